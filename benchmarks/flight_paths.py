@@ -9,15 +9,12 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.commands.command import fly_command
-from drone_rl.flight.commands.movement import Hover
+from drone_rl.flight.commands.command import Hover, fly_command, period_ticks
 from drone_rl.flight.commands.path_following import (
     PathCommand,
-    Paths,
     braking_time,
+    distance_from,
     make_paths,
-    nearest,
-    place_at,
 )
 from drone_rl.sim.dynamics import Quadrotor
 
@@ -118,13 +115,16 @@ def path_following(
     points[..., 2] += HEIGHT
     speeds = torch.tensor([course.speed for course in chosen.values()], dtype=torch.float64)
     limit = max(3.0 * course.length / course.speed + 20.0 for course in chosen.values())
-    command = PathCommand(points[:, 1:], speeds, limit, braking=braking_time(quadrotor.settings))
-    record = fly_command(quadrotor, quadrotor.start(points[:, 0].clone()), command, limit)
-    away = distance_from(
-        make_paths(points.repeat(len(record.times), 1, 1)), record.positions.flatten(0, 1)
-    ).view(len(record.times), -1)
+    braking, body = braking_time(quadrotor.settings), quadrotor.start(points[:, 0].clone())
+    command = PathCommand(body, points[:, 1:], speeds, limit, braking=braking)
+    states, done = fly_command(quadrotor, body, command)
+    positions = torch.cat([state.position for state in states])
+    followed = make_paths(points.repeat(len(states), 1, 1))
+    away = distance_from(followed, positions).view(len(states), -1)
+    step = period_ticks(quadrotor.settings) * quadrotor.settings.tick
+    times = torch.arange(len(states), dtype=torch.float64) * step
     return {
-        name: _following(course, record.times, away[:, number], int(record.done[number]))
+        name: _following(course, times, away[:, number], int(done[number]))
         for number, (name, course) in enumerate(chosen.items())
     }
 
@@ -151,12 +151,6 @@ def stack_paths(paths: Sequence[Tensor]) -> Tensor:
     return torch.stack(rows).double()
 
 
-def distance_from(paths: Paths, position: Tensor) -> Tensor:
-    """Return the distances of positions from whole paths. Shape: (num_worlds,)."""
-    along = nearest(paths, position, torch.zeros_like(paths.lengths), paths.lengths)
-    return (position - place_at(paths, along)).norm(dim=-1)
-
-
 @dataclasses.dataclass(frozen=True)
 class HoverError:
     """Distances from where drones were told to stay, metres."""
@@ -181,7 +175,8 @@ def hover_error(
     quadrotor = Quadrotor(settings)
     place = torch.tensor([[0.0, 0.0, 5.0]], dtype=torch.float64).repeat(num_drones, 1)
     body = quadrotor.start(place, torch.arange(seed, seed + num_drones))
-    away = (fly_command(quadrotor, body, Hover(seconds), seconds).positions - place).norm(dim=-1)
+    states, _ = fly_command(quadrotor, body, Hover(body, seconds))
+    away = (torch.stack([state.position for state in states]) - place).norm(dim=-1)
     return HoverError(float(away[len(away) // 2 :].mean()), float(away.max()))
 
 

@@ -45,10 +45,8 @@ if TYPE_CHECKING:
     from drone_rl.explanations.explain import Explanations, explain
     from drone_rl.explanations.settings import ExplainSettings
     from drone_rl.flight.commands.command import FlightFuture, PilotError
-    from drone_rl.flight.commands.drone import Sensors
-    from drone_rl.flight.commands.movement import Sticks
-    from drone_rl.flight.commands.pilot import Pilot
-    from drone_rl.flight.commands.state import PilotState, Trajectory
+    from drone_rl.flight.commands.pilot import Pilot, Sticks
+    from drone_rl.flight.commands.state import PilotState, Sensors, Trajectory
     from drone_rl.flight.commands.yaw import Drivetrain, YawMode
     from drone_rl.policies.environment import make_env
     from drone_rl.policies.external_policy import ForeignPolicy, policy_from
@@ -94,10 +92,8 @@ _PLACES = {
     "envs.sb3.worlds": ("Sb3Worlds",),
     "explanations.settings": ("ExplainSettings",),
     "flight.commands.command": ("FlightFuture", "PilotError"),
-    "flight.commands.drone": ("Sensors",),
-    "flight.commands.movement": ("Sticks",),
-    "flight.commands.pilot": ("Pilot",),
-    "flight.commands.state": ("PilotState", "Trajectory"),
+    "flight.commands.pilot": ("Pilot", "Sticks"),
+    "flight.commands.state": ("PilotState", "Sensors", "Trajectory"),
     "flight.commands.yaw": ("Drivetrain", "YawMode"),
     "policies.sb3": ("Sb3Logits", "Sb3Trunk"),
     "config.commands": ("BodiesSettings", "EvaluateSettings", "JudgeSettings", "ShiftSettings"),

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from drone_rl.flight.commands.state import Attitude, attitude_of
+from drone_rl.flight.commands.state import Attitude
 from drone_rl.sim.dynamics import FlightState
 
 WIDTH, HEIGHT = 476, 190
@@ -48,7 +48,7 @@ def read(body: FlightState) -> Reading:
     heading = float(body.heading[0])
     cos, sin = math.cos(heading), math.sin(heading)
     speeds = (cos * x_speed + sin * y_speed, cos * y_speed - sin * x_speed, climb)
-    return Reading(attitude_of((w, x, y, z)), speeds, tuple(body.rotors[0].tolist()))
+    return Reading(Attitude.of((w, x, y, z)), speeds, tuple(body.rotors[0].tolist()))
 
 
 def panel(reading: Reading, most: float, hover: float) -> Image.Image:

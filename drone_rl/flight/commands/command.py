@@ -1,7 +1,6 @@
-"""The command interface: goals for each control period until the command is complete."""
+"""Commands: goals for each control period until the command is complete."""
 
 import abc
-import dataclasses
 import math
 from collections.abc import Callable
 
@@ -19,6 +18,14 @@ ACCURACY = 0.5
 """Distance in metres within which a position counts as reached."""
 HOLD = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
 """Goal modes of a drone that holds its position."""
+LANDING_SPEED = 0.2
+"""Metres per second."""
+_STOPPED = 0.05
+"""Vertical speed up to which a landing drone counts as standing, m/s."""
+_STOPPED_PERIODS = 10
+"""Control periods without sinking after which a landing is complete."""
+_STILL = 0.01
+"""Yaw rate up to which a drone does not turn, radians per second."""
 
 
 class PilotError(InputError):
@@ -26,16 +33,12 @@ class PilotError(InputError):
 
 
 class Command(abc.ABC):
-    """A command for a batch of drones. An instance is used once."""
+    """A command for a batch of drones that starts at once. An instance is used once."""
 
     limit: float = math.inf
     """Seconds after which the command ends."""
     succeeds_at_limit: bool = False
     """Whether running until the limit is success, as for a movement of given duration."""
-
-    def begin(self, body: FlightState) -> None:
-        """Record the state at the start of the command."""
-        del body
 
     @abc.abstractmethod
     def goals(self, body: FlightState) -> Goals:
@@ -72,6 +75,108 @@ def goals_of(
 def hold(reference: Tensor) -> Goals:
     """Return goals that hold a pose. Shape: (num_worlds, 4), as in `FlightState.reference`."""
     return Goals(HOLD, reference)
+
+
+class TimedCommand(Command):
+    """Sets goals for some seconds, and no position to hold afterwards."""
+
+    succeeds_at_limit = True
+
+    def __init__(self, goals: Callable[[FlightState], Goals], duration: float) -> None:
+        """Take the goals of each control period, and the duration in seconds."""
+        self._goals, self.limit = goals, duration
+
+    def goals(self, body: FlightState) -> Goals:
+        """See `Command`."""
+        return self._goals(body)
+
+
+class Hover(Command):
+    """Holds the reference pose."""
+
+    succeeds_at_limit = True
+
+    def __init__(self, body: FlightState, duration: float) -> None:
+        """Take the state at the start and the duration in seconds."""
+        self.reference, self.limit = body.reference.clone(), duration
+
+    def goals(self, body: FlightState) -> Goals:
+        """See `Command`."""
+        del body
+        return hold(self.reference)
+
+    def rest(self, body: FlightState) -> Tensor:
+        """See `Command`."""
+        del body
+        return self.reference
+
+
+class RotateToCommand(Hover):
+    """Turns to a heading the shorter way round, holding the position."""
+
+    succeeds_at_limit = False
+
+    def __init__(self, body: FlightState, heading: float, margin: float, limit: float) -> None:
+        """Create the command.
+
+        Args:
+            body: State at the start.
+            heading: Radians to the left of the world's x axis.
+            margin: Heading error in radians at which the command is complete, at rest.
+            limit: Seconds after which it fails.
+        """
+        super().__init__(body, limit)
+        self.heading, self.margin = heading, margin
+        self.reference[:, 2] = heading
+
+    def is_complete(self, body: FlightState) -> Tensor:
+        """Return which drones have the heading and do not turn."""
+        missing = self.heading - body.heading
+        missing = torch.atan2(missing.sin(), missing.cos())
+        is_still = body.angular_velocity[:, 2].abs() <= _STILL
+        return (missing.abs() <= self.margin) & is_still
+
+
+class RotateByCommand(Hover):
+    """Turns at a rate, holding the position."""
+
+    def __init__(self, body: FlightState, rate: float, duration: float) -> None:
+        """Take the rate in radians per second, to the left, and the duration in seconds."""
+        super().__init__(body, duration)
+        self.rate = rate
+
+    def goals(self, body: FlightState) -> Goals:
+        """See `Command`."""
+        x, y, _, z = self.reference.unbind(-1)
+        modes = (Mode.POSITION, Mode.POSITION, Mode.RATE, Mode.POSITION)
+        return goals_of(body, modes, x, y, self.rate, z)
+
+    def rest(self, body: FlightState) -> Tensor:
+        """Return the position with the heading that the drone has now."""
+        after = self.reference.clone()
+        after[:, 2] = body.heading
+        return after
+
+
+class Land(Command):
+    """Descends at the reference position until the drone stands."""
+
+    def __init__(self, body: FlightState, limit: float) -> None:
+        """Take the state at the start and the time limit in seconds."""
+        self.limit, self.reference = limit, body.reference.clone()
+        self._stopped = torch.zeros(len(body), dtype=torch.int64)
+
+    def goals(self, body: FlightState) -> Goals:
+        """See `Command`."""
+        x, y, heading, _ = self.reference.unbind(-1)
+        modes = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.VELOCITY)
+        return goals_of(body, modes, x, y, heading, -LANDING_SPEED)
+
+    def is_complete(self, body: FlightState) -> Tensor:
+        """Count periods without sinking; must be called once per period."""
+        is_still = body.velocity[:, 2].abs() <= _STOPPED
+        self._stopped = torch.where(is_still, self._stopped + 1, 0)
+        return self._stopped > _STOPPED_PERIODS
 
 
 class FlightFuture:
@@ -126,23 +231,6 @@ class FlightFuture:
         return f"<{self.name}: {'done' if self._success else 'failed'} in {self.elapsed:.2f} s>"
 
 
-@dataclasses.dataclass(frozen=True)
-class FlightRecord:
-    """States of `num_worlds` drones while they run one command."""
-
-    times: Tensor  # (T,) float64
-    """Seconds since the start."""
-    states: list[FlightState]
-    """State at each time."""
-    done: Tensor  # (num_worlds,) int64
-    """Index of the first time at which each drone was complete; T if it never was."""
-
-    @property
-    def positions(self) -> Tensor:
-        """Metres. Shape: (T, num_worlds, 3)."""
-        return torch.stack([state.position for state in self.states])
-
-
 def period_ticks(settings: DynamicsSettings) -> int:
     """Return the physics ticks of one control period: the fewest that last `PERIOD`."""
     return max(1, math.ceil(PERIOD / settings.tick - 1e-9))
@@ -152,27 +240,28 @@ def fly_command(
     quadrotor: Quadrotor,
     body: FlightState,
     command: Command,
-    seconds: float,
+    seconds: float = math.inf,
     obstacles: Obstacles | None = None,
-) -> FlightRecord:
+) -> tuple[list[FlightState], Tensor]:
     """Run one command until all drones are complete; drones that are complete continue.
 
     Args:
         quadrotor: Vehicle dynamics.
         body: Initial state.
         command: The command.
-        seconds: Maximum duration.
+        seconds: Maximum duration, in addition to the command's limit.
         obstacles: Obstacles to collide with.
+
+    Returns:
+        The state at the start and after each of T - 1 control periods, and the index of the first
+        one at which each drone was complete, of shape (num_worlds,), int64; T if it never was.
     """
     ticks = period_ticks(quadrotor.settings)
-    step = ticks * quadrotor.settings.tick
     states = [body]
-    command.begin(body)
     done = torch.full((len(body),), -1)
-    most = int(min(seconds, command.limit) / step)
+    most = int(min(seconds, command.limit) / (ticks * quadrotor.settings.tick))
     while len(states) <= most and bool((done < 0).any()):
         body = quadrotor.fly(body, command.goals(body), ticks, obstacles)
         done = torch.where((done < 0) & command.is_complete(body), len(states), done)
         states.append(body)
-    done = torch.where(done < 0, len(states), done)
-    return FlightRecord(torch.arange(len(states), dtype=torch.float64) * step, states, done)
+    return states, torch.where(done < 0, len(states), done)

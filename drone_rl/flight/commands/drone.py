@@ -1,32 +1,36 @@
-"""A single simulated drone: physics, arming, sensors, and the runner of its commands."""
+"""A simulated drone with its clock, arming, sensors, cameras and running command."""
 
+import copy
 import math
+from collections.abc import Sequence
+from typing import Any, Self
 
 import torch
 from torch import Tensor
 
+from drone_rl.config import DynamicsSettings
 from drone_rl.config.sensors import SensorSettings
-from drone_rl.flight.commands.command import Command, FlightFuture, hold, period_ticks
-from drone_rl.flight.commands.movement import GoHomeCommand, Land
-from drone_rl.flight.commands.state import (
-    LandedState,
-    PilotState,
-    Trajectory,
-    attitude_of,
-    collision_of,
-    triple,
+from drone_rl.flight.commands import checks
+from drone_rl.flight.commands.command import (
+    Command,
+    FlightFuture,
+    Land,
+    PilotError,
+    hold,
+    period_ticks,
 )
+from drone_rl.flight.commands.path_following import GoHomeCommand
+from drone_rl.flight.commands.state import LandedState, PilotState, Sensors, Trajectory
 from drone_rl.sim.dynamics import FlightState, Goals, Obstacles, Quadrotor
 from drone_rl.sim.dynamics.control import rotor_goals
-from drone_rl.sim.dynamics.state import CLIMB, NOTHING, TICKS
-from drone_rl.sim.sensors import (
-    BarometerReading,
-    CollisionState,
-    GpsReading,
-    ImuReading,
-    MagnetometerReading,
-    SensorSuite,
-)
+from drone_rl.sim.dynamics.state import CLIMB, NOTHING, TICKS, heading_only
+from drone_rl.sim.entities import FRONT_CENTER
+from drone_rl.sim.image_types import ImageRequest, images
+from drone_rl.sim.rendering.view import Modality
+from drone_rl.sim.tasks import State
+from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Whole
 
 COASTING = 0.06
 """Seconds for which the last goals hold after a command that sets no position."""
@@ -40,184 +44,71 @@ _AT_REST = 0.08
 """Speed in m/s, and turn rate in rad/s, below which a drone on the ground has landed."""
 
 
-class Sensors:
-    """IMU, barometer, magnetometer, GPS and collision sensor of one drone.
+class Drone:
+    """One drone that runs commands and hovers between them; `Pilot` adds the commands.
 
-    Readings have batch shape (1, *). They are sampled in each control period, seven ticks by
-    default, even if a sensor's rate is higher.
+    A new command replaces the running one. Simulated time advances only by `advance`, or while a
+    command is waited for.
     """
 
-    def __init__(self, body: FlightState, settings: SensorSettings, seed: int = 0) -> None:
-        """Turn the sensors on.
-
-        Args:
-            body: State of one drone now.
-            settings: Rates, latencies and noise.
-            seed: Seed of the noise.
-        """
-        self._senses = SensorSuite(settings, seed=seed)
-        self._state = self._senses.start(body)
-
-    @property
-    def settings(self) -> SensorSettings:
-        """Rates, latencies and noise."""
-        return self._senses.settings
-
-    @property
-    def time(self) -> float:
-        """Simulated seconds since the sensors were turned on; the clock of the readings."""
-        return float(self._state.time[0])
-
-    def update(self, body: FlightState, seconds: float) -> None:
-        """Advance the sensors to the state `body`, some seconds later."""
-        self._state = self._senses.update(self._state, body, seconds)
-
-    def imu(self) -> ImuReading:
-        """Return specific force, angular rates and attitude."""
-        return self._senses.read_imu(self._state)
-
-    def barometer(self) -> BarometerReading:
-        """Return pressure and the corresponding altitude above the sea."""
-        return self._senses.read_barometer(self._state)
-
-    def magnetometer(self) -> MagnetometerReading:
-        """Return Earth's magnetic field."""
-        return self._senses.read_magnetometer(self._state)
-
-    def gps(self) -> GpsReading:
-        """Return place on Earth and velocity; invalid until the receiver has a fix."""
-        return self._senses.read_gps(self._state)
-
-    def collision(self) -> CollisionState:
-        """Return the last contact, and whether it is new since the last call."""
-        reading, self._state = self._senses.read_collision(self._state)
-        return reading
-
-
-class Drone:
-    """Vehicle state, arming and clock of one drone, without commands."""
-
-    def __init__(self, quadrotor: Quadrotor, start: Tensor, heading: float, seed: int) -> None:
+    def __init__(
+        self,
+        dynamics: DynamicsSettings | Quadrotor | None = None,
+        *,
+        start: Sequence[float] = (0.0, 0.0),
+        yaw: float = 0.0,
+        seed: int = 0,
+        obstacles: Obstacles | None = None,
+        worlds: Worlds | None = None,
+        sensors: SensorSettings | None = None,
+        **changes: Any,
+    ) -> None:
         """Put a disarmed drone on the ground.
 
         Args:
-            quadrotor: Vehicle dynamics.
-            start: Centre of the drone, metres. Shape: (3,), float64.
-            heading: Radians to the left of the world's x axis.
-            seed: Seed of the gusts.
+            dynamics: Vehicle and wind; those of `worlds` if it has vehicle dynamics, else AirSim's
+                generic drone in still air.
+            start: Position x and y, metres.
+            yaw: Heading, degrees to the left of the world's x axis.
+            seed: Seed of gusts and sensor noise.
+            obstacles: Obstacles in one world; those of `worlds` by default.
+            worlds: A single world that the cameras render.
+            sensors: Sensor settings; the sensors then run from the start.
+            changes: Dynamics settings to change, such as wind=[5, 0, 0].
+
+        Raises:
+            InputError: A setting is invalid.
         """
-        self.quadrotor, self.home = quadrotor, start
-        turned = [math.cos(0.5 * heading), 0.0, 0.0, math.sin(0.5 * heading)]
-        attitude = torch.tensor([turned], dtype=torch.float64)
-        self.body = FlightState.at_rest(start[None], attitude, torch.tensor([seed]))
-        self.obstacles: Obstacles | None = None
-        self.sensors: Sensors | None = None
-        self.armed = False
-        self.landed = LandedState.LANDED
-        self.period = period_ticks(quadrotor.settings)
-        self.trajectory = Trajectory()
-        self.trajectory.append(self.time, self.body)
-
-    @property
-    def tick(self) -> float:
-        """Physics time step, seconds."""
-        return self.quadrotor.settings.tick
-
-    @property
-    def time(self) -> float:
-        """Simulated seconds."""
-        return int(self.body.ticks[0]) * self.tick
-
-    @property
-    def speed(self) -> float:
-        """Metres per second."""
-        return float(self.body.velocity.norm())
-
-    @property
-    def is_flying(self) -> bool:
-        """Whether the drone is in the air."""
-        return self.landed == LandedState.FLYING
-
-    @property
-    def is_lost(self) -> bool:
-        """Whether the simulation has diverged."""
-        return bool(self.body.is_lost[0])
-
-    @property
-    def state(self) -> PilotState:
-        """The state as users read it."""
-        body = self.body
-        w, x, y, z = body.attitude[0].tolist()
-        return PilotState(
-            time=self.time,
-            position=triple(body.position),
-            velocity=triple(body.velocity),
-            attitude=attitude_of((w, x, y, z)),
-            landed=self.landed,
-            armed=self.armed,
-            lost=self.is_lost,
-            collision=collision_of(body),
+        if worlds is not None:
+            if worlds.num_worlds != 1:
+                raise InputError(f"worlds has {worlds.num_worlds} worlds; give Worlds(1, ...)")
+            if dynamics is None and isinstance(worlds.dynamics, Quadrotor):
+                dynamics = worlds.dynamics.settings
+            if obstacles is None:
+                obstacles = worlds.task.obstacles(worlds.state)
+        self._quadrotor = _quadrotor(dynamics, changes)
+        x, y = checks.numbers(start, "start", 2, -checks.FARTHEST, checks.FARTHEST)
+        place = [[x, y, self.settings.radius]]
+        half = 0.5 * math.radians(checks.real(yaw, "yaw", unit="degrees"))
+        attitude = [[math.cos(half), 0.0, 0.0, math.sin(half)]]
+        self._seed = Whole(0, 2**31 - 1).read(seed, "seed")
+        self.body = FlightState.at_rest(
+            torch.tensor(place, dtype=torch.float64),
+            torch.tensor(attitude, dtype=torch.float64),
+            torch.tensor([self._seed]),
         )
-
-    def ticks_of(self, seconds: float) -> int:
-        """Return the fewest ticks that last so long."""
-        return math.ceil(seconds / self.tick - 1e-9)
-
-    def fly(self, goals: Goals | None, ticks: int) -> None:
-        """Advance simulated time.
-
-        Args:
-            goals: Goals of the controller; idle rotors if None.
-            ticks: Duration.
-        """
-        if not self.armed:
-            goals = _all_rotors(0.0)
-        elif goals is None:
-            goals = _all_rotors(_IDLE * self.quadrotor.settings.hover_throttle)
-        if not self.is_lost:
-            self.body = self.quadrotor.fly(self.body, goals, ticks, self.obstacles)
-        if self.is_lost:  # the drone stays at its last valid state
-            self.body.numbers[:, TICKS] += ticks
+        """The state as the simulator has it; a batch of one."""
+        self.home = self.body.position[0].clone()
+        """Starting position, metres. Shape: (3,)."""
+        self.worlds, self._obstacles = worlds, obstacles
+        self.trajectory = Trajectory()
+        """The states of all control periods so far."""
         self.trajectory.append(self.time, self.body)
-        if self.sensors is not None:
-            self.sensors.update(self.body, ticks * self.tick)
-        self._update_landed()
-
-    def settle(self) -> None:
-        """Mark the drone as landed and reset the climb controller."""
-        self.landed = LandedState.LANDED
-        self.body.numbers[:, CLIMB] = 2.0 * self.quadrotor.settings.hover_throttle - 1.0
-
-    def here(self) -> Tensor:
-        """Return the current pose, as in `FlightState.reference`. Shape: (1, 4)."""
-        return self.body.settled().reference.clone()
-
-    def _update_landed(self) -> None:
-        """Detect take-off and landing."""
-        body = self.body
-        pushes = float(body.rotors.mean()) > _LEAST_THRUST
-        if not self.is_flying:
-            if pushes and abs(float(body.velocity[0, 2])) > _CLIMBS:
-                self.landed = LandedState.FLYING
-            return
-        contact = body.contact
-        touches = int(contact.thing[0]) != NOTHING
-        touches = touches and float(contact.time[0]) > self.time - 2.5 * self.tick
-        turns = float(body.angular_velocity.norm())
-        if touches and not pushes and max(self.speed, turns) < _AT_REST:
-            self.settle()
-
-
-class Runner:
-    """Advances a drone under its running command and lets it hover afterwards.
-
-    A new command replaces the running one.
-    """
-
-    def __init__(self, drone: Drone) -> None:
-        """Take the drone."""
-        self.drone = drone
+        self._sensors = None if sensors is None else Sensors(self.body, sensors, self._seed)
+        self._is_armed, self._landed = False, LandedState.LANDED
+        self._period = period_ticks(self.settings)
         self.running: FlightFuture | None = None
+        """The running command, if any."""
         self._goals: Goals | None = None
         """Goals of the current control period."""
         self._left = 0
@@ -227,65 +118,247 @@ class Runner:
         self._place: Tensor | None = None
         """Pose to hold without a command."""
 
-    def start(self, name: str, command: Command) -> FlightFuture:
-        """Start a command; `name` is for messages."""
+    def __enter__(self) -> Self:
+        """Return the drone."""
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Cancel the running command."""
         self.cancel()
-        future = FlightFuture(name, command, self.finish)
-        command.begin(self.drone.body)
-        self.running, self._left = future, 0
-        if command.limit <= 0.0:
-            self._end(command.succeeds_at_limit)
-        return future
+
+    @property
+    def settings(self) -> DynamicsSettings:
+        """Vehicle and wind."""
+        return self._quadrotor.settings
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds since the drone was created."""
+        return int(self.body.ticks[0]) * self.settings.tick
+
+    @property
+    def state(self) -> PilotState:
+        """Position, velocity, attitude, arming, landing state and last contact."""
+        return PilotState.of(self.body, self.time, self._landed, self._is_armed)
+
+    @property
+    def sensors(self) -> Sensors:
+        """IMU, barometer, magnetometer, GPS and collision sensor.
+
+        Without `sensors` at creation, AirSim's sensors are turned on at the first access; they cost
+        nothing until then.
+        """
+        if self._sensors is None:
+            self._sensors = Sensors(self.body, SensorSettings(), self._seed)
+        return self._sensors
+
+    def advance(self, seconds: float) -> PilotState:
+        """Advance simulated time and return the state.
+
+        Raises:
+            InputError: The duration is negative.
+        """
+        self._advance(self._ticks_of(checks.duration(seconds)))
+        return self.state
 
     def cancel(self) -> None:
-        """Cancel the running command, if any."""
+        """Cancel the running command; the drone holds its position."""
         if self.running is not None:
             self.running.cancel()
             self._end(None)
 
-    def finish(self, future: FlightFuture) -> None:
-        """Advance simulated time until a command ends."""
-        while not future.done:
-            self.advance(self._left or self.drone.period)
+    def arm(self) -> None:
+        """Start the rotors.
 
-    def advance(self, ticks: int) -> None:
-        """Advance simulated time."""
-        while ticks > 0:
-            if self._left == 0:
-                self._goals, self._left = self._next_goals(), self.drone.period
-            now = min(ticks, self._left)
-            self.drone.fly(self._goals, now)
-            ticks, self._left = ticks - now, self._left - now
-            self._coasting = max(0, self._coasting - now)
-            if self.running is not None:
-                self.running.elapsed += now * self.drone.tick
-                if self._left == 0:
-                    self._check(self.running)
+        Raises:
+            PilotError: The drone is in the air.
+        """
+        if self._is_flying and not self._is_armed:
+            raise PilotError("can't arm in the air; wait until the drone lies on the ground")
+        self._is_armed = True
 
-    def reset(self) -> None:
-        """Cancel the running command and hold no position, as after disarming."""
+    def disarm(self, *, force: bool = False) -> None:
+        """Stop the rotors.
+
+        Args:
+            force: Also in the air; the drone then falls.
+
+        Raises:
+            PilotError: The drone is in the air and `force` is False.
+        """
+        if self._is_flying and not force:
+            raise PilotError("can't disarm in the air; land first, or let it fall by force=True")
+        self._is_armed = False
         self.cancel()
         self._place, self._coasting, self._left = None, 0, 0
 
+    def picture(
+        self,
+        camera: str = FRONT_CENTER.name,
+        modality: Modality = "rgb",
+        height: int | None = None,
+        width: int | None = None,
+    ) -> Tensor:
+        """Render one of the drone's cameras; level if the cameras hang in a gimbal.
+
+        Args:
+            camera: Name of one of AirSim's five cameras.
+            modality: See `Renderer.render`.
+            height: Pixels; the worlds' setting by default.
+            width: Pixels; the worlds' setting by default.
+
+        Raises:
+            PilotError: The pilot has no worlds.
+        """
+        worlds, state = self._scene("picture")
+        return worlds.render(state, worlds.view(camera, modality, height, width))[0]
+
+    def images(
+        self,
+        requests: Sequence[ImageRequest],
+        *,
+        height: int | None = None,
+        width: int | None = None,
+    ) -> list[Tensor]:
+        """Render AirSim's images: any of five cameras and seven types, all of one size.
+
+        Args:
+            requests: Camera and type of each image.
+            height: Pixels; the worlds' setting by default.
+            width: Pixels; the worlds' setting by default.
+
+        Returns:
+            One tensor a request. Shapes: (H, W, 3), uint8; or (H, W), float32, for `as_float`.
+
+        Raises:
+            PilotError: The pilot has no worlds.
+            InputError: There are no requests, or a size is out of range.
+        """
+        worlds, state = self._scene("images")
+        return [found[0] for found in images(worlds, state, requests, height=height, width=width)]
+
+    def _scene(self, name: str) -> tuple[Worlds, State]:
+        """Return the worlds and their state with this drone in it."""
+        if self.worlds is None:
+            raise PilotError(f"{name}: there is nothing to render; give worlds=Worlds(1, ...)")
+        state, body = copy.copy(self.worlds.state), self.body
+        is_level = self._quadrotor.mount == "gimbal"
+        state.body = body.moved(body.position, heading_only(body.attitude)) if is_level else body
+        return self.worlds, state
+
+    @property
+    def _is_flying(self) -> bool:
+        return self._landed == LandedState.FLYING
+
+    @property
+    def _is_lost(self) -> bool:
+        """Whether the simulation has diverged."""
+        return bool(self.body.is_lost[0])
+
+    @property
+    def _speed(self) -> float:
+        return float(self.body.velocity.norm())
+
+    def _require_armed(self, name: str) -> None:
+        if self._is_lost:
+            raise PilotError(f"{name}: the simulation has diverged; make a new Pilot")
+        if not self._is_armed:
+            raise PilotError(f"{name}: the drone isn't armed; call arm() first")
+
+    def _run(self, name: str, command: Command, wait: bool) -> bool | FlightFuture:
+        """Start a command that only a flying drone can run.
+
+        Raises:
+            PilotError: The drone is not armed, or on the ground.
+        """
+        self._require_armed(name)
+        if not self._is_flying:
+            raise PilotError(f"{name}: the drone is on the ground; call take_off() first")
+        return self._start(name, command, wait)
+
+    def _start(self, name: str, command: Command, wait: bool) -> bool | FlightFuture:
+        self.cancel()
+        self.running = future = FlightFuture(name, command, self._finish)
+        self._left = 0
+        if command.limit <= 0.0:
+            self._end(command.succeeds_at_limit)
+        return future.result() if wait else future
+
+    def _finish(self, future: FlightFuture) -> None:
+        """Advance simulated time until a command ends."""
+        while not future.done:
+            self._advance(self._left or self._period)
+
+    def _ticks_of(self, seconds: float) -> int:
+        """Return the fewest ticks that last so long."""
+        return math.ceil(seconds / self.settings.tick - 1e-9)
+
+    def _advance(self, ticks: int) -> None:
+        while ticks > 0:
+            if self._left == 0:
+                self._goals, self._left = self._next_goals(), self._period
+            now = min(ticks, self._left)
+            self._fly(self._goals, now)
+            ticks, self._left = ticks - now, self._left - now
+            self._coasting = max(0, self._coasting - now)
+            if self.running is not None:
+                self.running.elapsed += now * self.settings.tick
+                if self._left == 0:
+                    self._check(self.running)
+
     def _next_goals(self) -> Goals | None:
-        drone = self.drone
+        """Return the goals of the next control period; None for idle rotors."""
         if self.running is not None:
-            return self.running.command.goals(drone.body)
+            return self.running.command.goals(self.body)
         if self._coasting > 0:
             return self._goals
-        if not drone.is_flying:
+        if not self._is_flying:
             self._place = None
             return None
         if self._place is None:
-            self._place = drone.here()
+            self._place = self.body.settled().reference.clone()
         return hold(self._place)
+
+    def _fly(self, goals: Goals | None, ticks: int) -> None:
+        if not self._is_armed:
+            goals = _all_rotors(0.0)
+        elif goals is None:
+            goals = _all_rotors(_IDLE * self.settings.hover_throttle)
+        if not self._is_lost:
+            self.body = self._quadrotor.fly(self.body, goals, ticks, self._obstacles)
+        if self._is_lost:  # the drone stays at its last valid state
+            self.body.numbers[:, TICKS] += ticks
+        self.trajectory.append(self.time, self.body)
+        if self._sensors is not None:
+            self._sensors.update(self.body, ticks * self.settings.tick)
+        self._update_landed()
+
+    def _update_landed(self) -> None:
+        """Detect take-off and landing."""
+        body = self.body
+        pushes = float(body.rotors.mean()) > _LEAST_THRUST
+        if not self._is_flying:
+            if pushes and abs(float(body.velocity[0, 2])) > _CLIMBS:
+                self._landed = LandedState.FLYING
+            return
+        contact = body.contact
+        touches = int(contact.thing[0]) != NOTHING
+        touches = touches and float(contact.time[0]) > self.time - 2.5 * self.settings.tick
+        turns = float(body.angular_velocity.norm())
+        if touches and not pushes and max(self._speed, turns) < _AT_REST:
+            self._settle()
+
+    def _settle(self) -> None:
+        """Mark the drone as landed and reset the climb controller."""
+        self._landed = LandedState.LANDED
+        self.body.numbers[:, CLIMB] = 2.0 * self.settings.hover_throttle - 1.0
 
     def _check(self, future: FlightFuture) -> None:
         """End the command if it is complete, over time, or the drone is lost."""
         command = future.command
-        if self.drone.is_lost:
+        if self._is_lost:
             self._end(False)
-        elif bool(command.is_complete(self.drone.body)[0]):
+        elif bool(command.is_complete(self.body)[0]):
             self._end(True)
         elif future.elapsed >= command.limit - 1e-9:
             self._end(command.succeeds_at_limit)
@@ -296,18 +369,26 @@ class Runner:
         assert future is not None
         command, self._left = future.command, 0
         self._place = None
-        self._coasting = self.drone.ticks_of(COASTING)
+        self._coasting = self._ticks_of(COASTING)
         if success is None:
             return
         future.finish(success)
         if success:
-            self._place = command.rest(self.drone.body)
+            self._place = command.rest(self.body)
         if success and isinstance(command, Land | GoHomeCommand):
-            self.drone.settle()
+            self._settle()
         if self._place is not None:
-            self.drone.body.reference[:] = self._place
-        if self._place is not None or not self.drone.is_flying:
+            self.body.reference[:] = self._place
+        if self._place is not None or not self._is_flying:
             self._coasting = 0
+
+
+def _quadrotor(dynamics: DynamicsSettings | Quadrotor | None, changes: dict[str, Any]) -> Quadrotor:
+    if isinstance(dynamics, Quadrotor):
+        if changes:
+            raise InputError(f"{', '.join(changes)} and a Quadrotor are given; give settings alone")
+        return dynamics
+    return Quadrotor((dynamics or DynamicsSettings()).replace(mode="simple_flight", **changes))
 
 
 def _all_rotors(share: float) -> Goals:

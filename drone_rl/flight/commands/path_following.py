@@ -11,7 +11,7 @@ from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
-from drone_rl.flight.commands.command import ACCURACY, PERIOD, Command
+from drone_rl.flight.commands.command import ACCURACY, PERIOD, Command, Land
 from drone_rl.flight.commands.yaw import YawControl
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
 from drone_rl.utils.errors import InputError
@@ -38,6 +38,7 @@ class PathCommand(Command):
 
     def __init__(
         self,
+        body: FlightState,
         points: Tensor,
         speed: float | Tensor,
         limit: float,
@@ -51,6 +52,7 @@ class PathCommand(Command):
         """Create the command.
 
         Args:
+            body: State at the start.
             points: Waypoints after the current position, metres. Shape: (num_worlds, P, 3).
             speed: Metres per second, for all drones or for each. Shape: (num_worlds,).
             limit: Seconds after which the command fails.
@@ -63,30 +65,17 @@ class PathCommand(Command):
         Raises:
             InputError: The lookahead is too short.
         """
-        self.limit = limit
-        self.points, self.accuracy, self.adaptive = points, accuracy, adaptive
+        self.limit, self.accuracy, self.adaptive = limit, accuracy, adaptive
+        self.paths = make_paths(torch.cat([body.position[:, None], points], 1))
+        """The paths, from the position at the start through all waypoints."""
         self.speed = torch.as_tensor(speed, dtype=torch.float64).expand(len(points))
         ahead = [lookahead_of(pace, lookahead, adaptive) for pace in self.speed.tolist()]
-        self.lookahead = self.speed.new_tensor(ahead)
-        self.yaw_control = yaw_control or YawControl()
-        self._braking = braking
-        self._paths: Paths | None = None
-
-    @property
-    def paths(self) -> "Paths":
-        """The paths, from the position at the start through all waypoints."""
-        assert self._paths is not None, "call begin first"
-        return self._paths
-
-    def begin(self, body: FlightState) -> None:
-        """See `Command`."""
-        self._paths = make_paths(torch.cat([body.position[:, None], self.points], 1))
-        self.yaw_control.begin(body.heading)
+        self.lookahead = self._ahead = self.speed.new_tensor(ahead)
+        self.yaw_control = yaw_control or YawControl(body)
         self.along = torch.zeros(len(body), dtype=torch.float64)
-        self._ahead = self.lookahead
         last = direction_at(self.paths, (self.paths.lengths - 1e-6).clamp(min=0.0))
         level = last[:, :2].norm(dim=-1)
-        self.braking = level * self._braking + (1.0 - level) * _VERTICAL_BRAKING
+        self.braking = level * braking + (1.0 - level) * _VERTICAL_BRAKING
 
     def goals(self, body: FlightState) -> Goals:
         """See `Command`."""
@@ -97,7 +86,7 @@ class PathCommand(Command):
         ahead = place_at(paths, self.along + self._ahead) - position
         pace = torch.maximum(self._pace(self._left(body)), self.speed.clamp(max=_SLOWEST))
         sideways = ahead[:, :2] * (pace / ahead.norm(dim=-1).clamp(min=1e-9))[:, None]
-        heading = self.yaw_control.goal(ahead, ACCURACY)
+        heading = self.yaw_control.goal(ahead)
         values = torch.cat([sideways, heading[:, None], place[:, 2:]], 1)
         drift = torch.zeros_like(values)
         climb = self._pace(paths.lengths - self.along)
@@ -114,7 +103,7 @@ class PathCommand(Command):
         """Return the last points, with the commanded heading if there is one."""
         heading = body.heading
         if self.yaw_control.mode == Mode.ANGLE:
-            heading = self.yaw_control.goal(torch.zeros_like(self.paths.ends), ACCURACY)
+            heading = self.yaw_control.goal(torch.zeros_like(self.paths.ends))
         x, y, z = self.paths.ends.unbind(-1)
         return torch.stack([x, y, heading, z], -1)
 
@@ -135,11 +124,35 @@ class TakeoffCommand(PathCommand):
     def __init__(self, body: FlightState, limit: float) -> None:
         """Take the state on the ground and the time limit in seconds."""
         up = body.position.new_tensor([0.0, 0.0, TAKEOFF_HEIGHT])
-        super().__init__((body.position + up)[:, None], TAKEOFF_SPEED, limit)
+        super().__init__(body, (body.position + up)[:, None], TAKEOFF_SPEED, limit)
 
     def is_complete(self, body: FlightState) -> Tensor:
         """Return which drones have reached the height."""
         return body.position[:, 2] >= self.paths.ends[:, 2] - _TAKEOFF_MARGIN
+
+
+class GoHomeCommand(Command):
+    """Follows a path and lands once every drone has reached its end."""
+
+    def __init__(self, path: PathCommand, landing_limit: float) -> None:
+        """Take the path, and the seconds that may be added to its time limit for the landing."""
+        self.limit = path.limit + landing_limit
+        self._path = path
+        self._landing: Land | None = None
+
+    def goals(self, body: FlightState) -> Goals:
+        """See `Command`."""
+        return (self._landing or self._path).goals(body)
+
+    def is_complete(self, body: FlightState) -> Tensor:
+        """Return which drones have landed; switch to landing at the end of the path."""
+        if self._landing is not None:
+            return self._landing.is_complete(body)
+        there = self._path.is_complete(body)
+        if bool(there.all()):
+            self._landing = Land(body, self.limit)
+            self._landing.reference[:] = self._path.rest(body)
+        return there & False
 
 
 def lookahead_of(speed: float, lookahead: float = AUTOMATIC, adaptive: float = 1.0) -> float:
@@ -233,6 +246,12 @@ def nearest(paths: Paths, position: Tensor, first: Tensor, last: Tensor) -> Tens
     rest = (found - paths.along[:, :-1])[..., None] * paths.directions
     distance = (away - rest).norm(dim=-1).masked_fill(low > high, torch.inf)
     return found.gather(1, distance.argmin(1, keepdim=True))[:, 0]
+
+
+def distance_from(paths: Paths, position: Tensor) -> Tensor:
+    """Return the distances of positions from whole paths. Shape: (num_worlds,)."""
+    along = nearest(paths, position, torch.zeros_like(paths.lengths), paths.lengths)
+    return (position - place_at(paths, along)).norm(dim=-1)
 
 
 def _segments_at(paths: Paths, along: Tensor) -> tuple[Tensor, Tensor]:

@@ -1,5 +1,6 @@
 """One drone flown by AirSim's commands: automatic flight (Table 2) and navigation (Table 3)."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -7,42 +8,65 @@ from typing import Any
 import torch
 
 from drone_rl.flight.commands import checks
-from drone_rl.flight.commands.base_pilot import BasePilot
-from drone_rl.flight.commands.command import FlightFuture, PilotError
-from drone_rl.flight.commands.movement import (
+from drone_rl.flight.commands.command import (
     LANDING_SPEED,
-    AngleCommand,
-    GoHomeCommand,
-    Height,
+    FlightFuture,
     Hover,
     Land,
-    Lift,
-    RateCommand,
+    PilotError,
     RotateByCommand,
     RotateToCommand,
-    RotorCommand,
-    StickCommand,
-    Throttle,
-    VelocityCommand,
-    parse_frame,
+    TimedCommand,
+    goals_of,
 )
+from drone_rl.flight.commands.drone import Drone
 from drone_rl.flight.commands.path_following import (
     AUTOMATIC,
     TAKEOFF_HEIGHT,
     TAKEOFF_SPEED,
+    GoHomeCommand,
     PathCommand,
     TakeoffCommand,
     braking_time,
 )
 from drone_rl.flight.commands.yaw import Drivetrain, YawControl, YawMode
+from drone_rl.sim.dynamics import FlightState, Goals, Mode
+from drone_rl.sim.dynamics.control import Modes, rotor_goals
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import OneOf
 
 MOVING = 0.05
 """Speed in m/s above which a drone can't take off."""
+YAW_AT_FULL_STICK = 100.0
+"""Degrees (per second) that the yaw stick adds to the yaw mode."""
 _FREE = Drivetrain.MAX_DEGREE_OF_FREEDOM
 
 
-class Pilot(BasePilot):
+@dataclasses.dataclass(frozen=True)
+class Sticks:
+    """Positions of a remote control's sticks, each from -1 to 1.
+
+    Raises:
+        InputError: A position is out of range.
+    """
+
+    pitch: float = 0.0
+    """Forward."""
+    roll: float = 0.0
+    """To the right."""
+    throttle: float = 0.0
+    """Up."""
+    yaw: float = 0.0
+    """To the right."""
+
+    def __post_init__(self) -> None:
+        """Check the positions."""
+        for field in dataclasses.fields(self):
+            number = checks.real(getattr(self, field.name), field.name, -1.0, 1.0)
+            object.__setattr__(self, field.name, number)
+
+
+class Pilot(Drone):
     """Flies one drone by the commands of AirSim (Tables 2 and 3), over simulated time.
 
     World frame: x forward, y left, z up, metres; angles in degrees, positive with the right side
@@ -60,6 +84,9 @@ class Pilot(BasePilot):
     ...     pilot.land()
     """
 
+    sticks = Sticks()
+    """Stick positions for `move_by_manual`; may be replaced at any time."""
+
     def take_off(self, timeout: float | None = None, *, wait: bool = True) -> bool | FlightFuture:
         """Climb 2 m at 0.5 m/s.
 
@@ -67,38 +94,36 @@ class Pilot(BasePilot):
             PilotError: The drone isn't armed, or is moving.
         """
         self._require_armed("take_off")
-        if self._drone.speed > MOVING:
+        if self._speed > MOVING:
             raise PilotError(
-                f"can't take off while moving at {self._drone.speed:.2g} m/s; wait until the drone "
+                f"can't take off while moving at {self._speed:.2g} m/s; wait until the drone "
                 "stands still"
             )
         limit = checks.time_limit(timeout, TAKEOFF_HEIGHT, TAKEOFF_SPEED)
-        return self._start("take_off", TakeoffCommand(self._drone.body, limit), wait)
+        return self._start("take_off", TakeoffCommand(self.body, limit), wait)
 
     def land(self, timeout: float | None = None, *, wait: bool = True) -> bool | FlightFuture:
         """Descend at 0.2 m/s until the drone stands."""
-        height = float(self._drone.body.position[0, 2])
+        height = float(self.body.position[0, 2])
         limit = checks.time_limit(timeout, height, LANDING_SPEED)
-        return self._fly("land", Land(limit), wait)
+        return self._run("land", Land(self.body, limit), wait)
 
     def go_home(
         self, timeout: float | None = None, *, speed: float = TAKEOFF_SPEED, wait: bool = True
     ) -> bool | FlightFuture:
         """Fly to the starting position at the present height and land there."""
         pace = checks.speed(speed)
-        position, home = self._drone.body.position, self._drone.home
-        over = torch.stack([home[0], home[1], position[0, 2]])[None, None]
+        position = self.body.position
+        over = torch.cat([self.home[:2], position[0, 2:]])[None, None]
         away, height = float((over[0] - position).norm()), float(position[0, 2])
         limit, braking = checks.time_limit(timeout, away, pace), braking_time(self.settings)
-        path = PathCommand(over, pace, limit, braking=braking)
-        command = GoHomeCommand(path, Land(checks.time_limit(timeout, height, LANDING_SPEED)))
-        if timeout is not None:
-            command.limit = path.limit
-        return self._fly("go_home", command, wait)
+        path = PathCommand(self.body, over, pace, limit, braking=braking)
+        landing = checks.time_limit(None, height, LANDING_SPEED) if timeout is None else 0.0
+        return self._run("go_home", GoHomeCommand(path, landing), wait)
 
     def hover(self, duration: float = 0.0, *, wait: bool = True) -> bool | FlightFuture:
         """Hold the position for some seconds and afterwards."""
-        return self._fly("hover", Hover(checks.duration(duration)), wait)
+        return self._run("hover", Hover(self.body, checks.duration(duration)), wait)
 
     def move_by_angle(
         self,
@@ -130,15 +155,15 @@ class Pilot(BasePilot):
         """
         if yaw is not None and yaw_rate is not None:
             raise InputError(f"yaw={yaw} and yaw_rate={yaw_rate} are both given; give one of them")
-        command = AngleCommand(
-            checks.radians(roll, "roll", 90.0),
-            checks.radians(pitch, "pitch", 90.0),
-            self._lift(z, throttle),
-            checks.duration(duration),
-            yaw=None if yaw is None else checks.radians(yaw, "yaw"),
-            yaw_rate=None if yaw_rate is None else checks.radians(yaw_rate, "yaw_rate"),
-        )
-        return self._fly("move_by_angle", command, wait)
+        x, y = checks.radians(roll, "roll", 90.0), checks.radians(pitch, "pitch", 90.0)
+        heading = self.body.heading if yaw is None else checks.radians(yaw, "yaw")
+        turn, turn_mode = heading, Mode.ANGLE
+        if yaw_rate is not None:
+            turn, turn_mode = checks.radians(yaw_rate, "yaw_rate"), Mode.RATE
+        lift_mode, lift = self._lift(z, throttle)
+        modes: Modes = (Mode.ANGLE, Mode.ANGLE, turn_mode, lift_mode)
+        goals = goals_of(self.body, modes, x, y, turn, lift)
+        return self._hold("move_by_angle", goals, duration, wait)
 
     def move_by_rates(
         self,
@@ -153,17 +178,19 @@ class Pilot(BasePilot):
     ) -> bool | FlightFuture:
         """Hold body rates, degrees per second; see `move_by_angle`."""
         named = ((roll, "roll"), (pitch, "pitch"), (yaw, "yaw"))
-        x, y, z_rate = (checks.radians(value, name) for value, name in named)
-        command = RateCommand((x, y, z_rate), self._lift(z, throttle), checks.duration(duration))
-        return self._fly("move_by_rates", command, wait)
+        x, y, turn = (checks.radians(value, name) for value, name in named)
+        lift_mode, lift = self._lift(z, throttle)
+        modes: Modes = (Mode.RATE, Mode.RATE, Mode.RATE, lift_mode)
+        goals = goals_of(self.body, modes, x, y, turn, lift)
+        return self._hold("move_by_rates", goals, duration, wait)
 
     def move_by_rotors(
         self, shares: Sequence[float], duration: float, *, wait: bool = True
     ) -> bool | FlightFuture:
         """Set all rotors: front right, rear left, front left, rear right, each from 0 to 1."""
-        a, b, c, d = checks.numbers(shares, "shares", 4, 0.0, 1.0)
-        command = RotorCommand((a, b, c, d), checks.duration(duration))
-        return self._fly("move_by_rotors", command, wait)
+        rotors = checks.numbers(shares, "shares", 4, 0.0, 1.0)
+        goals = rotor_goals(torch.tensor([rotors], dtype=torch.float64))
+        return self._hold("move_by_rotors", goals, duration, wait)
 
     def move_by_velocity(
         self,
@@ -201,15 +228,24 @@ class Pilot(BasePilot):
         )
         if z is not None and up != 0.0:
             raise InputError(f"z={z} and vz={up:g} are both given; give one of them")
-        command = VelocityCommand(
-            (x, y),
-            checks.duration(duration),
-            climb=up,
-            z=None if z is None else checks.height(z),
-            frame=parse_frame(frame),
-            yaw_control=YawControl(drivetrain, yaw_mode),
-        )
-        return self._fly("move_by_velocity", command, wait)
+        control = YawControl(self.body, drivetrain, yaw_mode)
+        is_body = OneOf(("world", "body")).read(frame, "frame") == "body"
+        if is_body and control.is_forward:
+            raise InputError(
+                "frame=body turns with the drone and can't be combined with "
+                "drivetrain=forward_only; give frame=world, or max_degree_of_freedom"
+            )
+        sideways = Mode.HEADING_VELOCITY if is_body else Mode.VELOCITY
+        height = up if z is None else checks.height(z)
+        up_mode = Mode.VELOCITY if z is None else Mode.POSITION
+        modes: Modes = (sideways, sideways, control.mode, up_mode)
+        travel = torch.tensor([[x, y, 0.0]], dtype=torch.float64)
+
+        def goals(body: FlightState) -> Goals:
+            return goals_of(body, modes, x, y, control.goal(travel), height)
+
+        command = TimedCommand(goals, checks.duration(duration))
+        return self._run("move_by_velocity", command, wait)
 
     def move_along(
         self,
@@ -242,18 +278,19 @@ class Pilot(BasePilot):
             PilotError: The drone isn't flying.
         """
         points, pace = checks.path(path), checks.speed(speed)
-        whole = torch.cat([self._drone.body.position[:, None], points], 1)
+        whole = torch.cat([self.body.position[:, None], points], 1)
         length = float(whole.diff(dim=1).norm(dim=-1).sum())
         command = PathCommand(
+            self.body,
             points,
             pace,
             checks.time_limit(timeout, length, pace),
-            yaw_control=YawControl(drivetrain, yaw_mode),
+            yaw_control=YawControl(self.body, drivetrain, yaw_mode),
             lookahead=checks.real(lookahead, "lookahead", unit="m"),
             adaptive=checks.real(adaptive_lookahead, "adaptive_lookahead", 0.0, 100.0),
             braking=braking_time(self.settings),
         )
-        return self._fly("move_along", command, wait)
+        return self._run("move_along", command, wait)
 
     def move_to(
         self, x: float, y: float, z: float, speed: float = 1.0, timeout: float | None = None,
@@ -266,7 +303,7 @@ class Pilot(BasePilot):
         self, z: float, speed: float = 1.0, timeout: float | None = None, **choices: Any
     ) -> bool | FlightFuture:
         """Fly straight up or down to a height; see `move_along`."""
-        x, y, _ = self._drone.body.position[0].tolist()
+        x, y, _ = self.body.position[0].tolist()
         return self.move_along([(x, y, z)], speed, timeout, **choices)
 
     def rotate_to(
@@ -282,14 +319,14 @@ class Pilot(BasePilot):
         """
         limit = 20.0 if timeout is None else checks.duration(timeout)
         near = math.radians(checks.real(margin, "margin", 0.0, 180.0, is_above=True))
-        return self._fly(
-            "rotate_to", RotateToCommand(checks.radians(yaw, "yaw"), near, limit), wait
-        )
+        command = RotateToCommand(self.body, checks.radians(yaw, "yaw"), near, limit)
+        return self._run("rotate_to", command, wait)
 
     def rotate_by(self, rate: float, duration: float, *, wait: bool = True) -> bool | FlightFuture:
         """Turn at a rate, degrees per second to the left, for some seconds."""
-        command = RotateByCommand(checks.radians(rate, "rate"), checks.duration(duration))
-        return self._fly("rotate_by", command, wait)
+        turn = checks.radians(rate, "rate")
+        command = RotateByCommand(self.body, turn, checks.duration(duration))
+        return self._run("rotate_by", command, wait)
 
     def move_by_manual(
         self,
@@ -305,7 +342,7 @@ class Pilot(BasePilot):
         """Follow `sticks`, which may change meanwhile.
 
         Args:
-            vx_max: Forward speed at full stick, metres per second.
+            vx_max: Forward speed at full stick, in the heading at the start; metres per second.
             vy_max: Sideways speed at full stick.
             z_max: Height of the goal above the drone at full throttle, metres.
             duration: Seconds.
@@ -313,24 +350,37 @@ class Pilot(BasePilot):
             yaw_mode: See `YawMode`.
             wait: Whether to wait for the end.
         """
-        command = StickCommand(
-            lambda: self.sticks,
-            checks.duration(duration),
-            vx_max=checks.speed(vx_max, "vx_max"),
-            vy_max=checks.speed(vy_max, "vy_max"),
-            z_max=checks.height(z_max, "z_max"),
-            yaw_control=YawControl(drivetrain, yaw_mode),
-        )
-        return self._fly("move_by_manual", command, wait)
+        fastest = checks.speed(vx_max, "vx_max"), checks.speed(vy_max, "vy_max")
+        climb = checks.height(z_max, "z_max")
+        control = YawControl(self.body, drivetrain, yaw_mode)
+        modes: Modes = (Mode.VELOCITY, Mode.VELOCITY, control.mode, Mode.POSITION)
+        cos, sin = self.body.heading.cos(), self.body.heading.sin()
 
-    def _lift(self, z: float | None, throttle: float | None) -> Lift:
-        """Return the vertical goal; hold the present height by default.
+        def goals(body: FlightState) -> Goals:
+            sticks = self.sticks
+            forward, left = sticks.pitch * fastest[0], -sticks.roll * fastest[1]
+            x, y = cos * forward - sin * left, sin * forward + cos * left
+            heading = control.goal(torch.stack([x, y, torch.zeros_like(x)], -1))
+            heading = heading - math.radians(YAW_AT_FULL_STICK) * sticks.yaw
+            z = (body.position[:, 2] + sticks.throttle * climb).clamp(min=0.0)
+            return goals_of(body, modes, x, y, heading, z)
+
+        command = TimedCommand(goals, checks.duration(duration))
+        return self._run("move_by_manual", command, wait)
+
+    def _hold(self, name: str, goals: Goals, duration: float, wait: bool) -> bool | FlightFuture:
+        """Keep the same goals for some seconds."""
+        return self._run(name, TimedCommand(lambda body: goals, checks.duration(duration)), wait)
+
+    def _lift(self, z: float | None, throttle: float | None) -> tuple[Mode, float]:
+        """Return the vertical goal and its mode; hold the present height by default.
 
         Raises:
             InputError: Both are given, or one is invalid.
         """
         if throttle is None:
-            return Height(float(self._drone.body.position[0, 2]) if z is None else checks.height(z))
+            height = float(self.body.position[0, 2]) if z is None else checks.height(z)
+            return Mode.POSITION, height
         if z is not None:
             raise InputError(f"z={z} and throttle={throttle} are both given; give one of them")
-        return Throttle(checks.real(throttle, "throttle", 0.0, 1.0))
+        return Mode.THROTTLE, checks.real(throttle, "throttle", 0.0, 1.0)

@@ -1,12 +1,15 @@
-"""The state of a drone as users read it, its trajectory, and their display in notebooks."""
+"""A drone's state, sensors and trajectory as users read them."""
 
 import dataclasses
 import enum
-import html
 import math
+from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
+from torch import Tensor
 
+from drone_rl.config.sensors import SensorSettings
 from drone_rl.sim.dynamics import FlightState
 from drone_rl.sim.dynamics.state import (
     ATTITUDE,
@@ -17,12 +20,16 @@ from drone_rl.sim.dynamics.state import (
     ROTORS,
     VELOCITY,
 )
+from drone_rl.sim.sensors import (
+    BarometerReading,
+    CollisionState,
+    GpsReading,
+    ImuReading,
+    MagnetometerReading,
+    SensorSuite,
+)
 
 Triple = tuple[float, float, float]
-_MAP_SIZE = 160.0
-"""Width and height of the map in a notebook, pixels."""
-_MAP_POINTS = 400
-"""Greatest number of trajectory points on the map."""
 
 
 class LandedState(enum.StrEnum):
@@ -43,6 +50,15 @@ class Attitude:
     yaw: float
     """Positive to the left of the world's x axis."""
 
+    @classmethod
+    def of(cls, quaternion: Sequence[float]) -> Self:
+        """Convert a unit quaternion (w, x, y, z)."""
+        w, x, y, z = quaternion
+        roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        pitch = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
+        yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return cls(*np.degrees([roll, pitch, yaw]).tolist())
+
 
 @dataclasses.dataclass(frozen=True)
 class Collision:
@@ -58,6 +74,21 @@ class Collision:
     """Penetration of the drone's bounding sphere, metres."""
     time: float
     """Simulated seconds."""
+
+    @classmethod
+    def of(cls, body: FlightState) -> Self | None:
+        """Return the last contact of a single drone."""
+        contact = body.contact
+        thing = int(contact.thing[0])
+        if thing == NOTHING:
+            return None
+        return cls(
+            "ground" if thing == GROUND else f"obstacle {thing}",
+            _triple(contact.normal),
+            _triple(contact.point),
+            float(contact.depth[0]),
+            float(contact.time[0]),
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,40 +112,84 @@ class PilotState:
     collision: Collision | None
     """The last contact, with the ground or an obstacle; None before the first."""
 
+    @classmethod
+    def of(cls, body: FlightState, time: float, landed: LandedState, armed: bool) -> Self:
+        """Return the state of a single drone."""
+        return cls(
+            time=time,
+            position=_triple(body.position),
+            velocity=_triple(body.velocity),
+            attitude=Attitude.of(body.attitude[0].tolist()),
+            landed=landed,
+            armed=armed,
+            lost=bool(body.is_lost[0]),
+            collision=Collision.of(body),
+        )
+
     @property
     def speed(self) -> float:
         """Metres per second."""
         return math.hypot(*self.velocity)
 
 
-def attitude_of(quaternion: tuple[float, float, float, float]) -> Attitude:
-    """Convert a unit quaternion (w, x, y, z)."""
-    w, x, y, z = quaternion
-    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    pitch = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
-    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return Attitude(*np.degrees([roll, pitch, yaw]).tolist())
-
-
-def collision_of(body: FlightState) -> Collision | None:
-    """Return the last contact of a single drone."""
-    contact = body.contact
-    thing = int(contact.thing[0])
-    if thing == NOTHING:
-        return None
-    return Collision(
-        "ground" if thing == GROUND else f"obstacle {thing}",
-        triple(contact.normal),
-        triple(contact.point),
-        float(contact.depth[0]),
-        float(contact.time[0]),
-    )
-
-
-def triple(rows: object) -> Triple:
+def _triple(rows: Tensor) -> Triple:
     """Return the first row of a tensor of shape (1, 3)."""
-    x, y, z = np.asarray(rows)[0].tolist()
+    x, y, z = rows[0].tolist()
     return x, y, z
+
+
+class Sensors:
+    """IMU, barometer, magnetometer, GPS and collision sensor of one drone.
+
+    Readings have batch shape (1, *). They are sampled in each control period, seven ticks by
+    default, even if a sensor's rate is higher.
+    """
+
+    def __init__(self, body: FlightState, settings: SensorSettings, seed: int = 0) -> None:
+        """Turn the sensors on.
+
+        Args:
+            body: State of one drone now.
+            settings: Rates, latencies and noise.
+            seed: Seed of the noise.
+        """
+        self._suite = SensorSuite(settings, seed=seed)
+        self._state = self._suite.start(body)
+
+    @property
+    def settings(self) -> SensorSettings:
+        """Rates, latencies and noise."""
+        return self._suite.settings
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds since the sensors were turned on; the clock of the readings."""
+        return float(self._state.time[0])
+
+    def update(self, body: FlightState, seconds: float) -> None:
+        """Advance the sensors to the state `body`, some seconds later."""
+        self._state = self._suite.update(self._state, body, seconds)
+
+    def imu(self) -> ImuReading:
+        """Return specific force, angular rates and attitude."""
+        return self._suite.read_imu(self._state)
+
+    def barometer(self) -> BarometerReading:
+        """Return pressure and the corresponding altitude above the sea."""
+        return self._suite.read_barometer(self._state)
+
+    def magnetometer(self) -> MagnetometerReading:
+        """Return Earth's magnetic field."""
+        return self._suite.read_magnetometer(self._state)
+
+    def gps(self) -> GpsReading:
+        """Return place on Earth and velocity; invalid until the receiver has a fix."""
+        return self._suite.read_gps(self._state)
+
+    def collision(self) -> CollisionState:
+        """Return the last contact, and whether it is new since the last call."""
+        reading, self._state = self._suite.read_collision(self._state)
+        return reading
 
 
 class Trajectory:
@@ -161,39 +236,3 @@ class Trajectory:
 
     def _part(self, first: int, count: int) -> np.ndarray:
         return np.array(self._rows).reshape(len(self), REFERENCE)[:, first : first + count]
-
-
-def state_html(state: PilotState, trajectory: Trajectory) -> str:
-    """Return a table of the state and a map of the trajectory as self-contained HTML."""
-    rows = "".join(
-        f"<tr><td>{name}</td><td>{html.escape(text)}</td></tr>" for name, text in _rows(state)
-    )
-    table = f"<table>{rows}</table>{trajectory_svg(trajectory)}"
-    return f'<div style="display: flex; gap: 1em">{table}</div>'
-
-
-def trajectory_svg(trajectory: Trajectory) -> str:
-    """Return the trajectory from above as SVG: x up, y to the left."""
-    step = max(1, len(trajectory) // _MAP_POINTS)
-    places = trajectory.positions[::step, :2]
-    low, high = places.min(0), places.max(0)
-    scale = (_MAP_SIZE - 20.0) / max(float((high - low).max()), 1.0)
-    across, up = 10.0 + scale * (high - places).T[::-1]
-    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(across, up, strict=True))
-    return (
-        f'<svg width="{_MAP_SIZE:.0f}" height="{_MAP_SIZE:.0f}"><polyline points="{points}" '
-        'fill="none" stroke="currentColor"/></svg>'
-    )
-
-
-def _rows(state: PilotState) -> list[tuple[str, str]]:
-    angles = state.attitude
-    contact = state.collision
-    return [
-        ("time", f"{state.time:.2f} s"),
-        ("state", f"{state.landed}, {'armed' if state.armed else 'disarmed'}"),
-        ("position", "{:.2f}, {:.2f}, {:.2f} m".format(*state.position)),
-        ("velocity", "{:.2f}, {:.2f}, {:.2f} m/s".format(*state.velocity)),
-        ("roll, pitch, yaw", f"{angles.roll:.1f}, {angles.pitch:.1f}, {angles.yaw:.1f} degrees"),
-        ("last contact", f"{contact.thing}, {contact.time:.2f} s" if contact else "none"),
-    ]

@@ -8,8 +8,10 @@ import torch
 from torch import Tensor
 
 from drone_rl.flight.commands.checks import real
-from drone_rl.sim.dynamics import Mode
+from drone_rl.flight.commands.command import ACCURACY
+from drone_rl.sim.dynamics import FlightState, Mode
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import OneOf
 
 
 class Drivetrain(enum.StrEnum):
@@ -37,38 +39,23 @@ class YawMode:
 
     def __post_init__(self) -> None:
         """Check the number."""
-        limit = 3600.0
-        number = real(self.yaw_or_rate, "yaw_or_rate", -limit, limit, unit="degrees")
+        number = real(self.yaw_or_rate, "yaw_or_rate", -3600.0, 3600.0, unit="degrees")
         object.__setattr__(self, "yaw_or_rate", number)
-
-    @property
-    def radians(self) -> float:
-        """The number in radians (per second)."""
-        return math.radians(self.yaw_or_rate)
-
-
-def parse_drivetrain(given: str) -> Drivetrain:
-    """Return a drivetrain by name.
-
-    Raises:
-        InputError: The name is unknown.
-    """
-    try:
-        return Drivetrain(given)
-    except ValueError as error:
-        known = ", ".join(Drivetrain)
-        raise InputError(f"drivetrain={given!r} is unknown; give one of: {known}") from error
 
 
 class YawControl:
     """Computes the heading goal, the third of four, in each control period."""
 
     def __init__(
-        self, drivetrain: str = Drivetrain.MAX_DEGREE_OF_FREEDOM, yaw_mode: YawMode | None = None
+        self,
+        body: FlightState,
+        drivetrain: str = Drivetrain.MAX_DEGREE_OF_FREEDOM,
+        yaw_mode: YawMode | None = None,
     ) -> None:
         """Create a heading control.
 
         Args:
+            body: State at the start.
             drivetrain: One of `Drivetrain`.
             yaw_mode: By default the drone faces its direction of travel with
                 `Drivetrain.FORWARD_ONLY`, and else holds its heading.
@@ -76,7 +63,8 @@ class YawControl:
         Raises:
             InputError: A rate is combined with `Drivetrain.FORWARD_ONLY`, or a value is unknown.
         """
-        self.is_forward = parse_drivetrain(drivetrain) == Drivetrain.FORWARD_ONLY
+        drivetrain = OneOf(tuple(Drivetrain)).read(drivetrain, "drivetrain")
+        self.is_forward = drivetrain == Drivetrain.FORWARD_ONLY
         self.yaw_mode = yaw_mode or YawMode(is_rate=not self.is_forward)
         if not isinstance(self.yaw_mode, YawMode):
             raise InputError(
@@ -87,38 +75,26 @@ class YawControl:
                 f"yaw_mode={self.yaw_mode} turns at a rate, but drivetrain=forward_only faces the "
                 "direction of travel; give is_rate=False, or max_degree_of_freedom"
             )
-        self._heading: Tensor | None = None
-
-    @property
-    def mode(self) -> Mode:
+        is_rate = self.yaw_mode.is_rate and self.yaw_mode.yaw_or_rate != 0.0
+        self.mode = Mode.RATE if is_rate else Mode.ANGLE
         """Goal mode of the heading."""
-        return Mode.RATE if self._is_rate else Mode.ANGLE
+        self._heading = body.heading.clone()
 
-    @property
-    def _is_rate(self) -> bool:
-        return self.yaw_mode.is_rate and self.yaw_mode.yaw_or_rate != 0.0
-
-    def begin(self, heading: Tensor) -> None:
-        """Start from the current headings, radians. Shape: (num_worlds,)."""
-        self._heading = heading.clone()
-
-    def goal(self, travel: Tensor, least: float) -> Tensor:
+    def goal(self, travel: Tensor) -> Tensor:
         """Return the heading goals.
 
         Args:
-            travel: Direction of travel (displacement or velocity), world frame.
-                Shape: (num_worlds, 3).
-            least: Horizontal length of `travel` up to which the previous goal is kept.
+            travel: Direction of travel (displacement or velocity), world frame; the previous goal
+                is kept up to a horizontal length of `ACCURACY`. Shape: (num_worlds, 3).
 
         Returns:
             Radians (per second). Shape: (num_worlds,).
         """
-        wanted = self.yaw_mode.radians
-        assert self._heading is not None, "call begin first"
+        wanted = math.radians(self.yaw_mode.yaw_or_rate)
         if not self.is_forward:
-            holds = self.yaw_mode.is_rate and not self._is_rate
+            holds = self.yaw_mode.is_rate and self.mode is Mode.ANGLE
             return self._heading if holds else torch.full_like(travel[:, 0], wanted)
         x, y, _ = travel.unbind(-1)
         along = torch.atan2(y, x) + wanted
-        self._heading = torch.where(torch.hypot(x, y) > least, along, self._heading)
+        self._heading = torch.where(torch.hypot(x, y) > ACCURACY, along, self._heading)
         return self._heading

@@ -12,7 +12,6 @@ class Nothing(Command):
 def test_it_is_never_done_by_itself(hovering):
     body = hovering((0, 0, 1), (0, 0, 2))
     command = Nothing()
-    command.begin(body)
     assert command.is_complete(body).tolist() == [False, False]
     assert command.rest(body) is None
     assert not command.succeeds_at_limit

@@ -1,9 +1,8 @@
-from drone_rl.flight.commands.command import FlightFuture
-from drone_rl.flight.commands.movement import Land
+from drone_rl.flight.commands.command import FlightFuture, TimedCommand
 
 
 def make(wait=lambda future: future.finish(True)):
-    return FlightFuture("land", Land(1.0), wait)
+    return FlightFuture("land", TimedCommand(None, 1.0), wait)
 
 
 def test_its_result_is_waited_for():

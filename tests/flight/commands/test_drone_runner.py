@@ -1,84 +1,85 @@
 import pytest
 import torch
 
-from drone_rl.flight.commands.drone import Drone, Runner
-from drone_rl.flight.commands.movement import Hover, Land, RotateToCommand, VelocityCommand
-from drone_rl.flight.commands.state import LandedState
+from drone_rl.flight.commands.command import Hover, Land, RotateToCommand
 
 
-@pytest.fixture
-def runner(quadrotor, hovering):
-    drone = Drone(quadrotor, hovering((0, 0, 0.3)).position[0], 0.0, 0)
-    drone.body, drone.armed, drone.landed = hovering((0, 0, 5)), True, LandedState.FLYING
-    return Runner(drone)
+def test_time_passes_to_the_tick(hovering_pilot):
+    drone = hovering_pilot
+    drone._advance(10)
+    drone._advance(3)
+    assert drone.body.ticks.item() == 13
 
 
-def test_time_passes_to_the_tick(runner):
-    runner.advance(10)
-    runner.advance(3)
-    assert runner.drone.body.ticks.item() == 13
-
-
-def test_what_lasts_is_done_when_its_time_is_over(runner):
-    future = runner.start("hover", Hover(0.1))
-    runner.advance(28)
+def test_what_lasts_is_done_when_its_time_is_over(hovering_pilot):
+    drone = hovering_pilot
+    future = drone._start("hover", Hover(drone.body, 0.1), False)
+    drone._advance(28)
     assert not future.done
-    runner.advance(7)
+    drone._advance(7)
     assert future.result() is True
     assert future.elapsed == pytest.approx(0.105)
 
 
-def test_what_should_have_come_to_an_end_has_failed(runner):
-    future = runner.start("rotate", RotateToCommand(3.0, 0.01, 0.1))
+def test_what_should_have_come_to_an_end_has_failed(hovering_pilot):
+    drone = hovering_pilot
+    future = drone._start("rotate", RotateToCommand(drone.body, 3.0, 0.01, 0.1), False)
     assert future.result() is False
     assert not future.cancelled
 
 
-def test_no_time_at_all(runner):
-    assert runner.start("hover", Hover(0.0)).result() is True
-    assert runner.start("rotate", RotateToCommand(3.0, 0.01, 0.0)).result() is False
-    assert runner.drone.time == 0.0
+def test_no_time_at_all(hovering_pilot):
+    drone = hovering_pilot
+    assert drone._start("hover", Hover(drone.body, 0.0), False).result() is True
+    assert (
+        drone._start("rotate", RotateToCommand(drone.body, 3.0, 0.01, 0.0), False).result() is False
+    )
+    assert drone.time == 0.0
 
 
-def test_the_next_command_ends_the_one_before(runner):
-    first = runner.start("fly", VelocityCommand((1.0, 0.0), 9.0, z=5.0))
-    runner.advance(10)
-    second = runner.start("hover", Hover(1.0))
+def test_the_next_command_ends_the_one_before(hovering_pilot):
+    drone = hovering_pilot
+    first = drone.move_by_velocity(1, 0, duration=9, z=5, wait=False)
+    drone._advance(10)
+    second = drone._start("hover", Hover(drone.body, 1.0), False)
     assert (first.cancelled, first.result()) == (True, False)
-    assert runner.running is second
+    assert drone.running is second
     assert second.result() is True
-    assert runner.running is None
+    assert drone.running is None
 
 
-def test_after_a_velocity_it_stays_where_it_is_60_ms_later(runner):
-    runner.start("fly", VelocityCommand((2.0, 0.0), 2.0, z=5.0)).result()
-    place = runner.drone.body.position[0, 0].item()
-    runner.advance(20)
-    later = runner.drone.body.position[0, 0].item()
+def test_after_a_velocity_it_stays_where_it_is_60_ms_later(hovering_pilot):
+    drone = hovering_pilot
+    drone.move_by_velocity(2, 0, duration=2, z=5, wait=False).result()
+    place = drone.body.position[0, 0].item()
+    drone._advance(20)
+    later = drone.body.position[0, 0].item()
     assert later > place + 0.05
-    runner.advance(3000)
-    x = runner.drone.body.position[0, 0].item()
+    drone._advance(3000)
+    x = drone.body.position[0, 0].item()
     assert x == pytest.approx(later, abs=0.05)
 
 
-def test_after_landing_its_rotors_idle(runner):
-    runner.drone.body.position[0, 2] = 0.5
-    assert runner.start("land", Land(20.0)).result() is True
-    assert not runner.drone.is_flying
-    runner.advance(50)
-    assert runner.drone.body.rotors.max() < 0.1
+def test_after_landing_its_rotors_idle(hovering_pilot):
+    drone = hovering_pilot
+    drone.body.position[0, 2] = 0.5
+    assert drone._start("land", Land(drone.body, 20.0), False).result() is True
+    assert not drone._is_flying
+    drone._advance(50)
+    assert drone.body.rotors.max() < 0.1
 
 
-def test_a_lost_drone_does_nothing_more(runner):
-    future = runner.start("fly", VelocityCommand((1.0, 0.0), 9.0, z=5.0))
-    runner.drone.body.velocity[0, 0] = torch.nan
+def test_a_lost_drone_does_nothing_more(hovering_pilot):
+    drone = hovering_pilot
+    future = drone.move_by_velocity(1, 0, duration=9, z=5, wait=False)
+    drone.body.velocity[0, 0] = torch.nan
     assert future.result() is False
 
 
-def test_reset_nothing_is_asked_for(runner):
-    future = runner.start("hover", Hover(9.0))
-    runner.reset()
+def test_reset_nothing_is_asked_for(hovering_pilot):
+    drone = hovering_pilot
+    future = drone._start("hover", Hover(drone.body, 9.0), False)
+    drone.disarm(force=True)
     assert future.cancelled
-    runner.drone.armed = False
-    runner.advance(100)
-    assert runner.drone.body.position[0, 2] < 4.7
+    drone._advance(100)
+    assert drone.body.position[0, 2] < 4.7

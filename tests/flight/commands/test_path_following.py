@@ -57,3 +57,8 @@ def test_a_part_keeps_to_one_way_through_a_crossing():
     position = rows([2, 0.1, 0])
     assert of.nearest(paths, position, rows(1), rows(4)).tolist() == [2]
     assert of.nearest(paths, position, rows(6), rows(9)).tolist() == [8]
+
+
+def test_distances(paths):
+    assert of.distance_from(paths, rows([2, -1, 1], [3, 4, 1])).tolist() == [1, 5]
+    assert of.distance_from(paths, rows([-3, -4, 1], [0, 3, 6])).tolist() == [5, 5]

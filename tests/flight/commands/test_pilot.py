@@ -43,7 +43,7 @@ def test_cameras_hang_in_a_gimbal_or_tilt_with_the_body():
     )
     pictures = []
     for pilot in (level, tilted):
-        pilot._drone.body.attitude[0] = torch.tensor([math.cos(0.2), 0, math.sin(0.2), 0]).double()
+        pilot.body.attitude[0] = torch.tensor([math.cos(0.2), 0, math.sin(0.2), 0]).double()
         pictures.append(pilot.picture())
     assert torch.equal(pictures[0], Pilot(worlds=Worlds(1, camera=camera)).picture())
     assert (pictures[0] != pictures[1]).any()

@@ -3,8 +3,7 @@ import math
 import pytest
 
 from drone_rl.flight.commands.command import PilotError
-from drone_rl.flight.commands.movement import Sticks
-from drone_rl.flight.commands.pilot import Pilot
+from drone_rl.flight.commands.pilot import Pilot, Sticks
 from drone_rl.flight.commands.yaw import YawMode
 from drone_rl.utils.errors import InputError
 

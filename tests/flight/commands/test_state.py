@@ -3,14 +3,7 @@ import math
 import pytest
 import torch
 
-from drone_rl.flight.commands.state import (
-    Attitude,
-    LandedState,
-    PilotState,
-    attitude_of,
-    collision_of,
-    triple,
-)
+from drone_rl.flight.commands.state import Attitude, Collision, LandedState, PilotState
 from drone_rl.sim.dynamics.state import DEPTH, GROUND, NORMAL, THING
 
 HALF = math.sqrt(0.5)
@@ -26,20 +19,20 @@ HALF = math.sqrt(0.5)
     ],
 )
 def test_angles(quaternion, angles):
-    found = attitude_of(quaternion)
+    found = Attitude.of(quaternion)
     assert (found.roll, found.pitch, found.yaw) == pytest.approx(angles, abs=1e-6)
 
 
 def test_contacts_have_names(hovering):
     body = hovering((0, 0, 1))
-    assert collision_of(body) is None
+    assert Collision.of(body) is None
     body.numbers[0, THING] = GROUND
     body.numbers[0, NORMAL : NORMAL + 3] = torch.tensor([0.0, 0.0, 1.0]).double()
     body.numbers[0, DEPTH] = 0.25
-    touched = collision_of(body)
+    touched = Collision.of(body)
     assert (touched.thing, touched.normal, touched.depth) == ("ground", (0, 0, 1), 0.25)
     body.numbers[0, THING] = 3
-    assert collision_of(body).thing == "obstacle 3"
+    assert Collision.of(body).thing == "obstacle 3"
 
 
 def test_speed():
@@ -47,4 +40,3 @@ def test_speed():
         0.0, (0, 0, 0), (2, 3, 6), Attitude(0, 0, 0), LandedState.FLYING, True, False, None
     )
     assert state.speed == 7.0
-    assert triple(torch.tensor([[1.0, 2.0, 3.0]])) == (1, 2, 3)

@@ -6,8 +6,8 @@ import pytest
 import torch
 
 from drone_rl.config.sensors import GpsSettings, SensorSettings
-from drone_rl.flight.commands.drone import Sensors
 from drone_rl.flight.commands.pilot import Pilot
+from drone_rl.flight.commands.state import Sensors
 from drone_rl.sim.coordinates import HOME
 from drone_rl.sim.dynamics import FlightState
 from drone_rl.sim.dynamics.state import GROUND
@@ -70,7 +70,7 @@ def test_where_nobody_asked_they_are_turned_on_by_the_first_look():
     pilot, other = Pilot(), Pilot(sensors=SensorSettings())
     for each in (pilot, other):
         each.advance(1.0)
-    assert pilot._drone.sensors is None
+    assert pilot._sensors is None
     assert pilot.sensors.time == 0.0 and pilot.sensors is pilot.sensors
     assert pilot.sensors.settings == SensorSettings()
-    assert (pilot._drone.body.numbers == other._drone.body.numbers).all()
+    assert (pilot.body.numbers == other.body.numbers).all()

@@ -1,22 +1,22 @@
 import torch
 
-from drone_rl.flight.commands.command import fly_command
-from drone_rl.flight.commands.movement import Land
+from drone_rl.flight.commands.command import Land, fly_command
 
 
 def test_it_sinks_slowly_and_is_done_where_it_stands(quadrotor, hovering):
-    record = fly_command(quadrotor, hovering((3, 4, 1.3)), Land(30.0), 30.0)
-    seconds = record.times[record.done].item()
+    body = hovering((3, 4, 1.3))
+    states, done = fly_command(quadrotor, body, Land(body, 30.0))
+    seconds = done.item() * 0.021
     assert 5.0 < seconds < 6.0  # 1 m at 0.2 m/s, and ten periods
-    last = record.states[-1].position[0]
+    last = states[-1].position[0]
     assert (last - torch.tensor([3.0, 4.0, 0.3])).norm() < 0.01
-    assert record.positions[:, 0, 2].diff().min() > -0.25 * 0.021
+    heights = torch.stack([state.position[0, 2] for state in states])
+    assert heights.diff().min() > -0.25 * 0.021
 
 
 def test_ten_periods_without_sinking(hovering):
     body = hovering((0, 0, 5))
-    command = Land(30.0)
-    command.begin(body)
+    command = Land(body, 30.0)
     assert [command.is_complete(body).item() for _ in range(11)] == [False] * 10 + [True]
     body.velocity[0, 2] = -0.1
     assert not command.is_complete(body).item()
