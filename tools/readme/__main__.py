@@ -8,11 +8,12 @@ from benchmarks.registry import BENCHMARKS
 from tools.readme.blocks import replace_blocks
 from tools.readme.flight_rows import FLIGHT
 from tools.readme.guest_rows import GUESTS
+from tools.readme.headlines import HEADLINES, make_headlines
 from tools.readme.layers import draw_layers, list_packages, read_contracts
 from tools.readme.notebook import make_notebook
 from tools.readme.peers import make_peers
 from tools.readme.robust import make_robust
-from tools.readme.rows import CLAIMS, MAIN, PROOF, TRUTH
+from tools.readme.rows import MAIN, PROOF, TRUTH
 from tools.readme.settings import list_commands, list_groups, list_parts, list_presets
 from tools.readme.stale import tell_ages
 from tools.readme.tables import list_figures, list_origins, make_table
@@ -38,7 +39,6 @@ def make_blocks(root: Path) -> dict[str, str]:
     ledger = Ledger(root / "docs" / "results.json")
     contracts = read_contracts(root)
     tables = {
-        "claims": CLAIMS,
         "main": MAIN,
         "flight": FLIGHT,
         "truth": TRUTH,
@@ -47,6 +47,7 @@ def make_blocks(root: Path) -> dict[str, str]:
     }
     return {
         **{name: make_table(rows, ledger.figures) for name, rows in tables.items()},
+        "headlines": make_headlines(HEADLINES, ledger.figures),
         "peers": make_peers(ledger.figures),
         "robust": make_robust(ledger.figures),
         "figures": list_figures(ledger),

@@ -28,7 +28,6 @@ FLIGHT = (
         "many as MuJoCo Warp makes of the same body without a controller",
         _speed,
         "300,000; 50",
-        is_claim=True,
     ),
     Row(
         "flight_speed",
@@ -48,7 +47,6 @@ FLIGHT = (
         "degrees",
         lambda f: f"{f['flight_parity_m']:.4f}; {f['flight_parity_deg']:.4f}",
         "0.01; 0.5",
-        is_claim=True,
     ),
     Row(
         "flight_paths",
@@ -63,7 +61,6 @@ FLIGHT = (
         "lower end of the share of 1,000 flights with all cubes",
         lambda f: _trained(f, "flight"),
         "median 60; 0.95",
-        is_claim=True,
     ),
     Row(
         "flight_velocity",

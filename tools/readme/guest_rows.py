@@ -18,7 +18,6 @@ GUESTS = (
         "PPO; Stable-Baselines3's PPO; its A2C; TorchRL's collector",
         _beside,
         "ours the least",
-        is_claim=True,
     ),
     Row(
         "peers",
@@ -38,7 +37,6 @@ GUESTS = (
         "the exact 95% interval, three seeds",
         lambda f: ", ".join(f"{lower:.3f}" for lower in f["pillars_lower95"]),
         "0.95",
-        is_claim=True,
     ),
     Row(
         "pillars",

@@ -3,8 +3,6 @@
 import statistics
 from collections.abc import Sequence
 
-from tools.readme.flight_rows import FLIGHT
-from tools.readme.guest_rows import GUESTS
 from tools.readme.tables import Figures, Row
 
 
@@ -62,14 +60,12 @@ TRUTH = (
         "certain and wrong, the worst of 42 simulated policies at and around the thresholds",
         lambda f: f"{f['false_certain_rate']:.3f}",
         "at most 0.05",
-        is_claim=True,
     ),
     Row(
         "maps",
         "maps that say nothing of the policy and are trusted",
         lambda f: f"{f['placebo_maps_trusted']} of {f['placebo_maps_total']}",
         "0",
-        is_claim=True,
     ),
     Row("maps", "planted networks whose true map is trusted", _planted, "0.9"),
     Row(
@@ -77,21 +73,18 @@ TRUTH = (
         "planted changes of evidence that change or take the sentence",
         lambda f: f"{f['sentences_flipped']} of {f['sentences_total']}",
         "all",
-        is_claim=True,
     ),
     Row(
         "verdicts",
         "verdicts called certain that agree with 5,000 other episodes",
         _verdicts,
         "all",
-        is_claim=True,
     ),
     Row(
         "hostile",
         "hostile files refused in one line, with nothing run, read or written",
         lambda f: f"{f['hostile_refused']} of {f['hostile_total']}",
         "all",
-        is_claim=True,
     ),
     Row(
         "hostile",
@@ -104,7 +97,6 @@ TRUTH = (
         "adversarial policies called good and certain, or proved",
         lambda f: f"{f['gamed_verdicts']} of {f['gamed_total']}",
         "0",
-        is_claim=True,
     ),
     Row(
         "fragile_honest",
@@ -180,7 +172,6 @@ PROOF = (
         "share of all placements that the default's 5 seeds fail at, exactly",
         lambda f: _shares(f["proof_lost"]),
         "",
-        is_claim=True,
     ),
     Row("prove", "the same, undecided at most", lambda f: f"{f['proof_undecided']:.1e}", "1e-6"),
     Row(
@@ -200,7 +191,6 @@ PROOF = (
         "flights of the simulator that end otherwise than proved",
         lambda f: f"{f['proof_contradicted']} of {f['proof_flights']:,}",
         "0",
-        is_claim=True,
     ),
     Row(
         "prove",
@@ -231,7 +221,6 @@ PROOF = (
         "minutes until `experiment=provable` is proved, three seeds",
         lambda f: ", ".join(f"{seconds / 60:.1f}" for seconds in f["provable_s"]),
         "30",
-        is_claim=True,
     ),
     Row(
         "exact_coverage",
@@ -253,7 +242,6 @@ MAIN = (
         "seconds from the start of `drone-rl train` to a running mean of 2.97 of 3 cubes, 5 seeds",
         _times,
         "60",
-        is_claim=True,
     ),
     Row("solve", "seeds of 5 that reach it", lambda f: str(f["seeds_solved"]), "5"),
     Row(
@@ -262,7 +250,6 @@ MAIN = (
         "interval, the least of 5 seeds",
         lambda f: f"{min(f['success_lower95']):.3f}",
         "0.95",
-        is_claim=True,
     ),
     Row(
         "seeds",
@@ -287,7 +274,6 @@ MAIN = (
         "drawing at 25x64, frames/s, and over MuJoCo Warp's renderer at 25x64; 64x64; 100x256",
         _drawing,
         "-",
-        is_claim=True,
     ),
     Row(
         "render",
@@ -321,14 +307,12 @@ MAIN = (
             f"{f['collector_fps_16']:,.0f}"
         ),
         "40,000; 15,000",
-        is_claim=True,
     ),
     Row(
         "dm_control",
         "batched environment over dm_control's pixel path, EGL, default quality",
         lambda f: f"{f['batched_over_dm_control']:.0f} times ({f['dm_control_fps']:.0f} frames/s)",
         "100 times",
-        is_claim=True,
     ),
     Row(
         "dm_control",
@@ -410,7 +394,6 @@ MAIN = (
         "runs that end the same, to the last bit, in a sweep killed three times",
         lambda f: f"{f['sweep_runs_same_after_kills']} of {f['sweep_runs']}",
         "all",
-        is_claim=True,
     ),
     Row(
         "ray",
@@ -420,5 +403,3 @@ MAIN = (
     ),
 )
 """The main job and sweeps."""
-CLAIMS = tuple(row for row in (*MAIN, *FLIGHT, *TRUTH, *PROOF, *GUESTS) if row.is_claim)
-"""What a newcomer reads first."""

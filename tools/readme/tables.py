@@ -17,14 +17,12 @@ class Row(NamedTuple):
     what: str
     measured: Callable[[Figures], str]
     """Takes what it needs by key; a key that is missing leaves the cell unmeasured."""
-    asked: str
-    is_claim: bool = False
-    """Whether it is among those that a newcomer reads first."""
+    asked: str = ""
 
 
 def make_table(rows: Iterable[Row], figures: Figures) -> str:
     """A table in Markdown."""
-    lines = [f"| {r.what} | {_cell(r, figures)} | {r.asked} | `{r.bench}` |" for r in rows]
+    lines = [f"| {r.what} | {make_cell(r, figures)} | {r.asked} | `{r.bench}` |" for r in rows]
     head = ["| what | measured | asked for | `drone-rl bench` |", "| --- | --- | --- | --- |"]
     return "\n".join([*head, *lines])
 
@@ -78,7 +76,8 @@ def _short(value: Any) -> str:
     return str(value)
 
 
-def _cell(row: Row, figures: Figures) -> str:
+def make_cell(row: Row, figures: Figures) -> str:
+    """Return a row's figure, or that it was not measured."""
     try:
         return row.measured(figures)
     except KeyError:
