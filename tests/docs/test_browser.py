@@ -26,7 +26,7 @@ def test_it_can_be_searched_and_asks_nobody(browser):
     found = WebDriverWait(browser, 20).until(
         lambda b: b.find_elements(By.CSS_SELECTOR, ".md-search-result__link")
     )
-    assert any("trust.html" in link.get_attribute("href") for link in found)
+    assert any("explanations.html" in link.get_attribute("href") for link in found)
     events = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
     asked = [e["params"]["request"]["url"] for e in events if e["method"].endswith("WillBeSent")]
     assert any(url.endswith("search_index.js") for url in asked)

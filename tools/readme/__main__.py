@@ -26,8 +26,8 @@ PAGES = (
     "docs/learners.md",
     "docs/onnx.md",
     "docs/results.md",
+    "docs/robustness.md",
     "docs/settings.md",
-    "docs/trust.md",
 )
 """Which have blocks that are made."""
 NOTEBOOK = "docs/tutorials/notebook"
