@@ -58,7 +58,7 @@ def test_every_example_registers_what_it_makes():
             if re.search(r"gymnasium\.make|make_vec\(", block) and "drone_rl/" in block:
                 found += 1
                 assert re.search(r"^import drone_rl\b|\"drone_rl:", block, re.M), (page, block)
-    assert found >= 4
+    assert found >= 3
 
 
 def test_the_example_of_the_readme_works_in_a_fresh_interpreter():
