@@ -21,8 +21,8 @@ from drone_rl.robustness.shifts import make_policy_spec, shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verdicts.judge import judge
-from drone_rl.verification.checker import fingerprint
-from drone_rl.verification.checker.rollouts import Simulator
+from drone_rl.verification.checker.certificate import fingerprint
+from drone_rl.verification.checker.checker import Simulator
 
 _AXIS, _VALUE = "dead_rows", 12.0
 """A condition in which the invented file says that a policy is good, which fails there."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.tampered_parts import Data, Way, largest
 from drone_rl.policies.policy import load_policy
-from drone_rl.verification.checker import fingerprint
+from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.checker.consistency import MOST_MISSING, volume
 
 _TAIL = 1000

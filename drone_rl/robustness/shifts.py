@@ -38,7 +38,7 @@ from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import say, seed_line
-from drone_rl.verification.checker import fingerprint
+from drone_rl.verification.checker.certificate import fingerprint
 
 
 @dataclasses.dataclass(frozen=True)

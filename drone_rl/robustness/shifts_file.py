@@ -38,7 +38,7 @@ from drone_rl.utils.schema import (
     as_mapping,
 )
 from drone_rl.utils.text import SEED_KEYS
-from drone_rl.verification.checker import fingerprint
+from drone_rl.verification.checker.certificate import fingerprint
 
 FORMAT = "drone_rl shifts"
 FORMAT_VERSION = 2

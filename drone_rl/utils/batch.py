@@ -1,6 +1,6 @@
 """Records of tensors whose first dimension counts worlds, cut and written all together."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
 import torch
@@ -32,6 +32,11 @@ class Batch:
         parts = {k: v.split(size) for k, v in vars(self).items()}
         count = len(next(iter(parts.values())))
         return [type(self)(**{k: v[i] for k, v in parts.items()}) for i in range(count)]
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Concatenate parts; their fields must be tensors."""
+        return cls(**{k: torch.cat([vars(part)[k] for part in parts]) for k in vars(parts[0])})
 
     def tensors(self) -> dict[str, Any]:
         """The fields by name, those of batches in it as mappings: what a file may hold."""

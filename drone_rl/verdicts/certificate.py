@@ -16,8 +16,9 @@ from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed, root_seed
-from drone_rl.verification.checker import Certificate, check_certificate, find, read_validated
-from drone_rl.verification.checker.sampling import ANYWHERE
+from drone_rl.verification.checker.certificate import Certificate
+from drone_rl.verification.checker.checker import check_certificate, read_validated
+from drone_rl.verification.checker.sampling import ANYWHERE, find
 
 
 @dataclasses.dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 import dataclasses
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ from drone_rl.verification.prover.markov_chain import (
     propagate,
 )
 from drone_rl.verification.prover.policy_spec import make_policy_spec
-from drone_rl.verification.requirements import require_cubes, require_moves
+from drone_rl.verification.requirements import require_cubes
 
 _BOUNDS = {
     "least": "everywhere at least",
@@ -42,9 +43,6 @@ CELLS_AT_A_TIME = 2**22
 """Bounds memory."""
 PLACEMENTS_AT_A_TIME = 20
 """Placements between two reports of progress."""
-
-
-_WHAT = "exact probabilities"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,20 +75,24 @@ class Chances:
 
     def rows(self) -> list[list[str]]:
         """Return a table: a header, then mean, minimum and maximum over placements."""
-        told = self.outcomes
-        rows = [["", "mean", "least", "most"], _row("all cubes", told.success, _percent)]
-        rows.append(_row("not all cubes", told.failure, _percent))
-        rows.append(_row("mean cubes", told.cubes, "{:.4f}".format))
-        for i, collected in enumerate(told.collected.unbind(-1)):
-            rows.append(_row(f"cube {i + 1} collected", collected, _percent))
-        for reason in list(EndReason)[EndReason.FRONT_BOUNDARY : EndReason.LOST_CONTROL]:
-            text = f"ended: {reason.name.lower().replace('_', ' ')}"
-            rows.append(_row(text, told.reasons[:, reason], _percent))
-        rows.append(_row("mean length", told.steps, "{:.2f}".format))
-        rows.append(_row("undecided", told.undecided, _percent))
+        told, collected = self.outcomes, self.outcomes.collected.unbind(-1)
+        reasons = list(EndReason)[EndReason.FRONT_BOUNDARY : EndReason.LOST_CONTROL]
+        rows = [
+            ["", "mean", "least", "most"],
+            _row("all cubes", told.success),
+            _row("not all cubes", told.failure),
+            _row("mean cubes", told.cubes, "{:.4f}".format),
+            *(_row(f"cube {i} collected", share) for i, share in enumerate(collected, 1)),
+            *(
+                _row(f"ended: {end.name.lower().replace('_', ' ')}", told.reasons[:, end])
+                for end in reasons
+            ),
+            _row("mean length", told.steps, "{:.2f}".format),
+            _row("undecided", told.undecided),
+        ]
         for name, words in _BOUNDS.items() if self.bounded else ():
             bounds = torch.tensor([getattr(b, name) for b in self.bounded], dtype=torch.float64)
-            rows.append(_row(f"within {self.within:g} m, {words}", bounds, _percent))
+            rows.append(_row(f"within {self.within:g} m, {words}", bounds))
         return rows if len(self.cubes) > 1 else [["", "chance"], *(row[:2] for row in rows[1:])]
 
     def as_dict(self) -> dict[str, Any]:
@@ -111,7 +113,6 @@ class Chances:
         path.write_text(json.dumps(self.as_dict(), indent=2))
 
     def __str__(self) -> str:
-        """The table for a terminal."""
         return "\n".join([aligned(self.rows(), are_numbers=True), *self._notes()])
 
     def _repr_html_(self) -> str:
@@ -120,22 +121,16 @@ class Chances:
 
     def _notes(self) -> list[str]:
         """Return the lines below the table."""
-        if self.seed is None:
-            return [self._about()]
-        seed = self.seed.as_dict()
-        notes = [self._about(), say(CHANCES, seed), seed_line(seed, "placements")]
-        return [*filter(None, notes)]
-
-    def _about(self) -> str:
+        about = f"{len(self.cubes)} placements; least probable at cubes={_places(self.worst)}"
         if len(self.cubes) == 1:
-            return f"cubes at {_places(self.cubes[0, :, 1])} metres to the left"
-        least = f"least probable at cubes={_places(self.worst)}"
-        return f"{len(self.cubes)} placements; {least}"
+            about = f"cubes at {_places(self.cubes[0, :, 1])} metres to the left"
+        if self.seed is None:
+            return [about]
+        seed = self.seed.as_dict()
+        return [*filter(None, [about, say(CHANCES, seed), seed_line(seed, "placements")])]
 
     def _placement(self, i: int) -> dict[str, Any]:
-        told, ends = self.outcomes, self.outcomes.ends[i]
-        count = self.cubes.shape[1]
-        bounds = None
+        told, ends, bounds = self.outcomes, self.outcomes.ends[i], None
         if self.bounded:
             bounds = {"metres": self.within, **dataclasses.asdict(self.bounded[i])}
         return {
@@ -149,7 +144,7 @@ class Chances:
             "ends": [
                 {
                     "reason": EndReason(reason).name.lower(),
-                    "collected": [bool(cubes >> k & 1) for k in range(count)],
+                    "collected": [bool(cubes >> k & 1) for k in range(self.cubes.shape[1])],
                     "probability": float(ends[reason, cubes]),
                 }
                 for reason, cubes in ends.nonzero().tolist()
@@ -190,35 +185,36 @@ def chances(
     progress = progress or Bar()
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
-    flown, described = require_cubes(policy.task, _WHAT), policy.description
-    require_moves(described.dynamics, described.actions, _WHAT)
+    flown = require_cubes(policy.description, "exact probabilities")
     placed = _drawn(flown, settings.placements, seed) if cubes is None else _given(flown, cubes)
-    at_a_time = max(1, CELLS_AT_A_TIME // shape_of(flown).nodes)
+    at_a_time = max(1, CELLS_AT_A_TIME // math.prod(shape_of(flown)))
     parts = placed.split(min(at_a_time, PLACEMENTS_AT_A_TIME))
-    env = policy.make_env(1, device=settings.device, renderer=settings.renderer)
-    try:
-        sight, told = NodeEvaluator(env, policy.make_network(settings.device)), []
+    with closing(policy.make_env(1, device=settings.device, renderer=settings.renderer)) as env:
+        evaluator, found = NodeEvaluator(env, policy.make_network(settings.device)), []
         for part in parts:
-            progress("placements", sum(map(len, told)), len(placed))
+            progress("placements", sum(map(len, found)), len(placed))
             graph = explore(flown, part)
-            told.append(propagate(graph, sight.on(graph)))
-    finally:
-        env.close()
+            found.append(propagate(graph, evaluator.on(graph)))
     progress("placements", len(placed), len(placed))
-    bounded = _bounded(policy, placed, settings, progress) if settings.within else ()
-    outcomes = Outcomes.joined(told)
-    origin = seed if cubes is None else None
-    return Chances(policy, placed, outcomes, sight.pictures, settings.within, bounded, origin)
+    return Chances(
+        policy,
+        placed,
+        Outcomes.joined(found),
+        evaluator.pictures,
+        settings.within,
+        _bounded(policy, placed, settings, progress) if settings.within else (),
+        seed if cubes is None else None,
+    )
 
 
 def _bounded(
     policy: Policy, placed: Tensor, settings: ChanceSettings, progress: Progress
 ) -> tuple[SuccessBounds, ...]:
     """Return bounds around each placement, clipped to the positions where cubes may stand."""
-    network, gap = policy.make_network(), ProveSettings().logit_gap
-    made = make_policy_spec(policy.description, network, gap, settings.renderer)
+    network, gap = policy.make_network(), ProveSettings.logit_gap
     found: list[SuccessBounds] = []
-    with closing(made) as spec:
+    spec = make_policy_spec(policy.description, network, gap, settings.renderer)
+    with closing(spec):
         bound = spec.lattice.task.lateral_bound
         for i, aside in enumerate(placed[..., 1].numpy()):
             progress("bounds", i, len(placed))
@@ -230,8 +226,7 @@ def _bounded(
 
 def _drawn(task: TaskSettings, count: int, seed: RootSeed) -> Tensor:
     """Return the first placement of each of `count` held-out environments."""
-    worlds = range(count)
-    streams = (world_random_state(seed.value, world, Stream.REPORT) for world in worlds)
+    streams = (world_random_state(seed.value, env, Stream.REPORT) for env in range(count))
     return torch.stack([CollectCubes(task).draw(stream) for stream in streams])
 
 
@@ -257,13 +252,10 @@ def _given(task: TaskSettings, cubes: Any) -> Tensor:
     )
 
 
-def _row(name: str, values: Tensor, show: Any) -> list[str]:
-    figures = (values.mean(), values.min(), values.max())
-    return [name, *(show(float(figure)) for figure in figures)]
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.4g}%"
+def _row(
+    name: str, values: Tensor, show: Callable[[float], str] = lambda share: f"{100 * share:.4g}%"
+) -> list[str]:
+    return [name, *(show(float(figure)) for figure in (values.mean(), values.min(), values.max()))]
 
 
 def _places(aside: Tensor) -> str:

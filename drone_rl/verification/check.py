@@ -17,13 +17,12 @@ from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import CHECK, say, seed_line
-from drone_rl.verification.checker import (
+from drone_rl.verification.checker.certificate import (
     Certificate,
-    Findings,
-    check_certificate,
     check_same_policy,
     read_certificate,
 )
+from drone_rl.verification.checker.checker import Findings, check_certificate
 
 REFUSED = 14
 """Exit status for a refused certificate."""
@@ -71,32 +70,27 @@ class Check:
 
     def lines(self) -> list[str]:
         """Return the result, the statements, and each finding in one line."""
-        stated, flown = self.certificate, sum(self.findings.flights.values())
-        kind = "accepted" if self.accepted else "refused"
-        count = sum(map(len, stated.groups))
-        shares = [f"{outcome.share:.9g} {outcome}" for outcome in stated.outcomes]
+        stated, seed = self.certificate, self.seed.as_dict()
+        own = self.policy.state["description"]["task"]
+        changed = [f"{n}={v}" for n, v in self.policy.task.values().items() if own.get(n) != v]
         return [
-            f"{kind}: {self.path}, of policy {self.policy.name}{self._changes()}, {count} boxes, "
-            f"{flown} flights, {self.findings.contradicted} of them ended otherwise than stated",
-            *(f"stated: {share}" for share in (*shares, f"{stated.undecided_share:.3g} undecided")),
+            f"{'accepted' if self.accepted else 'refused'}: {self.path}, of policy "
+            f"{self.policy.name}{' with ' if changed else ''}{', '.join(changed)}, "
+            f"{sum(map(len, stated.groups))} boxes, {sum(self.findings.flights.values())} flights, "
+            f"{self.findings.contradicted} of them ended otherwise than stated",
+            *(f"stated: {outcome.share:.9g} {outcome}" for outcome in stated.outcomes),
+            f"stated: {stated.undecided_share:.3g} undecided",
             *(f"refused: {line}" for line in self.findings.lines()),
-            *(f"note: {line}" for line in filter(None, [say(CHECK, self.seed.as_dict())])),
-            seed_line(self.seed.as_dict(), "placements"),
+            *(f"note: {line}" for line in filter(None, [say(CHECK, seed)])),
+            seed_line(seed, "placements"),
         ]
 
     def __str__(self) -> str:
-        """The lines."""
         return "\n".join(self.lines())
 
     def _repr_html_(self) -> str:
         head, *rows = (line.split(": ", 1) for line in self.lines())
         return table(head, rows)
-
-    def _changes(self) -> str:
-        """Return how the certificate's task differs from the policy's own."""
-        own = self.policy.state["description"]["task"]
-        changed = [f"{n}={v}" for n, v in self.policy.task.values().items() if own.get(n) != v]
-        return f" with {', '.join(changed)}" if changed else ""
 
 
 def check(
@@ -128,8 +122,12 @@ def check(
     settings, seed = with_seed((settings or CheckSettings()).replace(**changes))
     path = _find(certificate, outputs)
     stated = read_certificate(path)
-    if policy is None:
-        policy = _named(stated.name)
+    if policy is None and stated.name not in policy_names():
+        raise InputError(
+            f"the certificate is of policy {stated.name!r}, which is none of "
+            f"{', '.join(policy_names())}; give policy= its file"
+        )
+    policy = stated.name if policy is None else policy
     loaded = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     weights, asked = loaded.state["policy"], loaded.in_task(**task).task if task else None
     check_same_policy(stated, loaded.description, weights, asked)
@@ -156,13 +154,3 @@ def _find(certificate: str | Path, outputs: str | Path) -> Path:
             "first or give the path of a certificate"
         )
     return path
-
-
-def _named(name: str) -> str:
-    """Return the policy that a certificate names, which must be a shipped one."""
-    if name not in policy_names():
-        raise InputError(
-            f"the certificate is of policy {name!r}, which is none of "
-            f"{', '.join(policy_names())}; give policy= its file"
-        )
-    return name

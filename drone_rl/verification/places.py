@@ -71,16 +71,14 @@ class Places:
         (folder / "places.svg").write_text(head)
 
     def __str__(self) -> str:
-        """The table and a summary."""
-        return f"{aligned(rows(self.numbers, SHOWN_MOVES.names))}\n{self._about()}"
+        about = say(PLACES, {"places": self.numbers})
+        return f"{aligned(rows(self.numbers, SHOWN_MOVES.names))}\n{about}"
 
     def _repr_html_(self) -> str:
         head, *lines = rows(self.numbers, SHOWN_MOVES.names)
         figure = regions.chart(self.numbers, self.places.outlines(), SHOWN_MOVES)
-        return table(head, lines) + paragraph(self._about()) + picture(figure)
-
-    def _about(self) -> str:
-        return say(PLACES, {"places": self.numbers})
+        about = say(PLACES, {"places": self.numbers})
+        return table(head, lines) + paragraph(about) + picture(figure)
 
 
 def places(
@@ -113,8 +111,8 @@ def places(
     policy = policy.in_task(**(task or {}))
     begin = time.perf_counter()
     network, gap = policy.make_network(), settings.logit_gap
-    made = make_policy_spec(policy.description, network, gap, settings.renderer)
-    with one_thread(), closing(made) as spec:
+    spec = make_policy_spec(policy.description, network, gap, settings.renderer)
+    with one_thread(), closing(spec):
         progress("comparing the renderer's pictures")
         compared = spec.images.check(
             settings.compared, np.random.RandomState(legacy_seed(fresh_seed()))

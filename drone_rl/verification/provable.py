@@ -9,6 +9,7 @@ import io
 import json
 import shutil
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -21,7 +22,7 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.config.verification import ProvableSettings
 from drone_rl.evaluation.rollouts import find_failures
 from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.policies.zoo import read_checkpoint
+from drone_rl.policies.zoo import describe, read_checkpoint
 from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.sim.tasks.failure_replay import inflated
 from drone_rl.training import Callback
@@ -45,13 +46,16 @@ from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import Settings
 from drone_rl.verification.prove import Proof, prove
 from drone_rl.verification.prover.boxes import volumes
-from drone_rl.verification.requirements import require_cubes, require_moves
+from drone_rl.verification.requirements import require_cubes
 
+WORLDS = 250
+"""Environments of a search; each search uses other seeds."""
 HOW_MAY_CHANGE = ("rounds", "limit_s")
 """Settings of rounds that a resumed run may change."""
 _Count = Annotated[int, Whole(0, 2**62)]
 _Seconds = Annotated[float, Real(0.0, 1e12)]
 _Share = Annotated[float, Real(0.0, 1.0)]
+_JOURNAL = Record({"settings": Plain(), "how": Plain(), "rounds": Several(Plain(), 0, 10_000)})
 
 
 class Round(Settings):
@@ -127,18 +131,15 @@ class Journal:
 
     def note(self) -> None:
         """Write the file once the training has accepted the settings."""
-        if self.is_noted:
-            return
-        if not self.rounds:
-            shutil.rmtree(self.folder / "rounds", ignore_errors=True)
-        self._write()
+        if not self.is_noted:
+            if not self.rounds:
+                shutil.rmtree(self.folder / "rounds", ignore_errors=True)
+            self._write()
 
     @property
     def task(self) -> TaskSettings:
         """The task, if it can be proved."""
-        told, what = self.settings, "proofs"
-        require_moves(told.dynamics, told.actions, what)
-        return require_cubes(told.task, what)
+        return require_cubes(describe(self.settings), "proofs")
 
     @property
     def is_proved(self) -> bool:
@@ -167,12 +168,7 @@ class Journal:
         return self.folder / "rounds" / str(len(self.rounds))
 
     def add(self, done: Round, failures: NDArray[np.float64]) -> None:
-        """Record a search.
-
-        Args:
-            done: Its result.
-            failures: Boxes to train on, metres. Shape: (boxes, num_cubes, 2).
-        """
+        """Record a search and the boxes to train on, metres, shape (boxes, num_cubes, 2)."""
         buffer = io.BytesIO()
         np.save(buffer, failures)
         self.next_folder.mkdir(parents=True, exist_ok=True)
@@ -190,7 +186,9 @@ class Journal:
         cubes = self.task.num_cubes
         try:
             boxes = read_array(path)
-            if boxes.dtype != np.float64 or boxes.shape[1:] != (cubes, 2) or not _are_boxes(boxes):
+            is_sound = boxes.dtype == np.float64 and boxes.shape[1:] == (cubes, 2)
+            is_sound = is_sound and bool(np.isfinite(boxes).all())
+            if not is_sound or (boxes[..., 0] > boxes[..., 1]).any():
                 raise InputError(f"it holds no boxes of {cubes} cubes")
         except InputError as error:
             raise InputError(f"{path} is damaged ({error}); train again") from None
@@ -204,17 +202,6 @@ class Journal:
         }
         write_atomically(self.folder / "provable.json", json.dumps(noted, indent=2))
         self.is_noted = True
-
-
-def _are_boxes(boxes: NDArray[np.float64]) -> bool:
-    return bool(np.isfinite(boxes).all() and (boxes[..., 0] <= boxes[..., 1]).all())
-
-
-_JOURNAL = Record({"settings": Plain(), "how": Plain(), "rounds": Several(Plain(), 0, 10_000)})
-
-
-WORLDS = 250
-"""Environments of a search; each search uses other seeds."""
 
 
 def train_until_proved(
@@ -300,7 +287,9 @@ def _search(journal: Journal, progress: Progress) -> None:
     how = journal.how
     policy = load_policy(last_of(journal.folder))
     progress(f"{how.flights} flights in search of failures", 0, how.flights)
-    places, flights = _fly(policy, journal)
+    places, flights = np.empty((0, journal.task.num_cubes)), 0
+    if how.flights:
+        places, flights = _fly(policy, journal)
     progress(f"{len(places)} of {flights} flights failed", how.flights, how.flights)
     proof, boxes = None, np.repeat(places[..., None], 2, -1)
     if not len(places):
@@ -311,7 +300,8 @@ def _search(journal: Journal, progress: Progress) -> None:
             renderer=journal.settings.renderer,
             progress=progress,
         )
-        boxes = _largest(_doubtful(proof), how.most_boxes)
+        boxes = _doubtful(proof)
+        boxes = boxes[np.argsort(-volumes(boxes), kind="stable")[: how.most_boxes]]
     done = Round(
         frames=policy.state["progress"]["frames"],
         trained_s=policy.state["progress"]["seconds"],
@@ -328,8 +318,6 @@ def _search(journal: Journal, progress: Progress) -> None:
 def _fly(policy: Policy, journal: Journal) -> tuple[NDArray[np.float64], int]:
     """Search in environments that no other search uses, see `find_failures`."""
     settings, how = journal.settings, journal.how
-    if not how.flights:
-        return np.empty((0, journal.task.num_cubes)), 0
     env = policy.make_env(
         min(WORLDS, how.flights),
         seed=settings.seed,
@@ -338,18 +326,11 @@ def _fly(policy: Policy, journal: Journal) -> tuple[NDArray[np.float64], int]:
         renderer=settings.renderer,
         first_world=len(journal.rounds) * WORLDS,
     )
-    try:
+    with closing(env):
         return find_failures(env, policy.make_actor(env), how.flights, how.enough)
-    finally:
-        env.close()
 
 
 def _doubtful(proof: Proof) -> NDArray[np.float64]:
     """Return what fails or may fail; if a proof was stopped, only what certainly fails."""
     is_whole = proof.certificate["finished"]
     return np.concatenate([proof.losing(), proof.open()]) if is_whole else proof.losing()
-
-
-def _largest(boxes: NDArray[np.float64], most: int) -> NDArray[np.float64]:
-    """Return the largest boxes by volume."""
-    return boxes[np.argsort(-volumes(boxes), kind="stable")[:most]]

@@ -1,5 +1,6 @@
 """Prove what a policy does over all placements of the cubes."""
 
+import contextlib
 import dataclasses
 import json
 import time
@@ -20,8 +21,9 @@ from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import plural
+from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.prover.policy_spec import PolicySpec, make_policy_spec, one_thread
-from drone_rl.verification.prover.proof_files import certify, load, save, weights_hash
+from drone_rl.verification.prover.proof_files import certify, load, save
 from drone_rl.verification.prover.prover import Prover
 from drone_rl.verification.text import describe_proof, why_stopped
 
@@ -41,8 +43,7 @@ class Proof:
     @property
     def success(self) -> float:
         """Fraction of all placements from which all cubes are certainly collected."""
-        done = (o["share"] for o in self.certificate["outcomes"] if o["end"] == "all_cubes")
-        return sum(done)
+        return sum(o["share"] for o in self.certificate["outcomes"] if o["end"] == "all_cubes")
 
     @property
     def lost(self) -> float:
@@ -62,14 +63,16 @@ class Proof:
 
     def losing(self) -> np.ndarray:
         """Return the boxes of certain failure. Shape: (N, num_cubes, 2), metres."""
-        lost = [o["boxes"] for o in self.certificate["outcomes"] if o["end"] != "all_cubes"]
-        n = self.certificate["policy"]["description"]["task"]["num_cubes"]
-        return np.concatenate([np.empty((0, n, 2)), *map(np.array, lost)])
+        outcomes = self.certificate["outcomes"]
+        return self._boxes([b for o in outcomes if o["end"] != "all_cubes" for b in o["boxes"]])
 
     def open(self) -> np.ndarray:
         """Return the undecided boxes. Shape: (N, num_cubes, 2), metres."""
-        n = self.certificate["policy"]["description"]["task"]["num_cubes"]
-        return np.array(self.certificate["undecided"]["boxes"], float).reshape(-1, n, 2)
+        return self._boxes(self.certificate["undecided"]["boxes"])
+
+    def _boxes(self, boxes: list[Any]) -> np.ndarray:
+        num_cubes = self.certificate["policy"]["description"]["task"]["num_cubes"]
+        return np.array(boxes, float).reshape(-1, num_cubes, 2)
 
     def rows(self) -> list[list[str]]:
         """Return the outcomes as a table: a header, then one row each."""
@@ -82,7 +85,6 @@ class Proof:
         return [*rows, ["undecided", "", f"{left['share']:.9g}", str(len(left["boxes"]))]]
 
     def __str__(self) -> str:
-        """The table and a summary."""
         return f"{aligned(self.rows())}\n{describe_proof(self.certificate)}"
 
     def _repr_html_(self) -> str:
@@ -119,15 +121,14 @@ def prove(
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
     network, gap = policy.make_network(), settings.logit_gap
-    made = make_policy_spec(policy.description, network, gap, settings.renderer)
-    with one_thread(), closing(made) as spec:
+    spec = make_policy_spec(policy.description, network, gap, settings.renderer)
+    with one_thread(), closing(spec), contextlib.ExitStack() as stack:
         spec.images.check(settings.compared, np.random.RandomState(legacy_seed(fresh_seed())))
-        if folder is None:
-            return _prove(policy, spec, settings, None, progress or Bar())
-        folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        with folder_lock(folder):
-            return _prove(policy, spec, settings, folder, progress or Bar())
+        if folder is not None:
+            folder = Path(folder)
+            folder.mkdir(parents=True, exist_ok=True)
+            stack.enter_context(folder_lock(folder))
+        return _prove(policy, spec, settings, folder, progress or Bar())
 
 
 def _prove(
@@ -137,10 +138,8 @@ def _prove(
     folder: Path | None,
     progress: Progress,
 ) -> Proof:
-    prover, weights = (
-        Prover(spec, settings.most_combinations),
-        weights_hash(policy.state["policy"]),
-    )
+    prover = Prover(spec, settings.most_combinations)
+    weights = fingerprint(policy.state["policy"])
     known = json.dumps([weights, policy.description.as_dict(), settings.logit_gap])
     state = None if folder is None else folder / "state.npz"
     if state is not None and state.exists():
@@ -151,10 +150,10 @@ def _prove(
     seconds = time.monotonic() - begin
     found = certify(policy.name, policy.description, weights, prover, seconds, stopped)
     found |= provenance()
-    if folder is not None:
+    if folder is not None and state is not None:
         write_atomically(folder / "certificate.json", json.dumps(found))
-    if state is not None and prover.is_finished:
-        state.unlink(missing_ok=True)
+        if prover.is_finished:
+            state.unlink(missing_ok=True)
     return Proof(found, folder)
 
 
@@ -167,9 +166,12 @@ def _go_on(
     """
     task, last = prover.lattice.task, prover.lattice.last
     total = (2 * task.lateral_bound) ** task.num_cubes
-    begin, stopped = time.monotonic(), None
-    saved = begin
-    while not prover.is_finished and not (stopped := _reached(prover, settings, begin)):
+    begin = saved = time.monotonic()
+    until, stopped = begin + (np.inf if settings.limit_s is None else settings.limit_s), None
+    while not prover.is_finished:
+        if time.monotonic() > until or prover.boxes_under_way > settings.most_boxes:
+            stopped = "limit_s" if time.monotonic() > until else "most_boxes"
+            break
         place = prover.advance()
         done = prover.decided / total
         text = f"step {place.ahead} of {last}, {done:.1%} decided, {prover.pictures:,} pictures"
@@ -184,13 +186,6 @@ def _go_on(
         save(prover, state, known)
     progress(why_stopped(stopped) if stopped else "proved", last, last)
     return stopped
-
-
-def _reached(prover: Prover, settings: ProveSettings, begin: float) -> str | None:
-    """Return the setting that stops a proof now, if any."""
-    if settings.limit_s is not None and time.monotonic() - begin > settings.limit_s:
-        return "limit_s"
-    return "most_boxes" if prover.boxes_under_way > settings.most_boxes else None
 
 
 def load_proof(path: str | Path) -> Proof:

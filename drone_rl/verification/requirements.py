@@ -1,38 +1,27 @@
-"""Refuse tasks, dynamics and actions that verification does not support."""
+"""Refuse policies that verification does not support."""
 
-from drone_rl.config import ActionSettings, BaseTaskSettings, DynamicsSettings, TaskSettings
+from drone_rl.config import TaskSettings
+from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.utils.errors import InputError
 
 
-def require_cubes(task: BaseTaskSettings, what: str) -> TaskSettings:
-    """Return the settings of cube collection.
+def require_cubes(described: PolicyDescription, what: str) -> TaskSettings:
+    """Return the settings of cube collection by the three moves of computer-vision mode.
 
     Args:
-        task: Settings of any task.
+        described: The policy. A position of the drone must determine its observation.
         what: What needs it, plural, such as "proofs".
 
     Raises:
-        InputError: It is another task.
+        InputError: The task, the dynamics or the actions are others, or the policy stacks frames or
+            its camera simulates faults.
     """
+    task, dynamics, actions = described.task, described.dynamics, described.actions
     if not isinstance(task, TaskSettings):
         raise InputError(
             f"{what} support only task={TaskSettings.name}, got task={task.name}; give a policy of "
             "that task"
         )
-    return task
-
-
-def require_moves(dynamics: DynamicsSettings, actions: ActionSettings, what: str) -> None:
-    """Refuse other motion than the three moves of computer-vision mode.
-
-    Args:
-        dynamics: Settings of the vehicle dynamics.
-        actions: Settings of the actions.
-        what: See `require_cubes`.
-
-    Raises:
-        InputError: The drone has dynamics, or other actions.
-    """
     if not dynamics.is_computer_vision:
         raise InputError(
             f"{what} support only dynamics=computer_vision, got dynamics.mode={dynamics.mode}; "
@@ -43,3 +32,14 @@ def require_moves(dynamics: DynamicsSettings, actions: ActionSettings, what: str
             f"{what} support only actions=moves, got actions.kind={actions.kind}; give a policy "
             "trained with it"
         )
+    if any(choice.name == "stack" for choice in described.transforms):
+        raise InputError(
+            f"{what} support only policies that observe one frame; this one stacks frames "
+            "(transform stack)"
+        )
+    if described.faults:
+        raise InputError(
+            f"{what} support only cameras without faults; this policy's simulates faults "
+            f"(transform {described.faults[0]})"
+        )
+    return task

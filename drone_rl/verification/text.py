@@ -55,11 +55,6 @@ def _does(evidence: Evidence) -> str:
     )
 
 
-def _unseen(evidence: Evidence) -> str:
-    share = exact_percent(evidence["places"]["unseen"])
-    return f"At {share} of the places not one pixel shows the cube."
-
-
 def _blind(evidence: Evidence) -> str:
     places, names = evidence["places"], shown_actions(evidence).names
     shares = [
@@ -83,28 +78,15 @@ def _gap(evidence: Evidence) -> str:
     )
 
 
-def _close(evidence: Evidence) -> str:
-    places = evidence["places"]
-    return (
-        f"At {exact_percent(places['close'])} of the places they are no farther apart than "
-        f"{places['logit_gap']:g}, where rounding may decide between the two actions."
-    )
-
-
-def _doubt(evidence: Evidence) -> str:
-    return (
-        f"At most {exact_percent(evidence['places']['in_doubt'])} of the places lie so near to a "
-        "border between two pictures that the renderer, by rounding, may show the other one."
-    )
-
-
 PLACES = (
     Sentence("places.does", "every cell of places was decided", _made, _does),
     Sentence(
         "places.unseen",
         "there are places where no pixel shows the cube",
         lambda e: _made(e) and e["places"]["unseen"] > 0,
-        _unseen,
+        lambda e: (
+            f"At {exact_percent(e['places']['unseen'])} of the places not one pixel shows the cube."
+        ),
     ),
     Sentence(
         "places.blind",
@@ -126,13 +108,19 @@ PLACES = (
         "places.close",
         "somewhere the two highest logits are closer than sums are sure to be",
         lambda e: _made(e) and e["places"]["close"] > 0,
-        _close,
+        lambda e: (
+            f"At {exact_percent(e['places']['close'])} of the places they are no farther apart "
+            f"than {e['places']['logit_gap']:g}, where rounding may decide between the two actions."
+        ),
     ),
     Sentence(
         "places.doubt",
         "pictures have borders",
         lambda e: _made(e) and e["places"]["in_doubt"] > 0,
-        _doubt,
+        lambda e: (
+            f"At most {exact_percent(e['places']['in_doubt'])} of the places lie so near to a "
+            "border between two pictures that the renderer, by rounding, may show the other one."
+        ),
     ),
     Sentence(
         "places.refused",

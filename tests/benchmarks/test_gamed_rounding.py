@@ -1,14 +1,23 @@
+from types import SimpleNamespace
+
 import pytest
 
+from benchmarks import gamed_rounding
 from benchmarks.gamed_rounding import cases, judged_good, non_finite
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.judge import judge
 
 
-def test_there_are_enough_kinds(tmp_path):
-    found = cases(tmp_path)
-    assert len({case.name for case in found}) == len(found) >= 8
-    assert len([*tmp_path.glob("*.safetensors")]) >= 7
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rounding")
+    return folder, {case.name: case for case in cases(folder)}
+
+
+def test_there_are_enough_kinds(made):
+    folder, found = made
+    assert len(found) >= 8
+    assert len([*folder.glob("*.safetensors")]) >= 7
 
 
 @pytest.mark.parametrize(
@@ -20,13 +29,16 @@ def test_there_are_enough_kinds(tmp_path):
         "bad one at a time",
     ],
 )
-def test_none_is_called_good(tmp_path, name):
-    (case,) = (case for case in cases(tmp_path) if case.name == name)
-    assert not case.called_good()
+def test_one_of_each_analysis_is_not_called_good(made, name):
+    """The benchmark runs all of them."""
+    assert not made[1][name].called_good()
 
 
-def test_honest_policies_are_called_good():
-    assert judged_good("good")
+def test_only_a_status_of_success_is_called_good(monkeypatch):
+    for status in (0, 13):
+        verdict = SimpleNamespace(verdict=SimpleNamespace(exit_code=status))
+        monkeypatch.setattr(gamed_rounding, "judge", lambda policy, verdict=verdict, **_: verdict)
+        assert judged_good("good") == (status == 0)
 
 
 def test_non_finite_logits_end_the_run_with_one_line(tmp_path):

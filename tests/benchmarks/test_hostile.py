@@ -14,8 +14,9 @@ from benchmarks.hostile import SECRET
 
 @pytest.mark.slow
 def test_hostile_files_are_refused(tmp_path):
-    outcomes = hostile.run_all(tmp_path, every=4)
-    assert len(outcomes) >= 40
+    """A sample; the benchmark opens all of them."""
+    outcomes = hostile.run_all(tmp_path, every=13)
+    assert len(outcomes) >= 12
     assert len({outcome["name"] for outcome in outcomes}) == len(outcomes)
     assert {o["name"]: o["wrong"] for o in outcomes if o["wrong"]} == {}
 
@@ -84,7 +85,7 @@ def die():
     ],
 )
 def test_what_is_no_refusal_is_noticed(tmp_path, monkeypatch, main, wrong):
-    monkeypatch.setattr(hostile, "PATIENCE_S", 2)
+    monkeypatch.setattr(hostile, "PATIENCE_S", 1)
     found = hostile._fork(main, ["x"], tmp_path)["wrong"]
     assert re.fullmatch(wrong + ".*" if wrong else "", found, re.S), found
 

@@ -13,7 +13,7 @@ from drone_rl.robustness.perturbations import Mode
 from drone_rl.robustness.suite import finite, mcnemar, success_area
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.intervals import mean_bounds, proportion
-from drone_rl.verification.checker import fingerprint
+from drone_rl.verification.checker.certificate import fingerprint
 
 EPISODES = 200
 

@@ -102,5 +102,5 @@ def test_a_policy_with_a_memory_is_refused(small):
     description = parse(described)
     weights = description.build_network(torch.Generator()).state_dict()
     remembering = Policy("stack", small.path, description, {**small.state, "policy": weights})
-    with pytest.raises(InputError, match="stack of frames"):
+    with pytest.raises(InputError, match="stacks frames"):
         drone_rl.places(remembering, progress=silent)

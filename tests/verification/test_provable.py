@@ -1,6 +1,7 @@
 """Training until proved: its rounds, what they practise, and that it goes on bit for bit."""
 
 import json
+import shutil
 import signal
 
 import numpy as np
@@ -90,6 +91,11 @@ def whole(tmp_path_factory):
         return train(tmp_path_factory.mktemp("run") / "whole")
 
 
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory):
+    return drone_rl.train(TINY, folder=tmp_path_factory.mktemp("usual"), progress=silent)
+
+
 def test_rounds_until_nothing_is_left(whole):
     assert whole.reason == "proved"
     rounds = whole.result["rounds"]
@@ -104,9 +110,11 @@ def test_rounds_until_nothing_is_left(whole):
     assert first.tolist() == [[[1.75, 3.25]], [[4.75, 6.0]]]
 
 
-def test_the_first_part_is_the_usual_training(tmp_path, prover):
-    train(tmp_path / "until", HOW.replace(rounds=1))
-    usual = drone_rl.train(TINY, folder=tmp_path / "usual", progress=silent)
+def test_the_first_part_is_the_usual_training_and_the_largest_boxes_are_kept(
+    tmp_path, prover, usual
+):
+    done = train(tmp_path, HOW.replace(rounds=0, most_boxes=1))
+    assert done.result["rounds"][0]["boxes"] == 1
     assert usual.reason == "solved"
     one, two = weights(usual.folder), prover.weights[0]
     assert all(torch.equal(one[name], two[name]) for name in one)
@@ -129,10 +137,9 @@ def test_failures_are_practised(tmp_path, monkeypatch):
     assert all(0.75 <= y <= 1.75 for y in second)
 
 
-@pytest.mark.parametrize("at", [1, 3])
-def test_killed_and_resumed_is_bit_for_bit_the_uninterrupted(whole, tmp_path, at):
+def test_killed_and_resumed_is_bit_for_bit_the_uninterrupted(whole, tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        train(tmp_path, callbacks=[Watch(at)])
+        train(tmp_path, callbacks=[Watch(3)])
     done = drone_rl.train_until_proved(folder=tmp_path, resume=True, progress=silent)
     assert done.result["frames"] == whole.result["frames"]
     one, two = weights(tmp_path), weights(whole.folder)
@@ -154,17 +161,13 @@ def test_killed_in_a_proof(whole, tmp_path, monkeypatch, prover):
     assert done.reason == "proved" and done.result["frames"] == whole.result["frames"]
 
 
-def test_a_usual_run_is_made_provable(whole, tmp_path):
-    drone_rl.train(TINY, folder=tmp_path, progress=silent)
-    done = drone_rl.train_until_proved(None, HOW, folder=tmp_path, resume=True, progress=silent)
-    assert done.reason == "proved" and done.result["frames"] == whole.result["frames"]
-
-
-def test_a_usual_run_that_is_refused_stays_one(tmp_path):
-    drone_rl.train(TINY, folder=tmp_path, progress=silent)
+def test_a_usual_run_that_is_refused_stays_one_and_else_is_made_provable(whole, usual, tmp_path):
+    shutil.copytree(usual.folder, tmp_path, dirs_exist_ok=True)
     with pytest.raises(InputError, match="can't resume with seed=9"):
         drone_rl.train_until_proved(None, HOW, folder=tmp_path, resume=True, seed=9)
     assert not (tmp_path / "provable.json").exists()
+    done = drone_rl.train_until_proved(None, HOW, folder=tmp_path, resume=True, progress=silent)
+    assert done.reason == "proved" and done.result["frames"] == whole.result["frames"]
 
 
 class Interrupt(Callback):
@@ -215,11 +218,6 @@ def test_flights_come_first(tmp_path, monkeypatch, prover):
     boxes = np.load(tmp_path / "rounds" / "0" / "failures.npy")
     np.testing.assert_allclose(boxes, [[[1.75, 2.25]], [[-6.0, -5.65]]])
     assert len(prover.weights) == 1
-
-
-def test_the_largest_boxes_are_practised(tmp_path):
-    done = train(tmp_path, HOW.replace(rounds=1, most_boxes=1))
-    assert done.result["rounds"][0]["boxes"] == 1
 
 
 def test_what_a_stopped_proof_leaves_open_is_not_practised():

@@ -112,20 +112,3 @@ def test_torch_has_its_threads_again():
         assert torch.get_num_threads() == 2
     finally:
         torch.set_num_threads(before)
-
-
-def test_a_policy_with_memory_is_refused(tmp_path):
-    drone_rl.train(
-        folder=tmp_path,
-        transforms=drone_rl.TrainSettings().transforms + _stack(),
-        trainer=drone_rl.TrainerSettings(total_frames=1),
-        progress=silent,
-    )
-    with pytest.raises(InputError, match="observes a stack of frames"):
-        drone_rl.prove(tmp_path, task=ONE, progress=silent)
-
-
-def _stack():
-    from drone_rl.config.transforms import Stack
-
-    return (Stack(),)

@@ -1,12 +1,44 @@
 import pytest
 
-from drone_rl.config import PillarsSettings, TaskSettings
+import drone_rl
+from drone_rl.config import ActionSettings, DynamicsSettings, PillarsSettings
+from drone_rl.config.training import TrainSettings
+from drone_rl.policies.zoo import describe, parse
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.requirements import require_cubes
 
 
-def test_only_cube_collection_passes():
-    task = TaskSettings(num_cubes=2)
-    assert require_cubes(task, "proofs") is task
-    with pytest.raises(InputError, match="only task=collect_cubes, got task=pillars"):
-        require_cubes(PillarsSettings(), "proofs")
+def test_the_policies_of_the_package_pass():
+    policy = drone_rl.load_policy("good").description
+    assert require_cubes(policy, "proofs") is policy.task
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"task": PillarsSettings()}, "proofs support only task=collect_cubes, got task=pillars"),
+        (
+            {"dynamics": DynamicsSettings(mode="simple_flight")},
+            "only dynamics=computer_vision, got",
+        ),
+        ({"actions": ActionSettings(kind="velocity")}, "only actions=moves, got actions.kind=vel"),
+    ],
+)
+def test_other_tasks_dynamics_and_actions_are_refused(change, message):
+    with pytest.raises(InputError, match=message):
+        require_cubes(describe(TrainSettings().replace(**change)), "proofs")
+
+
+@pytest.mark.parametrize(
+    ("transform", "message"),
+    [
+        ({"name": "stack", "N": 2}, "proofs support only policies that observe one frame"),
+        ({"name": "late_frames", "frames": 1}, r"simulates faults \(transform late_frames\)"),
+        ({"name": "frozen_frames", "share": 0.1}, r"simulates faults \(transform frozen_frames\)"),
+    ],
+)
+def test_memory_and_camera_faults_are_refused(transform, message):
+    described = drone_rl.load_policy("good").description.as_dict()
+    described["transforms"] = [{"name": "gray"}, transform]
+    with pytest.raises(InputError, match=message):
+        require_cubes(parse(described), "proofs")

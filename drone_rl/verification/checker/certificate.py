@@ -14,22 +14,11 @@ from numpy.typing import NDArray
 from drone_rl.config import BaseTaskSettings, TaskSettings
 from drone_rl.policies.zoo import PolicyDescription, parse
 from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.utils import schema
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.limits import CERTIFICATE_BYTES, CERTIFICATE_VALUES
-from drone_rl.utils.schema import (
-    Flag,
-    OneOf,
-    Plain,
-    Real,
-    Record,
-    Several,
-    Text,
-    Whole,
-    as_mapping,
-    shown,
-)
-from drone_rl.verification.requirements import require_cubes, require_moves
+from drone_rl.verification.requirements import require_cubes
 
 FORMAT = "drone_rl certificate"
 FORMAT_VERSION = 1
@@ -59,7 +48,6 @@ class Outcome:
     """Metres to the left of each cube, lowest and highest. Shape: (boxes, cubes, 2)."""
 
     def __str__(self) -> str:
-        """A short description."""
         which = ", ".join(str(i + 1) for i, collected in enumerate(self.collected) if collected)
         loops = ", to and fro" if self.loops else ""
         return f"{self.end.name.lower()}{loops}, cubes collected: {which or 'none'}"
@@ -80,7 +68,7 @@ class Certificate:
     @property
     def task(self) -> TaskSettings:
         """The task of the certificate."""
-        return require_cubes(self.description.task, "certificates")
+        return require_cubes(self.description, "certificates")
 
     @property
     def bound(self) -> float:
@@ -113,8 +101,8 @@ def parse_certificate(data: Any) -> Certificate:
         InputError: A key is missing or unknown, or a value has another type or is out of bounds.
     """
     read = _WHOLE.read(data, "certificate")
-    described = read["policy"]["description"]
-    task = described.task
+    described = parse(read["policy"]["description"])
+    task = require_cubes(described, "certificates")
     if task.vertical_bound != 0 or task.lateral_bound == 0:
         raise InputError(
             f"its task has vertical_bound={task.vertical_bound} and lateral_bound="
@@ -130,11 +118,8 @@ def parse_certificate(data: Any) -> Certificate:
     if (steps := sum(len(outcome.steps) for outcome in outcomes)) > MOST_STEPS:
         raise InputError(f"it has {steps} numbers of steps; give at most {MOST_STEPS}")
     count = sum(len(outcome.boxes) for outcome in outcomes) + len(undecided)
-    if count > min(MOST_BOXES, MOST_CORNERS >> cubes):
-        raise InputError(
-            f"it has {count} boxes; of {cubes} cubes give at most "
-            f"{min(MOST_BOXES, MOST_CORNERS >> cubes)}"
-        )
+    if count > (most := min(MOST_BOXES, MOST_CORNERS >> cubes)):
+        raise InputError(f"it has {count} boxes; of {cubes} cubes give at most {most}")
     return Certificate(
         name=read["policy"]["name"],
         weights=read["policy"]["weights"],
@@ -146,44 +131,37 @@ def parse_certificate(data: Any) -> Certificate:
     )
 
 
-class _Anything:
-    """Accepts a value that is parsed later."""
-
-    def read(self, value: Any, where: str) -> Any:
-        """See `drone_rl.utils.schema.Kind`."""
-        return value
-
-
-class _Description:
-    """Parses a policy's description."""
-
-    def read(self, value: Any, where: str) -> PolicyDescription:
-        """See `drone_rl.utils.schema.Kind`."""
-        return parse(Plain(most=1000).read(value, where))
-
-
-_SHARE = Real(0.0, 1.0)
-_OUTCOME = Record(
+_LATER = schema.Instance(object)  # anything; parsed once the number of cubes is known
+_SHARE = schema.Real(0.0, 1.0)
+_OUTCOME = schema.Record(
     {
-        "end": OneOf(_ENDS),
-        "collected": Several(Flag(), 1, MOST_CUBES),
-        "loops": Flag(),
+        "end": schema.OneOf(_ENDS),
+        "collected": schema.Several(schema.Flag(), 1, MOST_CUBES),
+        "loops": schema.Flag(),
         "share": _SHARE,
-        "steps": _Anything(),
-        "boxes": _Anything(),
+        "steps": _LATER,
+        "boxes": _LATER,
     }
 )
-_ORIGIN = {"versions": Plain(), "git_revision": Plain(), "machine": Plain()}
-_WHOLE = Record(
+_ORIGIN = {"versions": schema.Plain(), "git_revision": schema.Plain(), "machine": schema.Plain()}
+_WHOLE = schema.Record(
     {
-        "format": OneOf((FORMAT,)),
-        "format_version": Whole(FORMAT_VERSION, FORMAT_VERSION),
-        "policy": Record({"name": Text(), "weights": Text(64), "description": _Description()}),
-        "outcomes": Several(_OUTCOME, 0, MOST_OUTCOMES),
-        "undecided": Record({"share": _SHARE, "boxes": _Anything()}),
-        "finished": Flag(),
-        "stated": Record({"logit_gap": Real(0.0), "largest_band": Real(0.0), "renderer": Text()}),
-        "found": Plain(most=1000, deepest=3),
+        "format": schema.OneOf((FORMAT,)),
+        "format_version": schema.Whole(FORMAT_VERSION, FORMAT_VERSION),
+        "policy": schema.Record(
+            {"name": schema.Text(), "weights": schema.Text(64), "description": schema.Plain(1000)}
+        ),
+        "outcomes": schema.Several(_OUTCOME, 0, MOST_OUTCOMES),
+        "undecided": schema.Record({"share": _SHARE, "boxes": _LATER}),
+        "finished": schema.Flag(),
+        "stated": schema.Record(
+            {
+                "logit_gap": schema.Real(0.0),
+                "largest_band": schema.Real(0.0),
+                "renderer": schema.Text(),
+            }
+        ),
+        "found": schema.Plain(most=1000, deepest=3),
         **_ORIGIN,
     },
     optional=frozenset(_ORIGIN),
@@ -208,9 +186,11 @@ def _read_outcome(read: Mapping[str, Any], where: str, cubes: int) -> Outcome:
 def _read_steps(value: Any, where: str) -> dict[int, float]:
     """Return fractions by number of steps, written without leading zeros."""
     steps = {}
-    for name, share in Plain(deepest=1).read(as_mapping(value, where), where).items():
+    for name, share in schema.Plain(deepest=1).read(schema.as_mapping(value, where), where).items():
         if not (name.isascii() and name.isdigit() and len(name) <= _DIGITS and name[0] != "0"):
-            raise InputError(f"{where}.{shown(name)} is no number of steps; give one above 0")
+            raise InputError(
+                f"{where}.{schema.shown(name)} is no number of steps; give one above 0"
+            )
         steps[int(name)] = _SHARE.read(share, f"{where}.{name}")
     return steps
 
@@ -218,12 +198,11 @@ def _read_steps(value: Any, where: str) -> dict[int, float]:
 def _read_boxes(value: Any, where: str, cubes: int) -> NDArray[np.float64]:
     """Parse lists of boxes, each a list of [low, high] pairs."""
     shape = f"give a list of boxes, each of {cubes} pairs of finite numbers [low, high]"
-    if type(value) is not list or not all(_is_list(box, cubes) for box in value):
-        raise InputError(f"{where} is of another shape; {shape}")
-    pairs = list(chain.from_iterable(value))
-    if not all(_is_list(pair, 2) for pair in pairs):
-        raise InputError(f"{where} is of another shape; {shape}")
-    numbers = list(chain.from_iterable(pairs))
+    numbers = [value]
+    for length in (None, cubes, 2):
+        if not all(type(part) is list and length in (None, len(part)) for part in numbers):
+            raise InputError(f"{where} is of another shape; {shape}")
+        numbers = list(chain.from_iterable(numbers))
     if not {*map(type, numbers)} <= {int, float}:
         raise InputError(f"{where} holds something else than numbers; {shape}")
     boxes = np.array(numbers, np.float64).reshape(len(value), cubes, 2)
@@ -238,10 +217,6 @@ def _read_boxes(value: Any, where: str, cubes: int) -> NDArray[np.float64]:
     if len(empty):
         raise InputError(f"{where}[{empty[0]}] is empty; {shape}, low below high")
     return boxes
-
-
-def _is_list(value: Any, length: int) -> bool:
-    return type(value) is list and len(value) == length
 
 
 def fingerprint(weights: Mapping[str, torch.Tensor]) -> str:
@@ -272,8 +247,7 @@ def check_same_policy(
         InputError: It is of another network, camera or task, or the policy has memory or camera
             faults.
     """
-    for of in (certificate.description, described):
-        require_moves(of.dynamics, of.actions, "certificates")
+    require_cubes(described, "certificates")
     if certificate.weights != (own := fingerprint(weights)):
         raise InputError(
             f"the certificate is of a network with the hash {certificate.weights[:12]}..., the "
@@ -291,14 +265,4 @@ def check_same_policy(
         raise InputError(
             f"the certificate is of another task: {name}={getattr(certificate.task, name)}, not "
             f"{getattr(task, name)}; prove the policy in that task"
-        )
-    if any(choice.name == "stack" for choice in described.transforms):
-        raise InputError(
-            "certificates support only policies that observe one frame; this one stacks frames "
-            "(transform stack)"
-        )
-    if described.faults:
-        raise InputError(
-            f"certificates support only cameras without faults; this policy's simulates faults "
-            f"(transform {described.faults[0]})"
         )

@@ -1,17 +1,22 @@
 """Check a certificate: it must be consistent, and simulated episodes must end as stated."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from tensordict import TensorDict
+from torch import Tensor
+from torchrl.envs import Transform
 
+from drone_rl.envs import worlds_of
 from drone_rl.policies.zoo import PolicyDescription
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks import State
+from drone_rl.sim.tasks.collect_cubes import EndReason, WorldState
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.checker.certificate import (
     Certificate,
@@ -24,13 +29,16 @@ from drone_rl.verification.checker.consistency import (
     find_wrong_step_counts,
     missing_steps,
 )
-from drone_rl.verification.checker.rollouts import ProgressCallback, Rollouts, Simulator
 from drone_rl.verification.checker.sampling import ANYWHERE, BORDER, INSIDE, sample_placements
+from drone_rl.verification.requirements import require_cubes
 
 MOST_TOLD = 20  # contradictions printed
 MOST_EXACT = 200  # episodes repeated with the network in float64, about
 MOST_KEPT = 1000  # contradictions kept
+MOST_AT_ONCE = 1024  # episodes per batch
+MOST_PIXELS = 2**22  # pixels per batch of images
 _JUST_BEGUN = 2  # repetitions up to which a loop may count as one or not
+ProgressCallback = Callable[[int, int], None]  # called with the number done, and of all
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,7 +52,6 @@ class Contradiction:
     found: str
 
     def __str__(self) -> str:
-        """One line."""
         return (
             f"from y={list(self.placement)} ({self.where}) the flight ended otherwise than "
             f"stated ({self.stated}): {self.found}"
@@ -81,6 +88,98 @@ class Findings:
             "contradictions": [dataclasses.asdict(c) for c in self.contradictions],
             "flights": dict(self.flights),
         }
+
+
+@dataclasses.dataclass(frozen=True)
+class Rollouts:
+    """How episodes ended; the first dimension counts episodes."""
+
+    end: NDArray[np.int64]  # (k,); `EndReason`
+    collected: NDArray[np.bool_]  # (k, cubes); whether each cube was collected
+    steps: NDArray[np.int64]  # (k,); number of steps
+    repeats: NDArray[np.int64]  # (k,)
+    """Number of final steps in a row after which the state was that of two steps before."""
+
+    @classmethod
+    def join(cls, parts: Iterable["Rollouts"]) -> Self:
+        """Concatenate."""
+        return cls(*map(np.concatenate, zip(*(vars(p).values() for p in parts), strict=True)))
+
+
+class Simulator:
+    """Simulates a policy without memory."""
+
+    def __init__(
+        self,
+        described: PolicyDescription,
+        weights: Mapping[str, Tensor],
+        device: str = "cpu",
+        renderer: str = "raytrace",
+    ) -> None:
+        """Build the environment of a policy's task, and its network; see `check_certificate`."""
+        pixels = described.camera.width * described.camera.height
+        self.at_once = max(1, min(MOST_AT_ONCE, MOST_PIXELS // pixels))
+        count = min(self.at_once, 64)
+        self._env = described.build_env(count, seed=0, device=device, renderer=renderer)
+        self._worlds = worlds_of(self._env)
+        self._task = require_cubes(described, "certificates")
+        every: Iterable[Transform] = self._env.transform  # type: ignore[assignment]
+        self._transforms = [t for t in every if "pixels" in (t.in_keys or [])]
+        self._network = described.load_network(weights).to(self._worlds.device)
+        self._dtype = torch.float32
+
+    def fly(
+        self, placements: NDArray[np.float64], tell: ProgressCallback = lambda done, total: None
+    ) -> Rollouts:
+        """Simulate episodes in batches, from metres to the left of each cube (k, cubes)."""
+        parts = [self._fly(placements[:0])]
+        for first in range(0, len(placements), self.at_once):
+            parts.append(self._fly(placements[first : first + self.at_once]))
+            tell(min(first + self.at_once, len(placements)), len(placements))
+        return Rollouts.join(parts)
+
+    def compute_in(self, dtype: torch.dtype) -> None:
+        """Evaluate the network in another precision from now on."""
+        self._network, self._dtype = self._network.to(dtype), dtype
+
+    def close(self) -> None:
+        """Close the renderer."""
+        self._env.close()
+
+    @torch.no_grad()
+    def _fly(self, placements: NDArray[np.float64]) -> Rollouts:
+        now: Any = self._start(torch.from_numpy(placements))  # worlds are of any task's state
+        flying = torch.arange(len(now), device=self._worlds.device)
+        done, before = now[flying], now
+        repeats = torch.zeros_like(flying)
+        while len(flying):
+            earlier, before = before, now
+            now, _ = self._worlds.advance(now, self._choose(now))
+            is_same = self._is_same(earlier, now)
+            done[flying], repeats[flying] = now, (repeats[flying] + 1) * is_same
+            on = now.end_reason == 0
+            flying, now, before = flying[on], now[on], before[on]
+        ended = (done.end_reason, done.collected, done.steps, repeats)
+        return Rollouts(*(value.cpu().numpy() for value in ended))
+
+    def _start(self, lateral: Tensor) -> State:
+        """Return initial states with cubes at these positions."""
+        task = self._task
+        ahead = task.first_distance + task.spacing * torch.arange(task.num_cubes).double()
+        up = torch.full_like(lateral, task.altitude)
+        return self._worlds.start(torch.stack([ahead.expand_as(lateral), lateral, up], -1))
+
+    def _choose(self, state: WorldState) -> Tensor:
+        """Return the argmax actions."""
+        seen = TensorDict({"pixels": self._worlds.render(state)}, [len(state)])
+        for transform in self._transforms:
+            seen = transform(seen)
+        return self._network(seen["pixels"].to(self._dtype)).argmax(-1)
+
+    def _is_same(self, one: WorldState, other: WorldState) -> Tensor:
+        """Return whether states are equal: same position, same cubes standing."""
+        moved = (one.drone - other.drone).abs().amax(-1) > self._task.step_length / 2
+        return ~moved & (one.present == other.present).all(-1)
 
 
 def check_certificate(
@@ -176,9 +275,8 @@ def _rounding_errors(
 
     `is_wrong` marks the episodes that end otherwise in float32, too. Shape: (k,).
     """
-    ended = [ends_as_stated(outcome, exact, i) for i, outcome in enumerate(stated)]
-    count = sum(not is_so for is_so, wrong in zip(ended, is_wrong, strict=True) if not wrong)
-    if not count:
+    ended = np.array([ends_as_stated(outcome, exact, i) for i, outcome in enumerate(stated)], bool)
+    if not (count := int((~ended & ~is_wrong).sum())):
         return []
     return [
         f"{count} of {len(stated)} flights ended otherwise than stated with the network in float64 "

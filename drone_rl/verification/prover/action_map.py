@@ -25,6 +25,7 @@ from drone_rl.sim.actions import MOVES, Move
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import num_cores
 from drone_rl.verification.prover.arrangement import SAME, Arrangement, Pieces, Window, arrange
+from drone_rl.verification.prover.boxes import unite
 from drone_rl.verification.prover.cube_images import NOTHING, UNIT, CameraModel
 
 RenderFaces = Callable[[NDArray[np.uint8]], Tensor]
@@ -148,7 +149,8 @@ def map_actions(
     borders = find_borders(camera, window)
     cells = arrange(borders, window, most_cells)
     places = cells.inner_points()
-    (alone,), _ = _decide(look, network, _no_faces(camera))
+    nothing = np.full((1, len(camera.up), len(camera.left)), NOTHING, np.uint8)
+    (alone,), _ = _decide(look, network, nothing)
     parts = np.split(places, range(_BATCH, len(places), _BATCH))
 
     def decide(part: NDArray) -> tuple[NDArray, NDArray, NDArray]:
@@ -191,7 +193,7 @@ def find_borders(camera: CameraModel, window: Window) -> Pieces:
     upright = [
         [leave + half, *span]
         for leave in leaves[np.isfinite(leaves)]
-        for span in joined(np.stack([slopes * leave - half, slopes * leave + half], -1))
+        for span in unite(np.stack([slopes * leave - half, slopes * leave + half], -1), SAME)
     ]
     return Pieces(slope, offset, begin, end, np.reshape(upright, (-1, 3))).clipped(window)
 
@@ -214,17 +216,6 @@ def doubtful_area(camera: CameraModel, pieces: Pieces, window: Window) -> float:
     return UNIT * float(bands + 2 * 32 * farthest * (high - low).sum())
 
 
-def joined(spans: NDArray[np.float64]) -> list[list[float]]:
-    """Merge intervals that overlap or touch. Shape: (N, 2)."""
-    found: list[list[float]] = []
-    for low, high in spans[np.argsort(spans[:, 0])].tolist():
-        if found and low <= found[-1][1] + SAME:
-            found[-1][1] = max(found[-1][1], high)
-        else:
-            found.append([low, high])
-    return found
-
-
 def _lines(slope: NDArray, offset: NDArray, end: float) -> NDArray:
     """Return lines from -inf to x = end. Shape: (4, N)."""
     return np.stack([slope, offset, np.full_like(slope, -np.inf), np.full_like(slope, end)])
@@ -235,19 +226,11 @@ def _levels(aside: NDArray, outer: NDArray, leaves: NDArray, half: float) -> lis
     height = (aside[:, None] * leaves + outer[:, None]).reshape(-1)
     spans = np.stack([leaves - half, leaves + half], -1)[None].repeat(len(aside), 0).reshape(-1, 2)
     order = np.argsort(height)
-    height, spans = height[order], spans[order]
-    groups = np.split(np.arange(len(height)), np.flatnonzero(np.diff(height) > SAME) + 1)
-    return [
-        np.array([[0.0], [height[group[0]]], [begin], [end]])
-        for group in groups
-        if len(group)
-        for begin, end in joined(spans[group])
-    ]
-
-
-def _no_faces(camera: CameraModel) -> NDArray[np.uint8]:
-    """Return the faces without a visible cube. Shape: (1, H, W)."""
-    return np.full((1, len(camera.up), len(camera.left)), NOTHING, np.uint8)
+    found = []
+    for group in np.split(order, np.flatnonzero(np.diff(height[order]) > SAME) + 1):
+        for begin, end in unite(spans[group][spans[group, 0].argsort()], SAME):
+            found.append(np.array([[0.0], [height[group[0]]], [begin], [end]]))
+    return found
 
 
 @torch.no_grad()

@@ -37,14 +37,10 @@ class ActionTable:
         cells: Sequence[Cells],
         record: NDArray[np.int64],
     ) -> None:
-        """Start with nothing known.
+        """Start with nothing known of visible cubes, nearest first.
 
-        Args:
-            bounds: Of the network.
-            compositor: Composes images.
-            cells: Cells of each visible cube, nearest first.
-            record: Bounds tried, and decisive, by log2 of the uncertain pixels; shared by all
-                tables of a proof. Shape: (32, 2).
+        All tables of a proof share `record`: bounds tried, and decisive ones, by log2 of the
+        uncertain pixels. Shape: (32, 2).
         """
         self.cells = list(cells)
         self.table = np.zeros([len(c) for c in reversed(self.cells)], np.uint8)
@@ -87,9 +83,11 @@ class ActionTable:
             tried = np.flatnonzero(self._is_worth(pixels, counts))
             bits = np.zeros(len(tasks), np.uint8)
             bits[tried] = self._share_out(self._bound, tasks[tried])
-            self._note(pixels[tried], bits[tried] != 0)
-            self._write(tasks[bits != 0], bits[bits != 0])
+            note = np.stack([np.ones_like(tried), bits[tried] != 0], -1)
+            np.add.at(self._record, np.frexp(pixels[tried])[1], note)
             is_open = bits == 0
+            done = tuple(_combinations(tasks[~is_open]).T[::-1])
+            self._known[done] = np.repeat(bits[~is_open], counts[~is_open])
             self._look_at(_combinations(tasks[is_open & (counts <= FEW)]))
             is_open &= counts > FEW
             if is_open.any():
@@ -188,16 +186,6 @@ class ActionTable:
         tries, hits = self._record[np.frexp(pixels)[1]].T
         return (hits + 1) * counts > PRICE * (tries + 1)
 
-    def _note(self, doubts: NDArray, done: NDArray[np.bool_]) -> None:
-        np.add.at(
-            self._record,
-            np.frexp(doubts)[1],
-            np.stack([np.ones(len(done), int), done.astype(int)], -1),
-        )
-
-    def _write(self, blocks: NDArray, bits: NDArray[np.uint8]) -> None:
-        self._known[tuple(_combinations(blocks).T[::-1])] = np.repeat(bits, _counts(blocks))
-
 
 def _open(table: NDArray[np.uint8], spans: NDArray) -> NDArray[np.int64]:
     """Return disjoint blocks of all unknown entries within spans."""
@@ -268,21 +256,12 @@ def _slices(span: NDArray) -> tuple[slice, ...]:
 
 
 def runs(table: ActionTable, spans: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray, ...]]:
-    """Cut blocks of the table into runs with constant possible actions, along the nearest cube.
+    """Cut filled spans, shape (N, cubes, 2), into runs of the nearest cube with constant actions.
 
-    Args:
-        table: Filled there.
-        spans: First and last cell of each cube. Shape: (N, cubes, 2).
-        most: Approximate number of rows per batch; bounds memory.
-
-    Yields:
-        For each piece: its block; first and last cell of each cube, shape (cubes, 2); its bits.
+    Yields the span of each run, its first and last cell of each cube, shape (cubes, 2), and its
+    bits, in batches of about `most` rows.
     """
-    rows = (spans[:, 1:, 1] - spans[:, 1:, 0] + 1).prod(-1)
-    if rows.sum() <= most:
-        if len(spans):
-            yield _runs(table.table, spans, np.arange(len(spans)))
-        return
+    rows = _counts(spans[:, 1:])
     parts = np.searchsorted(np.cumsum(rows), np.arange(most, rows.sum() + most, most))
     for part in np.split(np.arange(len(spans)), np.unique(parts)[:-1] + 1):
         if len(part):
@@ -290,19 +269,12 @@ def runs(table: ActionTable, spans: NDArray[np.int64], most: int) -> Iterator[tu
 
 
 def _runs(table: NDArray, spans: NDArray, part: NDArray) -> tuple[NDArray, ...]:
-    sizes = spans[part, 1:, 1] - spans[part, 1:, 0] + 1
-    block, place = ragged(sizes.prod(-1))
-    cells = []
-    for k in range(sizes.shape[1]):
-        place, step = np.divmod(place, sizes[block, k])
-        cells.append(spans[part, 1 + k, 0][block] + step)
+    block, _ = ragged(_counts(spans[part, 1:]))
+    cells = _combinations(spans[part, 1:])  # of the other cubes
     low, high = spans[part, 0, 0], spans[part, 0, 1]
     least, most = low.min(), high.max()
-    rows = (
-        table[tuple(cells[::-1])][:, least : most + 1] if cells else table[None, least : most + 1]
-    )
-    if not cells:
-        rows = rows.repeat(len(part), 0)
+    rows = np.broadcast_to(table[tuple(cells.T[::-1])], (len(block), table.shape[-1]))
+    rows = rows[:, least : most + 1]
     places = np.arange(least, most + 1)
     changes = rows[:, 1:] != rows[:, :-1]
     changes &= (places[1:] > low[block][:, None]) & (places[1:] <= high[block][:, None])
@@ -314,5 +286,5 @@ def _runs(table: NDArray, spans: NDArray, part: NDArray) -> tuple[NDArray, ...]:
     is_last = np.concatenate([owner[1:] != owner[:-1], [True]])
     ends = np.where(is_last, high[block][owner], np.concatenate([starts[1:], [0]]) - 1)
     bits = rows[owner, starts - least]
-    ranges = [np.stack([starts, ends], -1)] + [np.stack([c[owner]] * 2, -1) for c in cells]
+    ranges = [np.stack([starts, ends], -1), *(np.stack([c[owner]] * 2, -1) for c in cells.T)]
     return part[block][owner], np.stack(ranges, 1), bits

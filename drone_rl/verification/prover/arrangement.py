@@ -162,9 +162,8 @@ class Arrangement:
         return ways
 
     def _around(self, cell: int) -> list[int]:
-        edge = first = int(np.flatnonzero(self.cell == cell)[0])
-        around = [first]
-        while (edge := int(self.following[edge])) != first:
+        around = [int(np.flatnonzero(self.cell == cell)[0])]
+        while (edge := int(self.following[around[-1]])) != around[0]:
             around.append(edge)
         return around
 

@@ -6,8 +6,8 @@ subtracted pairwise first, so that common terms cancel. ReLU, pooling and flatte
 homogeneous, so biases are scaled instead of halving the sums.
 """
 
+import functools
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -60,48 +60,42 @@ class NetworkBounds:
         self.num_actions = len(weight)
         self._errors = [_errors_of(layer) for layer in network.layers]
         self._rounding = RoundingBound(self._errors, getattr(network, "actions", MOVES))
-        self._hull: _Hull | None = None
+        self._hull: tuple[Tensor, Tensor, Tensor] | None = None
+        """Bounds on all images decided so far, and the lead that is certain for them."""
 
     @torch.no_grad()
     def possible(self, lower: Tensor, upper: Tensor) -> Tensor:
-        """Return which actions may have the highest logit.
+        """Return which actions may have the highest logit between bounds of images (N, C, H, W).
 
-        Args:
-            lower: Lower bounds of the network's input images. Shape: (N, C, H, W).
-            upper: Upper bounds.
-
-        Returns:
-            Bit a is clear if another action certainly beats action a. Shape: (N,), uint8.
+        Bit a is clear if another action certainly beats action a. Shape: (N,), uint8.
         """
-        largest: list[Tensor] = []
-        least = self._least(lower, upper, largest)
-        return self._bits(least > self._scale * self._error(largest).clamp(min=self.gap))
+        least, gap = self._least(lower, upper)
+        return self._bits(least > self._scale * gap)
 
     @torch.no_grad()
     def probabilities(self, lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor]:
         """Return bounds of the probability of each sampled action. Shapes: (N, actions)."""
-        largest: list[Tensor] = []
-        least = self._least(lower, upper, largest).double() / self._scale
-        least -= self._error(largest).clamp(min=self.gap)
+        least, gap = self._least(lower, upper)
+        least = least.double() / self._scale - gap
         lead = torch.zeros(len(least), self.num_actions, self.num_actions, dtype=torch.float64)
         first, second = torch.tensor(self._pairs).T
         lead[:, first, second] = least  # of an action over another one, at least
         return 1 / (-lead).exp().sum(-1), 1 / lead.transpose(1, 2).exp().sum(-1)
 
-    def _least(self, lower: Tensor, upper: Tensor, largest: list[Tensor] | None = None) -> Tensor:
-        """Return the lower bound of each logit difference, times the scale. Shape: (N, pairs).
+    def _least(self, lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor]:
+        """Return lower bounds of the logit differences, and the lead that is certain.
 
-        `largest` receives the largest input magnitude of each layer. Shapes: (1, *), float64.
+        Shapes: (N, pairs), times the scale; (pairs,), float64.
         """
         total, width = lower + upper, upper - lower
+        largest: list[Tensor] = []
         for step, scale in self._steps:
-            if largest is not None:
-                largest.append(_size(total, width) / scale)
+            largest.append(_size(total, width) / scale)
             total, width = step(total, width)
-        if largest is not None:
-            largest.append(_size(total, width) / self._scale)
+        largest.append(_size(total, width) / self._scale)
         least = functional.linear(total, self._weight, self._scale * self._bias)
-        return least - functional.linear(width, self._weight.abs())
+        least = least - functional.linear(width, self._weight.abs())
+        return least, self._error(largest).clamp(min=self.gap)
 
     @torch.no_grad()
     def decide(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
@@ -124,15 +118,14 @@ class NetworkBounds:
         It holds for all images seen so far.
         """
         lower, upper = pictures.amin(0, keepdim=True), pictures.amax(0, keepdim=True)
-        hull = self._hull
-        if hull is None or bool(((lower < hull.lower) | (upper > hull.upper)).any()):
-            if hull is not None:
-                lower, upper = torch.minimum(lower, hull.lower), torch.maximum(upper, hull.upper)
-            largest: list[Tensor] = []
-            self._least(lower, upper, largest)
-            gap = self._error(largest).clamp(min=self.gap).float()
-            hull = self._hull = _Hull(lower, upper, gap)
-        return hull.gap
+        if self._hull is not None:
+            lowest, highest, gap = self._hull
+            if not bool(((lower < lowest) | (upper > highest)).any()):
+                return gap
+            lower, upper = torch.minimum(lower, lowest), torch.maximum(upper, highest)
+        gap = self._least(lower, upper)[1].float()
+        self._hull = lower, upper, gap
+        return gap
 
     def _error(self, largest: Sequence[Tensor]) -> Tensor:
         """Return twice the rounding error of logit differences. Shape: (pairs,), float64."""
@@ -148,14 +141,6 @@ class NetworkBounds:
         for (_, loser), beats in zip(self._pairs, is_certain.T, strict=True):
             bits &= torch.where(beats, 255 - (1 << loser), 255).to(torch.uint8)
         return bits
-
-
-class _Hull(NamedTuple):
-    """Bounds on all images seen so far, and the lead that is certain for them."""
-
-    lower: Tensor
-    upper: Tensor
-    gap: Tensor
 
 
 def _errors_of(layer: nn.Module) -> Layer:
@@ -180,12 +165,13 @@ Step = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]
 
 def _step(layer: nn.Module, scale: int) -> Step:
     """Return how intervals pass through a layer; `scale` is the factor of sums before it."""
-    if isinstance(layer, nn.Conv2d):
-        return _convolution(layer, scale)
-    if isinstance(layer, nn.Linear):
-        return _linear(layer, scale)
+    if isinstance(layer, _AFFINE):
+        weight, bias = layer.weight.detach(), layer.bias
+        bias = None if bias is None else scale * bias.detach()
+        apply = layer._conv_forward if isinstance(layer, nn.Conv2d) else functional.linear
+        return lambda total, width: (apply(total, weight, bias), apply(width, weight.abs(), None))
     if isinstance(layer, nn.ReLU | nn.MaxPool2d | nn.Flatten):  # larger inputs, larger outputs
-        return lambda total, width: _monotone(layer, total, width)
+        return functools.partial(_monotone, layer)
     raise InputError(
         f"proofs do not support the network's layer {type(layer).__name__}; prove a policy of "
         "convolutions, linear layers, ReLU, MaxPool2d and Flatten"
@@ -198,30 +184,6 @@ def _monotone(layer: nn.Module, total: Tensor, width: Tensor) -> tuple[Tensor, T
     return lower + upper, upper.sub_(lower)
 
 
-def _convolution(layer: nn.Conv2d, scale: int) -> Step:
-    weight, bias = layer.weight.detach(), layer.bias
-    bias = None if bias is None else scale * bias.detach()
-
-    def step(total: Tensor, width: Tensor) -> tuple[Tensor, Tensor]:
-        return (
-            layer._conv_forward(total, weight, bias),
-            layer._conv_forward(width, weight.abs(), None),
-        )
-
-    return step
-
-
-def _linear(layer: nn.Linear, scale: int) -> Step:
-    weight, bias = layer.weight.detach(), scale * layer.bias.detach()
-
-    def step(total: Tensor, width: Tensor) -> tuple[Tensor, Tensor]:
-        return functional.linear(total, weight, bias), functional.linear(width, weight.abs())
-
-    return step
-
-
-Transform = Callable[[Tensor], Tensor]
-
 Crop = tuple[slice, slice]  # rows and columns of an image
 _FACES = 4
 
@@ -229,7 +191,9 @@ _FACES = 4
 class Compositor:
     """Composes images of cubes, nearer ones in front, before a uniform background."""
 
-    def __init__(self, background: Tensor, faces: Tensor, rest: Transform | None = None) -> None:
+    def __init__(
+        self, background: Tensor, faces: Tensor, rest: Callable[[Tensor], Tensor] | None = None
+    ) -> None:
         """Store the brightness of everything.
 
         Args:
@@ -273,10 +237,7 @@ class Compositor:
     def paint_one(self, cubes: Sequence[tuple[Crop, Tensor]], num_pictures: int) -> Tensor:
         """Return known images. Shape: (N, height, width).
 
-        Args:
-            cubes: For each cube, nearest first: the crop outside which it is never visible; its
-                faces there, shape (N, rows, columns), uint8.
-            num_pictures: N.
+        As `paint`, but with each cube's faces, shape (N, rows, columns), uint8.
         """
         pictures = self._background.repeat(num_pictures, 1, 1)
         for part, faces in reversed(cubes):

@@ -74,10 +74,8 @@ def union(boxes: Boxes, most: int = MOST_GRIDS) -> Boxes:
         return boxes
     boxes = np.unique(boxes, axis=0)
     hull = np.stack([boxes[..., 0].min(0), boxes[..., 1].max(0)], -1)[None]
-    grids = _grids(boxes, hull, most)
-    if grids is None:
-        return merge(boxes)
-    return merge(np.concatenate([_of_grid(_covered(*grid), grid[1]) for grid in grids]))
+    found = _select(boxes, hull, most, covered=True)
+    return merge(boxes) if found is None else found
 
 
 def complement(boxes: Boxes, space: Boxes, most: int = MOST_GRIDS) -> Boxes | None:
@@ -85,10 +83,27 @@ def complement(boxes: Boxes, space: Boxes, most: int = MOST_GRIDS) -> Boxes | No
 
     None if it takes more than `most` grids.
     """
-    grids = _grids(boxes, space, most)
-    if grids is None:
-        return None
-    return merge(np.concatenate([_of_grid(~_covered(*grid), grid[1]) for grid in grids]))
+    return _select(boxes, space, most, covered=False)
+
+
+def _select(boxes: Boxes, space: Boxes, most: int, *, covered: bool) -> Boxes | None:
+    """Return what is covered by boxes or not; None if it takes more than `most` grids."""
+    found = []
+    for some, sides in _grids(boxes, space, most) or ():
+        ends = blocks(_covered(some, sides) == covered)
+        found.append(merge(np.stack([side[ends[:, k]] for k, side in enumerate(sides)], 1)))
+    return merge(np.concatenate(found)) if found else None
+
+
+def unite(intervals: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
+    """Merge intervals, sorted by their start or middle, that overlap or are at most `gap` apart."""
+    starts, stops = intervals.T
+    is_new = starts[1:] > np.maximum.accumulate(stops)[:-1] + gap
+    first = np.flatnonzero(np.append(True, is_new)[: len(starts)])
+    if not len(first):
+        return intervals
+    merged = np.minimum.reduceat(starts, first), np.maximum.reduceat(stops, first)
+    return np.stack(merged, -1)
 
 
 def blocks(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -185,11 +200,6 @@ def _covered(boxes: Boxes, sides: Sides) -> NDArray[np.bool_]:
     for axis in range(len(sides)):
         count = count.cumsum(axis)
     return count[(slice(-1),) * len(sides)] > 0
-
-
-def _of_grid(mask: NDArray[np.bool_], sides: Sides) -> Boxes:
-    ends = blocks(mask)
-    return merge(np.stack([side[ends[:, k]] for k, side in enumerate(sides)], 1))
 
 
 def _join(boxes: NDArray[_Number], cube: int) -> NDArray[_Number]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.utils.errors import InputError
+from drone_rl.verification.prover.boxes import unite
 from drone_rl.verification.prover.cube_images import CameraModel, CubeView
 
 NARROWER = 8  # factor by which bands are narrower where the renderer's images are available
@@ -32,7 +33,7 @@ class Cells:
         """Find the cells.
 
         Args:
-            camera: The camera.
+            camera: The policy's.
             ahead: Metres from the camera to the cube's centre.
             lowest: Start of the first cell, metres to the left of the camera.
             highest: End of the last cell.
@@ -59,7 +60,7 @@ class Cells:
                 )
         self.limits = _limits(bands, lowest, highest)
         """Start of each cell and band, then the end of the last, metres left of the camera."""
-        pure = camera.faces(ahead, _middles(self.limits))
+        pure = _middle_faces(camera, ahead, self.limits)
         between = [pure[:0]] * len(bands) if between is None else between
         parts, begins = [pure[:1]], [0]
         for inner, after in zip(between, pure[1:], strict=True):
@@ -72,7 +73,6 @@ class Cells:
         """Index of the last one."""
 
     def __len__(self) -> int:
-        """Return the number of cells and bands."""
         return len(self.limits) - 1
 
     def between(self, lowest: float, highest: float) -> "Cells":
@@ -100,8 +100,8 @@ def _bands(
     """Return the bands that intersect an interval. Shape: (N, 2)."""
     places, errors = camera.borders(ahead)
     errors = errors / narrower + camera.rounding(places)
-    starts, stops = _unite(places - errors, places + errors)
-    return np.stack([starts, stops], -1)[(stops > lowest) & (starts < highest)]
+    bands = unite(np.stack([places - errors, places + errors], -1), 4 * SLIVER)
+    return bands[(bands[:, 1] > lowest) & (bands[:, 0] < highest)]
 
 
 def _limits(bands: NDArray, lowest: float, highest: float) -> NDArray[np.float64]:
@@ -111,8 +111,9 @@ def _limits(bands: NDArray, lowest: float, highest: float) -> NDArray[np.float64
     return np.concatenate([[lowest], bands.reshape(-1), [highest]])
 
 
-def _middles(limits: NDArray) -> NDArray[np.float64]:
-    return (limits[0::2] + limits[1::2]) / 2
+def _middle_faces(camera: CameraModel, ahead: float, limits: NDArray) -> NDArray[np.uint8]:
+    """Return the faces in closed form in the middle of each cell."""
+    return camera.faces(ahead, (limits[0::2] + limits[1::2]) / 2)
 
 
 def _within(
@@ -131,8 +132,9 @@ def _within(
     # most changes lie close to where they would be without rounding
     left = np.stack([low, middle - close, middle + close, high], -1).astype(np.float32)
     drawn = _look(renderer, left)
-    pure = camera.faces(ahead, _middles(_limits(bands, np.inf, -np.inf)))
-    if (drawn[:-1, -1] != drawn[1:, 0]).any() or _differs(renderer, drawn, pure):
+    pure = _middle_faces(camera, ahead, _limits(bands, np.inf, -np.inf))
+    next_to = np.concatenate([drawn[:, 0], drawn[-1:, -1]])
+    if (drawn[:-1, -1] != drawn[1:, 0]).any() or (renderer.read(next_to) != pure).any():
         return None
     band, found = np.arange(len(bands)), []
     while True:
@@ -161,18 +163,3 @@ def _look(renderer: CubeView, left: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Render several positions per band. Shape: (bands, places) to (bands, places, ...)."""
     pictures = renderer.look(left.reshape(-1))
     return pictures.reshape(*left.shape, *pictures.shape[1:])
-
-
-def _differs(renderer: CubeView, drawn: NDArray[np.uint8], pure: NDArray[np.uint8]) -> bool:
-    """Return whether the images next to bands contradict the closed form."""
-    beside = np.concatenate([drawn[:, 0], drawn[-1:, -1]])
-    return bool(len(beside)) and (renderer.read(beside) != pure).any()
-
-
-def _unite(starts: NDArray, stops: NDArray) -> tuple[NDArray, NDArray]:
-    """Merge overlapping intervals that are sorted by their middles."""
-    if not len(starts):
-        return starts, stops
-    is_new = starts[1:] > np.maximum.accumulate(stops)[:-1] + 4 * SLIVER
-    first = np.flatnonzero(np.concatenate([[True], is_new]))
-    return np.minimum.reduceat(starts, first), np.maximum.reduceat(stops, first)

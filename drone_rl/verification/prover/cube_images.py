@@ -187,10 +187,6 @@ class CubeImages:
                 "floor or the sky; give another colour"
             )
 
-    def of(self, cube: int, steps: int) -> "CubeView":
-        """Return the view of one cube after a number of steps ahead."""
-        return CubeView(self, cube, steps)
-
     def read(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Convert rendered images of one cube to faces, as `CameraModel.faces` returns them.
 

@@ -9,7 +9,6 @@ import dataclasses
 import functools
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -164,17 +163,8 @@ class Nodes(Batch):
     collected: Tensor  # (K,) int64; bit k is set if cube k is collected
 
 
-class Shape(NamedTuple):
-    """Number of values of each part of a node, without the placement."""
-
-    ahead: int
-    aside: int
-    collected: int
-
-    @property
-    def nodes(self) -> int:
-        """Nodes per placement."""
-        return self.ahead * self.aside * self.collected
+Shape = tuple[int, int, int]
+"""Number of values of each part of a node, without the placement."""
 
 
 @dataclasses.dataclass
@@ -193,7 +183,7 @@ class Graph:
 
     def states(self) -> WorldState:
         """Return the nodes as states that can be rendered."""
-        return states(self.settings, self.cubes, self.nodes)
+        return _states(self.settings, self.cubes, self.nodes)
 
     def pictures(self) -> tuple[Tensor, Tensor]:
         """Return one node per distinct image, (U,), and the image of each node, (K,)."""
@@ -205,48 +195,41 @@ class Graph:
 
 
 def explore(settings: TaskSettings, cubes: Tensor) -> Graph:
-    """Follow every move from the start until no node is new.
+    """Follow every move from the start until no node is new; see `shape_of` for errors.
 
-    Args:
-        settings: The task.
-        cubes: Placements, metres, world frame. Shape: (P, C, 3), float64.
-
-    Raises:
-        InputError: The task has too many nodes.
+    The placements of the cubes are in metres, world frame. Shape: (P, C, 3), float64.
     """
-    shape = shape_of(settings)
-    count = len(cubes)
-    number = torch.full((count * shape.nodes,), -1)
+    shape, count = shape_of(settings), len(cubes)
+    number = torch.full((count * math.prod(shape),), -1)
     zeros = torch.zeros(count, dtype=torch.int64)
     frontier = Nodes(torch.arange(count), zeros, zeros, zeros)
     parts, known = [], 0
     while len(frontier):
         number[_keys(shape, frontier)] = torch.arange(known, known + len(frontier))
         known += len(frontier)
-        moved, reason = follow(settings, cubes, frontier)
+        moved, reason = _follow(settings, cubes, frontier)
         goes_on = reason == EndReason.RUNNING
         keys = torch.where(goes_on.flatten(), _keys(shape, moved), -1).view(reason.shape)
         parts.append((frontier, keys, reason, moved.collected.view(reason.shape)))
         new = keys[goes_on].unique()
-        frontier = _cells(shape, new[number[new] < 0])
+        frontier = Nodes(*torch.unravel_index(new[number[new] < 0], (count, *shape)))
+        frontier.aside -= shape[1] // 2
     nodes, keys, reason, collected = zip(*parts, strict=True)
     key = torch.cat(keys)
     return Graph(
         settings,
         cubes,
-        Nodes(*(torch.cat(values) for values in zip(*map(_values, nodes), strict=True))),
+        Nodes.joined(nodes),
         target=torch.where(key < 0, -1, number[key]),
         reason=torch.cat(reason),
         collected=torch.cat(collected),
     )
 
 
-def follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes, Tensor]:
-    """Apply every move to some nodes, by `CollectCubes.judge`.
+def _follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes, Tensor]:
+    """Return the nodes after each move, those of the first node first (K * A), and their ends.
 
-    Returns:
-        The nodes after each move, those of the first node first (K * A); and the `EndReason` of
-        each, never the step limit. Shape: (K, A).
+    The `EndReason` of each move, never the step limit, has shape (K, A).
     """
     moves = torch.tensor(DIRECTIONS).long()
     each = torch.arange(len(nodes)).repeat_interleave(len(moves))
@@ -254,12 +237,12 @@ def follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes, 
     ahead, aside, _ = (moves.repeat(len(nodes), 1)).unbind(-1)
     moved = dataclasses.replace(before, ahead=before.ahead + ahead, aside=before.aside + aside)
     body = BodyState.at_rest(_positions(settings, moved))
-    judged, _ = CollectCubes(settings).judge(states(settings, cubes, before), body)
+    judged, _ = CollectCubes(settings).judge(_states(settings, cubes, before), body)
     moved.collected = _as_bits(judged.collected)
     return moved, judged.end_reason.view(len(nodes), len(moves))
 
 
-def states(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> WorldState:
+def _states(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> WorldState:
     """Convert nodes to states; steps are -1, so that the step limit is never met."""
     body = BodyState.at_rest(_positions(settings, nodes))
     state = CollectCubes(settings).start(cubes[nodes.placement], body)
@@ -271,15 +254,15 @@ def states(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> WorldState:
 
 
 def shape_of(settings: TaskSettings) -> Shape:
-    """Return the possible numbers of nodes; raise InputError if there are too many."""
+    """Return the numbers of possible nodes; raise InputError if there are too many."""
     ahead = math.ceil(settings.front_bound / settings.step_length) + 2
     aside = 2 * (math.ceil(settings.side_bound / settings.step_length) + 1) + 1
-    shape = Shape(ahead, aside, 2**settings.num_cubes)
-    if shape.nodes > MOST_NODES:
+    shape = ahead, aside, 2**settings.num_cubes
+    if math.prod(shape) > MOST_NODES:
         raise InputError(
             f"num_cubes={settings.num_cubes} and step_length={settings.step_length} give "
-            f"{shape.nodes:.2g} nodes per placement, more than {MOST_NODES:.2g}; give fewer cubes "
-            "or longer steps"
+            f"{math.prod(shape):.2g} nodes per placement, more than {MOST_NODES:.2g}; give fewer "
+            "cubes or longer steps"
         )
     return shape
 
@@ -305,17 +288,6 @@ def _as_bits(flags: Tensor) -> Tensor:
 
 def _keys(shape: Shape, nodes: Nodes) -> Tensor:
     """Return a unique number for each node. Shape: (K,)."""
-    row = nodes.placement * shape.ahead + nodes.ahead
-    place = row * shape.aside + nodes.aside + shape.aside // 2
-    return place * shape.collected + nodes.collected
-
-
-def _cells(shape: Shape, keys: Tensor) -> Nodes:
-    """Return the nodes of keys."""
-    place, collected = keys // shape.collected, keys % shape.collected
-    row, column = place // shape.aside, place % shape.aside
-    return Nodes(row // shape.ahead, row % shape.ahead, column - shape.aside // 2, collected)
-
-
-def _values(nodes: Nodes) -> tuple[Tensor, ...]:
-    return nodes.placement, nodes.ahead, nodes.aside, nodes.collected
+    num_ahead, num_aside, num_sets = shape
+    row = nodes.placement * num_ahead + nodes.ahead
+    return (row * num_aside + nodes.aside + num_aside // 2) * num_sets + nodes.collected

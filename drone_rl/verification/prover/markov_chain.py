@@ -7,16 +7,15 @@ Leach and Dean, 2000), solved backwards for its best and worst case.
 """
 
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence
-from typing import Self
+from collections.abc import Callable, Iterable
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
-from torchrl.envs import CatFrames, Transform, TransformedEnv
+from torchrl.envs import Transform, TransformedEnv
 
-from drone_rl.envs import CameraFault, worlds_of
+from drone_rl.envs import worlds_of
 from drone_rl.policies.rounding import RoundingBound
 from drone_rl.sim.tasks.collect_cubes import EndReason, WorldState
 from drone_rl.utils.batch import Batch
@@ -55,12 +54,6 @@ class Outcomes(Batch):
     """Probability not followed to its end. Every other probability is too low by at most this, and
     never too high, up to float64 rounding."""
 
-    @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
-        """Concatenate the outcomes of several sets of placements."""
-        columns = zip(*((p.ends, p.steps, p.undecided) for p in parts), strict=True)
-        return cls(*(torch.cat(column) for column in columns))
-
     @property
     def success(self) -> Tensor:
         """Probability that all cubes are collected. Shape: (P,)."""
@@ -69,8 +62,7 @@ class Outcomes(Batch):
     @property
     def failure(self) -> Tensor:
         """Probability that they are not, to full precision even if tiny. Shape: (P,)."""
-        missed = [reason for reason in EndReason if reason != EndReason.ALL_CUBES]
-        return self.reasons[:, missed].sum(-1)
+        return self.reasons[:, [end for end in EndReason if end != EndReason.ALL_CUBES]].sum(-1)
 
     @property
     def reasons(self) -> Tensor:
@@ -93,9 +85,7 @@ class Outcomes(Batch):
 def propagate(graph: Graph, evaluate: Evaluate) -> Outcomes:
     """Propagate the probability of every node until all episodes have ended.
 
-    Args:
-        graph: From `drone_rl.verification.prover.lattice.explore`.
-        evaluate: The policy; called once for each node that matters.
+    The policy is evaluated once at each node that matters.
     """
     count, sets = len(graph.cubes), 2 ** graph.cubes.shape[1]
     placement = graph.nodes.placement.numpy()
@@ -114,11 +104,10 @@ def propagate(graph: Graph, evaluate: Evaluate) -> Outcomes:
 
 
 def _propagate(graph: Graph, evaluate: Evaluate) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Step until every episode has ended.
+    """Return what is known of each node once every episode has ended.
 
-    Returns:
-        For each node the action probabilities, 0 where not evaluated (K, A); the expected number
-        of visits; the probability at the step limit; and that not followed. Shapes: (K,).
+    The action probabilities, 0 where not evaluated (K, A); the expected number of visits; the
+    probability at the step limit; and that not followed. Shapes: (K,).
     """
     target = graph.target.numpy()
     goes_on = target >= 0
@@ -146,33 +135,13 @@ class NodeEvaluator:
     """Renders graph nodes and evaluates the policy's action probabilities there."""
 
     def __init__(self, env: TransformedEnv, network: Callable[[Tensor], Tensor]) -> None:
-        """Use an environment's renderer and transforms, and a network.
-
-        Args:
-            env: Environment of cube collection with the policy's transforms.
-            network: Maps images (N, C, H, W) to logits (N, A).
-
-        Raises:
-            InputError: The policy has memory or its camera simulates faults, so that a node does
-                not determine the action.
-        """
+        """Use an environment's renderer and transforms, and a network from images to logits."""
         self.pictures = 0  # images rendered so far
         self._worlds, self._network = worlds_of(env), network
         is_module = isinstance(network, nn.Module)
         self._rounding = RoundingBound.find(network) if is_module else None
         pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
         self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
-        stacks = [t.N for t in self._transforms if isinstance(t, CatFrames)]
-        if max(stacks, default=1) > 1:
-            raise InputError(
-                f"the policy stacks {max(stacks)} frames, so its actions depend on the past; give "
-                "a policy that observes one frame"
-            )
-        if faults := [t for t in self._transforms if isinstance(t, CameraFault)]:
-            raise InputError(
-                f"the policy's camera simulates faults ({faults[0]}), so its actions depend on "
-                "chance or the past; give a policy without faults"
-            )
 
     def on(self, graph: Graph) -> Evaluate:
         """Return the evaluator of a graph's nodes; no image is rendered twice."""
@@ -194,16 +163,14 @@ class NodeEvaluator:
     def _probabilities(self, states: WorldState) -> Tensor:
         """Return the action probabilities. Shape: (N, A), float64, on the CPU."""
         self.pictures += len(states)
-        parts = states.to(self._worlds.device).split(BATCH)
-        return torch.cat([self._logits(part) for part in parts]).double().softmax(-1).cpu()
-
-    def _logits(self, state: WorldState) -> Tensor:
-        pixels = self._worlds.render(state)
-        for transform in self._transforms:
-            pixels = transform._apply_transform(pixels)
-        logits = self._network(pixels)  # refuses what is not finite
-        self._check_rounding(pixels)
-        return logits
+        logits = []
+        for part in states.to(self._worlds.device).split(BATCH):
+            pixels = self._worlds.render(part)
+            for transform in self._transforms:
+                pixels = transform._apply_transform(pixels)
+            logits.append(self._network(pixels))  # refuses what is not finite
+            self._check_rounding(pixels)
+        return torch.cat(logits).double().softmax(-1).cpu()
 
     def _check_rounding(self, pixels: Tensor) -> None:
         """Raise InputError if rounding may change a logit by more than `MOST_ROUNDING`."""

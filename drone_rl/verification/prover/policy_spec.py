@@ -23,9 +23,15 @@ from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.bounds import Compositor, NetworkBounds
 from drone_rl.verification.prover.boxes import Boxes, all_placements
 from drone_rl.verification.prover.cells import Cells
-from drone_rl.verification.prover.cube_images import FRONT, CameraModel, CubeImages, camera_ahead
+from drone_rl.verification.prover.cube_images import (
+    FRONT,
+    CameraModel,
+    CubeImages,
+    CubeView,
+    camera_ahead,
+)
 from drone_rl.verification.prover.lattice import Lattice
-from drone_rl.verification.requirements import require_cubes, require_moves
+from drone_rl.verification.requirements import require_cubes
 
 _MONOTONE = ("gray", "standardize", "crop", "resize", "blur")  # monotone transforms
 _BLIND = ("step_count", "episode_reward")  # transforms that do not change images
@@ -45,7 +51,7 @@ class PolicySpec:
     def cells(self, cube: int, steps: int, lowest: float, highest: float) -> Cells:
         """Return one cube's cells between metres to the left, after a number of steps ahead."""
         ahead = self.lattice.cubes[cube] - steps * self.lattice.task.step_length - camera_ahead()
-        return Cells(self.camera, ahead, lowest, highest, self.images.of(cube, steps))
+        return Cells(self.camera, ahead, lowest, highest, CubeView(self.images, cube, steps))
 
     def close(self) -> None:
         """Close the environments that render."""
@@ -69,9 +75,8 @@ def make_policy_spec(
     Raises:
         InputError: The policy or task is not supported; the message says why.
     """
-    task = require_cubes(description.task, "proofs")
+    task = require_cubes(description, "proofs")
     check_task(task)
-    require_moves(description.dynamics, description.actions, "proofs")
     if not description.appearance.is_minimal:
         raise InputError(
             "proofs support only appearance=minimal, whose images have a closed form; prove a "
@@ -107,20 +112,10 @@ def make_compositor(description: PolicyDescription, images: CubeImages) -> Compo
     """Apply the policy's transforms to the colours of faces and background.
 
     Raises:
-        InputError: A transform has memory, simulates a fault, or is not monotone.
+        InputError: A transform is not monotone.
     """
     chosen = [choice for choice in description.transforms if choice.name not in _BLIND]
     names = [choice.name for choice in chosen]
-    if "stack" in names:
-        raise InputError(
-            "the policy observes a stack of frames, so its actions depend on the past; prove one "
-            "without memory"
-        )
-    if description.faults:
-        raise InputError(
-            f"the policy's camera simulates faults (transform {description.faults[0]}), so its "
-            "actions depend on chance or the past; prove one without faults"
-        )
     if strange := [name for name in names if name not in _MONOTONE]:
         raise InputError(
             f"the transform {strange[0]} is not monotone in brightness; prove a policy whose only "
@@ -156,15 +151,13 @@ def pictures_of_each(spec: PolicySpec) -> list[int]:
     """Return the approximate number of images of each cube, where their product is largest."""
     lattice, found = spec.lattice, []
     for steps in range(lattice.last):
-        away = lattice.cubes - steps * lattice.task.step_length
-        found.append([_count(spec, ahead) if ahead >= 0 else 1 for ahead in away])
+        counts = []
+        for ahead in lattice.cubes - steps * lattice.task.step_length:
+            borders = spec.camera.borders(ahead - camera_ahead())[0] if ahead >= 0 else np.empty(0)
+            inside = np.abs(borders) <= lattice.task.lateral_bound
+            counts.append(1 + PICTURES * int(inside.sum()))
+        found.append(counts)
     return max(found, key=math.prod)
-
-
-def _count(spec: PolicySpec, away: float) -> int:
-    """Return the approximate number of images of a cube, metres ahead of the drone."""
-    places, _ = spec.camera.borders(away - camera_ahead())
-    return 1 + PICTURES * int((np.abs(places) <= spec.lattice.task.lateral_bound).sum())
 
 
 def partition_placements(spec: PolicySpec, most: int) -> Boxes:

@@ -5,16 +5,14 @@ partition the placements, and every episode from a box must end as stated.
 """
 
 import dataclasses
-import hashlib
 import io
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from torch import Tensor
 
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.tasks.collect_cubes import EndReason
@@ -30,20 +28,14 @@ FORMAT = "drone_rl certificate"
 FORMAT_VERSION = 1
 _COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band", "decided")
 _SETS = ("waiting", "ended", "ways", "forked", "parts", "part", "done", "undecided")
-_DAMAGE = (*(ValueError, TypeError, LookupError, ArithmeticError, AttributeError),)
+_DAMAGE = (ValueError, TypeError, LookupError, ArithmeticError, AttributeError)
 """Errors from reading a damaged file."""
 _MOST = 2**40  # bound on every integer in a row
 _NOWHERE = (-1, 0, 0)  # stands for an unknown ending
 
-
-def weights_hash(weights: Mapping[str, Tensor]) -> str:
-    """Return the SHA-256 hash of a network's weights; order and device do not matter."""
-    digest = hashlib.sha256()
-    for name in sorted(weights):
-        value = weights[name].detach().cpu().float().contiguous()
-        digest.update(f"{name} {list(value.shape)}\n".encode())
-        digest.update(value.numpy().astype("<f4").tobytes())
-    return digest.hexdigest()
+_Row = tuple[int, ...]
+_Set = list[tuple[_Row, Boxes]]
+"""Boxes, each with the integers that say what they are."""
 
 
 def certify(
@@ -59,32 +51,40 @@ def certify(
     Args:
         name: The policy's name, for people.
         description: The policy's, in the task of the proof.
-        weights: See `weights_hash`.
+        weights: SHA-256 hash of the network's weights.
         prover: The proof.
         seconds: Duration.
         stopped_by: The setting that stopped it early.
     """
-    findings = prover.findings()
-    task = prover.lattice.task
+    findings, task = prover.findings(), prover.lattice.task
     total = (2 * task.lateral_bound) ** task.num_cubes
+
+    def share(boxes: Boxes) -> float:
+        return float(volumes(boxes).sum()) / total
+
+    outcomes = [
+        {
+            "end": ending.reason.name.lower(),
+            "collected": [bool(ending.collected >> k & 1) for k in range(task.num_cubes)],
+            "loops": ending.loops,
+            "share": share(boxes),
+            "steps": {str(k): v / total for k, v in sorted(findings.steps.get(ending, {}).items())},
+            "boxes": boxes.tolist(),
+        }
+        for ending, boxes in sorted(findings.endings.items())
+        if len(boxes)
+    ]
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
         "policy": {"name": name, "weights": weights, "description": description.as_dict()},
-        "outcomes": [
-            _outcome(ending, boxes, findings, task.num_cubes, total)
-            for ending, boxes in sorted(findings.endings.items())
-            if len(boxes)
-        ],
-        "undecided": {
-            "share": float(volumes(findings.undecided).sum()) / total,
-            "boxes": findings.undecided.tolist(),
-        },
+        "outcomes": outcomes,
+        "undecided": {"share": share(findings.undecided), "boxes": findings.undecided.tolist()},
         "finished": prover.is_finished,
         "stated": {
-            "logit_gap": prover.gap,
+            "logit_gap": prover.spec.bounds.gap,
             "largest_band": prover.largest_band,
-            "renderer": prover.renderer,
+            "renderer": type(prover.spec.worlds.renderer).__name__,
         },
         "found": {
             "least_gap": prover.least_gap if prover.least_gap < float("inf") else None,
@@ -99,28 +99,30 @@ def certify(
 
 def save(prover: Prover, path: Path, proof_id: str) -> None:
     """Write a proof's state atomically; `proof_id` identifies what is proved."""
-    waiting = [
-        ((*dataclasses.astuple(p), prover.longest.get(p, 0)), b)
-        for p, boxes in prover.waiting.items()
-        for b in boxes
-    ]
-    ended = [((*_row(e), s), b) for (e, s), boxes in prover.ended.items() for b in boxes]
-    ways = [(_row(e), b) for e, boxes in prover.fork_ends.items() for b in boxes]
-    steps = [((*_row(e), s), v) for e, known in prover.done.steps.items() for s, v in known.items()]
-    arrays = {
+    done = prover.done
+    sets: dict[str, _Set] = {
+        "waiting": [
+            ((*dataclasses.astuple(p), prover.longest.get(p, 0)), b)
+            for p, boxes in prover.waiting.items()
+            for b in boxes
+        ],
+        "ended": [((*_row(e), s), b) for (e, s), boxes in prover.ended.items() for b in boxes],
+        "ways": [(_row(e), b) for e, boxes in prover.fork_ends.items() for b in boxes],
+        "forked": [((), b) for b in prover.forked],
+        "parts": [((), prover.parts)],
+        "part": [((), prover.part)],
+        "done": [(_row(e), b) for e, b in done.endings.items()],
+        "undecided": [((), done.undecided)],
+    }
+    steps = [((*_row(e), s), v) for e, known in done.steps.items() for s, v in known.items()]
+    arrays: dict[str, Any] = {
         "subject": np.frombuffer(proof_id.encode(), np.uint8),
         "counts": np.array([getattr(prover, name) for name in _COUNTS], np.float64),
-        **_packed("waiting", waiting),
-        **_packed("ended", ended),
-        **_packed("ways", ways),
-        **_packed("forked", [((), b) for b in prover.forked]),
-        **_packed("parts", [((), prover.parts)]),
-        **_packed("part", [((), prover.part)]),
-        **_packed("done", [(_row(e), b) for e, b in prover.done.endings.items()]),
-        **_packed("undecided", [((), prover.done.undecided)]),
-        "steps_rows": np.array([row for row, _ in steps], np.int64).reshape(len(steps), 4),
-        "steps_volumes": np.array([volume for _, volume in steps], np.float64),
     }
+    for name, parts in sets.items():
+        arrays |= _packed(name, parts)
+    arrays["steps_rows"] = np.array([row for row, _ in steps], np.int64).reshape(len(steps), 4)
+    arrays["steps_volumes"] = np.array([volume for _, volume in steps], np.float64)
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
     write_atomically(path, buffer.getvalue())
@@ -141,11 +143,12 @@ def load(prover: Prover, path: Path, proof_id: str, most: int = ARRAYS_BYTES) ->
         }
         shape = prover.parts.shape[1:]
         sets = {name: _unpacked(name, state, shape) for name in _SETS}
-        waiting = [(_place(row[:-1]), row[-1], b) for row, b in sets["waiting"]]
+        waiting = [(*_place(row), b) for row, b in sets["waiting"]]
         ended = [((_ending(row), row[3]), b) for row, b in sets["ended"]]
         ways = [(None if row == _NOWHERE else _ending(row), b) for row, b in sets["ways"]]
         forked = [boxes for _, boxes in sets["forked"]]
-        parts, part, left = (_only(sets[name]) for name in ("parts", "part", "undecided"))
+        ((_, parts),), ((_, part),) = sets["parts"], sets["part"]
+        ((_, left),) = sets["undecided"]
         _check(part, waiting, [*ended, *ways, *forked])
         done = [Findings({_ending(row): b}, left[:0], {}) for row, b in sets["done"]]
         done = combine([Findings({}, left, _steps(state)), *done])
@@ -170,9 +173,15 @@ def load(prover: Prover, path: Path, proof_id: str, most: int = ARRAYS_BYTES) ->
         setattr(prover, name, count)
 
 
-def _place(row: tuple[int, ...]) -> LatticeState:
-    ahead, left, collected, steps, came, is_fork = row
-    return LatticeState(ahead, left, collected, steps, came, bool(is_fork))
+def _check(part: Boxes, waiting: Sequence, known: Sequence) -> None:
+    """Check that states are pending exactly where a part is in progress."""
+    if len(part) != bool(waiting) or (known and not waiting):
+        raise ValueError(f"{len(part)} parts are in progress at {len(waiting)} states")
+
+
+def _place(row: _Row) -> tuple[LatticeState, int]:
+    ahead, left, collected, steps, came, is_fork, longest = row
+    return LatticeState(ahead, left, collected, steps, came, bool(is_fork)), longest
 
 
 def _row(ending: Ending | None) -> tuple[int, int, int]:
@@ -181,19 +190,8 @@ def _row(ending: Ending | None) -> tuple[int, int, int]:
     return int(ending.reason), ending.collected, int(ending.loops)
 
 
-def _ending(row: tuple[int, ...]) -> Ending:
+def _ending(row: _Row) -> Ending:
     return Ending(EndReason(row[0]), row[1], bool(row[2]))
-
-
-def _only(parts: Sequence[tuple[tuple[int, ...], Boxes]]) -> Boxes:
-    ((_, boxes),) = parts
-    return boxes
-
-
-def _check(part: Boxes, waiting: Sequence[tuple], known: Sequence) -> None:
-    """Check that states are pending exactly where a part is in progress."""
-    if len(part) != bool(waiting) or (known and not waiting):
-        raise ValueError(f"{len(part)} parts are in progress at {len(waiting)} states")
 
 
 def _steps(state: dict[str, NDArray]) -> dict[Ending, dict[int, float]]:
@@ -207,7 +205,7 @@ def _steps(state: dict[str, NDArray]) -> dict[Ending, dict[int, float]]:
     return dict(steps)
 
 
-def _packed(name: str, parts: Iterable[tuple[tuple, Boxes]]) -> dict[str, NDArray]:
+def _packed(name: str, parts: Sequence[tuple[_Row, Boxes]]) -> dict[str, NDArray]:
     rows, boxes = [row for row, _ in parts], [b for _, b in parts]
     return {
         f"{name}_rows": np.array(rows, np.int64).reshape(len(rows), -1 if rows and rows[0] else 0),
@@ -216,9 +214,7 @@ def _packed(name: str, parts: Iterable[tuple[tuple, Boxes]]) -> dict[str, NDArra
     }
 
 
-def _unpacked(
-    name: str, state: dict[str, NDArray], shape: tuple[int, ...]
-) -> list[tuple[tuple[int, ...], Boxes]]:
+def _unpacked(name: str, state: dict[str, NDArray], shape: tuple[int, ...]) -> _Set:
     rows, counts, boxes = (state[f"{name}_{part}"] for part in ("rows", "counts", "boxes"))
     if not len(counts):
         return []
@@ -229,16 +225,3 @@ def _unpacked(
         raise ValueError(f"{name} are {boxes.dtype} of shape {boxes.shape}")
     parts = np.split(boxes, np.cumsum(counts)[:-1])
     return [(tuple(row), b) for row, b in zip(rows.tolist(), parts, strict=True)]
-
-
-def _outcome(
-    ending: Ending, boxes: Boxes, findings: Findings, num_cubes: int, total: float
-) -> dict[str, Any]:
-    return {
-        "end": ending.reason.name.lower(),
-        "collected": [bool(ending.collected >> k & 1) for k in range(num_cubes)],
-        "loops": ending.loops,
-        "share": float(volumes(boxes).sum()) / total,
-        "steps": {str(k): v / total for k, v in sorted(findings.steps.get(ending, {}).items())},
-        "boxes": boxes.tolist(),
-    }

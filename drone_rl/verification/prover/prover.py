@@ -58,20 +58,15 @@ class Prover:
     """A proof in progress; its findings are available at any time."""
 
     def __init__(self, spec: PolicySpec, most_combinations: int = 500_000_000) -> None:
-        """Start with every placement.
-
-        Args:
-            spec: Policy and task.
-            most_combinations: Approximate number of combinations of images in memory; larger tasks
-                are proved in parts, one after the other.
+        """Start with every placement, in parts of about `most_combinations` images in memory.
 
         Raises:
             InputError: There are too many parts.
         """
-        self.lattice = spec.lattice
+        self.spec, self.lattice = spec, spec.lattice
         self.parts = partition_placements(spec, most_combinations)  # not yet started
         self.part = self.parts[:0]  # in progress, if any
-        self.done = undecided(self.parts[:0])  # findings of the parts before
+        self.done = Findings({}, self.parts[:0], {})  # findings of the parts before
         self.waiting: dict[LatticeState, list[Boxes]] = defaultdict(list)
         self.ended: dict[tuple[Ending, int], list[Boxes]] = defaultdict(list)
         """Of the part in progress, by number of steps."""
@@ -82,25 +77,15 @@ class Prover:
         self.fork_ends: dict[Ending | None, list[Boxes]] = defaultdict(list)
         """Endings of branches; None if unknown."""
         self.boxes_under_way = 0  # boxes in all waiting states
-        self.num_places = self.pictures = self.most_boxes = 0
+        self.num_places = self.pictures = self.most_boxes = 0  # states, images, boxes of a state
         self.decided = 0.0  # volume known; of the part in progress, without forks
         self.least_gap, self.largest_band = np.inf, 0.0
-        self._spec, self._most = spec, most_combinations
+        self._most = most_combinations
         self._seen_from = -1
         self._foreseen: set[int] = set()
         self._cells: dict[int, Cells] = {}
         self._tables: dict[tuple[int, ...], ActionTable] = {}
         self._record = np.zeros((32, 2), np.int64)
-
-    @property
-    def gap(self) -> float:
-        """See `NetworkBounds`."""
-        return self._spec.bounds.gap
-
-    @property
-    def renderer(self) -> str:
-        """Class of the renderer that the proof is about."""
-        return type(self._spec.worlds.renderer).__name__
 
     @property
     def is_finished(self) -> bool:
@@ -113,7 +98,6 @@ class Prover:
             self.part, self.parts = self.parts[:1], self.parts[1:]
             self.wait(LatticeState(0, 0), self.part)
         place = min(self.waiting, key=lambda p: p.turn)
-        self._arrive(place.ahead)
         self._foresee(place)
         boxes = np.concatenate(self.waiting.pop(place))
         self.boxes_under_way -= len(boxes)
@@ -142,7 +126,7 @@ class Prover:
     def findings(self) -> Findings:
         """Return what is known of all placements, without forks of the part in progress."""
         task = self.lattice.task
-        found = [self.done, so_far(self.ended, self.part), undecided(self.parts)]
+        found = [self.done, so_far(self.ended, self.part), Findings({}, self.parts, {})]
         return simplified(combine(found), all_placements(task.lateral_bound, task.num_cubes))
 
     def _finish_part(self) -> None:
@@ -184,14 +168,13 @@ class Prover:
         self.wait(there, boxes)
 
     def _end(self, place: LatticeState, ending: Ending, boxes: Boxes) -> None:
-        if place.is_fork:
-            # a loop with an uncertain action may be left at any time
+        if place.is_fork:  # a loop with an uncertain action may be left at any time
             is_known = not ending.loops and ending.reason is not EndReason.STEP_LIMIT
             self.fork_ends[ending if is_known else None].append(boxes)
-        else:
-            steps = self.lattice.task.step_limit if ending.loops else place.steps
-            self.ended[ending, steps].append(boxes)
-            self.decided += float(volumes(boxes).sum())
+            return
+        steps = self.lattice.task.step_limit if ending.loops else place.steps
+        self.ended[ending, steps].append(boxes)
+        self.decided += float(volumes(boxes).sum())
 
     def _cut(self, place: LatticeState, boxes: Boxes) -> Iterator[tuple[int, Boxes]]:
         """Yield the bits of the possible actions and their part of the boxes."""
@@ -225,19 +208,15 @@ class Prover:
         self.least_gap = min(self.least_gap, table.least_gap)
         return spans
 
-    def _arrive(self, ahead: int) -> None:
-        """Drop tables of another x."""
-        if ahead != self._seen_from:
-            self._seen_from = ahead
-            self._foreseen.clear()
-            self._tables.clear()
-            self._cells.clear()
-
     def _foresee(self, place: LatticeState) -> None:
         """Fill the table for all waiting states beside this one: one large batch is faster.
 
-        None of them leads to another one.
+        None of them leads to another one. Tables of another x are dropped.
         """
+        if place.ahead != self._seen_from:
+            self._seen_from = place.ahead
+            for known in (self._foreseen, self._tables, self._cells):
+                known.clear()
         if place.collected in self._foreseen or not (cubes := self.lattice.standing(place)):
             return
         self._foreseen.add(place.collected)
@@ -255,11 +234,10 @@ class Prover:
         """Return the table at the state's x, as far to the sides as the boxes reach."""
         cells = self._all_cells(place, cubes, boxes)
         if not self._fits(cells):  # other states would profit little from a larger table
-            ends = zip(boxes[..., 0].min(0), boxes[..., 1].max(0), strict=True)
-            cells = [c.between(*end) for c, end in zip(cells, ends, strict=True)]
+            cells = [c.between(*end) for c, end in zip(cells, _hull(boxes), strict=True)]
         known = self._tables.get(tuple(cubes))
         if known is None or known.cells != cells:
-            known = ActionTable(self._spec.bounds, self._spec.compositor, cells, self._record)
+            known = ActionTable(self.spec.bounds, self.spec.compositor, cells, self._record)
             self._tables[tuple(cubes)] = known
         return known
 
@@ -268,8 +246,7 @@ class Prover:
         return math.prod(len(c.pictures) for c in cells) <= self._most
 
     def _all_cells(self, place: LatticeState, cubes: list[int], boxes: Boxes) -> list[Cells]:
-        ends = zip(boxes[..., 0].min(0), boxes[..., 1].max(0), strict=True)
-        return [self._cells_of(place, k, *end) for k, end in zip(cubes, ends, strict=True)]
+        return [self._cells_of(place, k, *end) for k, end in zip(cubes, _hull(boxes), strict=True)]
 
     def _cells_of(self, place: LatticeState, cube: int, lowest: float, highest: float) -> Cells:
         """Return the cells of one cube, at least from the lowest to the highest position."""
@@ -278,26 +255,24 @@ class Prover:
             return known
         if known is not None:
             lowest, highest = min(lowest, known.limits[0]), max(highest, known.limits[-1])
-        found = self._spec.cells(cube, place.ahead, lowest - MARGIN, highest + MARGIN)
+        found = self.spec.cells(cube, place.ahead, lowest - MARGIN, highest + MARGIN)
         bands = np.diff(found.limits)[1::2]
         self.largest_band = max(self.largest_band, float(bands.max(initial=0.0)))
         self._cells[cube] = found
         return found
 
 
-def undecided(boxes: Boxes) -> Findings:
-    """Return findings in which nothing is decided."""
-    return Findings({}, boxes, {})
+def _hull(boxes: Boxes) -> NDArray[np.float64]:
+    """Return the lowest and highest end of each cube's intervals. Shape: (cubes, 2)."""
+    return np.stack([boxes[..., 0].min(0), boxes[..., 1].max(0)], -1)
 
 
 def ended(known: Ended, none: Boxes) -> Findings:
     """Return the findings of placements followed to their end without forks."""
-    found = [undecided(none)]
+    found = [Findings({}, none, {})]
     for (ending, steps), parts in known.items():
-        boxes = np.concatenate(parts)
-        found.append(
-            Findings({ending: boxes}, none, {ending: {steps: float(volumes(boxes).sum())}})
-        )
+        volume = float(volumes(boxes := np.concatenate(parts)).sum())
+        found.append(Findings({ending: boxes}, none, {ending: {steps: volume}}))
     return combine(found)
 
 
@@ -307,7 +282,7 @@ def so_far(known: Ended, part: Boxes) -> Findings:
     Many cubes give millions of boxes, which nobody could check one by one.
     """
     if not known:
-        return undecided(part)
+        return Findings({}, part, {})
     each = [np.concatenate(parts) for parts in known.values()]
     boxes, owner = np.concatenate(each), np.repeat(range(len(each)), [len(b) for b in each])
     kinds = list(dict.fromkeys(ending for ending, _ in known))
@@ -318,20 +293,20 @@ def so_far(known: Ended, part: Boxes) -> Findings:
     while (left := complement(boxes[largest], part)) is None:
         largest = largest[: len(largest) // 2]
     stated = {key: [boxes[largest[owner[largest] == i]]] for i, key in enumerate(known)}
-    return combine([ended(stated, part[:0]), undecided(left)])
+    return combine([ended(stated, part[:0]), Findings({}, left, {})])
 
 
 def combine(some: Sequence[Findings]) -> Findings:
     """Combine the findings of disjoint placements."""
     endings: dict[Ending, list[Boxes]] = defaultdict(list)
-    steps: dict[Ending, dict[int, float]] = defaultdict(dict)
+    steps: dict[Ending, dict[int, float]] = defaultdict(lambda: defaultdict(float))
     for found in some:
         for ending, boxes in found.endings.items():
             if len(boxes):
                 endings[ending].append(boxes)
         for ending, volume in found.steps.items():
             for count, more in volume.items():
-                steps[ending][count] = steps[ending].get(count, 0.0) + more
+                steps[ending][count] += more
     return Findings(
         {ending: np.concatenate(boxes) for ending, boxes in endings.items()},
         np.concatenate([found.undecided for found in some]),

@@ -7,7 +7,7 @@ import numpy as np
 import drone_rl
 from benchmarks.gamed_certificates import certificate_of, steps_of
 from drone_rl.sim.tasks.collect_cubes import EndReason
-from drone_rl.verification.checker.rollouts import Simulator
+from drone_rl.verification.checker.checker import Simulator
 
 BAND = 1e-5
 """Half-width of the undecided band at a border, metres."""

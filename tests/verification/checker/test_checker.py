@@ -3,10 +3,14 @@ import pytest
 
 import drone_rl
 from drone_rl.sim.tasks.collect_cubes import EndReason
-from drone_rl.verification.checker import check_certificate
 from drone_rl.verification.checker.certificate import Outcome, parse_certificate
-from drone_rl.verification.checker.checker import Contradiction, Findings, ends_as_stated
-from drone_rl.verification.checker.rollouts import Rollouts
+from drone_rl.verification.checker.checker import (
+    Contradiction,
+    Findings,
+    Rollouts,
+    check_certificate,
+    ends_as_stated,
+)
 
 
 def findings(data, **settings):

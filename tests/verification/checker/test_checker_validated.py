@@ -4,7 +4,7 @@ import pytest
 
 import drone_rl
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.checker import read_validated
+from drone_rl.verification.checker.checker import read_validated
 from tests.verification.checker.making import of_every_place
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.verification.prover import action_map
-from drone_rl.verification.prover.action_map import doubtful_area, find_borders, joined
+from drone_rl.verification.prover.action_map import doubtful_area, find_borders
 from drone_rl.verification.prover.arrangement import Pieces, Window, arrange
 from drone_rl.verification.prover.cube_images import FRONT, LEFT_SIDE, NOTHING, UNIT, CameraModel
 
@@ -141,11 +141,6 @@ def test_the_doubtful_area_is_a_band_along_each_border():
     found = doubtful_area(camera([1.0], [0.5]), Pieces(*level, upright), window)
     band = 2 * (16 * (2 + 1) + 3 * 10) * 3
     assert found == pytest.approx((band + 2 * 32 * 10 * 4) * UNIT)
-
-
-def test_spans_that_touch_are_one():
-    spans = np.array([[3.0, 4.0], [0.0, 1.0], [1.0, 2.0], [0.5, 0.7]])
-    assert joined(spans) == [[0, 2], [3, 4]]
 
 
 def test_the_band_along_a_slanting_border_grows_with_its_height():

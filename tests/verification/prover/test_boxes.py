@@ -14,6 +14,7 @@ from drone_rl.verification.prover.boxes import (
     merge,
     ragged,
     union,
+    unite,
     volumes,
 )
 
@@ -135,3 +136,10 @@ def test_blocks_of_a_grid_are_its_cells_once_each():
         seen[a:b, c:d, e:f] += 1
     assert np.array_equal(seen, mask)
     assert blocks(np.zeros((2, 3), bool)).shape == (0, 2, 2)
+
+
+def test_intervals_that_touch_are_united():
+    intervals = np.array([[0.0, 1.0], [0.5, 0.7], [1.0, 2.0], [2.5, 4.0]])
+    assert unite(intervals, 0.0).tolist() == [[0.0, 2.0], [2.5, 4.0]]
+    assert unite(intervals, 0.5).tolist() == [[0.0, 4.0]]
+    assert unite(intervals[:0], 0.5).shape == (0, 2)

@@ -7,7 +7,13 @@ import torch
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.cube_images import FRONT, NOTHING, CameraModel, CubeImages
+from drone_rl.verification.prover.cube_images import (
+    FRONT,
+    NOTHING,
+    CameraModel,
+    CubeImages,
+    CubeView,
+)
 from drone_rl.verification.prover.lattice import Lattice
 
 
@@ -54,7 +60,7 @@ def test_a_picture_that_is_another_is_told(images, monkeypatch):
 
 
 def test_one_cube_alone(images):
-    one = images.of(cube=1, steps=20)
+    one = CubeView(images, cube=1, steps=20)
     left = np.array([-1.0, 0.0, 30.0], np.float32)
     pictures = one.look(left)
     faces = one.read(pictures)

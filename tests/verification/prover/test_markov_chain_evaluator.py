@@ -1,12 +1,8 @@
 """What a policy is shown of a node is what its camera shows it there."""
 
-import pytest
 import torch
-from torchrl.envs import CatFrames
 
 from drone_rl.config import TaskSettings
-from drone_rl.envs import DroneEnv, GrayPixels, LateFrames, with_transforms
-from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.lattice import explore
 from drone_rl.verification.prover.markov_chain import NodeEvaluator
 
@@ -33,22 +29,3 @@ def test_wishes_are_those_of_the_same_pictures_in_flight(make_pipeline):
         now = env.step(now.set("action", action))["next"]
     assert len(wishes) == len(graph.nodes)
     assert torch.allclose(wishes.sum(-1), torch.ones(len(wishes)).double())
-
-
-def test_a_policy_with_a_memory_is_refused():
-    env = with_transforms(
-        DroneEnv(1, TaskSettings(num_cubes=1)),
-        [GrayPixels(), CatFrames(N=2, dim=-3, in_keys=["pixels"])],
-    )
-    with pytest.raises(InputError, match=r"stacks 2 frames.*give a policy that observes one frame"):
-        NodeEvaluator(env, lambda pixels: pixels)
-    env.close()
-
-
-def test_a_camera_that_goes_wrong_is_refused():
-    env = with_transforms(DroneEnv(1, TaskSettings(num_cubes=1)), [GrayPixels(), LateFrames(1)])
-    with pytest.raises(
-        InputError, match=r"simulates faults \(LateFrames\(frames=1\)\).*a policy without"
-    ):
-        NodeEvaluator(env, lambda pixels: pixels)
-    env.close()

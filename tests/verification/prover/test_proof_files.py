@@ -90,6 +90,7 @@ NOTHING = np.zeros(0, np.int64)
         {"waiting_boxes": np.zeros((0, 1, 2))},
         {"waiting_boxes": np.array([[["a", "b"]]])},
         {"waiting_rows": np.zeros((1, 0), np.int64)},
+        {"waiting_rows": np.zeros((1, 8), np.int64)},
         {"ended_rows": np.zeros((1, 1), np.int64), "ended_counts": np.array([1])},
         {"ways_rows": np.array([[99, 0, 0]]), "ways_counts": np.array([0])},
         {"part_boxes": np.zeros((0, 1, 2)), "part_counts": np.array([0])},  # yet something waits

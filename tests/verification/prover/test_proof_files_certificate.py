@@ -4,12 +4,12 @@ import json
 from contextlib import closing
 
 import pytest
-import torch
 
 import drone_rl
 from drone_rl.utils.provenance import provenance
+from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.prover.policy_spec import make_policy_spec
-from drone_rl.verification.prover.proof_files import certify, weights_hash
+from drone_rl.verification.prover.proof_files import certify
 from drone_rl.verification.prover.prover import Prover
 
 
@@ -18,15 +18,6 @@ def proof(tmp_path_factory):
     folder = tmp_path_factory.mktemp("proof")
     task = {"num_cubes": 1}
     return drone_rl.prove("right_and_forward", folder=folder, task=task, compared=100)
-
-
-def test_the_hash_by_hand():
-    import hashlib
-
-    weights = {"b": torch.tensor([1.0]), "a": torch.tensor([[2.0, 3.0]])}
-    expected = hashlib.sha256()
-    expected.update(b"a [1, 2]\n\x00\x00\x00\x40\x00\x00\x40\x40b [1]\n\x00\x00\x80\x3f")
-    assert weights_hash(weights) == expected.hexdigest()
 
 
 def test_shares_add_up(proof):
@@ -57,7 +48,7 @@ def test_what_is_stated_when_it_is_stopped_within_a_part_is_accepted(tmp_path):
         while not prover.ended:
             prover.advance()
         assert prover.part.size and prover.waiting and prover.done.endings
-        weights = weights_hash(policy.state["policy"])
+        weights = fingerprint(policy.state["policy"])
         found = certify(policy.name, policy.description, weights, prover, 1.0, "limit_s")
     path.write_text(json.dumps(found | provenance()))
     assert not found["finished"] and found["found"]["stopped_by"] == "limit_s"

@@ -11,7 +11,6 @@ from drone_rl.verification.prover.prover import (
     ended,
     simplified,
     so_far,
-    undecided,
 )
 
 
@@ -31,7 +30,7 @@ def test_parts_put_together():
     some = [
         Findings({"won": line([0, 1])}, line([1, 2]), {"won": {3: 1.0}}),
         Findings({"won": line([2, 4]), "lost": line()}, line(), {"won": {3: 2.0, 4: 0.5}}),
-        undecided(line([4, 9])),
+        Findings({}, line([4, 9]), {}),
     ]
     found = combine(some)
     assert {e: b.tolist() for e, b in found.endings.items()} == {"won": [[[0, 1]], [[2, 4]]]}
@@ -46,7 +45,7 @@ def test_the_largest_part_is_what_the_others_leave():
     assert sorted(simple.endings["won"].tolist()) == [[[0, 7]], [[8, 9]]]
     assert simple.endings["lost"].tolist() == [[[7, 8]]]
     assert not len(simple.undecided) and simple.steps == {"won": {1: 8.0}}
-    nothing = simplified(undecided(line([0, 4], [4, 9])), line([0, 9]))
+    nothing = simplified(Findings({}, line([0, 4], [4, 9]), {}), line([0, 9]))
     assert nothing.undecided.tolist() == [[[0, 9]]] and not nothing.endings
 
 

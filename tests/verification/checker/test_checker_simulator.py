@@ -7,7 +7,7 @@ import torch
 import drone_rl
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.sim.tasks.collect_cubes import EndReason
-from drone_rl.verification.checker.rollouts import Rollouts, Simulator
+from drone_rl.verification.checker.checker import Rollouts, Simulator
 
 
 @pytest.fixture
