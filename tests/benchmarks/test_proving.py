@@ -9,7 +9,7 @@ def test_proofs_and_their_checks(tmp_path):
     found = bench_prove(tmp_path, [0, 1], quick=True)
     assert len(found["proof_three_s"]) == len(found["proof_success"]) == 1
     assert found["proof_checked"] == found["proof_checked_total"] == 4
-    assert found["proof_contradicted"] == 0 and found["proof_flights"] >= 600
+    assert found["proof_contradicted"] == 0 and found["proof_flights"] >= 300
     assert 0 <= found["proof_undecided"] < 1e-3
 
 

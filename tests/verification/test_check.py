@@ -43,7 +43,7 @@ def test_a_check_in_python(path, tmp_path):
 
 def test_the_certificate_that_travels_with_the_package():
     proved = drone_rl.load_policy("proved")
-    done = drone_rl.check(certificate_path(proved.path), flights=200, progress=silent)
+    done = drone_rl.check(certificate_path(proved.path), flights=100, progress=silent)
     assert done.accepted and done.findings.contradicted == 0
     assert drone_rl.load_proof(certificate_path(proved.path)).is_proved
     assert proved.task.num_cubes == 3

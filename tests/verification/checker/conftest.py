@@ -21,15 +21,20 @@ def one_sided(one_sided_truth):
     return copy.deepcopy(one_sided_truth)
 
 
-@pytest.fixture
-def two_halves():
-    """Of the policy good, two cubes: all collected, in two boxes, steps of most stated."""
+@pytest.fixture(scope="session")
+def two_halves_truth():
     import drone_rl
 
     policy = drone_rl.load_policy("good").in_task(num_cubes=2)
     boxes = [[[-6.0, 1.0], [-6.0, 6.0]], [[1.0, 6.0], [-6.0, 6.0]]]
     won = {"end": "all_cubes", "collected": [True, True], "loops": False, "share": 1.0}
     return certificate_of(policy, [{**won, "steps": steps_of(policy, 0.97), "boxes": boxes}])
+
+
+@pytest.fixture
+def two_halves(two_halves_truth):
+    """Of the policy good, two cubes: all collected, in two boxes, steps of most stated."""
+    return copy.deepcopy(two_halves_truth)
 
 
 @pytest.fixture
