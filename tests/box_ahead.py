@@ -5,6 +5,7 @@ import warp as wp
 
 from drone_rl.sim.rendering.raytrace import structs_kernel
 from drone_rl.sim.rendering.raytrace.intersection_kernel import BOX
+from drone_rl.sim.rendering.raytrace.renderer import Launch, make_scratch
 from drone_rl.sim.rendering.raytrace.scene import make_rays
 
 SIZE = 40
@@ -64,8 +65,13 @@ def images(**dtypes):
     return made
 
 
+def scratch(count=1, geoms=1):
+    """Buffers of images of `view`."""
+    return make_scratch(count, SIZE * SIZE, geoms)
+
+
 def drawn(launcher, name, what, dtype, scene=None):
-    """One picture by a launcher. Shape: (SIZE, SIZE, *)."""
+    """Render one image with a launcher. Shape: (SIZE, SIZE, *)."""
     out = images(**{name: dtype})
-    launcher.launch(1, view(int(what)), scene or geoms(), poses(), materials(), out)
+    launcher.launch(Launch(1, view(int(what)), scene or geoms(), poses(), materials(), out))
     return np.squeeze(getattr(out, name).numpy()).reshape(SIZE, SIZE, -1)

@@ -19,19 +19,14 @@ from drone_rl.sim.rendering.raytrace.intersection_kernel import (
     intersect_plane,
     intersect_solid,
     is_nearest,
-    surface_normal,
 )
 from drone_rl.sim.rendering.raytrace.projection_kernel import (
     bounding_rectangle,
-    camera_pose,
+    start_job,
     view_geom,
 )
-from drone_rl.sim.rendering.raytrace.shading_kernel import geom_pixel, sky_pixel, write_span
-from drone_rl.sim.rendering.raytrace.spans_kernel import (
-    fill_floats,
-    fill_ints,
-    intersect_level_plane,
-)
+from drone_rl.sim.rendering.raytrace.shading_kernel import shade_span
+from drone_rl.sim.rendering.raytrace.spans_kernel import fill, intersect_level_plane
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -81,51 +76,29 @@ def render_image(
     row: int,
 ) -> None:
     """Render the image `row` of one camera of one environment; see `render_images`."""
-    find_visible(view, camera, geoms, poses, world, scratch, member)
-    nearest, owners = scratch.nearest[member], scratch.owner[member]
-    geom_views, rays, cosines = scratch.geom_views[member], view.rays[camera], view.cosines[camera]
+    job = start_job(view, poses, scratch, row, camera, world, member)
+    find_visible(job, geoms, poses)
     count = view.height * view.width
     start = int(0)
     while start < count:
-        owner = owners[start]
-        end = span_end(owners, start, count)
-        shown = sky_pixel(materials, world)
-        if owner == structs.NO_GEOM:
-            fill_floats(nearest, start, end, 0.0)
-        else:
-            geom_view = geom_views[owner // structs.FACES]
-            normal = span_normal(geom_view, owner, rays[start], nearest[start])
-            shown = geom_pixel(materials, world, geom_view.number, geom_view.axes @ normal)
-        write_span(images, view.what, row, start, end, shown, nearest, cosines)
+        end = span_end(job.owner, start, count)
+        shade_span(job, materials, images, start, end)
         start = end
 
 
 @wp.func
-def find_visible(
-    view: structs.View,
-    camera: int,
-    geoms: structs.Geoms,
-    poses: structs.Poses,
-    world: int,
-    scratch: structs.Scratch,
-    member: int,
-) -> None:
-    """Find the nearest surface of each pixel, and leave it in `scratch`."""
-    nearest = scratch.nearest[member]
-    owner = scratch.owner[member]
-    geom_views = scratch.geom_views[member]
-    rays = view.rays[camera]
-    fill_floats(nearest, 0, view.height * view.width, FAR_AWAY)
-    fill_ints(owner, 0, view.height * view.width, structs.NO_GEOM)
-    pose = camera_pose(view.cameras[camera], poses, world)
+def find_visible(job: structs.Job, geoms: structs.Geoms, poses: structs.Poses) -> None:
+    """Find the nearest surface of each pixel: write `nearest` and `owner`."""
+    count = job.view.height * job.view.width
+    fill(job.nearest, 0, count, FAR_AWAY)
+    fill(job.owner, 0, count, structs.NO_GEOM)
     for geom in range(geoms.kind.shape[0]):
-        geom_view = view_geom(geoms, geom, poses, world, pose)
-        geom_views[geom] = geom_view
+        geom_view = view_geom(job, geoms, geom, poses)
+        job.geom_views[geom] = geom_view
         if geom_view.kind == PLANE:
-            _find_plane(view, rays, geom_view, geom, nearest, owner)
+            _find_plane(job, geom_view, geom)
         else:
-            part = bounding_rectangle(view, view.cameras[camera], geom_view)
-            _find_solid(view, part, rays, geom_view, geom, nearest, owner)
+            _find_solid(job, geom_view, geom)
 
 
 @wp.func
@@ -140,40 +113,26 @@ def span_end(owners: wp.array[int], start: int, count: int) -> int:
 
 
 @wp.func
-def span_normal(geom_view: structs.GeomView, owner: int, ray: wp.vec3, distance: float) -> wp.vec3:
-    """Return the normal of a span's first pixel, in the geom's frame."""
-    into = geom_view.into @ ray
-    kind, size, eye = geom_view.kind, geom_view.size, geom_view.eye
-    return surface_normal(kind, size, owner % structs.FACES, eye, into, distance)
-
-
-@wp.func
-def _find_plane(
-    view: structs.View,
-    rays: wp.array[wp.vec3],
-    geom_view: structs.GeomView,
-    geom: int,
-    nearest: wp.array[float],
-    owner: wp.array[int],
-) -> None:
+def _find_plane(job: structs.Job, geom_view: structs.GeomView, geom: int) -> None:
     """Only rows that end below its horizon; if both ends of a row hit, so does all between."""
+    rays, nearest, owner = job.rays, job.nearest, job.owner
     mark = geom * structs.FACES + UPPER
+    width, far = job.view.width, job.view.far
     start = int(0)
-    while start < view.height * view.width:
-        end = start + view.width
-        left = geom_view.into @ rays[start]
-        right = geom_view.into @ rays[end - 1]
+    while start < job.view.height * width:
+        end = start + width
+        leftmost, rightmost = rays[start], rays[end - 1]
+        left, right = geom_view.into @ leftmost, geom_view.into @ rightmost
         if left[2] < 0.0 or right[2] < 0.0:
             pixel = start
-            leftmost, rightmost = rays[start], rays[end - 1]
-            if _hits(view, geom_view, leftmost, left) and _hits(view, geom_view, rightmost, right):
+            if _hits(far, geom_view, leftmost, left) and _hits(far, geom_view, rightmost, right):
                 down, height = geom_view.into[2], -geom_view.eye[2]
                 intersect_level_plane(nearest, owner, start, end, rays, down, height, SAME, mark)
                 pixel = end
             while pixel < end:
                 ray = rays[pixel]
                 along = intersect_plane(geom_view.size, geom_view.eye, geom_view.into @ ray)
-                if is_nearest(along, nearest[pixel], -ray[2], view.far):
+                if is_nearest(along, nearest[pixel], -ray[2], far):
                     nearest[pixel] = along
                     owner[pixel] = mark
                 pixel += 1
@@ -181,30 +140,25 @@ def _find_plane(
 
 
 @wp.func
-def _hits(view: structs.View, geom_view: structs.GeomView, ray: wp.vec3, into: wp.vec3) -> bool:
+def _hits(far: float, geom_view: structs.GeomView, ray: wp.vec3, into: wp.vec3) -> bool:
     along = intersect_plane(geom_view.size, geom_view.eye, into)
-    return along >= 0.0 and along * -ray[2] <= view.far
+    return along >= 0.0 and along * -ray[2] <= far
 
 
 @wp.func
-def _find_solid(
-    view: structs.View,
-    part: wp.vec4i,
-    rays: wp.array[wp.vec3],
-    geom_view: structs.GeomView,
-    geom: int,
-    nearest: wp.array[float],
-    owner: wp.array[int],
-) -> None:
+def _find_solid(job: structs.Job, geom_view: structs.GeomView, geom: int) -> None:
+    rays, nearest, owner = job.rays, job.nearest, job.owner
+    width, far = job.view.width, job.view.far
+    part = bounding_rectangle(job, geom_view, wp.vec3())
     row = part[2]
     while row < part[3]:
-        pixel = row * view.width + part[0]
-        end = row * view.width + part[1]
+        pixel = row * width + part[0]
+        end = row * width + part[1]
         while pixel < end:
             ray = rays[pixel]
             into = geom_view.into @ ray
             along, face = intersect_solid(geom_view.kind, geom_view.size, geom_view.eye, into)
-            if is_nearest(along, nearest[pixel], -ray[2], view.far):
+            if is_nearest(along, nearest[pixel], -ray[2], far):
                 nearest[pixel] = along
                 owner[pixel] = geom * structs.FACES + face
             pixel += 1

@@ -1,15 +1,15 @@
-"""Projection: poses of cameras and geoms, and the pixels that can show a geom."""
+"""Projection: poses of cameras and geoms, and the pixels that can show a geom or its shadow."""
 
 import warp as wp
 
 from drone_rl.sim.rendering.raytrace.intersection_kernel import FAR_AWAY
 from drone_rl.sim.rendering.raytrace.structs_kernel import (
     DRONE_FRAME,
-    Camera,
-    CameraPose,
     Geoms,
     GeomView,
+    Job,
     Poses,
+    Scratch,
     View,
 )
 
@@ -18,93 +18,103 @@ IN_FRONT = wp.constant(1e-3)
 
 
 @wp.func
-def camera_pose(camera: Camera, poses: Poses, world: int) -> CameraPose:
-    """Return the world pose of a camera."""
-    turned = _frame_attitude(camera.frame, poses.attitudes[world])
-    found = CameraPose()
-    found.eye = poses.positions[world, camera.frame] + _rotation(turned) @ camera.position
-    found.looking = _rotation(_product(turned, camera.attitude))
-    return found
+def start_job(
+    view: View, poses: Poses, scratch: Scratch, row: int, camera: int, world: int, member: int
+) -> Job:
+    """Return the job of rendering image `row`, with the scratch buffers `member`."""
+    job = Job()
+    job.row = row
+    job.world = world
+    job.view = view
+    job.camera = view.cameras[camera]
+    turned = _frame_attitude(job.camera.frame, poses.attitudes[world])
+    origin = poses.positions[world, job.camera.frame]
+    job.eye = origin + _rotation(turned) @ job.camera.position
+    job.looking = _rotation(_product(turned, job.camera.attitude))
+    job.rays = view.rays[camera]
+    job.cosines = view.cosines[camera]
+    job.nearest = scratch.nearest[member]
+    job.owner = scratch.owner[member]
+    job.dark = scratch.dark[member]
+    job.colors = scratch.colors[member]
+    job.geom_views = scratch.geom_views[member]
+    return job
 
 
 @wp.func
-def view_geom(geoms: Geoms, geom: int, poses: Poses, world: int, there: CameraPose) -> GeomView:
-    """Return a geom of an environment relative to a camera."""
+def view_geom(job: Job, geoms: Geoms, geom: int, poses: Poses) -> GeomView:
+    """Return a geom relative to the camera."""
     frame = geoms.frame[geom]
-    turned = _frame_attitude(frame, poses.attitudes[world])
-    centre = poses.positions[world, frame] + _rotation(turned) @ geoms.position[geom]
+    turned = _frame_attitude(frame, poses.attitudes[job.world])
+    centre = poses.positions[job.world, frame] + _rotation(turned) @ geoms.position[geom]
     geom_view = GeomView()
     geom_view.kind = geoms.kind[geom]
     geom_view.number = geoms.number[geom]
     geom_view.size = geoms.size[geom]
     geom_view.reach = geoms.reach[geom]
     if poses.scales:
-        geom_view.size *= poses.scales[world, frame]
-        geom_view.reach *= poses.scales[world, frame]
+        geom_view.size *= poses.scales[job.world, frame]
+        geom_view.reach *= poses.scales[job.world, frame]
     geom_view.axes = _rotation(_product(turned, geoms.attitude[geom]))
-    geom_view.eye = wp.transpose(geom_view.axes) @ (there.eye - centre)
-    geom_view.into = wp.transpose(geom_view.axes) @ there.looking
+    geom_view.eye = wp.transpose(geom_view.axes) @ (job.eye - centre)
+    geom_view.into = wp.transpose(geom_view.axes) @ job.looking
     return geom_view
 
 
 @wp.func
-def up_in_camera(camera: Camera, poses: Poses, world: int) -> wp.vec3:
-    """Return the world's up axis in a camera's frame."""
-    turned = _frame_attitude(camera.frame, poses.attitudes[world])
-    return wp.transpose(_rotation(_product(turned, camera.attitude))) @ wp.vec3(0.0, 0.0, 1.0)
+def bounding_rectangle(job: Job, geom_view: GeomView, way: wp.vec3) -> wp.vec4i:
+    """Return the pixels that can show a geom or its shadow, which ends `way` (world frame) away.
 
-
-@wp.func
-def bounding_rectangle(view: View, camera: Camera, geom_view: GeomView) -> wp.vec4i:
-    """Return first and last+1 column, first and last+1 row outside which no ray meets a geom."""
+    Returns first and last+1 column, first and last+1 row. A zero `way` stands for no shadow.
+    """
+    back = wp.transpose(geom_view.into)
+    centre = -(back @ geom_view.eye)
+    swept = back @ (wp.transpose(geom_view.axes) @ way)
+    sides = back @ wp.diag(geom_view.reach)
+    bits = int(3)
+    if wp.length_sq(way) > 0.0:
+        bits = 4
     lowest = wp.vec2(FAR_AWAY, FAR_AWAY)
     highest = wp.vec2(-FAR_AWAY, -FAR_AWAY)
     behind = int(0)
-    for corner in range(8):
-        at = _corner(geom_view, corner)
+    for corner in range(1 << bits):
+        at = _corner(corner, centre, sides, swept)
         if -at[2] < IN_FRONT:
             behind += 1 << corner
         else:
             seen = wp.vec2(at[0] / -at[2], -at[1] / -at[2])
             lowest = wp.min(lowest, seen)
             highest = wp.max(highest, seen)
-    if behind == 255:
+    if behind == (1 << (1 << bits)) - 1:
         return wp.vec4i(0, 0, 0, 0)
     if behind > 0:
-        for edge in range(24):  # clip edges that lead behind the camera
-            one, other = edge // 3, (edge // 3) ^ (1 << (edge % 3))
+        for edge in range(bits << bits):  # clip edges that lead behind the camera
+            one, other = edge // bits, (edge // bits) ^ (1 << (edge % bits))
             if ((behind >> one) & 1) == 0 and ((behind >> other) & 1) == 1:
-                at, back = _corner(geom_view, one), _corner(geom_view, other)
-                at += (at[2] + IN_FRONT) / (at[2] - back[2]) * (back - at)
+                at = _corner(one, centre, sides, swept)
+                hidden = _corner(other, centre, sides, swept)
+                at += (at[2] + IN_FRONT) / (at[2] - hidden[2]) * (hidden - at)
                 seen = wp.vec2(at[0], -at[1]) / IN_FRONT
                 lowest = wp.min(lowest, seen)
                 highest = wp.max(highest, seen)
-    return pixel_rectangle(view, camera, lowest, highest)
+    wide, high = job.camera.half_width, job.camera.half_height
+    return wp.vec4i(
+        _first_pixel(lowest[0], wide, job.view.width),
+        wp.min(_first_pixel(highest[0], wide, job.view.width) + 3, job.view.width),
+        _first_pixel(lowest[1], high, job.view.height),
+        wp.min(_first_pixel(highest[1], high, job.view.height) + 3, job.view.height),
+    )
 
 
 @wp.func
-def _corner(geom_view: GeomView, corner: int) -> wp.vec3:
-    """A corner of the bounding box, in the camera's frame."""
-    sides = wp.vec3(
+def _corner(corner: int, centre: wp.vec3, sides: wp.mat33, swept: wp.vec3) -> wp.vec3:
+    """A corner of a box (bits 0 to 2), moved to the shadow's end (bit 3), camera frame."""
+    signs = wp.vec3(
         float(corner & 1) * 2.0 - 1.0,
         float((corner >> 1) & 1) * 2.0 - 1.0,
         float((corner >> 2) & 1) * 2.0 - 1.0,
     )
-    return wp.transpose(geom_view.into) @ (wp.cw_mul(sides, geom_view.reach) - geom_view.eye)
-
-
-@wp.func
-def pixel_rectangle(view: View, camera: Camera, lowest: wp.vec2, highest: wp.vec2) -> wp.vec4i:
-    """Return the pixels that can show anything between two points of the image plane.
-
-    Points are right and down, on the plane at distance 1. Returns first and last+1 column, and row.
-    """
-    return wp.vec4i(
-        _first_pixel(lowest[0], camera.half_width, view.width),
-        wp.min(_first_pixel(highest[0], camera.half_width, view.width) + 3, view.width),
-        _first_pixel(lowest[1], camera.half_height, view.height),
-        wp.min(_first_pixel(highest[1], camera.half_height, view.height) + 3, view.height),
-    )
+    return centre + sides @ signs + float(corner >> 3) * swept
 
 
 @wp.func

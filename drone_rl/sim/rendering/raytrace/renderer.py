@@ -28,17 +28,10 @@ from drone_rl.sim.rendering.raytrace.scene import (
 )
 from drone_rl.sim.rendering.renderer import Poses
 from drone_rl.sim.rendering.scene import Scene
-from drone_rl.sim.rendering.view import Modality, View
+from drone_rl.sim.rendering.view import MODALITIES, Modality, View
 
 _BITS: Mapping[Modality, int] = MappingProxyType(
-    {
-        "rgb": structs.RGB,
-        "gray": structs.GRAY,
-        "depth": structs.DEPTH,
-        "distance": structs.DISTANCE,
-        "segmentation": structs.SEGMENTATION,
-        "normals": structs.NORMALS,
-    }
+    {modality: getattr(structs, modality.upper()) for modality in MODALITIES}
 )
 """The kernels' bit of each modality."""
 _VECTORS = MappingProxyType({"rgb": wp.vec3ub, "normals": wp.vec3})
@@ -52,6 +45,24 @@ class KernelInputs(NamedTuple):
     geoms: structs.Geoms
     materials: structs.Materials
     scratch: structs.Scratch
+
+
+class Launch(NamedTuple):
+    """Arguments of a launch: `count` images, which are environments times cameras."""
+
+    count: int
+    view: structs.View
+    geoms: structs.Geoms
+    poses: structs.Poses
+    materials: structs.Materials
+    images: structs.Images
+    effects: "structs.Effects | None" = None
+    """Chooses the kernels with effects, if given."""
+
+    def inputs(self, scratch: structs.Scratch) -> list[Any]:
+        """Return the structs that kernels take last, in their order."""
+        effects = [] if self.effects is None else [self.effects]
+        return [self.poses, self.materials, scratch, self.images, *effects]
 
 
 class Raytracer:
@@ -103,7 +114,8 @@ class Raytracer:
             encoded = cameras.encode(look.camera, len(poses))
             frames = self._poses.write(poses, look.distractors)
             count, out = len(poses) * len(view.cameras), _images(images)
-            self._launcher.launch(count, encoded, geoms, frames, materials, out, effects)
+            launch = Launch(count, encoded, geoms, frames, materials, out, effects)
+            self._launcher.launch(launch)
         return images
 
     def kernel_inputs(self, view: View, num_workers: int) -> KernelInputs:
@@ -142,43 +154,22 @@ class CpuLauncher:
         self._workers = WorkerPool(num_worlds, num_shards)
         self._scratch: dict[tuple[int, int], structs.Scratch] = {}
 
-    def launch(
-        self,
-        count: int,
-        view: structs.View,
-        geoms: structs.Geoms,
-        poses: structs.Poses,
-        materials: structs.Materials,
-        images: structs.Images,
-        effects: "structs.Effects | None" = None,
-    ) -> None:
-        """Render images; kernels are loaded first, so that fused training need not load them.
-
-        Args:
-            count: Number of images: environments times cameras.
-            view: Cameras and modalities.
-            geoms: Of the scene.
-            poses: Of all environments.
-            materials: Colours and light.
-            images: Written.
-            effects: Chooses the kernels with effects, if given.
-        """
+    def launch(self, launch: Launch) -> None:
+        """Render images; kernels are loaded first, so that fused training need not load them."""
+        view, geoms = launch.view, launch.geoms
         size = (view.height * view.width, len(geoms.kind))
         if size not in self._scratch:
             self._scratch[size] = make_scratch(self._workers.size, *size)
-        module = plain_kernel if effects is None else effects_kernel
+        inputs = [view, geoms, *launch.inputs(self._scratch[size])]
+        module, kernel = plain_kernel, plain_kernel.render_images
+        if launch.effects is not None:
+            module, kernel = effects_kernel, effects_kernel.render_images_with_effects
         load_kernels(module).result()
-        if effects is None:
-            kernel, inputs = plain_kernel.render_images, [view, geoms, poses, materials]
-        else:
-            kernel = effects_kernel.render_images_with_effects
-            inputs = [view, geoms, poses, materials, effects]
 
         def work(worker: int, first: int, last: int) -> None:
-            own = [first, last, worker, *inputs, self._scratch[size], images]
-            wp.launch(kernel, 1, inputs=own, device="cpu")
+            wp.launch(kernel, 1, inputs=[first, last, worker, *inputs], device="cpu")
 
-        self._workers.map_spans(0, count, work)
+        self._workers.map_spans(0, launch.count, work)
 
     def close(self) -> None:
         """Stop the threads."""
@@ -192,53 +183,31 @@ class GpuLauncher:
         """Take a device, "cuda" or "cuda:N"."""
         self._device = device
 
-    def launch(
-        self,
-        count: int,
-        view: structs.View,
-        geoms: structs.Geoms,
-        poses: structs.Poses,
-        materials: structs.Materials,
-        images: structs.Images,
-        effects: "structs.Effects | None" = None,
-    ) -> None:
-        """Render images; see `CpuLauncher.launch`."""
-        pixels = view.height * view.width
-        shape = (count, len(geoms.kind))
-        geom_views = _empty(shape, structs.GeomView, self._device)
-        inputs = [view, geoms, poses, geom_views]
-        wp.launch(gpu_kernel.view_geoms, shape, inputs=inputs, device=self._device)
-        if effects is None:
-            kernel, inputs = gpu_kernel.render_pixels, [view, geom_views, materials, images]
-        else:
-            scratch = make_scratch(count, pixels, 1, self._device)
+    def launch(self, launch: Launch) -> None:
+        """Render images."""
+        view, geoms, device = launch.view, launch.geoms, self._device
+        pixels, shape = view.height * view.width, (launch.count, len(geoms.kind))
+        scratch = make_scratch(launch.count, pixels, len(geoms.kind), device)
+        inputs = [view, geoms, launch.poses, scratch]
+        wp.launch(gpu_kernel.view_geoms, shape, inputs=inputs, device=device)
+        kernel = gpu_kernel.render_pixels
+        if launch.effects is not None:
             kernel = gpu_kernel.render_pixels_with_effects
-            inputs = [view, poses, geom_views, materials, effects, scratch, images]
-        wp.launch(kernel, (count, pixels), inputs=inputs, device=self._device)
+        inputs = [view, *launch.inputs(scratch)]
+        wp.launch(kernel, (launch.count, pixels), inputs=inputs, device=device)
 
     def close(self) -> None:
         """Do nothing: there are no threads."""
 
 
-def make_scratch(num_workers: int, pixels: int, geoms: int, device: str = "cpu") -> structs.Scratch:
-    """Allocate scratch buffers.
-
-    Args:
-        num_workers: Images that are rendered at the same time.
-        pixels: Of an image.
-        geoms: Number of rendered geoms.
-        device: Of the kernels.
-    """
+def make_scratch(count: int, pixels: int, geoms: int, device: str = "cpu") -> structs.Scratch:
+    """Allocate scratch buffers for `count` images of some pixels and geoms at the same time."""
     scratch: Any = structs.Scratch()
     kinds = {"nearest": float, "owner": int, "dark": int, "colors": wp.vec3ub}
     for name, kind in kinds.items():
-        setattr(scratch, name, _empty((num_workers, pixels), kind, device))
-    scratch.geom_views = _empty((num_workers, geoms), structs.GeomView, device)
+        setattr(scratch, name, wp.empty((count, pixels), dtype=kind, device=device))
+    scratch.geom_views = wp.empty((count, geoms), dtype=structs.GeomView, device=device)
     return scratch
-
-
-def _empty(shape: tuple[int, int], kind: type, device: str) -> Any:
-    return wp.empty(shape, dtype=kind, device=device)
 
 
 def _images(images: Mapping[Modality, Tensor]) -> structs.Images:

@@ -3,15 +3,10 @@
 import warp as wp
 
 from drone_rl.sim.rendering.raytrace import structs_kernel as structs
-from drone_rl.sim.rendering.raytrace.intersection_kernel import ROUND
-from drone_rl.sim.rendering.raytrace.projection_kernel import up_in_camera
+from drone_rl.sim.rendering.raytrace.intersection_kernel import ROUND, surface_normal
 from drone_rl.sim.rendering.raytrace.spans_kernel import (
     copy,
-    copy_colors,
-    fill_bytes,
-    fill_floats,
-    fill_ints,
-    fill_vectors,
+    fill,
     mix_gray,
     multiply,
     shade_plain,
@@ -24,92 +19,95 @@ _RED, _GREEN, _BLUE = (wp.constant(weight) for weight in WEIGHTS)
 
 
 @wp.func
-def sky_pixel(materials: structs.Materials, world: int) -> structs.PixelValue:
-    """Return what a pixel shows that hits nothing."""
-    shown = structs.PixelValue()
-    shown.number = -1
-    shown.color = _bytes(materials.sky[world % materials.sky.shape[0]])
-    shown.gray = _gray(shown.color)
-    return shown
-
-
-@wp.func
-def geom_pixel(
-    materials: structs.Materials, world: int, number: int, normal: wp.vec3
-) -> structs.PixelValue:
-    """Return what a pixel shows of a geom. Normal: world frame."""
-    shown = structs.PixelValue()
-    shown.number = number
-    shown.normal = normal
-    shown.color = _bytes(_shade(materials, world, number, normal))
-    shown.gray = _gray(shown.color)
-    return shown
-
-
-@wp.func
-def write_pixel(
+def shade_span(
+    job: structs.Job,
+    materials: structs.Materials,
     images: structs.Images,
-    what: int,
-    row: int,
-    pixel: int,
-    shown: structs.PixelValue,
-    distance: float,
-    cosine: float,
+    first: int,
+    last: int,
 ) -> None:
-    """Write the requested modalities `what` of a pixel; `cosine` turns distance into depth."""
+    """Write a span of the sky or of one flat face, or one pixel of a round face."""
+    shown = _find_surface(job, first, last)
+    if shown.number == structs.NO_GEOM:
+        shown.color = _bytes(materials.sky[job.world % materials.sky.shape[0]])
+    else:
+        shown.color = _bytes(_lambert(materials, job.world, shown.number, shown.normal))
+    shown.gray = _gray(shown.color)
+    write_span(job, images, job.view.what, first, last, shown)
+
+
+@wp.func
+def shade_span_with_effects(
+    job: structs.Job,
+    materials: structs.Materials,
+    effects: structs.Effects,
+    images: structs.Images,
+    first: int,
+    last: int,
+) -> None:
+    """`shade_span` with fog, shadow, texture and a sky gradient."""
+    shown = _find_surface(job, first, last)
+    if shown.number == structs.NO_GEOM:
+        up = wp.transpose(job.looking) @ wp.vec3(0.0, 0.0, 1.0)
+        horizon = materials.sky[job.world % materials.sky.shape[0]]
+        zenith = effects.zenith[job.world % effects.zenith.shape[0]]
+        shade_sky(job, first, last, up, horizon, zenith)
+    else:
+        _color_geom(job, materials, effects, first, last, shown)
+    what = job.view.what
+    write_span(job, images, what & ~(structs.RGB | structs.GRAY), first, last, shown)
     if (what & structs.RGB) != 0:
-        images.rgb[row, pixel] = shown.color
+        copy(images.rgb[job.row], first, last, job.colors)
     if (what & structs.GRAY) != 0:
-        images.gray[row, pixel] = shown.gray
-    if (what & structs.DEPTH) != 0:
-        images.depth[row, pixel] = distance * cosine
-    if (what & structs.DISTANCE) != 0:
-        images.distance[row, pixel] = distance
-    if (what & structs.SEGMENTATION) != 0:
-        images.segmentation[row, pixel] = shown.number
-    if (what & structs.NORMALS) != 0:
-        images.normals[row, pixel] = shown.normal
+        mix_gray(images.gray[job.row], first, last, job.colors, _RED, _GREEN, _BLUE)
+
+
+@wp.func
+def _find_surface(job: structs.Job, first: int, last: int) -> structs.PixelValue:
+    """Return what a span shows, without its colour; set its distance to 0 if that is the sky."""
+    shown = structs.PixelValue()
+    shown.number = structs.NO_GEOM
+    owner = job.owner[first]
+    if owner == structs.NO_GEOM:
+        fill(job.nearest, first, last, 0.0)
+    else:
+        seen = job.geom_views[owner // structs.FACES]
+        into, distance = seen.into @ job.rays[first], job.nearest[first]
+        shown.number = seen.number
+        shown.face = owner % structs.FACES
+        shown.face_normal = surface_normal(
+            seen.kind, seen.size, shown.face, seen.eye, into, distance
+        )
+        shown.normal = seen.axes @ shown.face_normal
+    return shown
 
 
 @wp.func
 def write_span(
+    job: structs.Job,
     images: structs.Images,
     what: int,
-    row: int,
     first: int,
     last: int,
     shown: structs.PixelValue,
-    distances: wp.array[float],
-    cosines: wp.array[float],
 ) -> None:
-    """`write_pixel` for a span of pixels with one value; distances and cosines of all pixels."""
+    """Write the modalities `what` of a span of pixels that show one surface."""
     if (what & structs.RGB) != 0:
-        fill_bytes(images.rgb[row], first, last, shown.color)
+        fill(images.rgb[job.row], first, last, shown.color)
     if (what & structs.GRAY) != 0:
-        fill_floats(images.gray[row], first, last, shown.gray)
+        fill(images.gray[job.row], first, last, shown.gray)
     if (what & structs.DEPTH) != 0:
-        multiply(images.depth[row], first, last, distances, cosines)
+        multiply(images.depth[job.row], first, last, job.nearest, job.cosines)
     if (what & structs.DISTANCE) != 0:
-        copy(images.distance[row], first, last, distances)
+        copy(images.distance[job.row], first, last, job.nearest)
     if (what & structs.SEGMENTATION) != 0:
-        fill_ints(images.segmentation[row], first, last, shown.number)
+        fill(images.segmentation[job.row], first, last, shown.number)
     if (what & structs.NORMALS) != 0:
-        fill_vectors(images.normals[row], first, last, shown.normal)
+        fill(images.normals[job.row], first, last, shown.normal)
 
 
 @wp.func
-def write_colors(
-    images: structs.Images, what: int, row: int, first: int, last: int, colors: wp.array[wp.vec3ub]
-) -> None:
-    """Write colours that differ from pixel to pixel; see `write_span`."""
-    if (what & structs.RGB) != 0:
-        copy_colors(images.rgb[row], first, last, colors)
-    if (what & structs.GRAY) != 0:
-        mix_gray(images.gray[row], first, last, colors, _RED, _GREEN, _BLUE)
-
-
-@wp.func
-def _shade(materials: structs.Materials, world: int, geom: int, normal: wp.vec3) -> wp.vec3:
+def _lambert(materials: structs.Materials, world: int, geom: int, normal: wp.vec3) -> wp.vec3:
     """Lambert's law under distant lights, 0 to 255. Normal: world frame."""
     own = materials.colors[world % materials.colors.shape[0], geom]
     row = world % materials.ambient.shape[0]
@@ -138,63 +136,35 @@ def _gray(color: wp.vec3ub) -> float:
 
 
 @wp.func
-def color_sky(
-    colors: wp.array[wp.vec3ub],
-    first: int,
-    last: int,
-    rays: wp.array[wp.vec3],
-    camera: structs.Camera,
-    poses: structs.Poses,
+def _color_geom(
+    job: structs.Job,
     materials: structs.Materials,
     effects: structs.Effects,
-    world: int,
-) -> None:
-    """Colour a span of the sky: the horizon blended with the zenith."""
-    horizon = materials.sky[world % materials.sky.shape[0]]
-    zenith = effects.zenith[world % effects.zenith.shape[0]]
-    shade_sky(colors, first, last, rays, up_in_camera(camera, poses, world), horizon, zenith)
-
-
-@wp.func
-def color_geom(
-    colors: wp.array[wp.vec3ub],
     first: int,
     last: int,
-    rays: wp.array[wp.vec3],
-    nearest: wp.array[float],
-    dark: wp.array[int],
-    view: structs.View,
-    camera: structs.Camera,
-    materials: structs.Materials,
-    effects: structs.Effects,
-    world: int,
-    geom_view: structs.GeomView,
-    face: int,
-    normal: wp.vec3,
+    shown: structs.PixelValue,
 ) -> None:
-    """Colour a span of a flat face, or one pixel of a round one: light, shadow, texture, fog.
-
-    The normal is in the geom's frame; other arguments are those of `spans_kernel`.
-    """
-    own = 255.0 * materials.colors[world % materials.colors.shape[0], geom_view.number]
-    lit, shaded = light_surface(materials, world, geom_view.axes @ normal)
-    lit, shaded = wp.cw_mul(own, lit), wp.cw_mul(own, shaded)
-    fog = effects.fog[world % effects.fog.shape[0]]
-    horizon = materials.sky[world % materials.sky.shape[0]]
+    world, geom = job.world, shown.number
+    own = 255.0 * materials.colors[world % materials.colors.shape[0], geom]
+    lit, shaded = light_surface(materials, world, shown.normal)
+    light = structs.SurfaceLight()
+    light.lit = wp.cw_mul(own, lit)
+    light.shaded = wp.cw_mul(own, shaded)
+    light.fog = effects.fog[world % effects.fog.shape[0]]
+    light.horizon = materials.sky[world % materials.sky.shape[0]]
     row = world % effects.texture.shape[0]
-    texture = effects.texture[row, geom_view.number]
+    texture = effects.texture[row, geom]
     if texture < 0:
-        shade_plain(colors, first, last, nearest, dark, lit, shaded, fog, horizon)
+        shade_plain(job, first, last, light)
     else:
-        tiles = effects.tiles[row, geom_view.number]
-        start, side = effects.starts[texture], effects.sides[texture]
-        cover = map_texture(start, side, tiles, geom_view, face, normal)
-        pixel = 2.0 * camera.half_height / float(view.height) * tiles * float(side)
+        tiles, side = effects.tiles[row, geom], effects.sides[texture]
+        geom_view = job.geom_views[job.owner[first] // structs.FACES]
+        cover = map_texture(tiles, geom_view, shown.face, shown.face_normal)
+        cover.start = effects.starts[texture]
+        cover.side = side
+        pixel = 2.0 * job.camera.half_height / float(job.view.height) * tiles * float(side)
         cover.area = pixel * pixel
-        texels = effects.texels
-        shade_textured(
-            colors, first, last, rays, nearest, dark, texels, cover, lit, shaded, fog, horizon
-        )
+        shade_textured(job, first, last, light, cover, effects.texels)
 
 
 @wp.func
@@ -215,9 +185,9 @@ def light_surface(
 
 @wp.func
 def map_texture(
-    start: int, side: int, tiles: float, geom_view: structs.GeomView, face: int, normal: wp.vec3
+    tiles: float, geom_view: structs.GeomView, face: int, normal: wp.vec3
 ) -> structs.TextureMap:
-    """Project a texture onto a face. Normal: geom's frame.
+    """Project a texture, `tiles` of it per metre, onto a face. Normal: geom's frame.
 
     A flat face shows two coordinates of the geom's frame; a round one shows those of the side of a
     box with the most similar normal.
@@ -231,8 +201,6 @@ def map_texture(
     if axis == 2:
         low = 1
     cover = structs.TextureMap()
-    cover.start = start
-    cover.side = side
     cover.across = tiles * geom_view.into[right]
     cover.down = -tiles * geom_view.into[low]
     cover.corner = tiles * wp.vec2(geom_view.eye[right], -geom_view.eye[low])

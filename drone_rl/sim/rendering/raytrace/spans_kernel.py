@@ -3,49 +3,24 @@
 Warp's own loops allow for strided arrays and recompute each pixel's address, so they are not
 vectorized. These arrays are contiguous. A GPU calls the same functions for one pixel.
 
-Arguments: pixels from `first` up to, not including, `last`; `rays` in the camera's frame;
-`nearest`, the distance along each ray; `dark`, whether the surface is in shadow; `lit` and
-`shaded`, its colour in the sun and in shadow, 0 to 255 or more; `horizon` and `zenith`, colours of
-the sky, 0 to 255; `fog`, see `Effects.fog`.
+Each function processes the pixels from `first` up to, not including, `last`.
 """
+
+from typing import Any
 
 import warp as wp
 
-from drone_rl.sim.rendering.raytrace.structs_kernel import TextureMap
-
-_FILL = "for (int i = first; i < last; ++i) values.data[i] = value;"
+from drone_rl.sim.rendering.raytrace.structs_kernel import Job, SurfaceLight, TextureMap
 
 
-@wp.func_native(_FILL)
-def fill_floats(values: wp.array[float], first: int, last: int, value: float) -> None:
-    """Write one number to the pixels from `first` up to, not including, `last`."""
-
-
-@wp.func_native(_FILL)
-def fill_ints(values: wp.array[int], first: int, last: int, value: int) -> None:
-    """`fill_floats` for integers."""
-
-
-@wp.func_native(_FILL)
-def fill_bytes(values: wp.array[wp.vec3ub], first: int, last: int, value: wp.vec3ub) -> None:
-    """`fill_floats` for colours."""
-
-
-@wp.func_native("""
-const float x = value[0], y = value[1], z = value[2];
-float *const at = (float *)values.data;
-for (int i = first; i < last; ++i) {
-    at[3 * i] = x;
-    at[3 * i + 1] = y;
-    at[3 * i + 2] = z;
-}""")
-def fill_vectors(values: wp.array[wp.vec3], first: int, last: int, value: wp.vec3) -> None:
-    """`fill_floats` for vectors."""
+@wp.func_native("for (int i = first; i < last; ++i) values.data[i] = value;")
+def fill(values: wp.array[Any], first: int, last: int, value: Any) -> None:
+    """Write one value to the pixels from `first` up to, not including, `last`."""
 
 
 @wp.func_native("for (int i = first; i < last; ++i) values.data[i] = given.data[i];")
-def copy(values: wp.array[float], first: int, last: int, given: wp.array[float]) -> None:
-    """Copy numbers."""
+def copy(values: wp.array[Any], first: int, last: int, given: wp.array[Any]) -> None:
+    """Copy values."""
 
 
 @wp.func_native("for (int i = first; i < last; ++i) values.data[i] = given.data[i] * by.data[i];")
@@ -101,35 +76,22 @@ def mix_gray(
     """Write gray of colours by weights; each sum is rounded as by torch on x86."""
 
 
-@wp.func_native("for (int i = first; i < last; ++i) values.data[i] = given.data[i];")
-def copy_colors(
-    values: wp.array[wp.vec3ub], first: int, last: int, given: wp.array[wp.vec3ub]
-) -> None:
-    """Copy colours."""
-
-
 @wp.func_native("""
 for (int i = first; i < last; ++i) {
-    const wp::vec_t<3, float> ray = rays.data[i];
+    const wp::vec_t<3, float> ray = job.rays.data[i];
     const float height = up[0] * ray[0] + up[1] * ray[1] + up[2] * ray[2];
     const float share = height > 0.0f ? height : 0.0f;
     for (int c = 0; c < 3; ++c)
-        colors.data[i][c] = (unsigned char)(int)(horizon[c] + share * (zenith[c] - horizon[c]));
+        job.colors.data[i][c] = (unsigned char)(int)(horizon[c] + share * (zenith[c] - horizon[c]));
 }""")
 def shade_sky(
-    colors: wp.array[wp.vec3ub],
-    first: int,
-    last: int,
-    rays: wp.array[wp.vec3],
-    up: wp.vec3,
-    horizon: wp.vec3,
-    zenith: wp.vec3,
+    job: Job, first: int, last: int, up: wp.vec3, horizon: wp.vec3, zenith: wp.vec3
 ) -> None:
     """Colour the sky; `up` is the world's up axis in the camera's frame."""
 
 
 _FADE = """
-    const float power = wp::max(-1.44269504f * fog * nearest.data[i], -120.0f);
+    const float power = wp::max(-1.44269504f * fog * far[i], -120.0f);
     const int whole = (int)(power - 0.5f);
     const float part = power - (float)whole;
     union { int bits; float number; } two;
@@ -138,35 +100,34 @@ _FADE = """
         * (0.05550411f + part * (0.00961813f + part * 0.00133336f)))));
 """
 """Fog: the fraction `clear` of a colour that passes, e^(-fog distance), by a polynomial."""
+_READ = """
+const float *const far = job.nearest.data;
+const int *const dark = job.dark.data;
+wp::vec_t<3, unsigned char> *const colors = job.colors.data;
+const wp::vec_t<3, float> lit = light.lit, shaded = light.shaded, horizon = light.horizon;
+const float fog = light.fog;
+"""
+"""Loads everything before the first write, which C++ must assume to alias."""
 _WRITE = """
     for (int c = 0; c < 3; ++c) {
         const float full = color[c] < 255.0f ? color[c] : 255.0f;
-        colors.data[i][c] = (unsigned char)(int)(clear * full + (1.0f - clear) * horizon[c]);
+        colors[i][c] = (unsigned char)(int)(clear * full + (1.0f - clear) * horizon[c]);
     }
 """
 
 
 @wp.func_native(f"""
+{_READ}
 for (int i = first; i < last; ++i) {{
     {_FADE}
-    const float in_sun = dark.data[i] ? 0.0f : 1.0f;
+    const float in_sun = dark[i] ? 0.0f : 1.0f;
     const float color[3] = {{
         shaded[0] + in_sun * (lit[0] - shaded[0]),
         shaded[1] + in_sun * (lit[1] - shaded[1]),
         shaded[2] + in_sun * (lit[2] - shaded[2])}};
     {_WRITE}
 }}""")
-def shade_plain(
-    colors: wp.array[wp.vec3ub],
-    first: int,
-    last: int,
-    nearest: wp.array[float],
-    dark: wp.array[int],
-    lit: wp.vec3,
-    shaded: wp.vec3,
-    fog: float,
-    horizon: wp.vec3,
-) -> None:
+def shade_plain(job: Job, first: int, last: int, light: SurfaceLight) -> None:
     """Colour a flat face, with shadow and fog."""
 
 
@@ -181,6 +142,7 @@ const int at_once = 64;
 
 
 @wp.func_native(f"""
+{_READ}
 {_AT_ONCE}
 const float x_on = texture.across[0], y_on = texture.across[1], z_on = texture.across[2];
 const float x_down = texture.down[0], y_down = texture.down[1], z_down = texture.down[2];
@@ -189,8 +151,7 @@ const float z_against = texture.facing[2];
 const float corner_x = texture.corner[0], corner_y = texture.corner[1], area = texture.area;
 const int begin = texture.start, whole_side = texture.side;
 const unsigned *const stored = texels.data;
-const wp::vec_t<3, float> *const seen = rays.data;
-const float *const far = nearest.data;
+const wp::vec_t<3, float> *const seen = job.rays.data;
 int of_a[at_once], of_b[at_once], of_c[at_once], of_d[at_once];
 int lower[at_once], right[at_once];
 unsigned a[at_once], b[at_once], c[at_once], d[at_once];
@@ -238,7 +199,7 @@ for (int k = 0; k < count; ++k) {{
         + share_c * (c[k] & 0xff00ffu) + share_d * (d[k] & 0xff00ffu);
     const unsigned green = share_a * ((a[k] >> 8) & 255u) + share_b * ((b[k] >> 8) & 255u)
         + share_c * ((c[k] >> 8) & 255u) + share_d * ((d[k] >> 8) & 255u);
-    const float in_sun = dark.data[i] ? 0.0f : 1.0f, unit = 1.0f / 65280.0f;
+    const float in_sun = dark[i] ? 0.0f : 1.0f, unit = 1.0f / 65280.0f;
     const float color[3] = {{
         (shaded[0] + in_sun * (lit[0] - shaded[0])) * unit * (int)(red_and_blue & 0xffffu),
         (shaded[1] + in_sun * (lit[1] - shaded[1])) * unit * (int)green,
@@ -247,20 +208,14 @@ for (int k = 0; k < count; ++k) {{
 }}
 }}""")
 def shade_textured(
-    colors: wp.array[wp.vec3ub],
+    job: Job,
     first: int,
     last: int,
-    rays: wp.array[wp.vec3],
-    nearest: wp.array[float],
-    dark: wp.array[int],
-    texels: wp.array[wp.uint32],
+    light: SurfaceLight,
     texture: TextureMap,
-    lit: wp.vec3,
-    shaded: wp.vec3,
-    fog: float,
-    horizon: wp.vec3,
+    texels: wp.array[wp.uint32],
 ) -> None:
-    """Colour a textured face; `lit` and `shaded` are the colours of a white texel.
+    """Colour a textured face; `light` has the colours of a white texel.
 
     Texels are interpolated bilinearly. The mip level follows from the number of texels that a pixel
     covers, by the mean of its two sides.

@@ -154,25 +154,34 @@ class GeomView:
 
 
 @struct
-class CameraPose:
-    """A camera in the world frame."""
-
-    eye: wp.vec3
-    looking: wp.mat33
-    """Rotates directions from the camera's frame to the world's."""
-
-
-@struct
 class PixelValue:
     """Everything that a pixel shows except its distance."""
 
     number: int
     """Geom index in the model; -1 for the sky."""
+    face: int
+    """See `intersection_kernel.ROUND`."""
+    face_normal: wp.vec3
+    """In the geom's frame; zero for the sky."""
     normal: wp.vec3
     """World frame; zero for the sky."""
     color: wp.vec3ub
     gray: float
     """In [0, 1]."""
+
+
+@struct
+class SurfaceLight:
+    """Colours of a surface, 0 to 255 or more, and the fog before it."""
+
+    lit: wp.vec3
+    """In the sun."""
+    shaded: wp.vec3
+    """In shadow."""
+    fog: float
+    """See `Effects.fog`."""
+    horizon: wp.vec3
+    """Of the sky."""
 
 
 @struct
@@ -207,3 +216,25 @@ class Scratch:
     colors: wp.array2d[wp.vec3ub]
     """Colours, where they differ from pixel to pixel."""
     geom_views: wp.array2d[GeomView]
+
+
+@struct
+class Job:
+    """One image to render: the camera in its environment, and one worker's part of `Scratch`."""
+
+    row: int
+    """Of the image in `Images`."""
+    world: int
+    view: View
+    camera: Camera
+    eye: wp.vec3
+    """The camera's position, world frame."""
+    looking: wp.mat33
+    """Rotates directions from the camera's frame to the world's."""
+    rays: wp.array[wp.vec3]
+    cosines: wp.array[float]
+    nearest: wp.array[float]
+    owner: wp.array[int]
+    dark: wp.array[int]
+    colors: wp.array[wp.vec3ub]
+    geom_views: wp.array[GeomView]

@@ -5,15 +5,15 @@ import warp as wp
 
 from drone_rl.sim.rendering.raytrace import gpu_kernel as kernels
 from drone_rl.sim.rendering.raytrace import structs_kernel
-from tests.box_ahead import geoms, poses, view
+from tests.box_ahead import geoms, poses, scratch, view
 
 
 def test_every_geom_is_aimed_at():
-    geom_views = wp.zeros((1, 2), dtype=structs_kernel.GeomView, device="cpu")
+    buffers = scratch(1, 2)
     scene = geoms(-6.0, -9.0, numbers=(1, 2))
-    given = [view(int(structs_kernel.DEPTH)), scene, poses(), geom_views]
+    given = [view(int(structs_kernel.DEPTH)), scene, poses(), buffers]
     wp.launch(kernels.view_geoms, (1, 2), inputs=given, device="cpu")
-    found = geom_views.numpy()[0]
+    found = buffers.geom_views.numpy()[0]
     assert found["number"].tolist() == [1, 2]
     np.testing.assert_allclose(found["eye"], [[0, 0, 6], [0, 0, 9]])
     np.testing.assert_allclose(found["into"], [np.eye(3)] * 2)

@@ -7,10 +7,10 @@ import warp as wp
 from drone_rl.sim.rendering.raytrace import structs_kernel
 from drone_rl.sim.rendering.raytrace.projection_kernel import (
     bounding_rectangle,
-    camera_pose,
+    start_job,
     view_geom,
 )
-from tests.box_ahead import SIZE, geoms, poses, view
+from tests.box_ahead import SIZE, geoms, poses, scratch, view
 
 
 @wp.kernel(enable_backward=False)
@@ -18,12 +18,11 @@ def find_visible(
     seen: structs_kernel.View,
     scene: structs_kernel.Geoms,
     placed: structs_kernel.Poses,
+    buffers: structs_kernel.Scratch,
     part: wp.array[wp.vec4i],
 ):
-    camera = seen.cameras[0]
-    part[0] = bounding_rectangle(
-        seen, camera, view_geom(scene, 0, placed, 0, camera_pose(camera, placed, 0))
-    )
+    job = start_job(seen, placed, buffers, 0, 0, 0, 0)
+    part[0] = bounding_rectangle(job, view_geom(job, scene, 0, placed), wp.vec3())
 
 
 def found(position, size=(1.0, 1.0, 1.0)):
@@ -32,7 +31,7 @@ def found(position, size=(1.0, 1.0, 1.0)):
     scene.position = wp.array([position], dtype=wp.vec3, device="cpu")
     scene.reach = wp.array([size], dtype=wp.vec3, device="cpu")
     part = wp.zeros(1, dtype=wp.vec4i, device="cpu")
-    given = [view(int(structs_kernel.DEPTH)), scene, poses(), part]
+    given = [view(int(structs_kernel.DEPTH)), scene, poses(), scratch(), part]
     wp.launch(find_visible, 1, inputs=given, device="cpu")
     return part.numpy()[0].tolist()
 
@@ -75,5 +74,5 @@ def test_frames_carry_what_is_fixed_to_them():
     scene = geoms(-6.0)
     scene.position = wp.array([[7.0, 2.0, 3.0]], dtype=wp.vec3, device="cpu")
     part = wp.zeros(1, dtype=wp.vec4i, device="cpu")
-    wp.launch(find_visible, 1, inputs=[seen, scene, turned, part], device="cpu")
+    wp.launch(find_visible, 1, inputs=[seen, scene, turned, scratch(), part], device="cpu")
     assert part.numpy()[0].tolist() == [14, 25, 14, 25]

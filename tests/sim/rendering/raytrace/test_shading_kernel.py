@@ -1,17 +1,13 @@
-"""Pixels, each by itself and in a row; what light makes of colours is in test_raytrace_painters."""
+"""Spans of pixels of a face and of the sky; whole images are in test_renderer_launchers."""
 
 import numpy as np
 import pytest
 import warp as wp
 
 from drone_rl.sim.rendering.raytrace import structs_kernel
-from drone_rl.sim.rendering.raytrace.shading_kernel import (
-    geom_pixel,
-    sky_pixel,
-    write_pixel,
-    write_span,
-)
-from tests.box_ahead import SIZE, images, materials
+from drone_rl.sim.rendering.raytrace.intersection_kernel import BOX
+from drone_rl.sim.rendering.raytrace.shading_kernel import shade_span
+from tests.box_ahead import array, images, materials, view
 
 KINDS = {
     "rgb": (structs_kernel.RGB, wp.vec3ub),
@@ -24,45 +20,29 @@ KINDS = {
 
 
 @wp.kernel(enable_backward=False)
-def put_singly(
-    what: int,
-    worn: structs_kernel.Materials,
-    out: structs_kernel.Images,
-    distances: wp.array[float],
-    cosines: wp.array[float],
-):
-    shown = geom_pixel(worn, 0, 3, wp.vec3(0.0, 0.0, 1.0))
-    for pixel in range(2, 5):
-        write_pixel(out, what, 0, pixel, shown, distances[pixel], cosines[pixel])
-    write_pixel(out, what, 0, 5, sky_pixel(worn, 0), 0.0, cosines[5])
+def put(job: structs_kernel.Job, worn: structs_kernel.Materials, out: structs_kernel.Images):
+    shade_span(job, worn, out, 2, 5)
+    shade_span(job, worn, out, 5, 6)
 
 
-@wp.kernel(enable_backward=False)
-def put_together(
-    what: int,
-    worn: structs_kernel.Materials,
-    out: structs_kernel.Images,
-    distances: wp.array[float],
-    cosines: wp.array[float],
-):
-    shown = geom_pixel(worn, 0, 3, wp.vec3(0.0, 0.0, 1.0))
-    write_span(out, what, 0, 2, 5, shown, distances, cosines)
-    write_span(out, what, 0, 5, 6, sky_pixel(worn, 0), distances, cosines)
-
-
-def put(kernel, *names):
+def shown_by(*names):
+    """Three pixels of a face that looks along z, 4 to 6 m away, and one of the sky."""
     out = images(**{name: dtype for name, (_, dtype) in KINDS.items() if name in names})
-    distances, cosines = np.full(SIZE * SIZE, 1e10), np.ones(SIZE * SIZE)
-    distances[2:6], cosines[2:6] = [4.0, 5.0, 6.0, 0.0], 0.5
-    given = [wp.array(values, dtype=float, device="cpu") for values in (distances, cosines)]
-    what = sum(int(KINDS[name][0]) for name in names)
-    wp.launch(kernel, 1, inputs=[what, materials(), out, *given], device="cpu")
+    box = structs_kernel.GeomView()
+    box.kind, box.number, box.axes = int(BOX), 3, wp.mat33(*np.eye(3).flatten())
+    job = structs_kernel.Job()
+    job.view = view(sum(int(KINDS[name][0]) for name in names))
+    job.rays = wp.zeros(6, dtype=wp.vec3, device="cpu")
+    job.nearest = array([1e10, 1e10, 4.0, 5.0, 6.0, 1e10], float)
+    job.cosines = array([1.0, 1.0, 0.5, 0.5, 0.5, 0.5], float)
+    job.owner = array([-1, -1, 5, 5, 5, -1], int)
+    job.geom_views = array([box], structs_kernel.GeomView)
+    wp.launch(put, 1, inputs=[job, materials(), out], device="cpu")
     return {name: getattr(out, name).numpy()[0, 2:6].tolist() for name in names}
 
 
-@pytest.mark.parametrize("kernel", [put_singly, put_together])
-def test_three_pixels_of_a_geom_and_one_of_the_sky(kernel):
-    shown = put(kernel, *KINDS)
+def test_three_pixels_of_a_geom_and_one_of_the_sky():
+    shown = shown_by(*KINDS)
     assert shown["rgb"] == [[173, 86, 0]] * 3 + [[10, 20, 30]]
     assert shown["distance"] == [4.0, 5.0, 6.0, 0.0]
     assert shown["depth"] == [2.0, 2.5, 3.0, 0.0]
@@ -73,7 +53,6 @@ def test_three_pixels_of_a_geom_and_one_of_the_sky(kernel):
     )
 
 
-@pytest.mark.parametrize("kernel", [put_singly, put_together])
 @pytest.mark.parametrize("name", KINDS)
-def test_any_modality_may_be_asked_for_alone(kernel, name):
-    assert put(kernel, name)[name] == put(kernel, *KINDS)[name]
+def test_any_modality_can_be_rendered_alone(name):
+    assert shown_by(name)[name] == shown_by(*KINDS)[name]

@@ -33,7 +33,7 @@ def test_the_first_light_alone_is_kept_away():
 def cover(
     geom_view: structs_kernel.GeomView, face: int, normal: wp.vec3, out: wp.array[TextureMap]
 ):
-    out[0] = map_texture(5, 8, 2.0, geom_view, face, normal)
+    out[0] = map_texture(2.0, geom_view, face, normal)
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,6 @@ def test_a_face_shows_two_coordinates_of_the_geom(face, normal, corner):
     out = wp.zeros(1, dtype=TextureMap, device="cpu")
     wp.launch(cover, 1, inputs=[geom_view, face, wp.vec3(*normal), out], device="cpu")
     laid = out.numpy()[0]
-    assert (laid["start"], laid["side"]) == (5, 8)
     assert laid["corner"].tolist() == list(corner)
     # a metre along its own axis goes two tiles across, or down
     assert np.abs(laid["across"]).sum() == 2.0 and np.abs(laid["down"]).sum() == 2.0

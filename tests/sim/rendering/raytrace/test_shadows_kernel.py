@@ -12,16 +12,19 @@ from drone_rl.sim.rendering.raytrace.intersection_kernel import (
     PLANE,
     SPHERE,
 )
-from drone_rl.sim.rendering.raytrace.projection_kernel import camera_pose, view_geom
+from drone_rl.sim.rendering.raytrace.projection_kernel import (
+    bounding_rectangle,
+    start_job,
+    view_geom,
+)
 from drone_rl.sim.rendering.raytrace.shadows_kernel import (
     cast_box_shadow,
     find_ground,
     is_shadowed,
     mark_candidates,
     shadow_length,
-    shadow_rectangle,
 )
-from tests.box_ahead import SIZE, array, geoms, poses, view
+from tests.box_ahead import SIZE, array, geoms, poses, scratch, view
 
 
 @wp.kernel(enable_backward=False)
@@ -30,16 +33,16 @@ def look(
     scene: structs_kernel.Geoms,
     placed: structs_kernel.Poses,
     sun: wp.vec3,
-    geom_views: wp.array[structs_kernel.GeomView],
+    buffers: structs_kernel.Scratch,
     length: wp.array[float],
     parts: wp.array[wp.vec4i],
 ):
-    camera = seen.cameras[0]
-    for geom in range(geom_views.shape[0]):
-        geom_views[geom] = view_geom(scene, geom, placed, 0, camera_pose(camera, placed, 0))
-    ground = find_ground(seen, geom_views, sun)
-    length[0] = shadow_length(seen, geom_views, 0, ground, sun)
-    parts[0] = shadow_rectangle(seen, camera, geom_views[0], sun * length[0])
+    job = start_job(seen, placed, buffers, 0, 0, 0, 0)
+    for geom in range(job.geom_views.shape[0]):
+        job.geom_views[geom] = view_geom(job, scene, geom, placed)
+    box = job.geom_views[0]
+    length[0] = shadow_length(job, box, find_ground(job, sun), sun)
+    parts[0] = bounding_rectangle(job, box, sun * length[0])
 
 
 def looked(sun, box=(0.0, 0.0, -6.0), *, size=(0.0, 0.0, 1.0), floor=True):
@@ -49,14 +52,13 @@ def looked(sun, box=(0.0, 0.0, -6.0), *, size=(0.0, 0.0, 1.0), floor=True):
     count = len(scene.kind)
     scene.kind, scene.position = array(kinds[:count], int), array(places[:count], wp.vec3)
     scene.size = array([(1.0, 1.0, 1.0), size][:count], wp.vec3)
-    geom_views = wp.zeros(count, dtype=structs_kernel.GeomView, device="cpu")
     length, parts = (wp.zeros(1, dtype=of, device="cpu") for of in (float, wp.vec4i))
     given = [
         view(int(structs_kernel.DEPTH)),
         scene,
         poses(),
         wp.vec3(*sun),
-        geom_views,
+        scratch(1, count),
         length,
         parts,
     ]
@@ -103,17 +105,14 @@ def test_what_stays_behind_the_camera_is_not():
 
 @wp.kernel(enable_backward=False)
 def hide(
+    job: structs_kernel.Job,
     geom_view: structs_kernel.GeomView,
-    rays: wp.array[wp.vec3],
-    nearest: wp.array[float],
-    owners: wp.array[int],
     sun: wp.vec3,
-    dark: wp.array[int],
     behind: wp.array[int],
 ):
-    cast_box_shadow(dark, 0, rays.shape[0], rays, nearest, owners, 8, 0, geom_view, sun)
-    for i in range(rays.shape[0]):
-        behind[i] = int(is_shadowed(geom_view, rays[i], nearest[i], sun))
+    cast_box_shadow(job, 0, behind.shape[0], 0, geom_view, sun)
+    for i in range(behind.shape[0]):
+        behind[i] = int(is_shadowed(geom_view, job.rays[i], job.nearest[i], sun))
 
 
 def test_a_box_hides_what_is_beyond_it_alone():
@@ -128,8 +127,8 @@ def test_a_box_hides_what_is_beyond_it_alone():
     geom_view.eye, geom_view.into = wp.vec3(0.5, 1.0, 2.0), wp.mat33(*np.eye(3).flatten())
     dark, behind = (wp.zeros(20_000, dtype=int, device="cpu") for _ in range(2))
     sun = np.array([0.0, 0.6, -0.8])
-    given = [array(rays, wp.vec3), array(nearest, float), array(owners, int), wp.vec3(*sun)]
-    wp.launch(hide, 1, inputs=[geom_view, *given, dark, behind], device="cpu")
+    job = surfaces(rays, nearest, owners, dark)
+    wp.launch(hide, 1, inputs=[job, geom_view, wp.vec3(*sun), behind], device="cpu")
     others = owners >= 8
     assert np.array_equal(dark.numpy()[others], behind.numpy()[others])
     assert 50 < dark.numpy().sum() < 5000 and not dark.numpy()[~others].any()
@@ -141,17 +140,21 @@ def test_a_box_hides_what_is_beyond_it_alone():
 
 @wp.kernel(enable_backward=False)
 def near(
+    job: structs_kernel.Job,
     geom_view: structs_kernel.GeomView,
-    rays: wp.array[wp.vec3],
-    nearest: wp.array[float],
-    owners: wp.array[int],
     sun: wp.vec3,
-    dark: wp.array[int],
     behind: wp.array[int],
 ):
-    mark_candidates(dark, 0, rays.shape[0], rays, nearest, owners, 8, 0, geom_view, sun, 2)
-    for i in range(rays.shape[0]):
-        behind[i] = int(is_shadowed(geom_view, rays[i], nearest[i], sun))
+    mark_candidates(job, 0, behind.shape[0], 0, geom_view, sun)
+    for i in range(behind.shape[0]):
+        behind[i] = int(is_shadowed(geom_view, job.rays[i], job.nearest[i], sun))
+
+
+def surfaces(rays, nearest, owners, dark):
+    job = structs_kernel.Job()
+    job.rays, job.nearest = array(rays, wp.vec3), array(nearest, float)
+    job.owner, job.dark = array(owners, int), dark
+    return job
 
 
 @pytest.mark.parametrize(
@@ -177,8 +180,8 @@ def test_what_may_be_in_the_shadow_is_all_that_is(kind, reach):
     geom_view.eye, geom_view.into = wp.vec3(0.5, 1.0, 2.0), wp.mat33(*np.eye(3).flatten())
     dark, behind = array(before, int), wp.zeros(20_000, dtype=int, device="cpu")
     sun = np.array([0.0, 0.6, -0.8])
-    given = [array(rays, wp.vec3), array(nearest, float), array(owners, int), wp.vec3(*sun)]
-    wp.launch(near, 1, inputs=[geom_view, *given, dark, behind], device="cpu")
+    job = surfaces(rays, nearest, owners, dark)
+    wp.launch(near, 1, inputs=[job, geom_view, wp.vec3(*sun), behind], device="cpu")
     marked = dark.numpy() == 2
     is_open = (owners >= 8) & (before == 0)
     assert (dark.numpy() == before)[~is_open].all()

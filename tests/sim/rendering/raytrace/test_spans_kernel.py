@@ -14,10 +14,10 @@ def fill(
     colors: wp.array[wp.vec3ub],
     vectors: wp.array[wp.vec3],
 ):
-    spans_kernel.fill_floats(floats, 2, 5, 0.5)
-    spans_kernel.fill_ints(ints, 2, 5, 7)
-    spans_kernel.fill_bytes(colors, 2, 5, wp.vec3ub(wp.uint8(1), wp.uint8(2), wp.uint8(3)))
-    spans_kernel.fill_vectors(vectors, 2, 5, wp.vec3(1.0, 2.0, 3.0))
+    spans_kernel.fill(floats, 2, 5, 0.5)
+    spans_kernel.fill(ints, 2, 5, 7)
+    spans_kernel.fill(colors, 2, 5, wp.vec3ub(wp.uint8(1), wp.uint8(2), wp.uint8(3)))
+    spans_kernel.fill(vectors, 2, 5, wp.vec3(1.0, 2.0, 3.0))
 
 
 @wp.kernel(enable_backward=False)

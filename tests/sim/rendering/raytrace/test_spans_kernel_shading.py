@@ -4,12 +4,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from drone_rl.sim.rendering.raytrace.spans_kernel import (
-    TextureMap,
-    shade_plain,
-    shade_sky,
-    shade_textured,
-)
+from drone_rl.sim.rendering.raytrace.spans_kernel import shade_plain, shade_sky, shade_textured
+from drone_rl.sim.rendering.raytrace.structs_kernel import Job, SurfaceLight, TextureMap
 from drone_rl.sim.rendering.textures import levels
 from tests.box_ahead import array
 
@@ -18,33 +14,30 @@ LIT, SHADED, HORIZON = (wp.vec3(*c) for c in ((200, 100, 300), (20, 10, 30), (50
 
 @wp.kernel(enable_backward=False)
 def shade(
-    colors: wp.array[wp.vec3ub],
-    rays: wp.array[wp.vec3],
-    nearest: wp.array[float],
-    dark: wp.array[int],
-    texels: wp.array[wp.uint32],
+    job: Job,
+    light: SurfaceLight,
     cover: TextureMap,
-    fog: float,
+    texels: wp.array[wp.uint32],
     what: int,
 ):
-    count = colors.shape[0]
+    count = job.colors.shape[0]
     if what == 0:
-        shade_sky(colors, 0, count, rays, wp.vec3(0.0, 1.0, 0.0), HORIZON, LIT)
+        shade_sky(job, 0, count, wp.vec3(0.0, 1.0, 0.0), HORIZON, LIT)
     if what == 1:
-        shade_plain(colors, 0, count, nearest, dark, LIT, SHADED, fog, HORIZON)
+        shade_plain(job, 0, count, light)
     if what == 2:
-        shade_textured(
-            colors, 0, count, rays, nearest, dark, texels, cover, LIT, SHADED, fog, HORIZON
-        )
+        shade_textured(job, 0, count, light, cover, texels)
 
 
 def shaded(what, rays, nearest=None, dark=None, texels=(0,), cover=None, fog=0.0):
-    count = len(rays)
-    colors = wp.zeros(count, dtype=wp.vec3ub, device="cpu")
-    given = [array(rays, wp.vec3), array(nearest or [1.0] * count, float)]
-    given += [array(dark or [0] * count, int), array(texels, wp.uint32), cover or TextureMap()]
-    wp.launch(shade, 1, inputs=[colors, *given, fog, what], device="cpu")
-    return colors.numpy().tolist()
+    count, job, light = len(rays), Job(), SurfaceLight()
+    job.colors = wp.zeros(count, dtype=wp.vec3ub, device="cpu")
+    job.rays, job.nearest = array(rays, wp.vec3), array(nearest or [1.0] * count, float)
+    job.dark = array(dark or [0] * count, int)
+    light.lit, light.shaded, light.horizon, light.fog = LIT, SHADED, HORIZON, fog
+    given = [job, light, cover or TextureMap(), array(texels, wp.uint32), what]
+    wp.launch(shade, 1, inputs=given, device="cpu")
+    return job.colors.numpy().tolist()
 
 
 def test_the_sky_is_between_its_two_colours():
