@@ -1,19 +1,13 @@
 """Faster implementations of collecting, learning and inference. The package is optional.
 
 Without it everything works, only slower. `drone_rl.collectors.speedups` is the one module that
-imports it. Each function below returns an implementation, or the reasons why there is none.
+imports it. Each `try_create` returns an implementation, or the reasons why there is none.
 """
 
 from drone_rl.acceleration.direct_collector import DirectCollector, DirectStream
 from drone_rl.acceleration.fused_collector import FusedCollector
 from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
 from drone_rl.acceleration.inference_kernel import BatchedInference
-from drone_rl.acceleration.selection import (
-    accelerate,
-    accelerate_gradients,
-    accelerate_inference,
-    accelerate_stream,
-)
 
 __all__ = [
     "ActivationCache",
@@ -22,8 +16,4 @@ __all__ = [
     "DirectStream",
     "FusedCollector",
     "FusedNetwork",
-    "accelerate",
-    "accelerate_gradients",
-    "accelerate_inference",
-    "accelerate_stream",
 ]

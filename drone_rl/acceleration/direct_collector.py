@@ -27,15 +27,14 @@ class DirectCollector:
         renderer: DirectRenderer,
         actor: TensorDictModuleBase,
         action_key: NestedKey,
-        *,
         extra: Iterable[NestedKey] = (),
         keep_observations: bool = True,
     ) -> None:
-        """See `accelerate`."""
+        """See `collectors.speedups.accelerated_collector`."""
         self.renderer, self.actor, self.action_key = renderer, actor, action_key
         self.keep_observations = keep_observations
         self.reasons = Reasons()
-        """Why the collector is not fused; empty if nobody asked."""
+        """Why the collector is not fused; empty if it need not be."""
         self._extra = tuple(extra)
 
     @property
@@ -96,26 +95,21 @@ class DirectStream:
     name = "direct collector"
 
     def __init__(self, renderer: DirectRenderer) -> None:
-        """Takes over the environment's states."""
         self._renderer = renderer
         self._pixels: Tensor | None = None
 
     def observe(self) -> TensorDictBase:
-        """See `Stream`."""
-        pixels = self._start()
-        return TensorDict({"pixels": pixels}, [len(pixels)], device=pixels.device)
-
-    def _start(self) -> Tensor:
+        """See `TorchrlStream`."""
         if self._pixels is None:
             self._renderer.env.start()
             self._pixels = self._look()
-        return self._pixels
+        return TensorDict({"pixels": self._pixels}, [len(self._pixels)], device=self._pixels.device)
 
     def _look(self) -> Tensor:
         return self._renderer.look(self._renderer.worlds.state).get("pixels")
 
     def step(self, action: Tensor) -> Entries:
-        """See `Stream`."""
+        """See `TorchrlStream`."""
         worlds = self._renderer.worlds
         worlds.state, reward = worlds.advance(worlds.state, action)
         entries, _ = self._renderer.entries(worlds.state, reward)
@@ -123,22 +117,22 @@ class DirectStream:
         return entries | {("next", "pixels"): self._pixels}
 
     def restart(self, ended: Tensor) -> None:
-        """See `Stream`."""
+        """See `TorchrlStream`."""
         rows = ended.flatten().nonzero()[:, 0]
         self._renderer.env.start(rows)
         fresh = self._renderer.look(self._renderer.worlds.state[rows], rows).get("pixels")
-        self._pixels = self._start().index_copy(0, rows, fresh)
+        self._pixels = self.observe().get("pixels").index_copy(0, rows, fresh)
 
     def forget(self) -> None:
-        """See `Stream`."""
+        """See `TorchrlStream`."""
         self._pixels = None
 
     def state_dict(self) -> dict[str, Any]:
-        """See `Stream`; only the environments have a state."""
-        self._start()
+        """See `TorchrlStream`; only the environments have a state."""
+        self.observe()
         return {"worlds": self._renderer.env.running_state(), "transforms": {}, "carried": {}}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """See `Stream`."""
+        """See `TorchrlStream`."""
         self._renderer.env.load_running_state(state["worlds"])
         self._pixels = self._look()

@@ -1,4 +1,4 @@
-"""What the collectors of one batch of environments share."""
+"""Base class of the collectors of one batch of environments."""
 
 import abc
 from collections.abc import Callable, Iterable, Iterator
@@ -52,7 +52,10 @@ class BatchedCollector(BaseCollector):
         self.episodes = 0
         self._observed = tuple(actor.in_keys)
         flags = (env.reward_key, *env.done_keys)
-        observable = {("next", *_as_tuple(key)) for key in env.observation_spec.keys(True, True)}
+        observable = {
+            ("next", *((key,) if isinstance(key, str) else key))
+            for key in env.observation_spec.keys(True, True)
+        }
         self._kept = (*(("next", key) for key in flags), *(k for k in keep if k in observable))
 
     @property
@@ -76,11 +79,7 @@ class BatchedCollector(BaseCollector):
         return batch if self.postproc is None else self.postproc(batch)
 
     def set_seed(self, seed: int, static_seed: bool = False) -> int:
-        """Seeds the environments; whoever made the actor's generator seeds that.
-
-        Returns:
-            A seed for the next collector, or the same if it is static.
-        """
+        """Seeds the environments, not the actor's generator. Returns the next seed."""
         return cast(int, self.env.set_seed(seed, static_seed=static_seed))
 
     def shutdown(
@@ -97,35 +96,20 @@ class BatchedCollector(BaseCollector):
     def _maybe_fallback_update(
         self, policy_or_weights: Any = None, *, model_id: str | None = None
     ) -> None:
-        """Implements `update_policy_weights_`: nothing without weights, if the actor is shared."""
-        if policy_or_weights is not None:
-            copy_weights(policy_or_weights, self.actor)
-
-
-def copy_weights(source: Any, actor: TensorDictModuleBase) -> None:
-    """Copies parameters into an actor.
-
-    Args:
-        source: Another such actor, its `state_dict`, or a TensorDict of its parameters.
-        actor: Gets them.
-    """
-    if isinstance(source, TensorDictBase):
-        weights = cast(TensorDictBase, TensorDict.from_module(actor))
-        weights.data.update_(source.data)
-    else:
-        actor.load_state_dict(source.state_dict() if isinstance(source, nn.Module) else source)
+        """Implements `update_policy_weights_`, for another such actor or its weights."""
+        if policy_or_weights is None:
+            return
+        if isinstance(policy_or_weights, TensorDictBase):
+            weights = cast(TensorDictBase, TensorDict.from_module(self.actor))
+            weights.data.update_(policy_or_weights.data)
+            return
+        is_module = isinstance(policy_or_weights, nn.Module)
+        self.actor.load_state_dict(
+            policy_or_weights.state_dict() if is_module else policy_or_weights
+        )
 
 
 def take_rows(tensordict: TensorDictBase, rows: Tensor) -> TensorDictBase:
-    """Index the first dimension, faster than tensordict's own indexing.
-
-    Args:
-        tensordict: First dimension: rows.
-        rows: Indices. Shape: (k,).
-    """
+    """Index the first dimension by rows (k,), faster than tensordict's own indexing."""
     taken = {key: tensordict.get(key).index_select(0, rows) for key in tensordict.keys(True, True)}
     return TensorDict(taken, [len(rows)], device=tensordict.device)
-
-
-def _as_tuple(key: Any) -> tuple[str, ...]:
-    return (key,) if isinstance(key, str) else key

@@ -1,7 +1,7 @@
 """Collects complete episodes from a batch of environments."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import torch
 from tensordict import TensorDictBase
@@ -15,31 +15,7 @@ from drone_rl.collectors.stepping import SteppingCollector
 from drone_rl.envs.direct_renderer import Reasons
 
 if TYPE_CHECKING:
-    from drone_rl.acceleration import ActivationCache
-
-
-class EpisodeSource(Protocol):
-    """Runs complete episodes: by TorchRL's collector, or accelerated."""
-
-    implementation: str
-    """What computes the actions: "fused kernel" or "PyTorch"."""
-
-    @property
-    def name(self) -> str:
-        """What it is, for the log, and why it is not faster."""
-        ...
-
-    def collect(self, num_envs: int) -> TensorDictBase:
-        """Run an episode in each of the first environments; trajectories count from 0."""
-        ...
-
-    def cache_activations(self) -> "ActivationCache | None":
-        """Keep the activations of acting from now on, for a `FusedNetwork`, if that is possible."""
-        ...
-
-    def close(self) -> None:
-        """Ends its threads."""
-        ...
+    from drone_rl.acceleration import DirectCollector, FusedCollector
 
 
 class EpisodeCollector(BatchedCollector):
@@ -85,7 +61,7 @@ class EpisodeCollector(BatchedCollector):
         super().__init__(env, actor, **kwargs)
         what = {"kept": self._kept, "extra": noted, "keep_observations": keep_observations}
         found = accelerated_collector(env, actor, acceleration, num_threads=num_threads, **what)
-        self.source: EpisodeSource = (
+        self.source: FusedCollector | DirectCollector | SteppingCollector = (
             SteppingCollector(env, actor, found, **what) if isinstance(found, Reasons) else found
         )
         """What runs the episodes."""

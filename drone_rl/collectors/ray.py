@@ -1,11 +1,10 @@
 """Collectors on a Ray cluster, whose workers may die.
 
-TorchRL's `RayCollector` makes the workers, places them on the cluster and ends them. Two of its
-habits don't fit complete episodes and workers that may be lost, so the round trip of a batch is
-ours: it stacks the workers' batches, which have to be of one length for that, and it sends the
-parameters through a process group that breaks with its first member. Here the parameters travel
-with the question and the random streams with the answer, so that whoever takes a lost worker's
-place flies the very episodes that were under way.
+TorchRL's `RayCollector` creates the workers, places them and ends them. It stacks the workers'
+batches, which must have one length, and sends parameters through a process group that breaks with
+its first member. Therefore the exchange of a batch is implemented here: parameters travel with the
+request and random streams with the result, so that the replacement of a lost worker runs the very
+episodes that were under way.
 """
 
 import logging
@@ -29,25 +28,20 @@ _log = logging.getLogger(__name__)
 
 
 class RemoteEpisodes(BaseCollector):
-    """What lives in a worker: an `EpisodeCollector` that is told its parameters and its state."""
+    """Runs in a worker: an `EpisodeCollector` that receives its parameters and its state."""
 
     def __init__(self, create_env_fn: Sequence[Callable[[], Parts]], **unused: object) -> None:
-        """Builds the parts; the rest of what `RayCollector` gives has no use here."""
         super().__init__()
         torch.set_num_threads(1)
         self._episodes, self._network, self._actions = create_env_fn[0]()
 
-    def fly(
+    def collect(
         self, weights: dict[str, torch.Tensor], state: dict | None
     ) -> tuple[dict[str, Any], dict]:
-        """One episode in every world.
-
-        Args:
-            weights: Of the network.
-            state: From which to go on; None at the very start.
+        """Run one episode in every environment, with these weights, from this state or the start.
 
         Returns:
-            The batch as numpy arrays, which Ray hands over without copying, and the state after it.
+            The batch as numpy arrays, which Ray transfers without copies, and the state after it.
         """
         self._network.load_state_dict(weights)
         if state is not None:
@@ -57,16 +51,16 @@ class RemoteEpisodes(BaseCollector):
         return {key: value.numpy() for key, value in leaves}, self.state_dict()
 
     def state_dict(self) -> dict:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """State between two batches."""
+        """Return the state between two batches."""
         return {"episodes": self._episodes.state_dict(), "actions": self._actions.get_state()}
 
     def load_state_dict(self, state_dict: dict) -> None:
-        """Goes on from a state."""
+        """Resume from a state."""
         self._episodes.load_state_dict(state_dict["episodes"])
         self._actions.set_state(state_dict["actions"])
 
     def iterator(self) -> Iterator[TensorDictBase]:
-        """Batches without end."""
+        """Yield batches without end."""
         while True:
             yield self._episodes.collect()
 
@@ -82,8 +76,8 @@ class RemoteEpisodes(BaseCollector):
 class RayEpisodeCollector:
     """Joins the batches of collectors that run in workers of a Ray cluster.
 
-    The worlds, their random streams and the order of the batches are those of a
-    `ThreadedCollector` with as many threads as there are workers here, and so is the result.
+    Environments, random streams and the order of batches are those of a `ThreadedCollector` with
+    as many threads as there are workers, and so is the result.
     """
 
     def __init__(
@@ -101,7 +95,7 @@ class RayEpisodeCollector:
         """Starts the workers.
 
         Args:
-            makers: One a worker, over disjoint worlds; sent to it.
+            makers: One a worker, over disjoint environments; sent to it.
             actor: The policy that learns, here.
             network: Its network.
             address: Of the cluster; None starts one on this machine.
@@ -134,7 +128,7 @@ class RayEpisodeCollector:
             yield self.collect()
 
     def collect(self) -> TensorDictBase:
-        """Runs one episode in every world of every worker. Shape: (T_total,).
+        """Run one episode in every environment of every worker. Shape: (T_total,).
 
         Raises:
             InputError: Too many workers were lost.
@@ -142,7 +136,7 @@ class RayEpisodeCollector:
         weights = {k: v.detach().cpu() for k, v in self._network.state_dict().items()}
         shared = self._ray.put(weights)
         numbers = range(len(self._makers))
-        tasks = [self.workers[i].fly.remote(shared, self._states[i]) for i in numbers]
+        tasks = [self.workers[i].collect.remote(shared, self._states[i]) for i in numbers]
         answers = [self._answer(i, tasks[i], shared) for i in numbers]
         self._states = [state for _, state in answers]
         batches = [_to_tensordict(arrays) for arrays, _ in answers]
@@ -154,7 +148,7 @@ class RayEpisodeCollector:
         return {"workers": self._states}
 
     def load_state_dict(self, state_dict: dict) -> None:
-        """Goes on from a `state_dict`."""
+        """Resume from a `state_dict`."""
         self._states = list(state_dict["workers"])
 
     def shutdown(self) -> None:
@@ -162,7 +156,7 @@ class RayEpisodeCollector:
         self._pool.shutdown()
 
     def _answer(self, number: int, task: Any, weights: Any) -> tuple[dict[str, Any], dict]:
-        """A worker's batch and state, be it from the one that takes its place."""
+        """Return the batch and state of a worker or of its replacement."""
         while True:
             try:
                 return self._ray.get(task)
@@ -172,7 +166,7 @@ class RayEpisodeCollector:
                 self._ray.exceptions.ObjectLostError,
             ) as error:
                 self._replace(number, error)
-                task = self.workers[number].fly.remote(weights, self._states[number])
+                task = self.workers[number].collect.remote(weights, self._states[number])
 
     def _replace(self, number: int, error: Exception) -> None:
         if self._left == 0:
@@ -181,7 +175,7 @@ class RayEpisodeCollector:
                 f"{' '.join(str(error).split())[:200]}; see to the cluster, then go on with resume="
             ) from error
         self._left -= 1
-        _log.warning("Ray worker %d was lost; another flies its unfinished episodes", number)
+        _log.warning("Ray worker %d was lost; another runs its unfinished episodes", number)
         self._pool.add_collectors(
             [self._makers[number]], 1, None, [{}], [{"num_cpus": self._num_cpus}]
         )
@@ -191,7 +185,7 @@ class RayEpisodeCollector:
 def _start(
     makers: Sequence[Callable[[], Parts]], address: str | None, num_cpus: float
 ) -> tuple[Any, Any]:
-    """The module ray and TorchRL's collector, whose workers are ready to be asked."""
+    """Return the module ray and TorchRL's collector, whose workers are ready."""
     ray = extra("ray", "ray", "collector=ray")
     from torchrl.collectors.distributed import RayCollector
 

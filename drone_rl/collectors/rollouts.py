@@ -1,7 +1,7 @@
 """Collects rollouts of fixed length; episodes continue from batch to batch."""
 
 from collections.abc import Iterable, Mapping
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -14,6 +14,9 @@ from drone_rl.collectors.batched_collector import BatchedCollector
 from drone_rl.collectors.speedups import accelerated_stream
 from drone_rl.envs.direct_renderer import Entries, Reasons
 from drone_rl.utils.errors import InputError
+
+if TYPE_CHECKING:
+    from drone_rl.acceleration import DirectStream
 
 
 class RolloutCollector(BatchedCollector):
@@ -29,13 +32,7 @@ class RolloutCollector(BatchedCollector):
     def __init__(
         self, env: EnvBase, actor: TensorDictModuleBase, num_steps: int, **kwargs: Any
     ) -> None:
-        """Connects an environment and a policy.
-
-        Args:
-            env: A batched environment.
-            actor: Writes the action.
-            num_steps: Of each environment in a batch.
-            kwargs: See `BatchedCollector`.
+        """Connects an environment and a policy; `kwargs` as for `BatchedCollector`.
 
         Raises:
             InputError: The environment is not a batch of environments, or there are no steps.
@@ -45,7 +42,7 @@ class RolloutCollector(BatchedCollector):
         super().__init__(env, actor, **kwargs)
         self.num_steps = num_steps
         found = accelerated_stream(env, self._observed, self._kept)
-        self._stream: Stream = (
+        self._stream: DirectStream | TorchrlStream = (
             TorchrlStream(env, self._observed, self._kept, found)
             if isinstance(found, Reasons)
             else found
@@ -112,46 +109,8 @@ class RolloutCollector(BatchedCollector):
         self._steps = state_dict["step_count"].to(self._steps, copy=True)
 
 
-class Stream(Protocol):
-    """Steps all environments on and on; each restarts when its episode has ended."""
-
-    name: str
-    """What it is, for the log."""
-
-    def observe(self) -> TensorDictBase:
-        """Return the observations; the first call starts all environments. Shape: (num_envs,)."""
-        ...
-
-    def step(self, action: Tensor) -> Entries:
-        """Step every environment.
-
-        Args:
-            action: Of each environment. Shape: (num_envs, *).
-
-        Returns:
-            The kept entries of the step, and the ("next", ...) observations.
-        """
-        ...
-
-    def restart(self, ended: Tensor) -> None:
-        """Start new episodes where old ones ended. Shape: (num_envs, 1), bool."""
-        ...
-
-    def forget(self) -> None:
-        """Start all episodes again at the next call of `observe`."""
-        ...
-
-    def state_dict(self) -> dict[str, Any]:
-        """Return the state of the episodes under way, without observations."""
-        ...
-
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Resume within the episodes of a `state_dict`; observations are rendered again."""
-        ...
-
-
 class TorchrlStream:
-    """Steps any environment by `env.step`."""
+    """Steps all environments of any batch by `env.step`; each restarts when its episode ends."""
 
     def __init__(
         self,
@@ -162,8 +121,11 @@ class TorchrlStream:
     ) -> None:
         """See `accelerated_stream`; the reasons are why there is no faster stream."""
         self.name = f"stepping collector: {reasons}"
+        """For the log."""
         self._env, self._observed, self._kept = env, tuple(observed), tuple(kept)
-        self._dropped = _unused_keys(env, self._observed)
+        read = {key if isinstance(key, str) else key[0] for key in self._observed}
+        # copying entries that no step reads makes each step of TorchRL slower
+        self._dropped = {*env.done_keys, *({env.reward_key, "info"} - read)}
         self._state: TensorDictBase | None = None
 
     @property
@@ -171,25 +133,29 @@ class TorchrlStream:
         return getattr(self._env, "base_env", self._env)
 
     def observe(self) -> TensorDictBase:
-        """See `Stream`."""
+        """Return the observations; the first call starts all environments. Shape: (num_envs,)."""
         return self._begin().select(*self._observed)
 
     def _begin(self) -> TensorDictBase:
         if self._state is None:
-            self._state = self._without_unused(self._env.reset())
+            self._state = self._env.reset().exclude(*self._dropped)
         return self._state
 
     def step(self, action: Tensor) -> Entries:
-        """See `Stream`."""
+        """Step every environment with actions (num_envs, *).
+
+        Returns:
+            The kept entries of the step, and the ("next", ...) observations.
+        """
         after = self._env.step(self._begin().set(self._env.action_key, action))
         following = after.get("next")
         entries: Entries = {key: after.get(key) for key in self._kept}
         entries |= {("next", key): following.get(key) for key in self._observed}
-        self._state = self._without_unused(following)
+        self._state = following.exclude(*self._dropped)
         return entries
 
     def restart(self, ended: Tensor) -> None:
-        """See `Stream`.
+        """Start new episodes where old ones ended. Shape: (num_envs, 1), bool.
 
         TorchRL's `reset` would copy the observations of all environments, several times.
         """
@@ -202,38 +168,26 @@ class TorchrlStream:
             restarted.set(key, state.get(key).index_copy(0, indices, rows))
         self._state = restarted
 
-    def _without_unused(self, state: TensorDictBase) -> TensorDictBase:
-        """Without entries that no step reads."""
-        return state.exclude(*self._dropped, *self._env.done_keys)
-
     def forget(self) -> None:
-        """See `Stream`."""
+        """Start all episodes again at the next call of `observe`."""
         self._state = None
 
     def state_dict(self) -> dict[str, Any]:
-        """See `Stream`."""
+        """Return the state of the episodes under way, without observations."""
         carried = self._begin().exclude(*self._observed)
+        is_transformed = self._env is not self._base_env
         return {
             "worlds": self._base_env.running_state(),
-            "transforms": self._memories(),
+            "transforms": dict(self._env.state_dict()) if is_transformed else {},
             "carried": carried.to_dict(),
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """See `Stream`."""
+        """Resume within the episodes of a `state_dict`; observations are rendered again."""
         self._begin()  # transforms allocate their memory at a reset
         self._base_env.load_running_state(state["worlds"])
         if self._env is not self._base_env:
             self._env.load_state_dict(state["transforms"])
         nowhere = torch.zeros(*self._env.batch_size, 1, dtype=torch.bool, device=self._env.device)
         rendered = self._env._reset(TensorDict({"_reset": nowhere}, self._env.batch_size))
-        self._state = self._without_unused(rendered).update(state["carried"])
-
-    def _memories(self) -> dict:
-        """State of the transforms, such as earlier frames."""
-        return {} if self._env is self._base_env else dict(self._env.state_dict())
-
-
-def _unused_keys(env: EnvBase, observed: Iterable[NestedKey]) -> set[NestedKey]:
-    """Entries of a state that no step reads; copying them makes each step of TorchRL slower."""
-    return {env.reward_key, "info"} - {key if isinstance(key, str) else key[0] for key in observed}
+        self._state = rendered.exclude(*self._dropped).update(state["carried"])

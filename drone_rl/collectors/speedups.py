@@ -5,7 +5,7 @@ and torch.
 """
 
 import importlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import torch
@@ -14,7 +14,7 @@ from tensordict.utils import NestedKey
 from torch import Tensor, nn
 from torchrl.envs import EnvBase
 
-from drone_rl.envs.direct_renderer import Reasons
+from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
 
 if TYPE_CHECKING:
     from drone_rl.acceleration import (
@@ -41,7 +41,14 @@ def _package() -> Any:
 
 
 def accelerated_collector(
-    env: EnvBase, actor: TensorDictModuleBase, acceleration: Acceleration, **settings: Any
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    acceleration: Acceleration,
+    *,
+    kept: Iterable[NestedKey],
+    extra: Iterable[NestedKey] = (),
+    keep_observations: bool = True,
+    num_threads: int = 1,
 ) -> "FusedCollector | DirectCollector | Reasons":
     """Return an accelerated collector of complete episodes, or the reasons why there is none.
 
@@ -49,24 +56,43 @@ def accelerated_collector(
         env: A batch of environments.
         actor: The policy.
         acceleration: The fastest implementation that may be used.
-        settings: See `drone_rl.acceleration.accelerate`.
+        kept: ("next", ...) entries to keep of each step.
+        extra: Entries that the actor writes, kept in addition to the action.
+        keep_observations: Whether to keep observations and everything that the actor writes.
+        num_threads: Of the fused kernel; no result depends on it.
     """
     if acceleration == "none":
         return Reasons(["collector.compiled is false"])
     package = _package()
     if package is None:
         return MISSING
-    return package.accelerate(env, actor, fused=acceleration == "fused", **settings)
+    renderer = DirectRenderer.try_create(env, actor.in_keys, kept)
+    if isinstance(renderer, Reasons):
+        return renderer
+    direct = package.DirectCollector(renderer, actor, env.action_key, extra, keep_observations)
+    if acceleration == "direct":
+        return direct
+    found = package.FusedCollector.try_create(direct, num_threads)
+    if isinstance(found, Reasons):
+        direct.reasons = found
+        return direct
+    return found
 
 
 def accelerated_stream(
-    env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedKey]
+    env: EnvBase, observed: Sequence[NestedKey], kept: Iterable[NestedKey]
 ) -> "DirectStream | Reasons":
-    """Return what steps environments on and on without TorchRL, or the reasons why not."""
+    """Return what steps environments on and on without TorchRL, or the reasons why not.
+
+    `observed` are the entries that the actor reads, `kept` the ("next", ...) entries of each step.
+    """
     package = _package()
     if package is None:
         return MISSING
-    return package.accelerate_stream(env, observed, kept)
+    if tuple(observed) != ("pixels",):
+        return Reasons([f"the policy reads {', '.join(map(str, observed))} instead of pixels"])
+    renderer = DirectRenderer.try_create(env, observed, kept)
+    return renderer if isinstance(renderer, Reasons) else package.DirectStream(renderer)
 
 
 def accelerated_gradients(
@@ -82,12 +108,12 @@ def accelerated_gradients(
         network: From pixels to logits.
         num_threads: Of the kernel; sums over observations depend on it.
         of: What has gradients. Gradients of pixels take the weights as they are now.
-        cache: Makes the collector keep its activations, see `EpisodeSource.cache_activations`.
+        cache: Makes the collector keep its activations, see `FusedCollector.cache_activations`.
     """
     package = _package()
     if package is None:
         return network
-    found = package.accelerate_gradients(network, num_threads, of=of, cache=cache)
+    found = package.FusedNetwork.try_create(network, num_threads, of=of, cache=cache)
     return network if isinstance(found, Reasons) else found
 
 
@@ -97,5 +123,5 @@ def accelerated_inference(network: nn.Module) -> Callable[[Tensor], Tensor]:
     package = _package()
     if package is None:
         return plain
-    found = package.accelerate_inference(network)
+    found = package.BatchedInference.try_create(network)
     return plain if isinstance(found, Reasons) else found

@@ -39,16 +39,7 @@ class SteppingCollector:
         extra: Iterable[NestedKey] = (),
         keep_observations: bool = True,
     ) -> None:
-        """Connects an environment and a policy.
-
-        Args:
-            env: A batch of environments.
-            actor: The policy.
-            reasons: Why there is no faster collector.
-            kept: ("next", ...) entries to keep of each step.
-            extra: Entries that the actor writes, kept in addition to the action.
-            keep_observations: Whether to keep observations and everything that the actor writes.
-        """
+        """See `accelerated_collector`; the reasons are why there is no faster collector."""
         self.reasons = reasons
         self._env = _OneEpisode(env)
         self._actor = _ActiveOnly(actor, self._env)

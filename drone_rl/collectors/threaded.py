@@ -50,7 +50,7 @@ class ThreadedCollector(BaseCollector):
         return self.collectors[0].actor
 
     def cache_activations(self) -> "ActivationCache | None":
-        """See `EpisodeSource`; None for several collectors, whose batches are joined."""
+        """See `FusedCollector`; None for several collectors, whose batches are joined."""
         first, *others = self.collectors
         if others or not isinstance(first, EpisodeCollector):
             return None
@@ -78,11 +78,7 @@ class ThreadedCollector(BaseCollector):
             collector.load_state_dict(part)
 
     def set_seed(self, seed: int, static_seed: bool = False) -> int:
-        """Seeds all environments, each of which has a stream of its own.
-
-        Returns:
-            See `BatchedCollector.set_seed`.
-        """
+        """Seeds all environments. Returns a seed for the next collector."""
         return [c.set_seed(seed, static_seed=static_seed) for c in self.collectors][-1]
 
     def shutdown(

@@ -4,7 +4,16 @@ import sys
 
 import pytest
 import torch
+from torchrl.envs import RewardSum
 
+from drone_rl.acceleration import (
+    ActivationCache,
+    BatchedInference,
+    DirectCollector,
+    DirectStream,
+    FusedCollector,
+    FusedNetwork,
+)
 from drone_rl.collectors import speedups
 from drone_rl.collectors.episodes import EpisodeCollector
 from drone_rl.config import TaskSettings
@@ -12,6 +21,7 @@ from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
 from drone_rl.policies import MLP, SmallCNN, make_actor
 
 TASK = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=5)
+KEPT = [("next", "reward"), ("next", "done")]
 
 
 @pytest.fixture
@@ -35,9 +45,37 @@ def test_collectors_step_by_torchrl_if_the_package_is_missing(missing):
 def test_a_collector_that_may_not_be_accelerated_says_so():
     env = with_transforms(DroneEnv(2, TASK), [GrayPixels()])
     actor = make_actor(SmallCNN((1, 25, 64), 3), env.action_spec)
-    found = speedups.accelerated_collector(env, actor, "none")
+    found = speedups.accelerated_collector(env, actor, "none", kept=KEPT)
     assert found == ("collector.compiled is false",)
     env.close()
+
+
+def test_a_collector_is_fused_or_direct_or_impossible_for_reasons():
+    env = with_transforms(DroneEnv(2, TASK), [GrayPixels()])
+    actor = make_actor(SmallCNN((1, 25, 64), 3), env.action_spec)
+    find = speedups.accelerated_collector
+    assert isinstance(find(env, actor, "fused", kept=KEPT), FusedCollector)
+    assert isinstance(find(env, actor, "direct", kept=KEPT), DirectCollector)
+    found = find(env, make_actor(MLP((1, 25, 64), 3), env.action_spec), "fused", kept=KEPT)
+    assert isinstance(found, DirectCollector) and found.reasons == ("network MLP is not fused",)
+    assert isinstance(speedups.accelerated_stream(env, ["pixels"], KEPT), DirectStream)
+    summed = with_transforms(DroneEnv(2, TASK), [GrayPixels(), RewardSum()])
+    reasons = ("transform RewardSum is not fused",)
+    assert (
+        find(summed, make_actor(SmallCNN((1, 25, 64), 3), env.action_spec), "fused", kept=KEPT)
+        == reasons
+    )
+    assert speedups.accelerated_stream(summed, ["pixels"], KEPT) == reasons
+    env.close()
+    summed.close()
+
+
+def test_supported_networks_are_accelerated():
+    network, cache = SmallCNN((1, 25, 64), 3), ActivationCache(1, 1)
+    assert isinstance(speedups.accelerated_inference(network), BatchedInference)
+    found = speedups.accelerated_gradients(network, cache=lambda: cache)
+    assert isinstance(found, FusedNetwork) and found.in_keys == ("pixels", "activations")
+    assert speedups.accelerated_gradients(network).in_keys == ("pixels",)
 
 
 def test_networks_stay_as_they_are_if_the_package_is_missing(missing):
@@ -58,6 +96,6 @@ def test_networks_stay_as_they_are_if_they_are_not_supported():
 
 def test_an_error_within_the_package_is_no_missing_package(monkeypatch):
     monkeypatch.delitem(sys.modules, "drone_rl.acceleration", raising=False)
-    monkeypatch.setitem(sys.modules, "drone_rl.acceleration.selection", None)
-    with pytest.raises(ModuleNotFoundError, match="selection"):
+    monkeypatch.setitem(sys.modules, "drone_rl.acceleration.fused_collector", None)
+    with pytest.raises(ModuleNotFoundError, match="fused_collector"):
         speedups.accelerated_inference(torch.nn.Identity())
