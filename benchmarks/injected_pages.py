@@ -19,9 +19,8 @@ from typing import Any
 from markupsafe import Markup
 
 from drone_rl.explanations.report import embedding
-from drone_rl.explanations.report.explanation import Explanation
+from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.explanations.report.page import Policy, render_page
-from drone_rl.explanations.report.part import Part
 from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary
 from drone_rl.sweeps.report import render_page as render_sweep
 from drone_rl.utils.display import page, paragraph, table

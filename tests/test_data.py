@@ -15,7 +15,6 @@ MUTABLE = {
     "evaluation.rollouts:StepLog",
     "explanations.class_models:Attempts",
     "explanations.class_models:ClassModel",
-    "explanations.embedding:Embedding",
     "explanations.heat_maps:Explainer",
     "explanations.interventions:Intervention",
     "explanations.report.explanation:Explanation",

@@ -10,6 +10,6 @@ Shared:
 - `heat_maps`, `patches`, `interventions`, `controls`, `trust`: attribution methods, the measured
   effect of patches and of changes to a scene, placebo maps, and the tests of heat maps.
 
-Sections: `verdict` (with robustness), `behavior` (data set, contradictions, loops), `embedding`
-(t-SNE), `class_models`, `attribution`, `truth`, `response` (with asymmetry), `places`.
+Sections: `behavior` (verdict, robustness, data set, contradictions, loops), `embedding` (t-SNE),
+`class_models`, `attribution`, `truth`, `response` (with asymmetry), `places`.
 """

@@ -64,19 +64,14 @@ def _normalized(maps: Tensor) -> NDArray:
 
 
 def key_frames(dataset: RolloutDataset, episode: int, task: Task[Any]) -> list[tuple[int, str]]:
-    """Select six frames of an episode.
+    """Select six frames of an episode; fewer only if it is shorter.
 
     They are: the first frame; the frame half way to the first goal (or to the end); the frame
     before each goal is reached; the frame before one is missed, and the last one of an episode that
     failed. Remaining places go to the frames furthest from those selected.
 
-    Args:
-        dataset: Whole episodes.
-        episode: One of them.
-        task: Its task.
-
     Returns:
-        Frame number and reason, in order of time; fewer than six only if the episode is shorter.
+        Frame number and reason, in order of time.
     """
     frames = np.flatnonzero(dataset.episode == episode)
     chosen: dict[int, str] = {int(frames[0]): "start"}

@@ -1,7 +1,8 @@
-"""Sections "dataset" (statistics of the rollouts) and "flaws" (contradictions and loops).
+"""Sections "evaluation", "shifts" (robustness), "dataset" (rollout statistics) and "flaws".
 
-A contradiction (the flaw of Fig. 9) is a pair of similar observations with opposite actions. A loop
-is a stretch of an episode in which the drone moves back and forth.
+Flaws are contradictions and loops. A contradiction (the flaw of Fig. 9) is a pair of similar
+observations with opposite actions. A loop is a stretch of an episode in which the drone moves back
+and forth.
 """
 
 import dataclasses
@@ -12,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
+from drone_rl.evaluation.judge import judge_policy
+from drone_rl.evaluation.rule import Rule
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.actions import Actions
@@ -23,6 +26,35 @@ MIN_OPPOSITION = 0.2
 """Pairs with a smaller opposition are ignored."""
 LISTED = 50
 """Number of pairs that are listed; all are counted."""
+
+
+def evaluation_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Return "verdict", on held-out episodes."""
+    verdict = judge_policy(
+        context.env,
+        context.restart(),
+        context.settings.episodes,
+        rule=Rule(good_share=context.settings.good_share),
+        claim=context.claim,
+        unlike=context.unlike,
+        seed=context.seed,
+    )
+    return {"verdict": verdict.as_dict()}, {}
+
+
+def shifts_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Return "shifts", as in `shifts.json`, or why it is "refused"; nothing without such a file.
+
+    Arrays: "shifts_..." of each axis, frames without a shift and at the five strengths, black where
+    the task can't be changed so. Shapes: (6, H, W, 3).
+    """
+    if (measured := context.measured) is None:
+        return {}, {}
+    arrays = {
+        f"shifts_{name}": np.stack([np.zeros_like(strip[0]) if p is None else p for p in strip])
+        for name, strip in measured.pictures.items()
+    }
+    return {"shifts": measured.evidence}, arrays
 
 
 def dataset_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
@@ -87,10 +119,8 @@ def one_move(flights: RolloutDataset) -> float:
     """
     seen = flights.observations
     follows = np.flatnonzero(flights.episode[1:] == flights.episode[:-1])
-    if not len(follows):
-        return 0.0
     changes = [float(np.sqrt(np.mean((seen[t + 1] - seen[t]) ** 2))) for t in follows]
-    return float(np.median(changes))
+    return float(np.median(changes or [0.0]))
 
 
 def find_pairs(
@@ -115,10 +145,9 @@ def find_pairs(
             left, right = start + int(i), int(j)
             kind = _kind(offset[left], offset[right])
             found.append(Pair(left, right, float(distance[i, j]), float(swing[i, j]), kind))
-    found.sort(key=lambda pair: (-pair.opposition, pair.distance))
     used: set[int] = set()
     kept = []
-    for pair in found:
+    for pair in sorted(found, key=lambda pair: (-pair.opposition, pair.distance)):
         if not used & {pair.left, pair.right}:
             used |= {pair.left, pair.right}
             kept.append(pair)
@@ -157,32 +186,25 @@ class Loop:
     first: int
     """First frame."""
     length: int
-    """Number of frames."""
     reversals: int
     """Moves that undo the one before."""
 
 
-def find_loops(dataset: RolloutDataset, actions: Actions, min_reversals: int = 2) -> list[Loop]:
+def find_loops(flights: RolloutDataset, actions: Actions, min_reversals: int = 2) -> list[Loop]:
     """Find runs of reversible moves with at least so many reversals.
 
-    Args:
-        dataset: Whole episodes.
-        actions: Their actions; no move undoes forward.
-        min_reversals: With two, the drone is back where it was, and away again.
+    With two, the drone is back where it was, and away again; no move undoes forward.
     """
-    moves, episode = dataset.tensor("actions"), dataset.episode
-    sways = actions.sways({name: dataset.tensor(name) for name in actions.fields()})
+    moves, episode = flights.tensor("actions"), flights.episode
+    sways = actions.sways({name: flights.tensor(name) for name in actions.fields()}).numpy()
     turns = actions.undoes(moves[1:], moves[:-1])
-    loops, start = [], 0
-    for t in range(1, len(moves) + 1):
-        ends = t == len(moves) or episode[t] != episode[start]
-        if not ends and sways[t] and sways[start]:
-            continue
-        if sways[start]:
-            reversals = int(turns[start : t - 1].sum())
-            if reversals >= min_reversals:
-                loops.append(Loop(start, t - start, reversals))
-        start = t
+    is_new = (np.diff(episode) != 0) | (np.diff(sways.astype(int)) != 0)
+    starts = np.flatnonzero(np.concatenate([[True], is_new]))
+    loops = []
+    for start, end in zip(starts, [*starts[1:], len(moves)], strict=True):
+        reversals = int(turns[start : end - 1].sum())
+        if reversals >= min_reversals and sways[start]:
+            loops.append(Loop(int(start), int(end - start), reversals))
     return loops
 
 

@@ -16,7 +16,6 @@ from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.heat_maps import Objective
 from drone_rl.explanations.hooks import actions_of
 from drone_rl.policies import PictureNetwork
-from drone_rl.utils.errors import InputError
 
 OBJECTIVES: tuple[Objective, ...] = ("probability", "logit")
 AS_PROBABLE = 0.01
@@ -30,12 +29,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
             "Class models need gradients of the logits with respect to the pixels, and this policy "
             "has none; give it as a torch function of floats, which the transform rgb makes."
         )
-    statistics = PictureStatistics.of(context.observations)
-    numbers: dict[str, Any] = {
-        "statistics": dataclasses.asdict(statistics),
-        "channels": context.scenes.channels,
-    }
-    arrays = {}
+    statistics = ImageStatistics.of(context.observations)
 
     def optimize(objective: Objective) -> ClassModel:
         network = copy.deepcopy(context.network)  # it accumulates gradients
@@ -43,19 +37,18 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
 
     with ThreadPoolExecutor(len(OBJECTIVES)) as pool:  # a small batch uses one core
         found = dict(zip(OBJECTIVES, pool.map(optimize, OBJECTIVES), strict=True))
-    for objective, model in found.items():
-        arrays[f"class_model_{objective}"] = model.pictures.numpy()
-        numbers[objective] = model.summary()
+    numbers = {
+        "statistics": dataclasses.asdict(statistics),
+        "channels": context.scenes.channels,
+        **{objective: model.summary() for objective, model in found.items()},
+    }
+    arrays = {f"class_model_{name}": model.images.numpy() for name, model in found.items()}
     return {"class_model": numbers}, arrays
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ClassModelSettings:
-    """Settings of the optimization.
-
-    Raises:
-        InputError: A value is out of range.
-    """
+    """Settings of the optimization."""
 
     objective: Objective = "logit"
     """What is maximized: the action's probability (Eq. 18), or its logit minus the logits' mean."""
@@ -65,47 +58,34 @@ class ClassModelSettings:
     """Steps of gradient ascent."""
     lr: float = 20.0
     """Length of a step (pixel), or Adam's learning rate times 400 (fourier)."""
-    normalise: bool = True
-    """Whether to restore the data set's mean and standard deviation after each step."""
     blur: float = 0.6
-    """Standard deviation of a Gaussian blur after each step, pixels; 0 for none."""
+    """Standard deviation of a Gaussian blur after each step, pixels."""
     jitter: int = 1
-    """Largest random shift before each gradient, pixels; 0 for none."""
-    total_variation: float = 0.0
-    """Weight of the penalty on differences between neighbouring pixels."""
+    """Largest random shift before each gradient, pixels."""
     starts: int = 8
     """Number of random starts."""
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        if self.objective not in OBJECTIVES:
-            raise InputError(f"objective={self.objective!r} is unknown; give probability or logit")
-        if self.parameterisation not in ("pixel", "fourier"):
-            raise InputError(
-                f"parameterisation={self.parameterisation!r} is unknown; give pixel or fourier"
-            )
-        if self.steps < 1 or self.starts < 1 or not self.lr > 0:
-            raise InputError(
-                f"steps={self.steps}, starts={self.starts} and lr={self.lr} must be above 0"
-            )
-        if min(self.blur, self.jitter, self.total_variation) < 0:
-            raise InputError(
-                f"blur={self.blur}, jitter={self.jitter} and total_variation="
-                f"{self.total_variation} must be 0 or more"
-            )
 
 
 @dataclasses.dataclass
 class Attempts:
     """Results of one setting from each random start, for each action."""
 
-    pictures: Tensor  # (num_actions, starts, C, H, W)
+    images: Tensor  # (num_actions, starts, C, H, W)
     """Optimized observations."""
     probabilities: Tensor  # (num_actions, starts)
     """The policy's probability of the action on each of them."""
     roughness: Tensor  # (num_actions, starts)
     """Mean difference of neighbouring pixels, relative to the data set's."""
     settings: ClassModelSettings
+
+    def best(self) -> list[int]:
+        """Return each action's start with the highest probability; of similar ones, the smoothest.
+
+        Starts are similar if their probabilities differ by up to `AS_PROBABLE`.
+        """
+        highest = self.probabilities.amax(1, keepdim=True)
+        less_probable = self.probabilities < highest - AS_PROBABLE
+        return self.roughness.masked_fill(less_probable, float("inf")).argmin(1).tolist()
 
 
 @dataclasses.dataclass
@@ -114,18 +94,19 @@ class ClassModel:
 
     tried: list[Attempts]
     """Attempts of each setting, with the same number of starts."""
-    chosen: list[tuple[int, int]]
-    """Setting and start of each action's best observation; see `best_start`."""
 
     @property
-    def pictures(self) -> Tensor:
+    def every(self) -> Attempts:
+        """All attempts together, in the order of the settings."""
+        fields = ("images", "probabilities", "roughness")
+        joined = {name: torch.cat([getattr(a, name) for a in self.tried], 1) for name in fields}
+        return Attempts(**joined, settings=self.tried[0].settings)
+
+    @property
+    def images(self) -> Tensor:
         """The best observation of each action. Shape: (num_actions, C, H, W)."""
-        return torch.stack([self.tried[i].pictures[a, j] for a, (i, j) in enumerate(self.chosen)])
-
-    @property
-    def probabilities(self) -> list[float]:
-        """The policy's probability of each action on its best observation."""
-        return [float(self.tried[i].probabilities[a, j]) for a, (i, j) in enumerate(self.chosen)]
+        every = self.every
+        return torch.stack([every.images[a, i] for a, i in enumerate(every.best())])
 
     def summary(self) -> dict[str, Any]:
         """Return plain values; lists are by action.
@@ -134,35 +115,37 @@ class ClassModel:
         "starts_above_half" the number of attempts above one half. A low "highest" does not show
         that no observation has a high probability.
         """
-        every = torch.cat([attempts.probabilities for attempts in self.tried], 1)
+        every, starts = self.every, self.tried[0].settings.starts
+        best = every.best()
+        rows = [
+            {
+                **dataclasses.asdict(attempts.settings),
+                **_values(attempts, attempts.best()),
+                "each_start": attempts.probabilities.tolist(),
+                "chosen": [a for a, i in enumerate(best) if i // starts == setting],
+            }
+            for setting, attempts in enumerate(self.tried)
+        ]
         return {
-            "probabilities": self.probabilities,
-            "roughness": [
-                float(self.tried[i].roughness[a, j]) for a, (i, j) in enumerate(self.chosen)
-            ],
-            "starts": self.tried[0].settings.starts,
+            **_values(every, best),
+            "starts": starts,
             "num_settings": len(self.tried),
-            "highest": every.amax(1).tolist(),
-            "starts_above_half": (every > 0.5).sum(1).tolist(),
-            "tried": [self._row(i) for i in range(len(self.tried))],
+            "highest": every.probabilities.amax(1).tolist(),
+            "starts_above_half": (every.probabilities > 0.5).sum(1).tolist(),
+            "tried": rows,
         }
 
-    def _row(self, setting: int) -> dict[str, Any]:
-        attempts = self.tried[setting]
-        pairs = zip(attempts.probabilities, attempts.roughness, strict=True)
-        best = [best_start(*pair) for pair in pairs]
-        actions = range(len(best))
-        return {
-            **dataclasses.asdict(attempts.settings),
-            "probabilities": [float(attempts.probabilities[a, best[a]]) for a in actions],
-            "roughness": [float(attempts.roughness[a, best[a]]) for a in actions],
-            "each_start": attempts.probabilities.tolist(),
-            "chosen": [a for a in actions if self.chosen[a][0] == setting],
-        }
+
+def _values(attempts: Attempts, best: list[int]) -> dict[str, list[float]]:
+    """Return probability and roughness of each action's attempt."""
+    return {
+        name: [float(getattr(attempts, name)[a, i]) for a, i in enumerate(best)]
+        for name in ("probabilities", "roughness")
+    }
 
 
 @dataclasses.dataclass(frozen=True)
-class PictureStatistics:
+class ImageStatistics:
     """Statistics of the data set's observations, which optimized ones keep."""
 
     mean: float
@@ -172,7 +155,7 @@ class PictureStatistics:
     roughness: float
 
     @classmethod
-    def of(cls, observations: Tensor) -> "PictureStatistics":
+    def of(cls, observations: Tensor) -> "ImageStatistics":
         """Return the statistics of observations (T, C, H, W)."""
         return cls(
             mean=float(observations.mean()),
@@ -183,47 +166,30 @@ class PictureStatistics:
         )
 
 
-def best_start(probabilities: Tensor, roughness: Tensor) -> int:
-    """Return the start with the highest probability; among similar ones, the smoothest.
-
-    Args:
-        probabilities: The policy's probabilities of the action. Shape: (starts,).
-        roughness: Shape: (starts,).
-    """
-    as_probable = probabilities >= probabilities.max() - AS_PROBABLE
-    return int(roughness.masked_fill(~as_probable, float("inf")).argmin())
-
-
 def visualise(
     network: PictureNetwork,
-    statistics: PictureStatistics,
+    statistics: ImageStatistics,
     settings: ClassModelSettings,
     *,
     seed: int = 0,
 ) -> Attempts:
-    """Optimize observations for each action from random starts.
-
-    Args:
-        network: The policy's network; it is not changed.
-        statistics: Statistics of the data set.
-        settings: Settings of the optimization.
-        seed: Seed of the starts and of the jitter.
-    """
+    """Optimize observations for each action from random starts; the network is not changed."""
     generator = torch.Generator().manual_seed(seed)
     shape = network.in_shape
     num_actions = len(actions_of(network).names)
     starts = torch.rand(settings.starts, *shape, generator=generator)
     start = statistics.low + (statistics.high - statistics.low) * starts
-    pictures = start.repeat(num_actions, 1, 1, 1)
+    images = start.repeat(num_actions, 1, 1, 1)
     action = torch.arange(num_actions).repeat_interleave(settings.starts)
-    ascend = _ascend_fourier if settings.parameterisation == "fourier" else _ascend_pixels
     quick = accelerated_gradients(network, of="pixels") or network
-    reached = ascend(quick, pictures, action, statistics, settings, generator)
+    ascent = _Ascent(quick, action, statistics, settings, generator)
+    is_fourier = settings.parameterisation == "fourier"
+    reached = ascent.fourier(images) if is_fourier else ascent.pixels(images)
     with torch.no_grad():
         each = actions_of(network).wish(network(reached)).gather(1, action[:, None])[:, 0]
     by_action = (num_actions, settings.starts)
     return Attempts(
-        pictures=reached.view(*by_action, *shape),
+        images=reached.view(*by_action, *shape),
         probabilities=each.view(by_action),
         roughness=(_differences(reached) / max(statistics.roughness, 1e-12)).view(by_action),
         settings=settings,
@@ -232,130 +198,103 @@ def visualise(
 
 def search(
     network: PictureNetwork,
-    statistics: PictureStatistics,
+    statistics: ImageStatistics,
     objective: Objective = "logit",
     *,
     seed: int = 0,
 ) -> ClassModel:
-    """Try a few settings, and keep each action's best observation of all starts."""
+    """Try a few settings, each from all starts."""
     tried = []
     for parameterisation, blur in itertools.product(("pixel", "fourier"), (0.5, 0.9, 1.4)):
         settings = ClassModelSettings(
             objective=objective, parameterisation=parameterisation, blur=blur
         )
         tried.append(visualise(network, statistics, settings, seed=seed))
-    probabilities = torch.cat([attempts.probabilities for attempts in tried], 1)
-    roughness = torch.cat([attempts.roughness for attempts in tried], 1)
-    starts = tried[0].settings.starts
-    chosen = [
-        divmod(best_start(*pair), starts) for pair in zip(probabilities, roughness, strict=True)
-    ]
-    return ClassModel(tried, chosen)
+    return ClassModel(tried)
 
 
-def _objective(
-    network: nn.Module, pictures: Tensor, action: Tensor, settings: ClassModelSettings
-) -> Tensor:
-    """Return what is maximized. Shape: (N,)."""
-    actions, outputs = actions_of(network), network(pictures)
-    if settings.objective == "probability":
-        value = actions.wish(outputs).gather(1, action[:, None])[:, 0]
-    else:
+@dataclasses.dataclass(frozen=True)
+class _Ascent:
+    """Gradient ascent on images, one for each entry of `action`."""
+
+    network: nn.Module
+    action: Tensor
+    statistics: ImageStatistics
+    settings: ClassModelSettings
+    generator: torch.Generator
+
+    def value(self, images: Tensor) -> Tensor:
+        """Return what is maximized, on images shifted at random. Shape: (N,)."""
+        actions, outputs = actions_of(self.network), self.network(self.jitter(images))
+        if self.settings.objective == "probability":
+            return actions.wish(outputs).gather(1, self.action[:, None])[:, 0]
         scores = actions.scores(outputs)
-        value = (scores - scores.mean(-1, keepdim=True)).gather(1, action[:, None])[:, 0]
-    return value - settings.total_variation * _differences(pictures)
+        return (scores - scores.mean(-1, keepdim=True)).gather(1, self.action[:, None])[:, 0]
 
+    def pixels(self, images: Tensor) -> Tensor:
+        """Take steps of a fixed length along the gradient."""
+        for _ in range(self.settings.steps):
+            images = images.detach().requires_grad_()
+            (gradient,) = torch.autograd.grad(self.value(images).sum(), images)
+            length = gradient.flatten(1).norm(dim=1).clamp_min(1e-12)
+            step = self.settings.lr * self.statistics.std / 10 * gradient
+            images = self.refine(images.detach() + step / length[:, None, None, None])
+        return images
 
-def _ascend_pixels(
-    network: nn.Module,
-    pictures: Tensor,
-    action: Tensor,
-    statistics: PictureStatistics,
-    settings: ClassModelSettings,
-    generator: torch.Generator,
-) -> Tensor:
-    """Take steps of a fixed length along the gradient."""
-    for _ in range(settings.steps):
-        pictures = pictures.detach().requires_grad_()
-        value = _objective(network, _jitter(pictures, settings, generator), action, settings)
-        (gradient,) = torch.autograd.grad(value.sum(), pictures)
-        length = gradient.flatten(1).norm(dim=1).clamp_min(1e-12)
-        step = settings.lr * statistics.std / 10 * gradient / length[:, None, None, None]
-        pictures = _refine(pictures.detach() + step, statistics, settings)
-    return pictures
+    def fourier(self, images: Tensor) -> Tensor:
+        """Run Adam on coefficients scaled by 1 / frequency, so that large shapes come first."""
+        height, width = images.shape[-2:]
+        rows = torch.fft.fftfreq(height)[:, None]
+        columns = torch.fft.rfftfreq(width)[None]
+        scale = 1.0 / (rows**2 + columns**2).sqrt().clamp_min(1.0 / max(height, width))
+        noise = (images - images.mean()) * 0.1
+        spectrum = (torch.fft.rfft2(noise) / scale).detach().requires_grad_()
+        optimizer = torch.optim.Adam([spectrum], lr=self.settings.lr / 400)
 
+        def render() -> Tensor:
+            rendered = torch.fft.irfft2(spectrum * scale, s=(height, width))
+            return self.refine(rendered + self.statistics.mean)
 
-def _ascend_fourier(
-    network: nn.Module,
-    pictures: Tensor,
-    action: Tensor,
-    statistics: PictureStatistics,
-    settings: ClassModelSettings,
-    generator: torch.Generator,
-) -> Tensor:
-    """Run Adam on Fourier coefficients scaled by 1 / frequency, so that large shapes come first."""
-    height, width = pictures.shape[-2:]
-    rows = torch.fft.fftfreq(height)[:, None]
-    columns = torch.fft.rfftfreq(width)[None]
-    scale = 1.0 / (rows**2 + columns**2).sqrt().clamp_min(1.0 / max(height, width))
-    noise = (pictures - pictures.mean()) * 0.1
-    spectrum = (torch.fft.rfft2(noise) / scale).detach().requires_grad_()
-    optimiser = torch.optim.Adam([spectrum], lr=settings.lr / 400)
+        for _ in range(self.settings.steps):
+            optimizer.zero_grad()
+            (-self.value(render()).sum()).backward()
+            optimizer.step()
+        return render().detach()
 
-    def draw() -> Tensor:
-        drawn = torch.fft.irfft2(spectrum * scale, s=(height, width))
-        return _refine(drawn + statistics.mean, statistics, settings)
-
-    for _ in range(settings.steps):
-        value = _objective(network, _jitter(draw(), settings, generator), action, settings)
-        optimiser.zero_grad()
-        (-value.sum()).backward()
-        optimiser.step()
-    return draw().detach()
-
-
-def _refine(
-    pictures: Tensor, statistics: PictureStatistics, settings: ClassModelSettings
-) -> Tensor:
-    """Blur, restore the data set's mean and standard deviation, and clip to its range."""
-    if settings.blur:
-        pictures = gaussian_blur(pictures, settings.blur)
-    if settings.normalise:
+    def refine(self, images: Tensor) -> Tensor:
+        """Blur, restore the data set's mean and standard deviation, and clip to its range."""
+        images, kept = gaussian_blur(images, self.settings.blur), self.statistics
         dims = (1, 2, 3)
-        mean, std = pictures.mean(dims, keepdim=True), pictures.std(dims, keepdim=True)
-        pictures = (pictures - mean) / (std + 1e-6) * statistics.std + statistics.mean
-    return pictures.clamp(statistics.low, statistics.high)
+        mean, std = images.mean(dims, keepdim=True), images.std(dims, keepdim=True)
+        images = (images - mean) / (std + 1e-6) * kept.std + kept.mean
+        return images.clamp(kept.low, kept.high)
+
+    def jitter(self, images: Tensor) -> Tensor:
+        """Shift images at random, with edges repeated."""
+        reach = self.settings.jitter
+        shift = torch.randint(-reach, reach + 1, (2,), generator=self.generator).tolist()
+        padded = functional.pad(images, (reach,) * 4, mode="replicate")
+        height, width = images.shape[-2:]
+        top, left = reach + shift[0], reach + shift[1]
+        return padded[..., top : top + height, left : left + width]
 
 
-def gaussian_blur(pictures: Tensor, sigma: float) -> Tensor:
+def gaussian_blur(images: Tensor, sigma: float) -> Tensor:
     """Blur images (N, C, H, W) with replicated edges."""
     radius = max(1, round(3 * sigma))
-    x = torch.arange(-radius, radius + 1, dtype=pictures.dtype)
+    x = torch.arange(-radius, radius + 1, dtype=images.dtype)
     kernel = torch.exp(-(x**2) / (2 * sigma**2))
     kernel = kernel / kernel.sum()
-    channels = pictures.shape[1]
-    padded = functional.pad(pictures, (radius,) * 4, mode="replicate")
-    across = functional.conv2d(
-        padded, kernel.view(1, 1, 1, -1).expand(channels, 1, 1, -1), groups=channels
-    )
-    return functional.conv2d(
-        across, kernel.view(1, 1, -1, 1).expand(channels, 1, -1, 1), groups=channels
-    )
+    channels = images.shape[1]
+    blurred = functional.pad(images, (radius,) * 4, mode="replicate")
+    for shape in ((1, 1, 1, -1), (1, 1, -1, 1)):
+        weight = kernel.view(shape).expand(channels, *[-1] * 3)
+        blurred = functional.conv2d(blurred, weight, groups=channels)
+    return blurred
 
 
-def _jitter(pictures: Tensor, settings: ClassModelSettings, generator: torch.Generator) -> Tensor:
-    if not settings.jitter:
-        return pictures
-    reach = settings.jitter
-    shift = torch.randint(-reach, reach + 1, (2,), generator=generator).tolist()
-    padded = functional.pad(pictures, (reach,) * 4, mode="replicate")
-    height, width = pictures.shape[-2:]
-    top, left = reach + shift[0], reach + shift[1]
-    return padded[..., top : top + height, left : left + width]
-
-
-def _differences(pictures: Tensor) -> Tensor:
+def _differences(images: Tensor) -> Tensor:
     """Return the mean absolute difference of neighbouring pixels. Shape: (N,)."""
-    down = (pictures[..., 1:, :] - pictures[..., :-1, :]).abs().mean((1, 2, 3))
-    across = (pictures[..., 1:] - pictures[..., :-1]).abs().mean((1, 2, 3))
+    down = (images[..., 1:, :] - images[..., :-1, :]).abs().mean((1, 2, 3))
+    across = (images[..., 1:] - images[..., :-1]).abs().mean((1, 2, 3))
     return down + across

@@ -5,6 +5,7 @@ sections can run in any order.
 """
 
 import copy
+import dataclasses
 import functools
 import threading
 from collections.abc import Callable, Mapping
@@ -48,16 +49,7 @@ class Context:
         unlike: Mapping[str, Any] | None = None,
         seed: RootSeed | None = None,
     ) -> None:
-        """Store the policy and its environments.
-
-        Args:
-            env: A batch of environments that have not been stepped, with the policy's transforms.
-            network: The policy's network, on the CPU.
-            settings: What to compute.
-            claim: A certificate of the policy in the task of these environments, if there is one.
-            measured: Its measured robustness, if there is any.
-            unlike: See `drone_rl.evaluation.judge.judge_policy`.
-            seed: Root of all random streams; that of the settings by default.
+        """Store the policy and its environments; see `explain`.
 
         Raises:
             InputError: A setting does not fit the policy.
@@ -92,7 +84,7 @@ class Context:
         twin = copy.copy(self)
         if self.network.is_differentiable:
             twin.network = copy.deepcopy(self.network)
-            twin.explainer = Explainer(twin.network, self.absent, self.settings.grad_cam_layer)
+            twin.explainer = dataclasses.replace(self.explainer, network=twin.network)
         return twin
 
     def shared(self, name: str, compute: Callable[[], T]) -> T:

@@ -30,9 +30,7 @@ def placebo_maps(
         seed: Seed of the noise.
 
     Returns:
-        By name, shape (T, h, w), 0 or more: ones; noise for each frame; a blob in the middle; a
-        band along the horizon; the difference from the empty scene, as it is and smoothed; the
-        mean difference from the alternatives.
+        By name, shape (T, h, w), 0 or more.
     """
     count, _, height, width = observations.shape
     generator = torch.Generator().manual_seed(seed)
@@ -54,14 +52,9 @@ def difference(observations: Tensor, absent: Tensor) -> Tensor:
 
 
 def blob(height: int, width: int, down: float, across: float, size: float = 0.2) -> Tensor:
-    """Return a Gaussian.
+    """Return a Gaussian. Shape: (height, width).
 
-    Args:
-        height: Of the map, pixels.
-        width: Of the map, pixels.
-        down: Place of its maximum, as a fraction of the height.
-        across: Place of its maximum, as a fraction of the width.
-        size: Its standard deviation, as a fraction of height and width.
+    Its centre and its standard deviation `size` are fractions of height and width.
     """
     y = (torch.arange(height) + 0.5) / height
     x = (torch.arange(width) + 0.5) / width
@@ -88,54 +81,42 @@ def smoothed(maps: Tensor, passes: int = 2) -> Tensor:
     return maps
 
 
+@torch.no_grad()
+def _shuffled(
+    network: PictureNetwork, observations: Tensor, wanted: Tensor, generator: torch.Generator
+) -> PictureNetwork:
+    """Return a copy whose logits have the deviation, if they are not constant, and mean wanted."""
+    other = copy.deepcopy(network)
+    for parameter in other.parameters():
+        order = torch.randperm(parameter.numel(), generator=generator)
+        parameter.copy_(parameter.flatten()[order].view(parameter.shape))
+    deviation, mean = torch.std_mean(other(observations), 0, correction=0)
+    wanted_deviation, wanted_mean = torch.std_mean(wanted, 0, correction=0)
+    factor = torch.where(deviation > NO_CHANGE, wanted_deviation / deviation, 1.0)
+    other.rescale(factor, wanted_mean - factor * mean)
+    return other
+
+
 def shuffled_networks(
     network: PictureNetwork, observations: Tensor, count: int, seed: int = 0
 ) -> Iterator[PictureNetwork]:
     """Yield copies of a policy with weights and biases shuffled within each layer.
 
     Networks with shuffled weights are often nearly constant, which alone would distinguish their
-    maps. Therefore each copy's logits are rescaled to the policy's mean and standard deviation.
-
-    Args:
-        network: It is not changed.
-        observations: Inputs for mean and standard deviation. Shape: (T, C, h, w).
-        count: Number of copies.
-        seed: Seed of the shuffling; the first copies do not depend on `count`.
+    maps. Therefore each copy's logits are rescaled to the policy's mean and standard deviation on
+    observations (T, C, h, w). The first copies do not depend on `count`.
     """
     generator = torch.Generator().manual_seed(seed)
     with torch.no_grad():
         logits = network(observations)
     for _ in range(count):
-        other = copy.deepcopy(network)
-        for parameter in other.parameters():
-            _shuffle(parameter, generator)
-        _rescale(other, observations, logits)
-        yield other
-
-
-@torch.no_grad()
-def _shuffle(parameter: Tensor, generator: torch.Generator) -> None:
-    order = torch.randperm(parameter.numel(), generator=generator)
-    parameter.copy_(parameter.flatten()[order].view(parameter.shape))
-
-
-@torch.no_grad()
-def _rescale(network: PictureNetwork, observations: Tensor, wanted: Tensor) -> None:
-    """Give logits the mean and deviation of `wanted`; constant ones keep their deviation of 0."""
-    deviation, mean = torch.std_mean(network(observations), 0, correction=0)
-    wanted_deviation, wanted_mean = torch.std_mean(wanted, 0, correction=0)
-    factor = torch.where(deviation > NO_CHANGE, wanted_deviation / deviation, 1.0)
-    network.rescale(factor, wanted_mean - factor * mean)
+        yield _shuffled(network, observations, logits, generator)
 
 
 def likeness(first: Tensor, second: Tensor) -> NDArray:
-    """Return the rank correlation of maps over the pixels on which one of them has heat.
+    """Return the rank correlation of maps (T, h, w) over the pixels on which one of them has heat.
 
     Pixels without heat in both (such as those equal to the baseline) would make any maps similar.
-
-    Args:
-        first: Shape (T, h, w), 0 or more.
-        second: Shape (T, h, w).
 
     Returns:
         Shape: (T,); 1 where both are constant or one has no heat, which shows no dependence.

@@ -1,6 +1,5 @@
 """Section "embedding": t-SNE of the policy's features and of raw pixels (section 5.1)."""
 
-import dataclasses
 import logging
 from typing import Any
 
@@ -27,58 +26,39 @@ FEW = 2000
 
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Return "tsne"; arrays "tsne_features" and "tsne_pixels" (T, 2)."""
-    if context.layer is None:
+    layer = context.layer
+    if layer is None:
         raise LeftOutError(
             "t-SNE needs the features of a layer, and no layers of this policy are known; give it "
             "as a torch module made of layers."
         )
     data, settings = context.dataset, context.settings
-    seed = legacy_seed(context.seed.value)
     numbers, arrays = {}, {}
-    for name, originals in (
-        ("features", data.features[context.layer]),
-        ("pixels", data.observations),
-    ):
-        embedding = embed(originals, perplexity=settings.perplexity, seed=seed)
-        arrays[f"tsne_{name}"] = embedding.points
+    for name, originals in (("features", data.features[layer]), ("pixels", data.observations)):
+        points, faithful = embed(
+            originals, perplexity=settings.perplexity, seed=legacy_seed(context.seed.value)
+        )
+        arrays[f"tsne_{name}"] = points
         numbers[name] = {
-            "layer": context.layer if name == "features" else None,
+            "layer": layer if name == "features" else None,
             "perplexity": settings.perplexity,
-            **dataclasses.asdict(embedding.faithfulness),
+            **faithful,
         }
     return {"tsne": numbers}, arrays
 
 
-@dataclasses.dataclass(frozen=True)
-class Faithfulness:
-    """How well an embedding keeps neighbourhoods; see `faithfulness`."""
-
-    neighbours: int
-    """Size k of a neighbourhood; smaller than requested if there are few points."""
-    trustworthiness: float
-    """1 if all neighbours in the plane are neighbours originally (Venna and Kaski, 2001)."""
-    neighbours_kept: float
-    """Fraction of the k nearest in the plane that are among the k nearest originally."""
-    neighbours_chance: float
-    """The same fraction for a random embedding."""
-
-
-@dataclasses.dataclass
-class Embedding:
-    """Points in the plane that keep neighbourhoods (Eqs. 16 and 17)."""
-
-    points: NDArray  # (T, 2)
-    faithfulness: Faithfulness
-    """With respect to the originals, not to their principal components."""
-
-
-def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Embedding:
-    """Embed points in the plane; the same points and seed give the same result.
+def embed(
+    originals: NDArray, *, perplexity: float = 30.0, seed: int = 0
+) -> tuple[NDArray, dict[str, float]]:
+    """Embed points in the plane; the same points and seed give the same result (Eqs. 16 and 17).
 
     Args:
         originals: One row a point. Shape: (T, *).
         perplexity: Effective number of neighbours of a point.
         seed: Seed of the optimization; below 2**32.
+
+    Returns:
+        The points (T, 2) and their `faithfulness`.
 
     Raises:
         InputError: There are too few points for the perplexity, or one is not finite.
@@ -99,18 +79,19 @@ def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Emb
         negative_gradient_method="bh" if few else "fft",
     ).fit(_distinct(reduced, seed))
     points = np.array(model)
-    return Embedding(points, faithfulness(centred, points))
+    return points, faithfulness(centred, points)
 
 
-def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> Faithfulness:
-    """Measure how well an embedding keeps neighbourhoods.
+def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> dict[str, float]:
+    """Measure how well an embedding (T, 2) keeps the neighbourhoods of originals (T, D).
 
     With ties, all points as near as the k-th count as nearest, also in the figure for chance.
 
-    Args:
-        originals: Three points or more. Shape: (T, D).
-        points: Shape (T, 2).
-        k: Size of a neighbourhood; smaller if there are few points.
+    Returns:
+        "neighbours": size of a neighbourhood, smaller than k if there are few points;
+        "trustworthiness": 1 if all neighbours in the plane are neighbours originally (Venna and
+        Kaski, 2001); "neighbours_kept": fraction of the nearest in the plane that are among the
+        nearest originally; "neighbours_chance": the same for a random embedding.
     """
     count = len(originals)
     k = min(k, (count - 1) // 2)
@@ -118,18 +99,18 @@ def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> Fa
     true, drawn = _distances(originals, queries), _distances(points, queries)
     nearest = drawn.argsort(1, kind="stable")[:, 1 : k + 1]  # the query itself comes first
     ordered = np.sort(true, 1)
-    asked = np.take_along_axis(true, nearest, 1)
+    plane = np.take_along_axis(true, nearest, 1)
     # 1 is the nearest; the query itself is nearer than all
-    rank = np.stack([np.searchsorted(o, a) for o, a in zip(ordered, asked, strict=True)])
+    rank = np.stack([np.searchsorted(o, a) for o, a in zip(ordered, plane, strict=True)])
     strangers = np.maximum(rank - k, 0).sum()
     worst = len(queries) * k * (2 * count - 3 * k - 1) / 2
     as_near = (true <= ordered[:, [k]]).sum(1) - 1
-    return Faithfulness(
-        neighbours=k,
-        trustworthiness=float(1 - strangers / worst),
-        neighbours_kept=float((rank <= k).mean()),
-        neighbours_chance=float(as_near.mean() / (count - 1)),
-    )
+    return {
+        "neighbours": k,
+        "trustworthiness": float(1 - strangers / worst),
+        "neighbours_kept": float((rank <= k).mean()),
+        "neighbours_chance": float(as_near.mean() / (count - 1)),
+    }
 
 
 def _principal_components(centred: NDArray) -> NDArray:

@@ -27,7 +27,6 @@ from drone_rl.explanations import (
     places,
     response,
     truth,
-    verdict,
 )
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.report import write_report
@@ -36,7 +35,6 @@ from drone_rl.policies import PictureNetwork
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
-from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.utils.display import page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name
@@ -44,10 +42,12 @@ from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import seed_line
-from drone_rl.verdicts.certificate import Claim, find_claim
+from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import find_domain
 
 FORMAT_VERSION = 3
+_Result = tuple[dict[str, Any], dict[str, NDArray], float] | LeftOutError
+"""Numbers, arrays and seconds of a section, or why it is left out."""
 Given = str | Path | Pilot | Logits
 """A policy or something that `as_pilot` converts to one."""
 Section = Callable[[Context], tuple[dict[str, Any], dict[str, NDArray]]]
@@ -58,11 +58,11 @@ SECTIONS: dict[str, Section] = {
     "class_models": class_models.section,
     "dataset": behavior.dataset_section,
     "embedding": embedding.section,
-    "evaluation": verdict.evaluation_section,
+    "evaluation": behavior.evaluation_section,
     "flaws": behavior.flaws_section,
     "places": places.section,
     "response": response.response_section,
-    "shifts": verdict.shifts_section,
+    "shifts": behavior.shifts_section,
     "truth": truth.section,
 }
 """All sections by name. `report.page.PARTS` displays them."""
@@ -183,10 +183,7 @@ def explain_policy(
     provenance: dict[str, Any],
     progress: Callable[[str], None] = lambda _: None,
     sections: Mapping[str, Section] | None = None,
-    claim: Claim | None = None,
-    measured: SavedShifts | None = None,
-    unlike: Mapping[str, Any] | None = None,
-    seed: RootSeed | None = None,
+    **more: Any,
 ) -> dict[str, Any]:
     """Compute all sections for one policy and write them to a folder.
 
@@ -200,10 +197,7 @@ def explain_policy(
         provenance: Origin of the policy, as plain values.
         progress: Called with the title of each section.
         sections: Sections to compute, `SECTIONS` by default. Their order changes no result.
-        claim: A certificate of the policy in the task of these environments, if there is one.
-        measured: The policy's measured robustness in that task, if there is any.
-        unlike: See `drone_rl.evaluation.judge.judge_policy`.
-        seed: Root of all random streams, those of `env` included; that of the settings by default.
+        more: See `Context`.
 
     Returns:
         The contents of `explanation.json`; "left_out" gives the reason for each section that can't
@@ -212,49 +206,40 @@ def explain_policy(
     Raises:
         InputError: The folder can't be written or a setting does not fit the policy.
     """
-    settings, seed = with_seed(settings, seed)
-    context = Context(env, network, settings, claim, measured, unlike, seed)
+    context = Context(env, network, settings, **more)
     results = _run(SECTIONS if sections is None else sections, context, progress)
-    left_out = {title: one.left_out for title, one in results.items() if one.left_out}
-    made = {title: one for title, one in results.items() if title not in left_out}
+    left_out = {title: str(one) for title, one in results.items() if isinstance(one, LeftOutError)}
+    made = {title: one for title, one in results.items() if not isinstance(one, LeftOutError)}
     written = {
         "format": "drone_rl explanation",
         "format_version": FORMAT_VERSION,
         "name": name,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "settings": dataclasses.asdict(settings),
-        **seed.as_dict(),
-        "seconds": {title: one.seconds for title, one in made.items()},
+        "settings": dataclasses.asdict(context.settings),
+        **context.seed.as_dict(),
+        "seconds": {title: seconds for title, (_, _, seconds) in made.items()},
         "actions": context.scenes.actions.as_dict(),
         "terms": context.scenes.task.vocabulary.as_dict(),
-        **{key: value for one in made.values() for key, value in one.numbers.items()},
+        **{key: value for numbers, _, _ in made.values() for key, value in numbers.items()},
         **({"left_out": left_out} if left_out else {}),
         "provenance": provenance,
     }
-    arrays = {key: value for one in made.values() for key, value in one.arrays.items()}
+    arrays = {key: value for _, some, _ in made.values() for key, value in some.items()}
     _write(folder, written, arrays, context)
     return written
-
-
-@dataclasses.dataclass(frozen=True)
-class _Result:
-    numbers: dict[str, Any]
-    arrays: dict[str, NDArray]
-    seconds: float
-    left_out: str | None = None
 
 
 def _run(
     sections: Mapping[str, Section], context: Context, progress: Callable[[str], None]
 ) -> dict[str, _Result]:
     """Run all sections, those in `ASIDE` in a second thread."""
-    results: dict[str, _Result] = {}
     twin = context.aside()
     with ThreadPoolExecutor(1) as pool:
         waiting = {}
         for title in (t for t in sections if t in ASIDE):
             progress(f"{title} (aside)".replace("_", " "))
             waiting[title] = pool.submit(_compute, sections[title], twin)
+        results: dict[str, _Result] = {}
         for title in (t for t in sections if t not in ASIDE):
             progress(title.replace("_", " "))
             results[title] = _compute(sections[title], context)
@@ -267,8 +252,8 @@ def _compute(section: Section, context: Context) -> _Result:
     try:
         numbers, arrays = section(context)
     except LeftOutError as error:
-        return _Result({}, {}, 0.0, str(error))
-    return _Result(numbers, arrays, round(time.perf_counter() - began, 2))
+        return error
+    return numbers, arrays, round(time.perf_counter() - began, 2)
 
 
 def _write(

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import torch
 from captum.attr import IntegratedGradients, LayerGradCam, Saliency
@@ -20,8 +20,6 @@ BATCH = 256
 """Observations in one call, which bounds memory."""
 INTEGRATION_STEPS = 64
 """Steps of integrated gradients; with 16, errors of up to 0.7 occur on a steep softmax."""
-NO_GRADIENT = 1e-12
-"""Derivatives of the probability up to this count as zero: the softmax is saturated."""
 MapMethod = Callable[[Tensor, Tensor], Tensor]
 """Observations (T, C, H, W) and actions (T,) to heat maps (T, H, W), 0 or more."""
 
@@ -98,9 +96,8 @@ class Explainer:
         The exact integral sums to the action's probability on the observation minus that on the
         baseline; an integral with too few steps does not.
         """
-        chosen = actions[:, None]
         total = self._integrated(observations, actions).flatten(1).sum(1)
-        there = probabilities(self.network, observations).gather(1, chosen)[:, 0]
+        there = probabilities(self.network, observations).gather(1, actions[:, None])[:, 0]
         absent = probabilities(self.network, self.absent[None])[0][actions]
         return (total - (there - absent)).abs()
 
@@ -120,49 +117,23 @@ class Explainer:
         mean = change @ covered / covered.sum(0).clamp_min(1)
         return mean.view(-1, height, width).abs()
 
-    def maps_without_heat(self, observations: Tensor, actions: Tensor) -> dict[str, int]:
-        """Count observations on which Grad-CAM is zero everywhere.
-
-        Returns:
-            "logit" and "probability": counts by objective; "saturated": those of "probability" on
-            which the probability's gradient is zero, because the policy is too certain.
-        """
-        empty = {
-            objective: self.grad_cam(observations, actions, objective).flatten(1).amax(1) <= 0
-            for objective in ("probability", "logit")
-        }
-        flat = self.saliency(observations, actions).flatten(1).amax(1) <= NO_GRADIENT
-        return {
-            "logit": int(empty["logit"].sum()),
-            "probability": int(empty["probability"].sum()),
-            "saturated": int((empty["probability"] & flat).sum()),
-        }
-
     def _integrated(self, observations: Tensor, actions: Tensor) -> Tensor:
         """Return the path integral. Shape: (T, C, H, W)."""
         quick = accelerated_gradients(self.network, of="pixels")
         method = IntegratedGradients(self._forward("probability", quick))
 
         def attribute(x: Tensor, a: Tensor) -> Tensor:
-            return method.attribute(
-                x,
-                self.absent[None],
-                target=a,
-                n_steps=INTEGRATION_STEPS,
-                method="riemann_middle",
-                internal_batch_size=BATCH,
-            )
+            how: dict[str, Any] = {"n_steps": INTEGRATION_STEPS, "internal_batch_size": BATCH}
+            return method.attribute(x, self.absent[None], a, method="riemann_middle", **how)
 
         return _in_batches(attribute, observations, actions)
 
     def _forward(
         self, objective: Objective, network: nn.Module | None = None
     ) -> Callable[[Tensor], Tensor]:
-        if objective not in ("probability", "logit"):
-            raise InputError(f"objective={objective!r} is unknown; give probability or logit")
         actions = actions_of(self.network)
-        make = actions.scores if objective == "logit" else actions.wish
         evaluated = self.network if network is None else network
+        make = actions.scores if objective == "logit" else actions.wish
         return lambda x: make(evaluated(x))
 
 
@@ -170,10 +141,8 @@ def _in_batches(
     attribute: Callable[[Tensor, Tensor], Tensor], observations: Tensor, actions: Tensor
 ) -> Tensor:
     """Return attributions of all observations. Shape: (T, ...), that of `attribute`."""
-    maps = [
-        attribute(x.detach().clone().requires_grad_(), a).detach()
-        for x, a in zip(observations.split(BATCH), actions.split(BATCH), strict=True)
-    ]
+    pairs = zip(observations.split(BATCH), actions.split(BATCH), strict=True)
+    maps = [attribute(x.detach().clone().requires_grad_(), a).detach() for x, a in pairs]
     return torch.cat(maps).float()
 
 

@@ -1,9 +1,10 @@
 """Layers of a network by name, and their outputs. No hook remains after a call."""
 
 import collections
-from typing import Any
+from typing import Any, cast
 
 import torch
+from captum.attr import LayerActivation
 from torch import Tensor, nn
 
 from drone_rl.policies import PictureNetwork
@@ -82,27 +83,13 @@ def feature_layer(network: PictureNetwork) -> str | None:
 
 @torch.no_grad()
 def features(network: PictureNetwork, observations: Tensor, layer: str) -> Tensor:
-    """Return a layer's output.
-
-    Args:
-        network: The policy's network.
-        observations: Shape (T, C, h, w).
-        layer: Name of the layer.
-
-    Returns:
-        Shape: (T, *), the layer's own.
+    """Return a layer's output (T, *) on observations (T, C, h, w).
 
     Raises:
         InputError: There is no such layer.
     """
-    found: list[Tensor] = []
-    module = find_layer(network, layer)
-    handle = module.register_forward_hook(lambda _, __, out: found.append(out.detach().clone()))
-    try:
-        outputs(network, observations)
-    finally:
-        handle.remove()
-    return torch.cat(found)
+    method = LayerActivation(network, find_layer(network, layer))
+    return torch.cat([cast(Tensor, method.attribute(part)) for part in observations.split(BATCH)])
 
 
 @torch.no_grad()

@@ -79,10 +79,8 @@ def intervene(
 def _effect(
     network: PictureNetwork, scenes: Scenes, base: Tensor, frames: Tensor, area: Tensor
 ) -> NDArray:
-    after = probabilities(network, scenes.transform(frames))
-    change = scenes.actions.distance(after, base)
-    changed = area.flatten(1).any(1)
-    return torch.where(changed, change, torch.nan).double().cpu().numpy()
+    change = scenes.actions.distance(probabilities(network, scenes.transform(frames)), base)
+    return torch.where(area.flatten(1).any(1), change, torch.nan).double().cpu().numpy()
 
 
 def to_the_middle(scenes: Scenes, state: State) -> State:
@@ -117,54 +115,42 @@ class TargetRollouts:
     """Steps until then, or until the episode ended. Shape: (N,)."""
     lateral: NDArray
     """The drone's y after each step, metres; constant once decided. Shape: (N, steps + 1)."""
-    actions: NDArray
-    """-1 once decided. Shape: (N, steps)."""
 
 
 def outcomes(
     scenes: Scenes, network: PictureNetwork, state: State, episode: NDArray
 ) -> dict[str, Any]:
-    """Compare rollouts with the next target moved or removed, and with another ground colour.
+    """Compare greedy rollouts with the next target moved, and with another ground.
 
-    Args:
-        scenes: Renders and steps the environments.
-        network: The policy's network; it takes the most probable action.
-        state: Environments of the data set. T of them.
-        episode: Shape: (T,).
+    They start from states of the data set (T of them); `episode` has shape (T,).
 
     Returns:
         Means over episodes with intervals: "collected", by variant ("as it was", "moved left",
         "moved right"); "follows": metres that the drone moves sideways with the target per metre, 0
-        if it ignores it, 1 if it always goes there; "missed_when_moved": how much less often a
-        moved target is reached; "path_changed": fraction of rollouts with another action when the
-        target is removed; "ground_changed": fraction whose outcome differs with another ground.
-        "flights": number of rollouts of each variant.
+        if it ignores it, 1 if it always goes there; "ground_changed": fraction whose outcome
+        differs with another ground. "flights": number of rollouts of each variant.
     """
-    rows = _starts(scenes, state, episode)
-    start, group = state[torch.from_numpy(rows)].to(scenes.worlds.device), episode[rows]
     task = scenes.task
+    ahead = (~task.next_offset(state)[:, 0].isnan()).nonzero()[:, 0].cpu().numpy()
+    rows = ahead[sample_frames(episode[ahead], FLIGHTS_AN_EPISODE)]
+    start, group = state[torch.from_numpy(rows)].to(scenes.worlds.device), episode[rows]
     target = task.next_target(start)
     variants = {
         "as it was": start,
         "moved left": task.next_moved(start, MOVED_METRES),
         "moved right": task.next_moved(start, -MOVED_METRES),
-        "taken away": task.without_next(start),
     }
     runs = {name: run_to_target(scenes, network, s, target) for name, s in variants.items()}
     repainted = run_to_target(scenes, network, start, target, DARK_GROUND)
-    was, left, right = (runs[n] for n in ("as it was", "moved left", "moved right"))
-    moved = (left.collected.astype(float) + right.collected) / 2
 
     def mean(values: NDArray, low: float = 0.0) -> dict[str, Any]:
         return mean_bounds(episode_means(values.astype(np.float64), group), low, 1.0)
 
     return {
         "flights": len(rows),
-        "collected": {n: mean(r.collected) for n, r in runs.items() if n != "taken away"},
-        "follows": mean(followed(left, right), -1.0),
-        "missed_when_moved": mean(was.collected - moved, -1.0),
-        "path_changed": mean(differ(was, runs["taken away"])),
-        "ground_changed": mean(was.collected != repainted.collected),
+        "collected": {name: mean(run.collected) for name, run in runs.items()},
+        "follows": mean(followed(runs["moved left"], runs["moved right"]), -1.0),
+        "ground_changed": mean(runs["as it was"].collected != repainted.collected),
     }
 
 
@@ -177,33 +163,25 @@ def run_to_target(
 ) -> TargetRollouts:
     """Step until one target of each environment is reached or passed; see `rollout`.
 
-    Args:
-        scenes: Renders and steps the environments.
-        network: The policy's network.
-        state: Initial states.
-        target: The target of each environment. Shape: (N,).
-        appearance: Appearance of the scenes; the task's by default.
+    The states and the targets' numbers have shape (N,).
     """
     task = scenes.task
     decided = torch.zeros_like(target)
-    lateral, actions = [state.body.position[:, 1].clone()], []
+    lateral = [state.body.position[:, 1].clone()]
 
     def stays_active(step: Step) -> Tensor:
         after, goal = step.after, target[step.rows]
         decided[step.rows] += 1
-        actions.append(torch.full_like(target, -1))
-        actions[-1][step.rows] = scenes.actions.part(step.action)
         lateral.append(lateral[-1].clone())
         lateral[-1][step.rows] = after.body.position[:, 1]
         is_over = task.is_behind(after, goal) | task.is_reached(after, goal)
-        return ~is_over & (after.end_reason == 0) & (len(actions) < PATIENCE)
+        return ~is_over & (after.end_reason == 0) & (len(lateral) <= PATIENCE)
 
     end = rollout(scenes, network, state, stays_active, appearance)
     return TargetRollouts(
         task.is_reached(end, target).cpu().numpy(),
         decided.cpu().numpy(),
         torch.stack(lateral, 1).cpu().numpy(),
-        torch.stack(actions, 1).cpu().numpy() if actions else np.zeros((len(target), 0), int),
     )
 
 
@@ -212,24 +190,7 @@ def followed(left: TargetRollouts, right: TargetRollouts) -> NDArray:
 
     Both rollouts are compared at the step at which the first of them ends, so that a longer rollout
     does not count as following.
-
-    Args:
-        left: With the target moved to the left.
-        right: With the target moved to the right.
     """
     when = np.minimum(left.decided, right.decided)
     ends = [r.lateral[np.arange(len(when)), when] for r in (left, right)]
     return ((ends[0] - ends[1]) / (2 * MOVED_METRES)).clip(-1.0, 1.0)
-
-
-def differ(first: TargetRollouts, second: TargetRollouts) -> NDArray:
-    """Return whether two rollouts differ in the action of a common step. Shape: (N,), bool."""
-    steps = min(first.actions.shape[1], second.actions.shape[1])
-    one, two = first.actions[:, :steps], second.actions[:, :steps]
-    return ((one != two) & (one >= 0) & (two >= 0)).any(1)
-
-
-def _starts(scenes: Scenes, state: State, episode: NDArray) -> NDArray:
-    """Return a few frames of each episode with a next target ahead."""
-    there = (~scenes.task.next_offset(state)[:, 0].isnan()).nonzero()[:, 0].cpu().numpy()
-    return there[sample_frames(episode[there], FLIGHTS_AN_EPISODE)]

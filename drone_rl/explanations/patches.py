@@ -35,7 +35,6 @@ class Grid:
     height: int
     """Height of a patch, pixels."""
     width: int
-    """Width of a patch, pixels."""
     rows: int
     columns: int
     top: int = 0
@@ -57,25 +56,17 @@ class Grid:
         """Return the pixels of each patch in a frame of that size. Shape: (count, h, w), bool."""
         masks = torch.zeros(self.count, *size, dtype=torch.bool)
         for i in range(self.count):
-            rows, columns = self.span(i)
-            masks[i, rows, columns] = True
+            masks[i][self.span(i)] = True
         return masks
 
     def means(self, maps: Tensor) -> NDArray:
         """Return the mean heat of each patch. Shape: (T, h, w) to (T, count), float64."""
-        spans = [self.span(i) for i in range(self.count)]
-        heat = [maps[:, rows, columns].double().mean((1, 2)) for rows, columns in spans]
+        heat = [maps[:, *self.span(i)].double().mean((1, 2)) for i in range(self.count)]
         return torch.stack(heat, 1).cpu().numpy()
 
 
 def make_grid(height: int, width: int, patches: int = PATCHES) -> Grid:
-    """Return about so many patches, nearly square, that leave out few pixels.
-
-    Args:
-        height: Height of the frame, pixels.
-        width: Width of the frame, pixels.
-        patches: Wanted number.
-    """
+    """Return about so many patches, nearly square, that leave out few pixels of a frame."""
     best, cost = Grid(1, 1, height, width), np.inf
     for rows in range(1, height + 1):
         for columns in range(1, min(width, 2 * patches // rows) + 1):
@@ -117,13 +108,7 @@ def replaced(
 def patch_effects(
     network: PictureNetwork, observations: Tensor, others: Iterable[Tensor], grid: Grid
 ) -> NDArray:
-    """Return the effect on the policy of replacing each patch alone.
-
-    Args:
-        network: The policy's network.
-        observations: Shape (T, C, h, w).
-        others: Alternatives, each of shape (T, C, h, w); see `scenes.alternatives`.
-        grid: The patches.
+    """Return the effect on the policy of replacing each patch by alternatives (T, C, h, w).
 
     Returns:
         Distance of the action probabilities, averaged over the alternatives. Shape: (T, count).
@@ -140,16 +125,12 @@ def patch_effects(
 
 
 def moving(effects: NDArray) -> NDArray:
-    """Return the frames in which some patch affects the policy. Shape: (T,)."""
+    """Return whether some patch of a frame affects the policy. Shape: (T,)."""
     return effects.max(1) >= UNMOVED
 
 
 def scores(heat: NDArray, effects: NDArray) -> NDArray:
-    """Return how well each map agrees with the effects of the patches.
-
-    Args:
-        heat: Mean heat of each patch. Shape: (T, count).
-        effects: From `patch_effects`. Shape: (T, count).
+    """Return how well each map agrees with the effects of the patches, both (T, count).
 
     Returns:
         Spearman's rank correlation within each frame; 0 where either is constant. Shape: (T,).
@@ -158,11 +139,7 @@ def scores(heat: NDArray, effects: NDArray) -> NDArray:
 
 
 def pointing(heat: NDArray, effects: NDArray) -> tuple[NDArray, NDArray]:
-    """Return whether the hottest patch is one of those with the largest effect.
-
-    Args:
-        heat: Shape (T, count).
-        effects: Shape (T, count).
+    """Return whether the hottest patch is one of those with the largest effect; both (T, count).
 
     Returns:
         The fraction of the hottest patches that are, and the fraction of all patches that are

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from drone_rl.config import TaskSettings
 from drone_rl.config.verification import PlacesSettings
@@ -13,7 +14,7 @@ from drone_rl.sim.actions import MOVES
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import legacy_seed
-from drone_rl.verification.prover.action_map import ActionMap, RenderFaces, map_actions
+from drone_rl.verification.prover.action_map import ActionMap, map_actions
 from drone_rl.verification.prover.arrangement import Window
 from drone_rl.verification.prover.cube_images import NOTHING, CameraModel, CubeImages
 from drone_rl.verification.prover.lattice import Lattice
@@ -49,28 +50,21 @@ def _map(context: Context, settings: PlacesSettings) -> ActionMap:
     check_task(task)
     if not network.has_weights:
         raise InputError("it is no torch module, so that nothing is known of its sums")
-    camera, lattice = CameraModel.of(task, scenes.worlds.camera), Lattice(task)
-    images = CubeImages(scenes.worlds, lattice, camera)
+    camera = CameraModel.of(task, scenes.worlds.camera)
+    images = CubeImages(scenes.worlds, Lattice(task), camera)
     images.check(_COMPARED, np.random.RandomState(legacy_seed(context.seed.value)))
-    window = Window(max(settings.nearest, task.cube_size), settings.farthest, settings.sideways)
+
+    def render(faces: NDArray[np.uint8]) -> Tensor:
+        """Return observations from the cube's face at each pixel."""
+        shown = torch.from_numpy(faces).long()
+        is_open = (shown == NOTHING)[..., None]
+        return scenes.transform(torch.where(is_open, images.background, images.colors[shown]))
+
     return map_actions(
         camera,
-        window,
-        _face_renderer(context, images),
+        Window(max(settings.nearest, task.cube_size), settings.farthest, settings.sideways),
+        render,
         network.eval(),
         touch_distance=task.touch_distance,
         most_cells=settings.most_cells,
     )
-
-
-def _face_renderer(context: Context, images: CubeImages) -> RenderFaces:
-    """Return a function from the cube's face at each pixel to observations."""
-
-    def render(faces: NDArray[np.uint8]) -> torch.Tensor:
-        shown = torch.from_numpy(faces).long()
-        is_open = (shown == NOTHING)[..., None]
-        return context.scenes.transform(
-            torch.where(is_open, images.background, images.colors[shown])
-        )
-
-    return render

@@ -1,7 +1,7 @@
 """Sections "response" (maps over the place of one target) and "asymmetry" (left against right)."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from drone_rl.explanations.rollouts import run_to_end
 from drone_rl.explanations.scenes import Scenes, empty_scene, place_target
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.actions import Actions
-from drone_rl.sim.tasks import Grid
+from drone_rl.sim.tasks import Grid, State
 from drone_rl.utils.intervals import mean_interval
 from drone_rl.utils.seeding import Stream, torch_generator
 
@@ -38,11 +38,8 @@ def response_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArra
     """
     response = policy_response(context)
     outcome = outcome_map(context.scenes, context.network, seed=context.seed.value)
-    arrays = {
-        f"{name}_{field.name}": getattr(one, field.name)
-        for name, one in (("response", response), ("outcome", outcome))
-        for field in dataclasses.fields(one)
-    }
+    maps = {"response": vars(response), "outcome": vars(outcome)}
+    arrays = {f"{n}_{key}": array for n, fields in maps.items() for key, array in fields.items()}
     return {"response": summarise(response, outcome, context.scenes.task.strata)}, arrays
 
 
@@ -106,42 +103,55 @@ def response_map(
         num_forward: Places ahead.
         seed: Seed of the places, see `shrink`; fixed places by default.
     """
-    grid = scenes.task.grid(num_forward, num_lateral)
-    height, forward, lateral = grid if seed is None else shrink(grid, seed, _RESPONSE)
-    ahead, aside = torch.meshgrid(forward, lateral, indexing="ij")
-    layers = []
-    for up in height.tolist():
-        observed = scenes.observe(place_target(scenes, ahead.flatten(), aside.flatten(), up))
-        layers.append(probabilities(network, observed).view(num_forward, num_lateral, -1))
-    every = torch.stack(layers)
-    alone = probabilities(network, scenes.observe(empty_scene(scenes)))[0]
-    needed = scenes.needed(_offsets(lateral)).to(every.device)
-    return ResponseMap(
-        height=height.numpy(),
-        forward=forward.numpy(),
-        lateral=lateral.numpy(),
-        probabilities=every.cpu().numpy(),
-        without_target=alone.cpu().numpy(),
-        oracle=needed.cpu().numpy(),
-        stratum=scenes.task.stratum_at(_offsets(lateral)).numpy(),
-        blind=find_blind(scenes.actions, every, alone, needed).cpu().numpy(),
+    fields, wishes = _over_grid(
+        scenes,
+        (num_forward, num_lateral),
+        (seed, _RESPONSE),
+        lambda state: probabilities(network, scenes.observe(state)),
     )
+    alone = probabilities(network, scenes.observe(empty_scene(scenes)))[0]
+    needed = torch.from_numpy(fields["oracle"]).to(wishes.device)
+    return ResponseMap(
+        **fields,
+        probabilities=wishes.cpu().numpy(),
+        without_target=alone.cpu().numpy(),
+        blind=find_blind(scenes.actions, wishes, alone, needed).cpu().numpy(),
+    )
+
+
+def _over_grid(
+    scenes: Scenes,
+    shape: tuple[int, int],
+    seed: tuple[int | None, int],
+    evaluate: Callable[[State], Tensor],
+) -> tuple[dict[str, NDArray], Tensor]:
+    """Return the fields that both maps share, and results by place. Shape: (Z, F, L, ...)."""
+    grid, (root, number) = scenes.task.grid(*shape), seed
+    height, forward, lateral = grid if root is None else shrink(grid, root, number)
+    ahead, aside = (one.flatten() for one in torch.meshgrid(forward, lateral, indexing="ij"))
+    layers = [evaluate(place_target(scenes, ahead, aside, up)) for up in height.tolist()]
+    nothing = torch.zeros_like(lateral)
+    offsets = torch.stack([nothing, lateral, nothing], -1)
+    fields = {
+        "height": height,
+        "forward": forward,
+        "lateral": lateral,
+        "oracle": scenes.needed(offsets),
+        "stratum": scenes.task.stratum_at(offsets),
+    }
+    return {n: one.numpy() for n, one in fields.items()}, torch.stack(layers).unflatten(1, shape)
 
 
 def shrink(grid: Grid, seed: int, number: int = 0) -> Grid:
     """Move the outermost places inwards by random lengths, and all others in proportion.
 
     Nobody can know these places beforehand and fit a policy to their frames. Places stay evenly
-    spaced, and symmetric sideways.
+    spaced, and symmetric sideways. Each end moves by less than half the distance of two places.
 
     Args:
         grid: Of the task.
         seed: Root of the random stream.
         number: Of one grid among several from this seed.
-
-    Returns:
-        The same number of places. Each end has moved by less than half the distance between two
-        places.
     """
     generator = torch_generator(seed, Stream.SCENES, number=number)
     near, far, aside = (0.5 * torch.rand(3, dtype=torch.float64, generator=generator)).tolist()
@@ -167,9 +177,6 @@ def find_blind(actions: Actions, wishes: Tensor, alone: Tensor, needed: Tensor) 
         wishes: Action probabilities with a target there. Shape: (Z, F, L, A).
         alone: Action probabilities without a target. Shape: (A,).
         needed: The needed action, -1 where it is unknown. Shape: (L,).
-
-    Returns:
-        Shape: (Z, F, L), bool.
     """
     unmoved = actions.distance(wishes, alone) < BLIND
     needs_turn = (needed >= 0) & actions.turns(needed)
@@ -184,46 +191,24 @@ def outcome_map(
     num_forward: int = 8,
     seed: int | None = None,
 ) -> OutcomeMap:
-    """Run greedy rollouts from each place of a coarser grid.
-
-    Args:
-        scenes: Renders and steps the environments.
-        network: The policy's network.
-        num_lateral: Places sideways; see `Task.grid`.
-        num_forward: Places ahead.
-        seed: See `response_map`.
-    """
-    grid = scenes.task.grid(num_forward, num_lateral)
-    height, forward, lateral = grid if seed is None else shrink(grid, seed, _OUTCOME)
-    ahead, aside = torch.meshgrid(forward, lateral, indexing="ij")
+    """Run greedy rollouts from each place of a coarser grid; see `response_map`."""
     only = torch.zeros(num_forward * num_lateral, dtype=torch.int64, device=scenes.worlds.device)
-    layers = []
-    for up in height.tolist():
-        starts = place_target(scenes, ahead.flatten(), aside.flatten(), up)
-        ends = run_to_end(scenes, network, starts)
-        layers.append(scenes.task.is_reached(ends, only).view(num_forward, num_lateral))
-    return OutcomeMap(
-        height=height.numpy(),
-        forward=forward.numpy(),
-        lateral=lateral.numpy(),
-        collected=torch.stack(layers).cpu().numpy(),
-        oracle=scenes.needed(_offsets(lateral)).numpy(),
-        stratum=scenes.task.stratum_at(_offsets(lateral)).numpy(),
+    fields, collected = _over_grid(
+        scenes,
+        (num_forward, num_lateral),
+        (seed, _OUTCOME),
+        lambda state: scenes.task.is_reached(run_to_end(scenes, network, state), only),
     )
+    return OutcomeMap(**fields, collected=collected.cpu().numpy())
 
 
 def summarise(response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str]) -> dict[str, Any]:
-    """Return counts by height and side.
-
-    Args:
-        response: Response map.
-        outcome: Outcome map.
-        strata: Names of the task's strata, such as sides.
+    """Return counts by height and stratum, such as "left", "ahead" and "right".
 
     Returns:
-        "without_target"; "rows": for each height and side ("left", "ahead" where flying straight on
-        is enough, "right") the fraction of places at which the policy is "blind" (None if the grid
-        has none on that side), and the number of "places" and of those "collected".
+        "without_target"; "rows": for each height and side the fraction of places at which the
+        policy is "blind" (None if the grid has none on that side), and the number of "places" and
+        of those "collected".
     """
     rows = []
     for layer, height in enumerate(response.height.tolist()):
@@ -242,22 +227,10 @@ def summarise(response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str])
     return {"without_target": response.without_target.tolist(), "blind_below": BLIND, "rows": rows}
 
 
-def _offsets(lateral: Tensor) -> Tensor:
-    """Return places beside the drone, at its height. Shape: (L,) to (L, 3)."""
-    nothing = torch.zeros_like(lateral)
-    return torch.stack([nothing, lateral, nothing], -1)
-
-
 def asymmetry(
     network: PictureNetwork, observations: Tensor, episode: NDArray, actions: Actions
 ) -> dict[str, Any]:
-    """Compare pi(left | x) with pi(right | mirrored x) over a data set.
-
-    Args:
-        network: The policy's network.
-        observations: Shape (T, C, H, W).
-        episode: Shape (T,).
-        actions: Actions of the policy.
+    """Compare pi(left | x) with pi(right | mirrored x) on observations (T, C, H, W).
 
     Returns:
         "signed": mean of pi(left | x) - pi(right | mirrored x), below 0 if the policy prefers

@@ -85,20 +85,14 @@ class RolloutDataset:
         return torch.from_numpy(self.arrays[name])
 
     def offset(self, task: Task[Any]) -> NDArray:
-        """Return the next target's place relative to the drone: metres ahead and to the left.
-
-        Returns:
-            Shape: (T, 2); NaN where no target is left.
-        """
+        """Return metres ahead and to the left of the next target, or NaN. Shape: (T, 2)."""
         return task.next_offset(self.state(task))[:, :2].numpy()
 
     def state(self, task: Task[Any], dynamics: Dynamics | None = None) -> State:
         """Return the environments' states, with the drones at rest.
 
-        Args:
-            task: The task of the episodes.
-            dynamics: Dynamics by which to go on, if any; what their state has beyond a pose, such
-                as rotor speeds, is as at the start of an episode.
+        What the state of `dynamics` has beyond a pose, such as rotor speeds, is as at the start of
+        an episode.
         """
         kept = {name: self.tensor(name) for name in (*task.remembered, "step")}
         attitude, place = self.tensor("attitude").double(), self.tensor("drone").double()
@@ -109,23 +103,19 @@ class RolloutDataset:
         return task.recall(kept, body)
 
     def save(self, path: str | Path, flights: "RolloutDataset | None" = None) -> None:
-        """Write the file.
-
-        Args:
-            path: File to write.
-            flights: All steps of the episodes.
+        """Write the file, with all steps of the episodes as "flights/...".
 
         Raises:
             InputError: It can't be written.
         """
-        described = {**self.meta, "features": list(self.features)}
-        more = {f"features/{name}": value for name, value in self.features.items()}
+        arrays: dict[str, Any] = dict(self.arrays)  # Any: numpy's allow_pickle
+        arrays |= {f"features/{name}": value for name, value in self.features.items()}
         if flights is not None:
             whole = flights.arrays.items()
-            more |= {f"flights/{name}": value for name, value in whole if name not in SEEN}
+            arrays |= {f"flights/{name}": value for name, value in whole if name not in SEEN}
+        described = json.dumps({**self.meta, "features": list(self.features)})
         try:
-            arrays: dict[str, Any] = {**self.arrays, **more}  # Any: numpy's allow_pickle
-            np.savez_compressed(path, meta=json.dumps(described), **arrays)
+            np.savez_compressed(path, meta=described, **arrays)
         except OSError as error:
             raise InputError(
                 f"data set {path} can't be written ({error.strerror}); choose another folder"
@@ -173,14 +163,10 @@ def collect(
 
 
 def select_frames(episode: NDArray, num_frames: int) -> NDArray:
-    """Select the same number of frames of each episode, evenly spaced in time.
+    """Return indices of the same number of frames of each episode, evenly spaced in time.
 
-    Args:
-        episode: Episode of each frame, from 0, in order. Shape: (T,).
-        num_frames: Number to select; all if there are fewer.
-
-    Returns:
-        Indices, in order. Shape: (num_frames,).
+    `episode` has the episode of each frame, from 0, in order. If there are fewer than `num_frames`,
+    all are selected.
     """
     lengths = np.bincount(episode)
     quota = np.zeros_like(lengths)
@@ -249,18 +235,18 @@ class _WithTruth(TensorDictModuleBase):
 def _arrays(batch: TensorDictBase, task: Task[Any], actions: Actions) -> dict[str, NDArray]:
     info = cast(Mapping[str, Tensor], batch["info"])
     episode = cast(Tensor, batch["collector", "traj_ids"])
-    reward = cast(Tensor, batch["next", "reward"])[:, 0]
     end_reason = cast(Tensor, batch["next", "info", "end_reason"])[:, 0]
     starts = torch.cat([episode.new_ones(1, dtype=torch.bool), episode[1:] != episode[:-1]])
-    first = starts.nonzero()[:, 0][starts.cumsum(0) - 1]
+    number = starts.cumsum(0) - 1
+    first = starts.nonzero()[:, 0][number]
     arrays = {
         "observations": cast(Tensor, batch["pixels"]),
         **actions.kept(cast(Tensor, batch["action"])),
-        "rewards": reward,
+        "rewards": cast(Tensor, batch["next", "reward"])[:, 0],
         "event": _events(task, info, starts, end_reason),
         **{name: info[name] for name in _POSE},
         **task.remember(info),
-        "episode": starts.cumsum(0) - 1,
+        "episode": number,
         "step": torch.arange(len(batch), device=episode.device) - first,
         "end_reason": end_reason,
     }
@@ -312,7 +298,7 @@ def rollout(
         appearance: Appearance of the scenes; the task's by default.
 
     Returns:
-        Final states. Shape: that of `state`.
+        Final states.
     """
     device = state.body.position.device
     rows = torch.arange(len(state), device=device)
@@ -334,10 +320,7 @@ def run_to_end(scenes: Scenes, network: PictureNetwork, state: State) -> State:
     """Step until the episode ends, no target is left, or the policy is in a loop.
 
     A policy without memory is in a loop if it is back at its pose of two steps before. Such
-    episodes end with the task's truncation.
-
-    Returns:
-        Final states; `end_reason` is 0 where no target was left. Shape: that of `state`.
+    episodes end with the task's truncation. `end_reason` is 0 where no target was left.
     """
     task = scenes.task
     previous: Tensor | None = None

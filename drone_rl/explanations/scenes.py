@@ -46,7 +46,9 @@ class Scenes:
         self.actions = self.worlds.dynamics.actions
         pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
         self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
-        self.channels: str = _channels(self._transforms)
+        kinds = {type(transform) for transform in self._transforms}
+        colors = {ChromaticityPixels: "chromaticity", RgbPixels: "rgb"}
+        self.channels: str = next((name for kind, name in colors.items() if kind in kinds), "gray")
         """Channels of an observation: "gray", "rgb", or "chromaticity" (of red and blue)."""
         self.memory: int = memory_of(self._transforms)
         """Number of earlier frames in an observation."""
@@ -64,25 +66,16 @@ class Scenes:
         return self.transform(self.frames(state))
 
     def transform(self, frames: Tensor, earlier: Sequence[Tensor] = ()) -> Tensor:
-        """Apply the transforms to RGB frames.
+        """Apply the transforms to RGB frames. Shape: (T, H, W, 3) to (T, C, h, w).
 
-        Args:
-            frames: Shape (T, H, W, 3).
-            earlier: Frames of earlier steps, oldest first; the oldest one replaces missing ones.
-
-        Returns:
-            Observations. Shape: (T, C, h, w).
+        `earlier` has frames of earlier steps, oldest first; the oldest one replaces missing ones.
         """
         return see_film(self._transforms, [*earlier, frames])
 
     def to_frame(self, maps: Tensor) -> Tensor:
         """Transform heat maps back to the coordinates of the camera's frame.
 
-        Args:
-            maps: Shape (T, h, w).
-
-        Returns:
-            Shape: (T, H, W); 0 where a transform cropped the frame.
+        Shape: (T, h, w) to (T, H, W); 0 where a transform cropped the frame.
         """
         camera = self.worlds.camera
         pixels = torch.zeros(1, camera.height, camera.width, 3, dtype=torch.uint8)
@@ -101,13 +94,10 @@ class Scenes:
         return maps
 
     def needed(self, offset: Tensor) -> Tensor:
-        """Return the action that a target at a place calls for; -1 if unknown.
+        """Return the action that a target calls for at an offset (N, 3) from the drone, in metres.
 
         The task knows it for the actions of its default dynamics; for other actions it is the one
-        with the same name.
-
-        Args:
-            offset: Metres from the drone, world frame. Shape: (N, 3).
+        with the same name, or -1 if there is none.
         """
         names, known = self.actions.names, self.task.make_dynamics().actions.names
         if not set(known) <= set(names):
@@ -124,30 +114,19 @@ class Scenes:
         props = torch.tensor([*self.worlds.scene.props, -1], device=geoms.device)
         target = props[geoms]  # geom -1 (the sky) reads the last entry
         next_target = self.task.next_target(state)[:, None, None]
+        sky, is_target = geoms < 0, target >= 0
+        meets = sky[:, :-1] & ~(sky | is_target)[:, 1:]
+        border = functional.pad(meets, (0, 0, 0, 1)) | functional.pad(meets, (0, 0, 1, 0))
         regions = torch.full_like(target, Region.GROUND)
-        sky = geoms < 0
         regions[sky] = Region.SKY
-        regions[_border(sky, ~sky & (target < 0))] = Region.HORIZON
-        regions[target >= 0] = Region.OTHER_TARGET
-        regions[(target >= 0) & (target == next_target)] = Region.NEXT_TARGET
+        regions[border] = Region.HORIZON
+        regions[is_target] = Region.OTHER_TARGET
+        regions[is_target & (target == next_target)] = Region.NEXT_TARGET
         return regions.to(torch.uint8)
 
 
-def _channels(transforms: Iterable[Transform]) -> str:
-    kinds = {type(transform) for transform in transforms}
-    if ChromaticityPixels in kinds:
-        return "chromaticity"
-    return "rgb" if RgbPixels in kinds else "gray"
-
-
-def _border(sky: Tensor, ground: Tensor) -> Tensor:
-    """Return pixels of sky above ground, and of ground below sky. Shape: (T, H, W)."""
-    meets = sky[:, :-1] & ground[:, 1:]
-    return functional.pad(meets, (0, 0, 0, 1)) | functional.pad(meets, (0, 0, 1, 0))
-
-
 def place_target(scenes: Scenes, forward: Tensor, lateral: Tensor, height: float = 0.0) -> State:
-    """Return scenes with one target each and the drone at its origin.
+    """Return scenes with one target each; the drone is at its origin.
 
     Args:
         scenes: Renders the frames.
@@ -167,19 +146,11 @@ def empty_scene(scenes: Scenes) -> State:
 
 
 def alternatives(scenes: Scenes, state: State, seed: int = 0) -> dict[str, Tensor]:
-    """Return observations from the same places with other contents.
+    """Return observations (T, C, h, w) from the same places with other contents, by name.
 
-    Patches of an observation are replaced by patches of these. Unlike a gray box, they are similar
-    to observations that the policy was trained on.
-
-    Args:
-        scenes: Renders the frames.
-        state: The scenes.
-        seed: Seed of the targets' random places.
-
-    Returns:
-        By name, shape (T, C, h, w): no targets; targets elsewhere, `PLACEMENTS` times; ground and
-        sky darker, and brighter.
+    These are: no targets; targets at random places, `PLACEMENTS` times; ground and sky darker, and
+    brighter. Patches of an observation are replaced by patches of these. Unlike a gray box, they
+    are similar to observations that the policy was trained on.
     """
     generator = torch.Generator().manual_seed(seed)
     found = {"no targets": scenes.observe(scenes.task.without_targets(state))}

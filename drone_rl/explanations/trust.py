@@ -19,6 +19,7 @@ plain data.
 """
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -109,6 +110,7 @@ class Pictures:
         """Measure which patches affect a policy; `actions` (T,) are those to explain."""
         grid = make_grid(*self.observations.shape[-2:])
         effects = patches.patch_effects(network, self.observations, self.others, grid)
+        moved = patches.moving(effects)
         trial = Trial(
             network=network,
             observations=self.observations,
@@ -117,21 +119,14 @@ class Pictures:
             placebos=placebo_maps(self.observations, self.absent, self.others, self.seed),
             episode=self.episode,
             grid=grid,
+            still=int((~moved).sum()),
             seed=self.seed,
         )
-        moved = patches.moving(effects)
-        return dataclasses.replace(trial[moved], still=int((~moved).sum()))
+        return trial[moved]
 
 
 def draw_pictures(scenes: Scenes, state: State, episode: NDArray, seed: int = 0) -> Pictures:
-    """Render scenes and their alternatives.
-
-    Args:
-        scenes: Renders the frames.
-        state: T scenes.
-        episode: Shape: (T,).
-        seed: Seed of the targets' random places, of noise and of shuffled weights.
-    """
+    """Render T scenes and alternatives; the seed is that of places, noise and shuffled weights."""
     return Pictures(
         observations=scenes.observe(state),
         others=list(alternatives(scenes, state, seed).values()),
@@ -168,12 +163,10 @@ def make_trial(
 def method_maps(explainer: Explainer) -> dict[str, MapOf]:
     """Return an explainer's methods as functions of any network of the same shape."""
 
-    def make(name: str) -> MapOf:
-        return lambda network, x, a: dataclasses.replace(explainer, network=network).methods()[
-            name
-        ](x, a)
+    def of(name: str, network: PictureNetwork, *inputs: Tensor) -> Tensor:
+        return dataclasses.replace(explainer, network=network).methods()[name](*inputs)
 
-    return {name: make(name) for name in explainer.methods()}
+    return {name: functools.partial(of, name) for name in explainer.methods()}
 
 
 def check_maps(
@@ -193,9 +186,8 @@ def check_maps(
 
     Returns:
         "trusted": name of the best method that passed all tests, None if none did; "methods", by
-        name, see `check_method`; "placebos": their scores; "frames", "episodes" and
-        "frames_unmoved"; "level": error rate of each method; "confidence": of each bound but the
-        scores'.
+        name, see `check_method`; "placebos": their scores; "frames", "episodes", "frames_unmoved";
+        "level": error rate of each method; "confidence" of each bound but the scores'.
     """
     level = ERROR_RATE / (num_methods or max(1, len(methods)))
     maps = maps or {name: trial.maps(method) for name, method in methods.items()}
@@ -228,30 +220,31 @@ def check_method(
         "random_weights"; "maps_without_heat". With bounds: "median", "lower" and "upper", each of
         which holds with probability 1 - level; None for too few episodes.
     """
-    if not len(trial.episode):
+    episode = trial.episode
+    if not len(episode):
         none = patches.summarise_scores(np.zeros(0), np.zeros(0))
         return {"trusted": False, "failed": ["nothing moves the policy"], "score": none}
     maps = trial.maps(method) if maps is None else maps
-    heat, scores = trial.grid.means(maps), trial.scores(maps)
-    hit, chance = patches.pointing(heat, trial.effects)
+    scores = trial.scores(maps)
+    hit, chance = patches.pointing(trial.grid.means(maps), trial.effects)
     result = {
-        "score": patches.summarise_scores(scores, trial.episode),
+        "score": patches.summarise_scores(scores, episode),
         "placebos": {
-            name: _median(scores - trial.scores(placebo), trial.episode, level)
+            name: _median(scores - trial.scores(placebo), episode, level)
             for name, placebo in trial.placebos.items()
         },
         "pointing": {
-            **_median(hit - chance, trial.episode, level),
+            **_median(hit - chance, episode, level),
             "hit": float(hit.mean()),
             "chance": float(chance.mean()),
         },
         "likeness": _likeness(trial, method, level),
         "maps_without_heat": int((maps.flatten(1).amax(1) <= 0).sum()),
     }
-    failed = [name for name, is_passed in _tests(result).items() if not is_passed]
+    failed = _failed(result)
     if not failed:
         result["random_weights"] = random_weights(trial, method, level)
-        failed = [] if result["random_weights"]["as_good"] == 0 else ["random weights"]
+        failed = ["random weights"] if result["random_weights"]["as_good"] else []
     return {"trusted": not failed, "failed": failed, **result}
 
 
@@ -277,24 +270,19 @@ def random_weights(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
         "best": max(others),
         "mean": float(np.mean(others)),
         "tried": len(others),
-        "as_good": sum(score >= own - 1e-9 for score in others),
+        "as_good": int(others[-1] >= own - 1e-9),
     }
 
 
-def _tests(result: dict[str, Any]) -> dict[str, bool]:
-    """Return whether each test but "random weights" is passed."""
-    alike = result["likeness"]
-    return {
-        "placebos": all(_above(b["lower"], 0.0) for b in result["placebos"].values()),
-        "pointing": _above(result["pointing"]["lower"], 0.0),
-        "likeness": alike["upper"] is not None
-        and alike["upper"] < MOST_ALIKE
-        and max(alike["seeds"]) < MOST_ALIKE,
+def _failed(result: dict[str, Any]) -> list[str]:
+    """Return the failed tests, except "random weights"; a bound of None fails."""
+    upper, seeds = result["likeness"]["upper"], result["likeness"]["seeds"]
+    is_passed = {
+        "placebos": all((b["lower"] or 0.0) > 0.0 for b in result["placebos"].values()),
+        "pointing": (result["pointing"]["lower"] or 0.0) > 0.0,
+        "likeness": upper is not None and max(upper, *seeds) < MOST_ALIKE,
     }
-
-
-def _above(value: float | None, bar: float) -> bool:
-    return value is not None and value > bar
+    return [name for name, passed in is_passed.items() if not passed]
 
 
 def _likeness(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:

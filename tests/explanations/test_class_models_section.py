@@ -13,8 +13,8 @@ def test_both_objectives_are_sought_in_the_range_of_the_pictures(monkeypatch):
 
     def search(network, statistics, objective, *, seed):
         calls.append((network, statistics.low, statistics.high, objective, seed))
-        pictures = torch.full((3, 1, 2, 2), float(len(calls)))
-        return SimpleNamespace(pictures=pictures, summary=lambda: {"sought": objective})
+        images = torch.full((3, 1, 2, 2), float(len(calls)))
+        return SimpleNamespace(images=images, summary=lambda: {"sought": objective})
 
     monkeypatch.setattr(class_models, "search", search)
     observations = torch.linspace(-2, 2, 40).reshape(10, 1, 2, 2)

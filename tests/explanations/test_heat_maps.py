@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from drone_rl.explanations.heat_maps import Explainer
-from drone_rl.policies import MLP, ForeignNetwork, SmallCNN
+from drone_rl.policies import MLP, ForeignNetwork
 from drone_rl.sim.actions import MOVES
 from drone_rl.utils.errors import InputError
 
@@ -135,17 +135,3 @@ def test_occlusion_by_hand():
     expected = change * torch.tensor([1, 1 / 2, 1 / 3, 0, 0, 0])
     torch.testing.assert_close(found, expected.expand(3, 6))
     assert explainer.occlusion(torch.zeros(1, 1, 3, 6), torch.tensor([1])).max() == 0
-
-
-def test_why_maps_of_grad_cam_are_empty():
-    network = SmallCNN((1, 8, 8), 2, channels=(1,), hidden=())
-    with torch.no_grad():
-        network.layers.conv1.weight.fill_(1.0)
-        network.layers.logits.weight.copy_(torch.tensor([[0.0] * 4, [1.0] * 4]))
-    explainer = Explainer(network, torch.zeros(1, 8, 8))
-    x = torch.ones(3, 1, 8, 8) / 16
-    x[2] *= 100
-    # action 0: its logit depends on nothing; its probability falls with the feature map
-    found = explainer.maps_without_heat(x, torch.tensor([0, 1, 1]))
-    # picture 2: so sure of action 1 that its probability has no derivative, its logit has
-    assert found == {"logit": 1, "probability": 2, "saturated": 1}

@@ -2,8 +2,23 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.explanations.patches import Grid
+from drone_rl.explanations.trust import Trial
 from drone_rl.explanations.truth import SHARES, deletion_insertion
 from drone_rl.policies import MLP
+
+
+def curves(network, observations, actions, maps, absent, episode):
+    trial = Trial(
+        network=network,
+        observations=observations,
+        actions=actions,
+        effects=np.zeros((len(episode), 1)),
+        placebos={},
+        episode=episode,
+        grid=Grid(2, 5, 1, 1),
+    )
+    return deletion_insertion(trial, maps, absent)
 
 
 @pytest.fixture
@@ -21,14 +36,14 @@ def test_curves_of_a_policy_that_looks_at_one_pixel(network):
     right, wrong = torch.zeros(1, 2, 5), torch.ones(1, 2, 5)
     right[0, 1, 2], wrong[0, 1, 2] = 1.0, 0.0  # that pixel first, and last
     absent, episode = torch.zeros(1, 2, 5), np.zeros(1)
-    found = deletion_insertion(network, x, actions, right, absent, episode)["left"]
+    found = curves(network, x, actions, right, absent, episode)["left"]
     gone = [round(10 * share) >= 1 for share in SHARES]  # of ten pixels, 0.075 take one away
     third = pytest.approx(1 / 3)
     assert found["deletion"]["curve"] == [third if g else 1.0 for g in gone]
     assert found["insertion"]["curve"] == [1.0 if g else third for g in gone]
     # the area falls from 1 to 1/3 between 0.05 and 0.075
     assert found["deletion"]["area"]["mean"] == pytest.approx(0.05 + 0.025 * 2 / 3 + 0.925 / 3)
-    worse = deletion_insertion(network, x, actions, wrong, absent, episode)["left"]
+    worse = curves(network, x, actions, wrong, absent, episode)["left"]
     assert worse["deletion"]["curve"] == [1.0] * (len(SHARES) - 1) + [third]
     assert worse["insertion"]["area"]["mean"] < 0.5 < found["insertion"]["area"]["mean"]
 
@@ -37,7 +52,7 @@ def test_actions_are_told_apart_and_episodes_count_alike(network):
     x = torch.ones(4, 1, 2, 5)
     x[3] = 0.0
     actions = torch.tensor([1, 1, 0, 1])
-    found = deletion_insertion(
+    found = curves(
         network, x, actions, torch.rand(4, 2, 5), torch.zeros(1, 2, 5), np.array([0, 0, 0, 1])
     )
     assert [found[a]["frames"] for a in ("forward", "left", "right")] == [1, 3, 0]
@@ -59,5 +74,5 @@ def test_without_pictures_there_are_no_curves(network):
     none = torch.zeros(0, 1, 2, 5)
     maps, absent = torch.zeros(0, 2, 5), torch.zeros(1, 2, 5)
     actions = torch.zeros(0, dtype=torch.int64)
-    found = deletion_insertion(network, none, actions, maps, absent, np.zeros(0))
+    found = curves(network, none, actions, maps, absent, np.zeros(0))
     assert found["left"]["frames"] == 0 and found["left"]["insertion"]["curve"] is None

@@ -12,7 +12,7 @@ def test_methods_are_tried_against_placebos_and_every_change_is_shown(context):
     found = numbers["truth"]
     json.dumps(numbers)
     tried = set(found["methods"])
-    assert tried == set(found["heat"]) == set(found["cube"]) >= {"grad_cam", "saliency"}
+    assert tried == set(found["heat"]) >= {"grad_cam", "saliency"}
     assert set(found["curves"]) == {"shares", *tried, *found["placebos"]}
     assert found["trusted"] is None or found["methods"][found["trusted"]]["trusted"]
     assert arrays["interventions"].shape[0] == len(found["interventions"])

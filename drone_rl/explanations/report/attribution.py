@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from drone_rl.evaluation.plots import images
-from drone_rl.explanations.report.explanation import Explanation
-from drone_rl.explanations.report.part import Part
+from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.utils.text import Evidence, Sentence
 

@@ -3,8 +3,7 @@
 from PIL import Image
 
 from drone_rl.evaluation.plots import images
-from drone_rl.explanations.report.explanation import Explanation
-from drone_rl.explanations.report.part import Part
+from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.sim.vocabulary import shown_actions, terms_of
 from drone_rl.utils.text import Evidence, Sentence, among, bounds, listed, percent, plural
 
@@ -13,52 +12,47 @@ MOST_PAIRS = 4
 """Pairs of each kind that are shown."""
 
 
-def _size(evidence: Evidence) -> str:
-    data = evidence["dataset"]
-    return (
-        f"{data['frames']} frames, spread evenly over {data['episodes']} whole episodes of "
-        f"{data['steps']:,} steps with sampled actions."
-    )
-
-
-def _actions(evidence: Evidence) -> str:
+def _shares(evidence: Evidence) -> dict[str, float]:
+    """Return the fraction of the steps by name of the action."""
     shares, names = evidence["dataset"]["action_shares"], shown_actions(evidence).names
-    parts = listed([f"{percent(s)} {a}" for s, a in zip(shares, names, strict=True)])
-    return f"Actions taken: {parts}."
-
-
-def _one_action(evidence: Evidence) -> str:
-    shares, names = evidence["dataset"]["action_shares"], shown_actions(evidence).names
-    return f"Every step took the same action, {names[shares.index(max(shares))]}."
-
-
-def _entropy(evidence: Evidence) -> str:
-    entropy = evidence["dataset"]["entropy"]
-    return (
-        f"The policy's mean entropy is {entropy['mean']:.2f}, where 0 is deterministic and 1 is "
-        f"uniform ({bounds(entropy)})."
-    )
+    return dict(zip(names, shares, strict=True))
 
 
 DATASET = (
-    Sentence("dataset.size", "frames were recorded", lambda e: e["dataset"]["frames"] > 0, _size),
+    Sentence(
+        "dataset.size",
+        "frames were recorded",
+        lambda e: e["dataset"]["frames"] > 0,
+        lambda e: (
+            f"{e['dataset']['frames']} frames, spread evenly over {e['dataset']['episodes']} whole "
+            f"episodes of {e['dataset']['steps']:,} steps with sampled actions."
+        ),
+    ),
     Sentence(
         "dataset.actions",
         "more than one action was taken",
         lambda e: max(e["dataset"]["action_shares"]) < 1,
-        _actions,
+        lambda e: (
+            f"Actions taken: {listed([f'{percent(s)} {name}' for name, s in _shares(e).items()])}."
+        ),
     ),
     Sentence(
         "dataset.one_action",
         "every step took the same action",
         lambda e: max(e["dataset"]["action_shares"]) == 1,
-        _one_action,
+        lambda e: (
+            "Every step took the same action, "
+            f"{next(name for name, s in _shares(e).items() if s == 1)}."
+        ),
     ),
     Sentence(
         "dataset.entropy",
         "the policy's probabilities were recorded",
         lambda e: e["dataset"]["entropy"]["mean"] is not None,
-        _entropy,
+        lambda e: (
+            f"The policy's mean entropy is {e['dataset']['entropy']['mean']:.2f}, where 0 is "
+            f"deterministic and 1 is uniform ({bounds(e['dataset']['entropy'])})."
+        ),
     ),
     Sentence(
         "dataset.none_reached",
@@ -67,11 +61,6 @@ DATASET = (
         lambda e: f"No {terms_of(e).goal} was {terms_of(e).reached} in these episodes.",
     ),
 )
-
-
-def _no_pair(evidence: Evidence) -> str:
-    found = evidence["contradictions"]
-    return f"Among these {found['frames']} frames, no two similar ones get opposite actions."
 
 
 def _pairs(evidence: Evidence) -> str:
@@ -87,17 +76,15 @@ def _pairs(evidence: Evidence) -> str:
     )
 
 
-def _worst(evidence: Evidence) -> str:
-    worst = evidence["contradictions"]["worst_opposition"]
-    return f"In the worst contradiction, the probability of a turn changes sides by {worst:.2f}."
-
-
 CONTRADICTIONS = (
     Sentence(
         "contradictions.none",
         "no pair was found among the analysed frames",
         lambda e: e["contradictions"]["pairs"] == 0,
-        _no_pair,
+        lambda e: (
+            f"Among these {e['contradictions']['frames']} frames, no two similar ones get "
+            "opposite actions."
+        ),
     ),
     Sentence(
         "contradictions.pairs",
@@ -109,17 +96,12 @@ CONTRADICTIONS = (
         "contradictions.worst",
         "one of the pairs is a contradiction",
         lambda e: e["contradictions"]["contradictions"] > 0,
-        _worst,
+        lambda e: (
+            "In the worst contradiction, the probability of a turn changes sides by "
+            f"{e['contradictions']['worst_opposition']:.2f}."
+        ),
     ),
 )
-
-
-def _no_loop(evidence: Evidence) -> str:
-    share = evidence["loops"]["episodes"]
-    return (
-        f"None of these {share['trials']} sampled episodes has a loop, in which the drone moves "
-        f"back and forth; up to {percent(share['upper95'])} of such episodes may have one (95%)."
-    )
 
 
 def _loops(evidence: Evidence) -> str:
@@ -133,14 +115,18 @@ def _loops(evidence: Evidence) -> str:
 
 
 LOOPS = (
-    Sentence("loops.none", "no episode has a loop", lambda e: not e["loops"]["loops"], _no_loop),
+    Sentence(
+        "loops.none",
+        "no episode has a loop",
+        lambda e: not e["loops"]["loops"],
+        lambda e: (
+            f"None of these {e['loops']['episodes']['trials']} sampled episodes has a loop, in "
+            "which the drone moves back and forth; up to "
+            f"{percent(e['loops']['episodes']['upper95'])} of such episodes may have one (95%)."
+        ),
+    ),
     Sentence("loops.some", "episodes have loops", lambda e: e["loops"]["loops"] > 0, _loops),
 )
-
-
-def _draw_pairs(explanation: Explanation) -> dict[str, Image.Image]:
-    drawn = {kind: pairs(explanation, kind) for kind in KINDS}
-    return {f"pairs_{kind}": image for kind, image in drawn.items() if image is not None}
 
 
 def pairs(explanation: Explanation, kind: str) -> Image.Image | None:
@@ -167,5 +153,7 @@ FLAWS_PART = Part(
     label="Contradictions and loops",
     needs=("contradictions", "loops"),
     text={"contradictions": CONTRADICTIONS, "loops": LOOPS},
-    draw=_draw_pairs,
+    draw=lambda explanation: {
+        f"pairs_{kind}": image for kind in KINDS if (image := pairs(explanation, kind)) is not None
+    },
 )

@@ -10,8 +10,7 @@ from scipy.spatial.distance import cdist
 
 from drone_rl.evaluation.plots import images
 from drone_rl.evaluation.plots.saving import Rows, to_png, to_uri
-from drone_rl.explanations.report.explanation import Explanation
-from drone_rl.explanations.report.part import Part
+from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.utils.text import Evidence, Sentence, listed, percent
 
 MOST_THUMBNAILS = 900
@@ -58,11 +57,9 @@ TSNE = (
 def tsne_map(explanation: Explanation, which: str) -> Image.Image:
     """Return a map of thumbnails at their embedded positions, tinted by action."""
     chosen = shown_frames(explanation)
-    return images.thumbnails(
-        explanation.data["frames"][chosen],
-        [explanation.actions.colors[a] for a in explanation.data["actions"][chosen]],
-        cells(explanation, which),
-    )
+    colors = [explanation.actions.colors[a] for a in explanation.data["actions"][chosen]]
+    frames = explanation.data["frames"][chosen]
+    return images.thumbnails(frames, colors, cells(explanation, which))
 
 
 def shown_frames(explanation: Explanation) -> NDArray:
@@ -82,12 +79,7 @@ def cells(explanation: Explanation, which: str) -> NDArray:
 
 
 def snap_to_grid(points: NDArray, columns: int, rows: int) -> NDArray:
-    """Assign each point a cell of its own; the total squared distance is minimal.
-
-    Args:
-        points: Shape (T, 2).
-        columns: Cells across.
-        rows: Cells down; rows times columns must be at least T.
+    """Assign each point (T, 2) a cell of its own; the total squared distance is minimal.
 
     Returns:
         Column and row of each point. Shape: (T, 2), int.
@@ -136,11 +128,6 @@ def _event(explanation: Explanation, event: int) -> str:
     return {1: f"{terms.reaches} a {terms.goal}", -1: f"misses a {terms.goal}"}.get(event, "")
 
 
-def _legend(explanation: Explanation) -> list[dict[str, str]]:
-    actions = explanation.actions
-    return [{"name": n, "color": actions.css(i)} for i, n in enumerate(actions.names)]
-
-
 def table(explanation: Explanation) -> Rows:
     """Return the position of each frame on both maps."""
     data, arrays = explanation.data, explanation.arrays
@@ -161,5 +148,5 @@ PART = Part(
     text={"tsne": TSNE},
     draw=lambda explanation: {f"tsne_{which}": tsne_map(explanation, which) for which in MAPS},
     tables=lambda explanation: {"tsne": table(explanation)},
-    extras=lambda explanation: {"actions": _legend(explanation), "points": points(explanation)},
+    extras=lambda explanation: {"points": points(explanation)},
 )

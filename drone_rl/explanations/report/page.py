@@ -16,13 +16,11 @@ from drone_rl.explanations.report import (
     behavior,
     class_models,
     embedding,
-    places,
     response,
     truth,
     verdict,
 )
-from drone_rl.explanations.report.explanation import FRAME, Explanation
-from drone_rl.explanations.report.part import Drawn, Part
+from drone_rl.explanations.report.explanation import FRAME, Drawn, Explanation, Part
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest, to_file_name
@@ -39,7 +37,7 @@ PARTS: dict[str, Part] = {
     "attribution": attribution.PART,
     "truth": truth.PART,
     "response": response.RESPONSE_PART,
-    "places": places.PART,
+    "places": response.PLACES_PART,
     "asymmetry": response.ASYMMETRY_PART,
     "left_out": verdict.LEFT_OUT_PART,
 }
@@ -63,9 +61,9 @@ def report(folders: Sequence[Path], target: Path) -> Path:
     """
     try:
         return write_report(folders, target)
-    except InputError:
-        raise
     except (*_INCOMPLETE, jinja2.TemplateError) as error:
+        if isinstance(error, InputError):
+            raise
         names = ", ".join(map(str, folders))
         raise InputError(
             f"explanations={names} do not hold what a report needs "
@@ -83,16 +81,17 @@ def find_explanations(which: Sequence[str], outputs: str | Path = "outputs") -> 
     Raises:
         InputError: There is none.
     """
-    if tuple(which) != ("latest",):
-        return [folder for path in which for folder in _explanations(Path(path))]
-    made = Path(outputs).glob("explain/runs/*/*/explanation.json")
-    run = newest({path.parents[1] for path in made})
-    if run is None:
-        raise InputError(
-            f"explanations=latest, but there is none under {outputs}/explain; "
-            "run drone-rl explain first or give folders"
-        )
-    return _explanations(run)
+    folders = [Path(path) for path in which]
+    if tuple(which) == ("latest",):
+        made = Path(outputs).glob("explain/runs/*/*/explanation.json")
+        run = newest({path.parents[1] for path in made})
+        if run is None:
+            raise InputError(
+                f"explanations=latest, but there is none under {outputs}/explain; "
+                "run drone-rl explain first or give folders"
+            )
+        folders = [run]
+    return [found for folder in folders for found in _explanations(folder)]
 
 
 def _explanations(folder: Path) -> list[Path]:
@@ -181,10 +180,9 @@ def render_page(policies: Sequence[Policy]) -> str:
     """Return the page of some policies, as HTML."""
     environment = _environment()
     explanations = [policy.explanation for policy in policies]
-    several = len(policies) > 1
     style, script = static_text(environment, STYLES), static_text(environment, SCRIPTS)
     return environment.get_template("report.html").render(
-        title="Can these policies be trusted?" if several else "Can this policy be trusted?",
+        title="Can these policies be trusted?" if policies[1:] else "Can this policy be trusted?",
         parts=_parts(environment, policies),
         policies=explanations,
         sources=[say(verdict.SOURCE, {**e.numbers, "source": e.source}) for e in explanations],
@@ -199,7 +197,9 @@ def _environment() -> jinja2.Environment:
     """Return the templates of this page, compiled once."""
     environment = page_environment("drone_rl.explanations.report")
     environment.filters |= {
-        "percent": _short_percent,
+        "percent": lambda share: (
+            percent(share).replace("less than ", "<").replace("more than ", ">")
+        ),
         "json": functools.partial(json.dumps, indent=1),
     }
     return environment
@@ -241,8 +241,3 @@ def _render(template: jinja2.Template, part: Part, policies: Sequence[Policy]) -
 
 def _save(drawn: Drawn, folder: Path, prefix: str) -> Mapping[str, str]:
     return {name: save_drawn(one, folder / f"{prefix}{name}") for name, one in drawn.items()}
-
-
-def _short_percent(fraction: float) -> str:
-    """Format a fraction for a table."""
-    return percent(fraction).replace("less than ", "<").replace("more than ", ">")

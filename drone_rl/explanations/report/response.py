@@ -1,9 +1,10 @@
-"""Report sections "response" (maps over the place of one target) and "asymmetry" (left, right)."""
+"""Report sections on one target: "response" and "places" (maps over its place), and "asymmetry"."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
@@ -11,12 +12,13 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from PIL import Image
 
-from drone_rl.evaluation.plots import images
+from drone_rl.evaluation.plots import images, regions
 from drone_rl.evaluation.plots.saving import Rows
-from drone_rl.explanations.report.explanation import Explanation
-from drone_rl.explanations.report.part import Part
+from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.sim.vocabulary import ShownActions, terms_of
 from drone_rl.utils.text import Evidence, Sentence, bounds, listed, percent
+from drone_rl.verification.text import PLACES
+from drone_rl.verification.text import rows as place_rows
 
 _OUTCOMES = ("#d9d9de", "#4269d0")
 """Colours of targets that are not handled, and of those that are."""
@@ -28,21 +30,9 @@ def _level(evidence: Evidence, level: bool = True) -> list[Evidence]:
 
 
 def _collected(evidence: Evidence, rows: Sequence[Evidence]) -> str:
-    terms = terms_of(evidence)
-    parts = [
-        f"{row['collected']} of {row['places']} places {terms.place(row['side'])}"
-        for row in rows
-        if row["places"]
-    ]
-    return listed(parts)
-
-
-def _outcomes(evidence: Evidence) -> str:
-    terms = terms_of(evidence)
-    return (
-        f"With one {terms.target} alone and its most probable actions, the policy {terms.handles} "
-        f"from {_collected(evidence, _level(evidence))}."
-    )
+    place = terms_of(evidence).place
+    found = [row for row in rows if row["places"]]
+    return listed([f"{r['collected']} of {r['places']} places {place(r['side'])}" for r in found])
 
 
 def _heights(evidence: Evidence) -> str:
@@ -71,7 +61,10 @@ RESPONSE = (
         "response.collected",
         "episodes were run from places of the grid",
         lambda e: any(row["places"] for row in _level(e)),
-        _outcomes,
+        lambda e: (
+            f"With one {terms_of(e).target} alone and its most probable actions, the policy "
+            f"{terms_of(e).handles} from {_collected(e, _level(e))}."
+        ),
     ),
     Sentence(
         "response.heights",
@@ -88,14 +81,8 @@ RESPONSE = (
 )
 
 
-def _differs(evidence: Evidence) -> str:
-    found = evidence["asymmetry"]
-    absolute = found["dataset"]["absolute"]
-    return (
-        f"On these frames the policy differs from its mirror image by {absolute['mean']:.2f} on "
-        f"average (0: perfectly symmetric, 1: always opposite; {bounds(absolute)}), on the grid by "
-        f"{found['grid']['absolute']:.2f}."
-    )
+def _absolute(evidence: Evidence) -> Evidence:
+    return evidence["asymmetry"]["dataset"]["absolute"]
 
 
 def _signed(evidence: Evidence) -> Evidence:
@@ -116,7 +103,16 @@ def _is_sure(evidence: Evidence) -> bool:
 
 
 ASYMMETRY = (
-    Sentence("asymmetry.differs", "always", lambda e: True, _differs),
+    Sentence(
+        "asymmetry.differs",
+        "always",
+        lambda e: True,
+        lambda e: (
+            "On these frames the policy differs from its mirror image by "
+            f"{_absolute(e)['mean']:.2f} on average (0: perfectly symmetric, 1: always opposite; "
+            f"{bounds(_absolute(e))}), on the grid by {e['asymmetry']['grid']['absolute']:.2f}."
+        ),
+    ),
     Sentence("asymmetry.prefers", "the interval of the preference excludes 0", _is_sure, _prefers),
     Sentence(
         "asymmetry.undecided",
@@ -198,8 +194,9 @@ def response_tables(explanation: Explanation) -> dict[str, Rows]:
         needed = names[action] if action >= 0 else ""
         responses.append([*where, *shares, needed, int(arrays["response_blind"][at])])
     outcomes: list[list[Any]] = [[*place, "collected"]]
-    for at, where in _grid(arrays, "outcome"):
-        outcomes.append([*where, int(arrays["outcome_collected"][at])])
+    outcomes += [
+        [*where, int(arrays["outcome_collected"][at])] for at, where in _grid(arrays, "outcome")
+    ]
     return {"response": responses, "outcomes": outcomes}
 
 
@@ -214,15 +211,10 @@ def _grid(
 
 def worst_frames(explanation: Explanation) -> Image.Image:
     """Return the three frames on which the policy and its mirror image differ most."""
-    worst = explanation.numbers["asymmetry"]["dataset"]["worst"][:3]
+    data, actions = explanation.data, explanation.actions
     tiles = [
-        images.probed_frame(
-            explanation.data,
-            entry["frame"],
-            f"differs by {entry['distance']:.2f}",
-            explanation.actions,
-        )
-        for entry in worst
+        images.probed_frame(data, one["frame"], f"differs by {one['distance']:.2f}", actions)
+        for one in explanation.numbers["asymmetry"]["dataset"]["worst"][:3]
     ]
     return images.gridded(tiles, 3)
 
@@ -241,4 +233,31 @@ ASYMMETRY_PART = Part(
     needs=("asymmetry",),
     text={"asymmetry": ASYMMETRY},
     draw=lambda explanation: {"asymmetry": worst_frames(explanation)},
+)
+
+
+def _exact_map(explanation: Explanation) -> tuple[Any, ...]:
+    """Return numbers, outlines and actions of the exact map; nothing if there is none."""
+    if "refused" in explanation.numbers["places"]:
+        return ()
+    outlines = {n: explanation.arrays[f"places_{n}"] for n in ("points", "ends", "labels")}
+    return explanation.numbers["places"], outlines, explanation.actions
+
+
+def _place_rows(explanation: Explanation) -> Rows:
+    return place_rows(explanation.numbers["places"], explanation.actions.names)
+
+
+PLACES_PART = Part(
+    title="Exact action map of one cube",
+    label="Exact map",
+    needs=("places",),
+    text={"places": PLACES},
+    draw=lambda e: {"places": regions.chart(*_exact_map(e))} if _exact_map(e) else {},
+    tables=lambda e: {"places": _place_rows(e)} if _exact_map(e) else {},
+    extras=lambda e: (
+        {"svg": Markup(regions.svg(*_exact_map(e))), "rows": _place_rows(e)}
+        if _exact_map(e)
+        else {"svg": ""}
+    ),
 )

@@ -6,8 +6,7 @@ from typing import Any
 from PIL import Image
 
 from drone_rl.evaluation.plots import images
-from drone_rl.explanations.report.explanation import Explanation
-from drone_rl.explanations.report.part import Drawn, Part
+from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.explanations.report.truth_charts import curves_chart, heat_chart, truth_chart
 from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.sim.vocabulary import terms_of
@@ -31,26 +30,6 @@ def best_placebo(truth: Mapping[str, Any]) -> str:
 
 def _is_trusted(evidence: Evidence) -> bool:
     return _truth(evidence)["trusted"] is not None
-
-
-def _trusted(evidence: Evidence) -> str:
-    truth = _truth(evidence)
-    name, rival = truth["trusted"], best_placebo(truth)
-    score = truth["methods"][name]["score"]
-    return (
-        f"The heat map to trust is {METHOD_NAMES.get(name, name)}: it shows which patches of a "
-        f"frame affect the policy (score {score['mean']:.2f}, {bounds(score)}) reliably better "
-        f"than every map that does not use the policy (the best, {rival!r}: "
-        f"{truth['placebos'][rival]['mean']:.2f}), and it depends on the weights."
-    )
-
-
-def _hits(evidence: Evidence) -> str:
-    pointing = _truth(evidence)["methods"][_truth(evidence)["trusted"]]["pointing"]
-    return (
-        "Its hottest patch is one of those that affect the policy most in "
-        f"{percent(pointing['hit'])} of these frames (chance: {percent(pointing['chance'])})."
-    )
 
 
 def _refused(evidence: Evidence) -> list[str]:
@@ -96,59 +75,30 @@ def _next(evidence: Evidence) -> str:
     return f"the next {terms_of(evidence).target}"
 
 
-def _moved_along(evidence: Evidence) -> str:
-    follows, flights = _outcome(evidence, "follows"), _truth(evidence)["outcomes"]["flights"]
+def _trusted(evidence: Evidence) -> str:
+    truth = _truth(evidence)
+    name, rival = truth["trusted"], best_placebo(truth)
+    score = truth["methods"][name]["score"]
     return (
-        f"When {_next(evidence)} is moved sideways, {plural(flights, 'rollout')} from these frames "
-        f"follow it by {follows['mean']:.2f} m per metre ({bounds(follows)})."
+        f"The heat map to trust is {METHOD_NAMES.get(name, name)}: it shows which patches of a "
+        f"frame affect the policy (score {score['mean']:.2f}, {bounds(score)}) reliably better "
+        f"than every map that does not use the policy (the best, {rival!r}: "
+        f"{truth['placebos'][rival]['mean']:.2f}), and it depends on the weights."
     )
 
 
-def _not_along(evidence: Evidence) -> str:
-    follows = _outcome(evidence, "follows")
-    return (
-        f"When {_next(evidence)} is moved sideways, rollouts from these frames do not reliably "
-        f"follow it ({follows['mean']:.2f} m per metre, {bounds(follows)})."
-    )
+def _pointing(evidence: Evidence) -> Mapping[str, Any]:
+    return _truth(evidence)["methods"][_truth(evidence)["trusted"]]["pointing"]
 
 
-def _ground(evidence: Evidence) -> str:
-    changed = _outcome(evidence, "ground_changed")
-    return (
-        "Another ground colour, which should not matter, changes the outcome of "
-        f"{percent(changed['mean'])} of these rollouts, and of no more than "
-        f"{percent(changed['upper95'])} (95%)."
-    )
-
-
-def _patch(evidence: Evidence) -> Mapping[str, Any]:
-    return _truth(evidence)["interventions"]["ground patch changed"]
-
-
-def _taken(evidence: Evidence) -> Mapping[str, Any]:
-    return _truth(evidence)["interventions"]["target taken away"]
+def _effect(evidence: Evidence, change: str) -> Mapping[str, Any]:
+    return _truth(evidence)["interventions"][change]
 
 
 def _target_counts(evidence: Evidence) -> bool:
-    taken, patch = _taken(evidence)["lower95"], _patch(evidence)["upper95"]
+    taken = _effect(evidence, "target taken away")["lower95"]
+    patch = _effect(evidence, "ground patch changed")["upper95"]
     return taken is not None and patch is not None and taken > patch
-
-
-def _target(evidence: Evidence) -> str:
-    change = _taken(evidence)
-    return (
-        f"Removing {_next(evidence)} changes the action probabilities by {change['mean']:.2f} of 1 "
-        f"({bounds(change)}), reliably more than a patch of ground does."
-    )
-
-
-def _integral(evidence: Evidence) -> str:
-    error = _truth(evidence)["integration_error"]
-    return (
-        "Integrated gradients differ from the change in probability that they must add up to by "
-        f"{error['mean']:.4f} on average and {error['max']:.4f} at most, "
-        f"on {plural(error['pictures'], 'frame')}."
-    )
 
 
 def _has_any(evidence: Evidence) -> bool:
@@ -157,7 +107,16 @@ def _has_any(evidence: Evidence) -> bool:
 
 FINDINGS = (
     Sentence("truth.trusted", "a method passed every test", _is_trusted, _trusted),
-    Sentence("truth.hits", "a method passed every test", _is_trusted, _hits),
+    Sentence(
+        "truth.hits",
+        "a method passed every test",
+        _is_trusted,
+        lambda e: (
+            "Its hottest patch is one of those that affect the policy most in "
+            f"{percent(_pointing(e)['hit'])} of these frames "
+            f"(chance: {percent(_pointing(e)['chance'])})."
+        ),
+    ),
     Sentence(
         "truth.none",
         "some patch affects the policy, and no method passed every test",
@@ -195,35 +154,62 @@ FINDINGS = (
         "truth.follows",
         "the task's targets are approached, and rollouts reliably follow a moved target",
         _follows,
-        _moved_along,
+        lambda e: (
+            f"When {_next(e)} is moved sideways, "
+            f"{plural(_truth(e)['outcomes']['flights'], 'rollout')} from these frames follow it by "
+            f"{_outcome(e, 'follows')['mean']:.2f} m per metre ({bounds(_outcome(e, 'follows'))})."
+        ),
     ),
     Sentence(
         "truth.follows_not",
         "the task's targets are approached, and rollouts do not reliably follow a moved target",
         lambda e: _can_follow(e) and not _follows(e),
-        _not_along,
+        lambda e: (
+            f"When {_next(e)} is moved sideways, rollouts from these frames do not reliably follow "
+            f"it ({_outcome(e, 'follows')['mean']:.2f} m per metre, "
+            f"{bounds(_outcome(e, 'follows'))})."
+        ),
     ),
-    Sentence("truth.ground", "rollouts with another ground were run", _has_outcomes, _ground),
+    Sentence(
+        "truth.ground",
+        "rollouts with another ground were run",
+        _has_outcomes,
+        lambda e: (
+            "Another ground colour, which should not matter, changes the outcome of "
+            f"{percent(_outcome(e, 'ground_changed')['mean'])} of these rollouts, and of no more "
+            f"than {percent(_outcome(e, 'ground_changed')['upper95'])} (95%)."
+        ),
+    ),
     Sentence(
         "truth.patch",
         "a patch of ground was changed",
-        lambda e: _patch(e)["upper95"] is not None,
+        lambda e: _effect(e, "ground patch changed")["upper95"] is not None,
         lambda e: (
             "A patch of ground, which should not matter, changes the action probabilities by no "
-            f"more than {_patch(e)['upper95']:.2f} of 1 on average (95%)."
+            f"more than {_effect(e, 'ground patch changed')['upper95']:.2f} of 1 on average (95%)."
         ),
     ),
     Sentence(
         "truth.target",
         "the effect of removing the target is above that of a patch of ground (95% bounds)",
         _target_counts,
-        _target,
+        lambda e: (
+            f"Removing {_next(e)} changes the action probabilities by "
+            f"{_effect(e, 'target taken away')['mean']:.2f} of 1 "
+            f"({bounds(_effect(e, 'target taken away'))}), reliably more than a patch of ground "
+            "does."
+        ),
     ),
     Sentence(
         "truth.integral",
         "the error of integrated gradients was measured",
         lambda e: _truth(e)["integration_error"] is not None,
-        _integral,
+        lambda e: (
+            "Integrated gradients differ from the change in probability that they must add up to "
+            f"by {_truth(e)['integration_error']['mean']:.4f} on average and "
+            f"{_truth(e)['integration_error']['max']:.4f} at most, "
+            f"on {plural(_truth(e)['integration_error']['pictures'], 'frame')}."
+        ),
     ),
 )
 REASONS = (
@@ -251,20 +237,15 @@ def changes(explanation: Explanation) -> Image.Image:
     return images.gridded(tiles, 3)
 
 
-def draw(explanation: Explanation) -> Drawn:
-    """Return every figure of the tests."""
-    return {
-        "truth": truth_chart(explanation),
-        "curves": curves_chart(explanation),
-        "heat": heat_chart(explanation),
-        "interventions": changes(explanation),
-    }
-
-
 PART = Part(
     title="Tests of the heat maps",
     label="Tests of the heat maps",
     needs=("truth",),
     text={"truth": FINDINGS, "reasons": REASONS},
-    draw=draw,
+    draw=lambda explanation: {
+        "truth": truth_chart(explanation),
+        "curves": curves_chart(explanation),
+        "heat": heat_chart(explanation),
+        "interventions": changes(explanation),
+    },
 )

@@ -1,6 +1,7 @@
 """Charts of the tests of heat maps: scores, deletion and insertion, heat by region."""
 
-from collections.abc import Callable, Mapping
+import operator
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -26,15 +27,14 @@ def truth_chart(explanation: Explanation) -> Figure:
     figure = Figure(figsize=(17, 4.6), layout="constrained")
     axes = figure.subplots(1, 4, width_ratios=(2, 1.3, 1.3, 1.3))
     _scores(axes[0], truth)
-    _test(axes[1], truth, _hardest, 0.0, "score above its strongest placebo\n(must be above 0)")
-    _test(axes[2], truth, lambda m: m.get("pointing"), 0.0, "hits above chance\n(must be above 0)")
-    _test(
-        axes[3],
-        truth,
-        lambda m: m.get("likeness"),
-        0.5,
-        "similarity on shuffled weights\n(must be below 0.5)",
+    tests = (
+        ("placebos", 0.0, "score above its strongest placebo\n(must be above 0)"),
+        ("pointing", 0.0, "hits above chance\n(must be above 0)"),
+        ("likeness", 0.5, "similarity on shuffled weights\n(must be below 0.5)"),
     )
+    for axis, (test, bar, title) in zip(axes[1:], tests, strict=True):
+        of = _hardest if test == "placebos" else operator.methodcaller("get", test)
+        _test(axis, {name: of(method) for name, method in truth["methods"].items()}, bar, title)
     for axis in axes[2:]:
         axis.set_yticklabels([])
     return figure
@@ -64,29 +64,17 @@ def _hardest(method: Mapping[str, Any]) -> Mapping[str, Any] | None:
     return min(comparisons, key=lambda b: -1.0 if b["lower"] is None else b["lower"], default=None)
 
 
-def _test(
-    axis: Axes,
-    truth: Mapping[str, Any],
-    result: Callable[[Mapping[str, Any]], Mapping[str, Any] | None],
-    bar: float,
-    title: str,
-) -> None:
-    names = list(truth["methods"])[::-1]
-    for y, name in enumerate(names):
-        test = result(truth["methods"][name])
-        if test is None:
-            continue
-        if test["lower"] is None:
+def _test(axis: Axes, results: dict[str, Mapping[str, Any] | None], bar: float, title: str) -> None:
+    """Plot the median and the bounds of one test for each method, the first on top."""
+    for y, test in enumerate(reversed(results.values())):
+        if test is not None and test["lower"] is None:
             axis.text(bar, y, "too few episodes", va="center", fontsize=9)
-            continue
-        axis.plot([test["lower"], test["upper"]], [y, y], color="black", lw=1.5)
-        axis.plot(test["median"], y, "o", color=_METHOD)
+        elif test is not None:
+            axis.plot([test["lower"], test["upper"]], [y, y], color="black", lw=1.5)
+            axis.plot(test["median"], y, "o", color=_METHOD)
     axis.axvline(bar, color="#c62828", ls="--", lw=1.2)
-    axis.set(
-        yticks=range(len(names)),
-        yticklabels=[_name(n) for n in names],
-        ylim=(-0.6, len(names) - 0.4),
-    )
+    names = [_name(method) for method in reversed(results)]
+    axis.set(yticks=range(len(names)), yticklabels=names, ylim=(-0.6, len(names) - 0.4))
     axis.set_title(title, fontsize=11)
 
 
@@ -94,20 +82,17 @@ def heat_chart(explanation: Explanation) -> Figure:
     """Plot the fraction of each method's heat in each region of the frame."""
     figure = Figure(figsize=(9, 3.2), layout="constrained")
     axis, heat = figure.subplots(), explanation.numbers["truth"]["heat"]
-    regions = list(next(iter(heat.values())))
-    rows = [*heat, None]
-    for y, name in zip(range(len(rows) - 1, -1, -1), rows, strict=True):
-        shares = heat[name or next(iter(heat))]
+    first = next(iter(heat.values()))
+    bars = [*((shares, "share") for shares in heat.values()), (first, "chance")]
+    for y, (shares, of) in zip(range(len(heat), -1, -1), bars, strict=True):
         left = 0.0
-        for region, color in zip(regions, _REGION_COLORS, strict=True):
-            value = shares[region]["share" if name else "chance"]["mean"] or 0.0
-            label = region.replace("_", " ") if name is None else None
+        for region, color in zip(first, _REGION_COLORS, strict=True):
+            value = shares[region][of]["mean"] or 0.0
+            label = region.replace("_", " ") if of == "chance" else None
             axis.barh(y, value, left=left, color=color, height=0.7, label=label)
             left += value
-    axis.set(
-        yticks=range(len(rows)), yticklabels=["the pixels", *(_name(n) for n in [*heat][::-1])]
-    )
-    axis.set_xlim(0, 1)
+    names = ["the pixels", *(_name(method) for method in reversed(heat))]
+    axis.set(yticks=range(len(names)), yticklabels=names, xlim=(0, 1))
     axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=5, fontsize=8, frameon=False)
     return figure
 

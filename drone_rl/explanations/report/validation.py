@@ -166,8 +166,20 @@ def _check_arrays(arrays: Mapping[str, NDArray], known: _Arrays) -> None:
     if len(arrays) > _LONGEST:
         raise InputError(f"it holds {len(arrays)} arrays; give at most {_LONGEST}")
     for name, (kinds, dimensions, size) in _matches(arrays, known):
+        value = arrays[name]
         most = tuple(_SIZES[d] if isinstance(d, str) else d for d in dimensions)
-        _check_array(name, arrays[name], kinds, most, size)
+        is_small = len(value.shape) == len(most) and value.nbytes <= size
+        if (
+            value.dtype.kind not in kinds
+            or not is_small
+            or not np.less_equal(value.shape, most).all()
+        ):
+            raise InputError(
+                f"{name} is {value.shape} of {value.dtype}, which can't be rendered; give at most "
+                f"{most} and {size} bytes"
+            )
+        if kinds == _PIXEL and value.dtype != np.uint8:
+            raise InputError(f"{name} is of {value.dtype}; images have uint8")
 
 
 def _matches(
@@ -178,47 +190,39 @@ def _matches(
         yield from ((name, described) for name in names if re.fullmatch(pattern, name))
 
 
-def _check_array(name: str, value: NDArray, kinds: str, most: tuple[int, ...], size: int) -> None:
-    is_small = len(value.shape) == len(most) and value.nbytes <= size
-    if value.dtype.kind not in kinds or not is_small or not np.less_equal(value.shape, most).all():
-        raise InputError(
-            f"{name} is {value.shape} of {value.dtype}, which can't be rendered; give at most "
-            f"{most} and {size} bytes"
-        )
-    if kinds == _PIXEL and value.dtype != np.uint8:
-        raise InputError(f"{name} is of {value.dtype}; images have uint8")
-
-
 def check_fit(
     numbers: Mapping[str, Any],
     arrays: Mapping[str, NDArray],
     data: Mapping[str, NDArray],
     actions: ShownActions,
 ) -> None:
-    """Refuse an explanation whose arrays and numbers do not fit each other.
+    """Refuse an explanation whose arrays and numbers do not fit each other or its actions.
 
-    Args:
-        numbers: `explanation.json`.
-        arrays: `arrays.npz`.
-        data: `dataset.npz`.
-        actions: Actions of the policy.
+    See `check_sizes` for the arguments.
 
     Raises:
         InputError: They do not; the message names the part.
     """
-    known = {**data, **arrays}
-    lengths: dict[str, tuple[int, str]] = {"actions": (len(actions.names), "the list of actions")}
+    known, count = {**data, **arrays}, len(actions.names)
+    lengths: dict[str, tuple[int, str]] = {"actions": (count, "the list of actions")}
     for name, (_, dimensions, _) in _matches(known, {**_DATA, **_ARRAYS}):
         if any(isinstance(dimension, str) for dimension in dimensions):
             _check_dimensions(name, known[name].shape, dimensions, lengths)
     steps, frames = (lengths.get(what, (0, ""))[0] for what in ("steps of the film", "frames"))
     for name in ("actions", "film_actions"):
         if name in known:
-            check_indices(known[name], len(actions.names), name)
-    _check_film(numbers, steps)
-    for where, index in _frames_shown(numbers):
-        Whole(0, max(0, frames - 1)).read(index, where)
-    _check_places(numbers, arrays, len(actions.names))
+            check_indices(known[name], count, name)
+    film = _part(numbers, "attribution", "film") or {}
+    heat = film.get("heat_by")
+    if isinstance(heat, list) and len(heat) != steps:
+        raise InputError(f"attribution.film.heat_by has {len(heat)} steps; the film has {steps}")
+    for i, method in enumerate(_list(heat)):
+        Maybe(OneOf(tuple(METHOD_NAMES))).read(method, f"attribution.film.heat_by[{i}]")
+    step, frame = Whole(0, max(0, steps - 1)), Whole(0, max(0, frames - 1))
+    _read_items(numbers, ("attribution", "film", "key_steps"), {"step": step})
+    _read_items(numbers, ("asymmetry", "dataset", "worst"), {"frame": frame})
+    _read_items(numbers, ("contradictions", "list"), {"left": frame, "right": frame})
+    _check_places(numbers, arrays, count)
 
 
 def _check_dimensions(
@@ -238,59 +242,13 @@ def _check_dimensions(
                 raise InputError(f"{name} has {length} {what}, but {where} has {before}")
 
 
-def _check_film(numbers: Mapping[str, Any], steps: int) -> None:
-    film = _part(numbers, "attribution", "film")
-    if film is None:
-        return
-    heat = film.get("heat_by")
-    if isinstance(heat, list) and len(heat) != steps:
-        raise InputError(f"attribution.film.heat_by has {len(heat)} steps; the film has {steps}")
-    for i, method in enumerate(_list(heat)):
-        Maybe(OneOf(tuple(METHOD_NAMES))).read(method, f"attribution.film.heat_by[{i}]")
-    for i, entry in enumerate(_list(film.get("key_steps"))):
-        where = f"attribution.film.key_steps[{i}]"
-        step = as_mapping(entry, where).get("step")
-        Whole(0, max(0, steps - 1)).read(step, f"{where}.step")
-
-
-def _frames_shown(numbers: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield the name and value of each entry that is the number of a frame."""
-    worst = _part(numbers, "asymmetry", "dataset")
-    for i, entry in enumerate(_list((worst or {}).get("worst"))):
-        where = f"asymmetry.dataset.worst[{i}]"
-        yield f"{where}.frame", as_mapping(entry, where).get("frame")
-    for i, entry in enumerate(_list((_part(numbers, "contradictions") or {}).get("list"))):
-        where = f"contradictions.list[{i}]"
-        for side in ("left", "right"):
-            yield f"{where}.{side}", as_mapping(entry, where).get(side)
-
-
 def _check_places(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], count: int) -> None:
     places = _part(numbers, "places")
     if places is None or "refused" in places:
         return
-    for key, kind in _PLACES.items():
-        kind.read(places.get(key), f"places.{key}")
-    Whole(0, count - 1).read(places.get("alone"), "places.alone")
-    window = as_mapping(places.get("window"), "places.window")
-    for key, kind in _WINDOW.items():
-        kind.read(window.get(key), f"places.window.{key}")
-    _check_window(window)
     shares = Several(_SHARE, count, count)
-    shares.read(places.get("actions"), "places.actions")
-    for side, of in as_mapping(places.get("sides"), "places.sides").items():
-        if side not in WHERE:
-            raise InputError(f"places.sides.{side} is unknown; there are {', '.join(WHERE)}")
-        where = f"places.sides.{side}"
-        shares.read(as_mapping(of, where).get("actions"), f"{where}.actions")
-        for key in ("share", "unseen", "blind"):
-            Maybe(_SHARE).read(of.get(key), f"{where}.{key}")
-    points = arrays.get("places_points")
-    if points is not None and (np.abs(points) > _METRES.high).any():
-        raise InputError(f"places_points are up to {np.abs(points).max():g} m away")
-
-
-def _check_window(window: Mapping[str, Any]) -> None:
+    _read(places, {**_PLACES, "alone": Whole(0, count - 1), "actions": shares}, "places")
+    window = _read(places.get("window"), _WINDOW, "places.window")
     near, far, side = (window[key] for key in ("nearest", "farthest", "sideways"))
     if not near < far:
         raise InputError(f"places.window goes from {near:g} to {far:g} m ahead; it must go up")
@@ -299,6 +257,31 @@ def _check_window(window: Mapping[str, Any]) -> None:
             f"places.window is {far:g} m long and {2 * side:g} m wide; a map can be up to "
             f"{_FARTHEST_RATIO} times as long as wide"
         )
+    of_side = {"actions": shares, **dict.fromkeys(("share", "unseen", "blind"), Maybe(_SHARE))}
+    for side, of in as_mapping(places.get("sides"), "places.sides").items():
+        if side not in WHERE:
+            raise InputError(f"places.sides.{side} is unknown; there are {', '.join(WHERE)}")
+        _read(of, of_side, f"places.sides.{side}")
+    points = arrays.get("places_points")
+    if points is not None and (np.abs(points) > _METRES.high).any():
+        raise InputError(f"places_points are up to {np.abs(points).max():g} m away")
+
+
+def _read(value: Any, kinds: Mapping[str, Kind], where: str) -> Mapping[str, Any]:
+    """Check entries of a mapping and return it."""
+    found = as_mapping(value, where)
+    for key, kind in kinds.items():
+        kind.read(found.get(key), f"{where}.{key}")
+    return found
+
+
+def _read_items(
+    numbers: Mapping[str, Any], keys: tuple[str, ...], kinds: Mapping[str, Kind]
+) -> None:
+    """Check entries of each item of a list, if there is one."""
+    *outer, last = keys
+    for i, item in enumerate(_list((_part(numbers, *outer) or {}).get(last))):
+        _read(item, kinds, f"{'.'.join(keys)}[{i}]")
 
 
 def _part(numbers: Mapping[str, Any], *keys: str) -> Mapping[str, Any] | None:

@@ -3,13 +3,9 @@
 Evidence of all sentences: `explanation.json`; of `SOURCE` also "source", the name of that file.
 """
 
-from collections.abc import Mapping
-from typing import Any
-
 from drone_rl.evaluation.plots.saving import Rows
 from drone_rl.evaluation.verdict_text import depends_on_rounding
-from drone_rl.explanations.report.explanation import Explanation
-from drone_rl.explanations.report.part import Drawn, Part
+from drone_rl.explanations.report.explanation import Drawn, Explanation, Part
 from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.robustness import charts
 from drone_rl.robustness.domain_text import QUOTED, is_quoted, untested
@@ -17,25 +13,25 @@ from drone_rl.robustness.shifts_text import rows
 from drone_rl.utils.schema import as_mapping
 from drone_rl.utils.text import Evidence, Sentence, is_fixed, listed, seed_line, seed_of
 
-
-def _source_file(evidence: Evidence) -> str:
-    revision = as_mapping(evidence.get("provenance", {}), "provenance").get("git_revision")
-    date = evidence.get("date") or "on an unknown date"
-    return (
-        f"This page repeats what {evidence['source']} says (written {date}, revision "
-        f"{revision or 'unknown'}). The figures were read from this file and not measured again."
-    )
-
-
-SOURCE = (Sentence("source.file", "always", lambda e: True, _source_file),)
-
-
-def _is_good(evidence: Evidence) -> bool:
-    return evidence["verdict"]["kind"] == "good"
+SOURCE = (
+    Sentence(
+        "source.file",
+        "always",
+        lambda e: True,
+        lambda e: (
+            f"This page repeats what {e['source']} says (written "
+            f"{e.get('date') or 'on an unknown date'}, revision "
+            f"{as_mapping(e.get('provenance', {}), 'provenance').get('git_revision') or 'unknown'})"
+            ". The figures were read from this file and not measured again."
+        ),
+    ),
+)
 
 
-def _is_certain(evidence: Evidence) -> bool:
-    return evidence["verdict"]["certain"]
+def _is(evidence: Evidence, is_certain: bool, is_good: bool | None = None) -> bool:
+    """Return whether the verdict is certain, or not, and good, or not; None allows both."""
+    verdict = evidence["verdict"]
+    return verdict["certain"] == is_certain and is_good in (None, verdict["kind"] == "good")
 
 
 def _more_episodes(evidence: Evidence) -> str:
@@ -47,38 +43,24 @@ def _more_episodes(evidence: Evidence) -> str:
     return f"What to do: evaluate more episodes (episodes={enough}) before relying on it."
 
 
-def _refuse(evidence: Evidence) -> str:
-    return (
-        "What to do: do not rely on it; drone-rl verdict with require=good ends with exit status "
-        f"{evidence['verdict']['exit_code']}."
-    )
-
-
 ADVICE = (
-    Sentence(
-        "advice.more", "the verdict is not certain", lambda e: not _is_certain(e), _more_episodes
-    ),
+    Sentence("advice.more", "the verdict is not certain", lambda e: _is(e, False), _more_episodes),
     Sentence(
         "advice.use",
         "the verdict is good and certain",
-        lambda e: _is_certain(e) and _is_good(e),
+        lambda e: _is(e, True, True),
         lambda e: "What to do: rely on it in environments like those tested, and in no others.",
     ),
     Sentence(
         "advice.refuse",
         "the verdict is not good, and certain",
-        lambda e: _is_certain(e) and not _is_good(e),
-        _refuse,
+        lambda e: _is(e, True, False),
+        lambda e: (
+            "What to do: do not rely on it; drone-rl verdict with require=good ends with exit "
+            f"status {e['verdict']['exit_code']}."
+        ),
     ),
 )
-
-
-def _scope(evidence: Evidence) -> str:
-    start = "The verdict holds for" if is_quoted(evidence) else "Tested in"
-    return (
-        f"{start} one appearance and one light only, those of its task: nothing here tests other "
-        f"{listed(untested(evidence), 'or')}."
-    )
 
 
 SCOPE = (
@@ -86,7 +68,11 @@ SCOPE = (
         "scope.one_look",
         "the policy was not evaluated with other colours, light or sizes",
         lambda e: bool(untested(e)),
-        _scope,
+        lambda e: (
+            f"{'The verdict holds for' if is_quoted(e) else 'Tested in'} one appearance and one "
+            "light only, those of its task: nothing here tests other "
+            f"{listed(untested(e), 'or')}."
+        ),
     ),
 )
 SEED = (
@@ -110,7 +96,7 @@ LEFT_OUT = (
 )
 
 
-def _evaluation_extras(explanation: Explanation) -> Mapping[str, Any]:
+def _evaluation_extras(explanation: Explanation) -> dict[str, str]:
     truth = explanation.numbers.get("truth")
     trusted = METHOD_NAMES.get(truth["trusted"], "none") if truth else "none was tested"
     return {"trusted": trusted, "seed": seed_line(explanation.numbers)}
@@ -127,9 +113,9 @@ EVALUATION_PART = Part(
 
 def _draw_shifts(explanation: Explanation) -> Drawn:
     """Draw curves and rows of frames, unless the measurement is refused."""
+    numbers = explanation.numbers["shifts"]
     if not is_quoted(explanation.numbers):
         return {}
-    numbers = explanation.numbers["shifts"]
     frames = {name: [*explanation.arrays[f"shifts_{name}"]] for name in numbers["axes"]}
     return {"shifts": charts.chart(numbers), "conditions": charts.strips(numbers, frames)}
 

@@ -68,4 +68,3 @@ def test_maps_are_drawn_and_all_that_the_page_needs_is_given(explanation):
     assert PART.draw(explanation).keys() == {"tsne_features", "tsne_pixels"}
     extras = PART.extras(explanation)
     assert extras["points"]["sprite"].startswith("data:image/png;base64,")
-    assert len(extras["actions"]) == 3

@@ -6,9 +6,8 @@ import pytest
 
 from benchmarks.evidence import EXPLANATION
 from drone_rl.explanations.explain import SECTIONS
-from drone_rl.explanations.report.explanation import Explanation
+from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.explanations.report.page import PARTS
-from drone_rl.explanations.report.part import Part
 from drone_rl.utils.text import said
 
 

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from drone_rl.explanations.verdict import evaluation_section
+from drone_rl.explanations.behavior import evaluation_section
 from drone_rl.verdicts.certificate import Claim
 
 

@@ -3,7 +3,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from drone_rl.explanations.verdict import shifts_section
+from drone_rl.explanations.behavior import shifts_section
 from drone_rl.robustness.shifts_file import SavedShifts
 
 
