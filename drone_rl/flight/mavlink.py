@@ -13,7 +13,7 @@ import termios
 import time
 import tty
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -27,6 +27,8 @@ TCP_PORT = 4560
 """Port at which PX4 expects a simulator."""
 HEARTBEAT_EVERY = 1.0
 """Wall-clock seconds between heartbeats."""
+GPS_EVERY = 0.1
+"""Simulated seconds between HIL_GPS messages."""
 ROTORS = 4
 ARMED = 128
 """MAV_MODE_FLAG_SAFETY_ARMED."""
@@ -41,20 +43,138 @@ _READ_BYTES = 65536
 _FIX_3D, _SATELLITES, _UNKNOWN = 3, 12, 65535
 
 
-class Link(Protocol):
+class Link:
     """A bidirectional byte stream. Methods raise FlightControllerError once the peer is gone."""
+
+    def __init__(self, name: str, patience: float, file: int | None = None) -> None:
+        """Create a link.
+
+        Args:
+            name: Name of the peer for messages.
+            patience: Seconds after which a peer that accepts no bytes counts as gone.
+            file: Descriptor in non-blocking mode; None before the peer has connected.
+        """
+        self.name, self.patience, self._file = name, patience, file
+
+    def accept(self, within: float) -> None:
+        """Wait up to so many seconds until the peer has connected."""
 
     def read(self, within: float) -> bytes:
         """Return received bytes; empty if there are none within so many seconds."""
-        ...
+        file = self._connected()
+        if not select.select([file], [], [], within)[0]:
+            return b""
+        try:
+            data = os.read(file, _READ_BYTES)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise FlightControllerError(f"{self.name} is gone: {error.strerror}") from error
+        if not data:
+            raise FlightControllerError(f"{self.name} is gone")
+        return data
 
     def write(self, data: bytes) -> None:
         """Send all bytes."""
-        ...
+        file, end = self._connected(), time.monotonic() + self.patience
+        while data:
+            try:
+                data = data[os.write(file, data) :]
+            except BlockingIOError:
+                select.select([], [file], [], 0.05)
+                if time.monotonic() > end:
+                    raise FlightControllerError(f"{self.name} accepts no more bytes") from None
+            except OSError as error:
+                raise FlightControllerError(f"{self.name} is gone: {error.strerror}") from error
 
     def close(self) -> None:
         """Close the link."""
-        ...
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+    def _connected(self) -> int:
+        if self._file is None:
+            raise FlightControllerError(f"{self.name} isn't connected; call accept first")
+        return self._file
+
+
+class SerialLink(Link):
+    """A serial port, such as that of a flight controller, or a pseudo-terminal."""
+
+    def __init__(self, device: str, baud: int = 921_600, patience: float = 1.0) -> None:
+        """Open the port in raw mode.
+
+        Args:
+            device: Such as /dev/ttyACM0.
+            baud: Bits per second.
+            patience: See `Link`.
+
+        Raises:
+            InputError: The device can't be opened, is no serial port, or the speed is invalid.
+        """
+        speed = getattr(termios, f"B{baud}", None)
+        if speed is None:
+            raise InputError(f"baud={baud} is no serial speed; give one such as 921600")
+        if not Path(device).exists():
+            raise InputError(f"device={device} doesn't exist; is the controller plugged in?")
+        try:
+            file = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        except OSError as error:
+            raise InputError(f"device={device} can't be opened: {error.strerror}") from error
+        try:
+            tty.setraw(file)
+            settings = termios.tcgetattr(file)
+            settings[4:6] = [speed, speed]
+            termios.tcsetattr(file, termios.TCSANOW, settings)
+        except termios.error as error:
+            os.close(file)
+            raise InputError(f"device={device} is no serial port; give one") from error
+        super().__init__(device, patience, file)
+
+
+class TcpLink(Link):
+    """A TCP port to which one autopilot connects, as PX4's simulation does."""
+
+    def __init__(self, port: int = TCP_PORT, host: str = "127.0.0.1") -> None:
+        """Listen.
+
+        Args:
+            port: 0 for any free port.
+            host: Address; by default only this machine can connect.
+
+        Raises:
+            InputError: The port is in use.
+        """
+        super().__init__("the autopilot", patience=1.0)
+        self._listener = socket.socket()
+        self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            self._listener.bind((host, port))
+        except (OSError, OverflowError) as error:
+            self._listener.close()
+            raise InputError(f"can't listen at port={port}: {error}; give another") from error
+        self._listener.listen(1)
+        self.port: int = self._listener.getsockname()[1]
+        """The port."""
+
+    def accept(self, within: float) -> None:
+        """See `Link`."""
+        self._listener.settimeout(within)
+        try:
+            link, _ = self._listener.accept()
+        except TimeoutError:
+            raise FlightControllerError(
+                f"no autopilot connected to port {self.port} in {within:g} s"
+            ) from None
+        link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        link.setblocking(False)
+        self._file = link.detach()
+
+    def close(self) -> None:
+        """See `Link`."""
+        self._listener.close()
+        super().close()
 
 
 class MavlinkBridge:
@@ -65,7 +185,6 @@ class MavlinkBridge:
         link: Link,
         *,
         lockstep: bool = True,
-        gps_every: float = 0.1,
         patience: float = 5.0,
         answer_within: float = 1.0,
         connect_within: float = 30.0,
@@ -76,7 +195,6 @@ class MavlinkBridge:
             link: Connection to the autopilot.
             lockstep: Wait in each step for controls with its time stamp or a later one; else use
                 the newest controls, as hardware with its own clock needs.
-            gps_every: Simulated seconds between HIL_GPS messages.
             patience: Seconds without any message after which the autopilot counts as gone.
             answer_within: Seconds to wait for controls in lockstep, once there were any (a starting
                 autopilot sends none). Then the step uses the old ones.
@@ -90,7 +208,6 @@ class MavlinkBridge:
         self._codec.robust_parsing = True  # skip invalid bytes
         self.link = link
         self.lockstep = lockstep
-        self.gps_every = gps_every
         self.patience = patience
         self.answer_within = answer_within
         self.connect_within = connect_within
@@ -114,8 +231,7 @@ class MavlinkBridge:
         """
         with contextlib.ExitStack() as stack:
             stack.callback(self.link.close)
-            if isinstance(self.link, TcpLink):
-                self.link.accept(self.connect_within)
+            self.link.accept(self.connect_within)
             self._wait_for_heartbeat()
             stack.pop_all()
         return self
@@ -141,7 +257,7 @@ class MavlinkBridge:
         self._beat()
         self._send("hil_sensor", sensor_fields(readings))
         if readings.time >= self._next_gps:
-            self._next_gps = readings.time + self.gps_every
+            self._next_gps = readings.time + GPS_EVERY
             self._send("hil_gps", gps_fields(readings))
         self.steps += 1
         self._receive(0.0)
@@ -256,144 +372,3 @@ def rotor_outputs(controls: list[float], mode: int) -> Vector:
 
 def _int16(value: float) -> int:
     return max(-32768, min(32767, round(float(value))))
-
-
-class SerialLink:
-    """A serial port, such as that of a flight controller, or a pseudo-terminal."""
-
-    def __init__(self, device: str, baud: int = 921_600, patience: float = 1.0) -> None:
-        """Open the port in raw mode.
-
-        Args:
-            device: Such as /dev/ttyACM0.
-            baud: Bits per second.
-            patience: Seconds after which a port that accepts no bytes counts as gone.
-
-        Raises:
-            InputError: The device can't be opened, is no serial port, or the speed is invalid.
-        """
-        speed = getattr(termios, f"B{baud}", None)
-        if speed is None:
-            raise InputError(f"baud={baud} is no serial speed; give one such as 921600")
-        if not Path(device).exists():
-            raise InputError(f"device={device} doesn't exist; is the controller plugged in?")
-        try:
-            self._file = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        except OSError as error:
-            raise InputError(f"device={device} can't be opened: {error.strerror}") from error
-        try:
-            tty.setraw(self._file)
-            settings = termios.tcgetattr(self._file)
-            settings[4:6] = [speed, speed]
-            termios.tcsetattr(self._file, termios.TCSANOW, settings)
-        except termios.error as error:
-            os.close(self._file)
-            raise InputError(f"device={device} is no serial port; give one") from error
-        self.device = device
-        self.patience = patience
-
-    def read(self, within: float) -> bytes:
-        """See `Link`."""
-        if not select.select([self._file], [], [], within)[0]:
-            return b""
-        try:
-            data = os.read(self._file, _READ_BYTES)
-        except BlockingIOError:
-            return b""
-        except OSError as error:
-            raise FlightControllerError(f"{self.device} is gone: {error.strerror}") from error
-        if not data:
-            raise FlightControllerError(f"{self.device} is gone")
-        return data
-
-    def write(self, data: bytes) -> None:
-        """See `Link`."""
-        end = time.monotonic() + self.patience
-        while data:
-            try:
-                data = data[os.write(self._file, data) :]
-            except BlockingIOError:
-                select.select([], [self._file], [], 0.05)
-                if time.monotonic() > end:
-                    raise FlightControllerError(f"{self.device} accepts no more bytes") from None
-            except OSError as error:
-                raise FlightControllerError(f"{self.device} is gone: {error.strerror}") from error
-
-    def close(self) -> None:
-        """See `Link`."""
-        os.close(self._file)
-
-
-class TcpLink:
-    """A TCP port to which one autopilot connects, as PX4's simulation does."""
-
-    def __init__(self, port: int = TCP_PORT, host: str = "127.0.0.1") -> None:
-        """Listen.
-
-        Args:
-            port: 0 for any free port.
-            host: Address; by default only this machine can connect.
-
-        Raises:
-            InputError: The port is in use.
-        """
-        self._listener = socket.socket()
-        self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            self._listener.bind((host, port))
-        except (OSError, OverflowError) as error:
-            self._listener.close()
-            raise InputError(f"can't listen at port={port}: {error}; give another") from error
-        self._listener.listen(1)
-        self._link: socket.socket | None = None
-        self.port: int = self._listener.getsockname()[1]
-        """The port."""
-
-    def accept(self, within: float) -> None:
-        """Wait for the autopilot to connect.
-
-        Raises:
-            FlightControllerError: None connected within so many seconds.
-        """
-        self._listener.settimeout(within)
-        try:
-            self._link, _ = self._listener.accept()
-        except TimeoutError:
-            raise FlightControllerError(
-                f"no autopilot connected to port {self.port} in {within:g} s"
-            ) from None
-        self._link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-
-    def read(self, within: float) -> bytes:
-        """See `Link`."""
-        link = self._connected
-        if not select.select([link], [], [], within)[0]:
-            return b""
-        try:
-            data = link.recv(_READ_BYTES)
-        except OSError as error:
-            raise FlightControllerError(f"the autopilot is gone: {error}") from error
-        if not data:
-            raise FlightControllerError("the autopilot has closed its connection")
-        return data
-
-    def write(self, data: bytes) -> None:
-        """See `Link`."""
-        try:
-            self._connected.settimeout(1.0)
-            self._connected.sendall(data)
-        except OSError as error:
-            raise FlightControllerError(f"the autopilot is gone: {error}") from error
-
-    def close(self) -> None:
-        """See `Link`."""
-        with contextlib.ExitStack() as stack:
-            stack.callback(self._listener.close)
-            if self._link is not None:
-                stack.callback(self._link.close)
-
-    @property
-    def _connected(self) -> socket.socket:
-        if self._link is None:
-            raise FlightControllerError("no autopilot has connected yet; call accept first")
-        return self._link

@@ -14,7 +14,7 @@ ARM = SETTINGS.arm_length / np.sqrt(2.0)
 
 
 class SimpleBody:
-    """Answers `push` as a quadrotor does."""
+    """Answers `fly` and `push` as a quadrotor does."""
 
     def __init__(self, tick=SETTINGS.tick):
         self.tick = tick
@@ -22,6 +22,9 @@ class SimpleBody:
 
     def start(self):
         return BodyState.at_rest(torch.zeros(1, 3, dtype=torch.float64))
+
+    def fly(self, body, goals, ticks, obstacles=None):
+        return self.push(body, goals.values, ticks)
 
     def push(self, body, rotors, ticks=1):
         for _ in range(ticks):

@@ -68,7 +68,7 @@ def test_tcp_links():
         assert link.read(0.0) == b""
         far.sendall(b"def")
         assert link.read(5.0) == b"def"
-    with pytest.raises(FlightControllerError, match="closed its connection"):
+    with pytest.raises(FlightControllerError, match="the autopilot is gone"):
         link.read(5.0)
     link.close()
 

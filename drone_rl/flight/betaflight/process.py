@@ -11,10 +11,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
 
-from drone_rl.flight.betaflight.packets import CLI_PORT, RC_PORT, ROTOR_PORT, STATE_PORT
 from drone_rl.flight.in_the_loop.drone import FlightControllerError
 from drone_rl.utils.errors import InputError
 
+STATE_PORT, RC_PORT, ROTOR_PORT, CLI_PORT = 9003, 9004, 9002, 5761
+"""UDP into the firmware: state, RC channels; UDP out of it: rotors; TCP: its command line."""
 _SUPERVISOR = Path(__file__).with_name("supervisor.py")
 _log = logging.getLogger(__name__)
 
@@ -75,10 +76,6 @@ class FirmwareProcess:
     def status(self) -> int | None:
         """Return the firmware's exit status; None while it runs."""
         return self._ask("poll")[0]["status"]
-
-    def stop(self) -> None:
-        """Stop the firmware."""
-        self._ask("stop")
 
     def connect(self, kind: str, port: int) -> socket.socket:
         """Open a socket in the firmware's network; see `supervisor.make_socket`.

@@ -10,8 +10,10 @@ time, firmware and simulation would wait for each other, slower and slower.
 """
 
 import contextlib
+import dataclasses
 import json
 import socket
+import struct
 import sys
 import tempfile
 import time
@@ -25,21 +27,18 @@ import torch
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
 from drone_rl.flight.betaflight.build import find_firmware
-from drone_rl.flight.betaflight.packets import (
+from drone_rl.flight.betaflight.process import (
     CLI_PORT,
     RC_PORT,
     ROTOR_PORT,
     STATE_PORT,
-    pack_state,
-    pack_sticks,
-    setup_lines,
-    unpack_rotors,
+    FirmwareProcess,
 )
-from drone_rl.flight.betaflight.process import FirmwareProcess
-from drone_rl.flight.in_the_loop.control import FULL_ANGLE, FULL_YAW_RATE, RcSticks
+from drone_rl.flight.in_the_loop.control import FULL_ANGLE, FULL_YAW_RATE, LOWEST, RcSticks
 from drone_rl.flight.in_the_loop.drone import TICK, DroneInTheLoop, FlightControllerError
 from drone_rl.flight.in_the_loop.instruments import Readings, Vector
 from drone_rl.flight.in_the_loop.trial_flight import fly_course
+from drone_rl.sim.coordinates import enu_from_world, frd_from_body, ned_attitude_from_world
 from drone_rl.sim.dynamics import FlightState, Quadrotor
 from drone_rl.sim.dynamics.state import LEVEL
 from drone_rl.utils.errors import InputError
@@ -62,6 +61,31 @@ _STANDING = Readings(
     force=np.array([0.0, 0.0, GRAVITY]),
 )
 _PROMPT = b"\n# "
+_CHANNELS = 16
+_STATE = struct.Struct("<d3d3d4d3d3dd")
+_RC = struct.Struct(f"<d{_CHANNELS}H")
+_ROTORS = struct.Struct("<4f")
+"""Packets are little-endian, without padding, over UDP. Each field has its own frame."""
+SETUP = (
+    "aux 0 0 0 1700 2100 0 0",  # fifth channel: armed
+    "aux 1 1 1 1700 2100 0 0",  # sixth channel: ANGLE
+    "set pid_process_denom = 8",  # of 8 kHz: its controllers assume a step of 1 ms
+    "set small_angle = 180",
+    "set angle_limit = {angle}",
+    *(f"set {axis}_expo = 0" for axis in ("roll", "pitch", "yaw")),
+    # Equal values make an axis linear; ANGLE mode uses the same curve.
+    *(f"set {axis}_{rate} = 60" for axis in ("roll", "pitch") for rate in ("rc_rate", "srate")),
+    *(f"set yaw_{rate} = {{yaw}}" for rate in ("rc_rate", "srate")),
+    # Gains for a large frame; the defaults suit small ones, which turn ten times as readily.
+    "set p_yaw = 250",
+    "set i_yaw = 20",
+    # The firmware measures stick speeds by the wall clock, which simulation does not follow: with
+    # feedforward the same sticks tilt the drone by 30 degrees in one flight and by 80 in another.
+    "set angle_feedforward = 0",
+    "set f_yaw = 0",
+)
+"""Command lines that set up a new firmware, without `save`: {angle} is the roll or pitch at full
+stick, degrees, {yaw} the yaw rate, tens of degrees per second."""
 
 
 class Betaflight:
@@ -186,16 +210,16 @@ class Betaflight:
             self._process.start(self.program, self.folder, self.log)
             end = time.monotonic() + self.patience / 2
             while time.monotonic() < end:
-                if self._answers(_STANDING):
+                if self._answers():
                     self._heard = time.monotonic()
                     return
         raise self._failure()
 
-    def _answers(self, readings: Readings) -> bool:
+    def _answers(self) -> bool:
         """Return whether it answers several states in a row."""
         for _ in range(_AWAKE):
             self._drop_late_answers()
-            self._send(self._state, pack_state(readings, 0.0))
+            self._send(self._state, pack_state(_STANDING, 0.0))
             self._hear.settimeout(_WAKES_WITHIN)  # packets before it listens are lost
             try:
                 self._hear.recv(64)
@@ -212,8 +236,8 @@ class Betaflight:
             with self._process.connect_within("tcp", CLI_PORT, self.patience) as cli:
                 cli.settimeout(self.patience)
                 _command(cli, b"#")
-                for line in setup_lines(angle, yaw):
-                    _command(cli, line.encode() + b"\n")
+                for line in SETUP:
+                    _command(cli, line.format(angle=angle, yaw=yaw).encode() + b"\n")
                 cli.sendall(b"save\n")
                 self._wait_for_end()
         except (OSError, FlightControllerError) as error:
@@ -227,6 +251,52 @@ class Betaflight:
             if time.monotonic() > end:
                 raise FlightControllerError("it doesn't exit after `save`")
             time.sleep(0.02)
+
+
+def pack_state(readings: Readings, time: float) -> bytes:
+    """Pack `fdm_packet`: time, gyroscope, accelerometer, attitude, velocity, place, pressure.
+
+    The gyroscope is in forward-right-down, the attitude relates that frame to north-east-down, the
+    accelerometer is our body frame with all signs inverted, the velocity is east-north-up, and the
+    place is longitude, latitude, altitude, as the firmware's virtual GPS expects.
+
+    Args:
+        readings: Measurements.
+        time: Seconds. The firmware scales its clock by the progress of these; if they are constant,
+            its clock is the wall clock.
+    """
+    latitude, longitude, altitude = readings.place
+    return _STATE.pack(
+        time,
+        *frd_from_body(readings.rates),
+        *-readings.force,
+        *ned_attitude_from_world(readings.attitude),
+        *enu_from_world(readings.velocity),
+        *(longitude, latitude, altitude),
+        readings.pressure,
+    )
+
+
+def pack_sticks(time: float, channels: Sequence[int]) -> bytes:
+    """Pack `rc_packet`: seconds, and `RcSticks.channels`; further channels are low."""
+    return _RC.pack(time, *channels, *[LOWEST] * (_CHANNELS - len(channels)))
+
+
+def unpack_rotors(packet: bytes) -> Vector:
+    """Unpack `servo_packet`: the rotor commands.
+
+    Returns:
+        Front right, rear left, front left, rear right, 0 to 1. Shape: (4,).
+
+    Raises:
+        ValueError: The packet is invalid.
+    """
+    if len(packet) != _ROTORS.size:
+        raise ValueError(f"a rotor packet must have {_ROTORS.size} bytes, got {len(packet)}")
+    rotors = np.array(_ROTORS.unpack(packet), dtype=np.float64)
+    if not np.isfinite(rotors).all():
+        raise ValueError(f"rotors={rotors.tolist()} are not finite")
+    return rotors.clip(0.0, 1.0)
 
 
 def _command(cli: socket.socket, line: bytes) -> bytes:
@@ -255,7 +325,7 @@ def betaflight_drone(
     firmware: str | Path | None = None,
     folder: str | Path | None = None,
     isolated: bool = True,
-) -> Iterator[DroneInTheLoop[FlightState]]:
+) -> Iterator[DroneInTheLoop]:
     """Yield a disarmed drone at the world's origin; the firmware ends with the block.
 
     Args:
@@ -289,7 +359,7 @@ def main() -> None:
             report = fly_course(drone)
     except (InputError, FlightControllerError) as error:
         sys.exit(f"error: {error}")
-    sys.stdout.write(json.dumps(report.values(), indent=1) + "\n")
+    sys.stdout.write(json.dumps(dataclasses.asdict(report), indent=1) + "\n")
 
 
 if __name__ == "__main__":

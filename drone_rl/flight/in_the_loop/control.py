@@ -73,16 +73,8 @@ class RcSticks:
 AT_REST = RcSticks()
 
 
-@dataclasses.dataclass(frozen=True)
-class ClimbState:
-    """State of the climb controller."""
-
-    integral: float = 0.0
-    """Fraction of half the thrust."""
-
-
 def velocity_to(
-    target: Vector, readings: Readings, settings: DynamicsSettings, speed: float | None = None
+    target: Vector, readings: Readings, settings: DynamicsSettings
 ) -> tuple[float, float, float]:
     """Position loop: return the velocity towards a position.
 
@@ -90,15 +82,13 @@ def velocity_to(
         target: Metres, world frame. Shape: (3,).
         readings: Measurements.
         settings: Gains and limits.
-        speed: Greatest horizontal speed; that of the settings by default.
 
     Returns:
         Metres per second, world frame; along the straight line where the limit is reached.
     """
     missing = target - readings.position
-    most = settings.velocity_limit if speed is None else min(speed, settings.velocity_limit)
     flat = settings.position_gain * settings.velocity_limit * missing[:2]
-    flat = flat * min(1.0, most / max(float(np.linalg.norm(flat)), 1e-9))
+    flat = flat * min(1.0, settings.velocity_limit / max(float(np.linalg.norm(flat)), 1e-9))
     up = settings.climb_limit * _clamp(settings.position_gain * float(missing[2]))
     return float(flat[0]), float(flat[1]), up
 
@@ -106,21 +96,21 @@ def velocity_to(
 def sticks_for(
     setpoint: Setpoint,
     readings: Readings,
-    climb: ClimbState,
+    integral: float,
     seconds: float,
     settings: DynamicsSettings,
-) -> tuple[RcSticks, ClimbState]:
+) -> tuple[RcSticks, float]:
     """Velocity and heading loops: return the sticks that track a setpoint.
 
     Args:
         setpoint: Velocity and heading.
         readings: Measurements.
-        climb: State of the climb controller.
-        seconds: Time since that state.
+        integral: Integral of the climb controller, a fraction of half the thrust.
+        seconds: Time since that integral.
         settings: Gains and limits.
 
     Returns:
-        The sticks, armed, and the new state of the climb controller.
+        The sticks, armed, and the new integral.
     """
     missing = np.array(setpoint.velocity) - readings.velocity
     cosine, sine = math.cos(readings.heading), math.sin(readings.heading)
@@ -128,7 +118,7 @@ def sticks_for(
     left = -sine * missing[0] + cosine * missing[1]
     tilt = settings.angle_limit / FULL_ANGLE
     up = float(missing[2])
-    integral = _clamp(climb.integral + settings.climb_integral * up * seconds)
+    integral = _clamp(integral + settings.climb_integral * up * seconds)
     throttle = 0.5 + 0.5 * _clamp(settings.climb_gain * up + integral)
     turn = HEADING_GAIN * math.remainder(setpoint.heading - readings.heading, math.tau)
     rate = turn if setpoint.yaw_rate is None else setpoint.yaw_rate
@@ -139,7 +129,7 @@ def sticks_for(
         yaw=_clamp(rate / FULL_YAW_RATE),
         armed=True,
     )
-    return sticks, ClimbState(integral)
+    return sticks, integral
 
 
 def setpoint_of(
@@ -160,13 +150,12 @@ def setpoint_of(
         InputError: The goals are not positions, velocities and headings.
     """
     sideways, _, heading, height = goals.modes
-    fits = sideways in _SIDEWAYS and heading in _HEADINGS and height in _HEIGHTS
-    if not fits:
+    if sideways not in _SIDEWAYS or heading not in _HEADINGS or height not in _HEIGHTS:
         names = ", ".join(mode.name.lower() for mode in goals.modes)
         raise InputError(f"modes={names} are no setpoint; give velocities or positions")
     values, drifts = _first_row(goals.values), _first_row(goals.drifts)
     wanted = values + drifts * since
-    to_place = velocity_to(_target(wanted, readings, goals), readings, settings)
+    to_place = velocity_to(wanted[[0, Y, Z]], readings, settings)
     x, y = float(values[0]), float(values[Y])
     if sideways is Mode.POSITION:
         limit = settings.velocity_limit
@@ -179,15 +168,6 @@ def setpoint_of(
     if heading is Mode.RATE:
         return Setpoint(velocity, readings.heading, yaw_rate=float(wanted[HEADING]))
     return Setpoint(velocity, float(wanted[HEADING]))
-
-
-def _target(wanted: Vector, readings: Readings, goals: Goals) -> Vector:
-    """Return the goal position; the current one on axes without a position goal."""
-    place = readings.position.copy()
-    for axis, number in ((0, 0), (1, Y), (2, Z)):
-        if goals.modes[number] is Mode.POSITION:
-            place[axis] = wanted[number]
-    return place
 
 
 def _first_row(values: Tensor) -> Vector:

@@ -3,23 +3,16 @@
 import dataclasses
 import time
 from collections.abc import Callable
-from typing import Generic, Protocol, TypeVar
+from typing import Protocol
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.in_the_loop.control import (
-    AT_REST,
-    ClimbState,
-    RcSticks,
-    Setpoint,
-    sticks_for,
-)
+from drone_rl.flight.in_the_loop.control import AT_REST, RcSticks, Setpoint, sticks_for
 from drone_rl.flight.in_the_loop.instruments import Readings, Vector, measure
-from drone_rl.sim.coordinates import HOME, GeoPoint
-from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.dynamics import FlightState, Obstacles, Quadrotor
+from drone_rl.sim.dynamics.control import rotor_goals
 
 TICK = 0.001
 """Physics time step for Betaflight, seconds; the firmware runs at 1 kHz."""
@@ -39,17 +32,6 @@ class NotReadyError(FlightControllerError):
     """A flight controller did not bring the drone to the start of an episode."""
 
 
-B = TypeVar("B", bound=BodyState)
-
-
-class Physics(Protocol[B]):
-    """Vehicle dynamics under rotor commands, such as `Quadrotor`."""
-
-    def push(self, body: B, rotors: Tensor, ticks: int) -> B:
-        """Return the state some ticks later. Shape of rotors: (1, 4)."""
-        ...
-
-
 class Controller(Protocol):
     """A flight controller, such as `Betaflight`."""
 
@@ -58,34 +40,19 @@ class Controller(Protocol):
         ...
 
 
-Guidance = Callable[[B, Readings], Setpoint]
+Guidance = Callable[[FlightState, Readings], Setpoint]
 """Returns the next setpoint, from the drone's state and measurements: a policy or a path."""
 
 
-@dataclasses.dataclass(frozen=True)
-class TraceSample:
-    """State of a flight at one setpoint."""
-
-    time: float
-    """Seconds."""
-    position: Vector
-    """Metres, world frame. Shape: (3,)."""
-    velocity: Vector
-    """Metres per second, world frame. Shape: (3,)."""
-    rotors: Vector
-    """Rotor commands. Shape: (4,)."""
-
-
-class DroneInTheLoop(Generic[B]):
+class DroneInTheLoop:
     """One simulated drone with an external flight controller."""
 
     def __init__(
         self,
-        physics: Physics[B],
-        body: B,
+        physics: Quadrotor,
+        body: FlightState,
         controller: Controller,
         settings: DynamicsSettings,
-        home: GeoPoint = HOME,
     ) -> None:
         """Create the drone.
 
@@ -94,19 +61,19 @@ class DroneInTheLoop(Generic[B]):
             body: State of one drone, at rest.
             controller: The flight controller.
             settings: Vehicle, and gains of the outer loops. Betaflight needs `tick=TICK`.
-            home: The world's origin on Earth.
         """
         self.physics = physics
+        self.obstacles: Obstacles | None = None
+        """Obstacles to collide with."""
         self.body = body
         self.controller = controller
         self.settings = settings
-        self.home = home
-        self.readings = measure(body, body, settings.tick, 0.0, home)
+        self.readings = measure(body, body, settings.tick, 0.0)
         self.rotors: Vector = np.zeros(4)
-        self.trace: list[TraceSample] = []
-        """One sample a setpoint."""
+        self.trace: list[Readings] = []
+        """The measurements at each setpoint."""
         self._ticks = 0
-        self._climb = ClimbState()
+        self._integral = 0.0
 
     @property
     def time(self) -> float:
@@ -121,9 +88,10 @@ class DroneInTheLoop(Generic[B]):
         """
         self.rotors = self.controller.step(self.readings, sticks)
         before = self.body
-        self.body = self.physics.push(before, torch.from_numpy(self.rotors)[None], 1)
+        goals = rotor_goals(torch.from_numpy(self.rotors)[None])
+        self.body = self.physics.fly(before, goals, 1, self.obstacles)
         self._ticks += 1
-        self.readings = measure(before, self.body, self.settings.tick, self.time, self.home)
+        self.readings = measure(before, self.body, self.settings.tick, self.time)
         if bool(self.body.is_lost[0]) or not np.isfinite(self.readings.position).all():
             raise FlightControllerError(f"the drone's motion diverged after {self.time:.3g} s")
 
@@ -143,7 +111,7 @@ class DroneInTheLoop(Generic[B]):
         Raises:
             FlightControllerError: They don't.
         """
-        self._climb = ClimbState()
+        self._integral = 0.0
         self.hold(AT_REST, settle)
         for _ in range(tries):
             for _ in range(round(within / self.settings.tick)):
@@ -161,7 +129,7 @@ class DroneInTheLoop(Generic[B]):
 
     def fly(
         self,
-        guidance: Guidance[B],
+        guidance: Guidance,
         seconds: float,
         *,
         every: float = SETPOINT_PERIOD,
@@ -189,21 +157,15 @@ class DroneInTheLoop(Generic[B]):
                 if until(self.readings):
                     return True
                 setpoint = self._timed(guidance)
-                r = self.readings
-                self.trace.append(TraceSample(r.time, r.position, r.velocity, self.rotors))
+                self.trace.append(self.readings)
             if count % STICKS_TICKS == 0:
-                sticks = self._move_sticks(setpoint)
+                sticks, self._integral = sticks_for(
+                    setpoint, self.readings, self._integral, STICKS_TICKS * tick, self.settings
+                )
             self.tick(sticks)
         return until(self.readings)
 
-    def _move_sticks(self, setpoint: Setpoint) -> RcSticks:
-        seconds = STICKS_TICKS * self.settings.tick
-        sticks, self._climb = sticks_for(
-            setpoint, self.readings, self._climb, seconds, self.settings
-        )
-        return sticks
-
-    def _timed(self, guidance: Guidance[B]) -> Setpoint:
+    def _timed(self, guidance: Guidance) -> Setpoint:
         """Return the setpoint; raise if that took too long."""
         begin = time.monotonic()
         setpoint = guidance(self.body, self.readings)

@@ -15,10 +15,8 @@ from drone_rl.flight.in_the_loop.drone import (
     NotReadyError,
 )
 from drone_rl.flight.in_the_loop.instruments import Readings
-from drone_rl.flight.in_the_loop.trial_flight import HoldPosition, take_off
-from drone_rl.sim.actions import Actions
-from drone_rl.sim.dynamics import BodyState, Dynamics, FlightState, Obstacles, Quadrotor
-from drone_rl.sim.dynamics.control import rotor_goals
+from drone_rl.flight.in_the_loop.trial_flight import hold_position, take_off
+from drone_rl.sim.dynamics import BodyState, FlightState, Obstacles, Quadrotor
 from drone_rl.sim.dynamics.state import SEED
 
 NEAR, SLOW = 0.1, 0.1
@@ -29,8 +27,8 @@ _HOVER_WITHIN = 15.0
 """Seconds in which the drone must hover after take-off."""
 
 
-class InTheLoopDynamics(Dynamics):
-    """Dynamics of one world in which each step flies the drone in the loop for one action.
+class InTheLoopDynamics:
+    """`Dynamics` of one world in which each step flies the drone in the loop for one action.
 
     Unlike other dynamics it holds a drone that has one flight only: `start` chooses where the
     episode begins, `begin` flies there, then each `step` continues.
@@ -38,7 +36,7 @@ class InTheLoopDynamics(Dynamics):
 
     def __init__(
         self,
-        drone: DroneInTheLoop[FlightState],
+        drone: DroneInTheLoop,
         settings: DynamicsSettings,
         actions: ActionSettings | None = None,
     ) -> None:
@@ -52,28 +50,12 @@ class InTheLoopDynamics(Dynamics):
         self.drone = drone
         self.settings = settings
         self._quadrotor = Quadrotor(settings, actions)
-        self._physics = _ObstaclePhysics(Quadrotor(drone.settings))
+        self.actions = self._quadrotor.actions
+        self.mount = self._quadrotor.mount
+        self.is_random = self._quadrotor.is_random
+        """As without the loop, so that the same worlds are sampled."""
+        self.needs_obstacles = True
         self._last = 0.0
-
-    @property
-    def actions(self) -> Actions:
-        """The action space."""
-        return self._quadrotor.actions
-
-    @property
-    def mount(self) -> str:
-        """See `DynamicsSettings.camera_mount`."""
-        return self.settings.camera_mount
-
-    @property
-    def is_random(self) -> bool:
-        """The same as without the loop, so that the same worlds are sampled."""
-        return self._quadrotor.is_random
-
-    @property
-    def needs_obstacles(self) -> bool:
-        """True: the vehicle collides with obstacles."""
-        return True
 
     def start(self, position: Tensor, seeds: Tensor | None = None) -> FlightState:
         """Return the start of an episode; the drone itself moves in `begin`."""
@@ -90,7 +72,6 @@ class InTheLoopDynamics(Dynamics):
         """
         assert isinstance(body, FlightState)
         drone, place = self.drone, body.position[0].numpy()
-        drone.physics = self._physics
         drone.body.numbers[:, SEED] = body.numbers[:, SEED]
 
         def hovers(readings: Readings) -> bool:
@@ -102,7 +83,7 @@ class InTheLoopDynamics(Dynamics):
             take_off(drone, place)
         except FlightControllerError as error:
             raise NotReadyError(str(error)) from error
-        if not drone.fly(HoldPosition(place, drone.settings), _HOVER_WITHIN, until=hovers):
+        if not drone.fly(hold_position(place, drone.settings), _HOVER_WITHIN, until=hovers):
             raise NotReadyError(f"the drone doesn't hover {_HOVER_WITHIN:g} s after its take-off")
         self._last = time.monotonic()
 
@@ -133,21 +114,10 @@ class InTheLoopDynamics(Dynamics):
             del body
             return setpoint_of(goals, readings.time - begin, readings, drone.settings)
 
-        self._physics.obstacles = obstacles
+        drone.obstacles = obstacles
         seconds, every = self.settings.control_timestep, STICKS_TICKS * drone.settings.tick
         drone.fly(track, seconds, every=every)
         self._last = time.monotonic()
         after = FlightState(drone.body.numbers.clone())
         after.reference[:] = goals.reference_after(seconds, after)
         return after
-
-
-class _ObstaclePhysics:
-    """Vehicle dynamics under rotor commands, with obstacles."""
-
-    def __init__(self, quadrotor: Quadrotor) -> None:
-        self._quadrotor = quadrotor
-        self.obstacles: Obstacles | None = None
-
-    def push(self, body: FlightState, rotors: Tensor, ticks: int) -> FlightState:
-        return self._quadrotor.fly(body, rotor_goals(rotors), ticks, self.obstacles)

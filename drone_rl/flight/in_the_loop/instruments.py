@@ -61,9 +61,7 @@ class Readings:
         return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-def measure(
-    before: BodyState, after: BodyState, seconds: float, time: float, home: GeoPoint = HOME
-) -> Readings:
+def measure(before: BodyState, after: BodyState, seconds: float, time: float) -> Readings:
     """Measure the motion between two states, at its end.
 
     Rates and forces are averages over the interval, from attitudes and velocities, so that they
@@ -74,7 +72,6 @@ def measure(
         after: State at the end.
         seconds: Length of the interval.
         time: Time of its end, seconds.
-        home: The world's origin on Earth.
     """
     position, velocity, attitude = map(_first, (after.position, after.velocity, after.attitude))
     acceleration = (velocity - _first(before.velocity)) / seconds
@@ -85,7 +82,6 @@ def measure(
         attitude=attitude,
         rates=rotation_between(_first(before.attitude), attitude) / seconds,
         force=into_body(attitude, acceleration + np.array([0.0, 0.0, GRAVITY])),
-        home=home,
     )
 
 

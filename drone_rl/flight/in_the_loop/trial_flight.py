@@ -1,24 +1,24 @@
 """A trial flight of a flight controller: hover, fly a square, land; and its errors."""
 
 import dataclasses
-import itertools
-import math
 import time
-from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+import torch
+from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.in_the_loop.control import Setpoint, velocity_to
-from drone_rl.flight.in_the_loop.drone import (
-    DroneInTheLoop,
-    FlightControllerError,
-    Guidance,
-    TraceSample,
+from drone_rl.flight.commands.path_following import (
+    Paths,
+    direction_at,
+    distance_from,
+    make_paths,
+    place_at,
 )
+from drone_rl.flight.in_the_loop.control import Setpoint, velocity_to
+from drone_rl.flight.in_the_loop.drone import DroneInTheLoop, FlightControllerError, Guidance
 from drone_rl.flight.in_the_loop.instruments import Readings, Vector
-from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.dynamics import FlightState
 
 LANDING_SPEED = 0.5
 """Sink rate, metres per second."""
@@ -59,65 +59,36 @@ class CourseReport:
     wall_s: float
     """Wall-clock duration."""
 
-    def values(self) -> dict[str, Any]:
-        """Return the results as a dictionary."""
-        return dataclasses.asdict(self)
+
+def hold_position(place: Vector, settings: DynamicsSettings) -> Guidance:
+    """Return guidance that holds a position (metres, world frame; shape (3,)), facing along x."""
+    return lambda body, readings: Setpoint(velocity_to(place, readings, settings))
 
 
-class HoldPosition:
-    """Guidance that holds a position and heading."""
+def follow_path(path: Paths, speed: float, settings: DynamicsSettings) -> Guidance:
+    """Return guidance to a point that moves along a path at constant speed from the first call.
 
-    def __init__(self, place: Vector, settings: DynamicsSettings, heading: float = 0.0) -> None:
-        """Take the position in metres, world frame; shape (3,)."""
-        self.place = place
-        self.settings = settings
-        self.heading = heading
+    Args:
+        path: A single path.
+        speed: Metres per second.
+        settings: Gains and limits.
+    """
+    begin: float | None = None
 
-    def __call__(self, body: BodyState, readings: Readings) -> Setpoint:
-        """See `Guidance`."""
-        del body
-        return Setpoint(velocity_to(self.place, readings, self.settings), self.heading)
-
-
-class FollowPath:
-    """Guidance to a point that moves along a path at constant speed."""
-
-    def __init__(self, path: Sequence[Vector], speed: float, settings: DynamicsSettings) -> None:
-        """Take the corners, in metres, world frame; each of shape (3,)."""
-        self.path = np.array(path)
-        self.speed = speed
-        self.settings = settings
-        steps = np.linalg.norm(np.diff(self.path, axis=0), axis=1)
-        self._until = np.concatenate([[0.0], np.cumsum(steps)])
-        self._begin: float | None = None
-
-    @property
-    def seconds(self) -> float:
-        """Duration of the path."""
-        return float(self._until[-1]) / self.speed
-
-    def __call__(self, body: BodyState, readings: Readings) -> Setpoint:
-        """See `Guidance`; the path begins with the first call."""
-        del body
-        if self._begin is None:
-            self._begin = readings.time
-        place, ahead = self._point(readings.time - self._begin)
-        back = np.array(velocity_to(place, readings, self.settings))
-        x, y, z = (float(v) for v in back + ahead)
+    def guide(body: FlightState, readings: Readings) -> Setpoint:
+        nonlocal begin
+        begin = readings.time if begin is None else begin
+        along = torch.tensor([(readings.time - begin) * speed], dtype=torch.float64)
+        is_moving = (along < path.lengths).double()[:, None]
+        ahead = (speed * is_moving * direction_at(path, along))[0].numpy()
+        back = velocity_to(place_at(path, along)[0].numpy(), readings, settings)
+        x, y, z = (back + ahead).tolist()
         return Setpoint((x, y, z))
 
-    def _point(self, seconds: float) -> tuple[Vector, Vector]:
-        """Return position and velocity of the point. Shapes: (3,)."""
-        along = seconds * self.speed
-        leg = int(np.searchsorted(self._until, along, side="right")) - 1
-        if leg >= len(self.path) - 1:
-            return self.path[-1], np.zeros(3)
-        way = self.path[leg + 1] - self.path[leg]
-        direction = way / np.linalg.norm(way)
-        return self.path[leg] + direction * (along - self._until[leg]), direction * self.speed
+    return guide
 
 
-def fly_course(drone: DroneInTheLoop[Any], course: Course | None = None) -> CourseReport:
+def fly_course(drone: DroneInTheLoop, course: Course | None = None) -> CourseReport:
     """Arm, take off, hover, fly a square and land.
 
     Args:
@@ -132,14 +103,16 @@ def fly_course(drone: DroneInTheLoop[Any], course: Course | None = None) -> Cour
     drone.arm()
     above = ground + np.array([0.0, 0.0, course.height])
     take_off(drone, above)
-    hover = _fly(drone, HoldPosition(above, settings), course.hover)
-    path = square(above, course.side)
-    follow = FollowPath(path, course.speed, settings)
-    square_flown = _fly(drone, follow, follow.seconds)
-    _fly(drone, HoldPosition(above, settings), _SETTLING)
+    hold = hold_position(above, settings)
+    hover = _fly(drone, hold, course.hover)
+    corners = square(above, course.side)
+    follow = follow_path(make_paths(corners[None]), course.speed, settings)
+    flown = _fly(drone, follow, 4.0 * course.side / course.speed)
+    _fly(drone, hold, _SETTLING)
     land(drone, ground)
     counted = [m for m in hover if m.time >= hover[0].time + _SETTLING] or hover
-    errors = np.array([distance_from(path, m.position) for m in square_flown])
+    positions = torch.from_numpy(np.stack([m.position for m in flown]))
+    errors = distance_from(make_paths(corners.repeat(len(flown), 1, 1)), positions).numpy()
     return CourseReport(
         hover_error_m=float(np.mean([np.linalg.norm(m.position - above) for m in counted])),
         path_error_m=float(errors.mean()),
@@ -150,13 +123,13 @@ def fly_course(drone: DroneInTheLoop[Any], course: Course | None = None) -> Cour
     )
 
 
-def take_off(drone: DroneInTheLoop[Any], above: Vector, within: float = 10.0) -> None:
+def take_off(drone: DroneInTheLoop, above: Vector, within: float = 10.0) -> None:
     """Climb to a position above an armed drone.
 
     Raises:
         FlightControllerError: It isn't reached within so many seconds.
     """
-    hold = HoldPosition(above, drone.settings)
+    hold = hold_position(above, drone.settings)
     if not drone.fly(hold, within, until=lambda s: abs(s.position[2] - above[2]) < 0.3):
         height = float(drone.readings.position[2])
         raise FlightControllerError(
@@ -164,7 +137,7 @@ def take_off(drone: DroneInTheLoop[Any], above: Vector, within: float = 10.0) ->
         )
 
 
-def land(drone: DroneInTheLoop[Any], ground: Vector, within: float = 20.0) -> None:
+def land(drone: DroneInTheLoop, ground: Vector, within: float = 20.0) -> None:
     """Descend over a position, stop the rotors and disarm.
 
     Args:
@@ -175,9 +148,9 @@ def land(drone: DroneInTheLoop[Any], ground: Vector, within: float = 20.0) -> No
     Raises:
         FlightControllerError: The drone isn't on the ground in time.
     """
-    hold = HoldPosition(ground, drone.settings)
+    hold = hold_position(ground, drone.settings)
 
-    def descend(body: BodyState, readings: Readings) -> Setpoint:
+    def descend(body: FlightState, readings: Readings) -> Setpoint:
         forward, left, _ = hold(body, readings).velocity
         return Setpoint((forward, left, -LANDING_SPEED))
 
@@ -189,23 +162,13 @@ def land(drone: DroneInTheLoop[Any], ground: Vector, within: float = 20.0) -> No
     drone.disarm()
 
 
-def square(corner: Vector, side: float) -> list[Vector]:
-    """Return a square's corners and the first again: forward, left, back, right."""
-    steps = ((0.0, 0.0), (side, 0.0), (side, side), (0.0, side), (0.0, 0.0))
-    return [corner + np.array([x, y, 0.0]) for x, y in steps]
+def square(corner: Vector, side: float) -> Tensor:
+    """Return a square's corners and the first again: forward, left, back, right. Shape: (5, 3)."""
+    steps = [[0, 0, 0], [side, 0, 0], [side, side, 0], [0, side, 0], [0, 0, 0]]
+    return torch.from_numpy(corner + np.array(steps))
 
 
-def distance_from(path: Sequence[Vector], place: Vector) -> float:
-    """Return the distance of a position from a path, metres."""
-    least = math.inf
-    for start, end in itertools.pairwise(path):
-        way = end - start
-        along = float(np.clip((place - start) @ way / (way @ way), 0.0, 1.0))
-        least = min(least, float(np.linalg.norm(place - start - along * way)))
-    return least
-
-
-def _fly(drone: DroneInTheLoop[Any], guidance: Guidance[Any], seconds: float) -> list[TraceSample]:
+def _fly(drone: DroneInTheLoop, guidance: Guidance, seconds: float) -> list[Readings]:
     """Fly and return the trace of this part."""
     first = len(drone.trace)
     drone.fly(guidance, seconds)

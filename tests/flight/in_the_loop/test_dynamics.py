@@ -1,6 +1,8 @@
 """Steps of a world whose drone has a firmware on board: the stub, and one of three lines."""
 
+import copy
 import shlex
+import time
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ import torch
 
 from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.flight.betaflight.sitl import betaflight_drone
+from drone_rl.flight.in_the_loop import drone as drone_module
 from drone_rl.flight.in_the_loop import dynamics as module
 from drone_rl.flight.in_the_loop.drone import DroneInTheLoop, FlightControllerError, NotReadyError
 from drone_rl.flight.in_the_loop.dynamics import InTheLoopDynamics
@@ -34,6 +37,26 @@ def drone(controller=None):
     return DroneInTheLoop(Quadrotor(FAST), body, controller or Even(), FAST)
 
 
+@pytest.fixture(scope="module")
+def hovering():
+    """Dynamics whose episode has begun, with gusts of seed 7, and its first state."""
+    dynamics = InTheLoopDynamics(drone(), SETTINGS)
+    start = dynamics.start(PLACE, torch.tensor([7]))
+    assert dynamics.drone.time == 0.0  # `start` moves nothing
+    dynamics.begin(start)
+    return dynamics, start
+
+
+@pytest.fixture
+def begun(hovering, monkeypatch):
+    """A copy of `hovering`, with a limit of a minute for decisions: this machine may be busy."""
+    for part in (module, drone_module):
+        monkeypatch.setattr(part, "LONGEST_DECISION", 60.0)
+    dynamics, start = copy.copy(hovering[0]), FlightState(hovering[1].numbers.clone())
+    dynamics.drone, dynamics._last = copy.copy(dynamics.drone), time.monotonic()
+    return dynamics, start
+
+
 def test_it_is_a_worlds_dynamics():
     moves = InTheLoopDynamics(drone(), SETTINGS)
     assert moves.actions.names == ("forward", "left", "right")
@@ -43,35 +66,28 @@ def test_it_is_a_worlds_dynamics():
     assert gusty.actions.entry.shape == (3,)
 
 
-def test_an_episode_begins_where_it_is_to():
-    """`start` moves nothing; `begin` brings the drone there, with the gusts of the episode."""
-    dynamics = InTheLoopDynamics(drone(), SETTINGS)
-    start = dynamics.start(PLACE, torch.tensor([7]))
-    assert dynamics.drone.time == 0.0
-    dynamics.begin(start)
+def test_an_episode_begins_where_it_is_to(begun):
+    """`begin` brings the drone there, with the gusts of the episode."""
+    dynamics, _ = begun
     assert np.linalg.norm(dynamics.drone.readings.position - [0.0, 0.0, 2.0]) < 0.1
     assert dynamics.drone.body.numbers[0, 25] == 7.0
 
 
-def test_a_step_lasts_as_long_as_an_action():
+def test_a_step_lasts_as_long_as_an_action(begun):
     """33 ticks of 3 ms are 99 of 1 ms. It keeps its height, and is wanted ahead of where it is."""
-    dynamics = InTheLoopDynamics(drone(), SETTINGS)
-    body = dynamics.start(PLACE)
-    dynamics.begin(body)
-    begun = dynamics.drone.time
+    dynamics, body = begun
+    first = dynamics.drone.time
     for _ in range(2):
         body = dynamics.step(body, torch.tensor([0]))
-    assert dynamics.drone.time - begun == pytest.approx(0.198)
+    assert dynamics.drone.time - first == pytest.approx(0.198)
     assert abs(float(body.position[0, 2]) - 2.0) < 0.1
     assert body.reference[0].tolist() == pytest.approx([0.792, 0.0, 0.0, 2.0])
     assert body.position is not dynamics.drone.body.position
 
 
-def test_obstacles_are_felt():
+def test_obstacles_are_felt(begun):
     """A box right above: the drone, told to be higher, stays below it."""
-    dynamics = InTheLoopDynamics(drone(), SETTINGS)
-    body = dynamics.start(PLACE)
-    dynamics.begin(body)
+    dynamics, body = begun
     body.reference[:, 3] = 4.0
     above = Obstacles(torch.tensor([[[0.0, 0.0, 3.5]]], dtype=torch.float64), (1.0, 1.0, 1.0))
     for _ in range(10):
@@ -87,10 +103,8 @@ def test_a_firmware_that_never_arms():
         dynamics.begin(dynamics.start(PLACE))
 
 
-def test_a_policy_that_thinks_for_too_long(monkeypatch):
-    dynamics = InTheLoopDynamics(drone(), SETTINGS)
-    body = dynamics.start(PLACE)
-    dynamics.begin(body)
+def test_a_policy_that_thinks_for_too_long(begun, monkeypatch):
+    dynamics, body = begun
     monkeypatch.setattr(module, "LONGEST_DECISION", 0.0)
     with pytest.raises(FlightControllerError, match="the policy took"):
         dynamics.step(body, torch.tensor([0]))
