@@ -216,9 +216,8 @@ def open_all(
 
 def summary(folder: Path) -> dict[str, Any]:
     """Return the summary of a sweep with runs of each state."""
-    from drone_rl.sweeps.manifest import open_sweep
+    from drone_rl.sweeps.manifest import Run, open_sweep
     from drone_rl.sweeps.rows import read_rows
-    from drone_rl.sweeps.runs import Run
     from drone_rl.sweeps.summary import summarise_sweep
 
     sweep = folder / "sweep"

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.commands import PROGRAM, call
-from drone_rl.sweeps.runs import THREADS
+from drone_rl.sweeps.manifest import THREADS
 from drone_rl.training import CheckpointCallback, CsvCallback, LoggerCallback
 from drone_rl.utils.checkpoint import load_checkpoint
 

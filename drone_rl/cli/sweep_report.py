@@ -28,7 +28,7 @@ class Command(CommandSettings):
 
 def prepare(overrides: Sequence[str]) -> list[str]:
     """Translate `drone-rl sweep-report FOLDER` to `folder=FOLDER`."""
-    from drone_rl.sweeps.runs import quoted
+    from drone_rl.sweeps.manifest import quoted
 
     return [
         o if "=" in o.split("/")[0] or o.startswith("-") else f"folder={quoted(o)}"
@@ -38,14 +38,20 @@ def prepare(overrides: Sequence[str]) -> list[str]:
 
 def run(settings: Command, folder: Path) -> tuple[int, None]:
     """Report on a sweep, finished or not; return the exit status."""
-    from drone_rl.sweeps.report import find_sweep, judge_sweep, report_sweep, write_picture
+    from drone_rl.sweeps.report import (
+        find_sweep,
+        judge_sweep,
+        terminal_lines,
+        write_picture,
+        write_sweep_report,
+    )
 
     del folder
     sweep = find_sweep(settings.folder, settings.paths.outputs)
     if settings.judge:
         judge_sweep(sweep, settings.episodes, settings.device)
-    page, lines = report_sweep(sweep)
-    print(lines)
+    page, summary = write_sweep_report(sweep)
+    print(terminal_lines(summary))
     if settings.picture is not None:
         write_picture(sweep, Path(settings.picture))
         _log.info("picture: %s", settings.picture)

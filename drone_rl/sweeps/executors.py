@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from drone_rl.sweeps.runs import THREADS, Run, read_result
+from drone_rl.sweeps.manifest import THREADS, Run, read_result
 from drone_rl.utils.errors import InputError, extra
 from drone_rl.utils.files import is_locked, read_tail, write_atomically
 from drone_rl.utils.limits import LOG_BYTES
@@ -52,7 +52,8 @@ class RunProcess:
         if is_locked(self.run.folder) or read_result(self.run.folder) is not None:
             self._process = None  # a process of an earlier sweep finished it
             return None
-        self._note_failure(status)
+        tail = read_tail(self._log, LOG_BYTES).decode(errors="replace").splitlines()
+        note_failure(self.run, _error(tail, status))
         return status
 
     def wait(self) -> int:
@@ -83,10 +84,6 @@ class RunProcess:
     @property
     def _log(self) -> Path:
         return self.run.folder / "output.log"
-
-    def _note_failure(self, status: int) -> None:
-        tail = read_tail(self._log, LOG_BYTES).decode(errors="replace").splitlines()
-        note_failure(self.run, _error(tail, status))
 
 
 def note_failure(run: Run, error: str) -> None:
@@ -182,16 +179,11 @@ class SlurmExecutor:
         while left:
             ended = [run for run, job in left.items() if job.done()]
             for run in ended:
-                yield run, self._status(run, left.pop(run))
+                job = left.pop(run)
+                error = job.exception()
+                yield run, job.result() if error is None else _lost(run, "Slurm job", error)
             if not ended:
                 time.sleep(1.0)
-
-    def _status(self, run: Run, job: Any) -> int:
-        error = job.exception()
-        if error is None:
-            return job.result()
-        note_failure(run, f"its Slurm job was lost: {_reason(error)}")
-        return 1
 
 
 class RayExecutor:
@@ -233,22 +225,19 @@ class RayExecutor:
                 ended, _ = self._ray.wait(list(left))
                 for task in ended:
                     run = left.pop(task)
-                    yield run, self._status(run, task)
+                    try:
+                        status = self._ray.get(task)
+                    except self._ray.exceptions.RayError as error:
+                        status = _lost(run, "Ray task", error)
+                    yield run, status
         finally:
             if self._started:
                 self._ray.shutdown()
 
-    def _status(self, run: Run, task: Any) -> int:
-        try:
-            return self._ray.get(task)
-        except self._ray.exceptions.RayError as error:
-            note_failure(run, f"its Ray task was lost: {_reason(error)}")
-            return 1
 
-
-def _reason(error: BaseException) -> str:
-    """Return the line of a remote traceback that names the error."""
+def _lost(run: Run, what: str, error: BaseException) -> int:
+    """Note the line of a remote traceback that names the error; return an exit status."""
     lines = str(error).strip().splitlines() or [type(error).__name__]
-    return next(
-        (line for line in reversed(lines) if re.match(r"\w+(Error|Exception):", line)), lines[-1]
-    )
+    named = [line for line in lines if re.match(r"\w+(Error|Exception):", line)]
+    note_failure(run, f"its {what} was lost: {(named or lines)[-1]}")
+    return 1

@@ -25,7 +25,6 @@ COLORS = {
     "none of these": "0.5",
     FAILED: "tab:purple",
 }
-_OTHER_KIND = "tab:cyan"
 MAX_PANELS = 6
 LOG_FROM = 3.0
 """Ratio of the greatest to the least value from which the axis is logarithmic."""
@@ -34,11 +33,6 @@ MOST_LABELS = 7
 UNIFORM = float(np.log(len(SHOWN_MOVES.names)))
 """Entropy of the uniform distribution over the moves, nats."""
 _ROUNDING = 1e-4
-
-
-def color_of(kind: str | None) -> str:
-    """Return the colour of a kind of policy."""
-    return COLORS.get(str(kind), _OTHER_KIND)
 
 
 @dataclasses.dataclass
@@ -67,62 +61,36 @@ def lay_out(groups: Sequence[Group]) -> Layout:
     return Layout(axis, dict(list(panels.items())[:MAX_PANELS]))
 
 
-def draw_curves(layout: Layout) -> tuple[bytes, bytes]:
-    """Plot learning curves: the median over runs with its exact band, or each of few runs."""
-    return _draw(layout, _curves, height=3.6)
-
-
-def draw_verdicts(layout: Layout) -> tuple[bytes, bytes]:
-    """Plot the fraction of each verdict, with exact intervals."""
-    return _draw(layout, _verdicts, height=3.4)
-
-
-def draw_sides(layout: Layout) -> tuple[bytes, bytes]:
-    """Plot the fraction of cubes collected on the right minus on the left, per run."""
-    return _draw(layout, _sides, height=3.2)
-
-
-def draw_entropies(layout: Layout) -> tuple[bytes, bytes]:
-    """Plot the final entropy of each run's policy."""
-    return _draw(layout, _entropies, height=3.2)
-
-
-def draw_costs(layout: Layout) -> tuple[bytes, bytes]:
-    """Plot the frames to solve of each run, or the frames of unsolved runs."""
-    return _draw(layout, _costs, height=3.2)
+def draw(layout: Layout, name: str) -> tuple[bytes, bytes]:
+    """Return one of `PLOTS` for a light and for a dark page."""
+    _, plot, height = PLOTS[name]
+    pages = []
+    for sheet in ("default", "dark_background"):
+        with style.context(sheet):
+            pages.append(_render(layout, [plot], height, transparent=True))
+    return pages[0], pages[1]
 
 
 def draw_outcome(layout: Layout) -> bytes:
-    """Plot verdicts, sides and entropies as one image for a light page."""
-    return _picture(layout, [_verdicts, _sides, _entropies], height=2.5)
+    """Return verdicts, sides and entropies as one image for a light page."""
+    return _render(layout, [_verdicts, _sides, _entropies], height=2.5)
 
 
-Draw = Callable[[Axes, Layout, list[Group]], None]
-
-
-def _draw(layout: Layout, draw: Draw, height: float) -> tuple[bytes, bytes]:
-    pictures = []
-    for sheet in ("default", "dark_background"):
-        with style.context(sheet):
-            pictures.append(_picture(layout, [draw], height, transparent=True))
-    return pictures[0], pictures[1]
-
-
-def _picture(
-    layout: Layout, draws: Sequence[Draw], height: float, transparent: bool = False
+def _render(
+    layout: Layout, plots: Sequence["Plot"], height: float, transparent: bool = False
 ) -> bytes:
     """Stack a block of panels per plot, with up to three panels a row, else two."""
     panels = list(layout.panels.items())
     columns = len(panels) if 0 < len(panels) <= 3 else min(2, len(panels) or 1)
     rows = max(1, -(-len(panels) // columns))
-    size = (min(5.2 * columns, 13.0), height * rows * len(draws))
+    size = (min(5.2 * columns, 13.0), height * rows * len(plots))
     figure = Figure(figsize=size, layout="constrained")
-    grid = figure.subplots(rows * len(draws), columns, squeeze=False, sharey="row")
-    for draw, block in zip(draws, np.split(grid, len(draws)), strict=True):
+    grid = figure.subplots(rows * len(plots), columns, squeeze=False, sharey="row")
+    for plot, block in zip(plots, np.split(grid, len(plots)), strict=True):
         for axes, (title, groups) in zip(block.flat, panels, strict=False):
             axes.spines[["top", "right"]].set_visible(False)
             axes.set_title(_literal(title), fontsize=10)
-            draw(axes, layout, groups)
+            plot(axes, layout, groups)
         for axes in block[:, 1:].flat:
             axes.set_ylabel("")  # the first column labels the shared axis
         for axes in block.flat[len(panels) :]:
@@ -159,7 +127,7 @@ def _no_label(values: NDArray) -> list[str]:
 
 def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     places = _places(axes, layout, groups)
-    for i, kind in enumerate((*KINDS, FAILED)):
+    for i, kind in enumerate(COLORS):
         shares = [group.verdicts[kind] for group in groups]
         known = [(x, s) for x, s in zip(places, shares, strict=True) if s["trials"]]
         if not any(s["successes"] for _, s in known):
@@ -167,7 +135,7 @@ def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
         x = _aside(axes, np.array([place for place, _ in known]), 0.08 * (i - 2), places)
         y, low, high = (np.array([s[k] for _, s in known]) for k in ("share", "lower95", "upper95"))
         error = np.abs([y - low, high - y])
-        axes.errorbar(x, y, yerr=error, marker="o", markersize=4, capsize=2, color=color_of(kind))
+        axes.errorbar(x, y, yerr=error, marker="o", markersize=4, capsize=2, color=COLORS[kind])
     axes.set(ylabel="share of runs", ylim=(-0.03, 1.03))
     _explain_colours(axes)
 
@@ -202,7 +170,7 @@ def _dots(
                 shift = 0.05 * (i - (len(beside) - 1) / 2)
                 x = _aside(axes, np.array([place]), shift, places)
                 fill = "full" if row.is_certain else "none"
-                axes.plot(x, [y], "o", markersize=4, color=color_of(row.kind), fillstyle=fill)
+                axes.plot(x, [y], "o", markersize=4, color=COLORS[str(row.kind)], fillstyle=fill)
     _explain_colours(axes)
 
 
@@ -219,9 +187,8 @@ def _explain_colours(axes: Axes) -> None:
     figure = axes.get_figure()
     if figure is None or figure.legends:
         return
-    kinds = (*KINDS, FAILED)
-    handles = [Line2D([], [], marker="o", color=color_of(kind), label=kind) for kind in kinds]
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(kinds), fontsize=8)
+    handles = [Line2D([], [], marker="o", color=c, label=kind) for kind, c in COLORS.items()]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=8)
 
 
 def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
@@ -243,6 +210,17 @@ def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     frames = [row.frames for group in layout.groups for row in group.known]
     top = max(frames, default=0.0) or 1.0  # the panels share the axis
     axes.set(ylabel="frames to solve", ylim=(0, 1.2 * top))
+
+
+Plot = Callable[[Axes, Layout, list[Group]], None]
+PLOTS: dict[str, tuple[str, Plot, float]] = {
+    "curves": ("Learning curves", _curves, 3.6),
+    "shares": ("Verdicts", _verdicts, 3.4),
+    "sides": ("Left and right", _sides, 3.2),
+    "entropies": ("Entropy at the end", _entropies, 3.2),
+    "costs": ("Frames to solve", _costs, 3.2),
+}
+"""Title, function and height in inches of each plot; its sentences have the same prefix."""
 
 
 def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:

@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup, escape
 
 from drone_rl.sweeps import figures
-from drone_rl.sweeps.manifest import Sweep, read_sweep
+from drone_rl.sweeps.manifest import Sweep, read_result, read_sweep
 from drone_rl.sweeps.rows import read_rows
-from drone_rl.sweeps.runs import read_result
 from drone_rl.sweeps.summary import Group, make_groups, summarise_sweep, to_csv
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
@@ -52,17 +51,11 @@ def find_sweep(which: str | Path, outputs: str | Path = "outputs") -> Sweep:
     return read_sweep(last.parent.absolute())
 
 
-def report_sweep(sweep: Sweep) -> tuple[Path, str]:
-    """Write a sweep's report; return its path and the lines for a terminal."""
-    page = write_sweep_report(sweep)
-    return page, terminal_lines(json.loads((sweep.folder / "summary.json").read_text()))
-
-
-def write_sweep_report(sweep: Sweep) -> Path:
+def write_sweep_report(sweep: Sweep) -> tuple[Path, dict[str, Any]]:
     """Write `summary.csv`, `summary.json` and `report.html` to the sweep's folder.
 
     Returns:
-        The page.
+        The path of the page, and the summary.
     """
     rows = read_rows(sweep)
     summary = summarise_sweep(sweep, rows)
@@ -71,7 +64,7 @@ def write_sweep_report(sweep: Sweep) -> Path:
     pictures = _plots(make_groups(rows), summary["sentences"])
     page = sweep.folder / "report.html"
     write_atomically(page, render_page(sweep.folder.name, summary, pictures))
-    return page
+    return page, summary
 
 
 def write_picture(sweep: Sweep, path: Path) -> None:
@@ -192,24 +185,20 @@ def render_page(name: str, summary: dict[str, Any], pictures: list[dict[str, str
 
 
 def _plots(groups: Sequence[Group], sentences: Mapping[str, str]) -> list[dict[str, str]]:
-    ended = [row for group in groups for row in group.known]
-    if not ended:
+    known = [row for group in groups for row in group.known]
+    if not known:
         return []
-    layout = figures.lay_out(groups)
-    plots = [("Learning curves", "curves.", figures.draw_curves)]
-    if any(row.kind for row in ended):
-        plots += [
-            ("Verdicts", "shares.", figures.draw_verdicts),
-            ("Left and right", "sides.", figures.draw_sides),
-            ("Entropy at the end", "entropies.", figures.draw_entropies),
-        ]
-    plots += [("Frames to solve", "costs.", figures.draw_costs)]
-    return [_plot(title, _paragraph(sentences, part), draw(layout)) for title, part, draw in plots]
+    layout, plots = figures.lay_out(groups), []
+    for name, (title, *_) in figures.PLOTS.items():
+        if name in ("curves", "costs") or any(row.kind for row in known):
+            light, dark = map(_data_uri, figures.draw(layout, name))
+            text = _paragraph(sentences, f"{name}.")
+            plots.append({"title": title, "text": text, "light": light, "dark": dark})
+    return plots
 
 
-def _plot(title: str, text: str, content: tuple[bytes, bytes]) -> dict[str, str]:
-    light, dark = (f"data:image/png;base64,{base64.b64encode(c).decode()}" for c in content)
-    return {"title": title, "text": text, "light": light, "dark": dark}
+def _data_uri(png: bytes) -> str:
+    return f"data:image/png;base64,{base64.b64encode(png).decode()}"
 
 
 def _paragraph(sentences: Mapping[str, str], part: str) -> str:

@@ -3,7 +3,6 @@
 import contextlib
 import dataclasses
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,7 @@ from numpy.typing import NDArray
 
 from drone_rl.evaluation.consistency import check_verdict
 from drone_rl.evaluation.rule import SIDES, Kind, Rule
-from drone_rl.sweeps.manifest import Sweep
-from drone_rl.sweeps.runs import Run, read_failure, read_result
+from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_result
 from drone_rl.utils.consistency import read_entry
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.limits import SWEEP_RESULTS_BYTES, Allowance
@@ -174,10 +172,9 @@ def _read_row(run: Run, choice: dict[str, str], metrics: TablesAllowance) -> Row
         if row.verdict is not None:
             check_verdict(row.verdict)
         row.plain()
-    except InputError as error:
-        return Row(run, choice, "damaged", f"its files can't be read ({error})")
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        return Row(run, choice, "damaged", f"its files can't be read ({error!r})")
+        reason = str(error) if isinstance(error, InputError) else repr(error)
+        return Row(run, choice, "damaged", f"its files can't be read ({reason})")
     return row
 
 
@@ -242,18 +239,9 @@ def _metrics_columns(path: Path, allowance: TablesAllowance) -> Array:
     """Return the `_COLUMNS` of each update. Shape: (num_updates, 4)."""
     rows = read_table(path, allowance)
     header = [NAMES_OF_0_1.get(name, name) for name in next(rows, [])]
-    needed = [header.index(name) if name in header else None for name in _COLUMNS]
-    width = 1 + max((place for place in needed if place is not None), default=-1)
-    kept = [row if len(row) >= width else row + [""] * (width - len(row)) for row in rows]
+    table = [dict(zip(header, row, strict=False)) for row in rows]
     columns = [
-        _numbers([row[place] for row in kept] if place is not None else [""] * len(kept), empty)
-        for place, empty in zip(needed, _COLUMNS.values(), strict=True)
+        [float(row.get(name) or ("" if empty is None else empty)) for row in table]
+        for name, empty in _COLUMNS.items()
     ]
-    return np.stack(columns, -1)
-
-
-def _numbers(texts: Sequence[str], empty: float | None) -> Array:
-    """Parse a column; if `empty` is None, empty cells are an error."""
-    if empty is None:
-        return np.array([*map(float, texts)], np.float64)
-    return np.array([float(text) if text else empty for text in texts], np.float64)
+    return np.array(columns, np.float64).T

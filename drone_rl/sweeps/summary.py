@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from drone_rl.evaluation.rule import KINDS
-from drone_rl.sweeps.manifest import Sweep
+from drone_rl.sweeps.manifest import Sweep, quoted
 from drone_rl.sweeps.rows import Array, Row
-from drone_rl.sweeps.runs import quoted
 from drone_rl.sweeps.text import GROUP_SENTENCES, SENTENCES
 from drone_rl.utils.intervals import median_bounds, proportion
 from drone_rl.utils.text import said
@@ -46,15 +45,10 @@ def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> dict[str, Any]:
         "episodes": sorted({verdict["greedy"]["episodes"] for verdict in judged}),
         "sides_not_offered": sum(row.lean is None for row in rows if row.verdict is not None),
         "best": _best(rows),
-        "groups": [_group_figures(group) for group in make_groups(rows)],
+        "groups": [group.plain() for group in make_groups(rows)],
         "runs": [row.plain() for row in rows],
     }
     return {**summary, "sentences": said(SENTENCES, summary)}
-
-
-def _group_figures(group: "Group") -> dict[str, Any]:
-    figures = group.plain()
-    return {**figures, "sentences": said(GROUP_SENTENCES, figures)}
 
 
 def _best(rows: Sequence[Row]) -> dict[str, Any] | None:
@@ -162,9 +156,9 @@ class Group:
         return {**shares, FAILED: {**failures, "certain": len(failed)}}
 
     def plain(self) -> dict[str, Any]:
-        """Return counts, fractions and medians with exact intervals."""
+        """Return counts, fractions and medians with exact intervals, and their sentences."""
         known, states = self.known, [row.state for row in self.rows]
-        return {
+        figures = {
             **self.choice,
             "runs": len(self.rows),
             "ended": len(self.ended),
@@ -177,6 +171,7 @@ class Group:
             "entropy": median_of_runs([r.entropy for r in self.finished if r.entropy is not None]),
             "verdicts": self.verdicts,
         }
+        return {**figures, "sentences": said(GROUP_SENTENCES, figures)}
 
 
 def make_groups(rows: Sequence[Row]) -> list[Group]:

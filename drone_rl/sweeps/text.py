@@ -1,16 +1,13 @@
 """The sentences of a sweep's page and terminal lines; the evidence is its `summary.json`."""
 
-from drone_rl.utils.text import Evidence, Sentence, percent
+from collections.abc import Callable
+
+from drone_rl.utils.text import Evidence, Sentence, percent, plural
 
 FEWEST = 6
 """Fewest runs whose median has an exact 95% interval."""
 STILL = 0.01
 """Entropy in nats below which a policy is practically deterministic."""
-
-
-def in_words(number: int) -> str:
-    """Return "1 run" or "3 runs"."""
-    return "1 run" if number == 1 else f"{number} runs"
 
 
 def from_to(values: list) -> str:
@@ -70,93 +67,93 @@ def entropies(summary: Evidence) -> int:
     return sum(run["entropy"] is not None for run in judged)
 
 
-_RUNS = (
+def _if_any(name: str, condition: str, number: Callable[[Evidence], int], text: str) -> Sentence:
+    """Return a sentence that is said if a number is positive.
+
+    Args:
+        name: Name of the sentence.
+        condition: The condition in English.
+        number: The number, from the evidence.
+        text: Format string of {e}, the evidence; {n}, the number; {runs}, such as "3 runs"; and
+            {settings}, the number of settings.
+    """
+
+    def fill(e: Evidence) -> str:
+        n, settings = number(e), len(e.get("groups", ()))
+        return text.format(e=e, n=n, runs=plural(n, "run"), settings=settings)
+
+    return Sentence(name, condition, lambda e: number(e) > 0, fill)
+
+
+SENTENCES = (
     Sentence(
         "runs.counts",
         "always",
         lambda e: True,
         lambda e: (
-            f"{in_words(count(e))}: {e['finished']} finished, {e['failed']} failed, "
+            f"{plural(count(e), 'run')}: {e['finished']} finished, {e['failed']} failed, "
             f"{e['damaged']} damaged, {e['unfinished']} unfinished."
         ),
     ),
-    Sentence(
+    _if_any(
         "runs.read",
         "a run has ended",
-        lambda e: ended(e) > 0,
-        lambda e: (
-            f"All figures of {in_words(ended(e))} were read from files in their folders and not "
-            "measured again."
-        ),
+        ended,
+        "All figures of {runs} were read from files in their folders and not measured again.",
     ),
-    Sentence(
+    _if_any(
         "runs.failed",
         "a run failed",
-        lambda e: e["failed"] > 0,
-        lambda e: (
-            f"Fractions are of all runs that ended: {in_words(e['failed'])} that failed count as "
-            "not solved, as having learned nothing, and among the verdicts as failed."
-        ),
+        lambda e: e["failed"],
+        "Fractions are of all runs that ended: {runs} that failed count as not solved, as having "
+        "learned nothing, and among the verdicts as failed.",
     ),
-    Sentence(
+    _if_any(
         "runs.damaged",
         "a run's files can't be read",
-        lambda e: e["damaged"] > 0,
-        lambda e: (
-            f"The files of {in_words(e['damaged'])} can't be read: intervals of fractions allow "
-            "for any outcome of these; medians and curves leave them out."
-        ),
+        lambda e: e["damaged"],
+        "The files of {runs} can't be read: intervals of fractions allow for any outcome of these; "
+        "medians and curves leave them out.",
     ),
-    Sentence(
+    _if_any(
         "runs.copies",
         "runs have the same figures, measured seconds included",
-        lambda e: e["copies"] > 0,
-        lambda e: (
-            f"{in_words(e['copies'])} with exactly the figures of another run, seconds included: "
-            "probably copies of one training, which count more than once."
-        ),
+        lambda e: e["copies"],
+        "{runs} with exactly the figures of another run, seconds included: probably copies of one "
+        "training, which count more than once.",
     ),
-    Sentence(
+    _if_any(
         "runs.unfinished",
         "a run has not ended",
-        lambda e: e["unfinished"] > 0,
-        lambda e: (
-            f"{in_words(e['unfinished'])} not ended yet: left out of every fraction and median."
-        ),
+        lambda e: e["unfinished"],
+        "{runs} not ended yet: left out of every fraction and median.",
     ),
-    Sentence(
+    _if_any(
         "runs.solved_none",
         "runs ended and none was solved",
         lambda e: ended(e) > 0 and solved(e) == 0,
-        lambda e: "No run was stopped by reaching its target.",
+        "No run was stopped by reaching its target.",
     ),
-    Sentence(
+    _if_any(
         "runs.few",
         f"a setting has some ended runs, but fewer than {FEWEST}",
-        lambda e: few(e) > 0,
-        lambda e: (
-            f"{few(e)} of {len(e['groups'])} settings with fewer than {FEWEST} ended runs: their "
-            "medians have no valid interval, so that none is shown."
-        ),
+        few,
+        f"{{n}} of {{settings}} settings with fewer than {FEWEST} ended runs: their medians have "
+        "no valid interval, so that none is shown.",
     ),
-    Sentence(
+    _if_any(
         "runs.censored",
         "a setting of whose runs at least half never reached the target",
-        lambda e: censored(e) > 0,
-        lambda e: (
-            f"At {censored(e)} of {len(e['groups'])} settings at least half of the runs ended "
-            "without reaching the target: the median cost to solve is greater (>) than the value "
-            "shown."
-        ),
+        censored,
+        "At {n} of {settings} settings at least half of the runs ended without reaching the "
+        "target: the median cost to solve is greater (>) than the value shown.",
     ),
-)
-_VERDICTS = (
     Sentence(
         "verdicts.basis",
         "a policy was judged",
         lambda e: e["judged"] > 0,
         lambda e: (
-            f"Verdicts are on the last policies of {in_words(e['judged'])}, by "
+            f"Verdicts are on the last policies of {plural(e['judged'], 'run')}, by "
             f"{from_to(e['episodes'])} greedy episodes each in selection environments."
         ),
     ),
@@ -169,40 +166,32 @@ _VERDICTS = (
             f"{percent(max(e['error_rates']))}."
         ),
     ),
-    Sentence(
+    _if_any(
         "verdicts.not_certain",
         "a verdict is not certain",
-        lambda e: e["certain"] < e["judged"],
-        lambda e: (
-            f"{e['judged'] - e['certain']} of {e['judged']} verdicts are not certain (hollow "
-            "dots): more episodes might change them."
-        ),
+        lambda e: e["judged"] - e["certain"],
+        "{n} of {e[judged]} verdicts are not certain (hollow dots): more episodes might change "
+        "them.",
     ),
-    Sentence(
+    _if_any(
         "verdicts.older_rule",
         "a run has an evaluation, but no verdict by the present rule",
-        lambda e: e["judged_by_older_rule"] > 0,
-        lambda e: (
-            f"{in_words(e['judged_by_older_rule'])} judged by an older rule: not counted; the "
-            f"intervals of kinds allow for any. Judge again: `{e['judge_command']}`"
-        ),
+        lambda e: e["judged_by_older_rule"],
+        "{runs} judged by an older rule: not counted; the intervals of kinds allow for any. Judge "
+        "again: `{e[judge_command]}`",
     ),
-    Sentence(
+    _if_any(
         "verdicts.missing",
         "a finished run was never judged",
-        lambda e: e["never_judged"] > 0,
-        lambda e: (
-            f"{in_words(e['never_judged'])} finished and not judged; the intervals of kinds "
-            f"allow for any. Judge: `{e['judge_command']}`"
-        ),
+        lambda e: e["never_judged"],
+        "{runs} finished and not judged; the intervals of kinds allow for any. Judge: "
+        "`{e[judge_command]}`",
     ),
-)
-_BEST = (
-    Sentence(
+    _if_any(
         "best.none",
         "no run was judged",
         lambda e: e["best"] is None,
-        lambda e: "No run has been judged by the present rule, so that no best run is known.",
+        "No run has been judged by the present rule, so that no best run is known.",
     ),
     Sentence(
         "best.chosen",
@@ -215,57 +204,48 @@ _BEST = (
             "episodes in selection environments."
         ),
     ),
-    Sentence(
+    _if_any(
         "best.equals",
         "others collect the same share",
-        lambda e: e["best"] is not None and e["best"]["equals"] > 0,
-        lambda e: (
-            f"{in_words(e['best']['equals'])} collected the same fraction with at least as many "
-            "frames."
-        ),
+        lambda e: 0 if e["best"] is None else e["best"]["equals"],
+        "{runs} collected the same fraction with at least as many frames.",
     ),
-    Sentence(
+    _if_any(
         "best.flattered",
         "it was chosen among several",
         lambda e: e["best"] is not None and e["judged"] > 1,
-        lambda e: (
-            f"These figures are optimistic, since they selected the best of {e['judged']} runs."
-        ),
+        "These figures are optimistic, since they selected the best of {e[judged]} runs.",
     ),
-    Sentence(
+    _if_any(
         "best.report",
         "a run was judged",
         lambda e: e["best"] is not None,
-        lambda e: f"Report it with `{e['best']['report_command']}`, which uses other environments.",
+        "Report it with `{e[best][report_command]}`, which uses other environments.",
     ),
-)
-_FIGURES = (
-    Sentence(
+    _if_any(
         "curves.band",
         f"a setting with {FEWEST} ended runs or more",
         lambda e: any(readable(group) >= FEWEST for group in e["groups"]),
-        lambda e: (
-            "Thick line: the median over runs; band: its exact pointwise 95% interval by order "
-            "statistics."
-        ),
+        "Thick line: the median over runs; band: its exact pointwise 95% interval by order "
+        "statistics.",
     ),
-    Sentence(
+    _if_any(
         "curves.runs",
         f"a setting with fewer than {FEWEST} ended runs",
-        lambda e: few(e) > 0,
-        lambda e: f"Thin lines: single runs, where fewer than {FEWEST} have ended.",
+        few,
+        f"Thin lines: single runs, where fewer than {FEWEST} have ended.",
     ),
-    Sentence(
+    _if_any(
         "curves.ends",
         "a run has finished",
-        lambda e: e["finished"] > 0,
-        lambda e: "The curve of a finished run is extended by its last value.",
+        lambda e: e["finished"],
+        "The curve of a finished run is extended by its last value.",
     ),
-    Sentence(
+    _if_any(
         "curves.failed",
         "a run failed",
-        lambda e: e["failed"] > 0,
-        lambda e: "A failed run counts as having learned nothing.",
+        lambda e: e["failed"],
+        "A failed run counts as having learned nothing.",
     ),
     Sentence(
         "shares.bars",
@@ -276,81 +256,64 @@ _FIGURES = (
             "intervals over runs."
         ),
     ),
-    Sentence(
+    _if_any(
         "sides.dots",
         "a policy was offered cubes on both sides",
-        lambda e: e["judged"] > e["sides_not_offered"],
-        lambda e: (
-            "Each dot is a judged run: the fraction of the cubes on its right that it collects, "
-            "minus the fraction of those on its left."
-        ),
+        lambda e: e["judged"] - e["sides_not_offered"],
+        "Each dot is a judged run: the fraction of the cubes on its right that it collects, minus "
+        "the fraction of those on its left.",
     ),
-    Sentence(
+    _if_any(
         "sides.lost_left",
         "a policy is one-sided to the right",
-        lambda e: one_sided(e, "right") > 0,
-        lambda e: f"{in_words(one_sided(e, 'right'))} one-sided to the right.",
+        lambda e: one_sided(e, "right"),
+        "{runs} one-sided to the right.",
     ),
-    Sentence(
+    _if_any(
         "sides.lost_right",
         "a policy is one-sided to the left",
-        lambda e: one_sided(e, "left") > 0,
-        lambda e: f"{in_words(one_sided(e, 'left'))} one-sided to the left.",
+        lambda e: one_sided(e, "left"),
+        "{runs} one-sided to the left.",
     ),
-    Sentence(
+    _if_any(
         "sides.not_offered",
         "a policy was offered no cube on a side",
-        lambda e: e["sides_not_offered"] > 0,
-        lambda e: f"{in_words(e['sides_not_offered'])} without a dot: one side had no cubes.",
+        lambda e: e["sides_not_offered"],
+        "{runs} without a dot: one side had no cubes.",
     ),
-    Sentence(
+    _if_any(
         "entropies.dots",
         "a judged run has an entropy",
-        lambda e: entropies(e) > 0,
-        lambda e: (
-            "Each dot is a judged run: the mean entropy of its policy over the last updates; the "
-            "line is that of three actions of the same probability."
-        ),
+        entropies,
+        "Each dot is a judged run: the mean entropy of its policy over the last updates; the line "
+        "is that of three actions of the same probability.",
     ),
-    Sentence(
+    _if_any(
         "entropies.still",
         f"a finished run ended below {STILL} nats",
-        lambda e: still(e) > 0,
-        lambda e: (
-            f"{in_words(still(e))} ended below {STILL} nats: these policies are practically "
-            "deterministic."
-        ),
+        still,
+        f"{{runs}} ended below {STILL} nats: these policies are practically deterministic.",
     ),
-    Sentence(
+    _if_any(
         "costs.dots",
         "a run was solved",
-        lambda e: solved(e) > 0,
-        lambda e: (
-            "Each dot is a run that reached its target; above: their number, of the runs that "
-            "ended."
-        ),
+        solved,
+        "Each dot is a run that reached its target; above: their number, of the runs that ended.",
     ),
-    Sentence(
+    _if_any(
         "costs.open",
         "a run ended without reaching its target",
-        lambda e: unsolved(e) > 0,
-        lambda e: (
-            "Each open triangle is a run that ended without (red: failed): it needs more than that."
-        ),
+        unsolved,
+        "Each open triangle is a run that ended without (red: failed): it needs more than that.",
     ),
-)
-_SETTINGS = (
-    Sentence(
+    _if_any(
         "settings.intervals",
         "a run has ended",
-        lambda e: ended(e) > 0,
-        lambda e: (
-            "Fractions are of all runs that ended, with exact (Clopper-Pearson) 95% intervals; "
-            f"medians of at least {FEWEST} runs have intervals by order statistics."
-        ),
+        ended,
+        "Fractions are of all runs that ended, with exact (Clopper-Pearson) 95% intervals; "
+        f"medians of at least {FEWEST} runs have intervals by order statistics.",
     ),
 )
-SENTENCES = (*_RUNS, *_VERDICTS, *_BEST, *_FIGURES, *_SETTINGS)
 """The sentences on a whole sweep."""
 
 
@@ -363,17 +326,17 @@ def _kinds(group: Evidence) -> str:
 
 
 GROUP_SENTENCES = (
-    Sentence(
+    _if_any(
         "group.none",
         "no run of the setting has ended",
         lambda g: g["ended"] == 0,
-        lambda g: "no run has ended",
+        "no run has ended",
     ),
-    Sentence(
+    _if_any(
         "group.solved",
         "a run of the setting has ended",
-        lambda g: g["ended"] > 0,
-        lambda g: f"solved {g['solved']['successes']} of {g['ended']}",
+        lambda g: g["ended"],
+        "solved {e[solved][successes]} of {n}",
     ),
     Sentence(
         "group.verdicts",
@@ -381,17 +344,17 @@ GROUP_SENTENCES = (
         lambda g: g["judged"] > 0,
         lambda g: f"verdicts: {_kinds(g)}",
     ),
-    Sentence(
+    _if_any(
         "group.unknown",
         "some that ended have no verdict",
-        lambda g: g["ended"] > g["judged"] + g["failed"],
-        lambda g: f"without verdict {g['ended'] - g['judged'] - g['failed']}",
+        lambda g: g["ended"] - g["judged"] - g["failed"],
+        "without verdict {n}",
     ),
-    Sentence(
+    _if_any(
         "group.unfinished",
         "some have not ended",
-        lambda g: g["ended"] > 0 and g["unfinished"] > 0,
-        lambda g: f"unfinished {g['unfinished']}",
+        lambda g: g["unfinished"] if g["ended"] > 0 else 0,
+        "unfinished {n}",
     ),
 )
 """The sentences on one of "groups" in the summary."""

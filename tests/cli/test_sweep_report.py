@@ -5,8 +5,7 @@ import shutil
 
 import pytest
 
-from drone_rl.sweeps.manifest import Sweep
-from drone_rl.sweeps.runs import Run
+from drone_rl.sweeps.manifest import Run, Sweep
 from tests.cli.running import error_line
 
 

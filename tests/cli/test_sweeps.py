@@ -70,10 +70,9 @@ def test_the_mistake_stands_in_the_summary_and_harms_no_other(sweep):
     assert "seed=-1 is out of range" in (sweep / "report.html").read_text()
 
 
-def test_one_run_of_a_sweep_can_be_gone_on_with_by_hand(sweep):
+def test_one_run_of_a_sweep_can_be_gone_on_with_by_hand(sweep, in_process):
     (run,) = sweep.glob("0_*seed-0*")
-    command = [*PROGRAM, "train", f"resume={run}", "trainer.total_frames=1600"]
-    subprocess.run(command, cwd=sweep, check=True)
+    in_process("train", f"resume={run}", "trainer.total_frames=1600", cwd=sweep)
     assert json.loads((run / "result.json").read_text())["frames"] >= 1600
 
 
@@ -86,7 +85,7 @@ def test_one_run_of_a_sweep_can_be_gone_on_with_by_hand(sweep):
 )
 def test_clusters_from_the_command_line(module, launcher, tmp_path):
     pytest.importorskip(module, reason="pip install 'drone-rl[slurm,ray]'")
-    sweep = [*PROGRAM, "train", "-m", *TINY, "seed=0,1", *launcher, "hydra.sweep.dir=sweep"]
+    sweep = [*PROGRAM, "train", "-m", *TINY, "seed=0", *launcher, "hydra.sweep.dir=sweep"]
     subprocess.run(sweep, cwd=tmp_path, check=True)
     summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())
-    assert [run["state"] for run in summary["runs"]] == ["finished", "finished"]
+    assert [run["state"] for run in summary["runs"]] == ["finished"]

@@ -9,8 +9,7 @@ import pytest
 from drone_rl.evaluation.consistency import _expected
 from drone_rl.evaluation.rule import BLIND_BASELINES, Kind, Rule
 from drone_rl.sweeps import executors
-from drone_rl.sweeps.manifest import open_sweep
-from drone_rl.sweeps.runs import Run
+from drone_rl.sweeps.manifest import Run, open_sweep
 from drone_rl.utils.intervals import mean_bounds, proportion
 
 FAKE = """

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from drone_rl.sweeps.executors import LocalExecutor, RayExecutor, SlurmExecutor, finish_run
-from drone_rl.sweeps.runs import quoted, read_failure, read_result
+from drone_rl.sweeps.manifest import quoted, read_failure, read_result
 from drone_rl.utils.errors import InputError
 
 pytestmark = pytest.mark.usefixtures("fake_training")

@@ -10,7 +10,7 @@ import pytest
 
 from drone_rl.sweeps import executors
 from drone_rl.sweeps.executors import RunProcess, finish_run, note_failure
-from drone_rl.sweeps.runs import read_failure, read_result
+from drone_rl.sweeps.manifest import read_failure, read_result
 from drone_rl.utils.files import folder_lock
 
 pytestmark = pytest.mark.usefixtures("fake_training")

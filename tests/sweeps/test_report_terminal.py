@@ -6,9 +6,8 @@ import sys
 
 import pytest
 
-from drone_rl.sweeps.manifest import Sweep
+from drone_rl.sweeps.manifest import Run, Sweep
 from drone_rl.sweeps.report import find_sweep, terminal_lines
-from drone_rl.sweeps.runs import Run
 from drone_rl.utils.errors import InputError
 
 

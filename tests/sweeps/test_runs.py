@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from drone_rl.sweeps.runs import Run, read_failure, read_result
+from drone_rl.sweeps.manifest import Run, read_failure, read_result
 
 
 @pytest.mark.parametrize(

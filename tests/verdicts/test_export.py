@@ -8,8 +8,7 @@ import pytest
 import drone_rl
 from drone_rl.config.commands import FlightSettings
 from drone_rl.policies.zoo import certificate_path
-from drone_rl.sweeps.manifest import Sweep
-from drone_rl.sweeps.runs import Run
+from drone_rl.sweeps.manifest import Run, Sweep
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.coverage import find_domain
 from drone_rl.verdicts.export import export, origin_of

@@ -28,8 +28,7 @@ from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig, OmegaConf, open_dict
 
 from drone_rl.sweeps.executors import Executor, LocalExecutor, RayExecutor, SlurmExecutor
-from drone_rl.sweeps.manifest import Sweep, open_sweep
-from drone_rl.sweeps.runs import Run, read_failure, read_result
+from drone_rl.sweeps.manifest import Run, Sweep, open_sweep, read_failure, read_result
 from drone_rl.sweeps.search import import_optuna, next_trials, note_outcome, open_study
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, refuse_links
@@ -108,7 +107,7 @@ class SweepLauncher(Launcher):
             _log.info("go on with the same command: %s", sweep.command)
             raise
         finally:
-            _log.info("report: %s", write_sweep_report(sweep))
+            _log.info("report: %s", write_sweep_report(sweep)[0])
         return failed
 
     def _run(self, folder: Path, number: int, overrides: Sequence[str]) -> Run:

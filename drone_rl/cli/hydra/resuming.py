@@ -9,8 +9,7 @@ import yaml
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import OmegaConf
 
-from drone_rl.sweeps.manifest import is_sweep, sweep_name
-from drone_rl.sweeps.runs import quoted
+from drone_rl.sweeps.manifest import is_sweep, quoted, sweep_name
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import refuse_links, write_atomically
 from drone_rl.utils.overrides import must_be_typed, taken_over

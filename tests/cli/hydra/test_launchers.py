@@ -21,8 +21,7 @@ from drone_rl.cli.hydra.launchers import (
     _sigterm_as_interrupt,
     register_plugins,
 )
-from drone_rl.sweeps.manifest import Sweep
-from drone_rl.sweeps.runs import Run
+from drone_rl.sweeps.manifest import Run, Sweep
 
 
 @pytest.fixture
@@ -81,7 +80,9 @@ def test_an_interrupted_sweep_says_how_to_go_on(run, tmp_path, monkeypatch, capl
         def executor(self, folder):
             return Interrupted()
 
-    monkeypatch.setattr("drone_rl.sweeps.report.write_sweep_report", lambda sweep: "report.html")
+    monkeypatch.setattr(
+        "drone_rl.sweeps.report.write_sweep_report", lambda sweep: ("report.html", {})
+    )
     caplog.set_level(logging.INFO)
     sweep = Sweep(tmp_path, "drone-rl train -m seed=0,1", {}, [run])
     with pytest.raises(KeyboardInterrupt):
