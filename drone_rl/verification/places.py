@@ -22,9 +22,8 @@ from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import say
-from drone_rl.verification.prover.action_map import ActionMap, RenderFaces, map_actions
+from drone_rl.verification.prover.action_map import ActionMap, map_actions
 from drone_rl.verification.prover.arrangement import Window
-from drone_rl.verification.prover.bounds import Compositor
 from drone_rl.verification.prover.policy_spec import make_policy_spec, one_thread
 from drone_rl.verification.text import PLACES, rows
 
@@ -112,6 +111,12 @@ def places(
     begin = time.perf_counter()
     network, gap = policy.make_network(), settings.logit_gap
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
+    whole = (slice(None), slice(None))
+
+    def look(faces: NDArray[np.uint8]) -> torch.Tensor:
+        shown = [(whole, torch.from_numpy(faces))]
+        return spec.compositor.see(spec.compositor.paint_one(shown, len(faces)))
+
     with one_thread(), closing(spec):
         progress("comparing the renderer's pictures")
         compared = spec.images.check(
@@ -121,7 +126,7 @@ def places(
         found = map_actions(
             spec.camera,
             Window(settings.nearest, settings.farthest, settings.sideways),
-            _look(spec.compositor),
+            look,
             network.eval(),
             touch_distance=spec.lattice.task.touch_distance,
             most_cells=settings.most_cells,
@@ -137,13 +142,3 @@ def places(
         "seconds": time.perf_counter() - begin,
     }
     return Places(policy, settings, found, numbers)
-
-
-def _look(compositor: Compositor) -> RenderFaces:
-    """Return the map from faces to the network's input."""
-    whole = (slice(None), slice(None))
-
-    def look(faces: NDArray[np.uint8]) -> torch.Tensor:
-        return compositor.see(compositor.paint_one([(whole, torch.from_numpy(faces))], len(faces)))
-
-    return look

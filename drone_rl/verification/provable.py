@@ -80,15 +80,13 @@ class Round(Settings):
 
 
 @dataclasses.dataclass
-class Journal:
-    """The rounds of one training, saved in its folder."""
+class Journal(Callback):
+    """The rounds of one training, saved in its folder once the training accepts its settings."""
 
     folder: Path
     settings: TrainSettings
     how: ProvableSettings
     rounds: list[Round]
-    is_noted: bool = dataclasses.field(default=True, compare=False)
-    """Whether the file is up to date."""
 
     @classmethod
     def open(
@@ -101,7 +99,7 @@ class Journal:
     ) -> Self:
         """Start a journal, or continue the one in the folder.
 
-        With a checkpoint, nothing is written before `note`.
+        With a checkpoint, nothing is written before `on_start`.
 
         Args:
             folder: Folder of the training.
@@ -123,18 +121,15 @@ class Journal:
             check_same_config(saved["settings"], as_config(settings), MAY_CHANGE)
             check_same_config(saved["how"], how.values(), HOW_MAY_CHANGE)
             rounds = [Round.read(row, "rounds") for row in saved["rounds"]]
-        journal = cls(folder, settings, how or ProvableSettings(rounds=10), rounds, is_noted=False)
+        journal = cls(folder, settings, how or ProvableSettings(rounds=10), rounds)
         _ = journal.task  # refused before anything is written
         if state is None:  # whoever is killed from here on finds the rounds of this training
-            journal.note()
+            journal.save()
         return journal
 
-    def note(self) -> None:
-        """Write the file once the training has accepted the settings."""
-        if not self.is_noted:
-            if not self.rounds:
-                shutil.rmtree(self.folder / "rounds", ignore_errors=True)
-            self._write()
+    def on_start(self, training: OngoingTraining) -> None:
+        """Write the file."""
+        self.save()
 
     @property
     def task(self) -> TaskSettings:
@@ -174,7 +169,7 @@ class Journal:
         self.next_folder.mkdir(parents=True, exist_ok=True)
         write_atomically(self.next_folder / "failures.npy", buffer.getvalue())
         self.rounds.append(done)
-        self._write()
+        self.save()
 
     def failures(self) -> NDArray[np.float64]:
         """Return those of the last search. Shape: (boxes, num_cubes, 2), metres.
@@ -194,14 +189,16 @@ class Journal:
             raise InputError(f"{path} is damaged ({error}); train again") from None
         return boxes
 
-    def _write(self) -> None:
+    def save(self) -> None:
+        """Write the file; without rounds, delete those of an earlier training."""
+        if not self.rounds:
+            shutil.rmtree(self.folder / "rounds", ignore_errors=True)
         noted = {
             "settings": as_config(self.settings),
             "how": self.how.values(),
             "rounds": [done.values() for done in self.rounds],
         }
         write_atomically(self.folder / "provable.json", json.dumps(noted, indent=2))
-        self.is_noted = True
 
 
 def train_until_proved(
@@ -241,7 +238,7 @@ def train_until_proved(
     progress = progress or Bar()
     with folder_lock(folder):
         journal = Journal.open(folder, settings, how, state, changes)
-        callbacks = [_Note(journal), *callbacks, ForwardProgress(progress)]
+        callbacks = [journal, *callbacks, ForwardProgress(progress)]
         result = _learn(journal, state, callbacks)
         while not (journal.is_over or result["reason"].startswith("SIG")):
             _search(journal, progress)
@@ -256,16 +253,6 @@ def train_until_proved(
         result["rounds"] = [done.values() for done in journal.rounds]
         done = finish(journal.settings, folder, result)
     return hand_on_signal(done)
-
-
-class _Note(Callback):
-    """Writes the journal once the training has accepted its settings."""
-
-    def __init__(self, journal: Journal) -> None:
-        self._journal = journal
-
-    def on_start(self, training: OngoingTraining) -> None:
-        self._journal.note()
 
 
 def _learn(

@@ -87,12 +87,12 @@ def test_one_that_goes_on_is_noted_only_once_it_is_accepted(tmp_path):
     before = (tmp_path / "provable.json").read_bytes()
     again = begin(tmp_path, HOW.replace(rounds=9), STATE)
     assert (tmp_path / "provable.json").read_bytes() == before
-    again.note()
+    again.save()
     assert begin(tmp_path, None, STATE, None).how.rounds == 9
     (tmp_path / "provable.json").unlink()
     usual = begin(tmp_path, None, STATE)  # as if the rounds were of an earlier training
     assert (tmp_path / "rounds").exists() and not (tmp_path / "provable.json").exists()
-    usual.note()
+    usual.save()
     assert (tmp_path / "provable.json").exists() and not (tmp_path / "rounds").exists()
 
 

@@ -134,12 +134,11 @@ def _propagate(graph: Graph, evaluate: Evaluate) -> tuple[NDArray, NDArray, NDAr
 class NodeEvaluator:
     """Renders graph nodes and evaluates the policy's action probabilities there."""
 
-    def __init__(self, env: TransformedEnv, network: Callable[[Tensor], Tensor]) -> None:
+    def __init__(self, env: TransformedEnv, network: nn.Module) -> None:
         """Use an environment's renderer and transforms, and a network from images to logits."""
         self.pictures = 0  # images rendered so far
         self._worlds, self._network = worlds_of(env), network
-        is_module = isinstance(network, nn.Module)
-        self._rounding = RoundingBound.find(network) if is_module else None
+        self._rounding = RoundingBound.find(network)
         pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
         self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
 
