@@ -50,7 +50,7 @@ def test_what_the_policy_stops_is_noticed_where_the_string_should_have_been_text
 
 @pytest.mark.slow
 def test_nothing_runs_on_our_pages(explanations, tmp_path):  # noqa: F811
-    few = [PAYLOADS[7], f'"><img src=x onerror={RAN}>', f"</script><script>{RAN}</script>"]
+    few = [PAYLOADS[7], f'"></script><script>{RAN}</script>']  # markup; attributes and scripts
     outcomes = injections.open_all(tmp_path, explanations[1], few, names=False)
     assert {outcome["page"] for outcome in outcomes} == {
         "report", "report_of_files", "report_without_policy", "sweep", "sweep_without_policy",
