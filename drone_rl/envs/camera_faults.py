@@ -2,8 +2,8 @@
 
 import dataclasses
 import zlib
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -24,7 +24,7 @@ from drone_rl.envs.fault_models import (
     noise,
     random_shift,
 )
-from drone_rl.envs.transforms import PixelTransform
+from drone_rl.envs.transforms import PixelTransform, call_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import Settings, kinds_of
 
@@ -35,22 +35,17 @@ class CameraFault(ObservationTransform):
     Put it where "pixels" are floats from 0 to 1: after `GrayPixels` or `RgbPixels`, before
     `StandardizePixels`. Without an environment, on single images, it has no effect.
 
-    Random numbers come from side streams of the environment's streams (`DroneEnv.side_streams`).
-    So the environment's seed is the fault's seed, the first k environments do not depend on the
-    batch size, and the fault does not change which episodes are sampled. A task that samples
-    nothing at a reset meets the same random numbers in every episode of an environment.
+    Random numbers come from `DroneEnv.side_streams`. So the environment's seed is the fault's seed,
+    the first k environments do not depend on the batch size, and the fault does not change which
+    episodes are sampled. A task that samples nothing at a reset meets the same random numbers in
+    every episode of an environment.
 
     Partial resets and steps are supported: an environment outside the mask keeps its memory and
     its last image. `state_dict` holds all that is needed to resume within episodes.
     """
 
     def __init__(self, model: FaultModel, values: Settings | None = None) -> None:
-        """Create the transform.
-
-        Args:
-            model: The fault.
-            values: Its settings, for `repr`.
-        """
+        """Take the fault, and its settings for `repr`."""
         super().__init__(in_keys=["pixels"], out_keys=["pixels"])
         self.model = model
         self.values = values
@@ -154,74 +149,63 @@ class CameraFault(ObservationTransform):
         self._memory, self._streams = memory, streams
 
     def __repr__(self) -> str:
-        return _call_text(type(self).__name__, self.values)
+        return call_text(self, self.values) if self.values else f"{type(self).__name__}()"
+
+
+class _BuiltInFault(CameraFault):
+    """A fault with the fields of its settings as arguments, in order or by name."""
+
+    Settings: ClassVar[type[settings.Fault]]
+    make_model: Callable[[Any], FaultModel]
+
+    def __init__(self, *args: Any, **values: Any) -> None:
+        given = dict(zip(kinds_of(self.Settings), args, strict=False))
+        own = self.Settings(**given, **values)
+        super().__init__(type(self).make_model(own), own)
 
 
 @implements(settings.Noise)
-class Noise(CameraFault):
-    """Adds noise to each pixel, white or correlated in time."""
+class Noise(_BuiltInFault):
+    """Adds noise to each pixel; see `drone_rl.config.transforms.Noise`."""
 
-    def __init__(
-        self,
-        strength: float = settings.Noise.strength,
-        correlation_time: float = settings.Noise.correlation_time,
-    ) -> None:
-        """See `drone_rl.config.transforms.Noise`."""
-        values = settings.Noise(strength=strength, correlation_time=correlation_time)
-        super().__init__(noise(values.strength, values.correlation_time), values)
+    make_model = staticmethod(lambda own: noise(own.strength, own.correlation_time))
 
 
 @implements(settings.DeadRows)
-class DeadRows(CameraFault):
-    """Blanks rows of the image: fixed ones, ones sampled for each episode, or both."""
+class DeadRows(_BuiltInFault):
+    """Blanks rows: fixed ones, or of each episode; see `drone_rl.config.transforms.DeadRows`."""
 
-    def __init__(
-        self,
-        count: int = settings.DeadRows.count,
-        rows: tuple[int, ...] = settings.DeadRows.rows,
-        level: float = settings.DeadRows.level,
-    ) -> None:
-        """See `drone_rl.config.transforms.DeadRows`."""
-        values = settings.DeadRows(count=count, rows=rows, level=level)
-        model = dead_rows(values.count, values.rows, values.level)
+    @staticmethod
+    def make_model(own: settings.DeadRows) -> FaultModel:
+        """Return the model, which checks the height of the first images."""
+        model = dead_rows(own.count, own.rows, own.level)
 
         def begin(images: Tensor, sample: Sample) -> Tensor:
-            values.check_height(images.shape[-2])
+            own.check_height(images.shape[-2])
             return model.begin(images, sample)
 
-        super().__init__(dataclasses.replace(model, begin=begin), values)
+        return dataclasses.replace(model, begin=begin)
 
 
 @implements(settings.FrozenFrames)
-class FrozenFrames(CameraFault):
-    """Repeats the previous frame at random."""
+class FrozenFrames(_BuiltInFault):
+    """Repeats the previous frame at random; see `drone_rl.config.transforms.FrozenFrames`."""
 
-    def __init__(self, share: float = settings.FrozenFrames.share) -> None:
-        """See `drone_rl.config.transforms.FrozenFrames`."""
-        values = settings.FrozenFrames(share=share)
-        super().__init__(frozen_frames(values.share), values)
+    make_model = staticmethod(lambda own: frozen_frames(own.share))
 
 
 @implements(settings.LateFrames)
-class LateFrames(CameraFault):
-    """Delays frames; shows the episode's first frame until then."""
+class LateFrames(_BuiltInFault):
+    """Delays frames; see `drone_rl.config.transforms.LateFrames`."""
 
-    def __init__(self, frames: int = settings.LateFrames.frames) -> None:
-        """See `drone_rl.config.transforms.LateFrames`."""
-        values = settings.LateFrames(frames=frames)
-        super().__init__(late_frames(values.frames), values)
+    make_model = staticmethod(lambda own: late_frames(own.frames))
 
 
 @implements(settings.Shift)
-class Shift(CameraFault):
-    """Shifts the frames of an episode by a random offset."""
+class Shift(_BuiltInFault):
+    """Shifts the frames of an episode; see `drone_rl.config.transforms.Shift`."""
 
-    def __init__(
-        self, down: int = settings.Shift.down, across: int = settings.Shift.across
-    ) -> None:
-        """See `drone_rl.config.transforms.Shift`."""
-        values = settings.Shift(down=down, across=across)
-        super().__init__(random_shift(values.down, values.across), values)
+    make_model = staticmethod(lambda own: random_shift(own.down, own.across))
 
 
 @implements(settings.Blur)
@@ -230,16 +214,13 @@ class Blur(PixelTransform):
 
     def __init__(self, width: float = settings.Blur.width) -> None:
         """See `drone_rl.config.transforms.Blur`."""
-        super().__init__()
-        self.values = settings.Blur(width=width)
+        super().__init__(values=settings.Blur(width=width))
+        self.width = width
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
         if not obs.is_floating_point():
             raise InputError(f"Blur got {obs.dtype} images; put it after gray or rgb")
-        return blur(obs, self.values.width)
-
-    def __repr__(self) -> str:
-        return _call_text("Blur", self.values)
+        return blur(obs, self.width)
 
 
 def _sampler(streams: Sequence[np.random.Generator], device: torch.device) -> Sample:
@@ -263,10 +244,3 @@ def _indices(mask: Tensor | None, images: Tensor) -> Tensor:
 
 def _rows(values: Tensor, envs: Tensor) -> Tensor:
     return values if len(envs) == len(values) else values[envs]
-
-
-def _call_text(name: str, values: Settings | None) -> str:
-    """Return the text of a constructor call."""
-    given = {key: getattr(values, key) for key in kinds_of(type(values))} if values else {}
-    shown = (f"{k}={v:g}" if isinstance(v, float) else f"{k}={v}" for k, v in given.items())
-    return f"{name}({', '.join(shown)})"

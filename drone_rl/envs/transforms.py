@@ -15,6 +15,7 @@ from drone_rl.config import transforms as settings
 from drone_rl.config.registry import implements
 from drone_rl.sim.rendering.view import to_gray
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.settings import Settings, kinds_of
 
 Keys = list[NestedKey] | None
 
@@ -22,9 +23,16 @@ Keys = list[NestedKey] | None
 class PixelTransform(ObservationTransform):
     """A stateless transform of images, applied at reset and at every step."""
 
-    def __init__(self, in_keys: Keys = None, out_keys: Keys = None) -> None:
+    def __init__(
+        self, in_keys: Keys = None, out_keys: Keys = None, values: Settings | None = None
+    ) -> None:
         in_keys = in_keys if in_keys is not None else ["pixels"]
         super().__init__(in_keys=in_keys, out_keys=out_keys or list(in_keys))
+        self.values = values
+        """Its settings, for `repr`."""
+
+    def __repr__(self) -> str:
+        return call_text(self, self.values) if self.values else super().__repr__()
 
     @property
     def is_in_place(self) -> bool:
@@ -84,7 +92,7 @@ class ChromaticityPixels(PixelTransform):
     noise of dark pixels. Range: -1/3 to 2/3.
 
     Raises:
-        InputError: There are not three channels, or the floor is not above 0.
+        InputError: There are not three channels, or the floor is out of range.
     """
 
     def __init__(
@@ -93,9 +101,7 @@ class ChromaticityPixels(PixelTransform):
         in_keys: Keys = None,
         out_keys: Keys = None,
     ) -> None:
-        super().__init__(in_keys, out_keys)
-        if not floor > 0:
-            raise InputError(f"ChromaticityPixels(floor={floor}): give a floor above 0")
+        super().__init__(in_keys, out_keys, settings.Chromaticity(floor=floor))
         self.floor = float(floor)
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
@@ -107,9 +113,6 @@ class ChromaticityPixels(PixelTransform):
         red_and_blue = torch.stack((obs[..., 0, :, :], obs[..., 2, :, :]), -3)
         return (red_and_blue - total / 3).div_(total + self.floor)
 
-    def __repr__(self) -> str:
-        return f"ChromaticityPixels(floor={self.floor:g})"
-
 
 @implements(settings.Crop)
 class CropRows(PixelTransform):
@@ -120,8 +123,8 @@ class CropRows(PixelTransform):
     """
 
     def __init__(self, top: int, bottom: int, in_keys: Keys = None, out_keys: Keys = None) -> None:
-        super().__init__(in_keys, out_keys)
-        if not 0 <= top < bottom:
+        super().__init__(in_keys, out_keys, settings.Crop(top=top, bottom=bottom))
+        if not top < bottom:
             raise InputError(f"CropRows({top}, {bottom}) keeps no row; give 0 <= top < bottom")
         self.top, self.bottom = top, bottom
 
@@ -133,24 +136,19 @@ class CropRows(PixelTransform):
             )
         return obs[..., self.top : self.bottom, :]
 
-    def __repr__(self) -> str:
-        return f"CropRows(top={self.top}, bottom={self.bottom})"
-
 
 @implements(settings.Resize)
 class Resize(PixelTransform):
     """Resizes frames (*, C, H, W) by averaging over areas; those of the size stay as they are.
 
     Raises:
-        InputError: A size is below 1.
+        InputError: A size is out of range.
     """
 
     def __init__(
         self, *, height: int, width: int, in_keys: Keys = None, out_keys: Keys = None
     ) -> None:
-        super().__init__(in_keys, out_keys)
-        if height < 1 or width < 1:
-            raise InputError(f"Resize(height={height}, width={width}): give 1 pixel or more")
+        super().__init__(in_keys, out_keys, settings.Resize(height=height, width=width))
         self.height, self.width = height, width
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
@@ -161,16 +159,13 @@ class Resize(PixelTransform):
         resized = functional.interpolate(flat, size, mode="area")
         return resized.reshape(*obs.shape[:-2], *size)
 
-    def __repr__(self) -> str:
-        return f"Resize(height={self.height}, width={self.width})"
-
 
 @implements(settings.Standardize)
 class StandardizePixels(PixelTransform):
     """Standardizes pixels: (x - mean) / std. The defaults are the original study's.
 
     Raises:
-        InputError: The deviation is not above 0.
+        InputError: A number is out of range.
     """
 
     def __init__(
@@ -180,16 +175,18 @@ class StandardizePixels(PixelTransform):
         in_keys: Keys = None,
         out_keys: Keys = None,
     ) -> None:
-        super().__init__(in_keys, out_keys)
-        if not std > 0:
-            raise InputError(f"StandardizePixels(std={std}): give a deviation above 0")
+        super().__init__(in_keys, out_keys, settings.Standardize(mean=mean, std=std))
         self.mean, self.std = float(mean), float(std)
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
         return (obs - self.mean).div_(self.std)
 
-    def __repr__(self) -> str:
-        return f"StandardizePixels(mean={self.mean:g}, std={self.std:g})"
+
+def call_text(transform: Transform, values: Settings) -> str:
+    """Return the text of a constructor call."""
+    given = ((name, getattr(values, name)) for name in kinds_of(type(values)))
+    shown = (f"{k}={v:g}" if isinstance(v, float) else f"{k}={v}" for k, v in given)
+    return f"{type(transform).__name__}({', '.join(shown)})"
 
 
 def _check_bytes(transform: PixelTransform, obs: Tensor) -> None:

@@ -59,18 +59,17 @@ class ComposerTask(composer.Task):
         """Assemble the scene.
 
         Args:
-            task: Cube collection as in the original study by default.
-            camera: Image size and field of view; 64x25 pixels and 135 degrees by default.
-            dynamics: How the drone moves; computer-vision mode by default.
-            actions: The action set, if dynamics are settings; moves by default.
+            task: A task or its settings; cube collection by default.
+            camera: The policy's camera.
+            dynamics: Vehicle dynamics; the task's default if None.
+            actions: Action space, if `dynamics` are settings; the moves by default.
             pixels: Whether to observe the front-center camera, which needs OpenGL.
-            distractors: Things that mean nothing, behind the task's own props; as many as the
-                appearance has where it is given.
-            appearance: How the world looks, see `OpenGlAppearance`; as the task has it by default.
+            distractors: Their number, if no appearance is given.
+            appearance: Visual appearance, see `OpenGlAppearance`; the task's by default.
 
         Raises:
             InputError: A texture can't be read, there is no room for camera or distractors, or the
-                dynamics bring actions of their own.
+                dynamics have their own actions.
         """
         self.rules = as_task(task)
         self.dynamics = make_dynamics(self.rules, dynamics, actions)
@@ -89,7 +88,6 @@ class ComposerTask(composer.Task):
         for frame in self._frames:
             frame.mocap = True
         self._flight = self._make_flight()
-        self._reward = 0.0
         self._begin(np.random.RandomState(0))
         self._pixels = self._drone.observables.front_center.enabled = pixels  # pyright: ignore[reportAttributeAccessIssue]
         self._look: Appearance | None = None
@@ -172,12 +170,8 @@ class ComposerTask(composer.Task):
         if self._flight is not None:
             self._state.body = self._flight.command(physics, given)
             return
-        body = self._found(physics)
-        if self.dynamics.needs_obstacles:
-            moved = self.dynamics.step(body, given, self.rules.obstacles(self._state))
-        else:
-            moved = self.dynamics.step(body, given)
-        self._state.body = moved
+        around = [self.rules.obstacles(self._state)] if self.dynamics.needs_obstacles else []
+        self._state.body = self.dynamics.step(self._found(physics), given, *around)
         self._show(physics)
 
     def before_substep(
@@ -222,16 +216,12 @@ class ComposerTask(composer.Task):
     def _begin(self, random_state: np.random.RandomState) -> None:
         origin = torch.tensor([self.rules.origin], dtype=torch.float64)
         drawn = self.rules.draw(random_state)
-        body = (
-            self.dynamics.start(origin, draw_seeds([random_state]))
-            if self.dynamics.is_random
-            else self.dynamics.start(origin)
-        )
-        self._state = self.rules.start(drawn[None], body)
+        seeds = [draw_seeds([random_state])] if self.dynamics.is_random else []
+        self._state = self.rules.start(drawn[None], self.dynamics.start(origin, *seeds))
         self._reward = 0.0
 
     def _found(self, physics: mjcf.Physics) -> BodyState:
-        """The drone where MuJoCo has it: its pose may have been set by hand."""
+        """Return the drone at MuJoCo's pose, which users may have set."""
         body = self._state.body
         pose = [torch.from_numpy(np.array(p))[None] for p in self._drone.get_pose(physics)]
         if torch.equal(pose[0], body.position) and _is_same_turn(pose[1], self._shown(body)):
@@ -239,7 +229,7 @@ class ComposerTask(composer.Task):
         return body.moved(*pose)
 
     def _shown(self, body: BodyState) -> torch.Tensor:
-        """The attitude that cameras have. Shape: (1, 4)."""
+        """Return the cameras' attitude. Shape: (1, 4)."""
         return heading_only(body.attitude) if self.dynamics.mount == "gimbal" else body.attitude
 
     def _show(self, physics: mjcf.Physics) -> None:

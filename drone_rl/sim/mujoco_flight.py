@@ -1,7 +1,7 @@
-"""A flight that MuJoCo integrates: a drone's forces at every tick, and what it touches.
+"""A flight that MuJoCo integrates from a drone's forces at every tick, and its contacts.
 
-Contacts are MuJoCo's own: springs that bounce and rub about as the settings say. A ball touches
-obstacles; four feet, which stand as far down, touch the ground, so that a drone rests level.
+Contacts are MuJoCo's springs, with about the restitution and friction of the settings. A ball
+touches obstacles; four feet at its lowest height touch the ground, so that a drone rests level.
 """
 
 import math
@@ -28,11 +28,11 @@ mujoco: Any = mujoco_module
 _GROUND, _OBSTACLE = 2, 4
 """Bits of what touches what."""
 _UNSEEN = 5
-"""A group of geoms that nobody draws."""
+"""A group of geoms that no camera shows."""
 _STIFFNESS = 0.3
 """Of contacts: radians of their swing in a tick, so that a bounce takes ten of them."""
 _CALM = 0.5
-"""Share of its spin that a drone on the ground loses in a tick, where rotors can't carry it."""
+"""Fraction of its spin that a drone on the ground loses in a tick if rotors can't carry it."""
 
 
 class MujocoFlight:
@@ -45,13 +45,13 @@ class MujocoFlight:
         drone: Drone,
         obstacles: Sequence[mjcf.RootElement],
     ) -> None:
-        """Gives a model mass, gravity and contacts, before it is compiled.
+        """Give a model mass, gravity and contacts, before it is compiled.
 
         Args:
-            quadrotor: How the drone flies.
+            quadrotor: The drone's dynamics.
             arena: With its floor. (dm_control's arenas are untyped.)
             drone: Already attached to it.
-            obstacles: What the drone can fly into, in the order of `Obstacles`.
+            obstacles: In the order of `Obstacles`.
         """
         self.quadrotor, self.drone = quadrotor, drone
         self._settings = settings = quadrotor.settings
@@ -60,22 +60,14 @@ class MujocoFlight:
         option.flag.eulerdamp = "disable"
         drone.body.add("inertial", pos=(0, 0, 0), mass=settings.mass, diaginertia=settings.inertia)
         touch = _contact(settings)
-        bodies = {"group": _UNSEEN, "rgba": (0, 0, 0, 0), "type": "sphere", "conaffinity": 0}
+        sphere = {"group": _UNSEEN, "rgba": (0, 0, 0, 0), "type": "sphere", "conaffinity": 0}
+        sphere |= touch
         small, place = 0.1 * settings.radius, 0.8 * settings.radius
-        drone.body.add(
-            "geom", name="ball", size=(settings.radius,), contype=_OBSTACLE, **bodies, **touch
-        )
+        drone.body.add("geom", name="ball", size=(settings.radius,), contype=_OBSTACLE, **sphere)
         for name, x, y in (("a", 1, 1), ("b", 1, -1), ("c", -1, 1), ("d", -1, -1)):
             pos = (x * place, y * place, small - settings.radius)
-            drone.body.add(
-                "geom",
-                name=f"foot_{name}",
-                size=(small,),
-                pos=pos,
-                contype=_GROUND,
-                **bodies,
-                **touch,
-            )
+            foot = {"name": f"foot_{name}", "size": (small,), "pos": pos, "contype": _GROUND}
+            drone.body.add("geom", **foot, **sphere)
         floor = arena.mjcf_model.find("geom", "floor")
         floor.set_attributes(contype=0, conaffinity=_GROUND)
         self._things = {floor.full_identifier: fs.GROUND}
@@ -91,7 +83,7 @@ class MujocoFlight:
         return self._settings.control_timestep, self._settings.tick
 
     def begin(self, physics: mjcf.Physics, body: BodyState) -> None:
-        """Puts the drone where an episode begins, with the motion that it has."""
+        """Set the drone's pose and motion at the start of an episode."""
         assert isinstance(body, FlightState)
         model = physics.model.ptr
         joint = mjcf.get_attachment_frame(self.drone.mjcf_model).freejoint.full_identifier
@@ -114,7 +106,7 @@ class MujocoFlight:
         self.level_cameras(physics)
 
     def found(self, physics: mjcf.Physics) -> FlightState:
-        """The drone where MuJoCo has it; one moved by hand is told to stay there."""
+        """Return the drone at MuJoCo's pose; one moved by the user holds its position."""
         now = self._state.numbers.clone()
         now[0, fs.POSITION : fs.VELOCITY] = torch.from_numpy(physics.data.qpos[self._pose])
         now[0, fs.VELOCITY : fs.ROTORS] = torch.from_numpy(physics.data.qvel[self._motion])
@@ -123,23 +115,18 @@ class MujocoFlight:
         return state.settled() if is_moved else state
 
     def command(self, physics: mjcf.Physics, action: Tensor) -> FlightState:
-        """Takes what the drone is told from now on, and says where it is.
-
-        Args:
-            physics: In which it flies.
-            action: One of the dynamics' actions. Shape: (1,), then the entry's.
-        """
+        """Begin an action, shape (1,), then the entry's; return the drone."""
         body = self.found(physics)
         self.tell(physics, body, self.quadrotor.steering.goals(body, action))
         return body
 
     def tell(self, physics: mjcf.Physics, body: FlightState, goals: Goals) -> None:
-        """The same of goals, for a drone whose motion MuJoCo has already."""
+        """Begin goals for a drone whose motion MuJoCo already has."""
         self._state, self._goals, self._tick = body, goals, 0
         self._left = physics.data.qpos[self._pose].copy()
 
     def push(self, physics: mjcf.Physics) -> None:
-        """Applies a tick's forces, before MuJoCo's step."""
+        """Apply a tick's forces, before MuJoCo's step."""
         if self._goals is None:
             return
         self._left = physics.data.qpos[self._pose].copy()
@@ -150,12 +137,12 @@ class MujocoFlight:
         self._state, self._tick = body, self._tick + 1
 
     def moved(self, physics: mjcf.Physics) -> None:
-        """Notes what was touched, after MuJoCo's step."""
+        """Record contacts, after MuJoCo's step."""
         self._left = physics.data.qpos[self._pose].copy()
         self._touch(physics)
 
     def finished(self, physics: mjcf.Physics) -> FlightState:
-        """The drone at the end of a command."""
+        """Return the drone at the end of a command."""
         assert self._goals is not None
         self._state = body = self.found(physics)
         seconds = self._tick * self._settings.tick
@@ -164,7 +151,7 @@ class MujocoFlight:
         return self._state
 
     def level_cameras(self, physics: mjcf.Physics) -> None:
-        """Turns cameras on a gimbal so that they are level, and look where the drone is headed."""
+        """Level cameras on a gimbal; they follow the drone's heading."""
         if self.quadrotor.mount != "gimbal" or self._mounted is None:
             return
         attitude = physics.data.qpos[self._pose][3:]
@@ -185,7 +172,7 @@ class MujocoFlight:
         self._left = physics.data.qpos[self._pose].copy()
 
     def _rocking(self, physics: mjcf.Physics) -> NDArray:
-        """The torque that calms a drone on the ground, which else would rock from foot to foot."""
+        """Return a torque that damps rocking on the ground."""
         data, share = physics.data, _CALM / self._settings.tick
         turn = data.xmat[self._body].reshape(3, 3)
         return turn @ (share * np.array(self._settings.inertia) * data.qvel[self._motion][3:])
@@ -212,9 +199,9 @@ class MujocoFlight:
 
 
 def _contact(settings: DynamicsSettings) -> dict[str, Any]:
-    """MuJoCo's numbers of a contact: a spring and a damper that give back a share of speed.
+    """Return MuJoCo's parameters of a contact with the restitution of the settings.
 
-    A damped spring gives back exp(-pi z / sqrt(1 - z^2)) of it, where z is its damping ratio.
+    A damped spring has restitution exp(-pi z / sqrt(1 - z^2)), where z is its damping ratio.
     """
     loss = -math.log(max(settings.restitution, 1e-3))
     ratio, swing = loss / math.hypot(math.pi, loss), _STIFFNESS / settings.tick

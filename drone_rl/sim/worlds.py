@@ -50,20 +50,8 @@ class Worlds:
     ) -> None:
         """Create the environments; the model is compiled when something is rendered.
 
-        Args:
-            num_worlds: How many.
-            task: Cube collection as in the original study by default.
-            camera: The policy's.
-            dynamics: How the drones move; the task's own choice by default.
-            actions: The action set, if dynamics are the task's or settings; moves by default.
-            renderer: See `find_renderer`.
-            device: "cpu", "cuda" or "cuda:N".
-            num_shards: See `RendererFactory`.
-            appearance: Default appearance of all; the task's by default.
-            distractors: How many there may be; appearances position them.
-
-        Raises:
-            InputError: There is no such renderer, or the dynamics bring actions of their own.
+        Arguments and errors are as of `drone_rl.envs.DroneEnv`. The default appearance is the
+        task's; appearances position the distractors.
         """
         self.appearance, self.distractors = appearance, distractors
         self._looked: tuple[Appearance, Appearance | None, Appearance] | None = None
@@ -81,29 +69,17 @@ class Worlds:
 
     @property
     def entries(self) -> Mapping[str, Entry]:
-        """Shapes and types of what `info` returns.
-
-        `Task.entries`, and the drone's pose: "drone" (metres) and "attitude" (quaternion w, x, y,
-        z), world frame.
-        """
+        """`Task.entries`, "drone" (metres) and "attitude" (quaternion w, x, y, z), world frame."""
         return {**self.task.entries, **_POSE}
 
     def info(self, state: State | None = None) -> dict[str, Tensor]:
-        """Return the true state, as `entries` describes. Shapes: (N, *).
-
-        Args:
-            state: These environments' by default.
-        """
+        """Return the true state, by default of these environments; see `entries`. (N, *)."""
         state = self.state if state is None else state
         pose = {"drone": state.body.position.float(), "attitude": state.body.attitude.float()}
         return {**self.task.info(state), **pose}
 
     def ends(self, end_reason: Tensor | None = None) -> tuple[Tensor, Tensor]:
-        """Return which environments have terminated, and which were truncated. Shapes: (N,).
-
-        Args:
-            end_reason: Why episodes ended, 0 while they run; these environments' by default.
-        """
+        """Return which episodes terminated and which were truncated. Shapes: (N,)."""
         reason = self.state.end_reason if end_reason is None else end_reason
         truncated = reason == self.task.truncation
         return (reason != 0) & ~truncated, truncated
@@ -111,23 +87,15 @@ class Worlds:
     @functools.cached_property
     def scene(self) -> Scene:
         """The compiled model of dm_control."""
-        task = ComposerTask(
-            self.task,
-            self.camera,
-            dynamics=self.dynamics,
-            pixels=False,
-            distractors=self.distractors,
-        )
-        return task.compile()
+        own = {"dynamics": self.dynamics, "distractors": self.distractors}
+        return ComposerTask(self.task, self.camera, pixels=False, **own).compile()
 
     @functools.cached_property
     def renderer(self) -> Renderer:
         """The renderer, created at first use."""
+        shards, device = self._num_shards, str(self.device)
         return self._make_renderer(
-            self.scene,
-            num_worlds=self.num_worlds,
-            num_shards=self._num_shards,
-            device=str(self.device),
+            self.scene, num_worlds=self.num_worlds, num_shards=shards, device=device
         )
 
     def view(
@@ -149,12 +117,7 @@ class Worlds:
         )
 
     def start(self, drawn: Tensor, seeds: Tensor | None = None) -> State:
-        """Return states at the start of episodes; the environments stay as they are.
-
-        Args:
-            drawn: Stacked samples of `Task.draw`. Shape: (N, *).
-            seeds: See `Dynamics.start`. Shape: (N,).
-        """
+        """Return states at the start of episodes; see `Task.start` and `Dynamics.start`."""
         return self.task.start(drawn, self.bodies(len(drawn), seeds)).to(self.device)
 
     def bodies(self, count: int, seeds: Tensor | None = None) -> BodyState:
@@ -163,12 +126,7 @@ class Worlds:
         return self.dynamics.start(place) if seeds is None else self.dynamics.start(place, seeds)
 
     def reset(self, worlds: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
-        """Start new episodes.
-
-        Args:
-            worlds: Indices of the environments. Shape: (k,).
-            random_states: Source of each episode.
-        """
+        """Start new episodes in environments, shape (k,), each from a random state."""
         if not len(worlds):
             return
         drawn = torch.stack([self.task.draw(r) for r in random_states])
@@ -176,15 +134,7 @@ class Worlds:
         self.state[worlds] = self.start(drawn, seeds)
 
     def step(self, worlds: Tensor, action: Tensor) -> Tensor:
-        """Move drones and apply the rules.
-
-        Args:
-            worlds: Indices of the environments. Shape: (k,).
-            action: One of the dynamics' actions for each. Shape: (k, *).
-
-        Returns:
-            Reward. Shape: (k,), float64.
-        """
+        """Take actions, (k, *), in environments, (k,). Returns rewards, (k,), float64."""
         is_whole = torch.equal(worlds, self._every)
         state, reward = self.advance(self.state if is_whole else self.state[worlds], action)
         if is_whole:
@@ -195,10 +145,8 @@ class Worlds:
 
     def advance(self, state: State, action: Tensor) -> tuple[State, Tensor]:
         """Return states a step later, and rewards; the environments stay as they are."""
-        if not self.dynamics.needs_obstacles:
-            return self.task.judge(state, self.dynamics.step(state.body, action))
-        obstacles = self.task.obstacles(state)
-        return self.task.judge(state, self.dynamics.step(state.body, action, obstacles))
+        around = [self.task.obstacles(state)] if self.dynamics.needs_obstacles else []
+        return self.task.judge(state, self.dynamics.step(state.body, action, *around))
 
     def render(
         self, state: State, view: View | None = None, appearance: Appearance | None = None
@@ -208,7 +156,7 @@ class Worlds:
         Args:
             state: Of any number of environments.
             view: Of one camera and one modality; the policy's by default.
-            appearance: What differs from the environments' default appearance.
+            appearance: Differences from the environments' default appearance.
 
         Returns:
             See `Renderer.render`, without the dimension of cameras.
@@ -220,7 +168,7 @@ class Worlds:
         if len(view.cameras) * len(view.modalities) > 1:
             raise InputError(
                 f"a view of cameras {', '.join(view.cameras)}, each as "
-                f"{', '.join(view.modalities)}, is more than one picture; take render_all"
+                f"{', '.join(view.modalities)}, is more than one image; call render_all"
             )
         return self.render_all(state, view, appearance)[view.modalities[0]][:, 0]
 
@@ -242,12 +190,7 @@ class Worlds:
         return known[2]
 
     def poses(self, state: State, appearance: Appearance | None = None) -> Poses:
-        """Return the poses to render; on a gimbal, cameras and drone stay level.
-
-        Args:
-            state: Of the environments.
-            appearance: Positions the distractors; out of sight by default.
-        """
+        """Return the poses to render, level on a gimbal; `appearance` positions distractors."""
         props = self.task.places(state)
         if self.distractors:
             props = torch.cat([props, self._distractors(appearance, len(props)).to(props)], 1)
