@@ -1,8 +1,7 @@
 """Renders observations of given simulation states, without steps of TorchRL.
 
-A step of TorchRL copies every entry of every environment through each transform, whether or not its
-episode still runs. With few environments that takes longer than simulating, rendering and acting
-together. Where only maps from frame to frame lie between renderer and actor, it is not needed.
+A step of TorchRL copies every entry of every environment through each transform. With few
+environments that takes longer than simulation, rendering and policy together.
 """
 
 from collections.abc import Iterable, Sequence
@@ -60,19 +59,16 @@ class DirectRenderer:
 
     @property
     def needs_info(self) -> bool:
-        """Whether a step has other entries than reward, flags and end reason."""
+        """Whether `kept` has other entries than reward, flags and end reason."""
         return bool(self._info)
 
     @classmethod
     def try_create(
         cls, env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedKey]
     ) -> Self | Reasons:
-        """Return the renderer of an environment, or the reasons why there is none.
+        """Return the renderer of any environment, or the reasons why there is none.
 
-        Args:
-            env: Any batch of environments.
-            observed: Entries that the actor reads.
-            kept: ("next", ...) entries to keep of each step.
+        `observed` are the entries that the actor reads, `kept` the ("next", ...) entries to keep.
         """
         base: Any = env.base_env if type(env) is TransformedEnv else env
         if type(base) is not DroneEnv:
@@ -95,12 +91,7 @@ class DirectRenderer:
         return Reasons(reasons) if reasons else cls(base, transforms, observed, kept)
 
     def look(self, state: State, rows: Tensor | None = None) -> TensorDictBase:
-        """Return what the actor reads of states. First dimension: the state's.
-
-        Args:
-            state: Of some environments.
-            rows: Indices of these environments; all by default. Shape: (k,).
-        """
+        """Return what the actor reads of states, of environments `rows` (k,), by default all."""
         size, device = len(state.steps), state.steps.device
         entries: Entries = {}
         if "pixels" in self._observed:
@@ -122,14 +113,9 @@ class DirectRenderer:
         return self._transform(frames)
 
     def entries(self, state: State, reward: Tensor) -> tuple[Entries, Tensor]:
-        """Return the kept entries of a step, and whether it ended an episode.
+        """Return the kept entries of a step, (num_envs, *), and the done flag.
 
-        Args:
-            state: After the step.
-            reward: Of the step. Shape: (num_envs,), float64.
-
-        Returns:
-            Each kept entry, and the done flag. Shapes: (num_envs, *).
+        `state` is after the step, `reward` float64 of shape (num_envs,).
         """
         entries = self.flags(reward, state.end_reason)
         if self._info:
@@ -138,14 +124,9 @@ class DirectRenderer:
         return {key: entries[key] for key in self._kept}, entries["next", "done"]
 
     def flags(self, reward: Tensor, end_reason: Tensor) -> Entries:
-        """Return the entries that every step has.
+        """Return the entries of every step: ("next", ...) "reward", flags and end reason.
 
-        Args:
-            reward: Of the step. Shape: (num_envs,).
-            end_reason: After the step, 0 while the episode runs. Shape: (num_envs,).
-
-        Returns:
-            ("next", ...) "reward", float32, the flags and the end reason. Shapes: (num_envs, 1).
+        Shapes: (num_envs,) to (num_envs, 1).
         """
         terminated, truncated = self.worlds.ends(end_reason)
         values = (reward.float(), terminated | truncated, terminated, truncated, end_reason)

@@ -20,30 +20,22 @@ class Sample(Protocol):
         ...
 
 
-def _no_memory(images: Tensor, sample: Sample) -> Tensor:
-    return images[:, :0]
-
-
-def _keep(memory: Tensor, images: Tensor, sample: Sample) -> Tensor:
-    return memory
-
-
 @dataclasses.dataclass(frozen=True)
 class FaultModel:
     """A camera fault of independent environments. Images have shape (n, C, H, W)."""
 
     show: Callable[[Tensor, Tensor, float], Tensor] = lambda images, memory, blank: images
     """Return the faulty images, from images, memory and the value of a pixel without signal."""
-    begin: Callable[[Tensor, Sample], Tensor] = _no_memory
+    begin: Callable[[Tensor, Sample], Tensor] = lambda images, sample: images[:, :0]
     """Return the memory at the first images of episodes. Shape: (n, *)."""
-    update: Callable[[Tensor, Tensor, Sample], Tensor] = _keep
+    update: Callable[[Tensor, Tensor, Sample], Tensor] = lambda memory, images, sample: memory
     """Return the memory at the next images, from the previous memory."""
     hides: bool = False
     """Whether the fault can hide objects."""
 
 
 def noise(strength: float, correlation_time: float = 0.0) -> FaultModel:
-    """Add noise to each pixel, white or correlated in time; see `correlate`."""
+    """Add noise of standard deviation `strength`, clipped at black and white; see `correlate`."""
 
     def begin(images: Tensor, sample: Sample) -> Tensor:
         return sample(*images.shape[1:], normal=True)
@@ -51,19 +43,25 @@ def noise(strength: float, correlation_time: float = 0.0) -> FaultModel:
     def update(memory: Tensor, images: Tensor, sample: Sample) -> Tensor:
         return correlate(memory, begin(images, sample), correlation_time)
 
-    return FaultModel(lambda images, memory, _: add_noise(images, strength, memory), begin, update)
+    def show(images: Tensor, memory: Tensor, blank: float) -> Tensor:
+        return (images + strength * memory).clamp(0.0, 1.0)
+
+    return FaultModel(show, begin, update)
 
 
 def dead_rows(count: int, rows: Sequence[int] = (), level: float | None = None) -> FaultModel:
-    """Blank `count` random rows per episode and always `rows`; `level` overrides the blank."""
+    """Blank `count` random rows per episode and always `rows`; `level` overrides the blank.
+
+    A greater count adds rows to those of a smaller one.
+    """
 
     def begin(images: Tensor, sample: Sample) -> Tensor:
         numbers = sample(images.shape[-2])
         numbers[:, list(rows)] = -1.0  # before all others
-        return choose_rows(numbers, count + len(rows))
+        return numbers.argsort(dim=-1).argsort(dim=-1) < count + len(rows)
 
     def show(images: Tensor, memory: Tensor, blank: float) -> Tensor:
-        return kill_rows(images, memory, blank if level is None else level)
+        return torch.where(memory[..., None, :, None], blank if level is None else level, images)
 
     return FaultModel(show, begin, hides=True)
 
@@ -72,7 +70,7 @@ def frozen_frames(rate: float) -> FaultModel:
     """Repeat the previous image with this probability at each step."""
 
     def update(memory: Tensor, images: Tensor, sample: Sample) -> Tensor:
-        return freeze(images, memory, sample(1)[:, 0] < rate)
+        return torch.where((sample(1)[:, 0] < rate)[..., None, None, None], memory, images)
 
     return FaultModel(
         lambda images, memory, _: memory, lambda images, _: images, update, hides=True
@@ -118,17 +116,6 @@ def correlate(noise: Tensor, fresh: Tensor, correlation_time: float) -> Tensor:
     return kept * noise + math.sqrt(1.0 - kept**2) * fresh
 
 
-def add_noise(images: Tensor, strength: float, noise: Tensor) -> Tensor:
-    """Add noise of standard deviation `strength`, clipped at black and white as by a sensor.
-
-    Args:
-        images: Shape (*, C, H, W).
-        strength: Standard deviation.
-        noise: Mean 0 and variance 1. Shape: (*, C, H, W).
-    """
-    return (images + strength * noise).clamp(0.0, 1.0)
-
-
 def blur(images: Tensor, width: float) -> Tensor:
     """Convolve with a Gaussian of this standard deviation in pixels; edges are replicated."""
     if width == 0:
@@ -140,10 +127,7 @@ def blur(images: Tensor, width: float) -> Tensor:
 def gaussian(width: float) -> list[float]:
     """Return samples of a Gaussian at whole pixels up to four deviations from its centre; sum 1.
 
-    Below a width of 0.6 the samples have a smaller deviation than the Gaussian.
-
-    Args:
-        width: Standard deviation, pixels; above 0.
+    Below a deviation of 0.6 pixels the samples have a smaller one than the Gaussian.
     """
     radius = math.ceil(4 * width)
     samples = [math.exp(-0.5 * (x / width) ** 2) for x in range(-radius, radius + 1)]
@@ -162,12 +146,7 @@ def _convolved(images: Tensor, weights: list[float], dim: int) -> Tensor:
 
 
 def shift(images: Tensor, by: Tensor) -> Tensor:
-    """Shift images, replicating the edges.
-
-    Args:
-        images: Shape (*, C, H, W).
-        by: Pixels down and to the right. Shape: (*, 2), int64.
-    """
+    """Shift images, replicating the edges, by pixels down and to the right, (*, 2), int64."""
     for dim, far in ((-2, by[..., :1]), (-1, by[..., 1:])):
         size = images.shape[dim]
         there = torch.arange(size, device=images.device)
@@ -175,26 +154,3 @@ def shift(images: Tensor, by: Tensor) -> Tensor:
         rows = rows[..., None] if dim == -2 else rows[..., None, :]
         images = images.gather(dim, rows.expand(images.shape))
     return images
-
-
-def choose_rows(numbers: Tensor, count: int) -> Tensor:
-    """Choose the rows with the smallest numbers, so that a greater count adds rows.
-
-    Args:
-        numbers: Independent numbers. Shape: (*, H).
-        count: Number of rows.
-
-    Returns:
-        Shape: (*, H), bool.
-    """
-    return numbers.argsort(dim=-1).argsort(dim=-1) < count
-
-
-def kill_rows(images: Tensor, dead: Tensor, level: float = 0.0) -> Tensor:
-    """Set the dead rows, of shape (*, H), bool, to a level."""
-    return torch.where(dead[..., None, :, None], level, images)
-
-
-def freeze(images: Tensor, before: Tensor, is_frozen: Tensor) -> Tensor:
-    """Return `before` where frames are frozen, else `images`. Shape of is_frozen: (*), bool."""
-    return torch.where(is_frozen[..., None, None, None], before, images)

@@ -40,9 +40,9 @@ def test_a_step_of_noise_by_hand():
 def test_noise_is_cut_off_at_black_and_white():
     pictures = torch.tensor([0.1, 0.5, 0.9]).reshape(1, 1, 3)
     noise = torch.tensor([-1.0, 0.5, 1.0]).reshape(1, 1, 3)
-    noisy = fault_models.add_noise(pictures, 0.2, noise)
+    noisy = fault_models.noise(0.2).show(pictures, noise, 0.0)
     torch.testing.assert_close(noisy.flatten(), torch.tensor([0.0, 0.6, 1.0]))
-    assert torch.equal(fault_models.add_noise(pictures, 0.0, noise), pictures)
+    assert torch.equal(fault_models.noise(0.0).show(pictures, noise, 0.0), pictures)
 
 
 @pytest.mark.parametrize("width", [0.3, 0.5, 2.0])
@@ -85,27 +85,36 @@ def test_a_picture_is_blurred_the_same_in_a_batch_of_any_size():
         assert torch.equal(fault_models.blur(pictures[i : i + 1], 1.3)[0], together[i])
 
 
+def drawn(*values):
+    """A source that always gives the same numbers."""
+    return lambda *shape, normal=False: torch.tensor(values)
+
+
 def test_more_dead_rows_include_fewer():
-    numbers = torch.tensor([[0.4, 0.1, 0.9, 0.3], [0.2, 0.3, 0.1, 0.8]])
-    chosen = [fault_models.choose_rows(numbers, count).int().tolist() for count in range(5)]
+    sample = drawn([0.4, 0.1, 0.9, 0.3], [0.2, 0.3, 0.1, 0.8])
+    images = torch.zeros(2, 1, 4, 3)
+    models = [fault_models.dead_rows(count) for count in range(5)]
+    chosen = [model.begin(images, sample).int().tolist() for model in models]
     assert chosen[0] == [[0, 0, 0, 0], [0, 0, 0, 0]]
     assert chosen[1] == [[0, 1, 0, 0], [0, 0, 1, 0]]
     assert chosen[2] == [[0, 1, 0, 1], [1, 0, 1, 0]]
     assert chosen[4] == [[1, 1, 1, 1], [1, 1, 1, 1]]
+    always = fault_models.dead_rows(1, rows=(2,)).begin(images, sample).int().tolist()
+    assert always == [[0, 1, 1, 0], [1, 0, 1, 0]]
 
 
 def test_dead_rows_show_nothing():
     pictures = torch.full((1, 2, 3, 2), 0.5)
     dead = torch.tensor([[False, True, False]])
-    killed = fault_models.kill_rows(pictures, dead, 0.25)
+    killed = fault_models.dead_rows(1, level=0.25).show(pictures, dead, 0.0)
     assert killed.dtype == torch.float32
     assert killed[0, :, :, 0].tolist() == [[0.5, 0.25, 0.5]] * 2
-    assert fault_models.kill_rows(pictures, dead)[0, 0, 1].tolist() == [0.0, 0.0]
+    assert fault_models.dead_rows(1).show(pictures, dead, 0.0)[0, 0, 1].tolist() == [0.0, 0.0]
 
 
 def test_frozen_pictures_are_those_before():
     now, before = torch.ones(2, 1, 1, 2), torch.zeros(2, 1, 1, 2)
-    shown = fault_models.freeze(now, before, torch.tensor([True, False]))
+    shown = fault_models.frozen_frames(0.5).update(before, now, drawn([0.4], [0.5]))
     assert shown.flatten().tolist() == [0.0, 0.0, 1.0, 1.0]
 
 
