@@ -34,12 +34,9 @@ class DroneEnv(EnvBase):
     Observation "pixels": uint8, shape (num_envs, height, width, 3). The action space is that of the
     dynamics. The nested "info" is the ground truth, see `Worlds.entries`.
 
-    A partial reset renders only the environments that are reset. Environments outside a step's
-    "_step" mask (TorchRL's partial steps) are neither stepped nor rendered and repeat their last
-    image.
-
-    Environment i samples its episodes from its own random stream, so that the first k environments
-    do not depend on the batch size.
+    Partial resets and steps (TorchRL's masks "_reset" and "_step") leave the other environments
+    alone and repeat their last images. Environment i samples its episodes from its own random
+    stream, so that the first k environments do not depend on the batch size.
     """
 
     def __init__(
@@ -148,13 +145,9 @@ class DroneEnv(EnvBase):
         self._render(self._indices(None))
 
     def side_streams(self, worlds: Tensor, *key: int) -> list[np.random.Generator]:
-        """Return further random streams of episodes that have just begun.
+        """Return further random streams of episodes that have just begun, for the purpose `key`.
 
-        They leave the task's own streams unchanged.
-
-        Args:
-            worlds: Indices. Shape: (k,).
-            key: Distinguishes the purposes.
+        They leave the task's own streams unchanged. `worlds` are indices, (k,).
         """
         return [side_stream(self._random_states[i], *key) for i in worlds.tolist()]
 
@@ -196,14 +189,11 @@ class DroneEnv(EnvBase):
         worlds = self._indices(mask)
         self.start(worlds)
         self._render(worlds)
-        return self._observe({name: self._false() for name in _DONE_KEYS})
+        running = torch.zeros(*self.batch_size, 1, dtype=torch.bool, device=self.device)
+        return self._observe({name: running.clone() for name in _DONE_KEYS})
 
     def start(self, worlds: Tensor | None = None) -> None:
-        """Start episodes without rendering.
-
-        Args:
-            worlds: Indices; all by default. Shape: (k,).
-        """
+        """Start episodes without rendering, by default all. Indices: (k,)."""
         worlds = self._indices(None) if worlds is None else worlds
         random_states = [self._random_states[i] for i in worlds.tolist()]
         self.looks.reset(worlds, random_states)
@@ -242,9 +232,6 @@ class DroneEnv(EnvBase):
             return torch.arange(self.batch_size[0], device=self.device)
         return mask.reshape(self.batch_size).nonzero()[:, 0]
 
-    def _false(self) -> Tensor:
-        return torch.zeros(*self.batch_size, 1, dtype=torch.bool, device=self.device)
-
 
 _DONE_KEYS = ("done", "terminated", "truncated")
 
@@ -258,9 +245,8 @@ def worlds_of(env: EnvBase) -> Worlds:
 def _action_spec(entry: Entry, num_envs: int) -> TensorSpec:
     """Return the batched spec of an action; whole numbers are indices of discrete actions."""
     if entry.dtype == torch.int64 and entry.high is not None:
-        return Categorical(
-            int(entry.high) + 1, shape=torch.Size((num_envs, *entry.shape)), dtype=torch.int64
-        )
+        shape = torch.Size((num_envs, *entry.shape))
+        return Categorical(int(entry.high) + 1, shape=shape, dtype=torch.int64)
     return _spec(entry, num_envs)
 
 

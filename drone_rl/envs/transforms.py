@@ -204,11 +204,7 @@ def with_transforms(env: EnvBase, transforms: Sequence[Transform] = ()) -> Trans
 
 
 def on_pixels(transforms: Iterable[Transform]) -> Callable[[Tensor], Tensor]:
-    """Return a function that applies transforms to images without an environment.
-
-    Args:
-        transforms: In order; those that don't read "pixels" are left out.
-    """
+    """Return a function that applies transforms of "pixels" to images without an environment."""
     of_images = [transform for transform in transforms if "pixels" in (transform.in_keys or [])]
 
     def apply(images: Tensor) -> Tensor:
@@ -220,12 +216,7 @@ def on_pixels(transforms: Iterable[Transform]) -> Callable[[Tensor], Tensor]:
 
 
 def without_identities(transforms: Iterable[Transform], images: Tensor) -> list[Transform]:
-    """Leave out each resize to the size that images already have.
-
-    Args:
-        transforms: In order.
-        images: Any that the first transform can process.
-    """
+    """Leave out each resize to the size that images already have; `images` are an example."""
     kept: list[Transform] = []
     for transform in transforms:
         before, images = images, transform._apply_transform(images)
@@ -240,12 +231,7 @@ def memory_of(transforms: Iterable[Transform]) -> int:
 
 
 def see_film(transforms: Iterable[Transform], film: Sequence[Tensor]) -> Tensor:
-    """Apply transforms to the last of consecutive images, with frame stacking.
-
-    Args:
-        transforms: Image transforms, in order.
-        film: Consecutive images; the first is repeated if a stack needs more.
-    """
+    """Apply transforms to the last of consecutive images; stacks repeat the first if needed."""
     for transform in transforms:
         if isinstance(transform, CatFrames):
             shown = film[-transform.N :]

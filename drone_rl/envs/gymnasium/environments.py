@@ -127,10 +127,8 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Render each drone from behind, (360, 640, 3), if `render_mode` is set."""
-        if self.render_mode is None:
-            gymnasium.logger.warn("render() needs render_mode='rgb_array' at creation")
-            return None
-        return tuple(self.batch.film())
+        film = self.batch.film()
+        return None if film is None else tuple(film)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the renderer."""
@@ -273,10 +271,8 @@ class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
 
     def render(self) -> NDArray[np.uint8] | None:
         """Render the drone from behind, (360, 640, 3), if `render_mode` is set."""
-        if self.render_mode is None:
-            gymnasium.logger.warn("render() needs render_mode='rgb_array' at creation")
-            return None
-        return self.batch.film()[0]
+        film = self.batch.film()
+        return None if film is None else film[0]
 
     def close(self) -> None:
         """Close the renderer."""

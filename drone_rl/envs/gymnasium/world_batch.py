@@ -1,9 +1,10 @@
-"""A batch of worlds with NumPy arrays and Gymnasium spaces, for both environment classes."""
+"""Environments with NumPy arrays and Gymnasium spaces, for both Gymnasium classes."""
 
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import gymnasium
 import numpy as np
 import torch
 from gymnasium import spaces
@@ -51,19 +52,12 @@ def action_space(entry: Entry) -> spaces.Space[Any]:
     if entry.dtype != torch.int64:
         return spaces.Box(low, high, entry.shape)
     count = int(high) + 1
-    return spaces.MultiDiscrete(np.full(entry.shape, count)) if entry.shape else _counted(count)
+    space: Any = spaces.MultiDiscrete if entry.shape else spaces.Discrete
+    return space(np.full(entry.shape, count) if entry.shape else count)
 
 
 def read_action(given: Any, actions: Actions, batch: tuple[int, ...] = ()) -> Tensor:
-    """Check and convert an action, or one per world.
-
-    Args:
-        given: The user's action.
-        actions: The action space.
-        batch: Batch shape; () for a single world.
-
-    Returns:
-        Shape: (*batch, *), with the shape of `actions.entry`.
+    """Check and convert an action, or a batch of them. Shape: (*batch, *) of `actions.entry`.
 
     Raises:
         InputError: The action or its shape is invalid.
@@ -83,10 +77,6 @@ def read_action(given: Any, actions: Actions, batch: tuple[int, ...] = ()) -> Te
         text = " ".join(repr(given).split())[:80]
         raise InputError(f"action={text} is invalid; give {many}: {numbers}")
     return torch.as_tensor(array, dtype=entry.dtype)
-
-
-def _counted(count: int) -> spaces.Space[Any]:
-    return spaces.Discrete(count)
 
 
 def _finite_bounds(entry: Entry) -> tuple[float, float]:
@@ -118,13 +108,12 @@ class WorldBatch:
     """Worlds, their observations and their spaces."""
 
     def __init__(self, num_worlds: int, task: Chosen, given: Mapping[str, Any]) -> None:
-        """Create the worlds.
+        """Create the environments.
 
         Args:
             num_worlds: Batch size.
             task: The task.
-            given: `GymnasiumSettings` (camera, dynamics and actions also as mappings of some
-                settings) and settings of the task.
+            given: `GymnasiumSettings`, whose parts may be mappings, and settings of the task.
 
         Raises:
             InputError: An option or setting is unknown or out of range.
@@ -160,12 +149,7 @@ class WorldBatch:
         self.action_space = action_space(self.worlds.dynamics.actions.entry)
 
     def reset(self, worlds: Tensor, generators: Sequence[np.random.Generator]) -> None:
-        """Start new episodes.
-
-        Args:
-            worlds: Indices. Shape: (k,).
-            generators: Random generator of each of these worlds.
-        """
+        """Start new episodes in environments, shape (k,), each from its random generator."""
         # both objects share one bit generator
         streams = [np.random.RandomState(generator.bit_generator) for generator in generators]
         self.worlds.reset(worlds, streams)
@@ -190,19 +174,20 @@ class WorldBatch:
         return terminated.cpu().numpy(), truncated.cpu().numpy()
 
     def info(self, state: State | None = None) -> dict[str, NDArray[Any]]:
-        """Return the ground truth of all worlds, or of those in `state`.
+        """Return `Worlds.info` with a scalar "end_reason", and "is_success". (num_worlds, *).
 
-        It has the entries of `Worlds.entries`, with "end_reason" as one number per world, and
-        "is_success". Unknown values are 0, since Gymnasium's checker rejects NaN.
-        Shapes: (num_worlds, *).
+        Unknown values are 0, since Gymnasium's checker rejects NaN.
         """
         truth = self.worlds.info(state)
         info = {name: value.nan_to_num().cpu().numpy() for name, value in truth.items()}
         info[END] = info[END][:, 0]
         return {**info, "is_success": info[END] == self.worlds.task.success_end}
 
-    def film(self) -> NDArray[np.uint8]:
-        """Render the drones from behind. Shape: (num_worlds, FILM_HEIGHT, FILM_WIDTH, 3)."""
+    def film(self) -> NDArray[np.uint8] | None:
+        """Render the drones from behind; warn without `render_mode`. (num_worlds, 360, 640, 3)."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() needs render_mode='rgb_array' at creation")
+            return None
         worlds = self.worlds
         view = worlds.view(CHASE.name, height=FILM_HEIGHT, width=FILM_WIDTH, show_drone=True)
         return worlds.render(worlds.state, view).cpu().numpy()

@@ -3,7 +3,7 @@
 Stable-Baselines3 accepts single Gymnasium environments only, which it steps one after the other.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -46,9 +46,7 @@ class Sb3Worlds(VecEnv):
         if any(isinstance(transform, Stack) for transform in transforms):
             raise InputError("transforms stack frames; use Stable-Baselines3's VecFrameStack")
         if strange := [t.name for t in transforms if isinstance(t, Fault)]:
-            raise InputError(
-                f"the transform {strange[0]} needs a TorchRL environment; leave it out here"
-            )
+            raise InputError(f"the transform {strange[0]} needs a TorchRL environment; omit it")
         self.env = env
         self._look = on_pixels([transform.make() for transform in transforms])
         self._actions: NDArray[Any] = np.zeros(env.num_envs, np.int64)
@@ -63,8 +61,7 @@ class Sb3Worlds(VecEnv):
         if any(self._options):
             raise InputError("reset takes no options; set none")
         seen, info = self.env.reset(seed=self._seeds)  # pyright: ignore[reportArgumentType] (one a world, as SyncVectorEnv)
-        everywhere = range(self.num_envs)
-        self.reset_infos = [_of_world(info, i) for i in everywhere]
+        self.reset_infos = [_of_world(info, i) for i in range(self.num_envs)]
         self._reset_seeds()
         return self._seen(seen)
 
@@ -103,7 +100,7 @@ class Sb3Worlds(VecEnv):
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """Return an attribute of the vector environment, repeated for each environment."""
-        return [getattr(self.env, attr_name) for _ in self._worlds(indices)]
+        return [getattr(self.env, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Raise an error: the environments have no own attributes."""
@@ -119,13 +116,10 @@ class Sb3Worlds(VecEnv):
         self, wrapper_class: type[Wrapper], indices: VecEnvIndices = None
     ) -> list[bool]:
         """Return False for each environment."""
-        return [False for _ in self._worlds(indices)]
+        return [False for _ in self._get_indices(indices)]
 
-    def _worlds(self, indices: VecEnvIndices) -> Iterable[int]:
-        return self._get_indices(indices)
-
-    def _seen(self, pictures: NDArray[Any]) -> NDArray[Any]:
-        return self._look(torch.from_numpy(pictures)).numpy()
+    def _seen(self, images: NDArray[Any]) -> NDArray[Any]:
+        return self._look(torch.from_numpy(images)).numpy()
 
 
 def _of_world(info: dict[str, Any], world: int) -> dict[str, Any]:

@@ -69,7 +69,7 @@ def place_in_view(
     """Return random positions in view of a camera, uniform over the image's columns.
 
     Args:
-        draw: Numbers in [0, 1): how far ahead, and which column. Shape: (*, 2).
+        draw: Numbers in [0, 1) for distance and column. Shape: (*, 2).
         camera: The policy's.
         nearest: Metres ahead at least.
         farthest: Metres ahead at most, or less where that is too far aside.

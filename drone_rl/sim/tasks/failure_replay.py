@@ -1,4 +1,4 @@
-"""Cube collection with episodes that begin where somebody wants them to."""
+"""Cube collection with episodes in given boxes of placements."""
 
 import numpy as np
 import torch
@@ -11,20 +11,18 @@ from drone_rl.utils.errors import InputError
 
 
 class FailureReplayTask(CollectCubes):
-    """The same task, but a share of its episodes have their cubes in given boxes.
+    """The same task, but a fraction of its episodes have their cubes in given boxes.
 
-    Which ones, which box, and where in it, is drawn from the world's own stream, and the same
-    numbers are drawn for every episode: a world that goes on from a saved stream goes on alike.
+    Every episode samples as many numbers from the environment's stream, so that resuming is exact.
     """
 
     def __init__(self, settings: TaskSettings, boxes: NDArray[np.float64], share: float) -> None:
-        """Takes the boxes.
+        """Take the boxes.
 
         Args:
             settings: The task's.
-            boxes: Sideways places of the cubes, the lower and upper end for each, metres to the
-                left of the start; each box is drawn as often. Shape: (N, num_cubes, 2).
-            share: Of the episodes, 0 to 1.
+            boxes: Lowest and highest y of each cube, metres. Shape: (N, num_cubes, 2).
+            share: Fraction of episodes in boxes, 0 to 1; boxes are equally likely.
 
         Raises:
             InputError: There is no box, or one is not within the task's bounds.
@@ -36,17 +34,13 @@ class FailureReplayTask(CollectCubes):
                 f"boxes of shape {boxes.shape} are none to draw {settings.num_cubes} cubes from; "
                 f"give at least one, of shape (N, {settings.num_cubes}, 2)"
             )
-        if not (boxes[..., 0] <= boxes[..., 1]).all() or np.abs(boxes).max() > self.bound:
-            raise InputError(f"boxes reach beyond {self.bound} m to either side; give such within")
+        bound = settings.lateral_bound
+        if not (boxes[..., 0] <= boxes[..., 1]).all() or np.abs(boxes).max() > bound:
+            raise InputError(f"boxes reach beyond {bound} m to either side; give such within")
         self.boxes, self.share = boxes, share
 
-    @property
-    def bound(self) -> float:
-        """Metres to either side within which cubes are placed."""
-        return self.settings.lateral_bound
-
     def draw(self, random_state: np.random.RandomState) -> Tensor:
-        """Places of the cubes. Shape: (num_cubes, 3)."""
+        """Sample the positions of the cubes. Shape: (num_cubes, 3)."""
         cubes = super().draw(random_state)
         chance, which, *parts = random_state.uniform(size=2 + len(cubes))
         if chance < self.share:
@@ -56,11 +50,5 @@ class FailureReplayTask(CollectCubes):
 
 
 def inflated(boxes: NDArray[np.float64], metres: float, bound: float) -> NDArray[np.float64]:
-    """Boxes that reach farther on every side, though not beyond the placements.
-
-    Args:
-        boxes: Shape: (N, num_cubes, 2), metres.
-        metres: How much farther.
-        bound: Cubes are placed up to so many metres to either side.
-    """
+    """Return boxes, (N, num_cubes, 2), extended by metres at both ends, clipped to the bound."""
     return np.clip(boxes + np.array([-metres, metres]), -bound, bound)

@@ -1,8 +1,7 @@
-"""Lanes through a field of pillars: draw fields that can be crossed, and plan the way through.
+"""Lanes through a field of pillars: sample fields that can be crossed, and plan the path.
 
 A drone that moves in steps is always in one of finitely many lanes, a step apart. Between two rows
-there is room to change to any lane, so a field can be crossed if, and only if, each of its rows
-leaves a lane open.
+it can change to any lane, so a field can be crossed if and only if each row leaves a lane open.
 """
 
 import numpy as np
@@ -57,12 +56,8 @@ class Lanes:
     def seen_from(self, rows: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
         """Return lanes relative to drones, and which of them are open and within the field.
 
-        Args:
-            rows: The y of the pillars. Shape: (N, R, K).
-            y: Of the drones. Shape: (N,).
-
-        Returns:
-            Metres to the left of the drone, (N, L); whether open, (N, R, L).
+        The y of pillars, (N, R, K), and of drones, (N,), to metres to the left of the drone,
+        (N, L), and whether open, (N, R, L).
         """
         step, edge = self.settings.step_length, self.settings.spread + 1e-9
         count = int(2.0 * edge / step) + 1
@@ -75,12 +70,8 @@ class Lanes:
     def nearest(self, rows: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
         """Find the nearest open lane of rows; of two, that whose gap's middle is nearer.
 
-        Args:
-            rows: The y of their pillars. Shape: (n, K).
-            y: Of the drones. Shape: (n,).
-
-        Returns:
-            Metres to its left, and the width of its gap. Two of shape (n,).
+        The y of pillars, (n, K), and of drones, (n,), to metres to the left, (n,), and the width of
+        the gap, (n,).
         """
         turns, is_open = self.seen_from(rows[:, None], y)
         left, right = self._gap(rows, y[:, None] + turns)
@@ -100,16 +91,10 @@ class Lanes:
         return left, right
 
     def first_turn(self, rows: Tensor, y: Tensor, next_row: Tensor) -> Tensor:
-        """Plan the way through all rows with the fewest turns, by Bellman's recursion over rows.
+        """Plan the path through all rows with the fewest turns, by Bellman's recursion over rows.
 
-        Args:
-            rows: The y of the pillars. Shape: (N, R, K).
-            y: Of the drones. Shape: (N,).
-            next_row: Index of the first row that is ahead. Shape: (N,).
-
-        Returns:
-            Metres to turn left before the next row; 0 where no row is left or none can be crossed.
-            Shape: (N,).
+        The y of pillars, (N, R, K), and of drones, (N,), and the index of the first row ahead,
+        (N,), to metres to turn left before it, (N,); 0 if no row is left or none can be crossed.
         """
         turns, is_open = self.seen_from(rows, y)
         between = (turns[:, :, None] - turns[:, None]).abs()
@@ -127,15 +112,9 @@ class Lanes:
         return torch.where(is_known, turn, 0.0)
 
     def fly_through(self, drone: Tensor, rows: Tensor, next_row: Tensor) -> Tensor:
-        """Return the oracle's moves: turn between rows, fly straight through them.
+        """Return the oracle's moves, (N,): turn between rows, fly straight through them.
 
-        Args:
-            drone: Position. Shape: (N, 3).
-            rows: The y of the pillars. Shape: (N, R, K).
-            next_row: Index of the first row that is not passed, R if there is none. Shape: (N, 1).
-
-        Returns:
-            Shape: (N,).
+        Positions, (N, 3), the y of pillars, (N, R, K), the first row not passed or R, (N, 1).
         """
         s, x, y = self.settings, drone[:, 0].double(), drone[:, 1].double()
         ahead = s.first_distance + s.spacing * next_row[:, 0] - x
@@ -152,13 +131,8 @@ class Lanes:
 def nearest_pillar(rows: Tensor, y: Tensor, next_row: Tensor) -> Tensor:
     """Return the standing pillar of the next row that is nearest to a drone's lane.
 
-    Args:
-        rows: The y of the pillars; infinite where none stands. Shape: (N, R, K).
-        y: Of the drones. Shape: (N,).
-        next_row: Index of the first row that is not passed, R if there is none. Shape: (N,).
-
-    Returns:
-        Index among all pillars; their number if there is none. Shape: (N,).
+    The y of pillars, (N, R, K), infinite where none stands, and of drones, (N,), and the first row
+    not passed or R, (N,), to an index among all pillars, their number if there is none, (N,).
     """
     env, (_, count, size) = torch.arange(len(rows), device=rows.device), rows.shape
     aside = (rows[env, next_row.clamp(max=count - 1)] - y[:, None]).abs()
@@ -167,19 +141,10 @@ def nearest_pillar(rows: Tensor, y: Tensor, next_row: Tensor) -> Tensor:
 
 
 def meets(touch: float, before: Tensor, now: Tensor, pillars: Tensor) -> Tensor:
-    """Return whether drones that fly straight from one position to another touch pillars.
+    """Return whether drones that fly straight between positions, (N, 3), touch pillars, (N, P, 3).
 
-    A drone touches a pillar where its centre is within a square around the pillar's; its path
-    enters all slabs of that square before it leaves any.
-
-    Args:
-        touch: Half the edge of that square, metres.
-        before: Metres. Shape: (N, 3).
-        now: Shape: (N, 3).
-        pillars: Shape: (N, P, 3).
-
-    Returns:
-        Shape: (N, P).
+    A drone touches a pillar if its centre is at most `touch` metres away along both axes. Its path
+    enters all slabs of that square before it leaves any. Shape: (N, P).
     """
     away, way = pillars[..., :2] - before[:, None, :2], (now - before)[:, None, :2]
     is_still = way == 0

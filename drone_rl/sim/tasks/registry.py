@@ -18,14 +18,10 @@ MAKERS: dict[type[BaseTaskSettings], Callable[[Any], Task[Any]]] = {
 
 
 def register_task(settings: type[BaseTaskSettings], make: Callable[[Any], Task[Any]]) -> None:
-    """Makes a task known, to files too.
-
-    Args:
-        settings: The class of its settings, whose `name` files give.
-        make: Takes such settings.
+    """Register a task by the class of its settings and a function that takes such settings.
 
     Raises:
-        InputError: Another one has its name.
+        InputError: Another task has its name.
     """
     if TASKS.get(settings.name, settings) is not settings:
         raise InputError(f"there is a task called {settings.name}; give another name")
@@ -33,10 +29,10 @@ def register_task(settings: type[BaseTaskSettings], make: Callable[[Any], Task[A
 
 
 def as_task(task: BaseTaskSettings | Task[Any] | str | None) -> Task[Any]:
-    """The task of some settings, or of a name such as "pillars"; the original study's by default.
+    """Return the task of settings or of a name such as "pillars"; cube collection by default.
 
     Raises:
-        InputError: Nothing is known to make it.
+        InputError: The task is unknown.
     """
     task = TaskSettings() if task is None else task
     if isinstance(task, str):

@@ -197,10 +197,7 @@ class Task(abc.ABC, Generic[S]):
         return ComputerVision()
 
     def make_props(self) -> Sequence[Prop]:
-        """Return new entities for all that the scene holds besides field and drone.
-
-        Their frames are mocap bodies, positioned by `places`.
-        """
+        """Return new entities besides field and drone, positioned by `places`."""
         return ()
 
     @abc.abstractmethod
@@ -248,22 +245,14 @@ class Task(abc.ABC, Generic[S]):
         return {"drawn": drawn.float(), "end_reason": state.end_reason[:, None].clone()}
 
     def score(self, info: Mapping[str, Tensor]) -> Goals:
-        """Return what became of the goals.
-
-        Args:
-            info: The entries `scored` at the ends of episodes. Shapes: (n, *).
-        """
+        """Return the goals from the entries `scored` at the ends of episodes. Shapes: (n, *)."""
         is_reached = info["end_reason"] == self.success_end
         return Goals(is_reached, is_reached.long() * 0, info["drawn"].flatten(1).double())
 
     def classes(self, goals: Any) -> Iterator[tuple[str, str, Tensor]]:
-        """Yield the classes of goals that failure tables count: by stratum.
+        """Yield the classes of goals, from `score`, that failure tables count: by stratum.
 
-        Args:
-            goals: From `score`.
-
-        Yields:
-            Name of the property, its value, and which goals have it: bool, shape (n, C).
+        Each is the name of a property, its value, and which goals have it: bool, shape (n, C).
         """
         for number, stratum in enumerate(self.strata):
             yield "side", stratum, goals.stratum == number
