@@ -81,16 +81,18 @@ class ComposerTask(composer.Task):
         self._arena = Field()
         model: Any = self._arena.mjcf_model
         model.option.gravity = (0, 0, 0)
-        self._drone = Drone(size=self.rules.drone_size, camera=self.camera)
-        self._arena.add_free_entity(self._drone)
+        self.drone = Drone(size=self.rules.drone_size, camera=self.camera)
+        """The drone's entity."""
+        self._arena.add_free_entity(self.drone)
         self._props = [*self.rules.make_props(), *make_distractors(distractors)]
         self._frames = [self._arena.attach(prop) for prop in self._props]
         for frame in self._frames:
             frame.mocap = True
         self._flight = self._make_flight()
         self._begin(np.random.RandomState(0))
-        self._pixels = self._drone.observables.front_center.enabled = pixels  # pyright: ignore[reportAttributeAccessIssue]
-        self._look: Appearance | None = None
+        self._pixels = self.drone.observables.front_center.enabled = pixels  # pyright: ignore[reportAttributeAccessIssue]
+        self.look: Appearance | None = None
+        """Appearance of the running episode; None for the task's own."""
         if self._looks is not None:
             self._prepare()
         self._task_observables = {
@@ -106,21 +108,6 @@ class ComposerTask(composer.Task):
     def root_entity(self) -> Field:
         """The arena."""
         return self._arena
-
-    @property
-    def drone(self) -> Drone:
-        """The drone."""
-        return self._drone
-
-    @property
-    def state(self) -> State:
-        """State of the running episode, as a batch of one."""
-        return self._state
-
-    @property
-    def look(self) -> Appearance | None:
-        """Appearance of the running episode; None for the task's own."""
-        return self._look
 
     @property
     def task_observables(self) -> dict[str, observable.Generic]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -141,7 +128,7 @@ class ComposerTask(composer.Task):
         physics = mjcf.Physics.from_mjcf_model(self._arena.mjcf_model)
         model = physics.model.ptr
         meanings, props = [SemanticClass.GROUND] * model.ngeom, [-1] * model.ngeom
-        for number, entity in [(-1, self._drone), *enumerate(self._props)]:
+        for number, entity in [(-1, self.drone), *enumerate(self._props)]:
             for geom in physics.bind(entity.mjcf_model.find_all("geom")).element_id:
                 meanings[geom], props[geom] = entity.semantic_class, number
         return Scene(model, tuple(meanings), tuple(props), SKY_COLOR)
@@ -152,12 +139,12 @@ class ComposerTask(composer.Task):
         """Put the drone at its origin and the props where they are sampled."""
         if self._looks is not None:
             self._looks.reset(torch.arange(1), [random_state])
-            self._look = self._looks.drawn() or self._looks.middle
+            self.look = self._looks.drawn() or self._looks.middle
         self._begin(random_state)
         if self._flight is not None:
-            self._flight.begin(physics, self._state.body)
-        if self._look is not None:
-            self._wear(physics, self._look)
+            self._flight.begin(physics, self.state.body)
+        if self.look is not None:
+            self._wear(physics, self.look)
         self._show(physics)
 
     def before_step(
@@ -168,10 +155,10 @@ class ComposerTask(composer.Task):
         given = torch.as_tensor(action).reshape(1, *self.dynamics.actions.entry.shape)
         given = given.to(self.dynamics.actions.entry.dtype)
         if self._flight is not None:
-            self._state.body = self._flight.command(physics, given)
+            self.state.body = self._flight.command(physics, given)
             return
-        around = [self.rules.obstacles(self._state)] if self.dynamics.needs_obstacles else []
-        self._state.body = self.dynamics.step(self._found(physics), given, *around)
+        around = [self.rules.obstacles(self.state)] if self.dynamics.needs_obstacles else []
+        self.state.body = self.dynamics.step(self._found(physics), given, *around)
         self._show(physics)
 
     def before_substep(
@@ -193,7 +180,7 @@ class ComposerTask(composer.Task):
         del random_state
         flight = self._flight
         body = self._found(physics) if flight is None else flight.finished(physics)
-        self._state, reward = self.rules.judge(self._state, body)
+        self.state, reward = self.rules.judge(self.state, body)
         self._reward = float(reward)
         self._show(physics)
         physics.forward()  # what is observed next must not show things that have just vanished
@@ -206,24 +193,25 @@ class ComposerTask(composer.Task):
     def should_terminate_episode(self, physics: mjcf.Physics) -> bool:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return whether the episode has ended."""
         del physics
-        return int(self._state.end_reason) != 0
+        return int(self.state.end_reason) != 0
 
     def get_discount(self, physics: mjcf.Physics) -> float:
         """Return 0 if the episode terminated, else 1."""
         del physics
-        return 1.0 if int(self._state.end_reason) in (0, self.rules.truncation) else 0.0
+        return 1.0 if int(self.state.end_reason) in (0, self.rules.truncation) else 0.0
 
     def _begin(self, random_state: np.random.RandomState) -> None:
         origin = torch.tensor([self.rules.origin], dtype=torch.float64)
         drawn = self.rules.draw(random_state)
         seeds = [draw_seeds([random_state])] if self.dynamics.is_random else []
-        self._state = self.rules.start(drawn[None], self.dynamics.start(origin, *seeds))
+        self.state: State = self.rules.start(drawn[None], self.dynamics.start(origin, *seeds))
+        """State of the running episode, as a batch of one."""
         self._reward = 0.0
 
     def _found(self, physics: mjcf.Physics) -> BodyState:
         """Return the drone at MuJoCo's pose, which users may have set."""
-        body = self._state.body
-        pose = [torch.from_numpy(np.array(p))[None] for p in self._drone.get_pose(physics)]
+        body = self.state.body
+        pose = [torch.from_numpy(np.array(p))[None] for p in self.drone.get_pose(physics)]
         if torch.equal(pose[0], body.position) and _is_same_turn(pose[1], self._shown(body)):
             return body
         return body.moved(*pose)
@@ -234,12 +222,12 @@ class ComposerTask(composer.Task):
 
     def _show(self, physics: mjcf.Physics) -> None:
         """Set the poses of the drone and the props."""
-        body = self._state.body
+        body = self.state.body
         if self._flight is None:
-            self._drone.set_pose(physics, body.position[0].numpy(), self._shown(body)[0].numpy())
-        places = self.rules.places(self._state)[0]
-        if self._look is not None and self._look.distractors is not None:
-            places = torch.cat([places, self._look.distractors.expand(1).places[0]])
+            self.drone.set_pose(physics, body.position[0].numpy(), self._shown(body)[0].numpy())
+        places = self.rules.places(self.state)[0]
+        if self.look is not None and self.look.distractors is not None:
+            places = torch.cat([places, self.look.distractors.expand(1).places[0]])
         for frame, place in zip(self._frames, places, strict=True):
             physics.bind(frame).mocap_pos = place.numpy()
 
@@ -248,13 +236,13 @@ class ComposerTask(composer.Task):
         if not isinstance(self.dynamics, Quadrotor):
             return None
         solid = [p.mjcf_model for p in self._props if p.semantic_class == SemanticClass.OBSTACLE]
-        return MujocoFlight(self.dynamics, self._arena, self._drone, solid)
+        return MujocoFlight(self.dynamics, self._arena, self.drone, solid)
 
     def _prepare(self) -> None:
         """Allocate textures, and enable the camera's rendering flags and fog."""
         root: Any = self._arena.mjcf_model
         opengl.prepare(root)
-        camera = self._drone.observables.front_center  # pyright: ignore[reportAttributeAccessIssue]
+        camera = self.drone.observables.front_center  # pyright: ignore[reportAttributeAccessIssue]
         camera.render_flag_overrides = opengl.RENDER_FLAGS
         camera.corruptor = self._in_fog
 
@@ -269,18 +257,18 @@ class ComposerTask(composer.Task):
     def _in_fog(self, picture: np.ndarray, random_state: np.random.RandomState) -> np.ndarray:
         """Return the image with fog."""
         del random_state
-        if self._look is None or self._look.fog is None:
+        if self.look is None or self.look.fog is None:
             return picture
-        model, camera = self._physics.model, self._drone.front_center.full_identifier
+        model, camera = self._physics.model, self.drone.front_center.full_identifier
         number = model.name2id(camera, "camera")
         height, width = picture.shape[:2]
         option = hide_drone()
         depth = self._physics.render(height, width, number, depth=True, scene_option=option)
         fovy = float(model.cam_fovy[number])
-        return opengl.apply_fog(picture, depth, self._look, fovy, _SKY)
+        return opengl.apply_fog(picture, depth, self.look, fovy, _SKY)
 
     def _read(self, name: str) -> np.ndarray:
-        return self.rules.info(self._state)[name][0].numpy()
+        return self.rules.info(self.state)[name][0].numpy()
 
 
 def _is_same_turn(one: torch.Tensor, other: torch.Tensor) -> bool:

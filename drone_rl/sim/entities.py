@@ -51,10 +51,7 @@ CHASE = CameraSpec("chase", (-7.0, 0, 3.5), (0, -1, 0, 0.34, 0, 0.94))
 
 
 def find_camera(name: str | int) -> CameraSpec:
-    """Return a camera by AirSim's name or number.
-
-    Args:
-        name: Such as "back_center", "4" or 4; "" and "fpv" mean the front camera.
+    """Return a camera by AirSim's name or number; "" and "fpv" mean the front camera.
 
     Raises:
         InputError: There is no such camera.
@@ -88,20 +85,11 @@ class Field(composer.Arena):
         root.visual.rgba.haze = (*SKY_COLOR, 1.0)
         sky = {"rgb1": SKY_COLOR, "rgb2": SKY_COLOR, "width": 8, "height": 48}
         root.asset.add("texture", name="sky", type="skybox", builtin="flat", **sky)
-        root.worldbody.add(
-            "geom", name="floor", type="plane", size=FLOOR_SIZE, rgba=(*FLOOR_COLOR, 1.0)
-        )
-        root.worldbody.add(
-            "light",
-            name="sun",
-            directional=True,
-            pos=(0, 0, 50),
-            dir=(0.35, -0.45, -0.82),
-            ambient=(0.35,) * 3,
-            diffuse=(0.75,) * 3,
-            specular=(0, 0, 0),
-            castshadow=False,
-        )
+        floor = {"type": "plane", "size": FLOOR_SIZE, "rgba": (*FLOOR_COLOR, 1.0)}
+        root.worldbody.add("geom", name="floor", **floor)
+        sun = {"directional": True, "pos": (0, 0, 50), "dir": (0.35, -0.45, -0.82)}
+        light = {"ambient": (0.35,) * 3, "diffuse": (0.75,) * 3, "specular": (0, 0, 0)}
+        root.worldbody.add("light", name="sun", castshadow=False, **sun, **light)
 
 
 class VisualEntity(composer.Entity):
@@ -110,20 +98,9 @@ class VisualEntity(composer.Entity):
     semantic_class: SemanticClass
 
     def _add_geom(
-        self,
-        kind: str,
-        size: tuple[float, ...],
-        color: tuple[float, float, float],
-        name: str,
+        self, kind: str, size: tuple[float, ...], color: tuple[float, float, float], name: str
     ) -> None:
-        """Make the geom.
-
-        Args:
-            kind: MuJoCo's type of the geom.
-            size: MuJoCo's size, metres.
-            color: Red, green, blue in [0, 1].
-            name: Prefix of its elements in the arena's model.
-        """
+        """Add a geom of MuJoCo's type and size; `color` is RGB in [0, 1]."""
         self._mjcf_root: Any = mjcf.RootElement(model=name)
         shape = {"type": kind, "size": size, "rgba": (*color, 1.0)}
         self._geom = self._mjcf_root.worldbody.add(
@@ -207,32 +184,19 @@ class Drone(composer.Entity):
     semantic_class = SemanticClass.DRONE
 
     def _build(self, size: float, camera: CameraSettings, name: str = "drone") -> None:
-        """Make the drone.
-
-        Args:
-            size: Edge of its bounding box, metres.
-            camera: Field of view and image size of its cameras.
-            name: Prefix of its elements in the arena's model.
-        """
+        """Make the drone, with a bounding box of so many metres, and its cameras."""
         self.camera_settings = camera
         self._mjcf_root: Any = mjcf.RootElement(model=name)
         self._body = self._mjcf_root.worldbody.add("body", name="body")
-        visual = {"group": BODY_GROUP, "contype": 0, "conaffinity": 0, "mass": 0.0}
-        hull = (size * 0.3, size * 0.18, size * 0.1)
-        self._body.add(
-            "geom", name="hull", type="box", size=hull, rgba=_LIGHT, **{**visual, "mass": _MASS_KG}
-        )
-        for x in (-1, 1):
-            for y in (-1, 1):
-                self._body.add(
-                    "geom",
-                    name=f"rotor_{'front' if x > 0 else 'rear'}_{'left' if y > 0 else 'right'}",
-                    type="cylinder",
-                    pos=(x * size * 0.3, y * size * 0.3, size * 0.12),
-                    size=(size * 0.2, size * 0.02),
-                    rgba=_DARK,
-                    **visual,
-                )
+        visual = {"group": BODY_GROUP, "contype": 0, "conaffinity": 0}
+        hull = {"size": (size * 0.3, size * 0.18, size * 0.1), "mass": _MASS_KG, **visual}
+        self._body.add("geom", name="hull", type="box", rgba=_LIGHT, **hull)
+        rotor = {"size": (size * 0.2, size * 0.02), "mass": 0.0, **visual}
+        for x, end in ((-1, "rear"), (1, "front")):
+            for y, side in ((-1, "right"), (1, "left")):
+                place = (x * size * 0.3, y * size * 0.3, size * 0.12)
+                own = {"name": f"rotor_{end}_{side}", "pos": place, "rgba": _DARK, **rotor}
+                self._body.add("geom", type="cylinder", **own)
         for spec in DRONE_CAMERAS:
             add_camera(self._body, spec, camera.vertical_fov)
         add_camera(self._body, CHASE, vertical_fov=60.0)

@@ -2,13 +2,12 @@
 
 import dataclasses
 import enum
-from typing import Protocol
 
 import torch
 from torch import Tensor
 
 from drone_rl.config import ActionSettings
-from drone_rl.sim.actions import DIRECTIONS, MOVES, Actions
+from drone_rl.sim.actions import DIRECTIONS, MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.dynamics.state import FlightState
 from drone_rl.utils.errors import InputError
@@ -111,19 +110,6 @@ def rotor_goals(rotors: Tensor) -> Goals:
     return Goals((Mode.ROTOR, Mode.ROTOR, Mode.ROTOR, Mode.ROTOR), rotors)
 
 
-class Steering(Protocol):
-    """Maps actions to goals of the controllers."""
-
-    @property
-    def actions(self) -> Actions:
-        """The action set."""
-        ...
-
-    def goals(self, body: FlightState, action: Tensor) -> Goals:
-        """Return the goals until the next action. `action`: (num_worlds,), then the entry's."""
-        ...
-
-
 class Moves:
     """The chapter's moves: each shifts the target position along one axis of the world.
 
@@ -142,7 +128,7 @@ class Moves:
         """Speed of the target for each move, metres a second. Shape: (moves, 4)."""
 
     def goals(self, body: FlightState, action: Tensor) -> Goals:
-        """See `Steering`."""
+        """Return the goals until the next action. `action`: (num_worlds,)."""
         place = body.position[:, :2]
         wanted = body.reference.clone()
         wanted[:, :2] = place + (wanted[:, :2] - place).clamp(-self.lead, self.lead)
@@ -159,7 +145,7 @@ class Velocities:
         self.actions = ContinuousActions.of(settings)
 
     def goals(self, body: FlightState, action: Tensor) -> Goals:
-        """See `Steering`."""
+        """Return the goals until the next action. `action`: (num_worlds, 3)."""
         height = body.reference[:, 3:]
         return Goals(self.MODES, torch.cat([self.actions.to_rates(action), height], -1))
 
