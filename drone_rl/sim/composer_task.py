@@ -280,17 +280,12 @@ def make_environment(
     task: BaseTaskSettings | Task[Any] | None = None,
     camera: CameraSettings | None = None,
     *,
-    dynamics: Dynamics | DynamicsSettings | None = None,
-    actions: ActionSettings | None = None,
-    pixels: bool = True,
     random_state: np.random.RandomState | int | None = None,
-    appearance: AppearanceSettings | None = None,
+    **options: Any,
 ) -> composer.Environment:
-    """Return the task as a dm_control environment, for its viewer and users of `dm_env`."""
+    """Return the task as a dm_control environment; `options` are those of `ComposerTask`."""
     return composer.Environment(
-        ComposerTask(
-            task, camera, dynamics=dynamics, actions=actions, pixels=pixels, appearance=appearance
-        ),
+        ComposerTask(task, camera, **options),
         random_state=random_state,
         strip_singleton_obs_buffer_dim=True,
         recompile_mjcf_every_episode=False,

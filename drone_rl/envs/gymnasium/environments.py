@@ -121,8 +121,7 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         final = {}
         if self.mode is AutoresetMode.SAME_STEP and self._ended.any():
             final = self._finish(self._ended)
-        everywhere = np.ones(self.num_envs, bool)
-        info = {**_masked(self.batch.info(), everywhere), **final}
+        info = {**_masked(self.batch.info(), np.ones(self.num_envs, bool)), **final}
         return self.batch.observe(), rewards, *flags, info
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
@@ -140,13 +139,10 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         last = np.full(self.num_envs, None, object)
         for i, seen in zip(np.flatnonzero(ended), self.batch.observe(state), strict=True):
             last[i] = seen
-        info = {}
-        for name, value in self.batch.info(state).items():
-            info[name] = np.zeros((self.num_envs, *value.shape[1:]), value.dtype)
-            info[name][ended] = value
+        info = _masked(self.batch.info(), ended)
         self._start(ended)
         self._ended = np.zeros_like(ended)
-        return _masked({"final_obs": last, "final_info": _masked(info, ended)}, ended)
+        return _masked({"final_obs": last, "final_info": info}, ended)
 
     def _start(self, mask: Mask) -> None:
         worlds = np.flatnonzero(mask)
@@ -183,12 +179,12 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
 
 def _masked(info: Info, mask: Mask) -> Info:
     """Add to each entry the mask of its environments; set the others to 0."""
-    told = {}
+    masked = {}
     for name, value in info.items():
         if isinstance(value, np.ndarray) and value.dtype != object and not mask.all():
             value = np.where(mask.reshape(-1, *[1] * (value.ndim - 1)), value, value.dtype.type(0))
-        told |= {name: value, f"_{name}": mask.copy()}
-    return told
+        masked |= {name: value, f"_{name}": mask.copy()}
+    return masked
 
 
 def _mode(given: AutoresetMode | str) -> AutoresetMode:

@@ -173,13 +173,13 @@ class WorldBatch:
         terminated, truncated = self.worlds.ends()
         return terminated.cpu().numpy(), truncated.cpu().numpy()
 
-    def info(self, state: State | None = None) -> dict[str, NDArray[Any]]:
+    def info(self) -> dict[str, NDArray[Any]]:
         """Return `Worlds.info` with a scalar "end_reason", and "is_success". (num_worlds, *).
 
         Unknown values are 0, since Gymnasium's checker rejects NaN.
         """
-        truth = self.worlds.info(state)
-        info = {name: value.nan_to_num().cpu().numpy() for name, value in truth.items()}
+        truth = self.worlds.info().items()
+        info = {name: value.nan_to_num().cpu().numpy() for name, value in truth}
         info[END] = info[END][:, 0]
         return {**info, "is_success": info[END] == self.worlds.task.success_end}
 

@@ -188,13 +188,9 @@ def make_bounds(settings: TaskSettings) -> Bounds:
 
 
 def launch(kernel: Any, settings: TaskSettings, state: Any, *others: Tensor) -> None:
-    """Run `judge_all` or `start_all` over environments.
+    """Run `judge_all` or `start_all` over environments, with its `others`, shape (N,).
 
-    Args:
-        kernel: Which of the two.
-        settings: Of the task.
-        state: A `WorldState`, of which "collected", "passed", "side" and "lateral" are written.
-        others: The kernel's other arguments. Shape: (N,).
+    Writes "collected", "passed", "side" and "lateral" of a `WorldState`.
     """
     device = state.cubes.device
     start_warp(str(device))
