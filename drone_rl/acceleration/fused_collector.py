@@ -25,7 +25,6 @@ from drone_rl.policies.networks import require_finite
 from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 from drone_rl.sim.rendering.raytrace.renderer import Raytracer
 from drone_rl.sim.rendering.raytrace.structs_kernel import Images
-from drone_rl.sim.tasks.task import FusedRules
 
 _MAX_STEPS = 64
 """Steps of one launch of the kernel; most episodes end within them."""
@@ -49,7 +48,7 @@ class FusedCollector:
         self,
         direct: DirectCollector,
         network: PackedNetwork,
-        worlds: FusedRules,
+        worlds: Any,
         num_threads: int,
     ) -> None:
         """Allocates what the kernel needs; see `try_create`."""

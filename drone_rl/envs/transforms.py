@@ -24,7 +24,7 @@ class PixelTransform(ObservationTransform):
     """A stateless transform of images, applied at reset and at every step."""
 
     def __init__(
-        self, in_keys: Keys = None, out_keys: Keys = None, values: Settings | None = None
+        self, in_keys: Keys = None, out_keys: Keys = None, *, values: Settings | None = None
     ) -> None:
         in_keys = in_keys if in_keys is not None else ["pixels"]
         super().__init__(in_keys=in_keys, out_keys=out_keys or list(in_keys))
@@ -95,13 +95,8 @@ class ChromaticityPixels(PixelTransform):
         InputError: There are not three channels, or the floor is out of range.
     """
 
-    def __init__(
-        self,
-        floor: float = settings.Chromaticity.floor,
-        in_keys: Keys = None,
-        out_keys: Keys = None,
-    ) -> None:
-        super().__init__(in_keys, out_keys, settings.Chromaticity(floor=floor))
+    def __init__(self, floor: float = settings.Chromaticity.floor, **keys: Keys) -> None:
+        super().__init__(values=settings.Chromaticity(floor=floor), **keys)
         self.floor = float(floor)
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
@@ -122,8 +117,8 @@ class CropRows(PixelTransform):
         InputError: The rows are not in the frame.
     """
 
-    def __init__(self, top: int, bottom: int, in_keys: Keys = None, out_keys: Keys = None) -> None:
-        super().__init__(in_keys, out_keys, settings.Crop(top=top, bottom=bottom))
+    def __init__(self, top: int, bottom: int, **keys: Keys) -> None:
+        super().__init__(values=settings.Crop(top=top, bottom=bottom), **keys)
         if not top < bottom:
             raise InputError(f"CropRows({top}, {bottom}) keeps no row; give 0 <= top < bottom")
         self.top, self.bottom = top, bottom
@@ -145,10 +140,8 @@ class Resize(PixelTransform):
         InputError: A size is out of range.
     """
 
-    def __init__(
-        self, *, height: int, width: int, in_keys: Keys = None, out_keys: Keys = None
-    ) -> None:
-        super().__init__(in_keys, out_keys, settings.Resize(height=height, width=width))
+    def __init__(self, *, height: int, width: int, **keys: Keys) -> None:
+        super().__init__(values=settings.Resize(height=height, width=width), **keys)
         self.height, self.width = height, width
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
@@ -172,10 +165,9 @@ class StandardizePixels(PixelTransform):
         self,
         mean: float = settings.Standardize.mean,
         std: float = settings.Standardize.std,
-        in_keys: Keys = None,
-        out_keys: Keys = None,
+        **keys: Keys,
     ) -> None:
-        super().__init__(in_keys, out_keys, settings.Standardize(mean=mean, std=std))
+        super().__init__(values=settings.Standardize(mean=mean, std=std), **keys)
         self.mean, self.std = float(mean), float(std)
 
     def _apply_transform(self, obs: Tensor) -> Tensor:

@@ -162,11 +162,6 @@ class DroneObservables(composer.Observables):
         return observable.MJCFFeature("xpos", self._entity.body)
 
     @composer.observable
-    def orientation(self) -> observable.MJCFFeature:
-        """Attitude quaternion (w, x, y, z), world frame. Shape: (4,)."""
-        return observable.MJCFFeature("xquat", self._entity.body)
-
-    @composer.observable
     def front_center(self) -> observable.MJCFCamera:
         """RGB image of the policy's camera. Shape: (height, width, 3), uint8."""
         camera = self._entity.camera_settings

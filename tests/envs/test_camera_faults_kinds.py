@@ -82,7 +82,7 @@ def test_rows_are_dead_for_an_episode_and_others_in_the_next():
             dead = (shown[t, world, 0] == 0.125).all(-1)
             assert dead.sum() == 2
             for later in range(t, t + 4):
-                expected = fault_models.kill_rows(clean[later, world], dead, 0.125)
+                expected = torch.where(dead[..., None], 0.125, clean[later, world])
                 assert torch.equal(shown[later, world], expected)
             drawn.add(tuple(dead.nonzero().flatten().tolist()))
     assert len(drawn) > 8  # of 18, out of 28 pairs

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.actions import MOVES, Entry, Move
-from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics
+from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.entities import Cube
 from drone_rl.sim.tasks.collect_cubes_kernel import (
     EndReason,
@@ -20,16 +20,14 @@ from drone_rl.sim.tasks.collect_cubes_kernel import (
     start_all,
 )
 from drone_rl.sim.tasks.common import (
-    SIDES,
+    PropTask,
     Side,
-    hide_absent,
     interval_classes,
-    move_left,
     number_classes,
     place_in_view,
     side_of,
 )
-from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State, Task
+from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State
 from drone_rl.sim.vocabulary import CUBES, some_cubes
 
 
@@ -69,7 +67,7 @@ class CubeGoals(Goals):
     """Metres by which each stands higher than the drone."""
 
 
-class CollectCubes(Task[WorldState]):
+class CollectCubes(PropTask[WorldState]):
     """Move until every cube is touched. The reward is 1 a cube."""
 
     name = TaskSettings.name
@@ -78,7 +76,7 @@ class CollectCubes(Task[WorldState]):
     success_end = EndReason.ALL_CUBES
     expected_end = EndReason.FRONT_BOUNDARY
     observed = ("cubes", "collected", "side", "end_reason")
-    strata = SIDES
+    props = "cubes"
     scored = ("collected", "side", "lateral", "cube_positions", "drone")
     remembered = types.MappingProxyType(
         {
@@ -111,10 +109,6 @@ class CollectCubes(Task[WorldState]):
             "end_reason": Entry((1,), torch.int64, 0, len(EndReason) - 1),
             "cube_positions": Entry((cubes, 3), torch.float32),
         }
-
-    def make_dynamics(self) -> ComputerVision:
-        """Return the chapter's three moves (Table 1)."""
-        return ComputerVision(self.settings.step_length)
 
     def make_props(self) -> list[Cube]:
         """Return the cubes, nearest first."""
@@ -166,10 +160,6 @@ class CollectCubes(Task[WorldState]):
         if type(self).judge is CollectCubes.judge and FlyingCubes.supports(dynamics):
             return FlyingCubes(self.settings, dynamics, num_envs)
         return None
-
-    def places(self, state: WorldState) -> Tensor:
-        """Return the cubes' positions; under the floor once vanished."""
-        return hide_absent(state.cubes, state.present)
 
     def info(self, state: WorldState) -> dict[str, Tensor]:
         """See `entries`."""
@@ -293,11 +283,6 @@ class CollectCubes(Task[WorldState]):
     def without_next(self, state: WorldState) -> WorldState:
         """Remove the next cube."""
         return dataclasses.replace(state, passed=state.passed | self._is_next(state))
-
-    def next_moved(self, state: WorldState, metres: Tensor | float) -> WorldState:
-        """Move the next cube to the left."""
-        cubes = move_left(state.cubes, metres, self._is_next(state))
-        return dataclasses.replace(state, cubes=cubes)
 
     def elsewhere(
         self, state: WorldState, camera: CameraSettings, generator: torch.Generator

@@ -253,10 +253,14 @@ def move(flights: Flights, world: int, action: int) -> float:
 
 
 class FlyingCubes:
-    """Arrays of environments, rewritten for each batch of episodes."""
+    """Arrays of environments, rewritten for each batch of episodes; see `Task.fused_rules`.
+
+    The fused kernel reads `flights` (the states) and `poses` (to render), and also `steps` and
+    `end_reasons`.
+    """
 
     functions = (Flights, place, move)
-    """See `FusedRules`."""
+    """Warp structure of the states; functions that write poses and that step an environment."""
 
     def __init__(self, settings: TaskSettings, dynamics: Dynamics, num_envs: int) -> None:
         """Allocate the arrays of at most `num_envs` environments; see `supports`."""
@@ -266,19 +270,16 @@ class FlyingCubes:
         """Taken so far. Shape: (num_envs,)."""
         self.end_reasons = torch.zeros(num_envs, dtype=torch.int32)
         """Shape: (num_envs,)."""
-        self.state = SimpleNamespace(
-            cubes=torch.zeros(*shape, 3, dtype=torch.float64),
-            collected=torch.zeros(shape, dtype=torch.bool),
-            passed=torch.zeros(shape, dtype=torch.bool),
-            side=torch.zeros(shape, dtype=torch.int64),
-            lateral=torch.zeros(shape, dtype=torch.float64),
-        )
-        """The cubes, named as in `WorldState`."""
         cubes, self.flights, self.poses = Cubes(), Flights(), Poses()
         cubes.bounds = make_bounds(settings)
+        self.state = SimpleNamespace(cubes=torch.zeros(*shape, 3, dtype=torch.float64))
+        """The cubes, named as in `WorldState`."""
         cubes.places = wp.from_torch(self.state.cubes, dtype=wp.vec3d)
-        for name in ("collected", "passed", "side", "lateral"):
-            setattr(cubes, name, wp.from_torch(getattr(self.state, name)))
+        kinds = {"collected": torch.bool, "passed": torch.bool, "side": torch.int64}
+        for name, kind in {**kinds, "lateral": torch.float64}.items():
+            values = torch.zeros(shape, dtype=kind)
+            setattr(self.state, name, values)
+            setattr(cubes, name, wp.from_torch(values))
         self.flights.cubes = cubes
         self.flights.drones = wp.from_torch(self._drones, dtype=wp.vec3d)
         self.flights.steps = wp.from_torch(self.steps)

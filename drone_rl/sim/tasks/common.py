@@ -1,32 +1,21 @@
-"""Functions that several tasks use: props out of sight, sides, classes of goals, views."""
+"""Parts that several tasks use: props, sides, classes of goals, views."""
 
+import dataclasses
 import enum
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import torch
 from torch import Tensor
 
 from drone_rl.config import CameraSettings
-from drone_rl.sim.tasks.task import Goals
+from drone_rl.sim.dynamics import ComputerVision
+from drone_rl.sim.tasks.task import Goals, S, Task
 from drone_rl.utils.text import ordinal
 
 HIDDEN_DEPTH = 100.0
 """Metres below its place at which an absent prop is kept, out of sight under the floor."""
-
-
-def hide_absent(places: Tensor, present: Tensor) -> Tensor:
-    """Return places of props, those of absent ones under the floor. (N, P, 3), (N, P)."""
-    hidden = (~present).double() * HIDDEN_DEPTH
-    return places - torch.nn.functional.pad(hidden[..., None], (2, 0))
-
-
-def move_left(places: Tensor, metres: Tensor | float, which: Tensor) -> Tensor:
-    """Return places of props, some of them moved to the left. (N, P, 3), (N,) or (), (N, P)."""
-    moved = places.clone()
-    metres = torch.as_tensor(metres, dtype=places.dtype, device=places.device)
-    moved[..., 1] += metres.expand(len(places))[:, None] * which
-    return moved
 
 
 class Side(enum.IntEnum):
@@ -44,6 +33,32 @@ def side_of(lateral: Tensor, tolerance: float) -> Tensor:
     """Return the `Side` of something so many metres to the left of the drone. Shape kept."""
     right = torch.where(lateral < -tolerance, Side.RIGHT.value, Side.AHEAD.value)
     return torch.where(lateral > tolerance, Side.LEFT.value, right)
+
+
+class PropTask(Task[S]):
+    """A task whose state has positions, (N, P, 3), and presence, (N, P), of its props."""
+
+    strata = SIDES
+    props: str
+    """Field of the state that holds the positions; `present` is the other one."""
+    settings: Any
+
+    def make_dynamics(self) -> ComputerVision:
+        """Return the chapter's three moves (Table 1)."""
+        return ComputerVision(self.settings.step_length)
+
+    def places(self, state: S) -> Tensor:
+        """Return the props' positions, those of absent ones under the floor."""
+        known: Any = state
+        hidden = (~known.present).double() * HIDDEN_DEPTH
+        return getattr(state, self.props) - torch.nn.functional.pad(hidden[..., None], (2, 0))
+
+    def next_moved(self, state: S, metres: Tensor | float) -> S:
+        """Move the next prop to the left."""
+        moved = getattr(state, self.props).clone()
+        metres = torch.as_tensor(metres, dtype=moved.dtype, device=moved.device)
+        moved[..., 1] += metres.expand(len(moved))[:, None] * self._is_next(state)
+        return dataclasses.replace(state, **{self.props: moved})
 
 
 def number_classes(name: str, goals: Goals) -> Iterator[tuple[str, str, Tensor]]:

@@ -14,20 +14,18 @@ from torch import Tensor
 
 from drone_rl.config import CameraSettings, PillarsSettings
 from drone_rl.sim.actions import MOVES, Entry, Move
-from drone_rl.sim.dynamics import BodyState, ComputerVision, Obstacles
+from drone_rl.sim.dynamics import BodyState, Obstacles
 from drone_rl.sim.entities import Pillar
 from drone_rl.sim.tasks.common import (
-    SIDES,
+    PropTask,
     Side,
-    hide_absent,
     interval_classes,
-    move_left,
     number_classes,
     place_in_view,
     side_of,
 )
 from drone_rl.sim.tasks.pillars_lanes import Lanes, meets, nearest_pillar
-from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State, Task
+from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State
 from drone_rl.sim.vocabulary import PILLARS
 from drone_rl.utils.text import plural
 
@@ -81,7 +79,7 @@ class RowGoals(Goals):
     """Metres between the pillars next to the nearest open lane; NaN if the row never came up."""
 
 
-class Pillars(Task[FieldState]):
+class Pillars(PropTask[FieldState]):
     """Get to the line and touch no pillar. The reward is progress, 1 for the whole way."""
 
     name = PillarsSettings.name
@@ -90,7 +88,7 @@ class Pillars(Task[FieldState]):
     success_end = EndReason.FINISH_LINE
     expected_end = EndReason.PILLAR_TOUCHED
     observed = ("passed", "side", "end_reason")
-    strata = SIDES
+    props = "pillars"
     scored = ("passed", "side", "gap", "rows")
     remembered = types.MappingProxyType(
         {
@@ -129,10 +127,6 @@ class Pillars(Task[FieldState]):
             "end_reason": Entry((1,), torch.int64, 0, len(EndReason) - 1),
             "rows": Entry((rows, s.row_size), torch.float32),
         }
-
-    def make_dynamics(self) -> ComputerVision:
-        """Return the chapter's three moves (Table 1)."""
-        return ComputerVision(self.settings.step_length)
 
     def make_props(self) -> list[Pillar]:
         """Return the pillars, row by row."""
@@ -217,10 +211,6 @@ class Pillars(Task[FieldState]):
             .masked_fill(state.touched.any(-1), EndReason.PILLAR_TOUCHED)
             .masked_fill(state.body.is_lost, EndReason.LOST_CONTROL)
         )
-
-    def places(self, state: FieldState) -> Tensor:
-        """Return the pillars' positions; under the floor where none stands."""
-        return hide_absent(state.pillars, state.present)
 
     def obstacles(self, state: FieldState) -> Obstacles:
         """Return the pillars."""
@@ -331,11 +321,6 @@ class Pillars(Task[FieldState]):
     def without_next(self, state: FieldState) -> FieldState:
         """Remove the next pillar."""
         return dataclasses.replace(state, present=state.present & ~self._is_next(state))
-
-    def next_moved(self, state: FieldState, metres: Tensor | float) -> FieldState:
-        """Move the next pillar to the left."""
-        pillars = move_left(state.pillars, metres, self._is_next(state))
-        return dataclasses.replace(state, pillars=pillars)
 
     def elsewhere(
         self, state: FieldState, camera: CameraSettings, generator: torch.Generator

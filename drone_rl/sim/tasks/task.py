@@ -123,25 +123,6 @@ class Grid(NamedTuple):
     lateral: Tensor  # (L,)
 
 
-class FusedRules(Protocol):
-    """Arrays of environments on which the fused episode kernel runs the rules of a task."""
-
-    functions: tuple[Any, Any, Any]
-    """Warp structure of the states; functions that write poses and that step an environment."""
-    flights: Any
-    """The states."""
-    poses: Any
-    """Warp structure of the poses that are rendered."""
-    steps: Tensor
-    """Steps taken so far. Shape: (num_envs,), int32."""
-    end_reasons: Tensor
-    """Shape: (num_envs,), int32."""
-
-    def begin(self, state: Any) -> None:
-        """Copy states at the start of episodes."""
-        ...
-
-
 class Task(abc.ABC, Generic[S]):
     """Something to do. A subclass defines `name`, `draw` and `judge`; all else has a default.
 
@@ -227,8 +208,11 @@ class Task(abc.ABC, Generic[S]):
             The state after the step, and the reward: float64, shape (N,).
         """
 
-    def fused_rules(self, dynamics: Dynamics, num_envs: int) -> "FusedRules | None":
-        """Return the arrays on which the fused episode kernel runs the task; None without one."""
+    def fused_rules(self, dynamics: Dynamics, num_envs: int) -> Any:
+        """Return the arrays on which the fused episode kernel runs the task; None without one.
+
+        See `FlyingCubes` in `collect_cubes_kernel.py` for the attributes that the kernel needs.
+        """
         del dynamics, num_envs
 
     def places(self, state: S) -> Tensor:
