@@ -2,7 +2,7 @@
 
 import dataclasses
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -156,28 +156,30 @@ class _BuiltInFault(CameraFault):
     """A fault with the fields of its settings as arguments, in order or by name."""
 
     Settings: ClassVar[type[settings.Fault]]
-    make_model: Callable[[Any], FaultModel]
 
     def __init__(self, *args: Any, **values: Any) -> None:
-        given = dict(zip(kinds_of(self.Settings), args, strict=False))
+        names = list(kinds_of(self.Settings))[: len(args)]
+        given = dict(zip(names, args, strict=True))
         own = self.Settings(**given, **values)
-        super().__init__(type(self).make_model(own), own)
+        super().__init__(self._model(own), own)
+
+    def _model(self, own: Any) -> FaultModel:
+        raise NotImplementedError
 
 
 @implements(settings.Noise)
 class Noise(_BuiltInFault):
     """Adds noise to each pixel; see `drone_rl.config.transforms.Noise`."""
 
-    make_model = staticmethod(lambda own: noise(own.strength, own.correlation_time))
+    def _model(self, own: settings.Noise) -> FaultModel:
+        return noise(own.strength, own.correlation_time)
 
 
 @implements(settings.DeadRows)
 class DeadRows(_BuiltInFault):
     """Blanks rows: fixed ones, or of each episode; see `drone_rl.config.transforms.DeadRows`."""
 
-    @staticmethod
-    def make_model(own: settings.DeadRows) -> FaultModel:
-        """Return the model, which checks the height of the first images."""
+    def _model(self, own: settings.DeadRows) -> FaultModel:
         model = dead_rows(own.count, own.rows, own.level)
 
         def begin(images: Tensor, sample: Sample) -> Tensor:
@@ -191,21 +193,24 @@ class DeadRows(_BuiltInFault):
 class FrozenFrames(_BuiltInFault):
     """Repeats the previous frame at random; see `drone_rl.config.transforms.FrozenFrames`."""
 
-    make_model = staticmethod(lambda own: frozen_frames(own.share))
+    def _model(self, own: settings.FrozenFrames) -> FaultModel:
+        return frozen_frames(own.share)
 
 
 @implements(settings.LateFrames)
 class LateFrames(_BuiltInFault):
     """Delays frames; see `drone_rl.config.transforms.LateFrames`."""
 
-    make_model = staticmethod(lambda own: late_frames(own.frames))
+    def _model(self, own: settings.LateFrames) -> FaultModel:
+        return late_frames(own.frames)
 
 
 @implements(settings.Shift)
 class Shift(_BuiltInFault):
     """Shifts the frames of an episode; see `drone_rl.config.transforms.Shift`."""
 
-    make_model = staticmethod(lambda own: random_shift(own.down, own.across))
+    def _model(self, own: settings.Shift) -> FaultModel:
+        return random_shift(own.down, own.across)
 
 
 @implements(settings.Blur)

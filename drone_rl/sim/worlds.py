@@ -87,7 +87,7 @@ class Worlds:
     @functools.cached_property
     def scene(self) -> Scene:
         """The compiled model of dm_control."""
-        own = {"dynamics": self.dynamics, "distractors": self.distractors}
+        own: dict[str, Any] = {"dynamics": self.dynamics, "distractors": self.distractors}
         return ComposerTask(self.task, self.camera, pixels=False, **own).compile()
 
     @functools.cached_property
