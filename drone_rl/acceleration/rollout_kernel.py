@@ -94,7 +94,7 @@ def choose(room: wp.array[float], at: int, count: int, draw: float) -> int:
 
 @functools.cache
 def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (functions that Warp compiles)
-    """Return the kernel for the rules of a task; see `FusedRules.functions`.
+    """Return the kernel for the rules of a task; see `Task.fused_rules`.
 
     Args:
         states: Warp structure of the environments, with "end_reasons".

@@ -121,7 +121,7 @@ def test_the_end_is_told_from_being_cut_off():
 
 
 def test_films_show_the_drone_from_behind():
-    stage = WorldBatch(2, TASK, {"observations": "state"})
+    stage = WorldBatch(2, TASK, {"observations": "state", "render_mode": "rgb_array"})
     film = stage.film()
     assert (film.shape, film.dtype) == ((2, 360, 640, 3), np.uint8)
     assert film[0, :, 320].std() > 10  # sky, drone, ground
