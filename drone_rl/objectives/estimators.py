@@ -1,4 +1,8 @@
-"""Return estimators, one for each of `objectives.returns`; they write "return_to_go"."""
+"""Return estimators, one for each of `objectives.returns`; they write "return_to_go".
+
+All but `TotalReward` and `LinearRamp` have a discount rate `gamma` in [0, 1] and raise `InputError`
+for another; the other arguments are those of `ReturnEstimator`.
+"""
 
 from typing import Any
 
@@ -16,15 +20,6 @@ from drone_rl.utils.errors import InputError
 
 class _Discounted(ReturnEstimator):
     def __init__(self, gamma: float | None = None, **kwargs: Any) -> None:
-        """Sets the discount rate.
-
-        Args:
-            gamma: Discount rate in [0, 1].
-            **kwargs: See `ReturnEstimator`.
-
-        Raises:
-            InputError: gamma is out of range.
-        """
         super().__init__(**kwargs)
         own: Any = self.Settings
         self.gamma: float = own.gamma if gamma is None else gamma
@@ -78,13 +73,6 @@ class SuccessScaled(_Discounted):
         max_reward: float = settings.SuccessScaled.max_reward,
         **kwargs: Any,
     ) -> None:
-        """Sets the scale.
-
-        Args:
-            gamma: Discount rate in [0, 1].
-            max_reward: Reward of a perfect episode.
-            **kwargs: See `ReturnEstimator`.
-        """
         super().__init__(gamma, **kwargs)
         self.max_reward = max_reward
 
@@ -112,10 +100,10 @@ class TimeBaseline(_Discounted):
         """Sets the memory.
 
         Args:
-            gamma: Discount rate in [0, 1].
+            gamma: Discount rate.
             decay: Share of the old mean that is kept at each batch.
             max_steps: Time steps that have a mean of their own.
-            **kwargs: See `ReturnEstimator`.
+            kwargs: See `ReturnEstimator`.
 
         Raises:
             InputError: decay is out of range.
@@ -169,11 +157,5 @@ class Advantages(GAE):
     def __init__(
         self, gamma: float = Gae.gamma, lmbda: float = Gae.lmbda, scale: bool = Gae.scale
     ) -> None:
-        """Sets the rates.
-
-        Args:
-            gamma: Discount rate in [0, 1].
-            lmbda: Weight in [0, 1] of estimates that look one step farther; 0 looks one step.
-            scale: Whether to standardise a batch's advantages.
-        """
+        """Sets discount rate, weight of later estimates, and whether to standardize a batch."""
         super().__init__(gamma=gamma, lmbda=lmbda, value_network=None, average_gae=scale)

@@ -1,4 +1,4 @@
-"""What all return estimators are: a TorchRL transform for whatever holds whole episodes."""
+"""Base class of return estimators: TorchRL transforms of batches of complete episodes."""
 
 import abc
 from typing import ClassVar
@@ -19,15 +19,14 @@ _MASK = ("collector", "mask")
 class ReturnEstimator(Transform, abc.ABC):
     """Reads rewards and end flags of shape (*batch, T, 1), writes returns of the same shape.
 
-    A return is known once its episode has ended, so this is no transform of an environment, which
-    sees one step at a time. Like TorchRL's `Reward2GoTransform` it is for what holds whole
-    episodes: a collector's `postproc` (of a chain, its `inv`), or a replay buffer, which estimates
-    when a batch comes in and hands samples of it out as they are.
+    A return is known once its episode has ended, so this is no transform of an environment. Like
+    TorchRL's `Reward2GoTransform` it is for complete episodes: the `postproc` of a collector (of a
+    chain, its `inv`), or the transform of a replay buffer, which estimates when a batch is added.
 
-    Where a batch ends within an episode, the return of that episode's steps is not known: they
-    get 0, and ("collector", "mask"), which TorchRL's losses and ours honour, tells them from the
-    others. An episode that began in an earlier batch is taken to begin with this one; TorchRL's
-    collectors start each batch again with `reset_at_each_iter=True`.
+    If a batch ends within an episode, the returns of its steps are unknown: they are 0, and
+    ("collector", "mask"), which TorchRL's losses and ours use, is False. An episode that began in
+    an earlier batch is taken to begin with this one; TorchRL's collectors start each batch again
+    with `reset_at_each_iter=True`.
 
     Examples:
         >>> Collector(env, actor, reset_at_each_iter=True, postproc=RewardToGo(), ...)
@@ -61,7 +60,7 @@ class ReturnEstimator(Transform, abc.ABC):
         self._is_contained = False
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Writes the returns; in a chain, as a replay buffer has one, it hands samples on.
+        """Write the returns; in the chain of a replay buffer, return samples unchanged.
 
         Raises:
             InputError: No episode ends in the batch.
@@ -70,7 +69,6 @@ class ReturnEstimator(Transform, abc.ABC):
 
     @torch.no_grad()
     def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Writes the returns, in a chain too: what a replay buffer does with what comes in."""
         reward, done = (tensordict.get(key) for key in self.in_keys)
         known = _ends_later(done)
         if bool(known.all()) and not (self._is_contained or _MASK in tensordict.keys(True)):
@@ -85,7 +83,7 @@ class ReturnEstimator(Transform, abc.ABC):
         return returns.scale_to_unit(values) if self.scale else values
 
     def set_container(self, container: Transform | EnvBase) -> None:
-        """Takes its place in a chain of transforms.
+        """Join a chain of transforms.
 
         Raises:
             InputError: It is an environment's.
@@ -100,18 +98,11 @@ class ReturnEstimator(Transform, abc.ABC):
 
     @abc.abstractmethod
     def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
-        """The returns. Shape: that of `reward`."""
+        """Return the returns. Shape: that of `reward`."""
 
 
 def _ends_later(done: Tensor) -> Tensor:
-    """Whether a step's episode ends within its row.
-
-    Args:
-        done: Shape: (*batch, T, 1).
-
-    Raises:
-        InputError: No episode ends.
-    """
+    """Return whether the episode of each step ends within its row. Shape: (*batch, T, 1)."""
     known = done.flip(-2).cumsum(-2).flip(-2) > 0
     if not bool(known.any()):
         raise InputError(

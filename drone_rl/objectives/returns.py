@@ -1,21 +1,19 @@
-"""What each step of an episode is credited with: pure functions of rewards.
+"""Returns of the steps of an episode: pure functions of rewards.
 
-Every function takes `reward` and `done` of shape (*batch, T, 1), time in dimension -2, made of
-complete episodes: credit never crosses a `done`, and the last step of every row must be one. A
-flat batch (T, 1) of episodes one after the other and a batch (N, T, 1) are the same to them.
+Every function takes `reward` and `done` of shape (*batch, T, 1), time in dimension -2, of complete
+episodes: no return crosses a `done`, and the last step of every row must be one. A flat batch
+(T, 1) of episodes one after the other and a batch (N, T, 1) are equivalent.
 
-The original study had five variants, called `advantage_type` 0 to 4: `standardised`,
-`linear_ramp`, `reward_to_go`, `success_scaled` and `time_baseline`. They are written here as they
-were meant: an episode of constant return standardises to zero instead of dividing by zero, and the
-baselines of `time_baseline` and `leave_one_out` never contain the episode that they are subtracted
-from.
+The original study has five variants, `advantage_type` 0 to 4: `standardised`, `linear_ramp`,
+`reward_to_go`, `success_scaled` and `time_baseline`. They are implemented as they were meant: an
+episode of constant return standardises to zero instead of dividing by zero, and the baselines of
+`time_baseline` and `leave_one_out` never contain the episode that they are subtracted from.
 
 Unbiased means: with the loss summed over steps and divided by the number of episodes, the expected
-gradient is that of the expected reward (undiscounted), or that of Eq. 15 with discounted returns.
-What is said of bias here is measured by adding up all outcomes of small batches on the process of
-Fig. 3 (`tests.three_state`), two steps long, with even odds of both actions, gamma 0.95; angles are
-those between the expected update and the exact gradient. Discounting alone turns it by 1.4 degrees
-away from the gradient of the expected reward, in batches of any size.
+gradient is that of the expected reward (undiscounted), or that of Eq. 15 (discounted). Biases are
+measured by enumerating all outcomes of small batches on the process of Fig. 3
+(`tests.three_state`), two steps long, both actions equally likely, gamma 0.95; angles are those
+between the expected update and the exact gradient. Discounting alone turns it by 1.4 degrees.
 """
 
 import torch

@@ -1,4 +1,4 @@
-"""From a network to an actor: outputs to actions."""
+"""Actors: from the outputs of a network to actions."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -25,7 +25,7 @@ class SeededCategorical(Categorical):
 
     @torch.no_grad()
     def sample(self, sample_shape: Sequence[int] = ()) -> Tensor:
-        """Draws by inverting the cumulative distribution. Shape: (*sample_shape, *batch)."""
+        """Sample by inverting the cumulative distribution. Shape: (*sample_shape, *batch)."""
         generator = None if self._source is None else self._source.generator
         shape = (*sample_shape, *self.logits.shape[:-1], 1)
         draw = torch.rand(shape, generator=generator, device=self.logits.device)
@@ -38,10 +38,10 @@ class SeededCategorical(Categorical):
 
 
 class StraightActor(ProbabilisticActor):
-    """A `ProbabilisticActor` that takes the straight way from network to action.
+    """A `ProbabilisticActor` that calls network and distribution directly.
 
-    The way around through TensorDict's modules, which `get_dist` and everything else still go,
-    takes longer than a small network does for one frame. The results are the same.
+    TensorDict's modules, which `get_dist` and everything else use, take longer than a small network
+    takes for one frame. The results are the same.
     """
 
     @property
@@ -51,12 +51,12 @@ class StraightActor(ProbabilisticActor):
 
     @property
     def exploration(self) -> ExplorationType | None:
-        """How it acts now: as `set_exploration_type` says, else by default."""
+        """How actions are chosen now: by `set_exploration_type`, else by default."""
         return exploration_type() or self._parts[1].default_interaction_type
 
     @property
     def generator(self) -> torch.Generator | None:
-        """What actions are drawn from; None for torch's global one."""
+        """Source of sampled actions; None for torch's global one."""
         source = self._parts[1].distribution_kwargs["source"]
         return None if source is None else source.generator
 
@@ -86,11 +86,11 @@ class StraightActor(ProbabilisticActor):
 
 
 class CategoricalActor(StraightActor):
-    """One that chooses between actions that are counted."""
+    """An actor with discrete actions."""
 
 
 def distribution_of(dtype: torch.dtype) -> type[SeededCategorical | SquashedNormal]:
-    """How a network's outputs become actions of a type: whole numbers are chosen among."""
+    """Return the distribution of actions of a type: integers are discrete actions."""
     return SquashedNormal if dtype.is_floating_point else SeededCategorical
 
 
@@ -103,8 +103,8 @@ def make_actor(
     under `set_exploration_type(ExplorationType.DETERMINISTIC)`.
 
     Args:
-        network: Pictures (*, C, H, W) to outputs (*, num_outputs): logits of counted actions.
-        action_spec: The environment's; its type decides how actions are drawn.
+        network: Frames (*, C, H, W) to outputs (*, num_outputs): logits of discrete actions.
+        action_spec: The environment's; its type decides the distribution.
         generator: Source of the sampled actions; torch's global one by default.
     """
     kind = distribution_of(action_spec.dtype)

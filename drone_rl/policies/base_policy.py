@@ -1,4 +1,4 @@
-"""Whoever can be flown, judged and explained: a policy out of a file, or one made elsewhere."""
+"""Base class of policies that can be evaluated and explained: from a file, or third-party."""
 
 import abc
 import contextlib
@@ -18,7 +18,7 @@ from drone_rl.utils.seeding import Stream, torch_generator
 
 
 class Pilot(abc.ABC):
-    """A policy, with what it sees and what it flies in."""
+    """A policy with its observations, task and dynamics."""
 
     name: str
     """For people."""
@@ -26,7 +26,7 @@ class Pilot(abc.ABC):
     @property
     @abc.abstractmethod
     def task(self) -> BaseTaskSettings | Task[Any]:
-        """What it flies in."""
+        """The task."""
 
     @property
     @abc.abstractmethod
@@ -36,16 +36,16 @@ class Pilot(abc.ABC):
     @property
     @abc.abstractmethod
     def actions(self) -> ActionSettings:
-        """What it can ask for."""
+        """What its outputs mean."""
 
     @property
     @abc.abstractmethod
     def own_dynamics(self) -> DynamicsSettings:
-        """How its drone moved when it was made."""
+        """Dynamics of its training."""
 
     @property
     def unlike(self) -> dict[str, dict[str, Any]]:
-        """By what `dynamics` differ from its own: setting to "own" and "flown", plain values."""
+        """Settings of `dynamics` that differ from its own: "own" and "flown" values by name."""
         own, flown = self.own_dynamics.values(), self.dynamics.values()
         if self.dynamics.is_computer_vision:  # where nothing else counts
             own, flown = ({"mode": of["mode"]} for of in (own, flown))
@@ -54,14 +54,11 @@ class Pilot(abc.ABC):
     @property
     @abc.abstractmethod
     def origin(self) -> dict[str, Any]:
-        """Where it comes from, as plain values: "policy", and how it was "trained", if known."""
+        """Its origin, as plain values: "policy", and how it was "trained", if known."""
 
     @abc.abstractmethod
     def in_task(self, **changes: Any) -> Self:
-        """The same policy in a changed task, such as `policy.in_task(num_cubes=5)`.
-
-        Args:
-            changes: Settings of the task; None keeps its own.
+        """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`.
 
         Raises:
             InputError: A setting is unknown or out of range; the message begins with "task.".
@@ -69,16 +66,12 @@ class Pilot(abc.ABC):
 
     @abc.abstractmethod
     def in_dynamics(self, **changes: Any) -> Self:
-        """The same policy in another body or air, as `policy.in_dynamics(mode="simple_flight")`.
-
-        Args:
-            changes: Settings of the dynamics; None keeps its own.
+        """Return the same policy with other dynamics: `policy.in_dynamics(mode="simple_flight")`.
 
         Raises:
             InputError: A setting is unknown or out of range; the message begins with "dynamics.".
         """
 
-    @abc.abstractmethod
     def make_env(
         self,
         num_envs: int,
@@ -88,19 +81,24 @@ class Pilot(abc.ABC):
         device: str = "cpu",
         **kwargs: Any,
     ) -> TransformedEnv:
-        """Worlds like those that it was trained in, seen as it sees them.
+        """Return environments like those of its training, with its camera and transforms.
 
         Args:
             num_envs: How many.
             seed: Root of their random streams.
-            stream: Which worlds: by default those to report on, which training never sees.
-            device: Where they are drawn.
+            stream: Which environments: by default those to report on, which training never sees.
+            device: Where they are rendered.
             kwargs: See `drone_rl.envs.DroneEnv`.
         """
+        options = {"seed": seed, "stream": stream, "device": device, **kwargs}
+        return self._make_env(num_envs, options)
+
+    @abc.abstractmethod
+    def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv: ...
 
     @abc.abstractmethod
     def make_network(self, device: str | torch.device = "cpu") -> PictureNetwork:
-        """Its network."""
+        """Return its network."""
 
     def make_actor(
         self, env: EnvBase | None = None, *, seed: int = 0, stream: Stream = Stream.REPORT
@@ -108,13 +106,12 @@ class Pilot(abc.ABC):
         """Return a TorchRL actor, which samples its actions from a stream of its own.
 
         Args:
-            env: From `make_env`, for whose device and actions the actor is made; by default for
-                those that `make_env` gives on a CPU.
-            seed: Of the stream.
-            stream: Which.
+            env: From `make_env`: its device and actions are used; those of a CPU by default.
+            seed: Root of the stream.
+            stream: Purpose of the stream.
 
         Raises:
-            InputError: The environment is none of TorchRL's.
+            InputError: The environment is not one of TorchRL's.
         """
         if env is None:
             own = self.make_env(1, pixels=False)
@@ -136,15 +133,7 @@ class Pilot(abc.ABC):
         device: str = "cpu",
         **kwargs: Any,
     ) -> Iterator[tuple[TransformedEnv, TensorDictModuleBase]]:
-        """Worlds and it as their actor, for a while; then the worlds are closed.
-
-        Args:
-            num_envs: How many.
-            seed: Root of their random streams and of its own.
-            stream: Which worlds.
-            device: Where they are drawn.
-            kwargs: See `drone_rl.envs.DroneEnv`.
-        """
+        """Yield environments and its actor; close them afterwards. See `make_env`."""
         env = self.make_env(num_envs, seed=seed, stream=stream, device=device, **kwargs)
         try:
             yield env, self.make_actor(env, seed=seed, stream=stream)

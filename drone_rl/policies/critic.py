@@ -31,16 +31,15 @@ class ActorCritic(nn.Module):
         own: PolicyNetwork | None = None,
         generator: torch.Generator | None = None,
     ) -> None:
-        """Puts a critic beside a policy.
+        """Adds a critic to a policy.
 
         Args:
             network: The policy's.
-            own: The critic's, from frames to one number; None makes one linear layer on the
-                features of the policy, whose trunk both then share.
+            own: The critic's, with one output; None makes a linear layer on the policy's features.
             generator: Source of that layer's initial weights.
 
         Raises:
-            InputError: The policy's network is not made of layers.
+            InputError: The policy's network is not a `PolicyNetwork`.
         """
         super().__init__()
         if not isinstance(network, PolicyNetwork):
@@ -70,21 +69,17 @@ class ActorCritic(nn.Module):
 
 
 class _Trunk(nn.Module):
-    """The layers of a policy but the last, for any number of leading batch dimensions."""
-
     def __init__(self, network: PolicyNetwork) -> None:
         super().__init__()
         self.in_shape = network.in_shape
         self.layers = network.layers[:-1]
 
     def forward(self, pixels: Tensor) -> Tensor:
-        """Frames (*, C, H, W) to features (*, width)."""
         features = self.layers(pixels.reshape(-1, *self.in_shape))
         return features.reshape(*pixels.shape[:-3], features.shape[-1])
 
 
 def _one_number(logits: nn.Module, generator: torch.Generator | None) -> nn.Linear:
-    """A layer that sees what the last one of a policy sees."""
     weight = logits.get_parameter("weight")
     layer = nn.Linear(weight.shape[1], 1)
     orthogonal(generator)(layer, True)

@@ -35,13 +35,7 @@ class SquashedNormal(Distribution):
     has_rsample = False
 
     def __init__(self, logits: Tensor, source: RandomSource | None = None) -> None:
-        """Takes a network's outputs.
-
-        Args:
-            logits: For n means and n deviations, see `normal_of`; they are called as those of all
-                policies are. Shape: (*batch, 2 n).
-            source: Where it draws from; torch's global generator by default.
-        """
+        """Takes outputs of a network, n means and n deviations, see `normal_of`: (*batch, 2 n)."""
         self.loc, self.scale = normal_of(logits)
         self._source = source
         shape = self.loc.shape
@@ -49,7 +43,7 @@ class SquashedNormal(Distribution):
 
     @property
     def arg_constraints(self) -> dict[str, Constraint]:
-        """None: outputs may be any numbers."""
+        """Return none: outputs may be any numbers."""
         return {}
 
     @property
@@ -59,34 +53,29 @@ class SquashedNormal(Distribution):
 
     @property
     def mode(self) -> Tensor:
-        """What is taken for it: `deterministic_sample`."""
+        """Return `deterministic_sample`."""
         return self.deterministic_sample
 
     @torch.no_grad()
     def sample(self, sample_shape: Sequence[int] = ()) -> Tensor:
-        """Draws. Shape: (*sample_shape, *batch, n)."""
+        """Sample. Shape: (*sample_shape, *batch, n)."""
         generator = None if self._source is None else self._source.generator
         shape = (*sample_shape, *self.loc.shape)
         draw = torch.randn(shape, generator=generator, device=self.loc.device)
         return (self.loc + self.scale * draw).tanh().clamp(-MOST, MOST)
 
     def log_prob(self, value: Tensor) -> Tensor:
-        """Logarithm of the density of actions; those nearer to a bound than `MOST` count as it.
-
-        Args:
-            value: Shape: (*, n).
-        """
+        """Return the log-density of actions (*, n), which are clamped to `MOST`."""
         number = torch.atanh(value.clamp(-MOST, MOST))
         square = ((number - self.loc) / self.scale) ** 2
         normal = -0.5 * square - self.scale.log() - 0.5 * math.log(2 * math.pi)
         return (normal - _log_slope(number)).sum(-1)
 
     def entropy(self) -> Tensor:
-        """Of the squashed numbers, so that it is greatest, n log 2, where these are uniform.
+        """Return the entropy of the squashed numbers: at most n log 2, where these are uniform.
 
-        It is that of the normal numbers, whose bonus would drive deviations up for ever, and the
-        mean of log(1 - tanh^2), by Gauss-Hermite quadrature: no draw, gradients as smooth as it.
-        Shape: batch.
+        That of the normal numbers, whose bonus would increase deviations for ever, plus the mean
+        of log(1 - tanh^2), by Gauss-Hermite quadrature, without sampling. Shape: batch.
         """
         places, weights = (self.loc.new_tensor(part) for part in _quadrature())
         numbers = self.loc[..., None] + self.scale[..., None] * places
@@ -95,11 +84,10 @@ class SquashedNormal(Distribution):
 
 
 def _log_slope(number: Tensor) -> Tensor:
-    """log(1 - tanh^2), without the difference."""
+    """Return log(1 - tanh^2), without cancellation."""
     return 2 * (math.log(2) - number - functional.softplus(-2 * number))
 
 
 def _quadrature() -> tuple[list[float], list[float]]:
-    """Places and weights of means over the standard normal distribution."""
     places, weights = np.polynomial.hermite_e.hermegauss(_NODES)
     return places.tolist(), (weights / weights.sum()).tolist()

@@ -1,4 +1,4 @@
-"""Worlds as a TorchRL environment, with the pixels that policies see."""
+"""Environments for training, with the transforms of policies."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -61,10 +61,5 @@ def make_env(
 
 
 def _check(value: Any, name: str, kind: type) -> None:
-    """Refuses a value of another type, such as the name of a file in conf/.
-
-    Raises:
-        InputError: It is one; the message names the class to give.
-    """
     if value is not None and not isinstance(value, kind):
         raise InputError(f"{name}={shown(value)} is no {kind.__name__}; give a {kind.__name__}")

@@ -1,4 +1,4 @@
-"""Any callable from frames to logits, made elsewhere, as a network like ours."""
+"""Third-party callables from frames to logits, as networks."""
 
 import copy
 from collections.abc import Callable
@@ -35,14 +35,14 @@ class ForeignNetwork(PictureNetwork):
         takes_bytes: bool = False,
         device: torch.device | str = "cpu",
     ) -> None:
-        """Tries it on a frame.
+        """Evaluates it on one frame.
 
         Args:
             logits: The callable.
             in_shape: Shape (C, H, W) of one frame.
             actions: One for each logit.
-            takes_bytes: Whether it wants RGB bytes (N, H, W, 3) in place of floats from 0 to 1.
-            device: Where a module is put.
+            takes_bytes: Whether it takes RGB bytes (N, H, W, 3) instead of floats from 0 to 1.
+            device: Of a module.
         """
         super().__init__()
         self.in_shape, self.actions = tuple(in_shape), actions
@@ -109,11 +109,7 @@ class ForeignNetwork(PictureNetwork):
 
 
 def _copied(module: nn.Module) -> nn.Module:
-    """A copy of its own, which stays as it is when the module is trained on.
-
-    Raises:
-        InputError: It can't be copied.
-    """
+    """Return a copy, which does not change when the module is trained further."""
     try:
         own = copy.deepcopy(module).eval()
     except Exception as error:
@@ -122,13 +118,12 @@ def _copied(module: nn.Module) -> nn.Module:
             "function that calls it"
         ) from error
     for part in own.modules():
-        if hasattr(part, "inplace"):  # else what a layer makes is gone when one looks at it
+        if hasattr(part, "inplace"):  # explanations read the outputs of layers
             vars(part)["inplace"] = False
     return own
 
 
 def _depends(logits: Tensor, picture: Tensor) -> bool:
-    """Whether there is a gradient."""
     if not logits.requires_grad:
         return False
     (slope,) = torch.autograd.grad(logits.sum(), picture, allow_unused=True)

@@ -1,4 +1,4 @@
-"""Policies that were made elsewhere: any callable from frames to logits."""
+"""Third-party policies: any callable from frames to logits."""
 
 import dataclasses
 import sys
@@ -30,15 +30,14 @@ from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import Settings, below
 
 
 @dataclasses.dataclass(frozen=True)
 class ForeignPolicy(Pilot):
-    """A network from elsewhere, and what it sees and flies in; see `policy_from`.
+    """A third-party network with its task, camera and transforms; see `policy_from`.
 
-    It is in no file, so that nothing can be proved of it for others to check.
+    It has no file, so no certificate of it can be checked by others.
     """
 
     name: str
@@ -87,31 +86,13 @@ class ForeignPolicy(Pilot):
         flown.check_air()
         return dataclasses.replace(self, flown=flown)
 
-    def make_env(
-        self,
-        num_envs: int,
-        *,
-        seed: int = 0,
-        stream: Stream = Stream.REPORT,
-        device: str = "cpu",
-        **kwargs: Any,
-    ) -> TransformedEnv:
-        """See `Pilot`."""
+    def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv:
         task: Any = self.own_task
-        dynamics = kwargs.pop("dynamics", None) or self.dynamics
+        dynamics = options.pop("dynamics", None) or self.dynamics
         if isinstance(dynamics, DynamicsSettings):
-            kwargs.setdefault("actions", self.actions)
-        return make_env(
-            num_envs,
-            task=task,
-            camera=self.camera,
-            dynamics=dynamics,
-            transforms=self.transforms or (Rgb(),),
-            seed=seed,
-            stream=stream,
-            device=device,
-            **kwargs,
-        )
+            options.setdefault("actions", self.actions)
+        parts = {"task": task, "dynamics": dynamics, "transforms": self.transforms or (Rgb(),)}
+        return make_env(num_envs, camera=self.camera, **parts, **options)
 
     def make_network(self, device: str | torch.device = "cpu") -> ForeignNetwork:
         """See `Pilot`.
@@ -188,7 +169,6 @@ def policy_from(
 
 
 def _camera_of(logits: Logits) -> CameraSettings:
-    """One whose frames are as large as those that a network was trained on, if it says so."""
     shape = getattr(logits, "observation_shape", None)
     return CameraSettings() if shape is None else CameraSettings(height=shape[1], width=shape[2])
 
@@ -205,19 +185,13 @@ def _is_sb3_model(which: Any) -> bool:
     return module is not None and isinstance(which, module.BaseAlgorithm)
 
 
-def _of_sb3(model: Any) -> ForeignPolicy:
-    from drone_rl.policies.sb3 import Sb3Logits  # needs Stable-Baselines3
-
-    return policy_from(Sb3Logits(model), name=f"{type(model).__name__} of Stable-Baselines3")
-
-
 def as_pilot(which: str | Path | Pilot | Logits, outputs: str | Path = "outputs") -> Pilot:
-    """A policy as it is, one made of a callable, or one out of a file.
+    """Return a policy as it is, or make one of a callable or a file.
 
     Args:
-        which: The policy, a callable as `policy_from` takes it, a model of Stable-Baselines3, or
+        which: The policy, a callable as for `policy_from`, a model of Stable-Baselines3, or
             what `load_policy` takes.
-        outputs: Folder under which runs are kept.
+        outputs: Folder of the runs.
 
     Raises:
         InputError: There is none, or it is unusable.
@@ -225,6 +199,9 @@ def as_pilot(which: str | Path | Pilot | Logits, outputs: str | Path = "outputs"
     if isinstance(which, Pilot):
         return which
     if _is_sb3_model(which):
-        return _of_sb3(which)
+        from drone_rl.policies.sb3 import Sb3Logits  # needs Stable-Baselines3
+
+        model: Any = which
+        return policy_from(Sb3Logits(model), name=f"{type(model).__name__} of Stable-Baselines3")
     is_file = isinstance(which, str | Path)
     return load_policy(which, outputs=outputs) if is_file else policy_from(which)

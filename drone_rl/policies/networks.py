@@ -1,9 +1,10 @@
 """Policy networks: from observations to action logits.
 
-Layers are named, and explanations address them by name.
+Layers are named, and explanations address them by name. The registered networks take `in_shape`,
+(C, H, W) of one frame, `num_actions`, the number of logits, sizes as in `config.networks`, and
+`generator`, the source of their initial weights; they raise `InputError` if the frame is too small.
 """
 
-import math
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 
@@ -75,7 +76,7 @@ class PolicyNetwork(PictureNetwork):
         layers: "OrderedDict[str, nn.Module]",
         initialise: Callable[[Weighted, bool], None],
     ) -> None:
-        """Wraps and initialises the layers.
+        """Initialises the layers.
 
         Args:
             in_shape: Shape (C, H, W) of one frame.
@@ -136,7 +137,10 @@ class PolicyNetwork(PictureNetwork):
 
 @implements(OriginalCnn)
 class OriginalCNN(PolicyNetwork):
-    """The original study's network: two convolutions with pooling and three linear layers."""
+    """The original study's network: two convolutions with pooling and three linear layers.
+
+    Initial weights: He-normal convolutions, Xavier-normal linear layers.
+    """
 
     def __init__(
         self,
@@ -147,18 +151,6 @@ class OriginalCNN(PolicyNetwork):
         hidden: Sequence[int] = OriginalCnn.hidden,
         generator: torch.Generator | None = None,
     ) -> None:
-        """Builds and initialises it (He-normal convolutions, Xavier-normal linear layers).
-
-        Args:
-            in_shape: Shape (C, H, W) of one frame.
-            num_actions: Number of logits.
-            channels: Output channels of the convolutions.
-            hidden: Widths of the linear layers but the last.
-            generator: Source of the initial weights.
-
-        Raises:
-            InputError: The frame is too small.
-        """
         convolutions: OrderedDict[str, nn.Module] = OrderedDict()
         before = in_shape[0]
         for i, after in enumerate(channels, start=1):
@@ -168,7 +160,6 @@ class OriginalCNN(PolicyNetwork):
             before = after
 
         def initialise(layer: Weighted, is_last: bool) -> None:
-            del is_last
             if isinstance(layer, nn.Conv2d):
                 nn.init.kaiming_normal_(layer.weight, nonlinearity="relu", generator=generator)
             else:
@@ -182,7 +173,10 @@ class OriginalCNN(PolicyNetwork):
 
 @implements(SmallCnn)
 class SmallCNN(PolicyNetwork):
-    """A patch convolution, 3x3 convolutions and linear layers: a tenth of `OriginalCNN`'s cost."""
+    """A patch convolution, 3x3 convolutions and linear layers: a tenth of `OriginalCNN`'s cost.
+
+    Initial weights are orthogonal, the logits near zero (a uniform first policy).
+    """
 
     def __init__(
         self,
@@ -194,19 +188,6 @@ class SmallCNN(PolicyNetwork):
         hidden: Sequence[int] = SmallCnn.hidden,
         generator: torch.Generator | None = None,
     ) -> None:
-        """Builds and initialises it: orthogonal, the logits near zero (a uniform first policy).
-
-        Args:
-            in_shape: Shape (C, H, W) of one frame.
-            num_actions: Number of logits.
-            patch: Size and stride, in pixels, of the first convolution.
-            channels: Output channels of the convolutions; all after the first are 3x3.
-            hidden: Widths of the linear layers but the last.
-            generator: Source of the initial weights.
-
-        Raises:
-            InputError: The frame is too small.
-        """
         convolutions: OrderedDict[str, nn.Module] = OrderedDict()
         before = in_shape[0]
         for i, after in enumerate(channels, start=1):
@@ -275,7 +256,7 @@ def _side(size: int | tuple[int, ...]) -> int:
 
 @implements(Mlp)
 class MLP(PolicyNetwork):
-    """Linear layers on the flattened frame."""
+    """Linear layers on the flattened frame, initialised like `SmallCNN`."""
 
     def __init__(
         self,
@@ -285,30 +266,12 @@ class MLP(PolicyNetwork):
         hidden: Sequence[int] = Mlp.hidden,
         generator: torch.Generator | None = None,
     ) -> None:
-        """Builds and initialises it: orthogonal, the logits near zero (a uniform first policy).
-
-        Args:
-            in_shape: Shape (C, H, W) of one frame.
-            num_actions: Number of logits.
-            hidden: Widths of the linear layers but the last.
-            generator: Source of the initial weights.
-        """
-        layers: OrderedDict[str, nn.Module] = OrderedDict(flatten=nn.Flatten())
-        width = math.prod(in_shape)
-        for i, size in enumerate(hidden, start=1):
-            layers[f"fc{i}"] = nn.Linear(width, size)
-            layers[f"fc_relu{i}"] = nn.ReLU()
-            width = size
-        layers["logits"] = nn.Linear(width, num_actions)
+        layers = _with_head(OrderedDict(), in_shape, hidden, num_actions)
         super().__init__(in_shape, layers, orthogonal(generator))
 
 
 def require_finite(outputs: Tensor, owner: str = "the policy") -> None:
-    """Check that outputs are finite.
-
-    Args:
-        outputs: Any shape.
-        owner: Name of the policy, for the message.
+    """Check that outputs are finite; `owner` is the policy's name for the message.
 
     Raises:
         InputError: An output is infinite or NaN.

@@ -1,4 +1,4 @@
-"""A trained policy, wherever it comes from, and the worlds to fly it in."""
+"""Trained policies out of files."""
 
 import dataclasses
 from pathlib import Path
@@ -15,12 +15,11 @@ from drone_rl.policies.zoo import PolicyDescription, parse, policy_names, policy
 from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest
-from drone_rl.utils.seeding import Stream
 
 
 @dataclasses.dataclass(frozen=True)
 class Policy(Pilot):
-    """A trained policy: what it flies in, what it sees, its network, and where it comes from."""
+    """A trained policy: its task, camera and transforms, network and provenance."""
 
     name: str
     """For people: a name in the zoo, or that of the run's folder."""
@@ -33,7 +32,7 @@ class Policy(Pilot):
 
     @property
     def task(self) -> BaseTaskSettings:
-        """What it flies in."""
+        """The task."""
         return self.description.task
 
     @property
@@ -72,19 +71,8 @@ class Policy(Pilot):
         described["dynamics"] = {**self.dynamics.values(), **changed}
         return dataclasses.replace(self, description=parse(described))
 
-    def make_env(
-        self,
-        num_envs: int,
-        *,
-        seed: int = 0,
-        stream: Stream = Stream.REPORT,
-        device: str = "cpu",
-        **kwargs: Any,
-    ) -> TransformedEnv:
-        """See `Pilot`."""
-        return self.description.build_env(
-            num_envs, seed=seed, stream=stream, device=device, **kwargs
-        )
+    def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv:
+        return self.description.build_env(num_envs, **options)
 
     def make_network(self, device: str | torch.device = "cpu") -> PolicyNetwork:
         """Its network."""
@@ -93,7 +81,6 @@ class Policy(Pilot):
         return network
 
     def _repr_html_(self) -> str:
-        """Shows itself in a notebook."""
         progress, described = self.state["progress"], self.description.as_dict()
         rows = {
             "network": ", ".join(f"{k}={v}" for k, v in described["network"].items()),
@@ -111,12 +98,12 @@ class Policy(Pilot):
 
 
 def load_policy(which: str | Path, *, outputs: str | Path = "outputs") -> Policy:
-    """A trained policy.
+    """Load a trained policy.
 
     Args:
-        which: A policy that travels with the package ("good", "poor", "right_and_forward"), a .pt
-            or .safetensors file, the folder of a run (its `last.pt`), or "latest" for the newest.
-        outputs: Folder under which runs are kept.
+        which: A policy of the package ("good", "poor", "right_and_forward"), a .pt or .safetensors
+            file, the folder of a run (its `last.pt`), or "latest" for the newest.
+        outputs: Folder of the runs.
 
     Raises:
         InputError: There is none, or it is unusable.

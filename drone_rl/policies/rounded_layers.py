@@ -40,20 +40,18 @@ class Layer(abc.ABC):
 
     @abc.abstractmethod
     def bound(self, largest: Tensor, error: Tensor) -> Tensor:
-        """Return a bound on the outputs' errors for all inputs up to a size.
+        """Return a bound on the errors of outputs for inputs up to a size. Shapes: (1, *), float64.
 
         Args:
-            largest: Size of the largest input of one evaluation in float32. Shape: (1, *), float64.
-            error: Of the inputs. Shape: (1, *), float64.
+            largest: Size of the largest input in one float32 evaluation.
+            error: Of the inputs.
         """
 
     @abc.abstractmethod
     def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
-        """Return the exact outputs, their errors and a note.
+        """Return the exact outputs, their errors and a note, from exact inputs and their errors.
 
-        Args:
-            value: Exact inputs. Shape: (N, *), float64.
-            error: Of these. Shape: (N, *), float64.
+        Shapes: (N, *), float64.
         """
 
     @abc.abstractmethod
@@ -61,11 +59,10 @@ class Layer(abc.ABC):
         """Return slopes by the inputs from slopes by the outputs. Shapes: (N, P, *)."""
 
 
-class Affine(Layer):
+class _Affine(Layer):
     """A convolution without padding or a linear layer, with a bias."""
 
     def __init__(self, layer: nn.Conv2d | nn.Linear) -> None:
-        """Copies the weights."""
         weight, bias = (layer.get_parameter(name).detach() for name in ("weight", "bias"))
         self._single = weight, bias
         self._weight, self._bias = weight.double(), bias.double()
@@ -74,18 +71,15 @@ class Affine(Layer):
         self._terms = weight[0].numel() + 1
 
     def __call__(self, value: Tensor) -> Tensor:
-        """See `Layer`."""
         return self._apply(value, *self._single)
 
     def bound(self, largest: Tensor, error: Tensor) -> Tensor:
-        """See `Layer`."""
         size = largest + 2 * error  # the exact inputs and another evaluation's are both that near
         total = self._apply(size, self._size, self._bias.abs())
         carried = self._apply(error, self._size, None)
         return SLACK * carried + self._local(total, total, size)
 
     def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
-        """See `Layer`."""
         size = value.abs() + error
         total = self._apply(size, self._size, self._bias.abs())
         carried = self._apply(error, self._size, None)
@@ -96,7 +90,6 @@ class Affine(Layer):
         return made, SLACK * carried + local, Note(value.shape, local)
 
     def back(self, slope: Tensor, note: Note) -> Tensor:
-        """See `Layer`."""
         if self._stride is None:
             return slope @ self._weight
         flat = slope.flatten(0, 1)
@@ -111,13 +104,7 @@ class Affine(Layer):
         return functional.conv2d(value, weight, bias, stride=self._stride)
 
     def _local(self, total: Tensor, most: Tensor, size: Tensor) -> Tensor:
-        """Errors that arise in the sum itself.
-
-        Args:
-            total: Sum of the sizes of all terms.
-            most: Size of the largest partial sum.
-            size: Of the inputs.
-        """
+        """Return the errors of a sum, from all sizes, the largest partial sum and the inputs."""
         roundings = SLACK / (1 - self._terms * UNIT)
         rounded = roundings * UNIT * (self._terms * most + 2 * total)
         # weights, inputs, products and sums that are too small to be normal
@@ -127,69 +114,54 @@ class Affine(Layer):
         return (rounded + lost).masked_fill(~(SLACK * total < LARGEST), torch.inf)
 
 
-class Rectified(Layer):
+class _Rectified(Layer):
     """A ReLU."""
 
     def __call__(self, value: Tensor) -> Tensor:
-        """See `Layer`."""
         return value.clamp(min=0)
 
     def bound(self, largest: Tensor, error: Tensor) -> Tensor:
-        """See `Layer`."""
-        del largest
         return error
 
     def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
-        """See `Layer`."""
         is_on, is_off = value > error, value < -error
         error = error.masked_fill(is_off, 0.0)
         return value.clamp(min=0), error, Note(value.shape, error.masked_fill(is_on, 0.0), is_on)
 
     def back(self, slope: Tensor, note: Note) -> Tensor:
-        """See `Layer`."""
         assert note.mask is not None
         return slope.where(note.mask[:, None], 0.0)
 
 
-class Flat(Layer):
+class _Flat(Layer):
     """All inputs in a row."""
 
     def __call__(self, value: Tensor) -> Tensor:
-        """See `Layer`."""
         return value.flatten(1)
 
     def bound(self, largest: Tensor, error: Tensor) -> Tensor:
-        """See `Layer`."""
-        del largest
         return error.flatten(1)
 
     def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
-        """See `Layer`."""
         return value.flatten(1), error.flatten(1), Note(value.shape)
 
     def back(self, slope: Tensor, note: Note) -> Tensor:
-        """See `Layer`."""
         return slope.view(*slope.shape[:2], *note.shape[1:])
 
 
-class Maximum(Layer):
+class _Maximum(Layer):
     """Pooling by maxima of squares that do not overlap."""
 
     def __init__(self, side: int) -> None:
-        """Takes the length of a square's side."""
         self._side = side
 
     def __call__(self, value: Tensor) -> Tensor:
-        """See `Layer`."""
         return functional.max_pool2d(value, self._side)
 
     def bound(self, largest: Tensor, error: Tensor) -> Tensor:
-        """See `Layer`."""
-        del largest
         return functional.max_pool2d(error, self._side)
 
     def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
-        """See `Layer`."""
         made, index = functional.max_pool2d(value, self._side, return_indices=True)
         most = functional.max_pool2d(error, self._side)
         index = index.flatten(2)
@@ -202,7 +174,6 @@ class Maximum(Layer):
         return made, most, Note(value.shape, most.masked_fill(is_clear, 0.0), winner)
 
     def back(self, slope: Tensor, note: Note) -> Tensor:
-        """See `Layer`."""
         assert note.mask is not None
         rows, columns = note.shape[-2:]
         wide = slope.repeat_interleave(self._side, -1).repeat_interleave(self._side, -2)
@@ -211,21 +182,17 @@ class Maximum(Layer):
 
 
 def layer_of(layer: nn.Module) -> Layer | None:
-    """Return the errors of a layer, or None if nothing is known of its kind.
-
-    Args:
-        layer: Of a policy network.
-    """
+    """Return the errors of a layer of a network, or None if its kind is not supported."""
     if isinstance(layer, nn.Conv2d):
         is_plain = (layer.padding, layer.dilation, layer.groups) == ((0, 0), (1, 1), 1)
-        return Affine(layer) if is_plain and layer.bias is not None else None
+        return _Affine(layer) if is_plain and layer.bias is not None else None
     if isinstance(layer, nn.Linear):
-        return Affine(layer) if layer.bias is not None else None
+        return _Affine(layer) if layer.bias is not None else None
     if isinstance(layer, nn.MaxPool2d):
         side = layer.kernel_size
         is_plain = (layer.padding, layer.dilation, layer.ceil_mode) == (0, 1, False)
         is_plain = is_plain and isinstance(side, int) and layer.stride == side
-        return Maximum(side) if is_plain and isinstance(side, int) else None
+        return _Maximum(side) if is_plain and isinstance(side, int) else None
     if isinstance(layer, nn.Flatten):
-        return Flat() if (layer.start_dim, layer.end_dim) == (1, -1) else None
-    return Rectified() if isinstance(layer, nn.ReLU) else None
+        return _Flat() if (layer.start_dim, layer.end_dim) == (1, -1) else None
+    return _Rectified() if isinstance(layer, nn.ReLU) else None

@@ -58,15 +58,13 @@ class RoundingBound:
     """Bounds for the present weights of one network."""
 
     def __init__(self, layers: list[Layer], actions: Actions) -> None:
-        """Takes layers; see `find`."""
         self._layers, self._actions = layers, actions
 
     @classmethod
     def find(cls, network: nn.Module) -> Self | None:
-        """Return the bounds of a network, or None if it has a layer for which none are known.
+        """Return the bounds of a network, or None if one of its layers is not supported.
 
-        Args:
-            network: A `PolicyNetwork` of convolutions, linear layers, ReLU, MaxPool2d and Flatten.
+        Supported are convolutions, linear layers, ReLU, MaxPool2d and Flatten of a `PolicyNetwork`.
         """
         if not isinstance(network, PolicyNetwork):
             return None
@@ -76,13 +74,9 @@ class RoundingBound:
 
     @torch.no_grad()
     def decide(self, pixels: Tensor) -> Decisions:
-        """Return which actions are possible.
+        """Return which actions are possible for frames (N, C, H, W), float32.
 
-        One bound for all frames together sorts out those whose decision is clear. The others get a
-        bound of their own.
-
-        Args:
-            pixels: Frames as the network sees them. Shape: (N, C, H, W), float32.
+        One bound for all frames decides the clear ones. The others get bounds of their own.
         """
         outputs, error = self.together(pixels)
         if not isinstance(self._actions, DiscreteActions):
@@ -104,14 +98,11 @@ class RoundingBound:
 
     @torch.no_grad()
     def together(self, pixels: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the outputs and one bound for all frames.
-
-        Args:
-            pixels: Shape: (N, C, H, W), float32.
+        """Return the outputs for frames (N, C, H, W), float32, and one bound for all frames.
 
         Returns:
-            The outputs in float32, and the largest error of each, infinite where a sum may
-            overflow. Shapes: (N, outputs), (outputs,) float64.
+            The outputs (N, outputs) in float32, and the largest error of each (outputs,), float64;
+            infinite where a sum may overflow.
         """
         largest = pixels.abs().amax(0, keepdim=True).double()
         error = _pixel_error(largest.amax().clamp(min=UNIT)).expand_as(largest)
@@ -134,10 +125,7 @@ class RoundingBound:
 
     @torch.no_grad()
     def possible(self, pixels: Tensor) -> Tensor:
-        """Return which actions are possible, frame by frame.
-
-        Args:
-            pixels: Shape: (N, C, H, W), float32.
+        """Return which actions are possible for each of the frames (N, C, H, W), float32.
 
         Returns:
             Whether the exact logit is lower than the best one by no more than the error of their
@@ -155,12 +143,7 @@ class RoundingBound:
         return possible.scatter(1, value.nan_to_num().argmax(-1, keepdim=True), True)
 
     def _run(self, pixels: Tensor) -> tuple[Tensor, Tensor, list[Any], Tensor]:
-        """From frames to outputs in float64.
-
-        Returns:
-            Outputs; the error of each pixel; what each layer notes; frames in which a sum may
-            overflow.
-        """
+        """Return outputs, pixel errors, the layers' notes, and frames whose sums may overflow."""
         value = pixels.double()
         first = _pixel_error(value.abs().flatten(1).amax(-1).clamp(min=UNIT))
         first = first[:, None, None, None].expand_as(value)
@@ -173,17 +156,10 @@ class RoundingBound:
         return value, first, notes, overflows
 
     def _back(self, pixels: Tensor, weigh: Callable[[Tensor], Tensor]) -> tuple[Tensor, Tensor]:
-        """Errors of weighted sums of the outputs, by a backward pass.
+        """Return outputs, and errors of P weighted sums of them, (N, P), by a backward pass.
 
         Every rounding error moves the outputs by its slope, as long as no ReLU and no maximum
         changes sides. Those that may are sources of error themselves.
-
-        Args:
-            pixels: Frames.
-            weigh: Outputs (N, outputs) to the weights of P sums, (N, P, outputs).
-
-        Returns:
-            Outputs, and errors of the sums. Shapes: (N, outputs), (N, P), float64.
         """
         value, first, notes, overflows = self._run(pixels)
         slope = weigh(value)
@@ -202,9 +178,6 @@ def decider(network: nn.Module) -> tuple[Decide, bool]:
 
     Without a bound, an error of `TOLERANCE` is assumed or, of a torch module, twice the difference
     between its outputs in float32 and in float64 if that is larger.
-
-    Args:
-        network: Frames to outputs, with `actions` as a `PictureNetwork` has.
     """
     bound = RoundingBound.find(network)
     if bound is not None:
@@ -230,9 +203,6 @@ def arithmetic_on(device: torch.device) -> tuple[str, bool]:
     """Return the name of the arithmetic of a device, and whether the bounds hold for it.
 
     They do not where cuDNN may round the inputs of convolutions to TF32, as it does by default.
-
-    Args:
-        device: Where networks are evaluated.
     """
     if device.type == "cuda" and torch.backends.cudnn.allow_tf32:
         return f"float32 (convolutions in TF32) on {device.type}", False
@@ -240,20 +210,17 @@ def arithmetic_on(device: torch.device) -> tuple[str, bool]:
 
 
 def _in_float64(network: nn.Module) -> nn.Module | None:
-    """A copy that computes in float64; None if there is no module or it fixes its precision."""
-    if not isinstance(network, PictureNetwork) or not any(True for _ in network.parameters()):
+    """Return a copy that computes in float64; None without weights or with a fixed precision."""
+    if not isinstance(network, PictureNetwork) or not network.has_weights:
         return None
+    device = next(network.parameters()).device
     exact = copy.deepcopy(network).double()
     try:
         with torch.no_grad():
-            exact(torch.zeros(1, *network.in_shape, dtype=torch.float64, device=_device(network)))
+            exact(torch.zeros(1, *network.in_shape, dtype=torch.float64, device=device))
     except (RuntimeError, TypeError, ValueError):
         return None
     return exact
-
-
-def _device(network: nn.Module) -> torch.device:
-    return next(network.parameters()).device
 
 
 def _pixel_error(largest: Tensor) -> Tensor:
@@ -267,19 +234,16 @@ REMEDY = (
 
 
 class Regrouped(PictureNetwork):
-    """Gives each frame the outputs that the network gives it in another batch.
-
-    A function of the frame does not notice.
-    """
+    """Evaluates a network on each frame in another batch; a function of the frame is unchanged."""
 
     def __init__(self, network: PictureNetwork, groups: str, seed: int = 0) -> None:
-        """Takes a network.
+        """Wraps a network.
 
         Args:
             network: Any.
-            groups: "single": one frame a call. "mixed": the frames in random order, in groups of
-                random sizes, each filled up with some of its frames again.
-            seed: Of the order and the sizes.
+            groups: "single": one frame a call. "mixed": random order and sizes of batches, each
+                with some of its frames twice.
+            seed: Of order and sizes.
         """
         super().__init__()
         self.network, self.groups = network, groups
@@ -306,22 +270,16 @@ class Regrouped(PictureNetwork):
         return outputs
 
     def _draw(self, most: int) -> int:
-        """A number from 1 to `most`, small ones more often."""
         share = float(torch.rand((), generator=self._generator))
         return min(most, 1 + int((most + 1) ** share - 1))
 
 
 @torch.no_grad()
 def require_same_in_any_batch(network: PictureNetwork, frames: Tensor, largest: int) -> None:
-    """Evaluate frames in batches of many sizes.
-
-    Args:
-        network: From elsewhere.
-        frames: Shape: (N, C, H, W).
-        largest: A size that must be among them.
+    """Check that outputs for frames (N, C, H, W) do not depend on the size of the batch.
 
     Raises:
-        InputError: The outputs depend on the size.
+        InputError: They do in one of many sizes, `largest` among them.
     """
     rows = torch.linspace(0, len(frames) - 1, min(len(frames), 64)).long().to(frames.device)
     frames = frames[rows]

@@ -22,21 +22,16 @@ _SAME = 1e-4
 
 
 class Sb3Logits(nn.Module):
-    """What the policy of PPO or A2C makes of frames: `drone_rl.judge(Sb3Logits(model))`.
+    """The logits of a PPO or A2C policy: `drone_rl.judge(Sb3Logits(model))`.
 
-    A policy that was trained on bytes gets frames from 0 to 1 here, such as the transform `Rgb`
-    makes.
+    A policy that was trained on bytes gets frames from 0 to 1, as from the transform `Rgb`.
 
     Raises:
-        InputError: The model has no probabilities of a few actions that depend on a frame alone.
+        InputError: Its action probabilities are not a function of one frame.
     """
 
     def __init__(self, model: BaseAlgorithm) -> None:
-        """Takes the modules between frame and logits, which it shares with the model.
-
-        Args:
-            model: Of an actor-critic algorithm with discrete actions.
-        """
+        """Takes the modules between frame and logits, which it shares with the model."""
         super().__init__()
         policy = model.policy
         if not isinstance(policy, ActorCriticPolicy) or not hasattr(policy.action_space, "n"):
@@ -61,7 +56,7 @@ class Sb3Logits(nn.Module):
 
     @torch.no_grad()
     def _agrees(self, policy: ActorCriticPolicy) -> bool:
-        """Whether it does what the policy does; one with a memory, say, does not."""
+        """Return whether it computes the policy's logits; a recurrent one has others."""
         picture = torch.zeros(1, *(policy.observation_space.shape or ()), device=policy.device)
         try:
             distribution: Any = policy.get_distribution(picture).distribution
@@ -72,7 +67,6 @@ class Sb3Logits(nn.Module):
 
 
 def _channels_first(shape: tuple[int, ...]) -> tuple[int, ...] | None:
-    """The shape (C, H, W) of a space of frames, whose few channels come first or last."""
     if len(shape) != 3:
         return None
     return shape if shape[0] <= shape[-1] else (shape[-1], *shape[:-1])
@@ -93,12 +87,7 @@ class Sb3Trunk(BaseFeaturesExtractor):
     """
 
     def __init__(self, observation_space: spaces.Box, network: Network | None = None) -> None:
-        """Builds it with fresh weights, which Stable-Baselines3 then makes orthogonal as ours.
-
-        Args:
-            observation_space: Pictures (C, H, W).
-            network: Which; the default's by default.
-        """
+        """Builds it for frames (C, H, W); Stable-Baselines3 initialises it orthogonally."""
         shape = observation_space.shape
         if len(shape) != 3:
             raise InputError(f"Sb3Trunk got observations of shape {shape}; give pictures (C, H, W)")

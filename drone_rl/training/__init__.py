@@ -1,4 +1,4 @@
-"""The loop that turns batches of episodes into a better policy, and what it leaves behind."""
+"""Training: the loop, its components and callbacks, and the folder of a run."""
 
 from drone_rl.training import actor_critic, ray_workers  # they connect parts with their settings
 from drone_rl.training.callbacks import (
@@ -15,14 +15,13 @@ from drone_rl.training.learners import (
     NotANumberError,
     ReinforceLearner,
 )
-from drone_rl.training.trainer import Collector, Trainer
+from drone_rl.training.trainer import Trainer
 from drone_rl.utils.checkpoint import check_weights, load_checkpoint, save_checkpoint
 
 __all__ = [
     "ActorCriticLearner",
     "Callback",
     "CheckpointCallback",
-    "Collector",
     "CsvCallback",
     "Learner",
     "LoggerCallback",

@@ -1,4 +1,4 @@
-"""What happens beside learning: checkpoints, logs, a progress bar."""
+"""Callbacks of the training loop: checkpoints, logs, a progress bar."""
 
 import copy
 import csv
@@ -36,21 +36,19 @@ class Progress:
 
 
 class OngoingTraining(Protocol):
-    """What a callback sees of a training, and may ask of it."""
+    """A training as callbacks see it."""
 
     progress: Progress
     total_frames: int
-    """After how many it stops."""
+    """Frames after which it stops."""
     stop_request: str
-    """Why a callback wants training to stop after this update; empty to go on."""
+    """A callback's reason to stop after this update; empty to go on."""
 
     def state_dict(self) -> dict[str, Any]:
-        """Everything that the next update depends on."""
+        """Return everything that the next update depends on."""
         ...
 
 
-_DIGITS = 20
-"""Of the number of an update."""
 _log = logging.getLogger(__name__)
 
 
@@ -80,35 +78,17 @@ class CheckpointCallback(Callback):
         interval_s: float = 15.0,
         extra: Mapping[str, Any] | None = None,
     ) -> None:
-        """Sets where and how often.
-
-        Args:
-            folder: Where the checkpoints go; made if need be.
-            interval_s: Seconds between two savings.
-            extra: Stored beside the trainer's state: configuration, versions.
-        """
+        """Sets the folder, the seconds between two checkpoints, and entries to add to each."""
         self.folder = Path(folder)
+        self.last_path, self.best_path = self.folder / "last.pt", self.folder / "best.pt"
         self.interval_s = interval_s
         self.extra = dict(extra or {})
         self.best = float("-inf")
         self._best_state: dict[str, Any] | None = None
         self._saved_at = time.monotonic()
 
-    @property
-    def last_path(self) -> Path:
-        """The newest checkpoint."""
-        return self.folder / "last.pt"
-
-    @property
-    def best_path(self) -> Path:
-        """The best checkpoint."""
-        return self.folder / "best.pt"
-
     def on_start(self, training: OngoingTraining) -> None:
-        """Makes sure, before any work is done, that there is a place to save to.
-
-        Deletes the half-written checkpoints of processes that were killed.
-        """
+        """Create the folder before any work is done; delete half-written checkpoints."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -121,7 +101,7 @@ class CheckpointCallback(Callback):
             self._save(training)
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
-        """Notes the best state of all updates; saves when the interval has passed."""
+        """Keep the best state of all updates; save when the interval has passed."""
         if training.progress.running_reward > self.best:
             self.best = training.progress.running_reward
             self._best_state = copy.deepcopy(training.state_dict())
@@ -146,11 +126,10 @@ class CsvCallback(Callback):
     """One row of `metrics.csv` an update; a resumed run drops the rows that it will repeat."""
 
     def __init__(self, path: str | Path) -> None:
-        """Sets the file."""
         self.path = Path(path)
 
     def on_start(self, training: OngoingTraining) -> None:
-        """Keeps the rows up to the state that training goes on from."""
+        """Keep the rows up to the state that training resumes from."""
         if not self.path.exists():
             return
         rows = [*read_table(self.path)] if self.path.stat().st_size else []
@@ -162,8 +141,7 @@ class CsvCallback(Callback):
         write_atomically(self.path, text.getvalue())
 
     def _update_of(self, row: Sequence[str]) -> int:
-        """The number of the update that a row is of."""
-        if not (row[0].isascii() and row[0].isdigit() and len(row[0]) < _DIGITS):
+        if not (row[0].isascii() and row[0].isdigit() and len(row[0]) < 20):
             raise InputError(
                 f"{self.path} is damaged: {shown(row[0])} is no number of an update; move it away"
             )
@@ -190,11 +168,9 @@ class LoggerCallback(Callback):
     """Passes the metrics, by frames, to any of TorchRL's loggers."""
 
     def __init__(self, loggers: Sequence[Logger] | Callable[[], Sequence[Logger]]) -> None:
-        """Sets the loggers.
+        """Sets the loggers, or a function that makes them when training starts.
 
-        Args:
-            loggers: Themselves, or a function that makes them when training starts. A logger may
-                write as soon as it is made, which must wait until a resumed run is accepted.
+        A logger may write as soon as it is made, which must wait until a resumed run is accepted.
         """
         self._make = loggers if callable(loggers) else None
         self.loggers = [] if callable(loggers) else list(loggers)
@@ -215,7 +191,6 @@ class ProgressCallback(Callback):
     """A progress bar on a terminal, a line every few seconds elsewhere."""
 
     def __init__(self, interval_s: float = 5.0) -> None:
-        """Sets the time between two lines where there is no terminal."""
         self.interval_s = interval_s
         self._bar: tqdm | None = None
         self._said_at = 0.0
@@ -238,26 +213,16 @@ class ProgressCallback(Callback):
             self._said_at = time.monotonic()
             rate = metrics["time/frames_per_second"]
             left = max(0, training.total_frames - progress.frames) / rate
-            _log.info(
-                "frames %d, %s, %.0f frames/s, at most %.0f s left",
-                progress.frames,
-                text,
-                rate,
-                left,
-            )
+            shape = "frames %d, %s, %.0f frames/s, at most %.0f s left"
+            _log.info(shape, progress.frames, text, rate, left)
 
     def on_end(self, training: OngoingTraining, reason: str) -> None:
         """Closes the bar and says how it ended."""
         self._close()
         progress = training.progress
-        _log.info(
-            "stopped (%s) after %d frames, %d episodes, %.1f s: running reward %.3f",
-            reason,
-            progress.frames,
-            progress.episodes,
-            progress.seconds,
-            progress.running_reward,
-        )
+        counters = (progress.frames, progress.episodes, progress.seconds, progress.running_reward)
+        shape = "stopped (%s) after %d frames, %d episodes, %.1f s: running reward %.3f"
+        _log.info(shape, reason, *counters)
 
     def on_failure(self, training: OngoingTraining) -> None:
         """Closes the bar."""
@@ -272,7 +237,6 @@ class ForwardProgress(Callback):
     """Forwards the progress of a training to a `drone_rl.utils.progress.Progress`."""
 
     def __init__(self, progress: Report) -> None:
-        """Sets the receiver."""
         self.progress = progress
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:

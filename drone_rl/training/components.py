@@ -1,4 +1,4 @@
-"""What a training consists of, between its collector and its learner."""
+"""Components of a training that its collectors and learners share."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -12,7 +12,6 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.policies import PolicyNetwork, make_actor
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.tasks import FailureReplayTask
-from drone_rl.training.learners import Learner
 
 
 class Group(NamedTuple):
@@ -47,45 +46,27 @@ def group_sizes(settings: TrainSettings) -> list[int]:
 
     On a GPU there is one group: several threads would only wait for each other.
     """
-    asked = settings.collector
-    is_one = settings.device.startswith("cuda") and not isinstance(asked, Ray)
-    groups = 1 if is_one else min(asked.num_envs, asked.num_threads)
-    return [asked.num_envs // groups + (i < asked.num_envs % groups) for i in range(groups)]
+    chosen = settings.collector
+    is_one = settings.device.startswith("cuda") and not isinstance(chosen, Ray)
+    groups = 1 if is_one else min(chosen.num_envs, chosen.num_threads)
+    return [chosen.num_envs // groups + (i < chosen.num_envs % groups) for i in range(groups)]
 
 
 def episode_options(settings: TrainSettings, num_threads: int) -> dict[str, Any]:
-    """Return the arguments of `EpisodeCollector` that settings choose.
-
-    Args:
-        settings: The training's.
-        num_threads: Of a fused kernel.
-    """
-    asked = settings.collector
-    fused = isinstance(asked, Episodes) and asked.compiled
+    """Return the arguments of `EpisodeCollector`; `num_threads` are those of a fused kernel."""
+    chosen = settings.collector
+    fused = isinstance(chosen, Episodes) and chosen.compiled
     return {"acceleration": "fused" if fused else "none", "num_threads": num_threads}
 
 
 def make_collector(settings: TrainSettings, replay: FailureReplayTask | None = None) -> Components:
     """Make the collector that the settings choose, with environments and an untrained network.
 
-    Args:
-        settings: The training's.
-        replay: Where episodes start, unless anywhere.
-
     Raises:
         InputError: There is no such device, or an extra isn't installed.
     """
     check_device(settings.device)
     return settings.collector.make(settings, replay)
-
-
-def make_learner(settings: TrainSettings, parts: Components) -> Learner:
-    """Make the learner that the settings choose.
-
-    Raises:
-        InputError: A part does not exist, or does not take its settings.
-    """
-    return settings.objective.learner(settings, parts)
 
 
 def learning_actor(settings: TrainSettings, parts: Components) -> Any:

@@ -1,4 +1,4 @@
-"""Is a policy that seems to have solved its task as good by its most probable actions?"""
+"""Confirms by its most probable actions that a policy has solved its task."""
 
 import functools
 from collections.abc import Mapping
@@ -13,42 +13,30 @@ from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import describe
 from drone_rl.utils.seeding import Stream
 
-_WORLDS = 250
-"""That are flown at the same time."""
+_NUM_ENVS = 250
 
 
 class Confirmation:
-    """Flies a policy as it will be judged, in worlds that it never learns from.
+    """Evaluates the policy of a training greedily, in environments that it never learns from.
 
-    What a training sees are drawn actions. They lead out of loops in which the most probable
-    actions are caught for ever, so that a policy which collects everything while it learns may fail
-    most flights afterwards.
+    Sampled actions lead out of loops in which the most probable actions are caught for ever, so
+    that a policy which collects everything while it learns may fail most episodes afterwards.
     """
 
     def __init__(self, settings: TrainSettings, network: nn.Module) -> None:
-        """Takes a training's policy.
-
-        Args:
-            settings: The training's; `trainer.confirm_episodes` are flown.
-            network: The policy's, as it learns.
-        """
         self._settings, self._network = settings, network
         self._description = describe(settings)
         self.flights = 0
-        """So far."""
+        """Episodes so far."""
         self.succeeded = 0
-        """Of the last `trainer.confirm_episodes`."""
+        """Of the last `trainer.confirm_episodes` episodes."""
 
     def __call__(self, update: int) -> bool:
-        """Whether enough flights reach every goal.
-
-        Args:
-            update: Number of the update after which this is asked; each is asked in other worlds.
-        """
+        """Return whether enough episodes succeed; each update has environments of its own."""
         settings, episodes = self._settings, self._settings.trainer.confirm_episodes
         env = self._env
         worlds: Any = env.base_env
-        worlds.first_world = update * _WORLDS
+        worlds.first_world = update * _NUM_ENVS
         env.set_seed(settings.seed)
         actor = make_actor(self._network, env.action_spec)
         flown = run_episodes(env, actor, episodes, is_compiled=True)
@@ -60,7 +48,7 @@ class Confirmation:
     def _env(self) -> TransformedEnv:
         settings = self._settings
         return self._description.build_env(
-            min(_WORLDS, settings.trainer.confirm_episodes),
+            min(_NUM_ENVS, settings.trainer.confirm_episodes),
             seed=settings.seed,
             stream=Stream.CONFIRMATION,
             device=settings.device,
@@ -68,7 +56,7 @@ class Confirmation:
         )
 
     def close(self) -> None:
-        """Ends the worlds, if any were flown in."""
+        """Close the environments, if there are any."""
         if "_env" in vars(self):
             self._env.close()
 

@@ -1,4 +1,4 @@
-"""Whether a saved state is one of this training, before anything of it is taken over."""
+"""Checks that a saved state fits a training, before any of it is loaded."""
 
 import copy
 import math
@@ -16,15 +16,11 @@ MAY_DIFFER = ("lr", "initial_lr", "_last_lr", "base_lrs")
 
 
 def check_fits(saved: Any, own: Any, where: str) -> None:
-    """Refuses a state that is not built as this training's own.
-
-    Args:
-        saved: Out of a file.
-        own: The training's own state of the same thing; what is None is not known yet.
-        where: Its name, for people.
+    """Check that a saved state has the structure of the training's own; None fits anything.
 
     Raises:
-        InputError: A name, type, shape or length differs, or a number is not finite; it is named.
+        InputError: A name, type, shape or length differs, or a number is not finite; the message
+            names it, from `where` on.
     """
     if isinstance(own, Tensor):
         _check_tensor(saved, own, where)
@@ -40,7 +36,7 @@ def check_fits(saved: Any, own: Any, where: str) -> None:
 
 
 def check_optimiser(saved: Any, optimiser: torch.optim.Optimizer) -> None:
-    """Refuses an optimizer's state that is not one of this optimizer after steps, or before any.
+    """Check that an optimizer's state fits this optimizer, before or after its first step.
 
     Raises:
         InputError: See `check_fits`; also if a hyperparameter is another.
@@ -51,14 +47,15 @@ def check_optimiser(saved: Any, optimiser: torch.optim.Optimizer) -> None:
     check_fits(saved, own, "optimiser")
     for mine, theirs in zip(own["param_groups"], saved["param_groups"], strict=True):
         for key in mine:
-            if key not in MAY_DIFFER and _plain(mine[key]) != _plain(theirs[key]):
+            values = [list(v[key]) if isinstance(v[key], tuple) else v[key] for v in (mine, theirs)]
+            if key not in MAY_DIFFER and values[0] != values[1]:
                 raise _misfit(
                     f"optimiser.{key}", f"is {shown(theirs[key])}, not {shown(mine[key])}"
                 )
 
 
 def _after_a_step(optimiser: torch.optim.Optimizer) -> dict[str, Any]:
-    """What a state looks like: that of a copy, whose copied parameters are stepped once by 0."""
+    """Return the state of a copy after one step along a gradient of 0."""
     again = copy.deepcopy(optimiser)
     for group in again.param_groups:
         for parameter in group["params"]:
@@ -75,7 +72,6 @@ def _check_list(saved: Any, own: Sequence[Any], where: str) -> None:
 
 
 def _check_value(saved: Any, own: Any, where: str) -> None:
-    """A whole number for one, a finite number for one, and anything else as it is."""
     if type(own) is int:
         fits = type(saved) is int
     elif type(own) is float:
@@ -100,7 +96,3 @@ def _misfit(where: str, what: str) -> InputError:
         f"the checkpoint does not fit this training: {where} {what}; go on from the checkpoint of "
         "a run with these settings, or start a new run"
     )
-
-
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value

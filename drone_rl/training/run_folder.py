@@ -86,7 +86,6 @@ class RunFolder:
     """The folder of one run; `drone_rl.training.train.learn` shows the order of the calls."""
 
     def __init__(self, path: Path) -> None:
-        """Takes an existing folder."""
         self.path = path
 
     @classmethod
@@ -150,13 +149,7 @@ def result_of(
 
 
 def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Training:
-    """Judge the last policy if settings ask for it and no signal stopped it; write `result.json`.
-
-    Args:
-        settings: Of the training.
-        folder: Its own.
-        result: Goes into `result.json`.
-    """
+    """Judge the last policy if settings request it and no signal came; write `result.json`."""
     if settings.evaluate_after and not result["reason"].startswith("SIG"):
         from drone_rl.evaluation.judge import judge_for_selection  # slow to import, and few need it
 
@@ -170,9 +163,7 @@ def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Tra
 def hand_on_signal(training: Training) -> Training:
     """Let a signal that stopped a training act, now that its state is saved.
 
-    Args:
-        training: Its result, which is returned if no signal stopped it, or if the caller's own
-            handler of that signal returns.
+    Returns `training` if there was no signal, or if the caller's own handler returns.
 
     Raises:
         KeyboardInterrupt: Ctrl-C stopped it. Not a subclass: Python ends itself by SIGINT, which
@@ -202,10 +193,10 @@ def _own(config: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def settings_of(config: Mapping[str, Any]) -> TrainSettings:
-    """Return the settings of a checkpoint; they may name built-in parts only.
+    """Return the settings of a checkpoint.
 
     Raises:
-        InputError: It names another part.
+        InputError: It names a part that is not built in.
     """
     settings = from_config(TrainSettings, _own(config))
     parts = (settings.network, settings.returns, settings.objective, settings.optimiser)
@@ -218,11 +209,6 @@ def settings_of(config: Mapping[str, Any]) -> TrainSettings:
 
 
 def _read_best(value: Any) -> float:
-    """Return the best running mean of a checkpoint.
-
-    Raises:
-        InputError: It is not a number.
-    """
     if type(value) is float and value == _NONE_YET:
         return value
     return Real(-1e6, 1e6).read(value, "the checkpoint's best")

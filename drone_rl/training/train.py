@@ -108,7 +108,7 @@ def learn(
     checkpoints = run.checkpoints(settings)
     trainer = Trainer(
         collector=parts.collector,
-        learner=components.make_learner(settings, parts),
+        learner=settings.objective.learner(settings, parts),
         callbacks=[CsvCallback(folder / "metrics.csv"), checkpoints, *callbacks],
         generators=parts.generators,
         target=limits.target_share and limits.target_share * largest_reward,

@@ -1,4 +1,4 @@
-"""The training loop: collect, learn, tell."""
+"""The training loop: collect, learn, log."""
 
 import contextlib
 import dataclasses
@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import FrameType
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import torch
 from tensordict import TensorDictBase
@@ -23,12 +23,11 @@ from drone_rl.utils.memory import return_freed_memory
 
 
 def episode_rewards(batch: TensorDictBase) -> Tensor:
-    """Reward of each episode that ends in a batch, in the batch's order. Shape: (num_episodes,).
+    """Return the rewards of the episodes that end in a batch, in order. Shape: (num_episodes,).
 
     Args:
-        batch: Rows of complete episodes; or pieces of fixed length with ("next",
-            "episode_reward"), which `RolloutCollector` and TorchRL's transform `RewardSum` write,
-            since the first part of an episode may lie in an earlier batch. Shape: (*batch, T).
+        batch: Rows of complete episodes; or rows of fixed length with ("next", "episode_reward"),
+            which `RolloutCollector` and TorchRL's `RewardSum` write. Shape: (*batch, T).
 
     Raises:
         InputError: An episode is not complete and its reward so far not known.
@@ -48,21 +47,16 @@ def episode_rewards(batch: TensorDictBase) -> Tensor:
 
 
 def running_mean(old: float, values: Tensor, decay: float) -> float:
-    """Takes values in one by one: m <- decay * m + (1 - decay) * value."""
+    """Update a mean with each value: m <- decay * m + (1 - decay) * value."""
     for value in values.tolist():
         old = decay * old + (1 - decay) * value
     return old
 
 
 def batch_metrics(batch: TensorDictBase, ends: Iterable[enum.IntEnum] = ()) -> dict[str, float]:
-    """Means over the episodes that end in a batch, and the shares of the reasons why.
+    """Return means over the episodes that end in a batch; NaN where none ends.
 
-    Args:
-        batch: See `episode_rewards`.
-        ends: What ("next", "info", "end_reason") may be (`Task.ends`); 0 is none.
-
-    Returns:
-        By name; NaN where no episode ends.
+    With `ends` (`Task.ends`), also the rate of each ("next", "info", "end_reason") but 0.
     """
     rewards = episode_rewards(batch)
     done, lengths = batch["next", "done"], batch.get(("next", "step_count"), None)
@@ -81,27 +75,7 @@ def batch_metrics(batch: TensorDictBase, ends: Iterable[enum.IntEnum] = ()) -> d
 
 
 TRIMMED_EVERY = 16
-"""Updates after which memory is given back, which makes the next one a tenth slower."""
-
-
-class Collector(Protocol):
-    """What a trainer needs of a collector, TorchRL's own included."""
-
-    def __iter__(self) -> Iterator[TensorDictBase]:
-        """Batches, until it has no more."""
-        ...
-
-    def state_dict(self) -> dict:
-        """State between two batches."""
-        ...
-
-    def load_state_dict(self, state_dict: dict) -> None:
-        """Goes on from a state."""
-        ...
-
-    def shutdown(self) -> None:
-        """Closes the environments; called by whoever made the collector."""
-        ...
+"""Updates between releases of memory, which make the next update a tenth slower."""
 
 
 class Trainer:
@@ -114,7 +88,7 @@ class Trainer:
     def __init__(
         self,
         *,
-        collector: Collector,
+        collector: Any,
         learner: Learner,
         callbacks: Sequence[Callback] = (),
         generators: Mapping[str, torch.Generator] | None = None,
@@ -128,18 +102,18 @@ class Trainer:
         """Connects the parts.
 
         Args:
-            collector: Yields batches.
+            collector: Iterates over batches; has `state_dict` and `load_state_dict`. TorchRL's
+                collectors do. Its maker shuts it down.
             learner: Learns from them.
-            callbacks: Told of every update, in order.
+            callbacks: Called after every update, in order.
             generators: Random streams to save and restore, by name.
             total_frames: Stop once this many were collected.
             total_episodes: Stop once this many were collected; None for no limit.
             target: Stop once the running mean of the episodes' rewards reaches it; None for never.
-            confirm: Whether the policy, after so many updates, has solved its task in earnest;
-                asked whenever the target is reached, until it has. By default nobody asks.
+            confirm: Called with the number of updates when the target is reached; returns whether
+                the policy has solved its task. By default the target is enough.
             running_decay: Weight of the old value in the running mean, per episode.
-            ends: Why an episode may end (`Task.ends`), to be told of; the batches have them as
-                ("next", "info", "end_reason").
+            ends: Why an episode may end (`Task.ends`), for the metrics.
         """
         self.collector = collector
         self.learner = learner
@@ -157,7 +131,7 @@ class Trainer:
         """Why a callback wants training to stop after this update; empty to go on."""
 
     def run(self) -> str:
-        """Trains until solved, out of budget or told to stop.
+        """Train until solved, out of budget or stopped.
 
         Ctrl-C and SIGTERM let the current update finish, so that nothing is lost; a second signal
         acts at once. Signals are watched in the main thread only.
@@ -190,7 +164,7 @@ class Trainer:
         return reason if self.stop_signal is None else self.stop_signal.name
 
     def _update(self, batches: Iterator[TensorDictBase]) -> dict[str, float] | None:
-        """Collects and learns. Returns what is to be told; None if there was no batch left."""
+        """Collect and learn. Returns the metrics, or None if there is no batch left."""
         begin = time.perf_counter()
         batch = next(batches, None)
         if batch is None:
@@ -259,7 +233,7 @@ class Trainer:
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
-        """Notes the first Ctrl-C or SIGTERM; gives the handlers back at the first and the end."""
+        """Record the first Ctrl-C or SIGTERM; restore the handlers then and at the end."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -296,7 +270,7 @@ class Trainer:
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Goes on from a `state_dict`, be it out of a file that nobody should trust.
+        """Resume from a `state_dict`, which may come from an untrusted file.
 
         Raises:
             InputError: It is not one of such a training.

@@ -19,7 +19,7 @@ from drone_rl.config.networks import SmallCnn
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.config.transforms import EpisodeReward, Gray, Stack
 from drone_rl.training import ActorCriticLearner, ReinforceLearner
-from drone_rl.training.components import make_collector, make_learner
+from drone_rl.training.components import make_collector
 from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
@@ -51,7 +51,7 @@ def test_every_objective_has_its_learner():
     for settings, kind in ((TINY, ActorCriticLearner), (TrainSettings(), ReinforceLearner)):
         settings = settings.replace(task=TASK)
         made = make_collector(settings)
-        learner = make_learner(settings, made)
+        learner = settings.objective.learner(settings, made)
         assert isinstance(learner, kind)
         assert learner.network is made.network
         made.collector.shutdown()
@@ -63,7 +63,7 @@ def test_gradients_by_the_kernel_teach_what_those_of_torch_do():
         limits = TrainerSettings(compiled=is_compiled, minibatch_frames=40)
         settings = TrainSettings(task=TASK, trainer=limits, optimiser=Sgd(lr=1.0))
         made = make_collector(settings)
-        learner = make_learner(settings, made)
+        learner = settings.objective.learner(settings, made)
         network = learner.loss.actor_network.module[0].module
         assert isinstance(network, FusedNetwork) is is_compiled
         before = [p.detach().clone() for p in made.network.parameters()]
@@ -93,7 +93,7 @@ def test_gradients_by_the_kernel_teach_what_those_of_torch_do():
 def test_what_the_network_made_is_kept_where_it_is_learned_from(settings, is_kept):
     settings = TrainSettings(task=TASK).replace(**settings)
     made = make_collector(settings)
-    learner = make_learner(settings, made)
+    learner = settings.objective.learner(settings, made)
     sources = [getattr(part, "source", None) for part in made.collector.collectors]
     kept = [s._cache for s in sources if isinstance(s, FusedCollector) and s._cache is not None]
     assert (len(kept) == 1) is is_kept and bool(kept) is is_kept
@@ -115,7 +115,7 @@ def test_what_was_made_in_flight_is_taken_and_teaches_the_same(monkeypatch):
         monkeypatch.setattr(ActivationCache, "find", note)
         settings = TrainSettings(task=TASK, trainer=TrainerSettings(minibatch_frames=40))
         made = make_collector(settings)
-        learner, batches = make_learner(settings, made), iter(made.collector)
+        learner, batches = settings.objective.learner(settings, made), iter(made.collector)
         for _ in range(3):
             learner.update(next(batches))
         made.collector.shutdown()
@@ -131,7 +131,11 @@ def test_a_critic_begins_alike_for_a_seed_and_leaves_the_policy_as_it_is(shares)
     states = []
     for seed in (0, 0, 1):
         made = make_collector(settings.replace(seed=seed))
-        states.append(copy.deepcopy(make_learner(settings.replace(seed=seed), made).state_dict()))
+        states.append(
+            copy.deepcopy(
+                settings.objective.learner(settings.replace(seed=seed), made).state_dict()
+            )
+        )
         made.collector.shutdown()
     one, two, other = (state["critic"] for state in states)
     assert all(torch.equal(one[name], two[name]) for name in one)
@@ -246,7 +250,7 @@ def refused(trained, folder, state, message):
 def test_advantages_are_torchrls_by_its_own_way_through_the_critic(is_ours):
     """TorchRL looks at every next picture, too; its own collector's batches will do as well."""
     made = make_collector(TINY.replace(collector=Rollouts(num_envs=5, num_threads=1)))
-    learner, (ours,) = make_learner(TINY, made), made.collector.collectors
+    learner, (ours,) = TINY.objective.learner(TINY, made), made.collector.collectors
     torch.nn.init.normal_(learner.model.critic.module.weight)
     collector = Collector(
         ours.env,

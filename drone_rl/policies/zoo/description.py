@@ -56,7 +56,7 @@ _OPTIONAL: dict[str, tuple[type[Settings], Settings]] = {
 
 @dataclasses.dataclass(frozen=True)
 class PolicyDescription:
-    """What a policy flies in, sees and consists of; in bounds, and its parts fit together.
+    """Task, camera, transforms and network of a policy; in bounds, and its parts fit together.
 
     Raises:
         InputError: They don't fit, or together exceed a bound.
@@ -75,7 +75,7 @@ class PolicyDescription:
     """What the network can ask for; files without it mean moves."""
 
     def __post_init__(self) -> None:
-        """Refuses what could not be built, or only with much memory."""
+        """Check that it can be built with bounded memory."""
         self.dynamics.check_air()
         pixels = self.camera.width * self.camera.height
         if pixels > MOST_PIXELS:
@@ -142,14 +142,14 @@ class PolicyDescription:
         task: Task[Any] | None = None,
         **kwargs: Any,
     ) -> TransformedEnv:
-        """The described worlds, seen through the described camera and transforms.
+        """Build environments with the described camera and transforms.
 
         Args:
             num_envs: How many.
             seed: Root of their random streams.
-            device: Where they are drawn.
-            pixels: Whether they are drawn at all.
-            task: One that looks like the described one, but begins its episodes otherwise.
+            device: Where they are rendered.
+            pixels: Whether they are rendered at all.
+            task: The same task with other starts of episodes.
             kwargs: See `DroneEnv`.
         """
         env = DroneEnv(
@@ -164,7 +164,7 @@ class PolicyDescription:
         return with_transforms(env, self.make_transforms() if pixels else ())
 
     def _moved(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """Dynamics and actions, unless the dynamics that are given bring actions of their own."""
+        """Return dynamics and actions, unless given dynamics have actions of their own."""
         dynamics = given.get("dynamics")
         if dynamics is None or isinstance(dynamics, DynamicsSettings):
             return {"dynamics": self.dynamics, "actions": self.actions}
@@ -179,33 +179,21 @@ class PolicyDescription:
         return [transform.make() for transform in self.transforms]
 
     def build_network(self, generator: torch.Generator | None = None) -> PolicyNetwork:
-        """The described network with fresh weights.
-
-        Args:
-            generator: Source of the initial weights; torch's global one by default.
-        """
+        """Return the network with fresh weights, from torch's global generator by default."""
         return self._network(self.make_dynamics().actions, generator)
 
     def load_network(self, weights: Mapping[str, torch.Tensor]) -> PolicyNetwork:
-        """The described network with given weights; none are drawn before, which takes longer.
-
-        Args:
-            weights: Names, shapes and types as in `expected_weights`.
-        """
+        """Return the network with given weights, as in `expected_weights`."""
         network = self._without_weights().to_empty(device="cpu")
         network.load_state_dict(weights)
         return network
 
     def build_critic(self, generator: torch.Generator | None = None) -> PolicyNetwork:
-        """A network like the described one, from a picture to one number.
-
-        Args:
-            generator: See `build_network`.
-        """
+        """Return a network of the same kind with one output, see `build_network`."""
         return self._layers(1, generator)
 
     def expected_weights(self) -> dict[str, torch.Tensor]:
-        """Names, shapes and types of the network's weights, without the weights themselves."""
+        """Return meta tensors with the names, shapes and types of the network's weights."""
         return dict(self._without_weights().state_dict())
 
     def _without_weights(self) -> PolicyNetwork:
@@ -225,18 +213,13 @@ class PolicyDescription:
 def describe(settings: TrainSettings) -> PolicyDescription:
     """Return the description of the policy that a training creates.
 
-    Args:
-        settings: Settings of the training.
-
     Raises:
         InputError: A part isn't registered, or a value is out of bounds.
     """
-    for where, part in (
-        ("network", settings.network),
-        *(("transforms", t) for t in settings.transforms),
-    ):
+    for part in (settings.network, *settings.transforms):
         if not part.is_known:
-            kind = "network" if where == "network" else "transform"
+            kind = "network" if part is settings.network else "transform"
+            where = "network" if part is settings.network else "transforms"
             raise InputError(
                 f"{where}._target_={part.target} is not registered, so no file could describe it; "
                 f"register it with drone_rl.register_{kind} and give plugins=[MODULE]"
@@ -253,10 +236,6 @@ def describe(settings: TrainSettings) -> PolicyDescription:
 def output_of(transform: Transform, frame: Frame) -> Frame:
     """Return shape and type of an image after a transform.
 
-    Args:
-        transform: Settings of the transform.
-        frame: Shape and type of its input.
-
     Raises:
         InputError: The transform can't process such images.
     """
@@ -270,13 +249,10 @@ def output_of(transform: Transform, frame: Frame) -> Frame:
 
 
 def parse(data: Any) -> PolicyDescription:
-    """Reads a description, strictly.
-
-    Args:
-        data: Plain data.
+    """Read a description from plain data, strictly.
 
     Raises:
-        InputError: A key is missing or unknown, a value is of another type or out of bounds.
+        InputError: A key is missing or unknown, a value has another type or is out of bounds.
     """
     data = as_mapping(data, "the policy's description")
     if data.get("format") != FORMAT or type(data.get("format_version")) is not int:

@@ -1,4 +1,4 @@
-"""Policies in files: what they consist of, their weights, and where they come from."""
+"""Policies in files: descriptions, weights and provenance."""
 
 import json
 from collections.abc import Mapping
@@ -18,9 +18,9 @@ from drone_rl.utils.readers import with_present_names
 from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
 
 MOST_HEADER = 2**20
-"""Bytes of what an exported file says besides its weights."""
+"""Bytes of the header of an exported file."""
 _ENTRY = {"dtype", "shape", "data_offsets"}
-"""What a file of safetensors states of each tensor."""
+"""Keys of each tensor in a safetensors header."""
 _FOLDER = Path(__file__).resolve().parent
 _COUNT = Whole(0, 2**62)
 _PROGRESS = Record(
@@ -66,45 +66,39 @@ _NOT_IN_ALL = frozenset({"verdict", "worlds", "seed", "chosen", "evaluation"})
 
 
 def policy_names() -> list[str]:
-    """Names of the policies that travel with the package."""
+    """Return the names of the policies in the package."""
     return sorted(path.stem for path in _FOLDER.glob("*.safetensors"))
 
 
 def policy_path(name: str) -> Path:
-    """File of a policy that travels with the package."""
+    """Return the file of a policy in the package."""
     return _FOLDER / f"{name}.safetensors"
 
 
 def card_path(name: str) -> Path:
-    """Model card of such a policy."""
+    """Return the model card of a policy in the package."""
     return _FOLDER / f"{name}.md"
 
 
 def certificate_path(policy: Path) -> Path:
-    """Where the certificate of a policy lies, if it has one.
-
-    Args:
-        policy: Its file: an exported one has it beside itself, as those that travel with the
-            package do, the checkpoint of a run in the run's folder.
-    """
-    if policy.suffix == ".safetensors":
-        return policy.with_suffix(".certificate.json")
-    return policy.absolute().parent.parent / "certificate.json"
+    """Return the path of a policy's certificate, see `_companion`."""
+    return _companion(policy, "certificate.json")
 
 
 def shifts_path(policy: Path) -> Path:
-    """Where the flights of a policy under other conditions lie, if it has any.
+    """Return the path of a policy's episodes under perturbations, see `_companion`."""
+    return _companion(policy, "shifts.json")
 
-    Args:
-        policy: See `certificate_path`.
-    """
+
+def _companion(policy: Path, name: str) -> Path:
+    """Return a path next to an exported policy, or in the run's folder of a checkpoint."""
     if policy.suffix == ".safetensors":
-        return policy.with_suffix(".shifts.json")
-    return policy.absolute().parent.parent / "shifts.json"
+        return policy.with_suffix(f".{name}")
+    return policy.absolute().parent.parent / name
 
 
 def read_policy(path: Path) -> dict[str, Any]:
-    """A policy out of a file: its description, weights that fit it, and where it comes from.
+    """Read a policy: its description, weights that fit it, and its provenance.
 
     Args:
         path: Of a checkpoint, or of an exported file (.safetensors).
@@ -147,7 +141,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
 def exported_bytes(
     weights: Mapping[str, torch.Tensor], description: Mapping[str, Any], about: Mapping[str, Any]
 ) -> bytes:
-    """Weights with their description and where they come from, as the content of a file."""
+    """Return the content of a file with weights, description and provenance."""
     contiguous = {name: value.contiguous() for name, value in weights.items()}
     metadata = {"description": json.dumps(description), "about": json.dumps(about)}
     return save(contiguous, {"format": FORMAT, **metadata})

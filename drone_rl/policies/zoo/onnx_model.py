@@ -1,4 +1,4 @@
-"""Policies as ONNX models: from a camera's picture to probabilities, for programs without torch."""
+"""Policies as ONNX models: from a camera's frame to probabilities, for programs without torch."""
 
 import contextlib
 import json
@@ -20,12 +20,8 @@ FRAMES, PROBABILITIES, ACTION = "frames", "probabilities", "action"
 _ASKED_BY = "format=onnx"
 
 
-class SeeingPolicy(nn.Module):
-    """All that a policy does about one picture of its camera: transforms, network, probabilities.
-
-    Raises:
-        InputError: It needs more than one picture.
-    """
+class _FullPolicy(nn.Module):
+    """Transforms, network and probabilities: RGB (N, H, W, 3), uint8, to outputs of the model."""
 
     def __init__(self, description: PolicyDescription, network: PolicyNetwork) -> None:
         super().__init__()
@@ -36,45 +32,33 @@ class SeeingPolicy(nn.Module):
             )
         self._network = network
         self._transform = on_pixels(description.make_transforms())
-
-    @property
-    def tells_action(self) -> bool:
-        """Whether the action is told, too: it is more than the most probable part's number."""
-        return bool(self._network.actions.entry.shape)
+        self.has_action = bool(network.actions.entry.shape)
+        """Whether there is an output for the action, which is not the most probable part."""
 
     def forward(self, frames: Tensor) -> Tensor | tuple[Tensor, Tensor]:
-        """RGB (N, H, W, 3), uint8, to the probability of each part (N, A), float32.
-
-        And to the greedy action, (N, 3), float32, where probabilities don't tell it.
-        """
         actions, outputs = self._network.actions, self._network(self._transform(frames))
         wish = actions.wish(outputs)
-        return (wish, actions.greedy(outputs)) if self.tells_action else wish
+        return (wish, actions.greedy(outputs)) if self.has_action else wish
 
 
 def make_onnx(
     description: PolicyDescription, network: PolicyNetwork, about: Mapping[str, Any]
 ) -> bytes:
-    """A policy as an ONNX model.
+    """Return a policy as an ONNX model.
 
-    The model's input is "frames", RGB of the policy's camera, uint8 (N, H, W, 3) for any N from 1;
-    its output "probabilities", of each action, float32 (N, A). Where actions are continuous these
-    are of their parts, see `Actions.wish`, and a second output, "action", float32 (N, 3), is what
-    to do. Its metadata are JSON texts: all that the description says, by its keys, and "actions",
-    names in the order of the first output.
-
-    Args:
-        description: Of the policy.
-        network: With the policy's weights, on the CPU.
-        about: What else the metadata should say.
+    The input is "frames", RGB of the camera, uint8 (N, H, W, 3) for any N from 1. The output is
+    "probabilities", of each action, float32 (N, A). Of continuous actions they are those of their
+    parts, see `Actions.wish`, and a second output is "action", float32 (N, 3). The metadata are
+    JSON: the description by its keys, "actions", names in the order of the first output, and
+    `about`.
 
     Raises:
-        InputError: It needs more than one picture, or does what ONNX can't say, or a package is
+        InputError: The policy needs more than one frame, ONNX does not support it, or a package is
             missing.
     """
     extra("onnxscript", "onnx", _ASKED_BY)  # which torch's exporter needs
     passes = extra("onnx_ir.passes.common", "onnx", _ASKED_BY)
-    policy, camera = SeeingPolicy(description, network).eval(), description.camera
+    policy, camera = _FullPolicy(description, network).eval(), description.camera
     sample = torch.zeros(2, camera.height, camera.width, 3, dtype=torch.uint8)
     try:
         with _silence():
@@ -83,7 +67,7 @@ def make_onnx(
                 (sample,),
                 dynamo=True,
                 input_names=[FRAMES],
-                output_names=[PROBABILITIES, ACTION][: 1 + policy.tells_action],
+                output_names=[PROBABILITIES, ACTION][: 1 + policy.has_action],
                 dynamic_shapes=({0: torch.export.Dim("N")},),
                 verbose=False,
             )
@@ -101,10 +85,7 @@ def make_onnx(
 
 
 def open_onnx(content: bytes) -> Callable[[Tensor], Tensor]:
-    """An ONNX model as a function of frames, computed by onnxruntime.
-
-    Args:
-        content: From `make_onnx`.
+    """Return a model of `make_onnx` as a function of frames, computed by onnxruntime.
 
     Raises:
         InputError: The package is missing.
@@ -123,7 +104,7 @@ def open_onnx(content: bytes) -> Callable[[Tensor], Tensor]:
 
 @contextlib.contextmanager
 def _silence() -> Iterator[None]:
-    """Holds back what torch's exporter and what it calls tell of themselves: all but errors."""
+    """Suppress warnings and logs of torch's exporter."""
     before = logging.root.manager.disable
     logging.disable(logging.WARNING)
     try:

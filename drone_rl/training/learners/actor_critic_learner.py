@@ -1,4 +1,4 @@
-"""A policy and its critic: some passes over the steps of a rollout, by TorchRL's losses."""
+"""Learning with a critic: passes over the steps of a rollout with TorchRL's losses."""
 
 import copy
 from collections.abc import Iterator, Mapping
@@ -14,19 +14,19 @@ from drone_rl.objectives import Advantages
 from drone_rl.policies import ActorCritic
 from drone_rl.policies.critic import LOG_PROB, PIXELS, VALUE
 from drone_rl.training.learners.learner import (
+    GradientLearner,
     NotANumberError,
     accumulate,
     check_entries,
     descend,
 )
-from drone_rl.training.restore import check_fits, check_optimiser
 
 ADVANTAGE, TARGET, ENTROPY = "advantage", "value_target", "entropy"
-_TOLD = ("loss_objective", "loss_critic", "loss_entropy", "clip_fraction", "kl_approx")
-"""What is told of a loss, as far as it has it."""
+_METRICS = ("loss_objective", "loss_critic", "loss_entropy", "clip_fraction", "kl_approx")
+"""Logged outputs of a loss, as far as it has them."""
 
 
-class ActorCriticLearner:
+class ActorCriticLearner(GradientLearner):
     """Values, advantages, then passes over minibatches, each a step of the optimizer.
 
     Values and log-probabilities are those of the policy and critic that an update begins with,
@@ -80,15 +80,11 @@ class ActorCriticLearner:
         self.in_keys = [PIXELS, "action", LOG_PROB, VALUE, ADVANTAGE, TARGET, ENTROPY]
 
     def update(self, batch: TensorDictBase) -> dict[str, float]:
-        """Learns from a rollout.
-
-        Args:
-            batch: As returned by `estimate`. Shape: (num_envs, T).
+        """Learn from a rollout of shape (num_envs, T), as returned by `estimate`.
 
         Returns:
-            Means over the minibatches: the terms of the loss, how far the policy went from where it
-            began, the gradient's norm; and the entropy of the policy that collected, and the
-            learning rate of the next step.
+            Means over the minibatches of the terms of the loss, the divergence from the policy that
+            collected, and the gradient's norm; that policy's entropy, and the next learning rate.
 
         Raises:
             NotANumberError: A loss or gradient is NaN or infinite.
@@ -97,30 +93,23 @@ class ActorCriticLearner:
         try:
             steps = batch.select(*self.in_keys).reshape(-1)
             entropy = float(steps.pop(ENTROPY).mean())
-            told = list(self._descend(steps))
+            metrics = list(self._descend(steps))
         except NotANumberError:
             self.load_state_dict(before)
             self.optimiser.zero_grad()
             raise
-        if self.scheduler is not None:
-            self.scheduler.step()
-        means = {f"loss/{name}": sum(t[name] for t in told) / len(told) for name in told[0]}
-        rate = self.optimiser.param_groups[0]["lr"]
-        return {**means, "loss/entropy": entropy, "train/learning_rate": rate}
+        means = {f"loss/{k}": sum(m[k] for m in metrics) / len(metrics) for k in metrics[0]}
+        return {**means, "loss/entropy": entropy, "train/learning_rate": self._next_rate()}
 
     @torch.no_grad()
     def estimate(self, batch: TensorDictBase) -> TensorDictBase:
         """Add the entries that the loss reads; the collector's `postproc`.
 
-        Args:
-            batch: Rows of steps, with the next observation of each. Shape: (num_envs, T).
-
-        Returns:
-            The batch, with log-probability, entropy and value of the policy that collected it, with
-            "advantage" and "value_target".
+        They are log-probability, entropy and value of the policy that collected, "advantage" and
+        "value_target".
 
         Raises:
-            InputError: An entry is missing.
+            InputError: An entry of the batch, of shape (num_envs, T), is missing.
         """
         check_entries(batch, self._read, type(self).__name__)
         seen = self._look(batch.get(PIXELS).flatten(0, batch.ndim - 1))
@@ -136,7 +125,7 @@ class ActorCriticLearner:
         return batch.set(ENTROPY, policy.entropy().reshape(batch.shape))
 
     def _after(self, batch: TensorDictBase, value: Tensor) -> Tensor:
-        """What the state after each step is worth; anything after a terminal one. Shape: kept."""
+        """Return the value after each step; arbitrary after a terminal one. Shape: as `value`."""
         after = torch.cat([value[..., 1:, :], value[..., -1:, :]], -2)
         cut = batch.get(("next", "done")).clone()
         cut[..., -1, :] = True
@@ -145,14 +134,14 @@ class ActorCriticLearner:
         return after
 
     def _look(self, pixels: Tensor) -> TensorDictBase:
-        """Features and values of frames, without these. Shape: (num_pictures,)."""
+        """Return features and values of frames, without the frames. Shape: (num_frames,)."""
         chunks = (TensorDict({PIXELS: c}, [len(c)]) for c in pixels.split(self.chunk_frames))
         seen = [self.model.critic(self.model.trunk(chunk)).exclude(PIXELS) for chunk in chunks]
         # it takes TensorDicts, too, which its annotation lacks
         return torch.cat(seen)  # pyright: ignore[reportReturnType]
 
     def _descend(self, steps: TensorDictBase) -> Iterator[dict[str, float]]:
-        """Takes the steps of the optimizer. Yields what is told of each."""
+        """Take the steps of the optimizer. Yields the metrics of each."""
         pieces = max(1, round(len(steps) / (self.minibatch_size or len(steps))))
         for _ in range(self.epochs):
             order = torch.randperm(len(steps), generator=self.generator).to(steps.device)
@@ -161,37 +150,18 @@ class ActorCriticLearner:
                 minibatch = take_rows(steps, rows)
                 terms = accumulate(minibatch, self._losses, self.chunk_frames)
                 norm = descend(self.optimiser, self.model.named_parameters(), self.max_grad_norm)
-                yield {**{k: terms[k] for k in _TOLD if k in terms}, "grad_norm": norm}
+                yield {**{k: terms[k] for k in _METRICS if k in terms}, "grad_norm": norm}
 
     def _losses(self, chunk: TensorDictBase) -> TensorDictBase:
         return self.loss(self.model.trunk(chunk))
 
     def state_dict(self) -> dict[str, Any]:
-        """Weights of both, and what the optimizer, scheduler and shuffling remember."""
-        return {
-            "policy": self.network.state_dict(),
-            "critic": self.model.critic.state_dict(),
-            "optimiser": self.optimiser.state_dict(),
-            "scheduler": None if self.scheduler is None else self.scheduler.state_dict(),
-            "minibatches": self.generator.get_state(),
-        }
-
-    def check_state(self, state: Mapping[str, Any]) -> None:
-        """See `Learner.check_state`.
-
-        Raises:
-            InputError: It is not a state of such a learner.
-        """
-        own = self.state_dict()
-        for key in ("policy", "critic", "scheduler", "minibatches"):
-            check_fits(state[key], own[key], key)
-        check_optimiser(state["optimiser"], self.optimiser)
+        """Return the weights of both and the states of optimizer, scheduler and shuffling."""
+        state = {**super().state_dict(), "critic": self.model.critic.state_dict()}
+        return {**state, "minibatches": self.generator.get_state()}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Goes on from a state."""
-        self.network.load_state_dict(state["policy"])
+        """Resume from a state."""
+        super().load_state_dict(state)
         self.model.critic.load_state_dict(state["critic"])
-        self.optimiser.load_state_dict(state["optimiser"])
-        if self.scheduler is not None:
-            self.scheduler.load_state_dict(state["scheduler"])
         self.generator.set_state(state["minibatches"])

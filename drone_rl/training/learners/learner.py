@@ -1,4 +1,4 @@
-"""What a trainer knows of learning, whatever is learned and how."""
+"""Learners: what a trainer expects of them, and what those with an optimizer share."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Protocol
@@ -9,6 +9,7 @@ from tensordict.utils import NestedKey
 from torch import Tensor, nn
 from torch.nn.utils import clip_grads_with_norm_, get_total_norm
 
+from drone_rl.training.restore import check_fits, check_optimiser
 from drone_rl.utils.errors import InputError
 
 
@@ -19,60 +20,91 @@ class NotANumberError(RuntimeError):
 class Learner(Protocol):
     """One update from one batch.
 
-    A learner holds all that learning needs, networks, losses and optimisers, and decides what to
-    do with a batch: how often to pass over it, in which pieces, with which critics. Batches come
-    as a collector gives them: complete episodes one after the other, shape (T_total,), or pieces
-    of fixed length, shape (num_envs, T).
+    A learner holds networks, losses and optimizers, and decides how often to pass over a batch and
+    in which minibatches. A batch is what the collector yields: complete episodes one after the
+    other, shape (T_total,), or rows of fixed length, shape (num_envs, T).
     """
 
     @property
     def in_keys(self) -> Sequence[NestedKey]:
-        """Entries that a batch must hold."""
+        """Entries that a batch must have."""
         ...
 
     def update(self, batch: TensorDictBase) -> dict[str, float]:
-        """Learns from a batch.
+        """Learn from a batch.
 
         Returns:
             Metrics by name, the same names at every update.
 
         Raises:
-            NotANumberError: The parameters would no longer be numbers; they are as before.
-            InputError: The batch can't be learned from.
+            NotANumberError: The parameters would become NaN or infinite; they are unchanged.
+            InputError: The batch lacks something.
         """
         ...
 
     def state_dict(self) -> dict[str, Any]:
-        """All that the next update depends on; the weights of the policy are its "policy"."""
+        """Return all that the next update depends on; "policy" is the policy's `state_dict`."""
         ...
 
     def check_state(self, state: Mapping[str, Any]) -> None:
-        """Refuses, before anything is taken over, a state that is not one of this learner.
+        """Check a state before any of it is loaded.
 
         Args:
-            state: Has the keys of `state_dict`, and may come from anywhere.
+            state: Has the keys of `state_dict`; its values are not trusted.
 
         Raises:
-            InputError: It is none; the first difference is named.
+            InputError: It is not a state of this learner; the first difference is named.
         """
         ...
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Goes on from a state."""
+        """Resume from a state."""
         ...
 
 
-def check_batch(batch: TensorDictBase, learner: Learner) -> None:
-    """Refuse a batch that lacks an entry which a learner reads.
+class GradientLearner:
+    """Base of learners with one optimizer: their state, and the step of the scheduler."""
 
-    Raises:
-        InputError: An entry is missing; it is named.
-    """
+    network: nn.Module
+    optimiser: torch.optim.Optimizer
+    scheduler: torch.optim.lr_scheduler.LRScheduler | None
+
+    def _next_rate(self) -> float:
+        """Step the scheduler. Returns the learning rate of the next update."""
+        if self.scheduler is not None:
+            self.scheduler.step()
+        return self.optimiser.param_groups[0]["lr"]
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return the weights and the states of optimizer and scheduler."""
+        return {
+            "policy": self.network.state_dict(),
+            "optimiser": self.optimiser.state_dict(),
+            "scheduler": None if self.scheduler is None else self.scheduler.state_dict(),
+        }
+
+    def check_state(self, state: Mapping[str, Any]) -> None:
+        """See `Learner.check_state`."""
+        for key, value in self.state_dict().items():
+            if key != "optimiser":
+                check_fits(state[key], value, key)
+        check_optimiser(state["optimiser"], self.optimiser)
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Resume from a state."""
+        self.network.load_state_dict(state["policy"])
+        self.optimiser.load_state_dict(state["optimiser"])
+        if self.scheduler is not None:
+            self.scheduler.load_state_dict(state["scheduler"])
+
+
+def check_batch(batch: TensorDictBase, learner: Learner) -> None:
+    """Check a batch for the entries that a learner reads, see `check_entries`."""
     check_entries(batch, learner.in_keys, type(learner).__name__)
 
 
 def check_entries(batch: TensorDictBase, keys: Sequence[NestedKey], reader: str) -> None:
-    """Refuse a batch that lacks an entry.
+    """Check a batch for entries.
 
     Raises:
         InputError: An entry is missing; it is named.
@@ -90,11 +122,7 @@ def check_entries(batch: TensorDictBase, keys: Sequence[NestedKey], reader: str)
 
 
 def check_finite(value: Tensor, name: str) -> None:
-    """Refuses to learn from what is no number.
-
-    Raises:
-        NotANumberError: A value is NaN or infinite.
-    """
+    """Raise `NotANumberError` if a loss or gradient is NaN or infinite."""
     if not bool(torch.isfinite(value).all()):
         raise NotANumberError(f"{name} is NaN or infinite")
 
@@ -106,17 +134,16 @@ def accumulate(
     *,
     is_sum: bool = False,
 ) -> dict[str, float]:
-    """Adds the gradient of a batch to the parameters, chunk by chunk.
+    """Add the gradient of steps (num_steps,) to the parameters, chunk by chunk.
 
     Args:
-        batch: Steps. Shape: (num_steps,).
-        losses: Gives the terms of the loss, `loss_*`, and figures beside them.
-        chunk_frames: Steps in one forward and backward pass; bounds memory; sums are
-            rounded by it in their last places.
+        batch: The steps.
+        losses: Returns the terms of the loss, `loss_*`, and other metrics.
+        chunk_frames: Steps in one forward and backward pass; bounds memory and affects rounding.
         is_sum: Whether the terms are sums over steps; means otherwise.
 
     Returns:
-        The terms and figures of the whole batch, by name.
+        Terms and metrics of the whole batch, by name.
 
     Raises:
         NotANumberError: A term is NaN or infinite.
@@ -125,13 +152,13 @@ def accumulate(
     for chunk in batch.split(chunk_frames):
         share = len(chunk) / len(batch)
         weight = 1.0 if is_sum else share
-        told = losses(chunk)
-        terms = {k: v for k, v in told.items() if k.startswith("loss_")}
+        metrics = losses(chunk)
+        terms = {k: v for k, v in metrics.items() if k.startswith("loss_")}
         for name, value in terms.items():
             check_finite(value, name)
         total: Any = sum(terms.values())  # not the 0 that it begins with
         (total * weight).backward()
-        for name, value in told.items():
+        for name, value in metrics.items():
             part = float(value.detach()) * (weight if name in terms else share)
             totals[name] = totals.get(name, 0.0) + part
     return totals
@@ -142,12 +169,7 @@ def descend(
     parameters: Iterable[tuple[str, nn.Parameter]],
     max_norm: float | None,
 ) -> float:
-    """A step along the gradient, and its norm before it was clipped.
-
-    Args:
-        optimiser: Over the parameters.
-        parameters: By name.
-        max_norm: Clip to this norm; None for no clipping.
+    """Step the optimizer. Returns the gradient's norm before it was clipped to `max_norm`.
 
     Raises:
         NotANumberError: The gradient is NaN or infinite; no parameter was changed.

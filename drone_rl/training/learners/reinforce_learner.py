@@ -1,18 +1,19 @@
 """REINFORCE: one optimizer step from a batch of complete episodes with returns."""
 
-from collections.abc import Mapping
-from typing import Any
-
 import torch
 from tensordict import TensorDictBase
 from torch import nn
 
 from drone_rl.objectives import ReinforceLoss
-from drone_rl.training.learners.learner import NotANumberError, accumulate, descend
-from drone_rl.training.restore import check_fits, check_optimiser
+from drone_rl.training.learners.learner import (
+    GradientLearner,
+    NotANumberError,
+    accumulate,
+    descend,
+)
 
 
-class ReinforceLearner:
+class ReinforceLearner(GradientLearner):
     """Loss, gradient, optimizer step (Algorithm 4): one step for each batch."""
 
     def __init__(
@@ -69,37 +70,8 @@ class ReinforceLearner:
         except NotANumberError:
             self.optimiser.zero_grad()
             raise
-        if self.scheduler is not None:
-            self.scheduler.step()
-        rate = self.optimiser.param_groups[0]["lr"]
-        told = {f"loss/{name}": value for name, value in {**terms, "grad_norm": norm}.items()}
-        return {**told, "train/learning_rate": rate}
-
-    def state_dict(self) -> dict[str, Any]:
-        """Return the weights and the states of optimizer and scheduler."""
-        return {
-            "policy": self.network.state_dict(),
-            "optimiser": self.optimiser.state_dict(),
-            "scheduler": None if self.scheduler is None else self.scheduler.state_dict(),
-        }
-
-    def check_state(self, state: Mapping[str, Any]) -> None:
-        """See `Learner.check_state`.
-
-        Raises:
-            InputError: It is not a state of such a learner.
-        """
-        own = self.state_dict()
-        for key in ("policy", "scheduler"):
-            check_fits(state[key], own[key], key)
-        check_optimiser(state["optimiser"], self.optimiser)
-
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Goes on from a state."""
-        self.network.load_state_dict(state["policy"])
-        self.optimiser.load_state_dict(state["optimiser"])
-        if self.scheduler is not None:
-            self.scheduler.load_state_dict(state["scheduler"])
+        losses = {f"loss/{name}": value for name, value in {**terms, "grad_norm": norm}.items()}
+        return {**losses, "train/learning_rate": self._next_rate()}
 
 
 def _known_steps(batch: TensorDictBase) -> TensorDictBase:
