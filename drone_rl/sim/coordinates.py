@@ -2,9 +2,9 @@
 
 Our frames are x forward, y left, z up, for the world and for bodies; the world's forward is north.
 NED is north, east, down, with bodies forward, right, down (FRD), as in AirSim and PX4. ENU is east,
-north, up, with bodies like ours (FLU), as in ROS. Quaternions are (w, x, y, z), turn the body's
-frame into the world's, and have length 1. All functions map tensors to tensors and NumPy arrays to
-arrays, of any number of vectors.
+north, up, as in ROS. Quaternions are (w, x, y, z), rotate the body's frame into the world's, and
+have length 1. All functions map tensors to tensors and NumPy arrays to arrays, of any number of
+vectors.
 
 The world is flat and level, as AirSim's is: a drone that keeps its z keeps its altitude. North and
 east are measured along the meridian and the parallel of WGS84's ellipsoid, with the meridian's
@@ -23,106 +23,35 @@ from torch import Tensor
 from drone_rl.sim.rendering.appearance import rotate
 
 Values = TypeVar("Values", Tensor, NDArray[Any])
-"""A tensor or an array; what comes out is of the kind that went in."""
-_HALF = math.sqrt(0.5)
+"""A tensor or an array; functions return the kind that they take."""
 
 
 def ned_from_world(vector: Values) -> Values:
-    """Positions, velocities or directions of our world in NED. Shape: (*, 3)."""
-    return _signed(vector, (1.0, -1.0, -1.0))
-
-
-def world_from_ned(vector: Values) -> Values:
-    """The inverse. Shape: (*, 3)."""
-    return _signed(vector, (1.0, -1.0, -1.0))
-
-
-def enu_from_world(vector: Values) -> Values:
-    """Positions, velocities or directions of our world in ENU. Shape: (*, 3)."""
-    return _signed(vector[..., [1, 0, 2]], (-1.0, 1.0, 1.0))
-
-
-def world_from_enu(vector: Values) -> Values:
-    """The inverse. Shape: (*, 3)."""
-    return _signed(vector[..., [1, 0, 2]], (1.0, -1.0, 1.0))
-
-
-def frd_from_body(vector: Values) -> Values:
-    """Vectors, or rates about the axes, of our body's frame in FRD. Shape: (*, 3)."""
-    return _signed(vector, (1.0, -1.0, -1.0))
-
-
-def body_from_frd(vector: Values) -> Values:
-    """The inverse. Shape: (*, 3)."""
+    """Convert positions, velocities or directions of our world to NED. Shape: (*, 3)."""
     return _signed(vector, (1.0, -1.0, -1.0))
 
 
 def ned_attitude_from_world(attitude: Values) -> Values:
-    """Attitudes of our bodies in our world as those of FRD bodies in NED. Shape: (*, 4)."""
+    """Convert attitudes of our bodies to those of FRD bodies in NED. Shape: (*, 4)."""
     return _signed(attitude, (1.0, 1.0, -1.0, -1.0))
 
 
-def world_attitude_from_ned(attitude: Values) -> Values:
-    """The inverse. Shape: (*, 4)."""
-    return _signed(attitude, (1.0, 1.0, -1.0, -1.0))
+world_from_ned = ned_from_world
+"""The inverse of `ned_from_world`, which is its own."""
+frd_from_body = ned_from_world
+"""The same for vectors, or rates about the axes, of our body's frame and FRD."""
+world_attitude_from_ned = ned_attitude_from_world
+"""The inverse of `ned_attitude_from_world`, which is its own."""
 
 
-def enu_attitude_from_world(attitude: Values) -> Values:
-    """Attitudes of our bodies in our world as those of the same bodies in ENU. Shape: (*, 4).
-
-    A quarter turn to the left comes before: who looks north has his x along ENU's y.
-    """
-    mixed = _signed(attitude[..., [3, 2, 1, 0]], (-1.0, -1.0, 1.0, 1.0))
-    return _HALF * (attitude + mixed)
-
-
-def world_attitude_from_enu(attitude: Values) -> Values:
-    """The inverse. Shape: (*, 4)."""
-    mixed = _signed(attitude[..., [3, 2, 1, 0]], (1.0, 1.0, -1.0, -1.0))
-    return _HALF * (attitude + mixed)
-
-
-def heading_from_yaw(yaw: Values) -> Values:
-    """Degrees clockwise from north, as seen from above, in (-180, 180], of our yaw.
-
-    Args:
-        yaw: Radians to the left of forward. Shape: (*).
-    """
-    return 180.0 - (180.0 / math.pi * yaw + 180.0) % 360.0
-
-
-def yaw_from_heading(heading: Values) -> Values:
-    """Radians to the left of forward, in [-pi, pi), of a heading.
-
-    Args:
-        heading: Degrees clockwise from north. Shape: (*).
-    """
-    return (math.pi - math.pi / 180.0 * heading) % (2 * math.pi) - math.pi
-
-
-def enu_yaw_from_yaw(yaw: Values) -> Values:
-    """Radians to the left of east, in [-pi, pi), of our yaw. Shape: (*)."""
-    return (yaw + 1.5 * math.pi) % (2 * math.pi) - math.pi
-
-
-def yaw_from_enu_yaw(yaw: Values) -> Values:
-    """The inverse, in [-pi, pi). Shape: (*)."""
-    return (yaw + 0.5 * math.pi) % (2 * math.pi) - math.pi
+def enu_from_world(vector: Values) -> Values:
+    """Convert positions, velocities or directions of our world to ENU. Shape: (*, 3)."""
+    return _signed(vector[..., [1, 0, 2]], (-1.0, 1.0, 1.0))
 
 
 def body_from_world(attitude: Tensor, vector: Tensor) -> Tensor:
-    """Vectors of our world's frame along the axes of bodies.
-
-    Args:
-        attitude: Of the bodies. Shape: (*, 4).
-        vector: Shape: (*, 3).
-    """
+    """Return vectors of our world's frame along the axes of bodies. Shapes: (*, 4) and (*, 3)."""
     return rotate(_signed(attitude, (1.0, -1.0, -1.0, -1.0)), vector)
-
-
-def world_from_body(attitude: Tensor, vector: Tensor) -> Tensor:
-    """The inverse. Shapes: (*, 4) and (*, 3)."""
-    return rotate(attitude, vector)
 
 
 def _signed(values: Values, signs: tuple[float, ...]) -> Values:
@@ -134,7 +63,7 @@ def _signed(values: Values, signs: tuple[float, ...]) -> Values:
 EQUATOR_RADIUS = 6378137.0
 """Of WGS84's ellipsoid, in metres."""
 FLATTENING = 1 / 298.257223563
-"""The same's."""
+"""Of the same."""
 _ECCENTRICITY_2 = FLATTENING * (2 - FLATTENING)
 
 
@@ -154,7 +83,7 @@ HOME = GeoPoint(47.641468, -122.140165, 122.0)
 
 
 def geo_from_world(position: Values, home: GeoPoint = HOME) -> Values:
-    """Latitude and longitude in degrees, altitude in metres.
+    """Return latitude and longitude in degrees, altitude in metres.
 
     Args:
         position: Metres from home, world frame: north, west, up. Shape: (*, 3), float64.
@@ -168,25 +97,17 @@ def geo_from_world(position: Values, home: GeoPoint = HOME) -> Values:
     latitude = home.latitude + math.degrees(1.0) * north / (meridian + home.altitude)
     parallel = _parallel(latitude, home)
     longitude = home.longitude - math.degrees(1.0) * west / parallel
-    return _written(position, latitude, (longitude + 180.0) % 360.0 - 180.0, home.altitude + up)
+    return _stack(latitude, (longitude + 180.0) % 360.0 - 180.0, home.altitude + up)
 
 
 def world_from_geo(place: Values, home: GeoPoint = HOME) -> Values:
-    """The inverse: metres from home, world frame.
-
-    Args:
-        place: Latitude and longitude in degrees, altitude in metres. Shape: (*, 3), float64.
-        home: The world's origin.
-
-    Returns:
-        Shape: (*, 3), float64.
-    """
+    """Invert `geo_from_world`: return metres from home, world frame."""
     meridian, _ = _radii(home.latitude)
     latitude, longitude, altitude = place[..., 0], place[..., 1], place[..., 2]
     north = math.radians(1.0) * (latitude - home.latitude) * (meridian + home.altitude)
     east = (longitude - home.longitude + 180.0) % 360.0 - 180.0
     west = -math.radians(1.0) * east * _parallel(latitude, home)
-    return _written(place, north, west, altitude - home.altitude)
+    return _stack(north, west, altitude - home.altitude)
 
 
 def _radii(latitude: float) -> tuple[float, float]:
@@ -205,8 +126,5 @@ def _parallel(latitude: Values, home: GeoPoint) -> Values:
     return np.cos(turn) * (across + home.altitude)
 
 
-def _written(like: Values, x: Values, y: Values, z: Values) -> Values:
-    """Three numbers each, in what is like another."""
-    made = 0.0 * like
-    made[..., 0], made[..., 1], made[..., 2] = x, y, z
-    return made
+def _stack(x: Values, y: Values, z: Values) -> Values:
+    return torch.stack([x, y, z], -1) if isinstance(x, Tensor) else np.stack([x, y, z], -1)

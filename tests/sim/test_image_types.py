@@ -8,7 +8,6 @@ from drone_rl.sim.image_types import (
     ImageRequest,
     ImageType,
     default_id,
-    image,
     images,
     object_names,
     palette,
@@ -17,6 +16,14 @@ from drone_rl.sim.image_types import (
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
+
+
+def image(
+    worlds, state=None, camera="front_center", kind=ImageType.SCENE, *, as_float=False, **how
+):
+    """Return one image of each environment."""
+    return images(worlds, state, [ImageRequest(camera, kind, as_float)], **how)[0]
+
 
 DEPTHS = torch.tensor([[[0.0, 2.0], [50.0, 250.0]]])
 """One world; nothing is hit in the first pixel."""
@@ -142,7 +149,7 @@ def test_what_there_is_not_is_refused(worlds):
     with pytest.raises(InputError, match=r"camera '5' is unknown; choose from: front_center \(0\)"):
         image(worlds, camera="5")
     with pytest.raises(InputError, match="don't fit"):
-        image(worlds, image_type=ImageType.SEGMENTATION, ids=torch.tensor([1]))
+        image(worlds, kind=ImageType.SEGMENTATION, ids=torch.tensor([1]))
     with pytest.raises(InputError, match="shows nothing"):
         images(worlds, None, [])
 
