@@ -1,10 +1,11 @@
 """Visual randomization: sample the appearance of each environment when its episode begins.
 
-Each environment samples from a random stream of its own, so that episodes are the same whatever
-they look like. Distractors stand on both sides of the way, as far ahead as the task's own props.
+Each environment samples from a random stream of its own, so that episodes are the same for any
+appearance. Distractors stand on both sides of the path, as far ahead as the task's own props.
 """
 
 import copy
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -30,21 +31,21 @@ PALETTE = (
     (0.29, 0.40, 0.66),
     (0.58, 0.47, 0.66),
 )
-"""Yellow, teal, white, green, blue, violet: none is red, as cubes are, or brown, as pillars are."""
+"""Yellow, teal, white, green, blue, violet: neither red (cubes) nor brown (pillars)."""
 WIDTH = 7
-"""Numbers of each: its place, its size, its colour."""
+"""Numbers of a distractor: position, size, colour."""
 _TURN = (5**0.5 - 1) / 2
-"""Of all shares of a way by which things go on, the one that leaves the most even gaps."""
+"""The step, as a fraction of the path, that leaves the most even gaps."""
 
 
 def things_of(task: Any) -> Things | None:
-    """Where the things of a task stand, or of its settings; none where that can't be said."""
+    """Return where the props of a task, or of its settings, stand; None if unknown."""
     settings = task if isinstance(task, BaseTaskSettings) else getattr(task, "settings", None)
     return getattr(settings, "things", None)
 
 
 def most_distractors(settings: AppearanceSettings) -> int:
-    """How many there are at most."""
+    """Return the largest number of distractors."""
     count = settings.distractors
     return count[1] if isinstance(count, tuple) else count
 
@@ -52,13 +53,13 @@ def most_distractors(settings: AppearanceSettings) -> int:
 def stand(
     things: Things, ahead: Tensor, aside: Tensor, is_left: Tensor, height: float | Tensor
 ) -> Tensor:
-    """Places beside the way.
+    """Return positions next to the path.
 
     Args:
-        things: Whose way.
+        things: Where the task's props stand.
         ahead: Metres. Shape: (*).
-        aside: Metres between them and where things may stand. Shape: (*).
-        is_left: On which side. Shape: (*).
+        aside: Metres from the region of the props. Shape: (*).
+        is_left: Whether on the left. Shape: (*).
         height: Metres.
 
     Returns:
@@ -71,14 +72,12 @@ def stand(
 def draw_distractors(
     settings: AppearanceSettings, things: Things | None, source: np.random.RandomState | None
 ) -> list[float]:
-    """One number after the other: `WIDTH` of each distractor that there may be.
-
-    They stand on the ground, by turns to the left and to the right.
+    """Sample `WIDTH` numbers of each distractor, alternately left and right on the ground.
 
     Args:
-        settings: What is drawn from.
-        things: Where what matters stands.
-        source: Middles of all ranges without.
+        settings: Ranges.
+        things: Where the task's props stand.
+        source: Random stream; without it, the middles of all ranges.
     """
     most = most_distractors(settings)
     if not most or things is None:
@@ -110,7 +109,7 @@ def _color(
 ) -> Tensor:
     given = settings.distractor_color
     if given is None:
-        turn = number + number // len(PALETTE)  # or all of a kind had one colour
+        turn = number + number // len(PALETTE)  # otherwise all of a kind have one colour
         return torch.tensor(PALETTE[turn % len(PALETTE)], dtype=torch.float64)
     ends = given if isinstance(given[0], tuple) else (given, given)
     return torch.stack([_drawn(pair, source, ()) for pair in zip(*ends, strict=True)])
@@ -118,14 +117,14 @@ def _color(
 
 _OBJECTS = (SemanticClass.TARGET, SemanticClass.OBSTACLE)
 _APART = 7919
-"""Keeps the draws of an appearance apart from those of the task."""
+"""Separates the random stream of an appearance from that of the task."""
 _STILL = (0.0, 0.0, 0.0)
 _OF_CAMERA = 7
-"""Numbers that say how the camera is mounted."""
+"""Numbers of a camera mounting."""
 
 
 class Appearances:
-    """Draws them, and says what worlds look like."""
+    """Samples and keeps the appearance of each environment."""
 
     def __init__(
         self,
@@ -136,46 +135,45 @@ class Appearances:
         task: BaseTaskSettings | Task[Any] | None = None,
         camera: CameraSettings | None = None,
     ) -> None:
-        """Reads all textures; every world looks as in the middle of all ranges at first.
+        """Read all textures; environments start in the middle of all ranges.
 
         Args:
-            settings: What is drawn from.
-            num_worlds: How many.
-            device: Where they are drawn.
-            task: What there is to do in them; the original study's by default.
+            settings: Ranges.
+            num_worlds: Number of environments.
+            device: Of the renderer.
+            task: The original study's by default.
             camera: The policy's.
 
         Raises:
-            InputError: A texture can't be read, or is too large; there is no room for the camera or
-                for distractors.
+            InputError: A texture can't be read or is too large, or the camera or distractors do not
+                fit into the scene.
         """
         task, self._camera = as_task(task), camera or CameraSettings()
         self._things = things_of(task)
         check_appearance(settings, self._camera, self._things, task.name)
         self.settings, self._device = settings, device
         self.distractors = most_distractors(settings)
-        """How many things the worlds need that stand beside the way."""
+        """Largest number of distractors."""
         for name in {*(settings.ground_texture or ()), *(settings.object_texture or ())}:
             if name != NO_TEXTURE:
                 textures.load(name)
         middle = self._draw(None)
         self.varies = self._draw(np.random.RandomState(0)) != middle
-        """Whether worlds look otherwise from episode to episode."""
+        """Whether appearances differ between episodes."""
         self.middle = (
             None if settings.is_minimal else self._made(torch.tensor(middle, dtype=torch.float64))
         )
-        """The look of worlds that were only imagined; none for that of the task."""
+        """Appearance of imagined environments; None for the task's own."""
         self.values = torch.tensor([middle], dtype=torch.float64).repeat(num_worlds, 1)
-        """What was drawn, a row a world."""
+        """Sampled numbers. Shape: (num_worlds, *)."""
         self._now: Appearance | None = None
 
     def reset(self, worlds: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
-        """Draws anew.
+        """Sample new appearances.
 
         Args:
-            worlds: Indices of the worlds. Shape: (k,).
-            random_states: Theirs, as they are before the task draws: they stay so, and episodes are
-                the same whatever they look like.
+            worlds: Indices of the environments. Shape: (k,).
+            random_states: Their streams before the task samples; they are not advanced.
         """
         if not self.varies or not len(worlds):
             return
@@ -185,11 +183,11 @@ class Appearances:
         self._now = None
 
     def load(self, values: Tensor) -> None:
-        """Goes on with the `values` of another time."""
+        """Restore saved `values`."""
         self.values, self._now = values.clone(), None
 
     def drawn(self, worlds: Tensor | None = None) -> Appearance | None:
-        """What was drawn for worlds; none where nothing is, for all look as in the middle.
+        """Return the sampled appearance, or None if it does not vary.
 
         Args:
             worlds: Indices, in order; all by default. Shape: (k,).
@@ -203,17 +201,15 @@ class Appearances:
         return self._now
 
     def _draw(self, source: np.random.RandomState | None) -> list[float]:
-        """What `_made` reads; what was added later is drawn later, so that all else stays."""
+        # New numbers are sampled last, so that earlier ones keep their values.
         look, camera = _draw(self.settings, source), _draw_camera(self.settings, source)
         return [*look, *camera, *draw_distractors(self.settings, self._things, source)]
 
     def _made(self, values: Tensor) -> Appearance:
-        """Of rows as `_draw` makes them, or of a single one. Shape: (num_worlds, *) or (*)."""
+        """Appearance of rows of `_draw`, or of one. Shape: (num_worlds, *) or (*)."""
         settings, values = self.settings, values.to(self._device)
         columns = iter(values.unbind(-1))
-
-        def number() -> Tensor:
-            return next(columns)
+        number = functools.partial(next, columns)
 
         def color() -> Tensor:
             return torch.stack([number(), number(), number()], -1)
@@ -243,13 +239,12 @@ class Appearances:
             fog=None if settings.fog_visibility is None else fog,
             shadows=shadows if settings.shadows else None,
             exposure=None if settings.exposure == 1.0 else exposure,
-            textures={meaning: cover for meaning, cover in covers.items() if cover is not None},
+            textures={of: cover for of, cover in covers.items() if cover is not None},
             camera=mounting,
             distractors=self._distractors(list(columns)),
         )
 
     def _mounting(self, values: Tensor) -> Mounting | None:
-        """Of offset, turn and widening."""
         s = self.settings
         is_moved = s.camera_offset != _STILL or s.camera_turn != _STILL
         if not is_moved and s.camera_widening == 0.0:
@@ -261,7 +256,6 @@ class Appearances:
         return Mounting(offset=values[..., :3], turn=turn, zoom=zoom)
 
     def _distractors(self, columns: list[Tensor]) -> Distractors | None:
-        """Of what `draw_distractors` draws."""
         if not columns:
             return None
         rows = torch.stack(columns, -1).unflatten(-1, (self.distractors, WIDTH))
@@ -269,7 +263,7 @@ class Appearances:
 
 
 def _draw(settings: AppearanceSettings, source: np.random.RandomState | None) -> list[float]:
-    """One number after the other, in the order in which they are read; middles without a source."""
+    """Numbers in the order in which `Appearances._made` reads them; middles without a source."""
 
     def number(value: Any) -> float:
         if not isinstance(value, tuple):
@@ -300,23 +294,19 @@ def _draw(settings: AppearanceSettings, source: np.random.RandomState | None) ->
 
 
 def _draw_camera(settings: AppearanceSettings, source: np.random.RandomState | None) -> list[float]:
-    """Offset, turn and widening."""
+    """Offset, rotation and change of the field of view."""
     ends = [*_pairs(settings.camera_offset), *_pairs(settings.camera_turn)]
-    widening = settings.camera_widening
-    ends.append(widening if isinstance(widening, tuple) else (widening, widening))
-    return [
-        (low + high) / 2 if source is None or low == high else source.uniform(low, high)
-        for low, high in ends
-    ]
+    ends.append(settings.camera_widening)
+    return [float(_drawn(pair, source, ())) for pair in ends]
 
 
-def _pairs(value: Any) -> list[tuple[float, float]]:
+def _pairs(value: Any) -> list[Any]:
     low, high = value if isinstance(value[0], tuple) else (value, value)
     return [*zip(low, high, strict=True)]
 
 
 def _distractors(random_state: np.random.RandomState) -> np.random.RandomState:
-    """A stream that depends on where another is, which stays there."""
+    """A stream seeded by another one, which is not advanced."""
     ahead = copy.deepcopy(random_state)
     return np.random.RandomState([_APART, *ahead.randint(0, 2**32, 4, dtype=np.uint32)])
 

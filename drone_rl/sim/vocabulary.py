@@ -1,4 +1,4 @@
-"""What reports call the goals, targets and actions of a task."""
+"""Terms of reports: names of the goals, targets and actions of a task."""
 
 import dataclasses
 import re
@@ -9,83 +9,80 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Flag, Kind, Real, Record, Several, Text, Whole, as_mapping, shown
 
 LONGEST = 200
-"""Characters of a phrase."""
+"""Most characters of a phrase."""
 MOST = 64
-"""Phrases of a kind."""
+"""Most phrases of a kind."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class TaskVocabulary:
-    """What reports call the goals and targets of a task, as files have them under "terms"."""
+    """Terms of a task, as files hold them under "terms"."""
 
     goal: str = "goal"
-    """What has to be reached, one by one: "cube"."""
+    """One of the things to reach: "cube"."""
     reach: str = "reach"
-    """What is done to a goal: "collect"."""
+    """To do so: "collect"."""
     reached: str = "reached"
-    """And has been done: "collected"."""
     target: str = "target"
-    """What stands in the picture and calls for action: "cube"."""
+    """The thing in the image that requires an action: "cube"."""
     handle: str = "reach the target"
-    """What is done about a single target: "collect the cube"."""
+    """To act on a target: "collect the cube"."""
     handled: str = "reached"
-    """And has been done: "collected"."""
     unhandled: str = "missed"
-    """And has not been done: "missed"."""
     tested: str = ""
-    """In what it is flown, for its card: "three cubes of 2.5 m"."""
+    """The scenes of the test, for the model card: "three cubes of 2.5 m"."""
     follows: bool = True
-    """Whether a target is flown to, and so followed where it moves; else it is flown around."""
+    """Whether the drone flies to a target and follows it; else it flies around it."""
     sides: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    """Of goals, by stratum: "on its left"."""
+    """Phrases after goals, by stratum: "on its left"."""
     places: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    """Of places of a single target, by stratum: "on its left"."""
+    """Phrases after places of a single target, by stratum: "on its left"."""
     classes: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    """Where it fails, by what classes of goals are made by: "at the {value} cube"."""
+    """Phrases of failures, by the variable that classifies goals: "at the {value} cube"."""
     labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    """What tables call those: "number of the cube"."""
+    """Names of these variables in tables: "number of the cube"."""
     ends: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    """Where or how an episode ends, by its name: "at the step limit"."""
+    """Phrases of the ends of episodes, by name: "at the step limit"."""
 
     @property
     def goals(self) -> str:
-        """Many of them."""
+        """Plural of `goal`."""
         return f"{self.goal}s"
 
     @property
     def reaches(self) -> str:
-        """What it does to a goal."""
+        """Third person of `reach`."""
         return _third(self.reach)
 
     @property
     def handles(self) -> str:
-        """What it does about a target."""
+        """Third person of `handle`."""
         verb, _, rest = self.handle.partition(" ")
         return f"{_third(verb)} {rest}"
 
     @property
     def targets(self) -> str:
-        """Many of them."""
+        """Plural of `target`."""
         return f"{self.target}s"
 
     def side(self, stratum: str) -> str:
-        """Goals of a stratum, after their name."""
+        """Return the phrase after goals of a stratum."""
         return self.sides.get(stratum, stratum)
 
     def place(self, stratum: str) -> str:
-        """Places of a stratum, after their name."""
+        """Return the phrase after places of a stratum."""
         return self.places.get(stratum, stratum)
 
     def ending(self, end: str) -> str:
-        """How an episode ends."""
+        """Return the phrase of an episode's end."""
         return self.ends.get(end, f"by {end.replace('_', ' ')}")
 
     def label(self, by: str) -> str:
-        """What classes are made by."""
+        """Return the name of a variable that classifies goals."""
         return self.labels.get(by, by)
 
     def failing(self, by: str, value: str) -> str:
-        """Where it fails."""
+        """Return the phrase of failures where a variable has a value."""
         if by == "end":
             return f"by ending {self.ending(value)}"
         if by == "side":
@@ -95,17 +92,20 @@ class TaskVocabulary:
         return template.replace("{value}", value)
 
     def as_dict(self) -> dict[str, Any]:
-        """As in files."""
-        return {
-            k: dict(v) if isinstance(v, Mapping) else v for k, v in dataclasses.asdict(self).items()
-        }
+        """Return the values that files hold."""
+        return {k: dict(v) if isinstance(v, Mapping) else v for k, v in vars(self).items()}
 
 
 def _third(verb: str) -> str:
-    """The third person: "passes", "collects"."""
     return f"{verb}es" if verb.endswith(("s", "sh", "ch", "x")) else f"{verb}s"
 
 
+_ENDS = {
+    "side_boundary": "outside the field, left or right",
+    "step_limit": "at the step limit",
+    "lost_control": "with the drone out of control",
+}
+_SIDES = {"left": "on its left", "ahead": "ahead", "right": "on its right"}
 CUBES = TaskVocabulary(
     goal="cube",
     reach="collect",
@@ -114,8 +114,8 @@ CUBES = TaskVocabulary(
     handle="collect the cube",
     handled="collected",
     unhandled="missed",
-    sides={"left": "on its left", "ahead": "ahead", "right": "on its right"},
-    places={"left": "on its left", "ahead": "ahead", "right": "on its right"},
+    sides=_SIDES,
+    places=_SIDES,
     classes={
         "cube": "at the {value} cube",
         "sideways": "with cubes {value} to its side",
@@ -134,12 +134,10 @@ CUBES = TaskVocabulary(
     ends={
         "all_cubes": "with every cube collected",
         "front_boundary": "behind the last cube",
-        "side_boundary": "outside the field, left or right",
-        "step_limit": "at the step limit",
-        "lost_control": "with the drone out of control",
+        **_ENDS,
     },
 )
-"""Of cube collection, and of files that say nothing of their words."""
+"""Of cube collection, and of files without terms."""
 
 
 PILLARS = TaskVocabulary(
@@ -171,32 +169,26 @@ PILLARS = TaskVocabulary(
     ends={
         "finish_line": "at the line",
         "pillar_touched": "by touching a pillar",
-        "side_boundary": "outside the field, left or right",
-        "step_limit": "at the step limit",
-        "lost_control": "with the drone out of control",
+        **_ENDS,
     },
 )
 
 
 def terms_of(evidence: Mapping[str, Any]) -> TaskVocabulary:
-    """The words of whatever the evidence is about.
-
-    Args:
-        evidence: `verdict.json`, `explanation.json` or what a card is made of.
+    """Return the terms of `verdict.json`, `explanation.json` or a card's evidence.
 
     Raises:
-        InputError: They are none.
+        InputError: They are invalid.
     """
-    return (
-        TaskVocabulary(**_FIELDS.read(evidence["terms"], "terms")) if "terms" in evidence else CUBES
-    )
+    if "terms" not in evidence:
+        return CUBES
+    return TaskVocabulary(**_FIELDS.read(evidence["terms"], "terms"))
 
 
 class _Phrases:
-    """The kind of value that gives phrases by name."""
+    """Schema of phrases by name; see `drone_rl.utils.schema.Kind`."""
 
     def read(self, value: Any, where: str) -> dict[str, str]:
-        """See `drone_rl.utils.schema.Kind`."""
         given = as_mapping(value, where)
         if len(given) > MOST:
             raise InputError(f"{where} holds {len(given)} phrases; give at most {MOST}")
@@ -217,11 +209,7 @@ _NUMBERS = {1: "one cube", 2: "two cubes", 3: "three cubes", 4: "four cubes", 5:
 
 
 def some_cubes(task: Mapping[str, Any]) -> str:
-    """The cubes of a task.
-
-    Args:
-        task: Its settings, or a file's, which may be of before there were other tasks.
-    """
+    """Describe the cubes of a task, from its settings."""
     cubes = _NUMBERS.get(task["num_cubes"], f"{task['num_cubes']} cubes")
     return (
         f"{cubes} of {task['cube_size']:g} m, up to {task['lateral_bound']:g} m to either side "
@@ -235,20 +223,17 @@ _NAME = re.compile(r"[a-z][a-z0-9 _-]{0,23}")
 
 @dataclasses.dataclass(frozen=True)
 class ShownActions:
-    """Actions by number, as `explanation.json` describes them under "actions"."""
+    """Actions by number, as `explanation.json` holds them under "actions"; see `Parts`."""
 
     names: tuple[str, ...]
     order: tuple[int, ...]
-    """All of them from left to right."""
     arrows: tuple[tuple[float, float], ...]
-    """Where each points on the page: to the right and up; 0, 0 if nowhere."""
     colors: tuple[tuple[int, int, int], ...]
-    """Red, green, blue, 0 to 255."""
     speeds: tuple[float, float, float] | None = None
-    """The greatest, where actions are speeds: forward and to a side, m/s; of turning, degrees/s."""
+    """Greatest speeds of continuous actions: forward and sideways, m/s; yaw rate, degrees/s."""
 
     def css(self, action: int) -> str:
-        """The colour of an action, as style sheets have it."""
+        """Return the colour of an action for style sheets."""
         return "#{:02x}{:02x}{:02x}".format(*self.colors[action])
 
 
@@ -258,18 +243,15 @@ SHOWN_MOVES = ShownActions(
     ((0.0, 1.0), (-1.0, 0.0), (1.0, 0.0)),
     ((214, 39, 40), (44, 160, 44), (31, 96, 200)),
 )
-"""The chapter's three, which files describe that say nothing of actions. Red forward, green left,
-blue right, as in Figs. 7 and 8."""
+"""The chapter's three moves, also of files without actions. Red forward, green left, blue right, as
+in Figs. 7 and 8."""
 
 
 def shown_actions(numbers: Mapping[str, Any]) -> ShownActions:
-    """The actions of an explanation.
-
-    Args:
-        numbers: `explanation.json`.
+    """Return the actions of `explanation.json`.
 
     Raises:
-        InputError: They contradict themselves, or are out of bounds.
+        InputError: They are inconsistent or out of bounds.
     """
     if "actions" not in numbers:
         return SHOWN_MOVES
@@ -284,10 +266,9 @@ def shown_actions(numbers: Mapping[str, Any]) -> ShownActions:
 
 
 class _Name:
-    """The kind of text that may be an action's name: it stands in pages and tables."""
+    """Schema of an action's name, which pages and tables show."""
 
     def read(self, value: Any, where: str) -> str:
-        """See `drone_rl.utils.schema.Kind`."""
         text = Text(24).read(value, where)
         if not _NAME.fullmatch(text):
             raise InputError(f"{where}={shown(value)} is no action's name; give small letters")

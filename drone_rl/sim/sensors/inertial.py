@@ -4,7 +4,7 @@ import dataclasses
 import math
 
 import torch
-from torch import Tensor
+from torch import Generator, Tensor
 
 from drone_rl.config.dynamics import GRAVITY
 from drone_rl.config.sensors import ImuSettings, MagnetometerSettings
@@ -72,7 +72,7 @@ class Imu(Sensor[ImuState, ImuReading]):
         self.settings = settings or ImuSettings()
         self.sampling = Sampling(rate=self.settings.rate)
 
-    def _initial(self, body: BodyState, time: Tensor, generator: torch.Generator) -> ImuState:
+    def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> ImuState:
         """The body was at rest before: its first reading is that of a body that is carried."""
         own = self.settings
         still = torch.zeros_like(body.velocity)
@@ -82,14 +82,9 @@ class Imu(Sensor[ImuState, ImuReading]):
         return ImuState(self.sampling.start(time, 10), before, body.velocity.clone(), gyro, accel)
 
     def _sample(
-        self,
-        state: ImuState,
-        body: BodyState,
-        time: Tensor,
-        generator: torch.Generator,
-        is_due: Tensor,
+        self, state: ImuState, body: BodyState, time: Tensor, generator: Generator
     ) -> ImuState:
-        own = self.settings
+        own, is_due = self.settings, self.sampling.due(state.samples, time)
         seconds = torch.where(is_due, time - state.time, 1.0)
         force = specific_force(body.attitude, state.velocity, body.velocity, seconds)
         root = seconds.sqrt()[:, None]
@@ -159,21 +154,14 @@ class Magnetometer(Sensor[MagnetometerState, MagnetometerReading]):
         self.settings, self.home = settings or MagnetometerSettings(), home
         self.sampling = Sampling(rate=self.settings.rate, latency=self.settings.latency)
 
-    def _initial(
-        self, body: BodyState, time: Tensor, generator: torch.Generator
-    ) -> MagnetometerState:
+    def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> MagnetometerState:
         shape, device = body.position.shape, generator.device
         drawn = torch.rand(shape, dtype=torch.float64, generator=generator, device=device)
         bias = self.settings.noise * self.settings.bias * (2 * drawn - 1).to(time.device)
         return MagnetometerState(self.sampling.start(time, 3), bias)
 
     def _sample(
-        self,
-        state: MagnetometerState,
-        body: BodyState,
-        time: Tensor,
-        generator: torch.Generator,
-        is_due: Tensor,
+        self, state: MagnetometerState, body: BodyState, time: Tensor, generator: Generator
     ) -> MagnetometerState:
         own = self.settings
         field = own.scale * body_from_world(body.attitude, self.field(body.position))

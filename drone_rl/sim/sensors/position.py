@@ -4,7 +4,7 @@ import dataclasses
 import enum
 
 import torch
-from torch import Tensor
+from torch import Generator, Tensor
 
 from drone_rl.config.sensors import BarometerSettings, GpsSettings
 from drone_rl.sim.coordinates import HOME, GeoPoint, geo_from_world
@@ -74,16 +74,11 @@ class Gps(Sensor[GpsState, GpsReading]):
         self.settings, self.home = own, home
         self.sampling = Sampling(rate=own.rate, latency=own.latency, startup=own.startup)
 
-    def _initial(self, body: BodyState, time: Tensor, generator: torch.Generator) -> GpsState:
+    def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> GpsState:
         return GpsState(self.sampling.start(time, 7))
 
     def _sample(
-        self,
-        state: GpsState,
-        body: BodyState,
-        time: Tensor,
-        generator: torch.Generator,
-        is_due: Tensor,
+        self, state: GpsState, body: BodyState, time: Tensor, generator: Generator
     ) -> GpsState:
         own = self.settings
         side, up = own.noise * own.horizontal_noise, own.noise * own.vertical_noise
@@ -140,19 +135,14 @@ class Barometer(Sensor[BarometerState, BarometerReading]):
         self.settings, self.home = settings or BarometerSettings(), home
         self.sampling = Sampling(rate=self.settings.rate, latency=self.settings.latency)
 
-    def _initial(self, body: BodyState, time: Tensor, generator: torch.Generator) -> BarometerState:
+    def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> BarometerState:
         drift = torch.zeros_like(time)[:, None]
         return BarometerState(self.sampling.start(time, 2), time.clone(), drift)
 
     def _sample(
-        self,
-        state: BarometerState,
-        body: BodyState,
-        time: Tensor,
-        generator: torch.Generator,
-        is_due: Tensor,
+        self, state: BarometerState, body: BodyState, time: Tensor, generator: Generator
     ) -> BarometerState:
-        own = self.settings
+        own, is_due = self.settings, self.sampling.due(state.samples, time)
         strength, seconds = own.noise * own.drift, time - state.time
         drift = gauss_markov_step(state.drift, strength, own.drift_time, seconds, generator)
         at_sea = 100.0 * own.sea_level_pressure

@@ -6,7 +6,7 @@ import math
 from typing import Generic, Protocol, TypeVar
 
 import torch
-from torch import Tensor
+from torch import Generator, Tensor
 
 from drone_rl.sim.dynamics.state import BodyState
 from drone_rl.utils.batch import Batch
@@ -120,19 +120,11 @@ class Sensor(abc.ABC, Generic[State, Reading]):
 
     sampling: Sampling
 
-    def start(self, body: BodyState, time: Tensor, generator: torch.Generator) -> State:
-        """Switch the sensors on; those without start-up time take a reading.
-
-        Args:
-            body: The drones.
-            time: Now, seconds. Shape: (num_worlds,), float64.
-            generator: Of the noise.
-        """
+    def start(self, body: BodyState, time: Tensor, generator: Generator) -> State:
+        """Switch the sensors on; those without start-up time take a reading. See `update`."""
         return self.update(self._initial(body, time, generator), body, time, generator)
 
-    def update(
-        self, state: State, body: BodyState, time: Tensor, generator: torch.Generator
-    ) -> State:
+    def update(self, state: State, body: BodyState, time: Tensor, generator: Generator) -> State:
         """Return the sensors at a later time; a reading is taken where one is due.
 
         Args:
@@ -142,23 +134,18 @@ class Sensor(abc.ABC, Generic[State, Reading]):
             generator: Of the noise.
         """
         is_due = self.sampling.due(state.samples, time)
-        return self._sample(state, body, time, generator, is_due) if is_due.any() else state
+        return self._sample(state, body, time, generator) if is_due.any() else state
 
     def read(self, state: State, time: Tensor) -> Reading:
         """Return the readings that are delivered at a time (seconds, shape (num_worlds,))."""
         return self._reading(*self.sampling.read(state.samples, time))
 
     @abc.abstractmethod
-    def _initial(self, body: BodyState, time: Tensor, generator: torch.Generator) -> State: ...
+    def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> State: ...
 
     @abc.abstractmethod
     def _sample(
-        self,
-        state: State,
-        body: BodyState,
-        time: Tensor,
-        generator: torch.Generator,
-        is_due: Tensor,
+        self, state: State, body: BodyState, time: Tensor, generator: Generator
     ) -> State: ...
 
     @abc.abstractmethod
@@ -170,7 +157,7 @@ def select(condition: Tensor, chosen: Tensor, other: Tensor) -> Tensor:
     return torch.where(condition.view(-1, *[1] * (chosen.ndim - 1)), chosen, other)
 
 
-def normal(like: Tensor, generator: torch.Generator) -> Tensor:
+def normal(like: Tensor, generator: Generator) -> Tensor:
     """Draw standard normal numbers of the shape, type and device of a tensor.
 
     They are drawn on the generator's device: a CPU generator gives the same on every device.
@@ -180,7 +167,7 @@ def normal(like: Tensor, generator: torch.Generator) -> Tensor:
 
 
 def random_walk_step(
-    value: Tensor, strength: float, time: float, seconds: Tensor, generator: torch.Generator
+    value: Tensor, strength: float, time: float, seconds: Tensor, generator: Generator
 ) -> Tensor:
     """Advance a random walk by one step.
 
@@ -196,16 +183,11 @@ def random_walk_step(
 
 
 def gauss_markov_step(
-    value: Tensor, strength: float, time: float, seconds: Tensor, generator: torch.Generator
+    value: Tensor, strength: float, time: float, seconds: Tensor, generator: Generator
 ) -> Tensor:
-    """Advance a first-order Gauss-Markov process by one step.
+    """Advance a first-order Gauss-Markov process by one step; see `random_walk_step`.
 
-    Args:
-        value: Before. Shape: (num_worlds, n).
-        strength: Stationary standard deviation.
-        time: Time constant, seconds.
-        seconds: Length of the step. Shape: (num_worlds,).
-        generator: Of the noise.
+    `strength` is its stationary standard deviation, `time` its time constant in seconds.
     """
     kept = torch.exp(-seconds.clamp(min=0.0) / time)[:, None]
     return kept * value + strength * (1 - kept**2).sqrt() * normal(value, generator)

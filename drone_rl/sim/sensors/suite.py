@@ -81,9 +81,11 @@ class SensorSuite:
         self.imu, self.gps = Imu(own.imu), Gps(own.gps, home)
         self.barometer = Barometer(own.barometer, home)
         self.magnetometer = Magnetometer(own.magnetometer, home)
-        self._streams = [
-            torch_generator(seed, Stream.SENSORS, number=4 * number + i) for i in range(4)
-        ]
+        names = ("imu", "barometer", "magnetometer", "gps")
+        self._streams = {
+            name: torch_generator(seed, Stream.SENSORS, number=4 * number + i)
+            for i, name in enumerate(names)
+        }
 
     def start(self, body: BodyState) -> SensorSuiteState:
         """Switch all sensors on at time 0.
@@ -93,15 +95,12 @@ class SensorSuite:
                 restarts some of them.
         """
         time = torch.zeros_like(body.position[:, 0])
-        imu, barometer, magnetometer, gps = self._streams
-        return SensorSuiteState(
-            time,
-            self.imu.start(body, time, imu),
-            self.barometer.start(body, time, barometer),
-            self.magnetometer.start(body, time, magnetometer),
-            self.gps.start(body, time, gps),
-            _touched(start_collisions(body.position), body),
-        )
+        states = {
+            name: getattr(self, name).start(body, time, stream)
+            for name, stream in self._streams.items()
+        }
+        collision = _touched(start_collisions(body.position), body)
+        return SensorSuiteState(time=time, **states, collision=collision)
 
     def update(self, state: SensorSuiteState, body: BodyState, seconds: float) -> SensorSuiteState:
         """Return the sensors at a later time.
@@ -115,15 +114,12 @@ class SensorSuite:
             seconds: Since the last update.
         """
         time = state.time + seconds
-        imu, barometer, magnetometer, gps = self._streams
-        return SensorSuiteState(
-            time,
-            self.imu.update(state.imu, body, time, imu),
-            self.barometer.update(state.barometer, body, time, barometer),
-            self.magnetometer.update(state.magnetometer, body, time, magnetometer),
-            self.gps.update(state.gps, body, time, gps),
-            _touched(state.collision, body),
-        )
+        states = {
+            name: getattr(self, name).update(getattr(state, name), body, time, stream)
+            for name, stream in self._streams.items()
+        }
+        collision = _touched(state.collision, body)
+        return SensorSuiteState(time=time, **states, collision=collision)
 
     def read_imu(self, state: SensorSuiteState) -> ImuReading:
         """Return the readings of accelerometers and gyroscopes."""
@@ -146,20 +142,14 @@ class SensorSuite:
     ) -> tuple[CollisionState, SensorSuiteState]:
         """Return the last collisions, and the sensors with the flag cleared.
 
-        Args:
-            state: Before; not changed.
-            worlds: Indices of the drones to read; all by default. Shape: (k,).
+        See `read_collisions`.
         """
         reading, after = read_collisions(state.collision, worlds)
         return reading, dataclasses.replace(state, collision=after)
 
 
 def start_collisions(position: Tensor) -> CollisionState:
-    """Return drones that have never collided.
-
-    Args:
-        position: Metres, world frame. Shape: (num_worlds, 3), float64.
-    """
+    """Return the state of drones that have never collided. Shape: (num_worlds, 3), float64."""
     untouched = torch.zeros(len(position), dtype=torch.bool, device=position.device)
     numbers, zeros = torch.full_like(untouched, NOTHING, dtype=torch.int64), position.new_zeros
     nowhere, flat = zeros(position.shape), zeros(len(position))
