@@ -151,76 +151,98 @@ class Actions(Protocol):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the parts of a wish, in its order."""
+        ...
 
     @property
     def order(self) -> tuple[int, ...]:
         """The parts from left to right, as plots show them."""
+        ...
 
     @property
     def entry(self) -> Entry:
         """Shape, type and bounds of one environment's action."""
+        ...
 
     @property
     def num_outputs(self) -> int:
         """Number of the network's outputs."""
+        ...
 
     @property
     def output_names(self) -> tuple[str, ...]:
         """Names of the network's outputs."""
+        ...
 
     def wish(self, outputs: Tensor) -> Tensor:
         """Return the wish of a network's outputs. (*, num_outputs) to (*, len(names))."""
+        ...
 
     def scores(self, outputs: Tensor) -> Tensor:
         """Return unbounded scores with which the shares of parts grow. Shapes as of `wish`."""
+        ...
 
     def greedy(self, outputs: Tensor) -> Tensor:
         """Return the most probable action. (*, num_outputs) to (*), then the entry's."""
+        ...
 
     def chosen(self, wish: Tensor) -> Tensor:
         """Return the part with the largest share. Shape: (*)."""
+        ...
 
     def part(self, action: Tensor) -> Tensor:
         """Return the parts that actions belong to. (*), then the entry's, to (*)."""
+        ...
 
     def always(self, name: str) -> Tensor:
         """Return the full-speed action of a part, by name. Shape: the entry's."""
+        ...
 
     def draw(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
         """Sample uniformly, on the generator's device. Shape: `shape`, then the entry's."""
+        ...
 
     def fields(self) -> dict[str, str]:
         """Return the entries that data sets keep of an action, with descriptions."""
+        ...
 
     def kept(self, action: Tensor) -> dict[str, Tensor]:
         """Return these entries; "actions" are the parts. (T), then the entry's, to (T, *)."""
 
     def mirror(self, wish: Wish) -> Wish:
         """Return the mirror image of a wish. Shape kept."""
+        ...
 
     def distance(self, wish: Wish, other: Wish) -> Wish:
         """Return the distance of two wishes, 0 to 1. Shape: (*)."""
+        ...
 
     def leaning(self, wish: Wish) -> Wish:
         """Return the share of parts to the left, 0 to 1. Shape: (*)."""
+        ...
 
     def opposition(self, wish: NDArray, other: NDArray) -> NDArray:
         """How opposed two wishes are, 0 to 1; below 0 where the second leans left. Shape: (*)."""
+        ...
 
     def undoes(self, part: Tensor, before: Tensor) -> Tensor:
         """Return whether a part undoes the one before it. Shape: (*), bool."""
+        ...
 
     def sways(self, kept: Mapping[str, Tensor]) -> Tensor:
         """Return whether actions, as `kept`, are steps of going back and forth. (T,), bool."""
+        ...
 
     def turns(self, part: Tensor) -> Tensor:
         """Return whether a part differs from its mirror image. Shape: (*), bool."""
+        ...
 
     def agrees(self, part: Tensor, other: Tensor) -> Tensor:
         """Return whether parts are equal or lead to the same side. Shape: (*), bool."""
+        ...
 
     def as_dict(self) -> dict[str, Any]:
         """Return what reports need to name and plot them, as plain values."""
+        ...
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

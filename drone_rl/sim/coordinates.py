@@ -126,5 +126,5 @@ def _parallel(latitude: Values, home: GeoPoint) -> Values:
     return np.cos(turn) * (across + home.altitude)
 
 
-def _stack(x: Values, y: Values, z: Values) -> Values:
-    return torch.stack([x, y, z], -1) if isinstance(x, Tensor) else np.stack([x, y, z], -1)
+def _stack(*axes: Any) -> Any:
+    return torch.stack(axes, -1) if isinstance(axes[0], Tensor) else np.stack(axes, -1)

@@ -48,9 +48,10 @@ class KernelInputs(NamedTuple):
 
 
 class Launch(NamedTuple):
-    """Arguments of a launch: `count` images, which are environments times cameras."""
+    """Arguments of a launch."""
 
-    count: int
+    num_images: int
+    """Environments times cameras."""
     view: structs.View
     geoms: structs.Geoms
     poses: structs.Poses
@@ -169,7 +170,7 @@ class CpuLauncher:
         def work(worker: int, first: int, last: int) -> None:
             wp.launch(kernel, 1, inputs=[first, last, worker, *inputs], device="cpu")
 
-        self._workers.map_spans(0, launch.count, work)
+        self._workers.map_spans(0, launch.num_images, work)
 
     def close(self) -> None:
         """Stop the threads."""
@@ -186,15 +187,15 @@ class GpuLauncher:
     def launch(self, launch: Launch) -> None:
         """Render images."""
         view, geoms, device = launch.view, launch.geoms, self._device
-        pixels, shape = view.height * view.width, (launch.count, len(geoms.kind))
-        scratch = make_scratch(launch.count, pixels, len(geoms.kind), device)
+        pixels, shape = view.height * view.width, (launch.num_images, len(geoms.kind))
+        scratch = make_scratch(launch.num_images, pixels, len(geoms.kind), device)
         inputs = [view, geoms, launch.poses, scratch]
         wp.launch(gpu_kernel.view_geoms, shape, inputs=inputs, device=device)
         kernel = gpu_kernel.render_pixels
         if launch.effects is not None:
             kernel = gpu_kernel.render_pixels_with_effects
         inputs = [view, *launch.inputs(scratch)]
-        wp.launch(kernel, (launch.count, pixels), inputs=inputs, device=device)
+        wp.launch(kernel, (launch.num_images, pixels), inputs=inputs, device=device)
 
     def close(self) -> None:
         """Do nothing: there are no threads."""
@@ -203,10 +204,11 @@ class GpuLauncher:
 def make_scratch(count: int, pixels: int, geoms: int, device: str = "cpu") -> structs.Scratch:
     """Allocate scratch buffers for `count` images of some pixels and geoms at the same time."""
     scratch: Any = structs.Scratch()
-    kinds = {"nearest": float, "owner": int, "dark": int, "colors": wp.vec3ub}
+    kinds: dict[str, Any] = {"nearest": float, "owner": int, "dark": int, "colors": wp.vec3ub}
     for name, kind in kinds.items():
         setattr(scratch, name, wp.empty((count, pixels), dtype=kind, device=device))
-    scratch.geom_views = wp.empty((count, geoms), dtype=structs.GeomView, device=device)
+    kind: Any = structs.GeomView
+    scratch.geom_views = wp.empty((count, geoms), dtype=kind, device=device)
     return scratch
 
 
