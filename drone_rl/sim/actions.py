@@ -207,6 +207,7 @@ class Actions(Protocol):
 
     def kept(self, action: Tensor) -> dict[str, Tensor]:
         """Return these entries; "actions" are the parts. (T), then the entry's, to (T, *)."""
+        ...
 
     def mirror(self, wish: Wish) -> Wish:
         """Return the mirror image of a wish. Shape kept."""
