@@ -51,7 +51,6 @@ class FusedCollector:
         worlds: Any,
         num_threads: int,
     ) -> None:
-        """Allocates what the kernel needs; see `try_create`."""
         self._direct, actor = direct, direct.actor
         assert isinstance(actor, CategoricalActor)
         self._actor = actor
@@ -60,11 +59,14 @@ class FusedCollector:
         count, view = renderer.worlds.num_worlds, renderer.view
         self._workers = WorkerPool(count, num_threads)
         raytracer: Any = renderer.worlds.renderer
-        tools = raytracer.kernel_inputs(view, self._workers.size)
-        eye = self._eye = rollout_kernel.CameraView()
-        eye.view, eye.geoms, eye.materials, eye.scratch = tools
-        eye.mean, eye.deviation = _mean_and_deviation(renderer)
-        self._rooms = wp.empty((self._workers.size, network.room), dtype=float, device="cpu")
+        camera: Any = rollout_kernel.CameraView()
+        inputs = raytracer.kernel_inputs(view, self._workers.size)
+        camera.view, camera.geoms, camera.materials, camera.scratch = inputs
+        camera.poses = worlds.poses
+        camera.mean, camera.deviation = _mean_and_deviation(renderer)
+        self._camera = camera
+        shape = (self._workers.size, network.workspace_size)
+        self._workspaces = wp.empty(shape, dtype=float, device="cpu")
         pixels = view.height * view.width
         self._length = max(1, min(_MAX_STEPS, _MAX_PIXELS // (count * pixels)))
         self._num_rows = rows = count * self._length
@@ -86,11 +88,9 @@ class FusedCollector:
 
     @classmethod
     def try_create(cls, direct: DirectCollector, num_threads: int) -> Self | Reasons:
-        """Return the fused collector, or the reasons why the kernel does not support it.
+        """Return the fused form of a collector, or the reasons why the kernel does not support it.
 
-        Args:
-            direct: The same collector, stepping in Python.
-            num_threads: Groups of environments; no result depends on it.
+        No result depends on the number of threads.
         """
         reasons = [*_not_fused(direct.renderer), *_not_fused_policy(direct)]
         worlds = direct.renderer.worlds
@@ -115,10 +115,7 @@ class FusedCollector:
         return self._cache
 
     def collect(self, num_envs: int) -> TensorDictBase:
-        """Run an episode in each of the first environments; trajectories count from 0.
-
-        Shape: (T_total,), episode after episode.
-        """
+        """Run an episode in each of the first environments; trajectories count from 0."""
         if self._actor.exploration not in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC):
             return self._direct.collect(num_envs)
         load_kernels(self._kernel.module).result()
@@ -155,7 +152,7 @@ class FusedCollector:
         names, parts = ("action", "reward", "end_reason", *seen), []
         while not (parts and bool(reasons.all())):
             before, first = taken.clone(), len(parts) * self._num_rows
-            self._launch(num_envs, self._open_log(len(parts), names))
+            self._launch(num_envs, len(parts), names)
             envs, rows = self._written(taken - before)
             require_finite(self._logits[rows], self._owner)
             parts.append((envs, rows + first))
@@ -167,48 +164,36 @@ class FusedCollector:
             logged[ACTIVATIONS] = self._cache.add(rows, self._network.weights, logged["pixels"])
         return envs, logged
 
-    def _open_log(self, part: int, kept: tuple[str, ...]) -> Any:
-        """Return arrays that one launch writes, and of which the named ones are kept."""
-        log, pictures, room = rollout_kernel.RolloutLog(), Images(), self._buffer.open(part, kept)
-        gray: Any = wp.from_torch(room["pixels"].flatten(1))
-        pictures.gray = gray
-        self._logits = room["logits"]
-        log.pictures, log.logits = pictures, wp.from_torch(self._logits)
-        log.actions, log.rewards = wp.from_torch(room["action"]), wp.from_torch(room["reward"])
-        log.end_reasons = wp.from_torch(room["end_reason"])
-        if self._cache is not None:
-            first, last = part * self._num_rows, (part + 1) * self._num_rows
-            # of no rows if there is no room
-            log.outputs = wp.from_torch(self._cache.outputs[first:last])
-        return log
-
-    def _launch(self, num_envs: int, log: Any) -> None:
+    def _launch(self, num_envs: int, part: int, kept: tuple[str, ...]) -> None:
+        """Run up to `_length` steps; the named entries are kept beyond the next launch."""
         draws = torch.full((num_envs, self._length), -1.0)
         if self._actor.exploration == ExplorationType.RANDOM:
             source: Any = self._actor.generator
             draws.uniform_(generator=source)
-        given = [
-            self._eye,
-            self._network.layers,
-            self._rooms,
-            self._worlds.flights,
-            self._worlds.poses,
-            wp.from_torch(draws),
-            log,
-        ]
+        opened, frames = self._buffer.open(part, kept), Images()
+        gray: Any = wp.from_torch(opened["pixels"].flatten(1))
+        frames.gray = gray
+        self._logits = opened["logits"]
+        rollout: Any = rollout_kernel.Rollout()
+        rollout.camera, rollout.layers = self._camera, self._network.layers
+        rollout.workspaces, rollout.draws = self._workspaces, wp.from_torch(draws)
+        rollout.frames, rollout.logits = frames, wp.from_torch(self._logits)
+        rollout.actions = wp.from_torch(opened["action"])
+        rollout.rewards = wp.from_torch(opened["reward"])
+        rollout.end_reasons = wp.from_torch(opened["end_reason"])
+        if self._cache is not None:
+            first, last = part * self._num_rows, (part + 1) * self._num_rows
+            # of no rows if there is not enough memory
+            rollout.outputs = wp.from_torch(self._cache.outputs[first:last])
 
         def work(member: int, first: int, last: int) -> None:
-            inputs = [first, last, member, *given]
+            inputs = [first, last, member, rollout, self._worlds.flights]
             wp.launch(self._kernel, 1, inputs=inputs, device="cpu")
 
         self._workers.map_spans(0, num_envs, work)
 
     def _written(self, lengths: Tensor) -> tuple[Tensor, Tensor]:
-        """Return environment and row in the log of each step, environment after environment.
-
-        Args:
-            lengths: Steps of each environment. Shape: (num_envs,).
-        """
+        """Return environment and row of each step, from the steps of each environment."""
         is_step = torch.arange(self._length) < lengths[:, None]
         rows = is_step.flatten().nonzero()[:, 0]
         return rows // self._length, rows

@@ -10,11 +10,12 @@ from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
 from drone_rl.acceleration import gradients_kernel
-from drone_rl.acceleration.gradients_kernel import BLOCK, PackedParams
+from drone_rl.acceleration.gradients_kernel import BLOCK, Batch, PackedParams, Workspace
 from drone_rl.acceleration.layers_kernel import WIDTH
 from drone_rl.acceleration.packed_layers import (
     Order,
     PackedLayer,
+    as_products,
     odd_lines,
     outputs_at,
     packed_layers,
@@ -41,12 +42,7 @@ class ActivationCache:
     """
 
     def __init__(self, num_rows: int, num_outputs: int) -> None:
-        """Allocates memory.
-
-        Args:
-            num_rows: Observations of one batch.
-            num_outputs: Numbers of an observation, see `outputs_at`.
-        """
+        """Allocates memory for observations of one batch, of `num_outputs` numbers each."""
         self.outputs = torch.empty(num_rows, num_outputs)
         """Written by the collector between `clear` and `add`."""
         self.generation = 0
@@ -59,12 +55,12 @@ class ActivationCache:
         self.generation += 1
 
     def add(self, rows: Tensor, weights: Tensor, observations: Tensor) -> Tensor:
-        """Return handles of activations: -1 for each if there was not room for all.
+        """Return handles of activations (k,): -1 for each if there was not enough memory for all.
 
         Args:
             rows: Of `outputs`. Shape: (k,), int64.
             weights: Packed weights that the activations were computed with.
-            observations: What the activations are of. Shape: (k, *).
+            observations: Shape: (k, *).
         """
         self._weights = weights
         if int(rows.max()) >= len(self.outputs):
@@ -76,14 +72,12 @@ class ActivationCache:
         return rows + self.generation * len(self.outputs)
 
     def find(self, handles: Tensor, weights: Tensor, observations: Tensor) -> Tensor | None:
-        """Return the rows of activations, or None unless all are there for these weights.
-
-        None, too, if the observations have changed.
+        """Return the rows of activations, or None unless all are valid.
 
         Args:
             handles: As returned by `add`. Shape: (k,).
-            weights: Packed weights.
-            observations: Those of the batch now. Shape: (k, *).
+            weights: Packed weights, which may have changed.
+            observations: They may have changed, too. Shape: (k, *).
         """
         rows = handles - self.generation * len(self.outputs)
         is_valid = (rows >= 0) & (rows < len(self.outputs))
@@ -96,7 +90,7 @@ class ActivationCache:
 
 
 def _sample_pixels(observations: Tensor) -> Tensor:
-    """Return about 16 pixels of each observation, spread evenly. Shape: (k, up to 31)."""
+    """Return about 16 pixels of each observation. Shape: (k, up to 31)."""
     flat = observations.flatten(1)
     return flat[:, :: max(1, flat.shape[1] // 16)]
 
@@ -116,10 +110,10 @@ class FusedNetwork(PictureNetwork):
         of: GradientsOf = "weights",
         cache: ActivationCache | None = None,
     ) -> None:
-        """Wraps a network; see `try_create`."""
         super().__init__()
         self.network, self.in_shape, self.actions = network, network.in_shape, network.actions
-        self._num_threads, self._of, self._cache = num_threads, of, cache
+        self._num_threads, self._cache = num_threads, cache
+        self._of: GradientsOf = of
         self.in_keys = ("pixels",) if cache is None else ("pixels", ACTIVATIONS)
         self._work: _Work | None = None
         load_kernels(gradients_kernel)
@@ -138,13 +132,11 @@ class FusedNetwork(PictureNetwork):
         Args:
             network: From pixels to logits.
             num_threads: Threads that share the observations; sums over these depend on it.
-            of: What has gradients: the weights, or the pixels. For those of the pixels the weights
-                stay what they are at first.
-            cache: Called if the network is supported; returns the activations that a collector
-                keeps, such as `FusedCollector.cache_activations`.
+            of: What has gradients. With those of the pixels, the weights stay as they are first.
+            cache: Called if the network is supported; see `FusedCollector.cache_activations`.
         """
         reasons = unsupported(network)
-        if not reasons and of == "pixels" and not packed_layers(network)[0].has_way_back:
+        if not reasons and of == "pixels" and not packed_layers(network)[0].has_transpose:
             reasons.append(f"the first layer's inputs are not a multiple of {WIDTH}")
         num_weights = sum(p.numel() for p in network.parameters())
         if num_weights > MAX_WEIGHTS:
@@ -154,18 +146,15 @@ class FusedNetwork(PictureNetwork):
         return cls(network, num_threads, of=of, cache=cache())
 
     def forward(self, pixels: Tensor, activations: Tensor | None = None) -> Tensor:
-        """See `PictureNetwork`.
+        """Return the logits of pixels (*, C, H, W).
 
         Args:
-            pixels: Shape: (*, C, H, W).
+            pixels: Observations.
             activations: Handle of each observation's activations in the cache. Shape: (*,).
-
-        Raises:
-            InputError: The observations have another shape than the network was built for.
         """
         if self._work is None:
-            layers, is_fixed = packed_layers(self.network), self._of == "pixels"
-            self._work = _Work(layers, self._num_threads, self._cache, is_fixed=is_fixed)
+            layers = packed_layers(self.network)
+            self._work = _Work(layers, self._num_threads, self._cache, self._of)
         self.network.check(pixels)
         flat = pixels.reshape(-1, math.prod(self.in_shape))
         handles = None if activations is None else activations.reshape(-1)
@@ -175,10 +164,8 @@ class FusedNetwork(PictureNetwork):
 
 
 class _Activations(NamedTuple):
-    """Outputs of all layers."""
-
     outputs: Tensor
-    """One observation after the other; there may be room behind. Flat."""
+    """Of all layers, one observation after the other; there may be memory beyond. Flat."""
     rows: Tensor
     """Row of each observation."""
     generation: int | None
@@ -186,14 +173,12 @@ class _Activations(NamedTuple):
 
 
 class _Logits(torch.autograd.Function):
-    """Forward and backward pass."""
-
     @staticmethod
     def forward(
         ctx: Any, work: "_Work", pixels: Tensor, handles: Tensor | None, *parameters: Tensor
     ) -> Tensor:
-        ctx.work, ctx.of = work, "weights" if parameters else "pixels"
-        ctx.pixels = pixels.detach()  # Warp asks arrays for gradients, which torch warns of
+        ctx.work, ctx.is_learning = work, bool(parameters)
+        ctx.pixels = pixels.detach()  # Warp reads .grad of arrays, which torch warns of
         ctx.made = work.compute(ctx.pixels, handles)
         return work.logits(ctx.made)
 
@@ -203,9 +188,8 @@ class _Logits(torch.autograd.Function):
         if ctx.made is None:
             raise RuntimeError("a second backward pass is impossible: activations were released")
         made, ctx.made = ctx.made, None
-        if ctx.of == "pixels":
-            return None, ctx.work.pixel_gradient(ctx.pixels, made, grad_output), None
-        return None, None, None, *ctx.work.weight_gradients(ctx.pixels, made, grad_output)
+        gradients = ctx.work.gradients(ctx.pixels, made, grad_output)
+        return (None, None, None, *gradients) if ctx.is_learning else (None, *gradients, None)
 
 
 class _Work:
@@ -216,33 +200,39 @@ class _Work:
         layers: Sequence[PackedLayer],
         num_threads: int,
         cache: ActivationCache | None,
-        *,
-        is_fixed: bool,
+        of: GradientsOf,
     ) -> None:
         load_kernels(gradients_kernel).result()
-        self._layers, self._cache = layers, cache
+        self._layers, self._cache, self._is_fixed = layers, cache, of == "pixels"
         self._workers = WorkerPool(num_threads, num_threads)
         self._order = order = Order(layers)
         self._weights = torch.zeros(order.weights_at[-1])
         self._back = torch.zeros(order.back_at[-1])
         made_at = outputs_at(layers)
         self._logits_at, self._size = made_at[-2:]
-        params = PackedParams()
-        params.geometry = _ints([layer.geometry for layer in layers])
-        params.weights_at, params.back_at = _ints(order.weights_at), _ints(order.back_at)
+        params = self._params = PackedParams()
+        params.products = as_products(
+            [0, at, 0, *layer.geometry, int(layer is not layers[-1])]
+            for layer, at in zip(layers, order.weights_at, strict=False)
+        )
+        params.transposed = as_products(
+            _transposed(layer, at) for layer, at in zip(layers, order.back_at, strict=False)
+        )
         params.weights, params.back = wp.from_torch(self._weights), wp.from_torch(self._back)
-        params.made_at = _ints(made_at)
+        params.made_at = wp.from_torch(torch.tensor(made_at, dtype=torch.int32))
         params.num_convolutions = sum(layer.is_convolution for layer in layers)
-        params.near = odd_lines(self._logits_at - made_at[params.num_convolutions - 1])
-        self._params = params
-        self._rooms = torch.empty(self._workers.size, int(BLOCK) * self._size)
-        self._sides = torch.empty(self._workers.size, int(BLOCK) * params.near)
+        stride = odd_lines(self._logits_at - made_at[params.num_convolutions - 1])
+        params.inputs_stride = stride
+        self._gradients = torch.empty(self._workers.size, *self._weights.shape)
         most = max(v.num_inputs * v.geometry[0] for v in layers if v.is_convolution)
-        self._patches = torch.empty(self._workers.size, most)
+        sizes = {"deltas": int(BLOCK) * self._size, "inputs": int(BLOCK) * stride, "patches": most}
+        self._workspaces = [Workspace() for _ in range(self._workers.size)]
+        for workspace, gradients in zip(self._workspaces, self._gradients, strict=True):
+            for name, size in sizes.items():
+                setattr(workspace, name, wp.empty(size, dtype=float, device="cpu"))
+            workspace.gradients = wp.from_torch(gradients[: 0 if self._is_fixed else None])
         self._spare: Tensor | None = None
         """Outputs to overwrite; new memory takes longer than a layer."""
-        self._gradients = torch.empty(self._workers.size, *self._weights.shape)
-        self._is_fixed = is_fixed
         order.pack(self._weights, self._back)
 
     @property
@@ -261,12 +251,13 @@ class _Work:
                 return _Activations(outputs, rows, self._cache.generation)
         size, spare, self._spare = len(pixels) * self._size, self._spare, None
         made = torch.empty(size) if spare is None or len(spare) < size else spare
-        given = [self._params, wp.from_torch(pixels), wp.from_torch(made)]
+        batch: Any = Batch()
+        batch.frames, batch.made = wp.from_torch(pixels), wp.from_torch(made)
 
         def work(member: int, first: int, last: int) -> None:
             del member
-            inputs = [first, last, *given]
-            wp.launch(gradients_kernel.answer, 1, inputs=inputs, device="cpu")
+            inputs = [first, last, self._params, batch]
+            wp.launch(gradients_kernel.forward, 1, inputs=inputs, device="cpu")
 
         self._workers.map_spans(0, len(pixels), work)
         return _Activations(made, torch.arange(len(pixels), dtype=torch.int32), None)
@@ -276,50 +267,31 @@ class _Work:
         last = self._logits_at + torch.arange(len(self._layers[-1].layer.weight))
         return made.outputs.take(made.rows[:, None].long() * self._size + last)
 
-    def weight_gradients(
-        self, pixels: Tensor, made: _Activations, grad_output: Tensor
-    ) -> list[Tensor]:
-        """Return the gradients of the parameters; `made` may be overwritten afterwards."""
-        self._gradients.zero_()
-        self._backward(pixels, made, grad_output, self._gradients, torch.empty(0, 0))
-        return self._order.unpack(self._gradients.sum(0))
+    def gradients(self, pixels: Tensor, made: _Activations, grad_output: Tensor) -> list[Tensor]:
+        """Return the gradient of each parameter, or of the pixels.
 
-    def pixel_gradient(self, pixels: Tensor, made: _Activations, grad_output: Tensor) -> Tensor:
-        """Return the gradient of the pixels; `made` may be overwritten afterwards."""
-        seen = torch.empty_like(pixels)
-        self._backward(pixels, made, grad_output, torch.empty(0, 0), seen)
-        return seen
-
-    def _backward(
-        self,
-        pixels: Tensor,
-        made: _Activations,
-        grad_output: Tensor,
-        gradients: Tensor,
-        seen: Tensor,
-    ) -> None:
+        `made` may be overwritten afterwards.
+        """
         if self._cache is not None and made.generation not in (None, self._cache.generation):
             raise RuntimeError("a batch was collected between the forward and the backward pass")
-        rooms = (self._rooms, self._sides, self._patches)
-        arrays = (
-            pixels,
-            made.outputs,
-            made.rows,
-            grad_output.contiguous(),
-            *rooms,
-            gradients,
-            seen,
-        )
-        given = [self._params, *(wp.from_torch(array) for array in arrays)]
+        self._gradients.zero_()
+        grad_pixels = torch.empty_like(pixels) if self._is_fixed else torch.empty(0, 0)
+        batch: Any = Batch()
+        batch.frames, batch.made = wp.from_torch(pixels), wp.from_torch(made.outputs)
+        batch.rows, batch.grad_frames = wp.from_torch(made.rows), wp.from_torch(grad_pixels)
+        batch.grad_output = wp.from_torch(grad_output.contiguous())
 
         def work(member: int, first: int, last: int) -> None:
-            inputs = [first, last, member, *given]
-            wp.launch(gradients_kernel.learn, 1, inputs=inputs, device="cpu")
+            inputs = [first, last, self._params, batch, self._workspaces[member]]
+            wp.launch(gradients_kernel.backward, 1, inputs=inputs, device="cpu")
 
         self._workers.map_spans(0, len(pixels), work)
         if made.generation is None:
             self._spare = made.outputs
+        return [grad_pixels] if self._is_fixed else self._order.unpack(self._gradients.sum(0))
 
 
-def _ints(values: Any) -> wp.array:
-    return wp.from_torch(torch.tensor(values, dtype=torch.int32))
+def _transposed(layer: PackedLayer, weights_at: int) -> list[int]:
+    """Return the fields of the product from the gradient of outputs to that of patches."""
+    outs, size = layer.num_outs, layer.num_inputs
+    return [0, weights_at, 0, layer.geometry[0], 1, outs, 0, 1, outs, 0, size, size, 0]

@@ -8,46 +8,38 @@ import torch
 import warp as wp
 from torch import Tensor, nn
 
-from drone_rl.acceleration.layers_kernel import Layers, decide, look
+from drone_rl.acceleration.layers_kernel import Layers, run_convolutions, run_linear
 from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
 from drone_rl.envs.direct_renderer import Reasons
 from drone_rl.policies.networks import require_finite
 from drone_rl.sim.rendering.devices import load_kernels, start_warp
 
 _TOGETHER = wp.constant(16)
-"""Frames whose linear layers are worked out together."""
+"""Frames whose linear layers are computed together."""
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.kernel
-def answer(
-    layers: Layers, pictures: wp.array2d[float], room: wp.array[float], logits: wp.array2d[float]
+def infer(
+    layers: Layers, frames: wp.array2d[float], workspace: wp.array[float], logits: wp.array2d[float]
 ) -> None:
-    """Works logits out; launch it with a dimension of 1.
-
-    Args:
-        layers: The network.
-        pictures: A row each.
-        room: To work in.
-        logits: Are written, a row a frame.
-    """
-    for first in range(0, pictures.shape[0], _TOGETHER):
-        count = wp.min(pictures.shape[0] - first, _TOGETHER)
+    """Compute the logits of frames, a row each; launch it with a dimension of 1."""
+    for first in range(0, frames.shape[0], _TOGETHER):
+        count = wp.min(frames.shape[0] - first, _TOGETHER)
         for row in range(count):
-            look(layers, pictures[first + row], room, row)
-        decide(layers, room, count)
+            run_convolutions(layers, frames[first + row], workspace, row)
+        run_linear(layers, workspace, count)
         for row in range(count):
             at = layers.logits_at + row * layers.num_outs
             for action in range(logits.shape[1]):
-                logits[first + row, action] = room[at + action]
+                logits[first + row, action] = workspace[at + action]
 
 
 class BatchedInference:
-    """Logits of a network that no longer learns; any number of threads may call it at a time."""
+    """Computes the logits of a network that no longer learns; any thread may call it."""
 
     def __init__(self, network: nn.Module) -> None:
-        """Packs the network; see `try_create`."""
         start_warp("cpu")
         self._owner = getattr(network, "owner", "the policy")
         self._packed = PackedNetwork(network, int(_TOGETHER))
@@ -67,12 +59,12 @@ class BatchedInference:
         logits = torch.empty(len(pixels), self._packed.num_actions)
         flat = pixels.flatten(1).contiguous()
         arrays = wp.from_torch(flat), self._workspace(), wp.from_torch(logits)
-        wp.launch(answer, 1, inputs=[self._packed.layers, *arrays], device="cpu")
+        wp.launch(infer, 1, inputs=[self._packed.layers, *arrays], device="cpu")
         require_finite(logits, self._owner)
         return logits
 
     def _workspace(self) -> wp.array:
         """Each thread has one."""
         if not hasattr(self._own, "workspace"):
-            self._own.workspace = wp.empty(self._packed.room, dtype=float, device="cpu")
+            self._own.workspace = wp.empty(self._packed.workspace_size, dtype=float, device="cpu")
         return self._own.workspace

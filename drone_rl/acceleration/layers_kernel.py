@@ -1,19 +1,19 @@
-"""The layers of a small network on one core of a CPU, for kernels that ask it within a loop.
+"""Layers of a small network on one core of a CPU, for kernels that evaluate it within a loop.
 
-Libraries gain their speed on large batches. A kernel that flies a drone has a frame at a time, or
-a handful; so here a layer is a product of matrices whose rows are read where they lie, be they
-patches of a frame with its channels last or frames. Tiles of the product stay in registers,
-which makes it twice as fast as oneDNN on one core. Each number is summed in the order of its
-inputs, whatever is worked out beside it.
+Libraries gain their speed on large batches; a kernel that runs an episode has one frame at a time,
+or a few. A layer is therefore a matrix product whose rows are read in place: patches of a frame
+with its channels last, or whole vectors. Tiles of the product stay in registers, which makes it
+twice as fast as oneDNN on one core. Each output is summed in the order of its inputs, whatever is
+computed next to it.
 """
 
 import warp as wp
 
 WIDTH = 16
-"""Outputs that are worked out together: numbers of outputs are rounded up to a multiple of it."""
+"""Outputs that are computed together: numbers of outputs are rounded up to a multiple of it."""
 
-# Handed to a function, numbers make the compiler use registers of 512 bits where there are such; of
-# itself it takes two of 256 for each, and half of the speed.
+# As arguments of a function, vectors make the compiler use 512-bit registers where there are any;
+# otherwise it takes two of 256 bits for each, at half the speed.
 NUMBERS = """
 #pragma clang fp contract(fast)
 #pragma clang diagnostic ignored "-Wpsabi"
@@ -28,15 +28,17 @@ auto add = [](numbers sum, float by, numbers given) __attribute__((always_inline
 _TILES = (
     NUMBERS
     + """
-const float* input = given.data + given_at;
-float* output = made.data + made_at;
+const int rows = g.rows, columns = g.columns, down = g.down, across = g.across;
+const int lines = g.lines, length = g.length, next_line = g.next_line, num_outs = g.num_outs;
+const float* input = given.data + g.given_at;
+float* output = made.data + g.made_at;
 const int panel = 16 * (1 + lines * length);
 auto tile = [&](auto* shape, int row, int outs) __attribute__((always_inline)) {
     constexpr int ROWS = sizeof(*shape) / sizeof((*shape)[0]);
     constexpr int PARTS = sizeof((*shape)[0]) / sizeof(numbers);
     numbers sums[ROWS][PARTS];
     const float* from[ROWS];
-    const float* now = weights.data + weights_at + outs / 16 * panel;
+    const float* now = weights.data + g.weights_at + outs / 16 * panel;
     int column = row % columns;
     const float* first = input + row / columns * down + column * across;
     #pragma unroll
@@ -66,8 +68,8 @@ auto tile = [&](auto* shape, int row, int outs) __attribute__((always_inline)) {
         #pragma unroll
         for (int p = 0; p < PARTS; ++p) {
             numbers sum = sums[r][p];
-            if (is_rectified) sum = sum > 0.0f ? sum : numbers{};
-            *(anywhere*)(output + (row + r) * made_down + outs + p * 16) = sum;
+            if (g.is_rectified) sum = sum > 0.0f ? sum : numbers{};
+            *(anywhere*)(output + (row + r) * g.made_down + outs + p * 16) = sum;
         }
     }
 };
@@ -93,44 +95,45 @@ for (; outs < num_outs; outs += 16) cover((many_by_one*)nullptr, (one_by_one*)nu
 )
 
 
+@wp.struct
+class Product:
+    """Geometry of a layer: a matrix product whose rows are patches of a frame, or vectors."""
+
+    given_at: int
+    """Offset of the inputs."""
+    weights_at: int
+    """Offset of the weights."""
+    made_at: int
+    """Offset of the outputs."""
+    rows: int
+    """Patches, or vectors."""
+    columns: int
+    """Patches in a line of patches; rows are a multiple of it."""
+    down: int
+    """Stride from a line of patches to the next."""
+    across: int
+    """Stride from a patch to the next of its line."""
+    lines: int
+    """Lines of a patch."""
+    length: int
+    """Numbers in a line of a patch."""
+    next_line: int
+    """Stride from a line of a patch to the next."""
+    num_outs: int
+    """Outputs of a row, a multiple of `WIDTH`."""
+    made_down: int
+    """Stride from the outputs of a row to those of the next."""
+    is_rectified: int
+    """Whether outputs below 0 become 0."""
+
+
 @wp.func_native(_TILES)
 def multiply(
-    given: wp.array[float],
-    given_at: int,
-    weights: wp.array[float],
-    weights_at: int,
-    made: wp.array[float],
-    made_at: int,
-    rows: int,
-    columns: int,
-    down: int,
-    across: int,
-    lines: int,
-    length: int,
-    next_line: int,
-    num_outs: int,
-    made_down: int,
-    is_rectified: int,
+    given: wp.array[float], weights: wp.array[float], made: wp.array[float], g: Product
 ) -> None:
-    """A layer.
+    """Compute a layer.
 
-    Args:
-        given: What it looks at.
-        given_at: Where that begins.
-        weights: Of `WIDTH` outputs at a time their biases, then for each input their weights.
-        weights_at: Where these begin.
-        made: Takes the outputs, row after row.
-        made_at: Where these begin.
-        rows: Places that it looks at: of a patch, or frames.
-        columns: Of these in a line.
-        down: How much farther each line of places begins.
-        across: How much farther each place in a line begins.
-        lines: Of a patch.
-        length: Of a line of the patch.
-        next_line: How much farther the patch's next line begins.
-        num_outs: Of each row, a multiple of `WIDTH`.
-        made_down: How much farther each row of outputs begins.
-        is_rectified: Whether outputs below 0 become 0.
+    `weights` are, for each `WIDTH` outputs, their biases, then for each input their weights.
     """
     ...
 
@@ -143,110 +146,68 @@ for (int i = 0; i < size; ++i) to[i] = from[i];
 def copy(
     given: wp.array[float], given_at: int, made: wp.array[float], made_at: int, size: int
 ) -> None:
-    """Copies so many numbers."""
+    """Copy numbers."""
     ...
 
 
 @wp.struct
 class Layers:
-    """A network: convolutions, of one frame after the other, then layers of many at once."""
+    """A network: convolutions, of one frame after the other, then layers of several at once."""
 
-    steps: wp.array2d[int]
-    """A row a layer: where it reads and writes in the room to work, and what `multiply` takes."""
+    products: wp.array[Product]
+    """One for each layer; offsets are those in a workspace."""
     weights: wp.array[float]
     num_convolutions: int
-    picture_size: int
-    """Numbers that the convolutions leave of a frame."""
+    features_size: int
+    """Numbers that the convolutions make of a frame."""
     logits_at: int
-    """Where logits are in the room to work, `WIDTH` numbers a frame or a multiple of it."""
+    """Offset of the logits in a workspace."""
     num_outs: int
-    """Of these for each frame."""
+    """Stride from the logits of a frame to those of the next."""
     outputs_at: wp.array[int]
-    """Where those of each layer begin, where all of a frame are kept."""
+    """Offset of each layer where the outputs of all layers of a frame are saved."""
 
 
 @wp.func
-def look(layers: Layers, picture: wp.array[float], room: wp.array[float], row: int) -> None:
-    """What the convolutions make of a frame.
+def run_convolutions(
+    layers: Layers, frame: wp.array[float], workspace: wp.array[float], row: int
+) -> None:
+    """Compute the convolutions of one frame of gray pixels.
 
-    Args:
-        layers: The network.
-        picture: Gray, pixel after pixel.
-        room: To work in.
-        row: Number of the frame among those that are decided on together.
+    `row` is its number among the frames whose linear layers are computed together.
     """
     for layer in range(layers.num_convolutions):
-        made_at = layers.steps[layer, 1]
+        p = layers.products[layer]
         if layer == layers.num_convolutions - 1:
-            made_at += row * layers.picture_size
+            p.made_at += row * layers.features_size
         if layer == 0:
-            _apply(layers, layer, picture, 0, room, made_at, layers.steps[layer, 3])
+            multiply(frame, layers.weights, workspace, p)
         else:
-            given_at = layers.steps[layer, 0]
-            _apply(layers, layer, room, given_at, room, made_at, layers.steps[layer, 3])
+            multiply(workspace, layers.weights, workspace, p)
 
 
 @wp.func
-def decide(layers: Layers, room: wp.array[float], count: int) -> None:
-    """Logits of the frames that were looked at.
-
-    Args:
-        layers: The network.
-        room: To work in.
-        count: Of frames.
-    """
-    for layer in range(layers.num_convolutions, layers.steps.shape[0]):
-        given_at, made_at = layers.steps[layer, 0], layers.steps[layer, 1]
-        _apply(layers, layer, room, given_at, room, made_at, count)
+def run_linear(layers: Layers, workspace: wp.array[float], count: int) -> None:
+    """Compute the linear layers of the first `count` frames."""
+    for layer in range(layers.num_convolutions, layers.products.shape[0]):
+        p = layers.products[layer]
+        p.rows = count
+        multiply(workspace, layers.weights, workspace, p)
 
 
 @wp.func
-def keep(
-    layers: Layers, first: int, last: int, room: wp.array[float], row: int, outputs: wp.array[float]
-) -> None:
-    """Copies what layers made of a frame, before the next one takes their room.
-
-    Args:
-        layers: The network.
-        first: The first of the layers.
-        last: The one after the last.
-        room: Where they worked.
-        row: Number of the frame among those that are decided on together.
-        outputs: Takes them.
-    """
-    for layer in range(first, last):
-        size = layers.steps[layer, 3] * layers.steps[layer, 10]
-        at = layers.steps[layer, 1]
-        if layer >= layers.num_convolutions - 1:
-            at += row * size
-        copy(room, at, outputs, layers.outputs_at[layer], size)
-
-
-@wp.func
-def _apply(
+def save_outputs(
     layers: Layers,
-    layer: int,
-    given: wp.array[float],
-    given_at: int,
-    made: wp.array[float],
-    made_at: int,
-    rows: int,
+    first: int,
+    last: int,
+    workspace: wp.array[float],
+    row: int,
+    outputs: wp.array[float],
 ) -> None:
-    multiply(
-        given,
-        given_at,
-        layers.weights,
-        layers.steps[layer, 2],
-        made,
-        made_at,
-        rows,
-        layers.steps[layer, 4],
-        layers.steps[layer, 5],
-        layers.steps[layer, 6],
-        layers.steps[layer, 7],
-        layers.steps[layer, 8],
-        layers.steps[layer, 9],
-        layers.steps[layer, 10],
-        layers.steps[layer, 10],
-        layers.steps[layer, 11],
-    )
+    """Copy the outputs of layers `first` to `last` - 1 of one frame out of the workspace."""
+    for layer in range(first, last):
+        p = layers.products[layer]
+        size = p.rows * p.num_outs
+        if layer >= layers.num_convolutions - 1:
+            p.made_at += row * size
+        copy(workspace, p.made_at, outputs, layers.outputs_at[layer], size)

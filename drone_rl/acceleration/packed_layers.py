@@ -1,23 +1,24 @@
 """A network laid out for kernels, see `layers_kernel`."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import accumulate
 from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 import warp as wp
 from torch import Tensor, nn
 
-from drone_rl.acceleration.layers_kernel import WIDTH, Layers
+from drone_rl.acceleration.layers_kernel import WIDTH, Layers, Product
 from drone_rl.policies.networks import PolicyNetwork, Weighted
 
 
 class PackedLayer(NamedTuple):
-    """One layer; a linear one is a convolution that takes in all there is."""
+    """One layer; a linear one is a convolution whose patch is its whole input."""
 
     layer: Weighted
     channels: int
-    """Of its input; those after them are 0."""
+    """Of its input; channels beyond them are padding."""
     shape: tuple[int, int, int]
     """Height, width and channels of its input."""
     kernel: tuple[int, int]
@@ -25,7 +26,7 @@ class PackedLayer(NamedTuple):
 
     @property
     def is_convolution(self) -> bool:
-        """Whether it looks at one frame at a time."""
+        """Whether it takes one frame at a time."""
         return isinstance(self.layer, nn.Conv2d)
 
     @property
@@ -36,17 +37,17 @@ class PackedLayer(NamedTuple):
 
     @property
     def num_outs(self) -> int:
-        """Of each place, those that fill up included."""
+        """Outputs of each place, with padding."""
         return -(-len(self.layer.weight) // WIDTH) * WIDTH
 
     @property
     def num_inputs(self) -> int:
-        """Numbers that an output is a sum of."""
+        """Numbers in a patch."""
         return self.kernel[0] * self.kernel[1] * self.shape[2]
 
     @property
-    def has_way_back(self) -> bool:
-        """Whether weights fit that lead from outputs to inputs, as after the first layer."""
+    def has_transpose(self) -> bool:
+        """Whether kernels can multiply by the transposed weights."""
         return self.num_inputs % WIDTH == 0
 
     @property
@@ -57,7 +58,7 @@ class PackedLayer(NamedTuple):
 
     @property
     def geometry(self) -> list[int]:
-        """What `layers_kernel.multiply` takes from `rows` to `num_outs`."""
+        """Fields of `Product` from `rows` to `made_down`."""
         _, width, channels = self.shape
         high, wide = self.kernel
         rows, columns = self.places
@@ -65,7 +66,7 @@ class PackedLayer(NamedTuple):
         is_all = self.kernel == self.shape[:2]
         down = self.num_inputs if is_all else self.stride * line
         patch = [1, self.num_inputs, 0] if is_all else [high, wide * channels, line]
-        return [rows * columns, columns, down, across, *patch, self.num_outs]
+        return [rows * columns, columns, down, across, *patch, self.num_outs, self.num_outs]
 
     @property
     def parameters(self) -> tuple[Tensor, Tensor]:
@@ -73,13 +74,10 @@ class PackedLayer(NamedTuple):
         return self.layer.get_parameter("weight"), self.layer.get_parameter("bias")
 
     def order(self, first: int) -> Tensor:
-        """Which number of which output stands where: 0 for those that fill up.
+        """Return the index of each packed weight among all parameters; 0 for padding.
 
-        Args:
-            first: Number of the first weight; those of the biases follow.
-
-        Returns:
-            The biases, then by input, all of all outputs. Shape: (1 + num_inputs, num_outs).
+        The layer's weights begin at `first`, and its biases follow. Rows are the biases, then the
+        inputs. Shape: (1 + num_inputs, num_outs).
         """
         weight, bias = self.parameters
         outs, inner = len(weight), (self.channels, *self.kernel)
@@ -93,34 +91,28 @@ class PackedLayer(NamedTuple):
 
 
 class Order:
-    """Where the numbers of layers go, and come from: a way that is found once."""
+    """Maps parameters to packed weights and back."""
 
     def __init__(self, layers: Sequence[PackedLayer]) -> None:
-        """Finds it."""
         self._layers = layers
         first, there, back = 1, [], []
         for layer in layers:
             order = layer.order(first)
             there.append(in_panels(order))
             unbiased = torch.cat([order.new_zeros(1, layer.num_inputs), order[1:].T])
-            back.append(in_panels(unbiased) if layer.has_way_back else order[:0, 0])
+            back.append(in_panels(unbiased) if layer.has_transpose else order[:0, 0])
             first += sum(parameter.numel() for parameter in layer.parameters)
         self._there, self._back = torch.cat(there), torch.cat(back)
         self._home = torch.empty(first, dtype=torch.int32)
         self._home[self._there.long()] = torch.arange(len(self._there), dtype=torch.int32)
         self.weights_at = list(accumulate(map(len, there), initial=0))
-        """Where those of each layer begin, and where the last end."""
+        """Offsets of the layers in the packed weights, and the size of these."""
         self.back_at = list(accumulate(map(len, back), initial=0))
-        """The same of the weights the other way."""
+        """The same of the transposed weights."""
 
     @torch.no_grad()
     def pack(self, weights: Tensor, back: Tensor | None = None) -> None:
-        """Writes the weights.
-
-        Args:
-            weights: As `layers_kernel.multiply` reads them.
-            back: From outputs to inputs, without biases.
-        """
+        """Write the packed weights, and the transposed ones without biases."""
         parameters = [p.flatten() for layer in self._layers for p in layer.parameters]
         flat = torch.cat([weights.new_zeros(1), *parameters])
         torch.index_select(flat, 0, self._there, out=weights)
@@ -128,11 +120,7 @@ class Order:
             torch.index_select(flat, 0, self._back, out=back)
 
     def unpack(self, gradients: Tensor) -> list[Tensor]:
-        """What was worked out for packed weights, for each weight and bias.
-
-        Args:
-            gradients: In the order of the weights.
-        """
+        """Return the gradient of each weight and bias from that of the packed weights."""
         flat = gradients.index_select(0, self._home[1:])
         parameters = [p for layer in self._layers for p in layer.parameters]
         parts = flat.split([p.numel() for p in parameters])
@@ -140,27 +128,34 @@ class Order:
 
 
 def outputs_at(layers: Sequence[PackedLayer]) -> list[int]:
-    """Where the outputs of each layer begin among those of a frame, and where these end."""
+    """Return the offset of each layer in the outputs of a frame, and the size of these."""
     begins = list(accumulate((odd_lines(layer.num_made) for layer in layers), initial=0))
     return [*begins[:-1], odd_lines(begins[-1])]
 
 
 def odd_lines(size: int) -> int:
-    """Room for so many numbers: an odd number of cache lines, or rows would push each other out."""
+    """Round up to an odd number of cache lines, or rows would evict each other from the cache."""
     lines = -(-size // WIDTH)
     return WIDTH * (lines + 1 - lines % 2)
 
 
 def in_panels(by_row: Tensor) -> Tensor:
-    """Numbers of `WIDTH` columns, row by row, after those of the columns before. Flat."""
+    """Return panels of `WIDTH` columns, one after the other, each row by row. Flat."""
     return by_row.view(len(by_row), -1, WIDTH).transpose(0, 1).flatten()
+
+
+def as_products(rows: Iterable[Iterable[int]]) -> Any:
+    """Return an array of `Product`, from the fields of each in order."""
+    kind: Any = Product
+    fields = np.array([tuple(row) for row in rows], kind.numpy_dtype())
+    return wp.array(fields, dtype=kind, device="cpu")
 
 
 def unsupported(network: nn.Module) -> list[str]:
     """Return why kernels do not support a network; empty if they do.
 
-    They support convolutions of gray frames and then linear layers, with ReLU in between, of
-    32-bit numbers on the CPU.
+    They support convolutions of gray frames, then linear layers, with ReLU in between, in float32
+    on the CPU.
     """
     name = type(network).__name__
     if not isinstance(network, PolicyNetwork):
@@ -199,7 +194,6 @@ def packed_layers(network: nn.Module) -> list[PackedLayer]:
 
 
 def _letter(layer: nn.Module) -> str:
-    """Return the letter of a kind of layer."""
     if isinstance(layer, nn.Conv2d):
         is_square = layer.stride[0] == layer.stride[1]
         plain = (layer.padding, layer.dilation, layer.groups) == ((0, 0), (1, 1), 1)
@@ -212,46 +206,41 @@ def _letter(layer: nn.Module) -> str:
 
 
 class PackedNetwork:
-    """Convolutions of gray frames, then linear layers, rectified in between."""
+    """A network that kernels support, with its weights laid out for them."""
 
-    def __init__(self, network: nn.Module, num_pictures: int) -> None:
-        """Packs a network that is supported, see `unsupported`.
+    def __init__(self, network: nn.Module, num_frames: int) -> None:
+        """Packs a network, see `unsupported`.
 
         Args:
             network: From frames to logits.
-            num_pictures: Frames whose linear layers are computed together.
+            num_frames: Frames whose linear layers are computed together.
         """
         packed = packed_layers(network)
         self._order = Order(packed)
         self.weights = torch.zeros(self._order.weights_at[-1])
-        """As they are laid out."""
-        steps, self.room = self._lay_out(packed, num_pictures)
-        made: Any = Layers()
-        made.steps = wp.from_torch(torch.tensor(steps, dtype=torch.int32))
-        made.weights = wp.from_torch(self.weights)
-        made.num_convolutions = sum(layer.is_convolution for layer in packed)
-        made.picture_size = packed[made.num_convolutions].num_inputs
-        made.logits_at, made.num_outs = steps[-1][1], packed[-1].num_outs
-        *places, self.num_outputs = outputs_at(packed)
-        """Numbers that all layers make of a frame, and room between them."""
-        made.outputs_at = wp.from_torch(torch.tensor(places, dtype=torch.int32))
-        self.layers = made
+        """Packed weights."""
+        rows, given_at, made_at = [], 0, 0
+        for i, (layer, weights_at) in enumerate(zip(packed, self._order.weights_at, strict=False)):
+            is_last = i == len(packed) - 1
+            rows.append([given_at, weights_at, made_at, *layer.geometry, int(not is_last)])
+            is_alone = not is_last and packed[i + 1].is_convolution
+            given_at = made_at
+            made_at += layer.num_made * (1 if is_alone else num_frames)
+        self.workspace_size = made_at
+        """Numbers of the buffer that kernels need."""
+        layers: Any = Layers()
+        layers.products = as_products(rows)
+        layers.weights = wp.from_torch(self.weights)
+        layers.num_convolutions = sum(layer.is_convolution for layer in packed)
+        layers.features_size = packed[layers.num_convolutions].num_inputs
+        layers.logits_at, layers.num_outs = given_at, packed[-1].num_outs
+        *offsets, self.num_outputs = outputs_at(packed)
+        """Numbers of the outputs of all layers of a frame."""
+        layers.outputs_at = wp.from_torch(torch.tensor(offsets, dtype=torch.int32))
+        self.layers = layers
         """For kernels."""
         self.num_actions = len(packed[-1].layer.weight)
 
     def update(self) -> None:
-        """Takes over what the network has learned."""
+        """Pack the present weights."""
         self._order.pack(self.weights)
-
-    def _lay_out(
-        self, packed: Sequence[PackedLayer], num_pictures: int
-    ) -> tuple[list[list[int]], int]:
-        """Steps of the layers, and the numbers that the room to work must hold."""
-        steps, given_at, room = [], 0, 0
-        for i, (layer, weights_at) in enumerate(zip(packed, self._order.weights_at, strict=False)):
-            is_last = i == len(packed) - 1
-            steps.append([given_at, room, weights_at, *layer.geometry, int(not is_last)])
-            is_alone = not is_last and packed[i + 1].is_convolution
-            given_at = room
-            room += layer.num_made * (1 if is_alone else num_pictures)
-        return steps, room

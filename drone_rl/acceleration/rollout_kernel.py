@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from drone_rl.acceleration.layers_kernel import Layers, decide, keep, look
+from drone_rl.acceleration.layers_kernel import Layers, run_convolutions, run_linear, save_outputs
 from drone_rl.sim.rendering.raytrace.plain_kernel import render_image
 from drone_rl.sim.rendering.raytrace.structs_kernel import (
     Geoms,
@@ -21,7 +21,7 @@ from drone_rl.sim.rendering.raytrace.structs_kernel import (
 )
 
 TOGETHER = wp.constant(16)
-"""Worlds that take a step together."""
+"""Environments that take a step together."""
 
 _OPTIONS = {"enable_backward": False, "fuse_fp": False}
 wp.set_module_options(_OPTIONS)
@@ -29,64 +29,67 @@ wp.set_module_options(_OPTIONS)
 
 @wp.struct
 class CameraView:
-    """What draws, and what becomes of a frame before the network sees it."""
+    """Renders a frame and standardizes it."""
 
     view: View
     geoms: Geoms
     materials: Materials
     scratch: Scratch
+    poses: Poses
     mean: float
-    """Is taken away from each pixel."""
+    """Subtracted from each pixel."""
     deviation: float
-    """Divides it then."""
+    """Each pixel is divided by it."""
 
 
 @wp.struct
-class RolloutLog:
-    """What is written down, a row a step; each world has as many rows as there may be steps."""
+class Rollout:
+    """Inputs and outputs of one launch; environment i writes rows i * steps + t."""
 
-    pictures: Images
-    """As the network saw them."""
+    camera: CameraView
+    layers: Layers
+    workspaces: wp.array2d[float]
+    """Buffers for activations, one a worker."""
+    draws: wp.array2d[float]
+    """Uniform samples for actions; below 0 for the most probable one. Shape: (num_envs, steps)."""
+    frames: Images
+    """Observations."""
     logits: wp.array2d[float]
     actions: wp.array[int]
     rewards: wp.array[float]
     end_reasons: wp.array[int]
-    """0 where the flight goes on."""
+    """0 while the episode goes on."""
     outputs: wp.array2d[float]
-    """Of all layers; or of shape (0, 0)."""
+    """Outputs of all layers; of shape (0, 0) if they are not saved."""
 
 
 @wp.func_native("""
 #pragma clang fp contract(off)
 for (int i = 0; i < count; ++i) values.data[i] = (values.data[i] - mean) / deviation;""")
 def standardise(values: wp.array[float], count: int, mean: float, deviation: float) -> None:
-    """Shifts and scales numbers."""
+    """Subtract the mean and divide by the deviation."""
     ...
 
 
 @wp.func
-def choose(room: wp.array[float], at: int, count: int, draw: float) -> int:
-    """An action by its logits.
+def choose(logits: wp.array[float], at: int, count: int, draw: float) -> int:
+    """Return the action that a uniform sample `draw` selects, or the most probable one below 0.
 
-    Args:
-        room: Holds the logits.
-        at: Where they begin.
-        count: How many.
-        draw: A number from 0 to 1 to draw by; the most probable action is taken below 0.
+    `count` logits begin at `at`.
     """
     best = int(0)
     for action in range(1, count):
-        if room[at + action] > room[at + best]:
+        if logits[at + action] > logits[at + best]:
             best = action
     if draw < 0.0:
         return best
     total = float(0.0)
     for action in range(count):
-        total += wp.exp(room[at + action] - room[at + best])
+        total += wp.exp(logits[at + action] - logits[at + best])
     chosen = int(0)
     so_far = float(0.0)
     for action in range(count - 1):
-        so_far += wp.exp(room[at + action] - room[at + best])
+        so_far += wp.exp(logits[at + action] - logits[at + best])
         if draw * total > so_far:
             chosen = action + 1
     return chosen
@@ -103,111 +106,81 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
     """
 
     @wp.func
-    def see(
-        first: int,
-        last: int,
-        step: int,
-        member: int,
-        eye: CameraView,
-        layers: Layers,
-        room: wp.array[float],
-        flights: states,
-        poses: Poses,
-        steps: int,
-        log: RolloutLog,
+    def observe(
+        first: int, last: int, step: int, worker: int, rollout: Rollout, envs: states
     ) -> int:
-        """Render running environments and start the forward pass. Returns their number."""
-        going = int(0)
-        for world in range(first, last):
-            if flights.end_reasons[world] == 0:
-                row = world * steps + step
-                place(flights, world, poses)
+        """Render running environments and compute the convolutions. Returns their number."""
+        camera = rollout.camera
+        layers = rollout.layers
+        running = int(0)
+        for env in range(first, last):
+            if envs.end_reasons[env] == 0:
+                row = env * rollout.draws.shape[1] + step
+                place(envs, env, camera.poses)
                 render_image(
-                    eye.view,
+                    camera.view,
                     0,
-                    eye.geoms,
-                    poses,
-                    world,
-                    eye.materials,
-                    eye.scratch,
-                    member,
-                    log.pictures,
+                    camera.geoms,
+                    camera.poses,
+                    env,
+                    camera.materials,
+                    camera.scratch,
+                    worker,
+                    rollout.frames,
                     row,
                 )
-                picture = log.pictures.gray[row]
-                standardise(picture, picture.shape[0], eye.mean, eye.deviation)
-                look(layers, picture, room, going)
-                if log.outputs.shape[0] > 0:
-                    keep(layers, 0, layers.num_convolutions, room, going, log.outputs[row])
-                going += 1
-        return going
+                frame = rollout.frames.gray[row]
+                standardise(frame, frame.shape[0], camera.mean, camera.deviation)
+                workspace = rollout.workspaces[worker]
+                run_convolutions(layers, frame, workspace, running)
+                if rollout.outputs.shape[0] > 0:
+                    last_layer = layers.num_convolutions
+                    save_outputs(layers, 0, last_layer, workspace, running, rollout.outputs[row])
+                running += 1
+        return running
 
     @wp.func
-    def act(
-        first: int,
-        last: int,
-        step: int,
-        layers: Layers,
-        room: wp.array[float],
-        flights: states,
-        draws: wp.array2d[float],
-        log: RolloutLog,
-    ) -> None:
+    def act(first: int, last: int, step: int, worker: int, rollout: Rollout, envs: states) -> None:
         """Sample actions, and step the same environments."""
+        layers = rollout.layers
+        workspace = rollout.workspaces[worker]
+        num_actions = rollout.logits.shape[1]
         at = int(layers.logits_at)
-        count = int(0)
-        for world in range(first, last):
-            if flights.end_reasons[world] == 0:
-                row = world * draws.shape[1] + step
-                for action in range(log.logits.shape[1]):
-                    log.logits[row, action] = room[at + action]
-                chosen = choose(room, at, log.logits.shape[1], draws[world, step])
-                log.actions[row] = chosen
-                log.rewards[row] = move(flights, world, chosen)
-                log.end_reasons[row] = flights.end_reasons[world]
-                if log.outputs.shape[0] > 0:
-                    num_layers = layers.steps.shape[0]
-                    keep(layers, layers.num_convolutions, num_layers, room, count, log.outputs[row])
+        running = int(0)
+        for env in range(first, last):
+            if envs.end_reasons[env] == 0:
+                row = env * rollout.draws.shape[1] + step
+                for i in range(num_actions):
+                    rollout.logits[row, i] = workspace[at + i]
+                action = choose(workspace, at, num_actions, rollout.draws[env, step])
+                rollout.actions[row] = action
+                rollout.rewards[row] = move(envs, env, action)
+                rollout.end_reasons[row] = envs.end_reasons[env]
+                if rollout.outputs.shape[0] > 0:
+                    linear, end = layers.num_convolutions, layers.products.shape[0]
+                    save_outputs(layers, linear, end, workspace, running, rollout.outputs[row])
                 at += layers.num_outs
-                count += 1
+                running += 1
 
     @wp.kernel(module="unique", module_options=_OPTIONS)
-    def fly(
-        first: int,
-        last: int,
-        member: int,
-        eye: CameraView,
-        layers: Layers,
-        rooms: wp.array2d[float],
-        flights: states,
-        poses: Poses,
-        draws: wp.array2d[float],
-        log: RolloutLog,
-    ) -> None:
-        """Run environments to the ends of their episodes, or for as many steps as the log has rows.
+    def run_episodes(first: int, last: int, worker: int, rollout: Rollout, envs: states) -> None:
+        """Run environments to the ends of their episodes, or for as many steps as there are draws.
 
         Args:
             first: The first environment.
             last: The one after the last.
-            member: Which of the scratch buffers to use: launch with a dimension of 1.
-            eye: Camera and standardization.
-            layers: The network's.
-            rooms: Buffers for activations, one a member.
-            flights: The environments.
-            poses: Where they are rendered.
-            draws: Uniform samples for actions, or below 0 for the most probable. Shape: (N, T).
-            log: Is written.
+            worker: Which buffers to use: launch with a dimension of 1.
+            rollout: Inputs and outputs.
+            envs: States of the environments.
         """
-        room = rooms[member]
-        steps = draws.shape[1]
         for group in range(first, last, TOGETHER):
             end = wp.min(group + TOGETHER, last)
             step = int(0)
-            going = int(1)
-            while step < steps and going > 0:
-                going = see(group, end, step, member, eye, layers, room, flights, poses, steps, log)
-                decide(layers, room, going)
-                act(group, end, step, layers, room, flights, draws, log)
+            running = int(1)
+            while step < rollout.draws.shape[1] and running > 0:
+                running = observe(group, end, step, worker, rollout, envs)
+                run_linear(rollout.layers, rollout.workspaces[worker], running)
+                act(group, end, step, worker, rollout, envs)
                 step += 1
 
-    return fly
+    return run_episodes

@@ -33,7 +33,7 @@ def test_an_answer_does_not_depend_on_the_pictures_beside_it(network):
     assert torch.equal(answers(pictures.flip(0)).flip(0), whole)
 
 
-def test_threads_have_rooms_of_their_own(network):
+def test_threads_have_buffers_of_their_own(network):
     answers, parts = BatchedInference(network), torch.randn(8, 200, 1, 25, 64)
     expected = [answers(part) for part in parts]
     with ThreadPoolExecutor(4) as pool:

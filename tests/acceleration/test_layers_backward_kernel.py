@@ -6,7 +6,8 @@ import warp as wp
 from torch.nn import functional
 
 from drone_rl.acceleration.layers_backward_kernel import accumulate, fold, rectify
-from drone_rl.acceleration.packed_layers import in_panels
+from drone_rl.acceleration.layers_kernel import Product
+from drone_rl.acceleration.packed_layers import as_products, in_panels
 from drone_rl.sim.rendering.devices import start_warp
 
 start_warp("cpu")
@@ -19,44 +20,19 @@ def add_up(
     given: wp.array(dtype=float),
     deltas: wp.array(dtype=float),
     gradients: wp.array(dtype=float),
-    sizes: wp.array(dtype=int),
+    products: wp.array(dtype=Product),
 ) -> None:
-    accumulate(
-        given,
-        OFFSET,
-        deltas,
-        OFFSET,
-        gradients,
-        OFFSET,
-        sizes[0],
-        sizes[1],
-        sizes[2],
-        sizes[3],
-        sizes[4],
-        sizes[5],
-        sizes[6],
-        sizes[7],
-        sizes[8],
-    )
+    accumulate(given, deltas, gradients, products[0])
 
 
 @wp.kernel(enable_backward=False)
 def fold_up(
-    patches: wp.array(dtype=float), made: wp.array(dtype=float), sizes: wp.array(dtype=int)
+    patches: wp.array(dtype=float),
+    made: wp.array(dtype=float),
+    size: int,
+    products: wp.array(dtype=Product),
 ) -> None:
-    fold(
-        patches,
-        made,
-        OFFSET,
-        sizes[0],
-        sizes[1],
-        sizes[2],
-        sizes[3],
-        sizes[4],
-        sizes[5],
-        sizes[6],
-        sizes[7],
-    )
+    fold(patches, made, size, products[0])
 
 
 @wp.kernel(enable_backward=False)
@@ -77,8 +53,8 @@ def inside(values):
 def accumulated(given, deltas, before, *sizes):
     gradients = beside(in_panels(before))
     arrays = [wp.from_torch(v) for v in (beside(given), beside(deltas), gradients)]
-    sizes = wp.array(sizes, dtype=int, device="cpu")
-    wp.launch(add_up, 1, inputs=[*arrays, sizes], device="cpu")
+    product = as_products([[OFFSET, OFFSET, OFFSET, *sizes, 0]])
+    wp.launch(add_up, 1, inputs=[*arrays, product], device="cpu")
     panels = inside(gradients).view(-1, len(before), 16)
     return panels.transpose(0, 1).reshape(before.shape)
 
@@ -129,8 +105,9 @@ def test_convolutions(kernel, stride):
 
     patches = by_place @ weight.detach().permute(2, 3, 1, 0).reshape(-1, outs).T
     folded = torch.full((OFFSET + given.numel() + 1,), torch.inf)
-    sizes = wp.array([given.numel(), *places, *patch], dtype=int, device="cpu")
-    inputs = [wp.from_torch(patches.flatten()), wp.from_torch(folded), sizes]
+    product = as_products([[OFFSET, 0, 0, *places, *patch, 0, 0, 0]])
+    arrays = [wp.from_torch(patches.flatten()), wp.from_torch(folded)]
+    inputs = [*arrays, given.numel(), product]
     wp.launch(fold_up, 1, inputs=inputs, device="cpu")
     expected = picture.grad[0].permute(1, 2, 0).flatten()
     assert torch.allclose(inside(folded), expected, atol=1e-3)

@@ -5,8 +5,8 @@ import torch
 import warp as wp
 from torch.nn import functional
 
-from drone_rl.acceleration.layers_kernel import multiply
-from drone_rl.acceleration.packed_layers import in_panels
+from drone_rl.acceleration.layers_kernel import Product, multiply
+from drone_rl.acceleration.packed_layers import as_products, in_panels
 from drone_rl.sim.rendering.devices import start_warp
 
 start_warp("cpu")
@@ -19,37 +19,19 @@ def run(
     given: wp.array(dtype=float),
     weights: wp.array(dtype=float),
     made: wp.array(dtype=float),
-    sizes: wp.array(dtype=int),
+    products: wp.array(dtype=Product),
 ) -> None:
-    multiply(
-        given,
-        OFFSET,
-        weights,
-        OFFSET,
-        made,
-        OFFSET,
-        sizes[0],
-        sizes[1],
-        sizes[2],
-        sizes[3],
-        sizes[4],
-        sizes[5],
-        sizes[6],
-        sizes[7],
-        sizes[8],
-        sizes[9],
-    )
+    multiply(given, weights, made, products[0])
 
 
 def multiplied(given, weights, num_made, *sizes, made_down=None):
     """What is made; weights by input, as `multiply` wants them in panels."""
     *sizes, is_rectified = sizes
-    sizes = (*sizes, made_down or sizes[-1], is_rectified)
+    product = as_products([[OFFSET, OFFSET, OFFSET, *sizes, made_down or sizes[-1], is_rectified]])
     weights = in_panels(weights)
     made = torch.full((OFFSET + num_made + 1,), torch.inf)
     arrays = [wp.from_torch(functional.pad(v.flatten(), (OFFSET, 0))) for v in (given, weights)]
-    sizes = wp.array(sizes, dtype=int, device="cpu")
-    wp.launch(run, 1, inputs=[*arrays, wp.from_torch(made), sizes], device="cpu")
+    wp.launch(run, 1, inputs=[*arrays, wp.from_torch(made), product], device="cpu")
     assert made[:OFFSET].isinf().all() and made[-1].isinf()  # nothing is written beside it
     return made[OFFSET:-1]
 

@@ -7,7 +7,7 @@ import torch
 import warp as wp
 from torch import nn
 
-from drone_rl.acceleration.layers_kernel import Layers, decide, look
+from drone_rl.acceleration.layers_kernel import Layers, run_convolutions, run_linear
 from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
 from drone_rl.policies.networks import PolicyNetwork
@@ -18,21 +18,21 @@ start_warp("cpu")
 
 @wp.kernel(enable_backward=False)
 def ask(
-    layers: Layers, pictures: wp.array2d(dtype=float), room: wp.array(dtype=float), count: int
+    layers: Layers, pictures: wp.array2d(dtype=float), workspace: wp.array(dtype=float), count: int
 ) -> None:
     for row in range(count):
-        look(layers, pictures[row], room, row)
-    decide(layers, room, count)
+        run_convolutions(layers, pictures[row], workspace, row)
+    run_linear(layers, workspace, count)
 
 
 def asked(packed, pictures, num_actions):
-    room = torch.full((packed.room,), torch.nan)
+    workspace = torch.full((packed.workspace_size,), torch.nan)
     count = len(pictures)
     given = wp.from_torch(pictures.flatten(1).contiguous())
-    inputs = [packed.layers, given, wp.from_torch(room), count]
+    inputs = [packed.layers, given, wp.from_torch(workspace), count]
     wp.launch(ask, 1, inputs=inputs, device="cpu")
     outs = packed.layers.num_outs
-    logits = room[packed.layers.logits_at :][: count * outs].view(count, outs)
+    logits = workspace[packed.layers.logits_at :][: count * outs].view(count, outs)
     assert not logits[:, num_actions:].any()
     return logits[:, :num_actions]
 

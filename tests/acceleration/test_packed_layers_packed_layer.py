@@ -22,10 +22,10 @@ def small():
 def test_geometry_by_hand():
     _, (conv, hidden, logits) = small()
     # 4 places in lines of 2; a line of places begins 4 lines of 8 pixels farther, a place 4 pixels
-    assert conv.geometry == [4, 2, 32, 4, 4, 4, 8, 16]
+    assert conv.geometry == [4, 2, 32, 4, 4, 4, 8, 16, 16]
     # all of 2x2 places of 16 channels
-    assert hidden.geometry == [1, 1, 64, 16, 1, 64, 0, 16]
-    assert logits.geometry == [1, 1, 16, 16, 1, 16, 0, 16]
+    assert hidden.geometry == [1, 1, 64, 16, 1, 64, 0, 16, 16]
+    assert logits.geometry == [1, 1, 16, 16, 1, 16, 0, 16, 16]
     assert [layer.num_made for layer in (conv, hidden, logits)] == [64, 16, 16]
     assert [layer.is_convolution for layer in (conv, hidden, logits)] == [True, False, False]
 

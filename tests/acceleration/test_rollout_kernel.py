@@ -21,10 +21,10 @@ start_warp("cpu")
 
 @wp.kernel(enable_backward=False)
 def chosen(
-    room: wp.array(dtype=float), draws: wp.array(dtype=float), actions: wp.array(dtype=int)
+    logits: wp.array(dtype=float), draws: wp.array(dtype=float), actions: wp.array(dtype=int)
 ) -> None:
     i = wp.tid()
-    actions[i] = choose(room, 2, 3, draws[i])
+    actions[i] = choose(logits, 2, 3, draws[i])
 
 
 @wp.kernel(enable_backward=False)
@@ -34,8 +34,8 @@ def standardised(values: wp.array(dtype=float), mean: float, deviation: float) -
 
 def actions(logits, draws):
     made = torch.full((len(draws),), -1, dtype=torch.int32)
-    room = torch.tensor([9.0, 9.0, *logits, 9.0])
-    inputs = [wp.from_torch(v) for v in (room, torch.tensor(draws), made)]
+    logits = torch.tensor([9.0, 9.0, *logits, 9.0])
+    inputs = [wp.from_torch(v) for v in (logits, torch.tensor(draws), made)]
     wp.launch(chosen, len(draws), inputs=inputs, device="cpu")
     return made.tolist()
 
