@@ -61,13 +61,9 @@ def load_kernels(kernels: ModuleType | wp.Module) -> Future[None]:
 def _load_kernels(kernels: ModuleType | wp.Module, process: int) -> Future[None]:
     del process  # a fork has none of its parent's threads
     compiler = ThreadPoolExecutor(1, "compile")
-    loaded = compiler.submit(_load, kernels)
+    loaded = compiler.submit(wp.load_module, kernels, device="cpu")
     compiler.shutdown(wait=False)
     return loaded
-
-
-def _load(kernels: ModuleType | wp.Module) -> None:
-    wp.load_module(kernels, device="cpu")
 
 
 def on_torch_stream(device: torch.device) -> AbstractContextManager:
@@ -81,22 +77,14 @@ class WorkerPool:
     """Threads that split a batch: a Warp CPU kernel runs on one core, without Python's lock."""
 
     def __init__(self, num_rows: int, size: int | None = None) -> None:
-        """Start the threads.
-
-        Args:
-            num_rows: Expected batch size; there are no more threads than rows.
-            size: Number of threads; the number of cores by default.
-        """
+        """Start `size` threads, by default one per core, but no more than the expected rows."""
         self.size = max(1, min(size or num_cores(), num_rows))
         self._executor = None if self.size == 1 else ThreadPoolExecutor(self.size, "render")
 
     def map_spans(self, first: int, last: int, work: Callable[[int, int, int], None]) -> None:
         """Call `work(worker, begin, end)` for each worker's span of rows, and wait.
 
-        Args:
-            first: The first row.
-            last: One past the last row.
-            work: Processes rows from `begin` up to, not including, `end`.
+        Rows from `first` up to, not including, `last` are split; ends of spans are exclusive, too.
         """
         length = -(-(last - first) // self.size)
         spans = [(i, min(i + length, last)) for i in range(first, last, max(length, 1))]

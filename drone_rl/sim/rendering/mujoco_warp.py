@@ -7,7 +7,7 @@ import dataclasses
 import threading
 from typing import Any
 
-import mujoco
+import mujoco as _mujoco
 import mujoco_warp as mjw
 import torch
 import warp as wp
@@ -20,6 +20,8 @@ from drone_rl.sim.rendering.scene import Scene, SemanticClass
 from drone_rl.sim.rendering.view import Modality, View, to_gray
 from drone_rl.utils.errors import InputError
 
+mujoco: Any = _mujoco
+"""MuJoCo's bindings, which are untyped."""
 SUPPORTED = ("rgb", "gray", "depth", "segmentation")
 """Modalities."""
 _BUILDING = threading.Lock()
@@ -103,8 +105,7 @@ class WarpRenderer:
 
     def _render(self, single: View, poses: Poses, appearance: Appearance | None) -> Tensor:
         shards = self._shards_of(single)
-        (out,) = single.new_images(len(poses), self.device).values()
-        out = out[:, 0]
+        out = next(iter(single.new_images(len(poses), self.device).values()))[:, 0]
 
         def work(worker: int, first: int, last: int) -> None:
             rows = slice(first, last)
@@ -117,19 +118,15 @@ class WarpRenderer:
 
     def _shards_of(self, single: View) -> "list[Shard]":
         if single not in self._shards:
-            self._shards[single] = self._make_shards(single)
+            camera, count = self.scene.camera(single.cameras[0]), self._workers.size
+            capacity = -(-self._capacity // count)
+            with _BUILDING, wp.ScopedDevice(str(self.device)):
+                shards = [Shard(self.scene, single, camera, capacity) for _ in range(count)]
+                shards[0].warm_up()
+            for shard in shards[1:]:
+                shard.share_kernel_of(shards[0])
+            self._shards[single] = shards
         return self._shards[single]
-
-    def _make_shards(self, single: View) -> "list[Shard]":
-        camera = self.scene.camera(single.cameras[0])
-        count = self._workers.size
-        capacity = -(-self._capacity // count)
-        with _BUILDING, wp.ScopedDevice(str(self.device)):
-            shards = [Shard(self.scene, single, camera, capacity) for _ in range(count)]
-            shards[0].warm_up()
-        for shard in shards[1:]:
-            shard.share_kernel_of(shards[0])
-        return shards
 
 
 class Shard:
@@ -140,13 +137,13 @@ class Shard:
 
         Args:
             scene: What to render.
-            view: One camera and one modality.
-            camera: The camera's index in the model.
+            view: One camera, whose index in the model is `camera`, and one modality.
+            camera: See `view`.
             capacity: Most environments in one call.
         """
-        model, bindings = scene.model, _bindings()
-        data = bindings.MjData(model)
-        bindings.mj_forward(model, data)
+        model = scene.model
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
         (self._modality,) = view.modalities
         self._model: Any = mjw.put_model(model)
         self._data: Any = mjw.put_data(model, data, nworld=capacity)
@@ -158,9 +155,7 @@ class Shard:
             render_rgb=self._modality == "rgb",
             render_depth=self._modality == "depth",
             render_seg=self._modality == "segmentation",
-            enabled_geom_groups=sorted(
-                {int(model.geom_group[i]) for i in scene.seen(view.show_drone)}
-            ),
+            enabled_geom_groups=sorted({*map(int, model.geom_group[scene.seen(view.show_drone)])}),
             background_color=(*scene.sky, _SKY_OPACITY),
             use_textures=False,
             enable_specular=False,
@@ -189,8 +184,11 @@ class Shard:
         self._appearance.apply(appearance, num_worlds)
         self._launch(num_worlds)
         out.copy_(self._unpack(self._pixels[:num_worlds]))
-        if appearance is not None and self._modality == "rgb":
-            self._fill_sky(appearance, out)
+        sky = None if appearance is None else appearance.colors.get(SemanticClass.SKY)
+        if sky is not None and self._modality == "rgb":
+            rows = self._pixels[: len(out)].view(*out.shape[:-1], 4)
+            color = (expand_color(sky, len(out)) * 255).to(out.device, torch.uint8)
+            torch.where(rows[..., 3:] == 0, color[:, None, None], out, out=out)
 
     def _launch(self, num_worlds: int) -> None:
         self._data.nworld = num_worlds
@@ -213,14 +211,6 @@ class Shard:
         )
         return wp.to_torch(as_int).view(torch.uint8)
 
-    def _fill_sky(self, appearance: Appearance, out: Tensor) -> None:
-        sky = appearance.colors.get(SemanticClass.SKY)
-        if sky is None:
-            return
-        rows = self._pixels[: len(out)].view(*out.shape[:-1], 4)
-        color = (expand_color(sky, len(out)) * 255).to(out.device, torch.uint8)
-        torch.where(rows[..., 3:] == 0, color[:, None, None], out, out=out)
-
     def _unpack(self, rows: Tensor) -> Tensor:
         shape = (rows.shape[0], self._view.height, self._view.width)
         if self._modality == "depth":
@@ -234,7 +224,7 @@ class ModelAppearance:
     """Writes an appearance into MuJoCo Warp's model, and restores the model afterwards."""
 
     def __init__(self, scene: Scene, model: Any, capacity: int) -> None:
-        """Give each environment its own copy of the model's colours, lights and cameras.
+        """Give each of `capacity` environments its own colours, lights and cameras.
 
         Args:
             scene: Of the model.
@@ -251,21 +241,15 @@ class ModelAppearance:
         self._is_applied = False
 
     def apply(self, appearance: Appearance | None, num_worlds: int) -> None:
-        """Write an appearance to the first `num_worlds` environments; others get the scene's own.
-
-        Args:
-            appearance: The scene's own by default.
-            num_worlds: Number of environments of the appearance.
-        """
+        """Write the appearance of the first `num_worlds` environments; others get the scene's."""
         if self._is_applied:
             for name, values in self._values.items():
                 values[:] = self._plain[name]
         self._is_applied = appearance is not None
-        if appearance is None:
-            return
-        self._write_colors(appearance, num_worlds)
-        if appearance.camera is not None:
-            self._mount(appearance.camera, num_worlds)
+        if appearance is not None:
+            self._write_colors(appearance, num_worlds)
+            if appearance.camera is not None:
+                self._mount(appearance.camera, num_worlds)
 
     def _write_colors(self, appearance: Appearance, num_worlds: int) -> None:
         for semantic_class, color in appearance.colors.items():
@@ -292,11 +276,6 @@ class ModelAppearance:
     def _write(self, name: str, where: list[int] | slice, value: Tensor) -> None:
         values = self._values[name]
         values[: len(value), where, : value.shape[-1]] = value.to(values)
-
-
-def _bindings() -> Any:
-    """MuJoCo's bindings, which have no types."""
-    return mujoco
 
 
 def _is_supported(appearance: Appearance) -> bool:

@@ -13,7 +13,7 @@ columns.
 
 from typing import Any
 
-import mujoco
+import mujoco as _mujoco
 import numpy as np
 import torch
 from dm_control import mjcf
@@ -23,6 +23,8 @@ from drone_rl.sim.rendering import textures
 from drone_rl.sim.rendering.appearance import Appearance, Mounting, Texture, product
 from drone_rl.sim.rendering.scene import Scene, SemanticClass
 
+mujoco: Any = _mujoco
+"""MuJoCo's bindings, which are untyped."""
 _SIDE = 256
 """Texels of all textures, each way."""
 _SHADOWS = 70.0
@@ -66,25 +68,14 @@ class OpenGlAppearance:
     """Writes appearances into a simulation's model."""
 
     def __init__(self, scene: Scene, middle: float) -> None:
-        """Record the model's own cameras and sizes.
-
-        Args:
-            scene: Of a prepared model.
-            middle: x of the middle of the visible area, metres.
-        """
+        """Take a prepared model; `middle` is x of the middle of the visible area, metres."""
         self._scene, self._middle = scene, middle
         model = scene.model
         self._cameras = model.cam_pos.copy(), model.cam_quat.copy(), model.cam_fovy.copy()
         self._sizes = model.geom_size.copy()
 
     def apply(self, physics: mjcf.Physics, look: Appearance, upload: bool) -> None:
-        """Write an appearance.
-
-        Args:
-            physics: The simulation.
-            look: Of one environment.
-            upload: Whether OpenGL renders, so that new textures are sent to it.
-        """
+        """Write the appearance of one environment; `upload` sends new textures to OpenGL."""
         model: Any = physics.model
         exposure = 1.0 if look.exposure is None else float(look.exposure)
         self._light(model, look, exposure)
@@ -130,8 +121,8 @@ class OpenGlAppearance:
             model.cam_fovy[camera] = np.degrees(2 * np.arctan(half))
 
     def _write_sky(self, model: Any, look: Appearance, exposure: float) -> int:
-        horizon = _row(look.colors[SemanticClass.SKY])
-        zenith = horizon if look.zenith is None else _row(look.zenith)
+        sky = look.colors[SemanticClass.SKY]
+        horizon, zenith = _row(sky), _row(sky if look.zenith is None else look.zenith)
         colors = (np.clip(color * exposure, 0.0, 1.0) for color in (horizon, zenith))
         return self._write(model, "sky", sky_sides(_SIDE, *colors))
 
@@ -185,13 +176,7 @@ def apply_fog(
 def sky_sides(side: int, horizon: NDArray, zenith: NDArray) -> NDArray[np.uint8]:
     """Return a cube map of a sky that blends two colours by the sine of the elevation; +y is up.
 
-    Args:
-        side: Texels each way.
-        horizon: Colour at and below the horizon, in [0, 1]. Shape: (3,).
-        zenith: Colour overhead. Shape: (3,).
-
-    Returns:
-        Shape: (6, side, side, 3).
+    Colours are in [0, 1], that of the horizon also below it. Shape: (6, side, side, 3).
     """
     points = _points(side)
     up = np.clip(points[..., 1:2] / np.linalg.norm(points, axis=-1, keepdims=True), 0.0, 1.0)
@@ -248,9 +233,8 @@ def _mip_level(image: NDArray[np.uint8], size: float) -> NDArray[np.uint8]:
 
 def _upload(physics: mjcf.Physics, texture: int) -> None:
     contexts: Any = physics.contexts
-    bindings: Any = mujoco
     with contexts.gl.make_current() as call:
-        call.call(bindings.mjr_uploadTexture, physics.model.ptr, contexts.mujoco.ptr, texture)
+        call.call(mujoco.mjr_uploadTexture, physics.model.ptr, contexts.mujoco.ptr, texture)
 
 
 def _row(value: Any) -> NDArray[np.float64]:

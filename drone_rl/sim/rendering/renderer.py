@@ -40,7 +40,6 @@ class Renderer(Protocol):
         Raises:
             InputError: The renderer does not support the view.
         """
-        ...
 
     def render(
         self, view: View, poses: Poses, appearance: Appearance | None = None
@@ -62,11 +61,9 @@ class Renderer(Protocol):
         Raises:
             InputError: The renderer does not support the view or the appearance.
         """
-        ...
 
     def close(self) -> None:
         """Stop the worker threads."""
-        ...
 
 
 class RendererFactory(Protocol):
@@ -83,7 +80,6 @@ class RendererFactory(Protocol):
             num_shards: Worker threads that split the batch; the renderer's choice by default.
             device: Where images are wanted: "cpu", "cuda" or "cuda:N".
         """
-        ...
 
 
 _CLASSES = {

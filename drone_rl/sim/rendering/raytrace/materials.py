@@ -28,12 +28,7 @@ class MaterialsEncoder:
     """Encodes a scene's own colours and lights, and appearances that differ from them."""
 
     def __init__(self, scene: Scene, device: str) -> None:
-        """Read the scene's colours and lights.
-
-        Args:
-            scene: What is rendered.
-            device: Of the kernels.
-        """
+        """Read the scene's colours and lights."""
         model = scene.model
         self._scene, self._device = scene, device
         stored = {
@@ -60,11 +55,9 @@ class MaterialsEncoder:
         """
         if appearance is None:
             return self._own, None
-        last, count, encoded = self._last
-        if last is not appearance or count != num_worlds:
-            encoded = self._encode(appearance, num_worlds)
-            self._last = (appearance, num_worlds, encoded)
-        return encoded
+        if self._last[0] is not appearance or self._last[1] != num_worlds:
+            self._last = (appearance, num_worlds, self._encode(appearance, num_worlds))
+        return self._last[2]
 
     def _encode(self, appearance: Appearance, num_worlds: int) -> _Encoded:
         values = {
@@ -109,11 +102,7 @@ class EffectsEncoder:
         self._textures: dict[tuple[str, ...], dict[str, Any]] = {}
 
     def encode(self, appearance: Appearance, zenith: Tensor) -> structs.Effects:
-        """Return the effects of an appearance.
-
-        Args:
-            appearance: Of all environments.
-            zenith: Colours of the sky overhead, in [0, 1]. Shape: (num_worlds, 3).
+        """Return the effects; `zenith` holds colours in [0, 1], shape (num_worlds, 3).
 
         Raises:
             InputError: A texture can't be read.

@@ -27,12 +27,10 @@ mujoco: Any = _mujoco
 
 REACH: Mapping[int, Callable[[NDArray], NDArray]] = MappingProxyType(
     {
-        solids.PLANE: lambda size: size,
+        **dict.fromkeys((solids.PLANE, solids.ELLIPSOID, solids.BOX), lambda size: size),
         solids.SPHERE: lambda size: size[[0, 0, 0]],
         solids.CAPSULE: lambda size: size[[0, 0, 1]] + [0.0, 0.0, size[0]],
-        solids.ELLIPSOID: lambda size: size,
         solids.CYLINDER: lambda size: size[[0, 0, 1]],
-        solids.BOX: lambda size: size,
     }
 )
 """Half extents of the bounding box of each kind of geom, from MuJoCo's size."""
@@ -90,16 +88,7 @@ class Frames:
     def place(
         self, body: int, position: NDArray, attitude: NDArray
     ) -> tuple[int, NDArray, NDArray]:
-        """Return the pose of something that is fixed to a body.
-
-        Args:
-            body: Index of the body.
-            position: In the body's frame.
-            attitude: The same, (w, x, y, z).
-
-        Returns:
-            The frame's index, and position and attitude in that frame.
-        """
+        """Convert a body's local pose into its frame's index, position and attitude there."""
         data, frame = self._data, int(self._of_body[body])
         root = self._model.body_rootid[body] if frame else 0
         back, turned, whole = np.empty(4), np.empty(3), np.empty(4)
@@ -132,13 +121,7 @@ def make_view(scene: Scene, frames: Frames, view: View, device: str) -> structs.
 
 
 def make_camera(scene: Scene, frames: Frames, name: str, aspect: float) -> structs.Camera:
-    """Return a camera for the kernels.
-
-    Args:
-        scene: Of the camera.
-        frames: Of the scene.
-        name: In the model.
-        aspect: Width of its image over the height.
+    """Return a camera for the kernels; `aspect` is the width of its image over the height.
 
     Raises:
         InputError: The model has no such camera, or it is not supported.
@@ -174,25 +157,16 @@ def make_rays(camera: structs.Camera, height: int, width: int) -> NDArray:
 
 
 def make_geoms(scene: Scene, frames: Frames, show_drone: bool, device: str) -> structs.Geoms:
-    """Return the rendered geoms for the kernels.
-
-    Args:
-        scene: Of the geoms.
-        frames: Of the scene.
-        show_drone: Whether to render the drone.
-        device: Of the kernels.
-    """
-    model = scene.model
-    seen = scene.seen(show_drone)
-    places = [
-        frames.place(model.geom_bodyid[i], model.geom_pos[i], model.geom_quat[i]) for i in seen
-    ]
+    """Return the rendered geoms for the kernels."""
+    model, seen = scene.model, scene.seen(show_drone)
+    bodies, positions, attitudes = model.geom_bodyid, model.geom_pos, model.geom_quat
+    places = [frames.place(bodies[i], positions[i], attitudes[i]) for i in seen]
     values = {
         "kind": (model.geom_type[seen], int),
         "number": (seen, int),
-        "frame": ([frame for frame, _, _ in places], int),
-        "position": ([position for _, position, _ in places], wp.vec3),
-        "attitude": ([attitude for _, _, attitude in places], wp.vec4),
+        "frame": ([place[0] for place in places], int),
+        "position": ([place[1] for place in places], wp.vec3),
+        "attitude": ([place[2] for place in places], wp.vec4),
         "size": (model.geom_size[seen], wp.vec3),
         "reach": ([REACH[model.geom_type[i]](model.geom_size[i]) for i in seen], wp.vec3),
     }
@@ -206,13 +180,7 @@ class Cameras:
     """Cameras of a view, with the model's mounting or another one per environment."""
 
     def __init__(self, view: View, encoded: structs.View, device: torch.device) -> None:
-        """Take the model's cameras.
-
-        Args:
-            view: What to render.
-            encoded: The same for the kernels, with the model's mounting.
-            device: Of the kernels.
-        """
+        """Take a view, and the same encoded for the kernels with the model's mounting."""
         self._view, self._encoded, self._device = view, encoded, device
         arrays: Any = encoded
         self._cameras = arrays.cameras.numpy()
@@ -220,12 +188,7 @@ class Cameras:
         self._last: tuple[Mounting | None, int, structs.View] = (None, 0, encoded)
 
     def encode(self, mounting: Mounting | None, num_worlds: int) -> structs.View:
-        """Return the view for the kernels.
-
-        Args:
-            mounting: The model's by default; the last one is cached by identity.
-            num_worlds: Number of environments.
-        """
+        """Return the view for the kernels; the last mounting is cached by identity."""
         if mounting is None or mounting.camera not in self._view.cameras:
             return self._encoded
         if self._last[0] is not mounting or self._last[1] != num_worlds:
@@ -270,11 +233,7 @@ class PoseBuffers:
     """Poses of frames in arrays that are reused: new Warp arrays would take longer to make."""
 
     def __init__(self, device: torch.device) -> None:
-        """Start empty; `write` allocates.
-
-        Args:
-            device: Of the kernels.
-        """
+        """Start empty; `write` allocates."""
         self._device = device
         self._positions: Tensor = torch.empty(0, 0, 3)
         self._attitudes: Tensor = torch.empty(0, 4)
@@ -317,6 +276,7 @@ def _array(value: object) -> np.ndarray:
 
 def _repeated(values: Tensor, num_worlds: int) -> Tensor:
     """Repeat the cameras' values for each environment, without a copy if there is one camera."""
+    rest = values.shape[1:]
     if len(values) == 1:
-        return values.expand(num_worlds, *values.shape[1:])
-    return values.repeat(num_worlds, *[1] * (values.dim() - 1))
+        return values.expand(num_worlds, *rest)
+    return values.repeat(num_worlds, *[1] * len(rest))
