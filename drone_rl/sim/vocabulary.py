@@ -140,6 +140,11 @@ CUBES = TaskVocabulary(
 """Of cube collection, and of files without terms."""
 
 
+_SIDES_OF_ROWS = {
+    "left": "that call for a turn left",
+    "ahead": "that are open straight ahead",
+    "right": "that call for a turn right",
+}
 PILLARS = TaskVocabulary(
     goal="row",
     reach="pass",
@@ -149,16 +154,8 @@ PILLARS = TaskVocabulary(
     handled="flown around",
     unhandled="touched, or never passed",
     follows=False,
-    sides={
-        "left": "that call for a turn left",
-        "ahead": "that are open straight ahead",
-        "right": "that call for a turn right",
-    },
-    places={
-        "left": "that call for a turn left",
-        "ahead": "that leave the way free",
-        "right": "that call for a turn right",
-    },
+    sides=_SIDES_OF_ROWS,
+    places={**_SIDES_OF_ROWS, "ahead": "that leave the way free"},
     classes={"row": "at the {value} row", "gap": "at gaps of {value}"},
     labels={
         "row": "number of the row",

@@ -39,10 +39,7 @@ class Mounting:
 def moved(mounting: Mounting | None, offset: Tensor, turn: Tensor) -> Mounting:
     """Translate a camera, then rotate it about itself, both in the frame it had before.
 
-    Args:
-        mounting: The mounting before; the model's by default.
-        offset: Metres. Shape: (num_worlds, 3).
-        turn: Quaternions. Shape: (num_worlds, 4).
+    Shapes: (num_worlds, 3), metres, and quaternions (num_worlds, 4).
     """
     own = mounting or Mounting()
     before = torch.as_tensor(own.turn, dtype=offset.dtype).to(offset.device)
@@ -60,12 +57,7 @@ def turned(axis: str, degrees: float | Tensor) -> Tensor:
 
 
 def zoom_for_fov(own: float, wanted: Tensor) -> Tensor:
-    """Return the `Mounting.zoom` that gives a field of view.
-
-    Args:
-        own: The camera's field of view, degrees.
-        wanted: Degrees. Shape: (*).
-    """
+    """Return the `Mounting.zoom` for a wanted field of view. Degrees. Shape: (*)."""
     return math.tan(math.radians(own) / 2) / torch.tan(torch.deg2rad(wanted) / 2)
 
 

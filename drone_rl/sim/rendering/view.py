@@ -15,9 +15,7 @@ ray, geom index, surface normal."""
 MODALITIES: tuple[Modality, ...] = get_args(Modality)
 _KINDS: dict[Modality, tuple[torch.dtype, tuple[int, ...]]] = {
     "rgb": (torch.uint8, (3,)),
-    "gray": (torch.float32, ()),
-    "depth": (torch.float32, ()),
-    "distance": (torch.float32, ()),
+    **dict.fromkeys(("gray", "depth", "distance"), (torch.float32, ())),
     "segmentation": (torch.int32, ()),
     "normals": (torch.float32, (3,)),
 }

@@ -8,22 +8,7 @@ from torch import Tensor
 from drone_rl.config.sensors import SensorSettings
 from drone_rl.sim.coordinates import HOME, GeoPoint
 from drone_rl.sim.dynamics.state import NOTHING, BodyState, Contact, FlightState
-from drone_rl.sim.sensors.inertial import (
-    Imu,
-    ImuReading,
-    ImuState,
-    Magnetometer,
-    MagnetometerReading,
-    MagnetometerState,
-)
-from drone_rl.sim.sensors.position import (
-    Barometer,
-    BarometerReading,
-    BarometerState,
-    Gps,
-    GpsReading,
-    GpsState,
-)
+from drone_rl.sim.sensors import inertial, position
 from drone_rl.sim.sensors.sensor import select
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.seeding import Stream, torch_generator
@@ -47,10 +32,10 @@ class SensorSuiteState(Batch):
 
     time: Tensor  # (num_worlds,) float64
     """Of the last update, seconds."""
-    imu: ImuState
-    barometer: BarometerState
-    magnetometer: MagnetometerState
-    gps: GpsState
+    imu: inertial.ImuState
+    barometer: position.BarometerState
+    magnetometer: inertial.MagnetometerState
+    gps: position.GpsState
     collision: CollisionState
 
 
@@ -78,9 +63,9 @@ class SensorSuite:
         """
         own = settings or SensorSettings()
         self.settings, self.home = own, home
-        self.imu, self.gps = Imu(own.imu), Gps(own.gps, home)
-        self.barometer = Barometer(own.barometer, home)
-        self.magnetometer = Magnetometer(own.magnetometer, home)
+        self.imu, self.gps = inertial.Imu(own.imu), position.Gps(own.gps, home)
+        self.barometer = position.Barometer(own.barometer, home)
+        self.magnetometer = inertial.Magnetometer(own.magnetometer, home)
         names = ("imu", "barometer", "magnetometer", "gps")
         self._streams = {
             name: torch_generator(seed, Stream.SENSORS, number=4 * number + i)
@@ -121,19 +106,19 @@ class SensorSuite:
         collision = _touched(state.collision, body)
         return SensorSuiteState(time=time, **states, collision=collision)
 
-    def read_imu(self, state: SensorSuiteState) -> ImuReading:
+    def read_imu(self, state: SensorSuiteState) -> inertial.ImuReading:
         """Return the readings of accelerometers and gyroscopes."""
         return self.imu.read(state.imu, state.time)
 
-    def read_barometer(self, state: SensorSuiteState) -> BarometerReading:
+    def read_barometer(self, state: SensorSuiteState) -> position.BarometerReading:
         """Return the readings of barometers."""
         return self.barometer.read(state.barometer, state.time)
 
-    def read_magnetometer(self, state: SensorSuiteState) -> MagnetometerReading:
+    def read_magnetometer(self, state: SensorSuiteState) -> inertial.MagnetometerReading:
         """Return the readings of magnetometers."""
         return self.magnetometer.read(state.magnetometer, state.time)
 
-    def read_gps(self, state: SensorSuiteState) -> GpsReading:
+    def read_gps(self, state: SensorSuiteState) -> position.GpsReading:
         """Return the readings of GPS receivers."""
         return self.gps.read(state.gps, state.time)
 
