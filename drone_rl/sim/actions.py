@@ -6,10 +6,11 @@ a kind of action, such as "left", and its share is the probability of that kind.
 policies compares wishes, for any number and kind of actions.
 """
 
+import abc
 import dataclasses
 import enum
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import torch
@@ -72,25 +73,26 @@ class Parts:
         return (self.left,)
 
     def chosen(self, wish: Tensor) -> Tensor:
-        """See `Actions.chosen`."""
+        """Return the part with the largest share. Shape: (*)."""
         return wish.argmax(-1)
 
     def mirror(self, wish: Wish) -> Wish:
-        """See `Actions.mirror`."""
+        """Return the mirror image of a wish. Shape kept."""
         return wish[..., list(self.mirrored)]
 
     def distance(self, wish: Wish, other: Wish) -> Wish:
-        """Return the total variation: half the sum of the absolute differences."""
+        """Return the total variation: half the sum of the absolute differences. Shape: (*)."""
         return 0.5 * abs(wish - other).sum(-1)  # pyright: ignore[reportReturnType] (of arrays and tensors)
 
     def leaning(self, wish: Wish) -> Wish:
-        """See `Actions.leaning`."""
+        """Return the share of parts to the left, 0 to 1. Shape: (*)."""
         return wish[..., list(self.lefts)].sum(-1)  # pyright: ignore[reportReturnType] (of both)
 
     def opposition(self, wish: NDArray, other: NDArray) -> NDArray:
-        """Return the smaller of the changes to the left and to the right; 0 if signs differ.
+        """Return how opposed two wishes are, 0 to 1; below 0 where the second leans left.
 
-        The value is 1 if one wish is certainly left and the other certainly right.
+        This is the smaller of the changes to the left and to the right, 0 if their signs differ.
+        It is 1 if one wish is certainly left and the other certainly right. Shape: (*).
         """
         swing = wish - other
         to_left, to_right = self.leaning(swing), -self.leaning(self.mirror(swing))
@@ -99,7 +101,7 @@ class Parts:
         return np.where(agreed, np.sign(to_left) * least, 0.0)
 
     def undoes(self, part: Tensor, before: Tensor) -> Tensor:
-        """See `Actions.undoes`."""
+        """Return whether a part undoes the one before it. Shape: (*), bool."""
         return (part == _take(self.opposite, before)) & (part != before)
 
     def can_be_undone(self, part: Tensor) -> Tensor:
@@ -107,18 +109,18 @@ class Parts:
         return _take(self.opposite, part) != part
 
     def turns(self, part: Tensor) -> Tensor:
-        """See `Actions.turns`."""
+        """Return whether a part differs from its mirror image. Shape: (*), bool."""
         return _take(self.mirrored, part) != part
 
     def agrees(self, part: Tensor, other: Tensor) -> Tensor:
-        """See `Actions.agrees`; shapes are broadcast."""
+        """Return whether parts are equal or lead to the same side. Shape: (*), bool."""
         rights = [self.mirrored[left] for left in self.lefts]
         sides = [(i in self.lefts) - (i in rights) for i in range(len(self))]
         here, there = _take(sides, part), _take(sides, other)
         return (part == other) | ((here == there) & (here != 0))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the values that `explanation.json` holds."""
+        """Return what reports need to name and plot the parts, as plain values."""
         return {
             "names": list(self.names),
             "order": [*map(int, self.order)],
@@ -142,112 +144,66 @@ class Entry(NamedTuple):
     high: float | None = None
 
 
-class Actions(Protocol):
+class Actions(Parts, abc.ABC):
     """A set of actions. Wishes may be tensors or NumPy arrays.
 
     An *action* is what dynamics take, shaped as `entry` says; a *part* is a number, int64.
     """
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parts of a wish, in its order."""
-        ...
-
-    @property
-    def order(self) -> tuple[int, ...]:
-        """The parts from left to right, as plots show them."""
-        ...
-
-    @property
+    @abc.abstractmethod
     def entry(self) -> Entry:
         """Shape, type and bounds of one environment's action."""
-        ...
 
     @property
+    @abc.abstractmethod
     def num_outputs(self) -> int:
         """Number of the network's outputs."""
-        ...
 
     @property
+    @abc.abstractmethod
     def output_names(self) -> tuple[str, ...]:
         """Names of the network's outputs."""
-        ...
 
+    @abc.abstractmethod
     def wish(self, outputs: Tensor) -> Tensor:
         """Return the wish of a network's outputs. (*, num_outputs) to (*, len(names))."""
-        ...
 
+    @abc.abstractmethod
     def scores(self, outputs: Tensor) -> Tensor:
         """Return unbounded scores with which the shares of parts grow. Shapes as of `wish`."""
-        ...
 
+    @abc.abstractmethod
     def greedy(self, outputs: Tensor) -> Tensor:
         """Return the most probable action. (*, num_outputs) to (*), then the entry's."""
-        ...
 
-    def chosen(self, wish: Tensor) -> Tensor:
-        """Return the part with the largest share. Shape: (*)."""
-        ...
-
+    @abc.abstractmethod
     def part(self, action: Tensor) -> Tensor:
         """Return the parts that actions belong to. (*), then the entry's, to (*)."""
-        ...
 
+    @abc.abstractmethod
     def always(self, name: str) -> Tensor:
         """Return the full-speed action of a part, by name. Shape: the entry's."""
-        ...
 
+    @abc.abstractmethod
     def draw(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
         """Sample uniformly, on the generator's device. Shape: `shape`, then the entry's."""
-        ...
 
+    @abc.abstractmethod
     def fields(self) -> dict[str, str]:
         """Return the entries that data sets keep of an action, with descriptions."""
-        ...
 
+    @abc.abstractmethod
     def kept(self, action: Tensor) -> dict[str, Tensor]:
         """Return these entries; "actions" are the parts. (T), then the entry's, to (T, *)."""
-        ...
 
-    def mirror(self, wish: Wish) -> Wish:
-        """Return the mirror image of a wish. Shape kept."""
-        ...
-
-    def distance(self, wish: Wish, other: Wish) -> Wish:
-        """Return the distance of two wishes, 0 to 1. Shape: (*)."""
-        ...
-
-    def leaning(self, wish: Wish) -> Wish:
-        """Return the share of parts to the left, 0 to 1. Shape: (*)."""
-        ...
-
-    def opposition(self, wish: NDArray, other: NDArray) -> NDArray:
-        """How opposed two wishes are, 0 to 1; below 0 where the second leans left. Shape: (*)."""
-        ...
-
-    def undoes(self, part: Tensor, before: Tensor) -> Tensor:
-        """Return whether a part undoes the one before it. Shape: (*), bool."""
-        ...
-
+    @abc.abstractmethod
     def sways(self, kept: Mapping[str, Tensor]) -> Tensor:
         """Return whether actions, as `kept`, are steps of going back and forth. (T,), bool."""
-        ...
-
-    def turns(self, part: Tensor) -> Tensor:
-        """Return whether a part differs from its mirror image. Shape: (*), bool."""
-        ...
-
-    def agrees(self, part: Tensor, other: Tensor) -> Tensor:
-        """Return whether parts are equal or lead to the same side. Shape: (*), bool."""
-        ...
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return what reports need to name and plot them, as plain values."""
-        ...
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class DiscreteActions(Parts):
+class DiscreteActions(Actions):
     """A few numbered actions; a wish holds the probability of each. See `Actions`."""
 
     @property

@@ -23,7 +23,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config.dynamics import ActionSettings
-from drone_rl.sim.actions import MOVES, Entry, Parts, listed
+from drone_rl.sim.actions import MOVES, Actions, Entry, listed
 
 FORWARD, SIDEWAYS, YAW = range(3)
 """Indices of an action's numbers."""
@@ -41,7 +41,7 @@ _SLANTED = math.sqrt(0.5)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class ContinuousActions(Parts):
+class ContinuousActions(Actions):
     """Speeds forward and sideways, and a yaw rate; see the module and `Actions`."""
 
     speeds: tuple[float, float, float]
