@@ -61,6 +61,7 @@ class Renderer(Protocol):
         Raises:
             InputError: The renderer does not support the view or the appearance.
         """
+        ...
 
     def close(self) -> None:
         """Stop the worker threads."""
@@ -80,6 +81,7 @@ class RendererFactory(Protocol):
             num_shards: Worker threads that split the batch; the renderer's choice by default.
             device: Where images are wanted: "cpu", "cuda" or "cuda:N".
         """
+        ...
 
 
 _CLASSES = {
