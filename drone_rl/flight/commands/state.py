@@ -172,19 +172,19 @@ class Sensors:
 
     def imu(self) -> ImuReading:
         """Return specific force, angular rates and attitude."""
-        return self._suite.read_imu(self._state)
+        return self._suite.imu.read(self._state.imu, self._state.time)
 
     def barometer(self) -> BarometerReading:
         """Return pressure and the corresponding altitude above the sea."""
-        return self._suite.read_barometer(self._state)
+        return self._suite.barometer.read(self._state.barometer, self._state.time)
 
     def magnetometer(self) -> MagnetometerReading:
         """Return Earth's magnetic field."""
-        return self._suite.read_magnetometer(self._state)
+        return self._suite.magnetometer.read(self._state.magnetometer, self._state.time)
 
     def gps(self) -> GpsReading:
         """Return place on Earth and velocity; invalid until the receiver has a fix."""
-        return self._suite.read_gps(self._state)
+        return self._suite.gps.read(self._state.gps, self._state.time)
 
     def collision(self) -> CollisionState:
         """Return the last contact, and whether it is new since the last call."""

@@ -3,7 +3,7 @@
 import abc
 import dataclasses
 import math
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 import torch
 from torch import Generator, Tensor
@@ -31,7 +31,7 @@ class Samples(Batch):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Sampling:
-    """When readings are taken and delivered.
+    """When readings are taken and delivered. Times: seconds, shape (num_worlds,), float64.
 
     Reading k = 0, 1, ... is due `startup + k / rate` seconds after the start, and is taken at the
     first update from then on, so the mean rate is `rate` at any tick length. If several are due at
@@ -46,12 +46,7 @@ class Sampling:
     """Seconds until the first is taken."""
 
     def start(self, time: Tensor, width: int) -> Samples:
-        """Return sensors that are switched on and have taken nothing yet.
-
-        Args:
-            time: Seconds. Shape: (num_worlds,), float64.
-            width: Numbers in a reading.
-        """
+        """Return sensors that are switched on now, without readings of `width` numbers yet."""
         slots = math.ceil(self.latency * self.rate) + 2
         times = time.new_full((len(time), slots), -math.inf)
         rows = time.new_zeros(len(time), slots, width)
@@ -62,13 +57,7 @@ class Sampling:
         return self._count(samples, time) > samples.count
 
     def take(self, samples: Samples, time: Tensor, rows: Tensor) -> Samples:
-        """Append a reading where one is due.
-
-        Args:
-            samples: Before; not changed.
-            time: Now, seconds. Shape: (num_worlds,), float64.
-            rows: Values of a reading now. Shape: (num_worlds, width), float64.
-        """
+        """Append a reading `rows`, shape (num_worlds, width), float64, where one is due."""
         count = self._count(samples, time)
         is_due = count > samples.count
         times = torch.cat([samples.times[:, 1:], time[:, None]], 1)
@@ -82,10 +71,6 @@ class Sampling:
 
     def read(self, samples: Samples, time: Tensor) -> tuple[Tensor, Tensor]:
         """Return the newest reading that is old enough to be delivered.
-
-        Args:
-            samples: Those taken until now.
-            time: Now, seconds. Shape: (num_worlds,), float64.
 
         Returns:
             When it was taken, seconds, minus infinity for none, shape (num_worlds,), and its
@@ -103,11 +88,14 @@ class Sampling:
         return (torch.floor(periods + _ROUNDING) + 1).clamp(min=0).long()
 
 
-class _Sampled(Protocol):
+@dataclasses.dataclass
+class SensorState(Batch):
+    """State of one sensor of `num_worlds` drones."""
+
     samples: Samples
 
 
-State = TypeVar("State", bound=_Sampled)
+State = TypeVar("State", bound=SensorState)
 Reading = TypeVar("Reading")
 
 
@@ -125,14 +113,7 @@ class Sensor(abc.ABC, Generic[State, Reading]):
         return self.update(self._initial(body, time, generator), body, time, generator)
 
     def update(self, state: State, body: BodyState, time: Tensor, generator: Generator) -> State:
-        """Return the sensors at a later time; a reading is taken where one is due.
-
-        Args:
-            state: Before; not changed.
-            body: The drones now.
-            time: Now, seconds. Shape: (num_worlds,), float64.
-            generator: Of the noise.
-        """
+        """Return the sensors at a later time (seconds); a reading is taken where one is due."""
         is_due = self.sampling.due(state.samples, time)
         return self._sample(state, body, time, generator) if is_due.any() else state
 
@@ -169,14 +150,9 @@ def normal(like: Tensor, generator: Generator) -> Tensor:
 def random_walk_step(
     value: Tensor, strength: float, time: float, seconds: Tensor, generator: Generator
 ) -> Tensor:
-    """Advance a random walk by one step.
+    """Advance a random walk, shape (num_worlds, n), by some seconds, shape (num_worlds,).
 
-    Args:
-        value: Before. Shape: (num_worlds, n).
-        strength: Standard deviation of the increment over `time`.
-        time: Seconds.
-        seconds: Length of the step. Shape: (num_worlds,).
-        generator: Of the noise.
+    `strength` is the standard deviation of the increment over `time` seconds.
     """
     scale = (seconds / time).clamp(min=0.0).sqrt()[:, None]
     return value + strength * scale * normal(value, generator)

@@ -8,8 +8,8 @@ from torch import Tensor
 from drone_rl.config.sensors import SensorSettings
 from drone_rl.sim.coordinates import HOME, GeoPoint
 from drone_rl.sim.dynamics.state import NOTHING, BodyState, Contact, FlightState
-from drone_rl.sim.sensors import inertial, position
-from drone_rl.sim.sensors.sensor import select
+from drone_rl.sim.sensors import instruments
+from drone_rl.sim.sensors.sensor import SensorState, select
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.seeding import Stream, torch_generator
 
@@ -32,15 +32,18 @@ class SensorSuiteState(Batch):
 
     time: Tensor  # (num_worlds,) float64
     """Of the last update, seconds."""
-    imu: inertial.ImuState
-    barometer: position.BarometerState
-    magnetometer: inertial.MagnetometerState
-    gps: position.GpsState
+    imu: instruments.ImuState
+    barometer: instruments.BarometerState
+    magnetometer: instruments.MagnetometerState
+    gps: SensorState
     collision: CollisionState
 
 
 class SensorSuite:
-    """All sensors of drones; each has its own random stream."""
+    """All sensors of drones; each has its own random stream.
+
+    `suite.imu.read(state.imu, state.time)` returns readings; so do the other sensors.
+    """
 
     def __init__(
         self,
@@ -63,9 +66,9 @@ class SensorSuite:
         """
         own = settings or SensorSettings()
         self.settings, self.home = own, home
-        self.imu, self.gps = inertial.Imu(own.imu), position.Gps(own.gps, home)
-        self.barometer = position.Barometer(own.barometer, home)
-        self.magnetometer = inertial.Magnetometer(own.magnetometer, home)
+        self.imu, self.gps = instruments.Imu(own.imu), instruments.Gps(own.gps, home)
+        self.barometer = instruments.Barometer(own.barometer, home)
+        self.magnetometer = instruments.Magnetometer(own.magnetometer, home)
         names = ("imu", "barometer", "magnetometer", "gps")
         self._streams = {
             name: torch_generator(seed, Stream.SENSORS, number=4 * number + i)
@@ -73,12 +76,7 @@ class SensorSuite:
         }
 
     def start(self, body: BodyState) -> SensorSuiteState:
-        """Switch all sensors on at time 0.
-
-        Args:
-            body: The drones at the start of their episodes. `states[worlds] = start(body[worlds])`
-                restarts some of them.
-        """
+        """Switch all sensors on at time 0. To restart some drones, replace their rows of a state."""
         time = torch.zeros_like(body.position[:, 0])
         states = {
             name: getattr(self, name).start(body, time, stream)
@@ -88,15 +86,10 @@ class SensorSuite:
         return SensorSuiteState(time=time, **states, collision=collision)
 
     def update(self, state: SensorSuiteState, body: BodyState, seconds: float) -> SensorSuiteState:
-        """Return the sensors at a later time.
+        """Return the sensors some seconds after the last update.
 
         Called once a tick, no reading is late by more than that. Called less often, the
         accelerometer reports means over the interval, and of several due readings one is taken.
-
-        Args:
-            state: Before; not changed.
-            body: The drones now.
-            seconds: Since the last update.
         """
         time = state.time + seconds
         states = {
@@ -105,22 +98,6 @@ class SensorSuite:
         }
         collision = _touched(state.collision, body)
         return SensorSuiteState(time=time, **states, collision=collision)
-
-    def read_imu(self, state: SensorSuiteState) -> inertial.ImuReading:
-        """Return the readings of accelerometers and gyroscopes."""
-        return self.imu.read(state.imu, state.time)
-
-    def read_barometer(self, state: SensorSuiteState) -> position.BarometerReading:
-        """Return the readings of barometers."""
-        return self.barometer.read(state.barometer, state.time)
-
-    def read_magnetometer(self, state: SensorSuiteState) -> inertial.MagnetometerReading:
-        """Return the readings of magnetometers."""
-        return self.magnetometer.read(state.magnetometer, state.time)
-
-    def read_gps(self, state: SensorSuiteState) -> position.GpsReading:
-        """Return the readings of GPS receivers."""
-        return self.gps.read(state.gps, state.time)
 
     def read_collision(
         self, state: SensorSuiteState, worlds: Tensor | None = None
@@ -143,13 +120,10 @@ def start_collisions(position: Tensor) -> CollisionState:
 
 
 def update_collisions(state: CollisionState, contact: Contact, position: Tensor) -> CollisionState:
-    """Record new contacts.
+    """Record each drone's last contact, at a position in metres, world frame, if it is new.
 
-    Args:
-        state: Before; not changed.
-        contact: Each drone's last contact. It is new if its time or its object differs from the
-            recorded one; a drone that rests on something touches it at every tick.
-        position: Of the drones now, metres, world frame. Shape: (num_worlds, 3).
+    It is new if its time or its object differs from the recorded one; a drone that rests on
+    something touches it at every tick.
     """
     known = state.contact
     is_other = (contact.thing != known.thing) | (contact.time != known.time)
@@ -165,9 +139,7 @@ def read_collisions(
 ) -> tuple[CollisionState, CollisionState]:
     """Return the last collisions, and the state with the flag cleared, as AirSim does on reading.
 
-    Args:
-        state: Before; not changed.
-        worlds: Indices of the drones to read; all by default. Shape: (k,).
+    `worlds` are indices of the drones to read, all by default. Shape: (k,).
     """
     worlds = torch.arange(len(state), device=state.position.device) if worlds is None else worlds
     flag = state.has_collided.clone()

@@ -7,7 +7,7 @@ import torch
 from drone_rl.config.sensors import GpsSettings
 from drone_rl.sim.coordinates import HOME, world_from_geo
 from drone_rl.sim.dynamics.state import BodyState
-from drone_rl.sim.sensors.position import Fix, Gps
+from drone_rl.sim.sensors.instruments import Fix, Gps
 
 TICK = 0.003
 

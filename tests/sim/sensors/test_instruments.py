@@ -7,7 +7,7 @@ import torch
 from drone_rl.config.sensors import ImuSettings
 from drone_rl.sim.dynamics.state import BodyState
 from drone_rl.sim.rendering.appearance import turned
-from drone_rl.sim.sensors.inertial import Imu, specific_force
+from drone_rl.sim.sensors.instruments import Imu, specific_force
 
 PERFECT = ImuSettings(noise=0.0)
 

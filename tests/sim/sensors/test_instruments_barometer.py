@@ -6,7 +6,7 @@ import torch
 from drone_rl.config.sensors import BarometerSettings
 from drone_rl.sim.coordinates import HOME
 from drone_rl.sim.dynamics.state import BodyState
-from drone_rl.sim.sensors.position import Barometer, altitude_from_pressure_ratio, pressure_ratio
+from drone_rl.sim.sensors.instruments import Barometer, altitude_from_pressure_ratio, pressure_ratio
 
 TICK = 0.003
 

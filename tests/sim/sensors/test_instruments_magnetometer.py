@@ -4,7 +4,7 @@ import torch
 from drone_rl.config.sensors import MagnetometerSettings
 from drone_rl.sim.dynamics.state import BodyState
 from drone_rl.sim.rendering.appearance import turned
-from drone_rl.sim.sensors.inertial import Magnetometer, dipole_field
+from drone_rl.sim.sensors.instruments import Magnetometer, dipole_field
 
 CONSTANT = MagnetometerSettings(field="constant", noise=0.0)
 
