@@ -91,11 +91,7 @@ class ContinuousActions(Actions):
     def to_rates(self, action: Tensor) -> Tensor:
         """Return m/s forward, m/s to the left and rad/s to the left, in the drone's frame.
 
-        Args:
-            action: Clipped to [-1, 1]. Shape: (*, 3).
-
-        Returns:
-            Shape: (*, 3), float64.
+        Actions are clipped to [-1, 1]. Shapes: (*, 3), the result's type is float64.
         """
         forward, *aside = action.double().clamp(-1, 1).unbind(-1)
         return torch.stack([(forward + 1) / 2, *aside], -1) * action.new_tensor(
@@ -168,13 +164,9 @@ class ContinuousActions(Actions):
 def normal_of(outputs: Tensor) -> tuple[Tensor, Tensor]:
     """Return the normal distributions of a network's outputs, before squashing.
 
-    Both are bounded smoothly, so that float32 can distinguish the actions of any policy.
-
-    Args:
-        outputs: For n means, then for n deviations. Shape: (*, 2 n).
-
-    Returns:
-        Means, from -3 to 3, and deviations, from 0.05 to 1. Shapes: (*, n).
+    Both are bounded smoothly, so that float32 can distinguish the actions of any policy. Outputs
+    are n for means, then n for deviations, shape (*, 2 n). Means are from -3 to 3, deviations from
+    0.05 to 1. Shapes: (*, n).
     """
     mean, log = outputs.chunk(2, -1)
     share = (log + _SHIFT).sigmoid()

@@ -37,11 +37,9 @@ def ned_attitude_from_world(attitude: Values) -> Values:
 
 
 world_from_ned = ned_from_world
-"""The inverse of `ned_from_world`, which is its own."""
+"""The inverse of `ned_from_world`, which is its own; attitudes likewise."""
 frd_from_body = ned_from_world
 """The same for vectors, or rates about the axes, of our body's frame and FRD."""
-world_attitude_from_ned = ned_attitude_from_world
-"""The inverse of `ned_attitude_from_world`, which is its own."""
 
 
 def enu_from_world(vector: Values) -> Values:

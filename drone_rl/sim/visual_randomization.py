@@ -53,17 +53,10 @@ def most_distractors(settings: AppearanceSettings) -> int:
 def stand(
     things: Things, ahead: Tensor, aside: Tensor, is_left: Tensor, height: float | Tensor
 ) -> Tensor:
-    """Return positions next to the path.
+    """Return positions next to the path, metres, world frame. Shape: (*, 3), float64.
 
-    Args:
-        things: Where the task's props stand.
-        ahead: Metres. Shape: (*).
-        aside: Metres from the region of the props. Shape: (*).
-        is_left: Whether on the left. Shape: (*).
-        height: Metres.
-
-    Returns:
-        Metres, world frame. Shape: (*, 3), float64.
+    `ahead` and `height` are coordinates, `aside` is the distance from the region of the task's
+    props; all are in metres, shape (*).
     """
     side = (things.bound + aside) * (2.0 * is_left.double() - 1.0)
     return torch.stack([ahead, side, torch.as_tensor(height).expand(ahead.shape)], -1)
@@ -74,10 +67,8 @@ def draw_distractors(
 ) -> list[float]:
     """Sample `WIDTH` numbers of each distractor, alternately left and right on the ground.
 
-    Args:
-        settings: Ranges.
-        things: Where the task's props stand.
-        source: Random stream; without it, the middles of all ranges.
+    `things` is where the task's props stand. Without a random stream, the middles of all ranges
+    are returned.
     """
     most = most_distractors(settings)
     if not most or things is None:
@@ -169,11 +160,9 @@ class Appearances:
         self._now: Appearance | None = None
 
     def reset(self, worlds: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
-        """Sample new appearances.
+        """Sample new appearances of environments by indices, shape (k,).
 
-        Args:
-            worlds: Indices of the environments. Shape: (k,).
-            random_states: Their streams before the task samples; they are not advanced.
+        Their random streams, before the task samples, are not advanced.
         """
         if not self.varies or not len(worlds):
             return
@@ -189,8 +178,7 @@ class Appearances:
     def drawn(self, worlds: Tensor | None = None) -> Appearance | None:
         """Return the sampled appearance, or None if it does not vary.
 
-        Args:
-            worlds: Indices, in order; all by default. Shape: (k,).
+        `worlds` are indices in order, all by default. Shape: (k,).
         """
         if not self.varies:
             return None

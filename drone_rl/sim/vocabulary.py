@@ -202,12 +202,10 @@ def _kind(field: dataclasses.Field) -> Kind:
 _FIELDS = Record({field.name: _kind(field) for field in dataclasses.fields(TaskVocabulary)})
 
 
-_NUMBERS = {1: "one cube", 2: "two cubes", 3: "three cubes", 4: "four cubes", 5: "five cubes"}
-
-
 def some_cubes(task: Mapping[str, Any]) -> str:
     """Describe the cubes of a task, from its settings."""
-    cubes = _NUMBERS.get(task["num_cubes"], f"{task['num_cubes']} cubes")
+    names = {1: "one cube", 2: "two cubes", 3: "three cubes", 4: "four cubes", 5: "five cubes"}
+    cubes = names.get(task["num_cubes"], f"{task['num_cubes']} cubes")
     return (
         f"{cubes} of {task['cube_size']:g} m, up to {task['lateral_bound']:g} m to either side "
         f"and {task['vertical_bound']:g} m up or down"

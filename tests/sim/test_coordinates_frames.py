@@ -15,7 +15,7 @@ VECTORS = [
     (coordinates.enu_from_world, None, [1.0, 2.0, 3.0], [-2.0, 1.0, 3.0]),
     (coordinates.frd_from_body, None, [0.1, 0.2, -0.3], [0.1, -0.2, 0.3]),
 ]
-NED = (coordinates.ned_attitude_from_world, coordinates.world_attitude_from_ned)
+NED = (coordinates.ned_attitude_from_world, coordinates.ned_attitude_from_world)
 ATTITUDES = [
     # A quarter turn to the left: the nose points west, a quarter turn anticlockwise from above.
     (*NED, (HALF, 0.0, 0.0, HALF), (HALF, 0.0, 0.0, -HALF)),

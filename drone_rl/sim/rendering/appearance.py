@@ -153,11 +153,7 @@ class Appearance:
         return self.zenith is None and self.fog is None and not is_shaded and not self.textures
 
     def lights(self, num_worlds: int) -> dict[str, Tensor]:
-        """Return the lights that are given, by name; directions have length 1.
-
-        Returns:
-            Shapes: (num_worlds, 3), float64.
-        """
+        """Return the given lights by name, shapes (num_worlds, 3); directions have length 1."""
         given = {name: getattr(self, name) for name in _LIGHTS}
         lights = {name: expand_color(v, num_worlds) for name, v in given.items() if v is not None}
         if "sun_direction" in lights:

@@ -50,12 +50,8 @@ class WarpRenderer:
     ) -> None:
         """Start the renderer; the first image of a view allocates buffers and builds kernels.
 
-        Args:
-            scene: What to render.
-            num_worlds: Batch size of the buffers; larger batches are rendered in turn.
-            num_shards: Worker threads that split the batch; by default the number of cores, and one
-                on a GPU.
-            device: "cpu", "cuda" or "cuda:N".
+        Batches larger than `num_worlds` are rendered in turn. By default there are as many
+        shards as cores, and one on a GPU. See `RendererFactory`.
 
         Raises:
             InputError: This machine has no such device.
@@ -133,13 +129,9 @@ class Shard:
     """Buffers and kernels of one worker's part of the batch."""
 
     def __init__(self, scene: Scene, view: View, camera: int, capacity: int) -> None:
-        """Allocate the buffers.
+        """Allocate buffers for at most `capacity` environments.
 
-        Args:
-            scene: What to render.
-            view: One camera, whose index in the model is `camera`, and one modality.
-            camera: See `view`.
-            capacity: Most environments in one call.
+        The view has one modality and one camera, whose index in the model is `camera`.
         """
         model = scene.model
         data = mujoco.MjData(model)
@@ -162,10 +154,9 @@ class Shard:
             enable_emission=False,
             enable_vertex_normals=False,
         )
-        self._view = view
         self._qpos = wp.to_torch(self._data.qpos)
         self._mocap_pos = wp.to_torch(self._data.mocap_pos)
-        self._pixels = self._buffer()
+        self._pixels = self._buffer(view.height, view.width)
         self._appearance = ModelAppearance(scene, self._model, capacity)
 
     def warm_up(self) -> None:
@@ -183,10 +174,11 @@ class Shard:
         self._mocap_pos[:num_worlds] = poses.props
         self._appearance.apply(appearance, num_worlds)
         self._launch(num_worlds)
-        out.copy_(self._unpack(self._pixels[:num_worlds]))
+        rows = self._pixels[:num_worlds]
+        is_rgb = self._modality == "rgb"
+        out.copy_(rows[..., :3].flip(-1) if is_rgb else rows)
         sky = None if appearance is None else appearance.colors.get(SemanticClass.SKY)
-        if sky is not None and self._modality == "rgb":
-            rows = self._pixels[: len(out)].view(*out.shape[:-1], 4)
+        if sky is not None and is_rgb:
             color = (expand_color(sky, len(out)) * 255).to(out.device, torch.uint8)
             torch.where(rows[..., 3:] == 0, color[:, None, None], out, out=out)
 
@@ -198,26 +190,18 @@ class Shard:
             mjw.refit_bvh(self._model, self._data, self._context)
             mjw.render(self._model, self._data, self._context)
 
-    def _buffer(self) -> Tensor:
-        """The kernel's output as a tensor. First dimension: environments."""
+    def _buffer(self, height: int, width: int) -> Tensor:
+        """The kernel's output, (capacity, height, width, *); blue, green, red, alpha for RGB."""
         context = self._context
         if self._modality == "depth":
-            return wp.to_torch(context.depth_data)
+            return wp.to_torch(context.depth_data).view(-1, height, width)
         if self._modality == "segmentation":
-            return wp.to_torch(context.seg_data)
+            return wp.to_torch(context.seg_data).view(-1, height, width, 2)[..., 0]
         packed = context.rgb_data
         as_int = wp.array(
             ptr=packed.ptr, shape=packed.shape, dtype=wp.int32, device=packed.device, copy=False
         )
-        return wp.to_torch(as_int).view(torch.uint8)
-
-    def _unpack(self, rows: Tensor) -> Tensor:
-        shape = (rows.shape[0], self._view.height, self._view.width)
-        if self._modality == "depth":
-            return rows.view(shape)
-        if self._modality == "segmentation":
-            return rows.view(*shape, 2)[..., 0]
-        return rows.view(*shape, 4)[..., :3].flip(-1)  # packed as blue, green, red, alpha
+        return wp.to_torch(as_int).view(torch.uint8).view(-1, height, width, 4)
 
 
 class ModelAppearance:
@@ -226,10 +210,7 @@ class ModelAppearance:
     def __init__(self, scene: Scene, model: Any, capacity: int) -> None:
         """Give each of `capacity` environments its own colours, lights and cameras.
 
-        Args:
-            scene: Of the model.
-            model: An `mjw.Model`, changed in place.
-            capacity: Number of environments.
+        `model` is an `mjw.Model`, changed in place.
         """
         self._scene = scene
         self._values: dict[str, Tensor] = {}

@@ -150,14 +150,10 @@ class OpenGlAppearance:
 def apply_fog(
     image: NDArray[np.uint8], depth: NDArray, look: Appearance, fovy: float, sky: float
 ) -> NDArray[np.uint8]:
-    """Blend an image with its appearance's fog; the sky stays clear.
+    """Blend an image in clear air, shape (height, width, 3), with fog; the sky stays clear.
 
-    Args:
-        image: In clear air. Shape: (height, width, 3).
-        depth: Metres along the camera's axis. Shape: (height, width).
-        look: Of one environment.
-        fovy: Vertical field of view, degrees.
-        sky: Metres from the camera at which the sky begins.
+    Depth is in metres along the camera's axis, shape (height, width). `fovy` is the vertical field
+    of view in degrees, `sky` the distance in metres at which the sky begins.
     """
     visibility = np.inf if look.fog is None else float(look.fog)
     if visibility == np.inf:
@@ -187,14 +183,8 @@ def sky_sides(side: int, horizon: NDArray, zenith: NDArray) -> NDArray[np.uint8]
 def box_sides(side: int, image: NDArray[np.uint8], half: NDArray, tile: float) -> NDArray:
     """Return a cube map of a textured box, tiled from the middle of each side as by the ray tracer.
 
-    Args:
-        side: Texels each way.
-        image: The texture. Shape: (texels, texels, 3), a power of 2 of them.
-        half: Half extents of the box, metres. Shape: (3,).
-        tile: Edge of a tile, metres.
-
-    Returns:
-        Shape: (6, side, side, 3), uint8.
+    The texture has shape (texels, texels, 3), a power of 2 of them. The box's half extents and
+    the edge of a tile are in metres. Shape: (6, side, side, 3), uint8.
     """
     sides = []
     for number, at in enumerate(_points(side) * half):

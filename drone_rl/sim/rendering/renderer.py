@@ -92,10 +92,7 @@ _CLASSES = {
 
 
 def find_renderer(which: str | RendererFactory) -> RendererFactory:
-    """Return a renderer's factory.
-
-    Args:
-        which: A name of `RENDERERS`, or the factory itself.
+    """Return a renderer's factory, by a name of `RENDERERS`; a factory is returned itself.
 
     Raises:
         InputError: No renderer has that name.

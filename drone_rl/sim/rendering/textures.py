@@ -60,14 +60,9 @@ PROCEDURAL: Mapping[str, Callable[[], NDArray[np.float64]]] = MappingProxyType(
 
 @functools.cache
 def load(name: str) -> NDArray[np.uint8]:
-    """Load a texture.
+    """Load a texture: red, green, blue, shape (side, side, 3), the side a power of 2.
 
-    Args:
-        name: A name of `PROCEDURAL`, or a PNG or JPEG file, which is stretched to a square whose
-            side is a power of 2.
-
-    Returns:
-        Red, green, blue. Shape: (side, side, 3).
+    `name` is one of `PROCEDURAL`, or a PNG or JPEG file, which is stretched to a square.
 
     Raises:
         InputError: The file does not exist, is not an image, or is too large.
@@ -98,13 +93,9 @@ def load(name: str) -> NDArray[np.uint8]:
 
 
 def levels(texture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a texture and its mip levels, each the 2 x 2 means of the one before.
+    """Return a texture, as `load` does, and its mip levels, each the 2 x 2 means of the one before.
 
-    Args:
-        texture: Shape: (side, side, 3), the side a power of 2.
-
-    Returns:
-        All texels from the finest level to the coarsest, a single texel. Shape: (num_texels, 3).
+    All texels follow each other, from the finest level to a single one. Shape: (num_texels, 3).
     """
     level, rows = texture.astype(np.float32), [texture.reshape(-1, 3)]
     while len(level) > 1:

@@ -76,7 +76,7 @@ class SensorSuite:
         }
 
     def start(self, body: BodyState) -> SensorSuiteState:
-        """Switch all sensors on at time 0. To restart some drones, replace their rows of a state."""
+        """Switch all sensors on at time 0. To restart some drones, assign to their rows."""
         time = torch.zeros_like(body.position[:, 0])
         states = {
             name: getattr(self, name).start(body, time, stream)

@@ -46,9 +46,7 @@ class MaterialsEncoder:
     def encode(self, appearance: Appearance | None, num_worlds: int) -> _Encoded:
         """Return materials, and effects if the appearance has any.
 
-        Args:
-            appearance: The scene's own by default; the last one is cached by identity.
-            num_worlds: Number of environments of the appearance.
+        The last appearance and its number of environments are cached by identity.
 
         Raises:
             InputError: A texture can't be read.

@@ -72,13 +72,9 @@ class Raytracer:
     def __init__(
         self, scene: Scene, *, num_worlds: int, num_shards: int | None = None, device: str = "cpu"
     ) -> None:
-        """Prepare a scene; the first image loads the kernels.
+        """Prepare a scene; the first image loads the kernels. See `RendererFactory`.
 
-        Args:
-            scene: What to render.
-            num_worlds: About how many environments one call renders.
-            num_shards: Threads on a CPU; the number of cores by default.
-            device: "cpu", "cuda" or "cuda:N".
+        `num_shards` is used on a CPU, and is the number of cores by default.
 
         Raises:
             InputError: The scene has unsupported geoms or lights, or there is no such device.

@@ -145,10 +145,9 @@ def make_camera(scene: Scene, frames: Frames, name: str, aspect: float) -> struc
 
 
 def make_rays(camera: structs.Camera, height: int, width: int) -> NDArray:
-    """Return directions through the centres of all pixels, in the camera's frame.
+    """Return unit vectors through the centres of all pixels, in the camera's frame.
 
-    Returns:
-        Unit vectors. Shape: (height, width, 3), float32.
+    Shape: (height, width, 3), float32.
     """
     across = ((np.arange(width) + 0.5) / width * 2 - 1) * camera.half_width
     down = ((np.arange(height) + 0.5) / height * 2 - 1) * camera.half_height
@@ -244,9 +243,7 @@ class PoseBuffers:
     def write(self, poses: Poses, distractors: Distractors | None = None) -> structs.Poses:
         """Return poses for the kernels; the next call overwrites them.
 
-        Args:
-            poses: Of any number of environments.
-            distractors: The last of the props, which are scaled by their sizes.
+        Distractors are the last of the props, and are scaled by their sizes.
         """
         count, frames = len(poses), 2 + poses.props.shape[1]
         if len(self._positions) < count or self._positions.shape[1] != frames:
