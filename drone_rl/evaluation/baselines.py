@@ -3,8 +3,7 @@
 from typing import Any
 
 import torch
-from tensordict import TensorDictBase
-from tensordict.nn import TensorDictModuleBase
+from tensordict.nn import TensorDictModule
 from torch import Tensor
 
 from drone_rl.config import BaseTaskSettings
@@ -23,73 +22,53 @@ _RANDOM_ACTIONS = 5
 """Key of the random actions' stream, derived from that of the first environment."""
 
 
-class Oracle(TensorDictModuleBase):
-    """Act by the true state: an upper bound for a policy that sees images."""
+def oracle_policy(
+    task: BaseTaskSettings | Task[Any], actions: Actions | None = None
+) -> TensorDictModule:
+    """Return a policy that acts by the true state: an upper bound for one that sees images.
 
-    def __init__(self, task: BaseTaskSettings | Task[Any], actions: Actions | None = None) -> None:
-        """Take the oracle's rule from a task.
+    Args:
+        task: The task or its settings.
+        actions: Available actions; those of the task's default dynamics by default.
 
-        Args:
-            task: The task or its settings.
-            actions: Available actions; those of the task's default dynamics by default.
-
-        Raises:
-            InputError: The task has no oracle, or none for these actions.
-        """
-        super().__init__()
-        task = as_task(task)
-        rule = task.oracle
-        if rule is None:
-            raise InputError(
-                f"task={task.name} has no oracle; choose a task that has one, or give this one "
-                "a rule that knows the truth (Task.oracle)"
-            )
-        if actions is not None and not rule.can_fly(actions):
-            raise InputError(
-                f"the oracle of task={task.name} acts by {', '.join(rule.actions.names)}, these "
-                f"drones by {', '.join(actions.names)}; choose dynamics that it can fly"
-            )
-        self.rule, self.actions = rule, actions or rule.actions
-        keys = [("info", name) for name in rule.reads]
-        self.in_keys = keys  # pyright: ignore[reportAttributeAccessIssue] (untyped in tensordict)
-        self.out_keys = ["action"]
-
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write the action of each environment."""
-        known = [tensordict.get(key) for key in self.in_keys]
-        return tensordict.set("action", self.rule.decide(known, self.actions))
+    Raises:
+        InputError: The task has no oracle, or none for these actions.
+    """
+    task = as_task(task)
+    rule = task.oracle
+    if rule is None:
+        raise InputError(
+            f"task={task.name} has no oracle; choose a task that has one, or give this one "
+            "a rule that knows the truth (Task.oracle)"
+        )
+    if actions is not None and not rule.can_fly(actions):
+        raise InputError(
+            f"the oracle of task={task.name} acts by {', '.join(rule.actions.names)}, these "
+            f"drones by {', '.join(actions.names)}; choose dynamics that it can fly"
+        )
+    available = actions or rule.actions
+    return TensorDictModule(
+        lambda *known: rule.decide(known, available),
+        in_keys=[("info", name) for name in rule.reads],
+        out_keys=["action"],
+    )
 
 
-class RandomPolicy(TensorDictModuleBase):
-    """Sample every action with the same probability."""
-
-    def __init__(self, actions: Actions, generator: torch.Generator) -> None:
-        """Take the available actions and the generator that samples them."""
-        super().__init__()
-        self.in_keys = ["done"]
-        self.out_keys = ["action"]
-        self.actions = actions
-        self.generator = generator
-
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write the action of each environment."""
-        return tensordict.set("action", self.actions.draw(tensordict.batch_size, self.generator))
+def random_policy(actions: Actions, generator: torch.Generator) -> TensorDictModule:
+    """Return a policy that samples every action with the same probability."""
+    return TensorDictModule(
+        lambda done: actions.draw(done.shape[:-1], generator), in_keys=["done"], out_keys=["action"]
+    )
 
 
-class ConstantPolicy(TensorDictModuleBase):
-    """Take the same action at every step."""
-
-    def __init__(self, action: int | Tensor) -> None:
-        """Take the action: a number, or a tensor of one environment's shape and type."""
-        super().__init__()
-        self.in_keys = ["done"]
-        self.out_keys = ["action"]
-        self.action = torch.as_tensor(action)
-
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write the action of each environment."""
-        action = self.action.expand(*tensordict.batch_size, *self.action.shape)
-        return tensordict.set("action", action.to(tensordict["done"].device, copy=True))
+def constant_policy(action: int | Tensor) -> TensorDictModule:
+    """Return a policy that always takes one action: a number, or a tensor of one environment."""
+    one = torch.as_tensor(action)
+    return TensorDictModule(
+        lambda done: one.expand(*done.shape[:-1], *one.shape).to(done.device, copy=True),
+        in_keys=["done"],
+        out_keys=["action"],
+    )
 
 
 def make_baseline(
@@ -97,11 +76,11 @@ def make_baseline(
     task: BaseTaskSettings | Task[Any],
     generator: torch.Generator,
     actions: Actions | None = None,
-) -> TensorDictModuleBase:
-    """Build a baseline of a task.
+) -> TensorDictModule:
+    """Build a baseline of a task: "oracle" or one of its random and constant baselines.
 
     Args:
-        name: "oracle" or one of the task's random and constant baselines.
+        name: Of the baseline.
         task: The task or its settings.
         generator: Source of random actions.
         actions: Available actions; those of the task's default dynamics by default.
@@ -112,10 +91,12 @@ def make_baseline(
     task = as_task(task)
     actions = actions or task.make_dynamics().actions
     if name == "oracle":
-        return Oracle(task, actions)
-    if name == "random":
-        return RandomPolicy(actions, generator)
-    return ConstantPolicy(actions.always(name))
+        return oracle_policy(task, actions)
+    return (
+        random_policy(actions, generator)
+        if name == "random"
+        else constant_policy(actions.always(name))
+    )
 
 
 def run_baselines(

@@ -1,5 +1,7 @@
 """Axes of perturbation, each with five strengths that are the same for every policy.
 
+`axes.toml` has names, units and strengths; the functions that apply a strength are here.
+
 The strengths mirror published ones: colours Distracting Control Suite (Stone et al., 2021) and
 DMControl Generalization Benchmark (Hansen and Wang, 2021), camera angles the former's three levels
 and two below, sizes The Colosseum (Pumacay et al., 2024), correlated noise Nasvytis et al. (2024).
@@ -7,8 +9,8 @@ and two below, sizes The Colosseum (Pumacay et al., 2024), correlated noise Nasv
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple
 
 from drone_rl.envs.fault_models import dead_rows, late_frames, noise, out_of_focus
 from drone_rl.robustness.faults import frozen_frames
@@ -23,6 +25,7 @@ from drone_rl.robustness.perturbations import (
     tint,
     whiten,
 )
+from drone_rl.robustness.shifts_text import TABLE
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.utils.errors import InputError
 
@@ -59,11 +62,11 @@ class Axis:
     """Of values."""
     neutral: float
     """Strength of no perturbation."""
-    strengths: tuple[float, float, float, float, float]
-    """Weakest first; on both sides of the neutral one if the axis has two ends."""
+    strengths: tuple[float, ...]
+    """Five, weakest first; on both sides of the neutral one if the axis has two ends."""
     make: Callable[[float, PolicySpec], Condition]
     """The condition of a strength; raises InputError if it is not for the task."""
-    value: Callable[[float, PolicySpec], float] = lambda strength, _: strength
+    value: Callable[[float, PolicySpec], float]
     """A strength in the axis's unit; differs where strengths are relative to the policy."""
     own: Callable[[PolicySpec], float] | None = None
     """The neutral strength of a policy, if it is not the same for all."""
@@ -102,7 +105,7 @@ class Axis:
         return math.copysign(nearer, high - low) + low if inside > 0 else None
 
     def at(self, position: float) -> float:
-        """Return the strength at a position on the axis's scale."""
+        """Return the strength at a position, the inverse of `position`."""
         return self.scale.back(position + self.scale.there(self.neutral))
 
 
@@ -110,9 +113,6 @@ CORRELATION_TIME = -1.0 / math.log(0.95)
 """Frames; consecutive frames of noise correlate by 0.95."""
 _THINGS = (SemanticClass.TARGET, SemanticClass.OBSTACLE)
 _SIZES = {"collect_cubes": "cube_size", "pillars": "width"}
-_FACTORS = (0.9, 1.25, 0.75, 1.5, 0.5)
-_ANGLES = (1.0, 3.0, 9.0, 18.0, 27.0)
-_METRES = (0.1, 0.25, 0.5, 1.0, 2.0)
 
 
 def _size(subject: PolicySpec) -> str:
@@ -122,8 +122,7 @@ def _size(subject: PolicySpec) -> str:
     return _SIZES[name]
 
 
-def _drawn(subject: PolicySpec, condition: Condition) -> Condition:
-    """A condition that only the ray tracer can render."""
+def _rendered(subject: PolicySpec, condition: Condition) -> Condition:
     if subject.renderer != "raytrace":
         raise InputError(
             f"renderer={subject.renderer} can't draw fog and exposure; give axes without fog and "
@@ -142,116 +141,68 @@ def _middle(value: float | tuple[float, float]) -> float:
     return sum(value) / 2 if isinstance(value, tuple) else value
 
 
+def _field_of_view(change: float, subject: PolicySpec) -> float:
+    return subject.camera.horizontal_fov + change
+
+
 def _times(setting: str, factor: float, subject: PolicySpec) -> float:
     return factor * getattr(subject.task, setting)
 
 
-AXES: dict[str, Axis] = {
-    axis.name: axis
-    for axis in (
-        Axis(
-            *("object_color", "color", "of each color", 0.0, (0.025, 0.05, 0.1, 0.2, 0.3)),
-            lambda s, _: Condition(looks=(tint(_THINGS, s),)),
-        ),
-        Axis(
-            *("object_white", "color", "of white", 0.0, (0.1, 0.2, 0.4, 0.6, 0.8)),
-            lambda s, _: Condition(looks=(whiten(_THINGS, s),)),
-        ),
-        Axis(
-            *("floor_color", "color", "of each color", 0.0, (0.025, 0.05, 0.1, 0.2, 0.3)),
-            lambda s, _: Condition(looks=(tint((SemanticClass.GROUND,), s),)),
-        ),
-        Axis(
-            *("camera_yaw", "camera angle", "degrees", 0.0, _ANGLES),
-            lambda s, _: Condition(mounts=(mount(turn="yaw", degrees=s),)),
-        ),
-        Axis(
-            *("camera_pitch", "camera angle", "degrees", 0.0, _ANGLES),
-            lambda s, _: Condition(mounts=(mount(turn="pitch", degrees=s),)),
-        ),
-        Axis(
-            *("camera_roll", "camera angle", "degrees", 0.0, _ANGLES),
-            lambda s, _: Condition(mounts=(mount(turn="roll", degrees=s),)),
-        ),
-        Axis(
-            *("camera_height", "camera position", "m", 0.0, _METRES),
-            lambda s, _: Condition(mounts=(mount(offset=(0.0, 0.0, s)),)),
-        ),
-        Axis(
-            *("camera_sideways", "camera position", "m", 0.0, _METRES),
-            lambda s, _: Condition(mounts=(mount(offset=(0.0, s, 0.0)),)),
-        ),
-        Axis(
-            *("field_of_view", "field of view", "degrees", 0.0, (-10.0, 10.0, -20.0, 20.0, -45.0)),
-            lambda s, of: Condition(camera={"horizontal_fov": of.camera.horizontal_fov + s}),
-            value=lambda s, of: of.camera.horizontal_fov + s,
-        ),
-        Axis(
-            *("sun", "light", "degrees", 55.2, (60.0, 30.0, 15.0, 5.0, 0.0)),
-            lambda s, _: Condition(looks=(sun_at(s),)),
-            own=lambda of: _middle(of.appearance.sun_elevation),
-        ),
-        Axis(
-            *("brightness", "light", "times", 1.0, (0.8, 1.25, 0.4, 2.5, 0.1)),
-            lambda s, of: _drawn(of, Condition(looks=(expose(s),))),
-            scale=FACTORS,
-        ),
-        Axis(
-            *("fog", "fog", "m of sight", math.inf, (100.0, 60.0, 40.0, 25.0, 15.0)),
-            lambda s, of: _drawn(of, Condition(looks=(fog(s),))),
-            own=lambda of: _middle(of.appearance.fog_visibility or math.inf),
-            scale=INVERSE,
-        ),
-        Axis(
-            *("object_size", "object size", "m", 1.0, _FACTORS),
-            lambda s, of: Condition(task={_size(of): _times(_size(of), s, of)}),
-            value=lambda s, of: _times(_size(of), s, of),
-            scale=FACTORS,
-        ),
-        Axis(
-            *("distractors", "distractors", "of them", 0.0, (1.0, 2.0, 4.0, 8.0, 16.0)),
-            lambda s, of: _cluttered(of, round(s)),
-            whole=True,
-        ),
-        Axis(
-            *("noise", "sensor", "of 255", 0.0, (2.0, 4.0, 8.0, 16.0, 32.0)),
-            lambda s, _: Condition(faults=(noise(s / 255),)),
-        ),
-        Axis(
-            *("slow_noise", "sensor", "of 255", 0.0, (2.0, 4.0, 8.0, 16.0, 32.0)),
-            lambda s, _: Condition(faults=(noise(s / 255, CORRELATION_TIME),)),
-        ),
-        Axis(
-            *("blur", "sensor", "pixels", 0.0, (0.5, 0.75, 1.0, 1.5, 2.0)),
-            lambda s, _: Condition(faults=(out_of_focus(s),)),
-        ),
-        Axis(
-            *("dead_rows", "sensor", "rows", 0.0, (1.0, 2.0, 4.0, 8.0, 12.0)),
-            lambda s, _: Condition(faults=(dead_rows(round(s)),)),
-            whole=True,
-        ),
-        Axis(
-            *("frozen_frames", "sensor", "of frames", 0.0, (0.1, 0.2, 0.4, 0.6, 0.8)),
-            lambda s, _: Condition(faults=(frozen_frames(s),)),
-        ),
-        Axis(
-            *("late_frames", "sensor", "frames", 0.0, (1.0, 2.0, 3.0, 4.0, 5.0)),
-            lambda s, _: Condition(faults=(late_frames(round(s)),)),
-            whole=True,
-        ),
-        Axis(
-            *("step_length", "dynamics", "m", 1.0, _FACTORS),
-            lambda s, of: Condition(task={"step_length": _times("step_length", s, of)}),
-            value=lambda s, of: _times("step_length", s, of),
-            scale=FACTORS,
-        ),
-        Axis(
-            *("action_delay", "dynamics", "steps", 0.0, (1.0, 2.0, 3.0, 4.0, 5.0)),
-            lambda s, _: Condition(delay=round(s)),
-            whole=True,
-        ),
-    )
+def _turned(turn: str) -> Callable[[float, PolicySpec], Condition]:
+    return lambda s, _: Condition(mounts=(mount(turn=turn, degrees=s),))
+
+
+_MAKE: dict[str, Callable[[float, PolicySpec], Condition]] = {
+    "object_color": lambda s, _: Condition(looks=(tint(_THINGS, s),)),
+    "object_white": lambda s, _: Condition(looks=(whiten(_THINGS, s),)),
+    "floor_color": lambda s, _: Condition(looks=(tint((SemanticClass.GROUND,), s),)),
+    "camera_yaw": _turned("yaw"),
+    "camera_pitch": _turned("pitch"),
+    "camera_roll": _turned("roll"),
+    "camera_height": lambda s, _: Condition(mounts=(mount(offset=(0.0, 0.0, s)),)),
+    "camera_sideways": lambda s, _: Condition(mounts=(mount(offset=(0.0, s, 0.0)),)),
+    "field_of_view": lambda s, of: Condition(camera={"horizontal_fov": _field_of_view(s, of)}),
+    "sun": lambda s, _: Condition(looks=(sun_at(s),)),
+    "brightness": lambda s, of: _rendered(of, Condition(looks=(expose(s),))),
+    "fog": lambda s, of: _rendered(of, Condition(looks=(fog(s),))),
+    "object_size": lambda s, of: Condition(task={_size(of): _times(_size(of), s, of)}),
+    "distractors": lambda s, of: _cluttered(of, round(s)),
+    "noise": lambda s, _: Condition(faults=(noise(s / 255),)),
+    "slow_noise": lambda s, _: Condition(faults=(noise(s / 255, CORRELATION_TIME),)),
+    "blur": lambda s, _: Condition(faults=(out_of_focus(s),)),
+    "dead_rows": lambda s, _: Condition(faults=(dead_rows(round(s)),)),
+    "frozen_frames": lambda s, _: Condition(faults=(frozen_frames(s),)),
+    "late_frames": lambda s, _: Condition(faults=(late_frames(round(s)),)),
+    "step_length": lambda s, of: Condition(task={"step_length": _times("step_length", s, of)}),
+    "action_delay": lambda s, _: Condition(delay=round(s)),
 }
+_VALUE: dict[str, Callable[[float, PolicySpec], float]] = {
+    "field_of_view": lambda s, of: _field_of_view(s, of),
+    "object_size": lambda s, of: _times(_size(of), s, of),
+    "step_length": lambda s, of: _times("step_length", s, of),
+}
+_OWN: dict[str, Callable[[PolicySpec], float]] = {
+    "sun": lambda of: _middle(of.appearance.sun_elevation),
+    "fog": lambda of: _middle(of.appearance.fog_visibility or math.inf),
+}
+_SCALES = {"brightness": FACTORS, "fog": INVERSE, "object_size": FACTORS, "step_length": FACTORS}
+
+
+def _axis(name: str, entry: Mapping[str, Any]) -> Axis:
+    return Axis(
+        **{key: entry[key] for key in ("group", "unit", "neutral")},
+        name=name,
+        strengths=tuple(entry["strengths"]),
+        make=_MAKE[name],
+        value=_VALUE.get(name, lambda strength, _: strength),
+        own=_OWN.get(name),
+        scale=_SCALES.get(name, LINEAR),
+        whole=entry.get("whole", False),
+    )
+
+
+AXES = {name: _axis(name, entry) for name, entry in TABLE.items()}
 GROUPS = tuple(dict.fromkeys(axis.group for axis in AXES.values()))
 """Kinds of shift, each of one or more axes."""
 
@@ -290,7 +241,6 @@ def find_axes(names: Iterable[str] | None, subject: PolicySpec) -> list[Axis]:
 
 def _is_for(axis: Axis, subject: PolicySpec) -> bool:
     try:
-        axis.make(axis.strengths[0], subject)
+        return bool(axis.make(axis.strengths[0], subject))
     except InputError:
         return False
-    return True

@@ -1,65 +1,20 @@
 """Sentences and table of a robustness evaluation. Evidence: `shifts.json`."""
 
 import math
+import tomllib
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from drone_rl.sim.vocabulary import terms_of
 from drone_rl.utils.text import Evidence, Sentence, fixed_seed, listed, percent
 
-NAMES: Mapping[str, str] = {
-    "object_color": "color of the objects",
-    "object_white": "white in the objects",
-    "floor_color": "color of the floor",
-    "camera_yaw": "camera turned sideways",
-    "camera_pitch": "camera tilted",
-    "camera_roll": "camera rolled",
-    "camera_height": "camera higher or lower",
-    "camera_sideways": "camera moved sideways",
-    "field_of_view": "field of view",
-    "sun": "elevation of the sun",
-    "brightness": "brightness",
-    "fog": "fog",
-    "object_size": "size of the objects",
-    "distractors": "distractors",
-    "noise": "noise",
-    "slow_noise": "correlated noise",
-    "blur": "blur",
-    "dead_rows": "dead rows",
-    "frozen_frames": "frozen frames",
-    "late_frames": "late frames",
-    "step_length": "step length",
-    "action_delay": "delayed actions",
-}
+TABLE: Mapping[str, Mapping[str, Any]] = tomllib.loads(
+    Path(__file__).with_name("axes.toml").read_text(encoding="utf-8")
+)
+"""Axes by name; `axes.toml` documents the entries."""
+NAMES: Mapping[str, str] = {name: axis["label"] for name, axis in TABLE.items()}
 """Axes by name, in reports."""
-RANGES: Mapping[str, str] = {
-    "object_color": "{objects} whose red, green and blue differ by up to {high}",
-    "object_white": "{objects} with up to {high} of white mixed in",
-    "floor_color": "a floor whose red, green and blue differ by up to {high}",
-    "camera_yaw": "the camera turned sideways by up to {high} degrees",
-    "camera_pitch": "the camera tilted by up to {high} degrees",
-    "camera_roll": "the camera rolled by up to {high} degrees",
-    "camera_height": "the camera up to {high} m higher or lower",
-    "camera_sideways": "the camera up to {high} m to one side",
-    "field_of_view": "a field of view of {low} to {high} degrees",
-    "sun": "the sun at {low} to {high} degrees",
-    "brightness": "{low} to {high} times the light",
-    "fog": "fog with a visibility of {low} m or more",
-    "object_size": "{objects} of {low} to {high} m",
-    "distractors": "up to {high} distractors",
-    "noise": "noise of up to {high} of 255",
-    "slow_noise": "correlated noise of up to {high} of 255",
-    "blur": "blur of up to {high} pixels",
-    "dead_rows": "up to {high} dead rows",
-    "frozen_frames": "up to {high} of all frames frozen",
-    "late_frames": "frames up to {high} steps late",
-    "step_length": "steps of {low} to {high} m",
-    "action_delay": "actions up to {high} steps late",
-}
-"""Ranges; axes that are 0 without perturbation have no lower end, fog has no upper end if the air
-of the training is clear."""
-_UP_TO: Mapping[str, str] = {"fog": "fog with a visibility of {low} to {high} m"}
-"""Ranges with a finite upper end."""
 MOST_NAMED = 6
 """Largest number of axes that a sentence names."""
 
@@ -137,8 +92,9 @@ def inward(value: float, up: bool) -> str:
 def _range(e: Evidence, name: str) -> str:
     found, ends = _ranges(e)[name], {"low": True, "high": False}
     limits = {end: inward(found[end], up) for end, up in ends.items() if found[end] is not None}
-    text = RANGES[name] if found["high"] is None else _UP_TO.get(name, RANGES[name])
-    text = text.format(objects=_objects(e), **limits)
+    axis = TABLE[name]
+    text = axis["range"] if found["high"] is None else axis.get("bounded", axis["range"])
+    text = text.format(objects=f"{terms_of(e).target}s", **limits)
     most = {"low": "no less", "high": "no more"}
     tried = listed([most[end] for end in ends if found[f"{end}_open"]])
     lost = listed([f"{most[f['end']]} is possible" for f in found["failed"] if f["impossible"]])
@@ -181,10 +137,6 @@ def _why(e: Evidence, found: Mapping[str, Any]) -> str:
     if worst is None:
         return f": all {terms_of(e).goals} in {percent(found['success'])} of episodes"
     return f": {terms_of(e).goals} {terms_of(e).side(worst['side'])} {percent(worst['share'])}"
-
-
-def _objects(e: Evidence) -> str:
-    return f"{terms_of(e).target}s"
 
 
 def _impossible(e: Evidence) -> list[str]:

@@ -13,7 +13,7 @@ from torchrl.envs import RewardSum, TransformedEnv
 from drone_rl.collectors import EpisodeCollector, RolloutCollector, take_rows
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import Oracle
+from drone_rl.evaluation.baselines import oracle_policy
 from drone_rl.utils.errors import InputError
 
 TASK = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=12, front_margin=3.0)
@@ -28,7 +28,9 @@ def make(request):
     """Collectors of either kind, whose worlds are not drawn."""
 
     def build(actor=None, **kwargs):
-        return request.param(DroneEnv(3, TASK, pixels=False), actor or Oracle(TASK), **kwargs)
+        return request.param(
+            DroneEnv(3, TASK, pixels=False), actor or oracle_policy(TASK), **kwargs
+        )
 
     return build
 
@@ -103,8 +105,8 @@ def test_shutdown_may_leave_the_worlds_open(make):
 
 def test_the_worlds_are_those_behind_transforms():
     env = DroneEnv(2, TASK, pixels=False)
-    assert EpisodeCollector(TransformedEnv(env, RewardSum()), Oracle(TASK)).base_env is env
-    assert EpisodeCollector(env, Oracle(TASK)).base_env is env
+    assert EpisodeCollector(TransformedEnv(env, RewardSum()), oracle_policy(TASK)).base_env is env
+    assert EpisodeCollector(env, oracle_policy(TASK)).base_env is env
 
 
 def test_one_world_without_a_batch(make):
@@ -112,7 +114,7 @@ def test_one_world_without_a_batch(make):
     env.batch_size = torch.Size([])
     for kind in KINDS.values():
         with pytest.raises(InputError, match=r"batch size \[\]; give a batch of environments"):
-            kind(env, Oracle(TASK))
+            kind(env, oracle_policy(TASK))
 
 
 def test_rows_are_what_indexing_gives():

@@ -13,7 +13,7 @@ from torchrl.envs import EnvBase
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import Oracle
+from drone_rl.evaluation.baselines import oracle_policy
 from drone_rl.objectives import RewardToGo
 from drone_rl.utils.errors import InputError
 
@@ -99,7 +99,7 @@ def test_goes_on_for_ever_by_default():
 def test_nested_entries_are_read_and_kept_as_leaves():
     """An actor that reads the truth, and one that writes a note beside its action."""
     env = DroneEnv(2, SHORT, pixels=False)
-    assert EpisodeCollector(env, Oracle(SHORT)).collect()["next", "reward"].sum() > 0
+    assert EpisodeCollector(env, oracle_policy(SHORT)).collect()["next", "reward"].sum() > 0
     actor = TensorDictModule(
         lambda f: (f[:, 0].long(), f + 1), in_keys=["frame"], out_keys=["action", ("note", "more")]
     )
@@ -210,14 +210,14 @@ def test_stops_at_total_frames(make_pipeline):
 @pytest.fixture
 def seeing(make_pipeline):
     """A collector whose policy reads the nested truth; three worlds, nothing is drawn."""
-    return EpisodeCollector(DroneEnv(3, SHORT, pixels=False), Oracle(SHORT), keep=TRUTH)
+    return EpisodeCollector(DroneEnv(3, SHORT, pixels=False), oracle_policy(SHORT), keep=TRUTH)
 
 
 def test_what_a_policy_reads_is_there_at_every_step_and_kept(seeing):
     batch = seeing.collect()
     assert len(batch) > 3  # a second step needs the truth after the first
     read = set(batch.keys(True, True)) - {"action", ("collector", "traj_ids")}
-    assert {key for key in read if key[0] != "next"} == set(Oracle(SHORT).in_keys)
+    assert {key for key in read if key[0] != "next"} == set(oracle_policy(SHORT).in_keys)
     first = batch["collector", "traj_ids"].diff(prepend=torch.tensor([-1])) > 0
     drone, after = batch["info", "drone"], batch["next", "info", "cubes"][:, 0]
     assert drone[first].tolist() == [[0.0, 0.0, SHORT.altitude]] * 3
@@ -248,7 +248,7 @@ def test_episodes_are_numbered_on_from_batch_to_batch(seeing):
 
 def test_episodes_of_one_step():
     task = TaskSettings(num_cubes=1, first_distance=2.6, step_limit=1)
-    batch = EpisodeCollector(DroneEnv(3, task, pixels=False), Oracle(task)).collect()
+    batch = EpisodeCollector(DroneEnv(3, task, pixels=False), oracle_policy(task)).collect()
     assert batch["collector", "traj_ids"].tolist() == [0, 1, 2]
     assert batch["next", "done"].all()
 
@@ -290,7 +290,7 @@ def test_what_the_environment_lacks_is_not_kept():
 def test_it_is_one_of_torchrls_collectors(seeing):
     assert isinstance(seeing, BaseCollector)
     alone = DroneEnv(3, SHORT, pixels=False)
-    other = EpisodeCollector(alone, Oracle(SHORT), keep=TRUTH)
+    other = EpisodeCollector(alone, oracle_policy(SHORT), keep=TRUTH)
     assert torch.equal(seeing.next()["action"], other.collect()["action"])
     with pytest.raises(TypeError, match="not known beforehand"):
         len(seeing)

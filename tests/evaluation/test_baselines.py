@@ -7,9 +7,9 @@ from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import (
     BASELINES,
-    ConstantPolicy,
-    Oracle,
-    RandomPolicy,
+    constant_policy,
+    oracle_policy,
+    random_policy,
     run_baselines,
 )
 from drone_rl.evaluation.rollouts import run_episodes
@@ -28,8 +28,8 @@ def policies():
     """What each baseline is; random actions follow from the first environment's stream alone."""
     stream = side_stream(world_random_state(5, 0), 5)
     generator = torch.Generator().manual_seed(int(stream.integers(2**63)))
-    fixed = {action.name.lower(): ConstantPolicy(action) for action in Move}
-    return {"oracle": Oracle(TASK), "random": RandomPolicy(MOVES, generator), **fixed}
+    fixed = {action.name.lower(): constant_policy(action) for action in Move}
+    return {"oracle": oracle_policy(TASK), "random": random_policy(MOVES, generator), **fixed}
 
 
 def test_baselines_are_flown_in_the_same_worlds_one_by_one(policies, monkeypatch):
@@ -97,4 +97,4 @@ def test_a_task_without_an_oracle_says_so_in_one_line():
 def test_an_oracle_flies_no_dynamics_that_it_does_not_know():
     actions = SimpleNamespace(names=("throttle", "pitch"))
     with pytest.raises(InputError, match="acts by forward, left, right, these drones by throttle"):
-        Oracle(TASK, actions)
+        oracle_policy(TASK, actions)

@@ -3,7 +3,7 @@ import torch
 from tensordict import TensorDict
 
 from drone_rl.config import TaskSettings
-from drone_rl.evaluation.baselines import ConstantPolicy, Oracle, RandomPolicy
+from drone_rl.evaluation.baselines import constant_policy, oracle_policy, random_policy
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.tasks import CollectCubes
@@ -20,8 +20,8 @@ def test_the_oracle_does_what_the_tasks_rule_says():
     }
     seen = TensorDict({"info": TensorDict(info, [3])}, [3])
     for task in (TaskSettings(num_cubes=1), CollectCubes()):
-        assert Oracle(task)(seen)["action"].tolist() == [Move.LEFT, Move.FORWARD, Move.RIGHT]
-    assert Oracle(Posts()).in_keys == [("info", "end_reason")]
+        assert oracle_policy(task)(seen)["action"].tolist() == [Move.LEFT, Move.FORWARD, Move.RIGHT]
+    assert oracle_policy(Posts()).in_keys == [("info", "end_reason")]
 
 
 def test_a_task_without_an_oracle_says_so_in_one_line():
@@ -29,24 +29,24 @@ def test_a_task_without_an_oracle_says_so_in_one_line():
         name, oracle = "fog", None
 
     with pytest.raises(InputError, match="task=fog has no oracle; choose a task that has one") as e:
-        Oracle(Blind())
+        oracle_policy(Blind())
     assert "\n" not in str(e.value)
 
 
 def test_chance_draws_all_actions_alike_and_habit_takes_one():
     done = TensorDict({"done": torch.zeros(3000, 1, dtype=torch.bool)}, [3000])
-    drawn = RandomPolicy(MOVES, torch.Generator().manual_seed(0))(done)["action"]
+    drawn = random_policy(MOVES, torch.Generator().manual_seed(0))(done)["action"]
     assert all(900 < int((drawn == action).sum()) < 1100 for action in Move)
-    assert ConstantPolicy(Move.RIGHT)(done)["action"].unique().tolist() == [2]
+    assert constant_policy(Move.RIGHT)(done)["action"].unique().tolist() == [2]
 
 
 def test_chance_and_habit_have_continuous_actions_too():
     actions = ContinuousActions.of(SETTINGS)
     done = TensorDict({"done": torch.zeros(3000, 1, dtype=torch.bool)}, [3000])
-    drawn = RandomPolicy(actions, torch.Generator().manual_seed(0))(done)["action"]
+    drawn = random_policy(actions, torch.Generator().manual_seed(0))(done)["action"]
     assert drawn.shape == (3000, 3) and drawn.dtype == torch.float32
     assert drawn.mean(0).abs().max() < 0.05 and drawn.abs().max() <= 1  # 0.58 / 55 * 4
-    habit = ConstantPolicy(actions.always("right"))(done)["action"]
+    habit = constant_policy(actions.always("right"))(done)["action"]
     assert habit.shape == (3000, 3) and habit[7].tolist() == [-1, -1, 0]
 
 
@@ -57,5 +57,5 @@ def test_the_oracle_flies_what_has_actions_of_the_same_names():
         "next_cube": torch.zeros(3, 1, dtype=torch.int64),
     }
     seen = TensorDict({"info": TensorDict(info, [3])}, [3])
-    oracle = Oracle(TaskSettings(num_cubes=1), ContinuousActions.of(SETTINGS))
+    oracle = oracle_policy(TaskSettings(num_cubes=1), ContinuousActions.of(SETTINGS))
     assert oracle(seen)["action"].tolist() == [[-1, 1, 0], [1, 0, 0], [-1, -1, 0]]

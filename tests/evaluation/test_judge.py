@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import ConstantPolicy, Oracle
+from drone_rl.evaluation.baselines import constant_policy, oracle_policy
 from drone_rl.evaluation.judge import judge, judge_policy, measure, observe
 from drone_rl.evaluation.outcomes import Outcomes, Rounding
 from drone_rl.evaluation.rollouts import run_episodes
@@ -158,10 +158,10 @@ def test_baselines_fly_with_the_dynamics_of_the_environment(monkeypatch):
     task = TaskSettings(num_cubes=1)
     against = DynamicsSettings(mode="simple_flight", wind=(-2.0, 0.0, 0.0))
     env = DroneEnv(3, task, pixels=False, dynamics=against)
-    verdict = judge_policy(env, ConstantPolicy(Move.FORWARD), 3, sampled=False)
+    verdict = judge_policy(env, constant_policy(Move.FORWARD), 3, sampled=False)
     policy, baseline = verdict.evidence["greedy"], verdict.evidence["baselines"]["forward"]
     assert policy["mean_length"] == baseline["mean_length"]
-    still = judge_policy(DroneEnv(3, task, pixels=False), ConstantPolicy(Move.FORWARD), 3)
+    still = judge_policy(DroneEnv(3, task, pixels=False), constant_policy(Move.FORWARD), 3)
     assert still.evidence["greedy"]["mean_length"] < policy["mean_length"]
 
 
@@ -195,7 +195,7 @@ def test_a_policy_is_flown_beside_its_baselines_and_repeats():
     dicts = []
     for _ in range(2):
         env = DroneEnv(16, task, pixels=False)
-        dicts.append(judge_policy(env, Oracle(task), 20, sampled=True).as_dict())
+        dicts.append(judge_policy(env, oracle_policy(task), 20, sampled=True).as_dict())
     first, again = dicts
     assert first == again
     assert first["greedy"] == first["sampled"] == first["baselines"]["oracle"]
@@ -233,7 +233,7 @@ def test_a_mirrored_flight_gets_the_mirrored_kind(make_episodes, make_baselines,
 
 def test_another_task_is_judged_by_its_own_strata_and_luck():
     env = DroneEnv(20, Posts(), pixels=False)
-    straight = judge_policy(env, ConstantPolicy(Move.FORWARD), 200, sampled=False)
+    straight = judge_policy(env, constant_policy(Move.FORWARD), 200, sampled=False)
     assert (straight.kind, straight.certain) == (Kind.TRIVIAL, True)
     evidence = straight.evidence
     assert list(evidence["quantities"]) == [
@@ -241,7 +241,7 @@ def test_another_task_is_judged_by_its_own_strata_and_luck():
         "above random", "above forward", "unsolved by random", "unsolved by forward",
     ]  # fmt: skip
     assert list(evidence["baselines"]) == ["random", "forward", "oracle"]
-    leaving = judge_policy(env, ConstantPolicy(Move.LEFT), 200, sampled=False)
+    leaving = judge_policy(env, constant_policy(Move.LEFT), 200, sampled=False)
     assert (leaving.kind, leaving.certain) == (Kind.POOR, True)
     assert leaving.evidence["failures"]["largest"]["value"] in ("left", "right")
 
@@ -257,10 +257,10 @@ def test_a_policy_is_flown_greedily_and_with_drawn_actions_in_the_same_worlds(mo
     task = TaskSettings(num_cubes=1)
     env = DroneEnv(2, task, pixels=False)
     before = env.state_dict()
-    judge_policy(env, Oracle(task), 3)
+    judge_policy(env, oracle_policy(task), 3)
     assert flown == [(True, 3, before), (False, 3, before)]
     flown.clear()
-    judge_policy(env, Oracle(task), 3, sampled=False)
+    judge_policy(env, oracle_policy(task), 3, sampled=False)
     assert [greedy for greedy, *_ in flown] == [True]
 
 

@@ -4,7 +4,7 @@ import torch
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import ConstantPolicy, Oracle, RandomPolicy
+from drone_rl.evaluation.baselines import constant_policy, oracle_policy, random_policy
 from drone_rl.evaluation.metrics import summarise
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.sim.actions import MOVES, Move
@@ -18,13 +18,13 @@ from drone_rl.utils.seeding import Stream
 )
 def test_oracle_collects_everything(settings):
     env = DroneEnv(100, settings, pixels=False, stream=Stream.REPORT)
-    summary = summarise(run_episodes(env, Oracle(settings), 100))
+    summary = summarise(run_episodes(env, oracle_policy(settings), 100))
     assert summary["success"]["share"] == 1.0
 
 
 def test_random_policy_collects_what_the_original_studys_did():
     env = DroneEnv(500, pixels=False)
-    policy = RandomPolicy(MOVES, torch.Generator().manual_seed(0))
+    policy = random_policy(MOVES, torch.Generator().manual_seed(0))
     summary = summarise(run_episodes(env, policy, 500))
     assert 0.7 < summary["mean_goals"] < 1.0  # 0.84 there
     assert 125 < summary["mean_length"] < 142  # 133 there
@@ -32,13 +32,13 @@ def test_random_policy_collects_what_the_original_studys_did():
 
 def test_exactly_as_many_episodes_as_asked_for():
     env = DroneEnv(8, pixels=False)
-    episodes = run_episodes(env, Oracle(env.worlds.task.settings), 11)
+    episodes = run_episodes(env, oracle_policy(env.worlds.task.settings), 11)
     assert len(episodes.length) == 11
 
 
 def test_episodes_are_those_of_each_world_alone_in_order_and_the_first_of_them():
     """Of 4 worlds, 10 episodes: three rounds, of which the last gives two worlds'."""
-    policy = Oracle(TaskSettings())
+    policy = oracle_policy(TaskSettings())
     together = run_episodes(DroneEnv(4, pixels=False, seed=3), policy, 10)
     alone = [
         run_episodes(DroneEnv(1, pixels=False, seed=3, first_world=i), policy, 3) for i in range(4)
@@ -88,7 +88,7 @@ def test_heights_are_metres_above_the_drone():
     start = env.state_dict()
     drawn = env.reset()["info", "cube_positions"][..., 2]
     env.load_state_dict(start)
-    flown = run_episodes(env, ConstantPolicy(Move.FORWARD), 4)
+    flown = run_episodes(env, constant_policy(Move.FORWARD), 4)
     torch.testing.assert_close(flown.goals.height, drawn.double() - 5.0)
     assert (flown.end_reason == EndReason.FRONT_BOUNDARY).any()
     assert flown.length.max() == 45  # 44 is still within bounds
@@ -98,7 +98,7 @@ def test_the_kth_episode_is_the_same_world_whatever_the_policy():
     env = DroneEnv(8, TaskSettings(vertical_bound=1.0, altitude=5.0), pixels=False)
     start = env.state_dict()
     flown = []
-    for policy in (Oracle(env.worlds.task.settings), ConstantPolicy(Move.LEFT)):
+    for policy in (oracle_policy(env.worlds.task.settings), constant_policy(Move.LEFT)):
         env.load_state_dict(start)
         flown.append(run_episodes(env, policy, 20))
     ours, theirs = (episodes.goals for episodes in flown)

@@ -4,7 +4,7 @@ import numpy as np
 
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import ConstantPolicy
+from drone_rl.evaluation.baselines import constant_policy
 from drone_rl.evaluation.rollouts import find_failures
 from drone_rl.sim.actions import Move
 from drone_rl.utils.seeding import world_random_state
@@ -15,7 +15,7 @@ TASK = TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60)
 def flown(num_episodes, enough):
     env = DroneEnv(8, TASK, seed=4, pixels=False)
     try:
-        return find_failures(env, ConstantPolicy(Move.FORWARD), num_episodes, enough)
+        return find_failures(env, constant_policy(Move.FORWARD), num_episodes, enough)
     finally:
         env.close()
 
