@@ -24,7 +24,7 @@ from drone_rl.robustness import shifts_text as shifts
 from drone_rl.sweeps import text as sweep
 from drone_rl.utils import text as seeds
 from drone_rl.utils.text import Sentence, said
-from drone_rl.verdicts import card as card
+from drone_rl.verdicts import export as card
 
 Changes = Mapping[str, Any]
 SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {

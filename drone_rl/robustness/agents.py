@@ -31,7 +31,7 @@ class StepContext(NamedTuple):
     poses: Poses
     appearance: Appearance | None
     apply_faults: Callable[..., Tensor]
-    """See `faults.FaultPipeline`."""
+    """See `perturbations.FaultPipeline`."""
     pending: list[Tensor]
     """Actions decided but not yet taken, oldest first. Shapes: (n, *)."""
 

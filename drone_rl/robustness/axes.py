@@ -13,12 +13,12 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 from drone_rl.envs.fault_models import dead_rows, late_frames, noise, out_of_focus
-from drone_rl.robustness.faults import frozen_frames
 from drone_rl.robustness.paired_evaluation import PolicySpec
 from drone_rl.robustness.perturbations import (
     Condition,
     expose,
     fog,
+    frozen_frames,
     mount,
     sun_at,
     task_things,

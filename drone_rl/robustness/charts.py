@@ -8,7 +8,15 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from drone_rl.evaluation.plots.images import BACKGROUND, INK, MUTED, enlarge, titled
+from drone_rl.evaluation.plots.images import (
+    BACKGROUND,
+    INK,
+    MUTED,
+    enlarge,
+    gridded,
+    stacked,
+    titled,
+)
 from drone_rl.robustness.shifts_text import NAMES
 from drone_rl.utils.text import percent
 
@@ -106,13 +114,7 @@ def strips(
         pictures: By axis, without perturbation and at each strength. Shapes: (H, W, 3).
     """
     rows = [_strip(name, numbers["axes"][name], shown) for name, shown in pictures.items()]
-    width, height = max(r.width for r in rows), sum(r.height + 6 for r in rows)
-    canvas = Image.new("RGB", (width, height), BACKGROUND)
-    y = 0
-    for row in rows:
-        canvas.paste(row, (0, y))
-        y += row.height + 6
-    return canvas
+    return stacked(rows, gap=6)
 
 
 def _strip(name: str, along: Mapping[str, Any], pictures: Sequence[NDArray | None]) -> Image.Image:
@@ -123,13 +125,13 @@ def _strip(name: str, along: Mapping[str, Any], pictures: Sequence[NDArray | Non
     for number, picture in enumerate(pictures[1:], 1):
         if picture is not None and number in by_number:
             cells.append(titled(enlarge(picture, _SCALE), _caption(by_number[number], along)))
-    width, height = cells[0].width + 8, max(cell.height for cell in cells)
-    canvas = Image.new("RGB", (_LABEL + 6 * width, height), BACKGROUND)
+    strip = gridded(cells, len(cells), gap=8)
+    height = strip.height
+    canvas = Image.new("RGB", (_LABEL + 6 * (cells[0].width + 8), height), BACKGROUND)
+    canvas.paste(strip, (_LABEL, 0))
     pen = ImageDraw.Draw(canvas)
     pen.multiline_text((4, height // 2 - 16), NAMES[name], INK, ImageFont.load_default(15))
     pen.text((4, height // 2 + 6), along["unit"], MUTED, ImageFont.load_default(13))
-    for i, cell in enumerate(cells):
-        canvas.paste(cell, (_LABEL + i * width, 0))
     return canvas
 
 

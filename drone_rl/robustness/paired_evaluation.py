@@ -22,10 +22,10 @@ from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.rollouts import rollout
 from drone_rl.policies import PictureNetwork
 from drone_rl.robustness.agents import Agent, BaselineAgent, PolicyAgent, StepContext
-from drone_rl.robustness.faults import FaultPipeline
 from drone_rl.robustness.perturbations import (
     ONSET_STEP,
     Condition,
+    FaultPipeline,
     Mode,
     clutter,
     sample_distractors,

@@ -22,14 +22,13 @@ from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
 from drone_rl.policies.policy import Policy
 from drone_rl.robustness.agents import OracleAgent
-from drone_rl.robustness.axes import Axis, check_axes, find_axes
+from drone_rl.robustness.axes import AXES, Axis, check_axes, find_axes
 from drone_rl.robustness.charts import chart, strips
 from drone_rl.robustness.domain import Prober
 from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
 from drone_rl.robustness.perturbations import Condition, Mode
-from drone_rl.robustness.requirements import ranges_of
 from drone_rl.robustness.shifts_file import FORMAT, FORMAT_VERSION
-from drone_rl.robustness.shifts_text import SHIFTS, rows
+from drone_rl.robustness.shifts_text import SHIFTS, is_tested, rows
 from drone_rl.robustness.suite import Suite, make_strip, packed
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.display import aligned, paragraph, picture, table
@@ -151,6 +150,16 @@ def shifts(
         "seconds": time.perf_counter() - begin,
     }
     return Shifts(pilot, settings, numbers, pictures)
+
+
+def ranges_of(numbers: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return an operating domain, as in `shifts.json`, in the form of requirements."""
+    return {
+        name: {end: found[end] for end in ("low", "high") if found[end] is not None}
+        | {"unit": AXES[name].unit}
+        for name, found in numbers["domain"]["ranges"].items()
+        if found["positions"] is not None and is_tested(numbers, name)
+    }
 
 
 def _fly(

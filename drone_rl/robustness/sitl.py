@@ -5,10 +5,9 @@ import dataclasses
 import tempfile
 import time
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import torch
-from torch import Tensor
 from torchrl.envs.utils import ExplorationType, set_exploration_type, step_mdp
 
 from drone_rl.envs import worlds_of
@@ -21,7 +20,6 @@ from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.tasks import as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.seeding import RootSeed, root_seed
@@ -120,31 +118,17 @@ def evaluate_in_the_loop(
     progress, pilot = progress or Bar(), as_pilot(policy, outputs)
     root = drawn_seed or root_seed(seed)
     program = find_firmware(firmware)
-    flown: list[_Flown] = []
+    flown: list[tuple[Episodes, SitlEpisode]] = []
     with tempfile.TemporaryDirectory(prefix="betaflight-") as folder:
         for world in range(flights):
             progress(f"{pilot.name}: software in the loop", world, flights)
             flown.append(_fly_or_restart(pilot, world, root.value, program, Path(folder), isolated))
     progress("flown", flights, flights)
-    info = {name: torch.cat([one.info[name] for one in flown]) for name in flown[0].info}
-    lengths = torch.tensor([len(one.path) - 1 for one in flown])
-    episodes = Episodes.ended(as_task(pilot.task), info, lengths)
-    told = tuple(_as_episode(one, world, episodes) for world, one in enumerate(flown))
-    return SitlEvaluation(pilot.name, root, told, summarise(episodes))
+    ended, episodes = zip(*flown, strict=True)
+    return SitlEvaluation(pilot.name, root, episodes, summarise(Episodes.joined(ended)))
 
 
-class _Flown(NamedTuple):
-    """One episode, before its task scores it."""
-
-    info: dict[str, Tensor]
-    """Info of the last step. Shapes: (1, *)."""
-    path: list[tuple[float, float, float]]
-    simulated_s: float
-    wall_s: float
-    missed: int
-
-
-def _fly_or_restart(pilot: Pilot, world: int, *given: Any) -> _Flown:
+def _fly_or_restart(pilot: Pilot, world: int, *given: Any) -> tuple[Episodes, SitlEpisode]:
     """Run one episode; restart a firmware that fails before the policy acts."""
     for _ in range(STARTS - 1):
         with contextlib.suppress(NotReadyError):
@@ -155,7 +139,7 @@ def _fly_or_restart(pilot: Pilot, world: int, *given: Any) -> _Flown:
 @torch.no_grad()
 def _fly(
     pilot: Pilot, world: int, seed: int, program: Path, folder: Path, isolated: bool
-) -> _Flown:
+) -> tuple[Episodes, SitlEpisode]:
     """Run one episode with a new firmware process."""
     began = time.monotonic()
     settings = pilot.dynamics.replace(mode="simple_flight")
@@ -178,25 +162,21 @@ def _fly(
             if bool(after["next", "done"]):
                 break
             seen = step_mdp(after)
-        told = (*worlds.task.scored, "end_reason")
-        info = {name: after["next", "info", name].cpu() for name in told}
-        missed = drone.controller.missed if isinstance(drone.controller, Betaflight) else 0
-        return _Flown(info, path, drone.time - left, time.monotonic() - began, missed)
-
-
-def _as_episode(flown: _Flown, world: int, episodes: Episodes) -> SitlEpisode:
-    reached = episodes.goals.reached[world]
-    return SitlEpisode(
-        world=world,
-        goals=int(reached.sum()),
-        success=bool(reached.all()),
-        end=episodes.task.ends(int(episodes.end_reason[world])).name.lower(),
-        steps=len(flown.path) - 1,
-        simulated_s=flown.simulated_s,
-        wall_s=flown.wall_s,
-        missed=flown.missed,
-        path=tuple(flown.path),
-    )
+        names, steps = (*worlds.task.scored, "end_reason"), len(path) - 1
+        info = {name: after["next", "info", name] for name in names}
+        ended = Episodes.ended(worlds.task, info, torch.tensor([steps]))
+        reached = ended.goals.reached[0]
+        return ended, SitlEpisode(
+            world=world,
+            goals=int(reached.sum()),
+            success=bool(reached.all()),
+            end=worlds.task.ends(int(ended.end_reason[0])).name.lower(),
+            steps=steps,
+            simulated_s=drone.time - left,
+            wall_s=time.monotonic() - began,
+            missed=drone.controller.missed if isinstance(drone.controller, Betaflight) else 0,
+            path=tuple(path),
+        )
 
 
 def _place(body: BodyState) -> tuple[float, float, float]:

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Iterator, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,21 +14,30 @@ from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.policy import Policy
 from drone_rl.policies.zoo import shifts_path
 from drone_rl.robustness.agents import OracleAgent
-from drone_rl.robustness.axes import Axis, find_axes
+from drone_rl.robustness.axes import AXES, Axis, find_axes
 from drone_rl.robustness.domain import Prober
-from drone_rl.robustness.domain_text import contradicted, lacking, needed_range
 from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
 from drone_rl.robustness.perturbations import Condition
-from drone_rl.robustness.requirements import Need, read_requirements
 from drone_rl.robustness.shifts_file import SavedShifts, read_shifts
+from drone_rl.robustness.shifts_text import contradicted, lacking, needed_range
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.intervals import mean_bounds
+from drone_rl.utils.limits import YAML_BYTES
+from drone_rl.utils.readers import parse_yaml
+from drone_rl.utils.schema import Maybe, Real, as_mapping, shown
 from drone_rl.utils.seeding import RootSeed
 
 RANDOM = 2
 """Number of random strengths within each range, in addition to its ends."""
 MOST_LOOKED_AT = 100
 """Largest number of results of `drone-rl shifts` to read."""
+Need = Mapping[str, float | None]
+"""Of an axis, "low" and "high"; None for the value without perturbation."""
+_KEYS = ("low", "high", "unit")
+_LIMIT = Maybe(Real(-1e9, 1e9))
+_SIGNED = frozenset({"sun"})
+"""Axes with values below 0."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,10 +96,6 @@ class Coverage:
         """Whether it states so, and new episodes do not contradict it."""
         return self.is_stated and self.reflown is not None and not self.reflown.contradictions
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values."""
-        return dataclasses.asdict(self)
-
     def __str__(self) -> str:
         """Return a line for each axis that is not covered, or one for all."""
         if self.is_covered:
@@ -130,21 +135,73 @@ def find_domain(
                 "hash; leave shifts out"
             )
         return None
+    of = policy.description, policy.state["policy"]
     if given is not None:
         path = Path(given)
-        return _read(path / "shifts.json" if path.is_dir() else path, policy)
-    beside = shifts_path(policy.path)
-    if beside.is_file():
+        return read_shifts(path / "shifts.json" if path.is_dir() else path, *of)
+    adjacent = shifts_path(policy.path)
+    if adjacent.is_file():
         try:
-            return _read(beside, policy)
+            return read_shifts(adjacent, *of)
         except InputError as error:
-            return SavedShifts(beside, None, refused=str(error))
+            return SavedShifts(adjacent, None, refused=str(error))
+    folder = Path(outputs) / "shifts"
+    there = [*folder.glob("runs/*/shifts.json"), *folder.glob("multiruns/*/*/shifts.json")]
     found = None
-    for measured in _made(policy, Path(outputs)):
-        if measured.has_ranges:
-            return measured
-        found = found or measured
+    for path in sorted(there, key=lambda p: p.stat().st_mtime, reverse=True)[:MOST_LOOKED_AT]:
+        with suppress(InputError):  # of another policy
+            measured = read_shifts(path, *of)
+            if measured.has_ranges:
+                return measured
+            found = found or measured
     return found
+
+
+def read_requirements(path: Path) -> dict[str, Need]:
+    """Read requirements from a YAML or JSON file.
+
+    The file has for each axis `{low: 40, high: 100, unit: m of sight}`; one end may be missing.
+
+    Raises:
+        InputError: The file is missing or damaged, an axis does not exist, a unit is not its own,
+            or a range is none.
+    """
+    parse = parse_json if path.suffix == ".json" else parse_yaml
+    try:
+        given = as_mapping(parse(read_bytes(path, YAML_BYTES), "the file"), "the file")
+        if not given:
+            raise InputError(
+                "the file is empty; give axes, as in {fog: {low: 60, unit: m of sight}}"
+            )
+        return {name: _read_need(name, need) for name, need in given.items()}
+    except InputError as error:
+        raise InputError(f"require_domain={path}: {error}") from None
+
+
+def _read_need(name: str, value: Any) -> Need:
+    if name not in AXES:
+        raise InputError(f"{shown(name)} is no axis; give some of: {', '.join(AXES)}")
+    axis = AXES[name]
+    example = f"give low, high or both, and unit: {axis.unit}"
+    given = as_mapping(value, name)
+    unknown = [key for key in given if key not in _KEYS]
+    if unknown:
+        raise InputError(f"{name}.{shown(unknown[0])} is unknown; {example}")
+    if given.get("unit") != axis.unit:
+        raise InputError(f"{name}.unit={shown(given.get('unit'))} is not its own; {example}")
+    low, high = (_LIMIT.read(given.get(end), f"{name}.{end}") for end in ("low", "high"))
+    if low is None and high is None:
+        raise InputError(f"{name} has neither low nor high; {example}")
+    if low is not None and high is not None and low > high:
+        raise InputError(
+            f"{name} goes from {low:g} to {high:g}, which is less; give the lower first"
+        )
+    least = min(end for end in (low, high) if end is not None)
+    if least < 0 and name not in _SIGNED:
+        raise InputError(
+            f"{name} has {least:g}, and there is nothing below 0; give how much, whichever way"
+        )
+    return {"low": low, "high": high}
 
 
 def require(policy: Pilot, needed: str | Path, measured: SavedShifts | None) -> Coverage:
@@ -152,7 +209,7 @@ def require(policy: Pilot, needed: str | Path, measured: SavedShifts | None) -> 
 
     Args:
         policy: Which.
-        needed: A file, see `drone_rl.robustness.requirements.read_requirements`.
+        needed: A file, see `read_requirements`.
         measured: From `find_domain`.
 
     Raises:
@@ -184,7 +241,7 @@ def recheck_domain(
 
     Args:
         policy: Which, in its task.
-        needs: By axis, see `drone_rl.robustness.requirements.read_requirements`.
+        needs: By axis, see `read_requirements`.
         numbers: As in `shifts.json`, with the axes.
         settings: `domain_flights`, `good_share`, device and renderer count.
         seed: Root of the random streams of the sample and of its environments.
@@ -201,12 +258,12 @@ def recheck_domain(
     with closing(PairedEvaluator(subject, settings.domain_flights, seed.value)) as evaluator:
         oracle = evaluator.run(Condition(), agent=OracleAgent(looks=False)).episodes
         prober = Prober(evaluator, oracle, settings.good_share, plain_part=1 / count)
-        found = [_contradiction(None, prober.plain, 0.0, "")]
+        found = [contradicted(None, 0.0, "", prober.plain)]
         for axis, strengths in tried.items():
             for strength in strengths:
                 probed = prober.probe(axis.make(strength, subject), 1 / count)
                 value = axis.value(strength, subject)
-                found.append(_contradiction(axis.name, probed, value, axis.unit))
+                found.append(contradicted(axis.name, value, axis.unit, probed))
     return DomainRecheck(
         episodes=settings.domain_flights,
         seed=seed.value,
@@ -240,12 +297,6 @@ def _strengths(
             yield strength
 
 
-def _contradiction(
-    name: str | None, probed: Mapping[str, Any], value: float, unit: str
-) -> str | None:
-    return contradicted(name, value, unit, probed) if probed["bad"] else None
-
-
 def _fewest(episodes: int, rule: Rule) -> int:
     """Fewest successes that do not contradict, with an oracle that always succeeds."""
     least, most = 0, episodes
@@ -255,20 +306,3 @@ def _fewest(episodes: int, rule: Rule) -> int:
         upper = mean_bounds(values, -rule.good_share, 1.0, rule.confidence)["upper95"]
         least, most = (least, middle) if upper > 0 else (middle + 1, most)
     return least
-
-
-def _read(path: Path, policy: Policy) -> SavedShifts:
-    return read_shifts(path, policy.description, policy.state["policy"])
-
-
-def _made(policy: Policy, outputs: Path) -> Iterator[SavedShifts]:
-    """Evaluations of this network and task under `outputs`, newest first."""
-    there = [
-        *outputs.glob("shifts/runs/*/shifts.json"),
-        *outputs.glob("shifts/multiruns/*/*/shifts.json"),
-    ]
-    for path in sorted(there, key=lambda p: p.stat().st_mtime, reverse=True)[:MOST_LOOKED_AT]:
-        try:
-            yield _read(path, policy)
-        except InputError:
-            continue  # of another one

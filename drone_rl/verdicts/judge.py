@@ -22,8 +22,8 @@ from drone_rl.evaluation.verdict_text import quantity_label
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
-from drone_rl.robustness.domain_text import QUOTED, why_not
 from drone_rl.robustness.shifts_file import SavedShifts
+from drone_rl.robustness.shifts_text import QUOTED, why_not
 from drone_rl.utils.display import aligned, interval, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
@@ -31,12 +31,7 @@ from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
 from drone_rl.utils.text import say, seed_line
 from drone_rl.verdicts.certificate import find_claim
-from drone_rl.verdicts.coverage import (
-    Coverage,
-    find_domain,
-    recheck_domain,
-    require,
-)
+from drone_rl.verdicts.coverage import Coverage, find_domain, recheck_domain, require
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,13 +50,12 @@ class Judgement:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values, as in `verdict.json`."""
-        path = None if self.certificate is None else str(self.certificate)
         return {
             "policy": self.name,
-            "certificate": path,
-            "shifts": None if self.measured is None else str(self.measured.path),
+            "certificate": self.certificate and str(self.certificate),
+            "shifts": self.measured and str(self.measured.path),
             "domain": self.domain or None,
-            "required_domain": None if self.coverage is None else self.coverage.as_dict(),
+            "required_domain": self.coverage and dataclasses.asdict(self.coverage),
             **self.verdict.as_dict(),
             **provenance(),
         }
@@ -99,44 +93,26 @@ class Judgement:
 
     def _repr_html_(self) -> str:
         evidence = self.verdict.evidence
-        numbers = [
-            [
-                quantity_label(name, evidence),
-                *(_number(q[key]) for key in ("value", "lower", "upper")),
-            ]
-            for name, q in evidence["quantities"].items()
-        ]
         success = evidence["greedy"]["success"]
-        rate = [_number(success[key]) for key in ("share", "lower95", "upper95")]
-        head = ["quantity", "value", "lower", "upper"]
-        lines = "".join(paragraph(line) for line in str(self).splitlines())
-        return lines + table(head, [["success rate (95% interval)", *rate], *numbers])
+        rate = [success[key] for key in ("share", "lower95", "upper95")]
+        figures = {"success rate (95% interval)": rate} | {
+            quantity_label(name, evidence): [q[key] for key in ("value", "lower", "upper")]
+            for name, q in evidence["quantities"].items()
+        }
+        shown = [[k, *("" if v is None else f"{v:.3f}" for v in row)] for k, row in figures.items()]
+        lines = "".join(map(paragraph, str(self).splitlines()))
+        return lines + table(["quantity", "value", "lower", "upper"], shown)
 
 
-@dataclasses.dataclass(frozen=True)
-class Judgements(Sequence[Judgement]):
+class Judgements(tuple[Judgement, ...]):
     """Several judgements, in the order of the policies."""
 
-    each: tuple[Judgement, ...]
-
-    @overload
-    def __getitem__(self, index: int) -> Judgement: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Judgement]: ...
-
-    def __getitem__(self, index: int | slice) -> Judgement | Sequence[Judgement]:
-        """Return one of them, or some."""
-        return self.each[index]
-
-    def __len__(self) -> int:
-        """Return the number of judgements."""
-        return len(self.each)
+    __slots__ = ()
 
     def rows(self) -> list[list[str]]:
         """Return a table of texts: a heading, then a row for each policy."""
         rows = [["policy", "verdict", "certain", "success rate (95% interval)"]]
-        for one in self.each:
+        for one in self:
             verdict = one.verdict
             success = interval(verdict.evidence["greedy"]["success"], "share")
             certain = "yes" if verdict.certain else "no"
@@ -150,10 +126,6 @@ class Judgements(Sequence[Judgement]):
     def _repr_html_(self) -> str:
         head, *rows = self.rows()
         return table(head, rows)
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.3f}"
 
 
 @overload
@@ -227,7 +199,7 @@ def judge_one(
             task, see `drone_rl.policies.zoo.certificate_path`.
         shifts: Robustness evaluation to quote, see `drone_rl.verdicts.coverage.find_domain`.
         require_domain: File of the required operating domain, see
-            `drone_rl.robustness.requirements.read_requirements`.
+            `drone_rl.verdicts.coverage.read_requirements`.
         outputs: Folder of all runs.
         progress: Called with what is running; a progress bar by default.
         drawn_seed: Seed of a larger analysis of which this is a part.

@@ -8,7 +8,7 @@ import drone_rl
 from benchmarks import domain_axes
 from benchmarks.domain_axes import bench_domain_axes
 from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.requirements import ranges_of
+from drone_rl.robustness.shifts import ranges_of
 from tests.robustness.making import shifts_of
 
 robust = drone_rl.load_policy(domain_axes.POLICY)

@@ -8,8 +8,7 @@ from drone_rl.evaluation.verdict_text import depends_on_rounding
 from drone_rl.explanations.report.explanation import Drawn, Explanation, Part
 from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.robustness import charts
-from drone_rl.robustness.domain_text import QUOTED, is_quoted, untested
-from drone_rl.robustness.shifts_text import rows
+from drone_rl.robustness.shifts_text import QUOTED, is_quoted, rows, untested
 from drone_rl.utils.schema import as_mapping
 from drone_rl.utils.text import Evidence, Sentence, is_fixed, listed, seed_line, seed_of
 

@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from drone_rl.envs.fault_models import FaultModel, dead_rows, late_frames, noise, out_of_focus
-from drone_rl.robustness.faults import FaultPipeline, frozen_frames
+from drone_rl.robustness.perturbations import FaultPipeline, frozen_frames
 
 
 def picture(*values):

@@ -3,8 +3,9 @@ import json
 import pytest
 
 from benchmarks.evidence import SHIFTS, changed
-from drone_rl.robustness.requirements import ranges_of, read_requirements
+from drone_rl.robustness.shifts import ranges_of
 from drone_rl.utils.errors import InputError
+from drone_rl.verdicts.coverage import read_requirements
 
 
 @pytest.fixture

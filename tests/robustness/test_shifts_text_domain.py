@@ -1,7 +1,7 @@
 import pytest
 
 from benchmarks.evidence import SHIFTS, VERDICT, changed
-from drone_rl.robustness.domain_text import (
+from drone_rl.robustness.shifts_text import (
     QUOTED,
     contradicted,
     is_quoted,

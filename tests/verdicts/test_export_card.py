@@ -1,7 +1,8 @@
 """A card shows the figures of the verdict, by hand."""
 
-from drone_rl.verdicts.card import write_card
 from tests.verdicts.test_card_text import CARD, VERDICT
+
+from drone_rl.verdicts.export import write_card
 
 
 def lines(**changed):

@@ -3,7 +3,7 @@
 import pytest
 
 from drone_rl.utils.text import said
-from drone_rl.verdicts.card import SENTENCES
+from drone_rl.verdicts.export import SENTENCES
 
 SHARE = {"mean": 0.9, "lower95": 0.8, "upper95": 1.0}
 NOT_OFFERED = {"mean": None, "lower95": 0.0, "upper95": 1.0}
