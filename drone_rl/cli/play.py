@@ -37,7 +37,7 @@ def run(settings: Command, folder: Path) -> tuple[int, None]:
     policy = policy.in_task(**settings.task)
     policy = policy.in_dynamics(**settings.dynamics) if settings.dynamics else policy
     names = ("greedy", "seed", "device", "renderer", "appearance")
-    chosen = {name: getattr(settings, name) for name in names}
+    chosen = {k: getattr(settings, k) for k in names if getattr(settings, k) is not None}
     if settings.viewer:
         view(policy, **chosen)
     else:

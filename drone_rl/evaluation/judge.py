@@ -9,14 +9,13 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from tensordict.nn import TensorDictModuleBase
-from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.baselines import run_baselines
 from drone_rl.evaluation.metrics import Episodes, failure_table, summarise
 from drone_rl.evaluation.outcomes import Outcomes, Rounding
-from drone_rl.evaluation.rollouts import StepLog, run_episodes
+from drone_rl.evaluation.rollouts import StepLog, base_env, run_episodes
 from drone_rl.evaluation.rounding_sensitivity import check_rounding
 from drone_rl.evaluation.rule import NOT_CERTAIN, Kind, Quantity, Rule, decide, kinds_within
 from drone_rl.evaluation.verdict_text import SENTENCES, is_proved
@@ -71,11 +70,8 @@ def judge_policy(
     actor: TensorDictModuleBase,
     episodes: int,
     *,
-    rule: Rule | None = None,
     sampled: bool = True,
-    claim: Claim | None = None,
-    unlike: Mapping[str, Any] | None = None,
-    seed: RootSeed | None = None,
+    **known: Any,
 ) -> Verdict:
     """Run a policy and the baselines on the same initial states, and apply the rule.
 
@@ -83,16 +79,11 @@ def judge_policy(
         env: A batch of environments.
         actor: The policy.
         episodes: How many of each.
-        rule: Thresholds.
         sampled: Whether to run the policy with sampled actions, too.
-        claim: A certificate of the policy in this task, if there is one.
-        unlike: How the dynamics differ from those that the policy was trained with: setting to
-            "own" and "flown", plain values.
-        seed: Root of the environments' random streams; without it the verdict says that a policy
-            could have been fitted to these environments.
+        known: "rule", "claim", "unlike" and "seed", see `judge`.
     """
-    base: Any = getattr(env, "base_env", env)
-    state, worlds = base.state_dict(), worlds_of(env)
+    base, worlds = base_env(env), worlds_of(env)
+    state = base.state_dict()
     log, drawn = StepLog(), None
     greedy = run_episodes(env, actor, episodes, is_compiled=True, log=log)
     if sampled:
@@ -103,16 +94,7 @@ def judge_policy(
     baselines = run_baselines(
         env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
     )
-    return judge(
-        greedy,
-        baselines,
-        rule=rule,
-        sampled=drawn,
-        claim=claim,
-        unlike=unlike,
-        seed=seed,
-        rounding=rounding,
-    )
+    return judge(greedy, baselines, sampled=drawn, rounding=rounding, **known)
 
 
 def judge_for_selection(
@@ -166,9 +148,11 @@ def judge(
         baselines: Those of each baseline; the k-th starts in the same state as the policy's.
         rule: Thresholds.
         sampled: The policy's episodes with sampled actions, from the same states.
-        claim: See `judge_policy`.
-        unlike: See `judge_policy`.
-        seed: See `judge_policy`.
+        claim: A certificate of the policy in this task, if there is one.
+        unlike: How the dynamics differ from those that the policy was trained with: setting to
+            "own" and "flown", plain values.
+        seed: Root of the environments' random streams; without it the verdict says that a policy
+            could have been fitted to these environments.
         rounding: How rounding can change `greedy`; None if that was not checked.
 
     Raises:
@@ -178,7 +162,9 @@ def judge(
     rule = dataclasses.replace(
         rule or Rule(), strata=task.strata, blind_baselines=task.blind_baselines
     )
-    _check_pairs(greedy, [*baselines.values(), *([] if sampled is None else [sampled])])
+    for other in (*baselines.values(), greedy if sampled is None else sampled):
+        if not torch.equal(other.goals.world, greedy.goals.world):
+            raise ValueError("policy and baselines have different initial states; pair them")
     found = measure(greedy, baselines, rule)
     kind = decide([quantity.level for quantity in found], len(rule.strata))
     certain = is_enough = _is_certain(found, rule)
@@ -201,8 +187,13 @@ def judge(
         "greedy": summarise(greedy),
         "sampled": None if sampled is None else summarise(sampled),
         "baselines": {name: summarise(flown) for name, flown in baselines.items()},
-        "skill": {name: _gain(greedy.share, flown.share) for name, flown in baselines.items()},
-        "drawing": None if sampled is None else _gain(sampled.success, greedy.success),
+        "skill": {
+            name: mean_bounds(greedy.share - flown.share, -1.0, 1.0)
+            for name, flown in baselines.items()
+        },
+        "drawing": None
+        if sampled is None
+        else mean_bounds(sampled.success - greedy.success, -1.0, 1.0),
         "failures": failure_table(greedy),
         "quantities": {name: q._asdict() for name, q in zip(rule.quantities, found, strict=True)},
         "enough": len(greedy) if is_enough else _enough(greedy, baselines, rule),
@@ -216,11 +207,7 @@ def measure(
 ) -> tuple[Quantity, ...]:
     """Return the rule's quantities with intervals that hold all at once.
 
-    Args:
-        greedy: The policy's episodes.
-        baselines: Those of the baselines.
-        rule: Thresholds.
-        times: Count every episode so often, to extrapolate to more episodes.
+    Every episode counts `times` times, to extrapolate to more episodes.
     """
     observed = observe(greedy, baselines, rule)
     return tuple(estimate(i, np.tile(values, times), rule) for i, values in enumerate(observed))
@@ -233,17 +220,10 @@ def widen(
     rule: Rule,
     outcomes: Outcomes,
 ) -> tuple[Quantity, ...]:
-    """Widen the intervals of quantities by all outcomes that rounding leaves possible.
+    """Widen the intervals that `measure` returns by all outcomes that rounding leaves possible.
 
     Lower bounds hold even if every episode has the worst of its possible outcomes for a quantity,
     upper bounds even if each has the best one.
-
-    Args:
-        found: As `measure` returns them.
-        greedy: The policy's episodes.
-        baselines: Those of the baselines.
-        rule: Thresholds.
-        outcomes: Possible outcomes of some episodes.
     """
     observed = _observe_each(greedy, baselines, rule)
     if outcomes.episodes is None:
@@ -261,8 +241,8 @@ def widen(
         is_open = outcomes.is_open.numpy()
         lower[is_open], upper[is_open] = low, high
         least, most = (estimate(i, v[~np.isnan(v)], rule) for v in (lower, upper))
-        bounds = {"lower": min(quantity.lower, least.lower)}
-        widened.append(quantity._replace(**bounds, upper=max(quantity.upper, most.upper)))
+        ends = {"lower": min(quantity.lower, least.lower), "upper": max(quantity.upper, most.upper)}
+        widened.append(quantity._replace(**ends))
     return tuple(widened)
 
 
@@ -270,21 +250,15 @@ def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> 
     """Return each episode's value of each of the rule's quantities.
 
     Returns:
-        One array per quantity, shape (at most n,), float64; those of "collected" have a value for
-        each episode that offered such a cube, the others one for each episode.
+        An array for each quantity, shape (at most n,), float64; those of "collected" have values
+        only for episodes that offered such a cube.
     """
     each = _observe_each(greedy, baselines, rule)
     return [values[~np.isnan(values)] for values in each]
 
 
 def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
-    """Estimate one of the rule's quantities from its values, as `observe` returns them.
-
-    Args:
-        quantity: Its index.
-        values: By episode.
-        rule: Thresholds.
-    """
+    """Estimate the quantity of this index in a rule from its values, see `observe`."""
     name, thresholds = rule.quantities[quantity], rule.thresholds[quantity]
     if name.startswith("offered"):
         share = proportion(int(values.sum()), len(values), rule.confidence)
@@ -322,14 +296,3 @@ def _enough(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> 
         if _is_certain(measure(greedy, baselines, rule, times), rule):
             return times * len(greedy)
     return None
-
-
-def _gain(ours: Tensor, theirs: Tensor) -> dict[str, Any]:
-    """Mean paired difference of two fractions, with its interval."""
-    return mean_bounds(ours - theirs, -1.0, 1.0)
-
-
-def _check_pairs(greedy: Episodes, others: list[Episodes]) -> None:
-    for other in others:
-        if not torch.equal(other.goals.world, greedy.goals.world):
-            raise ValueError("policy and baselines have different initial states; pair them")

@@ -88,10 +88,10 @@ def summarise(episodes: Episodes) -> dict[str, Any]:
     came up ("never_reached") count as missed among all.
     """
     goals, task = episodes.goals, episodes.task
-    shares = {"all": _share(episodes.share, goals.reached.numel())}
+    shares = {"all": {**mean_bounds(episodes.share), "goals": goals.reached.numel()}}
     for number, name in enumerate(task.strata):
-        count = int((goals.stratum == number).sum())
-        shares[name] = _share(episodes.stratum_share(number), count)
+        share, count = episodes.stratum_share(number), int((goals.stratum == number).sum())
+        shares[name] = {**mean_bounds(share), "goals": count}
     ends = {
         reason.name.lower(): proportion(int((episodes.end_reason == reason).sum()), len(episodes))
         for reason in task.ends
@@ -107,10 +107,6 @@ def summarise(episodes: Episodes) -> dict[str, Any]:
         "mean_length": float(episodes.length.double().mean()),
         "max_length": int(episodes.length.max()),
     }
-
-
-def _share(values: Tensor, count: int) -> dict[str, Any]:
-    return {**mean_bounds(values), "goals": count}
 
 
 def failure_table(episodes: Episodes, confidence: float = 0.95) -> dict[str, Any]:

@@ -51,13 +51,8 @@ def run_episodes(
     Environment i samples its episodes from its own random stream, so that the k-th episode has the
     same initial state for every policy.
 
-    Args:
-        env: A batch of environments.
-        actor: The policy.
-        num_episodes: How many; surplus episodes of the last batch are dropped.
-        greedy: Whether to take the most probable action instead of sampling one.
-        is_compiled: Whether to use the fused kernel if it supports the policy.
-        log: Receives the actions, those of surplus episodes included.
+    Arguments are those of `episode_batches`. Surplus episodes of the last batch are dropped; `log`
+    receives their actions, too.
 
     Returns:
         The episodes, on the CPU.
@@ -178,11 +173,6 @@ def find_failures(
 def base_env(env: EnvBase) -> Any:
     """Return the environment below all transforms."""
     return getattr(env, "base_env", env)
-
-
-def env_state(env: EnvBase) -> dict[str, Any]:
-    """Return the random streams from which the next episodes follow."""
-    return base_env(env).state_dict()
 
 
 def first_difference(one: Tensor, other: Tensor) -> int | None:

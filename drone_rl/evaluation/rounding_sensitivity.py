@@ -23,7 +23,6 @@ from drone_rl.evaluation.outcomes import (
 from drone_rl.evaluation.rollouts import (
     StepLog,
     base_env,
-    env_state,
     episode_batches,
     final_episodes,
     first_difference,
@@ -74,28 +73,23 @@ def run_compared(
     Raises:
         InputError: See `check_rounding`.
     """
-    state, log = env_state(env), StepLog()
+    state, log = base_env(env).state_dict(), StepLog()
     episodes = run_episodes(env, actor, num_episodes, log=log)
     base_env(env).load_state_dict(state)
     return episodes, compare_implementations(env, actor, flown=episodes, log=log)
 
 
-def require_function(
-    policy: Pilot, *, seed: int, device: str = "cpu", renderer: str = "raytrace"
-) -> None:
+def require_function(policy: Pilot, **how: Any) -> None:
     """Check that a third-party policy acts by the current frame only.
 
     Args:
         policy: Any; policies of this package act so by construction.
-        seed: Root of the environments' random streams.
-        device: Where to run.
-        renderer: Name of the renderer.
+        how: Seed, device and renderer of the environments, see `Pilot.flying`.
 
     Raises:
         InputError: Its actions depend on the batch, on a frame's row, or on earlier calls.
     """
     if isinstance(policy, ForeignPolicy):
-        how = {"seed": seed, "device": device, "renderer": renderer}
         with policy.flying(_CHECKED_EPISODES, **how) as (env, actor):
             run_compared(env, actor, _CHECKED_EPISODES)
 
@@ -128,7 +122,7 @@ def check_rounding(
         return None
     decide, is_bound = decider(network)
     arithmetic, is_exact = arithmetic_on(worlds_of(env).device)
-    episodes, before = min(episodes, len(flown)), env_state(env)
+    episodes, before = min(episodes, len(flown)), base_env(env).state_dict()
     checked, again = _run_checked(env, decide, network, episodes)
     # implementations of flight dynamics round differently, so frames are not the same
     is_counted = isinstance(network.actions, DiscreteActions) and isinstance(
@@ -150,7 +144,7 @@ def check_rounding(
         is_bound=is_bound and is_counted and is_exact,
         frames=sum(map(len, checked.fragile)),
         fragile=int(sum(f.sum() for f in checked.fragile)),
-        is_fragile=torch.tensor([bool(f.any()) for f in checked.fragile]),
+        is_fragile=checked.is_fragile,
         outcomes=checked.outcomes(),
         compared=compared,
         compared_episodes=count,
@@ -176,7 +170,7 @@ def compare_implementations(
     Raises:
         InputError: See `check_rounding`.
     """
-    state, count = env_state(env), min(COMPARED, len(flown))
+    state, count = base_env(env).state_dict(), min(COMPARED, len(flown))
     found = check_rounding(env, actor, count, flown=flown, log=log)
     if found is None:
         return None
@@ -249,22 +243,25 @@ class _Checked:
     episodes: Episodes
     fragile: list[Tensor]
     """By episode, which frames are fragile. Shapes: (T,), bool."""
-    followed: list[tuple[int, Outcomes, Tensor]]
-    """By batch: its first episode, the outcomes of its fragile ones, and which these are."""
-    are_followed: bool
-    """Whether the outcomes can be enumerated at all."""
+    followed: list[tuple[int, Outcomes, Tensor]] | None
+    """By batch: its first episode, the outcomes of its fragile ones, and which these are. None if
+    they cannot be enumerated."""
 
     def explains(self, episode: int, step: int) -> bool:
         """Whether a frame was fragile up to that step."""
         return bool(self.fragile[episode][: step + 1].any())
 
+    @property
+    def is_fragile(self) -> Tensor:
+        """Episodes with a fragile frame. Shape: (n,), bool."""
+        return torch.tensor([bool(f.any()) for f in self.fragile])
+
     def outcomes(self) -> Outcomes:
         """Possible outcomes of all episodes."""
-        is_fragile = torch.tensor([bool(f.any()) for f in self.fragile])
         nobody = torch.empty(0, dtype=torch.int64)
-        if not self.are_followed:
-            return Outcomes(None, nobody, is_fragile)
-        is_open = torch.zeros_like(is_fragile)
+        if self.followed is None:
+            return Outcomes(None, nobody, self.is_fragile)
+        is_open = torch.zeros_like(self.is_fragile)
         ends, owners = [], []
         for first, found, worlds in self.followed:
             is_open[first + worlds] = found.is_open
@@ -283,7 +280,7 @@ def _run_checked(
     renderer = DirectRenderer.try_create(env, ("pixels",), ())
     is_counted = isinstance(network.actions, DiscreteActions)
     fragile, followed, log, finals, first = [], [], StepLog(), [], 0
-    before, actor = env_state(env), _CheckingActor(decide, network)
+    before, actor = base_env(env).state_dict(), _CheckingActor(decide, network)
     for batch in episode_batches(env, actor, episodes, ("fragile",), log=log):
         lengths = [len(a) for a in log.actions[first:]]
         fragile += cast(Tensor, batch["fragile"]).cpu().split(lengths)
@@ -300,8 +297,9 @@ def _run_checked(
                 found = _run_second_best(env, contrary, before, fragile[first:], worlds)
             followed.append((first, found, worlds))
         first += len(lengths)
-        before = env_state(env)
-    return _Checked(Episodes.joined(finals), fragile, followed, is_counted), log.actions
+        before = base_env(env).state_dict()
+    followed = followed if is_counted else None
+    return _Checked(Episodes.joined(finals), fragile, followed), log.actions
 
 
 def _run_second_best(
@@ -314,16 +312,10 @@ def _run_second_best(
     """Run a batch again with the second best action in fragile frames.
 
     For policies whose observations cannot be rendered from a state alone. The two rollouts are all
-    that an episode can become if each has a single fragile frame, the same one.
-
-    Args:
-        env: Its random streams are restored.
-        actor: Takes the second best action where two are possible.
-        before: Random streams at the start of the batch.
-        fragile: Fragile frames of each episode of the batch.
-        worlds: Episodes that have any. Shape: (k,).
+    that an episode can become if each has a single fragile frame, the same one. `before` has the
+    random streams at the start of the batch, `worlds` the episodes with fragile frames.
     """
-    after, log = env_state(env), StepLog()
+    after, log = base_env(env).state_dict(), StepLog()
     base_env(env).load_state_dict(before)
     (batch,) = episode_batches(env, actor, len(fragile), ("fragile",), log=log)
     base_env(env).load_state_dict(after)
@@ -346,15 +338,8 @@ def _run_regrouped(
 def _require_function_of_frames(
     env: EnvBase, network: PictureNetwork, log: StepLog, checked: _Checked
 ) -> None:
-    """Check that a third-party network acts by the frame alone.
-
-    Episodes of one batch are run again one frame at a time and in mixed batches; then frames are
-    evaluated in batches of many sizes.
-
-    Raises:
-        InputError: It does not.
-    """
-    before, frames = env_state(env), torch.empty(0)
+    """Check that a third-party network acts by the frame alone, in batches of any size."""
+    before, frames = base_env(env).state_dict(), torch.empty(0)
     count = min(ALONE, len(checked.fragile))
     for groups, how in (("single", "one frame at a time"), ("mixed", "in other batches")):
         base_env(env).load_state_dict(before)

@@ -9,11 +9,11 @@ import dataclasses
 import enum
 import functools
 import itertools
-import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Real
 
 NOT_CERTAIN = 13
 """Exit code if the episodes are too few to be certain of the kind."""
@@ -21,7 +21,7 @@ NOT_PROVED = 16
 """Exit code if a proof for every placement is required and no certificate gives it."""
 NOT_COVERED = 17
 """Exit code if an operating domain is required in which the policy was not found to be good."""
-_TRIVIAL_CODE = 18
+_FRACTION = Real(0.0, 1.0, is_above=True, is_below=True)
 
 
 class Kind(enum.StrEnum):
@@ -38,7 +38,7 @@ class Kind(enum.StrEnum):
     @property
     def exit_code(self) -> int:
         """0 for good; 10 poor, 11 one-sided, 12 none of these, 18 good, but trivial."""
-        codes = {Kind.GOOD: 0, Kind.POOR: 10, Kind.NONE: 12, Kind.TRIVIAL: _TRIVIAL_CODE}
+        codes = {Kind.GOOD: 0, Kind.POOR: 10, Kind.NONE: 12, Kind.TRIVIAL: 18}
         return codes.get(self, 11)
 
     @property
@@ -94,14 +94,8 @@ class Rule:
     def __post_init__(self) -> None:
         """Refuse thresholds that no policy could meet or miss."""
         for field in dataclasses.fields(self):
-            if field.type is not float:
-                continue
-            value = getattr(self, field.name)
-            is_number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not is_number or not math.isfinite(value) or not 0 < value < 1:
-                raise InputError(
-                    f"{field.name}={value} is out of range; give a share above 0 and below 1"
-                )
+            if field.type is float:
+                _FRACTION.read(getattr(self, field.name), field.name)
         if self.other_share > self.side_share:
             raise InputError(
                 f"other_share={self.other_share} must not exceed side_share={self.side_share}"
@@ -121,17 +115,16 @@ class Rule:
     @property
     def thresholds(self) -> tuple[tuple[float, ...], ...]:
         """Thresholds of each of `quantities`, in rising order."""
-        shares = [(self.other_share, self.side_share)] * len(self.strata)
-        offered = [(self.offered_share,)] * len(self.strata)
-        return ((0.0,), *offered, *shares, *[(0.0,)] * (2 * len(self.blind_baselines)))
+        offered, shares = (self.offered_share,), (self.other_share, self.side_share)
+        count, blind = len(self.strata), 2 * len(self.blind_baselines)
+        return ((0.0,), *[offered] * count, *[shares] * count, *[(0.0,)] * blind)
 
     @property
     def ranges(self) -> tuple[tuple[float, float], ...]:
         """Least and greatest value of each of `quantities` in an episode."""
-        count = len(self.strata)
-        above = [(-1.0, 1.0)] * len(self.blind_baselines)
-        unsolved = [(-1.0, self.good_share)] * len(self.blind_baselines)
-        return ((-self.good_share, 1.0), *[(0.0, 1.0)] * (2 * count), *above, *unsolved)
+        shares, good = [(0.0, 1.0)] * (2 * len(self.strata)), self.good_share
+        blind = len(self.blind_baselines)
+        return ((-good, 1.0), *shares, *[(-1.0, 1.0)] * blind, *[(-1.0, good)] * blind)
 
     @property
     def confidence(self) -> float:

@@ -1,5 +1,6 @@
 """Sentences of a verdict. Evidence: `verdict.json`."""
 
+from collections.abc import Callable
 from typing import Any
 
 from drone_rl.sim.vocabulary import terms_of
@@ -115,12 +116,12 @@ def _every(evidence: Evidence) -> str:
 
 def best_baseline(evidence: Evidence) -> str:
     """Return the random or constant baseline that collects most."""
-    flown = evidence["baselines"]
-    return max(_blind(evidence), key=lambda name: flown[name]["shares"]["all"]["mean"])
+    return _best(evidence, lambda flown: flown["shares"]["all"]["mean"])
 
 
-def _blind(evidence: Evidence) -> list[str]:
-    return [name for name in evidence["baselines"] if name != "oracle"]
+def _best(evidence: Evidence, figure: Callable[[Evidence], float]) -> str:
+    blind = {name: f for name, f in evidence["baselines"].items() if name != "oracle"}
+    return max(blind, key=lambda name: figure(blind[name]))
 
 
 def _acting(baseline: str) -> str:
@@ -143,11 +144,11 @@ def _lost_side(evidence: Evidence) -> str:
 def _looks(evidence: Evidence) -> str:
     if lost := _lost_side(evidence):
         return f"blind to {lost}"
-    others = {
+    kind = str(evidence["kind"])
+    return {
         "none of these": "neither good nor poor nor one-sided",
         "good, but trivial": "good in a trivial task",
-    }
-    return others.get(str(evidence["kind"]), str(evidence["kind"]))
+    }.get(kind, kind)
 
 
 def _kind(evidence: Evidence) -> str:
@@ -171,9 +172,7 @@ def _trivial(evidence: Evidence) -> str:
 
 
 def _most_successful(evidence: Evidence) -> str:
-    """The random or constant baseline that succeeds most often."""
-    flown = evidence["baselines"]
-    return max(_blind(evidence), key=lambda name: flown[name]["success"]["share"])
+    return _best(evidence, lambda flown: flown["success"]["share"])
 
 
 def _no_better(evidence: Evidence) -> str:
@@ -239,7 +238,7 @@ def _baselines(evidence: Evidence) -> str:
 
 def _is_trivial(evidence: Evidence) -> bool:
     flown = evidence["baselines"]
-    best = max(flown[name]["success"]["share"] for name in _blind(evidence))
+    best = flown[_most_successful(evidence)]["success"]["share"]
     return best > 0 and best >= evidence["good_share"] * flown["oracle"]["success"]["share"]
 
 

@@ -17,7 +17,6 @@ from torch import Tensor
 from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from drone_rl.config import AppearanceSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import instruments
 from drone_rl.policies.policy import Policy
@@ -61,10 +60,7 @@ def film(
     episodes: int,
     *,
     greedy: bool = True,
-    seed: int = 0,
-    device: str = "cpu",
-    renderer: str = "raytrace",
-    appearance: AppearanceSettings | None = None,
+    **how: Any,
 ) -> list[Path]:
     """Write videos of a policy in held-out environments, one MP4 and one GIF per episode.
 
@@ -73,17 +69,14 @@ def film(
         folder: Where the files go.
         episodes: How many.
         greedy: Whether to take the most probable action instead of sampling one.
-        seed: Root of the environments' random streams.
-        device: Where to run.
-        renderer: Name of the renderer, see `drone_rl.sim.rendering.find_renderer`.
-        appearance: Appearance of the scenes; as in the policy's training by default.
+        how: "seed", "device", "renderer" and "appearance" of the environments, see
+            `Policy.make_env`.
 
     Returns:
         The files.
     """
     files: list[Path] = []
-    look: dict[str, Any] = {} if appearance is None else {"appearance": appearance}
-    with policy.flying(1, seed=seed, device=device, renderer=renderer, **look) as (env, actor):
+    with policy.flying(1, **how) as (env, actor):
         for episode in range(episodes):
             frames = list(film_episode(env, actor, greedy=greedy))
             files += write_video(frames, folder / f"episode_{episode}")
@@ -97,11 +90,9 @@ def view(
     *,
     greedy: bool = True,
     seed: int = 0,
-    device: str = "cpu",
-    renderer: str = "raytrace",
-    appearance: AppearanceSettings | None = None,
+    **how: Any,
 ) -> None:
-    """Open dm_control's viewer on the composer task, controlled by a policy.
+    """Open dm_control's viewer on the composer task, controlled by a policy; see `film`.
 
     The viewer shows the dm_control simulation; observations are rendered as in training.
 
@@ -113,8 +104,7 @@ def view(
     import dm_env
     from dm_control import viewer
 
-    look: dict[str, Any] = {} if appearance is None else {"appearance": appearance}
-    env = policy.make_env(1, seed=seed, device=device, renderer=renderer, **look)
+    env = policy.make_env(1, seed=seed, **how)
     base = cast(DroneEnv, env.base_env)
     actor, worlds = policy.make_actor(env, seed=seed), base.worlds
     shown = make_environment(
@@ -230,10 +220,8 @@ def _panel(worlds: Worlds) -> Image.Image | None:
     body, dynamics = worlds.state.body, worlds.dynamics
     if not (isinstance(body, FlightState) and isinstance(dynamics, Quadrotor)):
         return None
-    settings = dynamics.settings
-    return instruments.panel(
-        instruments.read(body), settings.velocity_limit, settings.hover_throttle
-    )
+    reading, settings = instruments.read(body), dynamics.settings
+    return instruments.panel(reading, settings.velocity_limit, settings.hover_throttle)
 
 
 def _compose(
@@ -247,10 +235,8 @@ def _compose(
     draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(16)
     canvas.paste(Image.fromarray(seen.outside.cpu().numpy()), (0, 0))
     inside = Image.fromarray(seen.inside.cpu().numpy())
-    size = (
-        INSET_WIDTH,
-        max(1, min(CHASE_HEIGHT // 2, INSET_WIDTH * inside.height // inside.width)),
-    )
+    height = INSET_WIDTH * inside.height // inside.width
+    size = (INSET_WIDTH, max(1, min(CHASE_HEIGHT // 2, height)))
     draw.rectangle((12, 12, 17 + size[0], 41 + size[1]), _BACKGROUND)
     draw.text((20, 16), "what the policy sees", _TEXT, font)
     canvas.paste(inside.resize(size, Image.Resampling.NEAREST), (15, 39))

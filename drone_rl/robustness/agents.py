@@ -71,14 +71,7 @@ class PolicyAgent:
         *,
         examines_rounding: bool = False,
     ) -> None:
-        """Take the policy.
-
-        Args:
-            network: The policy's.
-            transforms: Of its observations.
-            num_worlds: Number of environments.
-            examines_rounding: Whether to find the episodes in which rounding can change an action.
-        """
+        """Take a policy's network and transforms; `examines_rounding` fills `is_fragile`."""
         self.is_fragile = torch.zeros(num_worlds, dtype=torch.bool)
         """Episodes with a frame in which rounding can change the action. Shape: (num_worlds,)."""
         self._decide = decider(network)[0] if examines_rounding else None

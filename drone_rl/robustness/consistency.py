@@ -23,18 +23,14 @@ _REMEDY = "run drone-rl shifts again"
 
 
 def check_counts(numbers: Mapping[str, Any], task: Task[Any]) -> None:
-    """Check the figures of all conditions.
-
-    Args:
-        numbers: As in `shifts.json`, of the right types.
-        task: Of the episodes.
+    """Check the figures of all conditions of `shifts.json`, of episodes of a task.
 
     Raises:
         InputError: A count, a rate, an interval or an area contradicts another one.
     """
     settings, plain = numbers["settings"], numbers["plain"]
     _refuse(_wrong_oracle(plain["oracle"], settings["episodes"]), "plain")
-    _refuse(_wrong_figures(plain, plain, settings["episodes"], task), "plain")
+    _refuse(next(_problems(plain, plain, settings["episodes"], task), None), "plain")
     for name, along in numbers["axes"].items():
         where = f"axes.{name}"
         if [level["number"] for level in along["levels"]] != [*settings["strengths"]]:
@@ -49,11 +45,11 @@ def check_counts(numbers: Mapping[str, Any], task: Task[Any]) -> None:
 
 
 def check_range(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[str, Any]) -> None:
-    """Check that a range follows from the strengths that the search tries.
+    """Check that a range of `domain.ranges` follows from the strengths that the search tries.
 
     Args:
-        axis: Which, with the policy's own neutral strength.
-        found: Of `domain.ranges`.
+        axis: With the policy's own neutral strength.
+        found: The range.
         of: The policy's description.
         numbers: As in `shifts.json`.
 
@@ -73,12 +69,7 @@ def check_range(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[
 
 
 def check_probe(found: Mapping[str, Any], episodes: int, where: str) -> None:
-    """Check the result at one strength.
-
-    Args:
-        found: "good", "bad", "success", and "oracle" with "impossible" where a side ends.
-        episodes: Of the search.
-        where: For the message.
+    """Check the result of a search with so many episodes at one strength.
 
     Raises:
         InputError: It contradicts itself.
@@ -116,16 +107,11 @@ def _wrong_level(
         return ".impossible does not follow from its oracle"
     episodes = settings["episodes"]
     problems = (
-        _wrong_figures(figures, numbers["plain"], episodes, task)
+        problem
         for figures in level["modes"].values()
+        for problem in _problems(figures, numbers["plain"], episodes, task)
     )
-    return _wrong_oracle(oracle, episodes) or next(filter(None, problems), None)
-
-
-def _wrong_figures(
-    figures: Mapping[str, Any], plain: Mapping[str, Any], episodes: int, task: Task[Any]
-) -> str | None:
-    return next(_problems(figures, plain, episodes, task), None)
+    return _wrong_oracle(oracle, episodes) or next(problems, None)
 
 
 def _problems(
@@ -190,15 +176,11 @@ def _is_end(axis: Axis, found: Mapping[str, Any], end: str, sign: int, of: Any, 
     left = {at["position"]: at["good"] for at in found["flown"] if sign * at["position"] > 0}
 
     def is_good(strength: float, _: float) -> bool:
-        where = [at for at in left if _is_same(at, axis.position(strength))]
-        return left.pop(where[0]) if where else missing()
-
-    def missing() -> bool:
-        raise InputError("a strength is missing")
+        return left.pop(next(at for at in left if _is_same(at, axis.position(strength))))
 
     try:
         walked = walk(axis, sign, seed, is_good)
-    except InputError:
+    except StopIteration:  # a strength is missing
         return False
     limits: dict[int, float] = dict(zip((-1, 1), found["positions"], strict=True))
     failed = [at["value"] for at in found["failed"] if at["end"] == end]

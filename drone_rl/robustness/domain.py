@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import torch
-from torch import Tensor
 
 from drone_rl.evaluation.judge import measure, widen
 from drone_rl.evaluation.metrics import Episodes
@@ -104,7 +103,7 @@ class Prober:
             oracle: Episodes of the task's oracle without perturbation.
             good_share: See `Rule`.
             possible_share: See `Suite`.
-            plain_part: Part of the axis's error for the test without perturbation.
+            plain_part: Part of the axis's error that this test may use.
         """
         task = oracle.task
         self._evaluator, self._oracle, self._possible = evaluator, oracle, possible_share
@@ -138,14 +137,16 @@ class Prober:
             key = self._evaluator.settings(condition)
         except InputError as error:
             return {"good": False, "bad": True, "refused": str(error)}
-        flown, is_fragile = self._fly(condition)
+        subject, count = self._evaluator.subject, self._evaluator.episodes
+        agent = PolicyAgent(subject.network, subject.transforms, count, examines_rounding=True)
+        flown = self._evaluator.run(condition, agent=agent).episodes
         if key not in self._baselines:  # appearance does not affect these baselines
             self._baselines[key] = self._evaluator.run_baselines(condition)
         rule = self.rule_at(part)
         baselines = {**self._baselines[key], "oracle": self._oracle}
-        found = dict(
-            zip(rule.quantities, _measure(flown, baselines, rule, is_fragile), strict=True)
-        )
+        unknown = Outcomes(None, torch.empty(0, dtype=torch.int64), agent.is_fragile)
+        widened = widen(measure(flown, baselines, rule), flown, baselines, rule, unknown)
+        found = dict(zip(rule.quantities, widened, strict=True))
         return {
             "good": is_surely_good(found, rule),
             "bad": Kind.GOOD not in _kinds(found, rule),
@@ -153,12 +154,6 @@ class Prober:
             "success": float(flown.success.mean()),
             "worst": _worst(found, rule),
         }
-
-    def _fly(self, condition: Condition) -> tuple[Episodes, Tensor]:
-        """Run the policy; also returns which episodes depend on rounding, (n,), bool."""
-        subject, count = self._evaluator.subject, self._evaluator.episodes
-        agent = PolicyAgent(subject.network, subject.transforms, count, examines_rounding=True)
-        return self._evaluator.run(condition, agent=agent).episodes, agent.is_fragile
 
     def search(self, axis: Axis) -> dict[str, Any]:
         """Find the widest range of an axis.
@@ -195,13 +190,11 @@ class Prober:
             for end in ends.values()
             for strength, good in end.flown
         )
+        opens = {f"{n}_open": e.failed is None if e.flown else None for n, e in ends.items()}
         return {
             **{name: self._value(axis, end.limit) for name, end in ends.items()},
+            **opens,
             "positions": sorted(axis.position(end.limit) for end in ends.values()),
-            **{
-                f"{name}_open": end.failed is None if end.flown else None
-                for name, end in ends.items()
-            },
             "failed": failed,
             "flown": [{"position": p, "value": v, "good": good} for p, v, good in flown],
         }
@@ -219,21 +212,8 @@ class Prober:
         return finite(axis.value(strength, self._evaluator.subject))
 
 
-def _measure(
-    flown: Episodes, baselines: Mapping[str, Episodes], rule: Rule, is_fragile: Tensor
-) -> tuple[Quantity, ...]:
-    """The rule's quantities, with unknown outcomes of the fragile episodes."""
-    unknown = Outcomes(None, torch.empty(0, dtype=torch.int64), is_fragile)
-    return widen(measure(flown, baselines, rule), flown, baselines, rule, unknown)
-
-
 def is_surely_good(found: Mapping[str, Quantity], rule: Rule) -> bool:
-    """Return whether the verdict is certainly good and certainly above all baselines.
-
-    Args:
-        found: The rule's quantities by name, in its order.
-        rule: With the probability of error.
-    """
+    """Return whether the verdict is certainly good and certainly above all baselines."""
     sees = all(found[f"above {name}"].levels[0] > 0 for name in rule.blind_baselines)
     return sees and _kinds(found, rule) == {Kind.GOOD}
 

@@ -74,13 +74,7 @@ class PairedEvaluator:
     """Runs agents under conditions; episode i starts in the same state under each of them."""
 
     def __init__(self, subject: PolicySpec, episodes: int, seed: int = 0) -> None:
-        """Sample the initial states.
-
-        Args:
-            subject: The policy to evaluate.
-            episodes: Number of environments, one episode each.
-            seed: Root of the random streams.
-        """
+        """Sample the initial states of so many environments, one episode each."""
         self.subject, self.episodes, self.seed = subject, episodes, seed
         task = as_task(subject.task)
         streams = [world_random_state(seed, i, Stream.SHIFTED) for i in range(episodes)]
@@ -213,20 +207,12 @@ class _Stage:
         own = looks.drawn(active) if looks.varies else self._own
         if self._full is not None:
             own = self._full if own is None else own.over(self._full)
-        appearance = _change(condition, own, variation)
+        appearance = own
+        for part, by in zip((*condition.looks, *condition.mounts), variation, strict=True):
+            appearance = part.change(appearance or Appearance(), by)
         if self._distractors is not None:
             things = task_things(self._evaluator.subject.task)
             places = self._distractors[active, : condition.clutter]
             appearance = clutter(appearance, things, places)
         poses = self.worlds.poses(state, appearance)
         return StepContext(self.worlds, state, active, poses, appearance, self._faults, pending)
-
-
-def _change(
-    condition: Condition, appearance: Appearance | None, variation: Sequence[Tensor]
-) -> Appearance | None:
-    """Apply the changes of colours, light and camera pose."""
-    changes = (*condition.looks, *condition.mounts)
-    for change, by in zip(changes, variation, strict=True):
-        appearance = change.change(appearance or Appearance(), by)
-    return appearance

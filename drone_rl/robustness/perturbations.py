@@ -229,11 +229,6 @@ def as_bright(color: Sequence[float]) -> tuple[float, ...]:
 def sample_distractors(things: Things, num_worlds: int, generator: torch.Generator) -> Tensor:
     """Sample positions of distractors next to the area of the task.
 
-    Args:
-        things: Of the task.
-        num_worlds: Number of environments.
-        generator: Samples them.
-
     Returns:
         Metres, world frame. Shape: (num_worlds, MOST, 3), float64.
     """
@@ -247,10 +242,7 @@ def sample_distractors(things: Things, num_worlds: int, generator: torch.Generat
 def clutter(appearance: Appearance | None, things: Things, places: Tensor) -> Appearance:
     """Add distractors of the size, height and luminance of the task's objects.
 
-    Args:
-        appearance: As in the model by default.
-        things: Of the task.
-        places: Metres, world frame. Shape: (num_worlds, count, 3).
+    Their places are in metres, world frame. Shape: (num_worlds, count, 3).
     """
     color = torch.tensor(as_bright(things.color)).to(places)
     more = Distractors(
@@ -283,13 +275,9 @@ class FaultPipeline:
     def __init__(
         self, faults: Sequence[FaultModel], num_worlds: int, seed: int, *, hiding_only: bool = False
     ) -> None:
-        """Take the faults.
+        """Take faults in the order in which they act; each has a random stream of its own.
 
-        Args:
-            faults: In the order in which they act; each has a random stream of its own.
-            num_worlds: Number of environments in all.
-            seed: Root of the streams.
-            hiding_only: Whether to leave out faults that hide nothing.
+        `hiding_only` leaves out those that hide nothing.
         """
         self._num_worlds = num_worlds
         self._faults = [

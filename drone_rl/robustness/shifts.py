@@ -83,20 +83,17 @@ class Shifts:
 
     def __str__(self) -> str:
         """Return the table and the sentences."""
-        said = f"{self.sentence}{self._unlike}"
-        return "\n".join([aligned(rows(self.numbers)), said, seed_line(self.numbers)])
+        return "\n".join([aligned(rows(self.numbers)), *self._notes()])
 
     def _repr_html_(self) -> str:
         head, *lines = rows(self.numbers)
-        said = paragraph(self.sentence + self._unlike)
-        seed = paragraph(seed_line(self.numbers))
-        return table(head, lines) + said + seed + picture(chart(self.numbers))
+        notes = "".join(map(paragraph, self._notes()))
+        return table(head, lines) + notes + picture(chart(self.numbers))
 
-    @property
-    def _unlike(self) -> str:
-        """How the dynamics differ from the policy's own, if they do."""
+    def _notes(self) -> tuple[str, str]:
         unlike = self.policy.unlike
-        return f" {say_unlike({'unlike': unlike})}" if unlike else ""
+        other = f" {say_unlike({'unlike': unlike})}" if unlike else ""
+        return f"{self.sentence}{other}", seed_line(self.numbers)
 
 
 def shifts(
@@ -134,7 +131,14 @@ def shifts(
     axes = find_axes(settings.axes, subject)
     total = len(axes) * (len(settings.strengths) + settings.domain) + 1
     done = itertools.count()
-    found = _fly(subject, axes, settings, seed, lambda text: progress(text, next(done), total))
+
+    def tell(text: str) -> None:
+        progress(text, next(done), total)
+
+    with closing(PairedEvaluator(subject, settings.episodes, seed.value)) as evaluator:
+        suite = Suite(evaluator, [Mode(mode) for mode in settings.modes], settings.possible_share)
+        found = suite.run(axes, settings.strengths, tell)
+    domain = _domain(subject, axes, settings, seed, tell) if settings.domain else None
     with closing(PairedEvaluator(subject, 1, seed.value)) as filmed:
         pictures = {axis.name: make_strip(filmed, axis) for axis in axes}
     progress("flown", total, total)
@@ -147,6 +151,7 @@ def shifts(
         **seed.as_dict(),
         "terms": as_task(subject.task).vocabulary.as_dict(),
         **found,
+        "domain": domain,
         "seconds": time.perf_counter() - begin,
     }
     return Shifts(pilot, settings, numbers, pictures)
@@ -162,43 +167,24 @@ def ranges_of(numbers: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     }
 
 
-def _fly(
+def _domain(
     subject: PolicySpec,
     axes: Sequence[Axis],
     settings: ShiftSettings,
     seed: RootSeed,
     tell: Callable[[str], None],
 ) -> dict[str, Any]:
-    """The results of the suite, and "domain", None if that is not wanted."""
-    with closing(PairedEvaluator(subject, settings.episodes, seed.value)) as evaluator:
-        suite = Suite(evaluator, [Mode(mode) for mode in settings.modes], settings.possible_share)
-        found = suite.run(axes, settings.strengths, tell)
-    if not settings.domain:
-        return {**found, "domain": None}
-    with closing(PairedEvaluator(subject, settings.domain_episodes, seed.value)) as wide:
-        return {**found, "domain": _domain(wide, axes, settings, tell)}
-
-
-def _domain(
-    evaluator: PairedEvaluator,
-    axes: Sequence[Axis],
-    settings: ShiftSettings,
-    tell: Callable[[str], None],
-) -> dict[str, Any]:
-    """The operating domain: "plain", and "ranges" by axis.
-
-    Raises:
-        InputError: The task has no oracle.
-    """
-    task = as_task(evaluator.subject.task)
+    """The operating domain: "plain", and "ranges" by axis."""
+    task = as_task(subject.task)
     if task.oracle is None:
         raise InputError(f"task={task.name} has no oracle to compare with; give domain=false")
-    oracle = evaluator.run(Condition(), agent=OracleAgent(looks=False)).episodes
-    prober = Prober(evaluator, oracle, settings.good_share, settings.possible_share)
     ranges: dict[str, Any] = {}
-    for axis in axes:
-        tell(f"range of {axis.name}")
-        ranges[axis.name] = prober.search(axis)
+    with closing(PairedEvaluator(subject, settings.domain_episodes, seed.value)) as evaluator:
+        oracle = evaluator.run(Condition(), agent=OracleAgent(looks=False)).episodes
+        prober = Prober(evaluator, oracle, settings.good_share, settings.possible_share)
+        for axis in axes:
+            tell(f"range of {axis.name}")
+            ranges[axis.name] = prober.search(axis)
     return {"plain": prober.plain, "ranges": ranges}
 
 
@@ -230,14 +216,5 @@ def make_policy_spec(pilot: Pilot, settings: ShiftSettings) -> PolicySpec:
     network = pilot.make_network(settings.device).eval()
     described = getattr(pilot, "description", None)  # of policies from files
     look = MINIMAL if described is None else described.appearance
-    return PolicySpec(
-        network,
-        task,
-        camera,
-        transforms,
-        look,
-        settings.device,
-        settings.renderer,
-        pilot.dynamics,
-        pilot.actions,
-    )
+    where, moved = (settings.device, settings.renderer), (pilot.dynamics, pilot.actions)
+    return PolicySpec(network, task, camera, transforms, look, *where, *moved)

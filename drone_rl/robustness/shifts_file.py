@@ -106,31 +106,22 @@ def read_shifts(
     return SavedShifts(path, {**numbers, "file": {"path": str(path), "dated": when}}, shown)
 
 
-class _Named:
-    """Mapping from given names to values of a kind."""
+@dataclasses.dataclass(frozen=True)
+class _Each:
+    """Mapping from names to values of a kind."""
 
-    def __init__(self, names: Any, kind: Kind) -> None:
-        self._names, self._kind = OneOf(tuple(names)), kind
+    kind: Kind
+    names: tuple[str, ...] | None = None
+    """Allowed names; any short ones by default."""
 
     def read(self, value: Any, where: str) -> dict[str, Any]:
         """See `drone_rl.utils.schema.Kind`."""
         given = as_mapping(value, where)
-        return {
-            self._names.read(key, f"a name in {where}"): self._kind.read(item, f"{where}.{key}")
-            for key, item in given.items()
-        }
-
-
-class _Each:
-    """Mapping from any short names to values of a kind."""
-
-    def __init__(self, kind: Kind) -> None:
-        self._kind = kind
-
-    def read(self, value: Any, where: str) -> dict[str, Any]:
-        """See `drone_rl.utils.schema.Kind`."""
-        given = Plain(most=1000).read(as_mapping(value, where), where)
-        return {str(key): self._kind.read(item, f"{where}.{key}") for key, item in given.items()}
+        if self.names is None:
+            Plain(most=1000).read(given, where)
+        for key in given if self.names is not None else ():
+            OneOf(self.names).read(key, f"a name in {where}")
+        return {key: self.kind.read(item, f"{where}.{key}") for key, item in given.items()}
 
 
 class _Counted:
@@ -139,17 +130,15 @@ class _Counted:
     def read(self, value: Any, where: str) -> dict[str, Any]:
         """See `drone_rl.utils.schema.Kind`."""
         read = _SHARE.read(value, where)
-        if read["successes"] > read["trials"]:
-            raise InputError(f"{where}.share is not what was counted; run drone-rl shifts again")
-        right = proportion(read["successes"], read["trials"])
+        successes, trials = read["successes"], read["trials"]
+        right = proportion(successes, trials) if successes <= trials else {"share": math.nan}
         if read["share"] != right["share"]:
             raise InputError(f"{where}.share is not what was counted; run drone-rl shifts again")
         for end in ("lower95", "upper95"):
             if not math.isclose(read[end], right[end], rel_tol=CLOSE, abs_tol=CLOSE):
                 raise InputError(
-                    f"{where}.{end}={read[end]} is not the interval's end of "
-                    f"{read['successes']} of {read['trials']}, {right[end]:.6g}; run drone-rl "
-                    "shifts again"
+                    f"{where}.{end}={read[end]} is not the interval's end of {successes} of "
+                    f"{trials}, {right[end]:.6g}; run drone-rl shifts again"
                 )
         return read
 
@@ -175,7 +164,7 @@ _FLOWN = {
     "refused": Maybe(Text()),
     "oracle": Maybe(_Counted()),
     "impossible": Maybe(Flag()),
-    "modes": _Named(MODES, Record(_FIGURES)),
+    "modes": _Each(Record(_FIGURES), MODES),
 }
 _LEVEL = Record({"number": Whole(1, 5), "value": _ANY, "position": _ANY, **_FLOWN})
 _AXIS = Record(
@@ -183,7 +172,7 @@ _AXIS = Record(
         "group": OneOf(GROUPS),
         "unit": Text(),
         "neutral": Maybe(_ANY),
-        "areas": _Named(MODES, Maybe(_PART)),
+        "areas": _Each(Maybe(_PART), MODES),
         "levels": Several(_LEVEL, 1, 5),
     }
 )
@@ -196,15 +185,9 @@ _PROBE: dict[str, Kind] = {
     "worst": Maybe(_WORST),
 }
 _UNLESS_REFUSED = frozenset({"success", "worst"})
+_END = {"end": OneOf(("low", "high")), "value": Maybe(_ANY)}
 _FAILED = Record(
-    {
-        "end": OneOf(("low", "high")),
-        "value": Maybe(_ANY),
-        "oracle": Maybe(_Counted()),
-        "impossible": Flag(),
-        **_PROBE,
-    },
-    optional=_UNLESS_REFUSED,
+    {**_END, "oracle": Maybe(_Counted()), "impossible": Flag(), **_PROBE}, optional=_UNLESS_REFUSED
 )
 _RANGE = Record(
     {
@@ -217,6 +200,8 @@ _RANGE = Record(
         "flown": Several(Record({"position": _ANY, "value": Maybe(_ANY), "good": Flag()}), 0, 100),
     }
 )
+_PLAIN = Record(_PROBE, optional=_UNLESS_REFUSED)
+_DOMAIN = Record({"plain": _PLAIN, "ranges": _Each(_RANGE, tuple(AXES))})
 _PARTS = ("appearance", "dynamics", "actions", "camera", "transforms", "network")
 _ORIGIN = {"versions": _FREE, "git_revision": _FREE, "machine": _FREE}
 _WHOLE = Record(
@@ -230,16 +215,9 @@ _WHOLE = Record(
         "seed_is_fixed": Flag(),
         "terms": Plain(),
         "plain": Record({"oracle": Maybe(_Counted()), **_FIGURES}),
-        "axes": _Named(AXES, _AXIS),
+        "axes": _Each(_AXIS, tuple(AXES)),
         "together": Record(_FLOWN),
-        "domain": Maybe(
-            Record(
-                {
-                    "plain": Record(_PROBE, optional=_UNLESS_REFUSED),
-                    "ranges": _Named(AXES, _RANGE),
-                }
-            )
-        ),
+        "domain": Maybe(_DOMAIN),
         "seconds": Real(0.0),
         **_ORIGIN,
     },

@@ -1,6 +1,7 @@
 """Measure success rates along every axis, paired with those without perturbation."""
 
 import base64
+import dataclasses
 import functools
 import math
 import zlib
@@ -32,23 +33,16 @@ class Suite:
     ) -> None:
         """Run both without perturbation.
 
-        Args:
-            evaluator: Runs the episodes.
-            modes: When conditions are active; CONSTANT is one of them.
-            possible_share: Success rate of the oracle below which a strength is impossible.
+        A strength is impossible if the oracle's success rate is below `possible_share`.
         """
         self._evaluator, self._modes, self._possible = evaluator, modes, possible_share
         self.plain = evaluator.run(Condition())
         self._knows = has_oracle(self.plain.episodes.task)
+        self.oracle: ConditionResult | None = None
         self.oracle = self._fly_oracle(Condition()) if self._knows else None
 
     def run(self, axes: Sequence[Axis], numbers: Iterable[int], tell: Report) -> dict[str, Any]:
-        """Measure all axes, one at a time and combined.
-
-        Args:
-            axes: Which.
-            numbers: Which of their strengths, from 1.
-            tell: Called with what is running.
+        """Measure axes at strengths of these numbers (from 1), one at a time and combined.
 
         Returns:
             Plain values: "plain", without perturbation, "axes" by name, and "together", all at
@@ -67,10 +61,8 @@ class Suite:
         for number in numbers:
             strength = axis.strengths[number - 1]
             tell(f"{axis.name} {number}")
-            value = axis.value(strength, subject)
-            found = self.level(axis.make(strength, subject))
-            position = axis.position(strength)
-            levels.append({"number": number, "value": value, "position": position, **found})
+            at = {"value": axis.value(strength, subject), "position": axis.position(strength)}
+            levels.append({"number": number, **at, **self.level(axis.make(strength, subject))})
         plain = float(self.plain.episodes.success.mean())
         return {
             "group": axis.group,
@@ -108,14 +100,8 @@ class Suite:
     def _fly_oracle(self, condition: Condition) -> ConditionResult:
         """Run the oracle, which light, colours and noise do not affect."""
         faults = tuple(fault for fault in condition.faults if fault.hides)
-        differs = (
-            condition.task
-            or condition.camera
-            or condition.mounts
-            or condition.delay
-            or condition.clutter
-        )
-        if not (differs or faults) and hasattr(self, "oracle") and self.oracle is not None:
+        kept = dataclasses.replace(condition, looks=(), faults=faults)
+        if kept == Condition() and self.oracle is not None:
             return self.oracle
         return self._evaluator.run(condition, agent=OracleAgent())
 
@@ -157,11 +143,7 @@ class FrameRecorder:
 
 
 def make_strip(evaluator: PairedEvaluator, axis: Axis) -> list[NDArray | None]:
-    """Record the camera without perturbation and at each strength of an axis.
-
-    Args:
-        evaluator: Of one environment.
-        axis: Which.
+    """Record the camera of one environment without perturbation and at each strength of an axis.
 
     Returns:
         Shapes: (H, W, 3), uint8; None where task or camera do not allow a strength.
@@ -185,11 +167,7 @@ def finite(value: float) -> float | None:
 
 
 def mcnemar(before: Tensor, after: Tensor) -> dict[str, Any]:
-    """Return McNemar's exact test of paired successes.
-
-    Args:
-        before: 1 for success, else 0. Shape: (n,).
-        after: The same.
+    """Return McNemar's exact test of paired successes, 1 or 0. Shapes: (n,).
 
     Returns:
         "lost": pairs with success only before, "gained": only after; "p": the p-value.

@@ -98,8 +98,7 @@ def find_claim(
     *,
     flights: int = JudgeSettings.certificate_flights,
     seed: RootSeed | None = None,
-    device: str = "cpu",
-    renderer: str = "raytrace",
+    **flying: Any,
 ) -> Claim | None:
     """Find and check the certificate of a policy, see `checker.read_validated`.
 
@@ -109,8 +108,7 @@ def find_claim(
             to the policy, see `drone_rl.policies.zoo.certificate_path`.
         flights: Rollouts that re-check it from other placements; 0 for none.
         seed: Root of the random stream of these placements; a fresh one by default.
-        device: Where to run them.
-        renderer: Name of the renderer.
+        flying: "device" and "renderer", see `drone_rl.verification.checker.check_certificate`.
 
     Returns:
         None if there is none. An invalid one next to the policy is returned as refused.
@@ -132,7 +130,7 @@ def find_claim(
     if given is None and not path.is_file():
         return None
     try:
-        return _try(policy, path, flights, seed=seed, device=device, renderer=renderer)
+        return _try(policy, path, flights, seed or root_seed(None), **flying)
     except InputError as error:
         if given is not None:
             raise
@@ -172,14 +170,11 @@ def _placements(episodes: Episodes) -> NDArray[np.float64]:
     return places[..., 1].double().numpy()
 
 
-def _try(
-    policy: Policy, path: Path, flights: int, *, seed: RootSeed | None, **flying: Any
-) -> Claim:
+def _try(policy: Policy, path: Path, flights: int, seed: RootSeed, **flying: Any) -> Claim:
     weights = policy.state["policy"]
     certificate = read_validated(path, policy.description, weights)
     if not flights:
         return Claim(path, certificate)
-    seed = seed or root_seed(None)
     found = check_certificate(certificate, weights, flights=flights, seed=seed.value, **flying)
     if not found.accepted:
         raise InputError(f"certificate {path} does not hold: {found.lines()[0]}; prove again")

@@ -132,7 +132,6 @@ def _looped(pilot: Pilot, settings: BodiesSettings, seed: RootSeed) -> dict[str,
 
 
 def _check_names(names: list[str]) -> None:
-    """Refuse no names and duplicate names."""
     if not names:
         raise InputError("policies=[] names nobody; give a policy or more")
     for name in names:

@@ -9,7 +9,6 @@ import drone_rl
 from drone_rl.evaluation.rollouts import (
     StepLog,
     base_env,
-    env_state,
     episode_batches,
     final_episodes,
     first_difference,
@@ -59,7 +58,7 @@ def test_episodes_of_the_same_streams_are_those_of_an_evaluation(is_compiled, im
     """Of 4 environments, 6 episodes: two batches, of four and of two."""
     policy, log = drone_rl.load_policy("good"), StepLog()
     with policy.flying(4, seed=3) as (env, actor):
-        before = env_state(env)
+        before = base_env(env).state_dict()
         flown = run_episodes(env, actor, 6)
         base_env(env).load_state_dict(before)
         batches = episode_batches(env, actor, 6, is_compiled=is_compiled, log=log)

@@ -64,14 +64,9 @@ def _mark(axis: Axes, numbers: Mapping[str, Any]) -> None:
         axis.axvline(y, color="white", ls=(0, (5, 4)), lw=1.6)
         axis.axvline(y, color="#1d2026", ls=(0, (5, 4)), lw=0.8, label=label)
     axis.plot(0, 0, "^", color="#1d2026", ms=11, clip_on=False, ls="", label="camera, looking up")
-    axis.plot(
-        numbers["least_gap_left"], numbers["least_gap_ahead"], "o", ms=11, mfc="none", mew=2,
-        color="white", ls="",
-    )  # fmt: skip
-    axis.plot(
-        numbers["least_gap_left"], numbers["least_gap_ahead"], "o", ms=11, mfc="none", mew=1,
-        color="#1d2026", ls="", label="logits closest",
-    )  # fmt: skip
+    at = numbers["least_gap_left"], numbers["least_gap_ahead"]
+    for color, width, label in (("white", 2, None), ("#1d2026", 1, "logits closest")):
+        axis.plot(*at, "o", ms=11, mfc="none", mew=width, color=color, ls="", label=label)
 
 
 def svg(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: ShownActions) -> str:
@@ -90,11 +85,10 @@ def svg(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: ShownA
         'fill-opacity=".7"/></pattern></defs>',
     ]
     for label, ways in _ways(arrays).items():
-        is_action = label < len(names.names)
-        fill = names.css(label) if is_action else "url(#unseen)"
-        title = escape(f"goes {names.names[label]}") if is_action else ""
-        inner = f"<title>{title}</title>" if title else ""
-        style = "" if is_action else ' pointer-events="none"'
+        fill, style, inner = "url(#unseen)", ' pointer-events="none"', ""
+        if label < len(names.names):
+            fill, style = names.css(label), ""
+            inner = f"<title>{escape(f'goes {names.names[label]}')}</title>"
         parts.append(
             f'<path fill="{fill}" fill-opacity=".85" fill-rule="evenodd"{style} '
             f'd="{"".join(map(_way, ways))}">{inner}</path>'
