@@ -66,7 +66,7 @@ class Axis:
     """Five, weakest first; on both sides of the neutral one if the axis has two ends."""
     make: Callable[[float, PolicySpec], Condition]
     """The condition of a strength; raises InputError if it is not for the task."""
-    value: Callable[[float, PolicySpec], float]
+    value: Callable[[float, PolicySpec], float] = lambda strength, _: strength
     """A strength in the axis's unit; differs where strengths are relative to the policy."""
     own: Callable[[PolicySpec], float] | None = None
     """The neutral strength of a policy, if it is not the same for all."""

@@ -114,7 +114,7 @@ def strips(
         pictures: By axis, without perturbation and at each strength. Shapes: (H, W, 3).
     """
     rows = [_strip(name, numbers["axes"][name], shown) for name, shown in pictures.items()]
-    return stacked(rows, gap=6)
+    return stacked(rows, gap=0)
 
 
 def _strip(name: str, along: Mapping[str, Any], pictures: Sequence[NDArray | None]) -> Image.Image:
@@ -127,7 +127,7 @@ def _strip(name: str, along: Mapping[str, Any], pictures: Sequence[NDArray | Non
             cells.append(titled(enlarge(picture, _SCALE), _caption(by_number[number], along)))
     strip = gridded(cells, len(cells), gap=8)
     height = strip.height
-    canvas = Image.new("RGB", (_LABEL + 6 * (cells[0].width + 8), height), BACKGROUND)
+    canvas = Image.new("RGB", (_LABEL + 6 * (cells[0].width + 8), height + 6), BACKGROUND)
     canvas.paste(strip, (_LABEL, 0))
     pen = ImageDraw.Draw(canvas)
     pen.multiline_text((4, height // 2 - 16), NAMES[name], INK, ImageFont.load_default(15))

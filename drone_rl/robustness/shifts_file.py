@@ -119,8 +119,9 @@ class _Each:
         given = as_mapping(value, where)
         if self.names is None:
             Plain(most=1000).read(given, where)
-        for key in given if self.names is not None else ():
-            OneOf(self.names).read(key, f"a name in {where}")
+        else:
+            for key in given:
+                OneOf(self.names).read(key, f"a name in {where}")
         return {key: self.kind.read(item, f"{where}.{key}") for key, item in given.items()}
 
 

@@ -123,7 +123,7 @@ def test_every_kind_can_be_given():
 
 @pytest.mark.parametrize("value", [0.0, 1.0, -1, float("nan"), "much", True])
 def test_shares_out_of_range(value):
-    with pytest.raises(InputError, match=f"good_share={value}"):
+    with pytest.raises(InputError, match=f"good_share={value!r}"):
         Rule(good_share=value)
 
 

@@ -1,6 +1,6 @@
 """A card shows the figures of the verdict, by hand."""
 
-from tests.verdicts.test_card_text import CARD, VERDICT
+from tests.verdicts.test_export_card_text import CARD, VERDICT
 
 from drone_rl.verdicts.export import write_card
 
