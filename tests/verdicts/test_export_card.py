@@ -1,8 +1,7 @@
 """A card shows the figures of the verdict, by hand."""
 
-from tests.verdicts.test_export_card_text import CARD, VERDICT
-
 from drone_rl.verdicts.export import write_card
+from tests.verdicts.test_export_card_text import CARD, VERDICT
 
 
 def lines(**changed):

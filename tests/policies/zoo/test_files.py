@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 import torch
 from safetensors.torch import save
-from tests.verdicts.test_card_text import VERDICT
 
 from drone_rl.policies.zoo import (
     card_path,
@@ -23,6 +22,7 @@ from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.export import export_policy
 from tests.policies.zoo.test_description import DEFAULT
+from tests.verdicts.test_export_card_text import VERDICT
 
 DESCRIPTION = {
     **DEFAULT,
