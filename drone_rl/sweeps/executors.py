@@ -35,7 +35,7 @@ class RunProcess:
 
     def __init__(self, run: Run) -> None:
         """Take a run; the first `poll` starts it."""
-        self.run = run
+        self.run, self._log = run, run.folder / "output.log"
         self._process: subprocess.Popen | None = None
 
     def poll(self) -> int | None:
@@ -80,10 +80,6 @@ class RunProcess:
                 env={**os.environ, **THREADS},
                 start_new_session=True,  # Ctrl-C goes to the sweep, which stops its runs
             )
-
-    @property
-    def _log(self) -> Path:
-        return self.run.folder / "output.log"
 
 
 def note_failure(run: Run, error: str) -> None:

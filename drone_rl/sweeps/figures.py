@@ -44,11 +44,6 @@ class Layout:
     panels: dict[str, list[Group]]
     """Groups by the values of the other settings."""
 
-    @property
-    def groups(self) -> list[Group]:
-        """The groups of all panels."""
-        return [group for groups in self.panels.values() for group in groups]
-
 
 def lay_out(groups: Sequence[Group]) -> Layout:
     """Put the learning rate, or else the last swept setting, on the x axis."""
@@ -111,18 +106,14 @@ def _curves(axes: Axes, layout: Layout, groups: list[Group]) -> None:
         label = _literal(group.choice.get(layout.axis or "", "all runs"))
         band = median_band(values)
         if band is None:
-            axes.plot(grid, values.T, color=color, linewidth=0.8, label=[label, *_no_label(values)])
+            labels = [label, *["_"] * (len(values) - 1)]  # legends omit a leading underscore
+            axes.plot(grid, values.T, color=color, linewidth=0.8, label=labels)
         else:
             axes.plot(grid, np.median(values, axis=0), color=color, label=label)
             axes.fill_between(grid, *band, color=color, alpha=0.2, linewidth=0)
     axes.set(xlabel="frames", ylabel="running mean, share of cubes", ylim=(0, 1))
     if axes.get_legend_handles_labels()[0]:
         axes.legend(title=_literal(layout.axis or ""), fontsize=7, title_fontsize=7)
-
-
-def _no_label(values: NDArray) -> list[str]:
-    """Labels of all lines but the first; legends omit a leading underscore."""
-    return ["_"] * (len(values) - 1)
 
 
 def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
@@ -165,9 +156,9 @@ def _dots(
         rows = [(y, row) for y, row in judged if y is not None]
         heights = np.round([y for y, _ in rows], 1)
         for level in np.unique(heights):
-            beside = [row for row, height in zip(rows, heights, strict=True) if height == level]
-            for i, (y, row) in enumerate(sorted(beside, key=lambda r: KINDS.index(r[1].kind))):
-                shift = 0.05 * (i - (len(beside) - 1) / 2)
+            close = [row for row, height in zip(rows, heights, strict=True) if height == level]
+            for i, (y, row) in enumerate(sorted(close, key=lambda r: KINDS.index(r[1].kind))):
+                shift = 0.05 * (i - (len(close) - 1) / 2)
                 x = _aside(axes, np.array([place]), shift, places)
                 fill = "full" if row.is_certain else "none"
                 axes.plot(x, [y], "o", markersize=4, color=COLORS[str(row.kind)], fillstyle=fill)
@@ -207,8 +198,8 @@ def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
             fontsize=7,
         )
         note.set_in_layout(False)
-    frames = [row.frames for group in layout.groups for row in group.known]
-    top = max(frames, default=0.0) or 1.0  # the panels share the axis
+    every = [group for panel in layout.panels.values() for group in panel]  # they share the axis
+    top = max((row.frames for group in every for row in group.known), default=0.0) or 1.0
     axes.set(ylabel="frames to solve", ylim=(0, 1.2 * top))
 
 
@@ -244,11 +235,11 @@ def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:
 def _labels(axes: Axes, places: Sequence[float], names: Sequence[str]) -> list[str]:
     """Return tick labels; a label that would overlap the previous one is empty."""
     at = np.log(places) if axes.get_xscale() == "log" else np.asarray(places)
-    room = np.ptp(at) / MOST_LABELS
+    least = np.ptp(at) / MOST_LABELS
     labels: list[str] = [""] * len(names)
     last = -np.inf
     for i in np.argsort(at, kind="stable"):
-        if at[i] - last >= room and at[i] > last:
+        if at[i] - last >= least and at[i] > last:
             labels[int(i)], last = _literal(names[int(i)]), at[i]
     return labels
 

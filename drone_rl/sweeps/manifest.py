@@ -196,36 +196,24 @@ def open_sweep(
     folder.mkdir(parents=True, exist_ok=True)
     refuse_links(folder)
     if not (folder / "sweep.json").exists():
-        _refuse_strangers(folder)
+        if stranger := next(folder.glob("*/run.yaml"), None):
+            raise InputError(
+                f"hydra.sweep.dir={folder} holds other runs ({stranger.parent.name}); "
+                "choose another folder"
+            )
         sweep = Sweep(folder, shlex.join(command), dict(settings), list(runs))
     else:
         sweep = read_sweep(folder)
-        _check_same_runs(sweep, runs)
+        known = {run.number: run.overrides for run in sweep.runs}
+        if any(known.get(run.number, run.overrides) != run.overrides for run in runs):
+            raise InputError(
+                f"hydra.sweep.dir={folder} holds another sweep, begun by: {sweep.command}; "
+                "choose another folder, or give that command to resume it"
+            )
         check_same_config(sweep.settings, json.loads(json.dumps(settings)), MAY_CHANGE)
-        known = {run.number for run in sweep.runs}
         sweep.runs += [run for run in runs if run.number not in known]
     sweep.save()
     return sweep
-
-
-def _refuse_strangers(folder: Path) -> None:
-    """Refuse a folder with runs but no sweep.json."""
-    stranger = next(folder.glob("*/run.yaml"), None)
-    if stranger is not None:
-        raise InputError(
-            f"hydra.sweep.dir={folder} holds other runs ({stranger.parent.name}); "
-            "choose another folder"
-        )
-
-
-def _check_same_runs(sweep: Sweep, runs: Sequence[Run]) -> None:
-    before = {run.number: run.overrides for run in sweep.runs}
-    for run in runs:
-        if before.get(run.number, run.overrides) != run.overrides:
-            raise InputError(
-                f"hydra.sweep.dir={sweep.folder} holds another sweep, begun by: {sweep.command}; "
-                "choose another folder, or give that command to resume it"
-            )
 
 
 _ELSEWHERE = ("hydra.", "hydra/", "paths.", "+hydra", "-")

@@ -155,9 +155,8 @@ def judge_run(
                 f"{folder}/checkpoints/last.pt is of frame {progress['frames']}, result.json of "
                 f"frame {result.get('frames')}; resume with: drone-rl train resume={folder}"
             )
-        write_atomically(
-            folder / "result.json", json.dumps({**result, "verdict": verdict}, indent=2)
-        )
+        content = json.dumps({**result, "verdict": verdict}, indent=2)
+        write_atomically(folder / "result.json", content)
     return verdict
 
 
@@ -191,14 +190,11 @@ def _plots(groups: Sequence[Group], sentences: Mapping[str, str]) -> list[dict[s
     layout, plots = figures.lay_out(groups), []
     for name, (title, *_) in figures.PLOTS.items():
         if name in ("curves", "costs") or any(row.kind for row in known):
-            light, dark = map(_data_uri, figures.draw(layout, name))
+            images = (base64.b64encode(png).decode() for png in figures.draw(layout, name))
+            light, dark = (f"data:image/png;base64,{image}" for image in images)
             text = _paragraph(sentences, f"{name}.")
             plots.append({"title": title, "text": text, "light": light, "dark": dark})
     return plots
-
-
-def _data_uri(png: bytes) -> str:
-    return f"data:image/png;base64,{base64.b64encode(png).decode()}"
 
 
 def _paragraph(sentences: Mapping[str, str], part: str) -> str:

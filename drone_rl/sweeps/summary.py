@@ -22,7 +22,6 @@ from drone_rl.utils.text import said
 STATES = ("finished", "failed", "damaged", "unfinished")
 FAILED = "failed"
 """Pseudo-verdict of a failed run, in addition to `KINDS`."""
-_SEED = "seed"
 _NEVER = float("inf")
 
 
@@ -31,12 +30,14 @@ def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> dict[str, Any]:
     states = [row.state for row in rows]
     judged = [row.verdict for row in rows if row.verdict is not None]
     older = sum(row.has_older_verdict for row in rows)
+    keys = ("reason", "frames", "episodes", "seconds", "running_reward")
+    figures = [tuple(row.result[key] for key in keys) for row in rows if row.state == "finished"]
     judge_arguments = (f"folder={_path_argument(sweep.folder)}", "judge=true")
     summary = {
         "command": sweep.command,
         "judge_command": shlex.join(["drone-rl", "sweep-report", *judge_arguments]),
         **{name: states.count(name) for name in STATES},
-        "copies": count_copies(rows),
+        "copies": len(figures) - len(set(figures)),  # seconds are measured to a nanosecond
         "judged": len(judged),
         "certain": sum(verdict["certain"] for verdict in judged),
         "judged_by_older_rule": older,
@@ -73,16 +74,6 @@ def best_rows(rows: Sequence[Row]) -> list[Row]:
     """
     judged = [row for row in rows if row.verdict is not None]
     return sorted(judged, key=lambda row: (-(row.share("all") or 0.0), row.frames))
-
-
-def count_copies(rows: Sequence[Row]) -> int:
-    """Count finished runs whose figures are those of an earlier run.
-
-    Seconds are measured to a nanosecond, so that no two trainings have the same.
-    """
-    keys = ("reason", "frames", "episodes", "seconds", "running_reward")
-    figures = [tuple(row.result[key] for key in keys) for row in rows if row.state == "finished"]
-    return len(figures) - len(set(figures))
 
 
 def to_csv(rows: Sequence[Row]) -> str:
@@ -178,7 +169,7 @@ def make_groups(rows: Sequence[Row]) -> list[Group]:
     """Group runs that differ in their seed only, in the order of their first run."""
     groups: dict[tuple, Group] = {}
     for row in rows:
-        choice = {key: value for key, value in row.choice.items() if key != _SEED}
+        choice = {key: value for key, value in row.choice.items() if key != "seed"}
         groups.setdefault(tuple(choice.items()), Group(choice, [])).rows.append(row)
     return list(groups.values())
 

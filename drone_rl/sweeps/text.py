@@ -68,14 +68,10 @@ def entropies(summary: Evidence) -> int:
 
 
 def _if_any(name: str, condition: str, number: Callable[[Evidence], int], text: str) -> Sentence:
-    """Return a sentence that is said if a number is positive.
+    """Return a sentence that is included if a number is positive.
 
-    Args:
-        name: Name of the sentence.
-        condition: The condition in English.
-        number: The number, from the evidence.
-        text: Format string of {e}, the evidence; {n}, the number; {runs}, such as "3 runs"; and
-            {settings}, the number of settings.
+    Its text formats {e}, the evidence; {n}, the number; {runs}, such as "3 runs"; and {settings},
+    the number of settings.
     """
 
     def fill(e: Evidence) -> str:

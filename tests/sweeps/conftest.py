@@ -21,6 +21,11 @@ with (folder / "starts").open("a") as file:
 (folder / "checkpoints").mkdir(exist_ok=True)
 (folder / "checkpoints" / "last.pt").touch()
 time.sleep(float(arguments.get("sleep", 0)))
+begin = time.monotonic()
+while "until" in arguments and not (folder.parent / arguments["until"] / "starts").exists():
+    time.sleep(0.01)
+    if time.monotonic() - begin > 120:
+        sys.exit("error: the other run never started")
 if arguments.get("fail") == "true":
     sys.exit("error: fail=true is a mistake")
 (folder / "result.json").write_text(json.dumps({"reason": "solved", "running_reward": 1.0}))

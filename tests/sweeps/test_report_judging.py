@@ -1,6 +1,7 @@
 """Each run keeps the verdict on its last policy."""
 
 import json
+import shutil
 
 import pytest
 
@@ -12,10 +13,15 @@ from drone_rl.utils.seeding import RootSeed
 from tests.training.test_train import TINY
 
 
+@pytest.fixture(scope="module")
+def training(tmp_path_factory):
+    return drone_rl.train(TINY, folder=tmp_path_factory.mktemp("run"), progress=silent).folder
+
+
 @pytest.fixture
-def trained(tmp_path):
+def trained(training, tmp_path):
     """The folder of a training that was not judged."""
-    return drone_rl.train(TINY, folder=tmp_path / "run", progress=silent).folder
+    return shutil.copytree(training, tmp_path / "run")
 
 
 def test_a_run_keeps_its_verdict_beside_its_result(trained):
