@@ -232,7 +232,12 @@ class MavlinkBridge:
         with contextlib.ExitStack() as stack:
             stack.callback(self.link.close)
             self.link.accept(self.connect_within)
-            self._wait_for_heartbeat()
+            end = time.monotonic() + self.connect_within
+            while self._heard < 0.0:
+                if time.monotonic() > end:
+                    raise FlightControllerError(f"no heartbeat in {self.connect_within:g} seconds")
+                self._beat()
+                self._receive(0.05)
             stack.pop_all()
         return self
 
@@ -276,14 +281,6 @@ class MavlinkBridge:
                 self.missed += self._began
                 return
             self._receive(min(left, 0.05))
-
-    def _wait_for_heartbeat(self) -> None:
-        end = time.monotonic() + self.connect_within
-        while self._heard < 0.0:
-            if time.monotonic() > end:
-                raise FlightControllerError(f"no heartbeat in {self.connect_within:g} seconds")
-            self._beat()
-            self._receive(0.05)
 
     def _beat(self) -> None:
         now = time.monotonic()

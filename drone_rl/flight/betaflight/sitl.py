@@ -114,6 +114,8 @@ class Betaflight:
         """
         self.program = list(program)
         self.folder = folder
+        self.log = folder / "firmware.log"
+        """The firmware's output."""
         self.isolated = isolated
         self.patience = patience
         self.answer_within = answer_within
@@ -125,11 +127,6 @@ class Betaflight:
         self._next_sticks = -np.inf
         self._heard = 0.0
         self._open = contextlib.ExitStack()
-
-    @property
-    def log(self) -> Path:
-        """The firmware's log file."""
-        return self.folder / "firmware.log"
 
     def __enter__(self) -> Self:
         """Start the firmware; set it up first if the folder has no settings.

@@ -195,17 +195,13 @@ class FlightFuture:
         """Simulated seconds since the command started."""
         self._wait = wait
         self._success: bool | None = None
-        self._is_cancelled = False
+        self.cancelled = False
+        """Whether another command replaced this one."""
 
     @property
     def done(self) -> bool:
         """Whether the command has ended, successfully or not."""
         return self._success is not None
-
-    @property
-    def cancelled(self) -> bool:
-        """Whether another command replaced this one."""
-        return self._is_cancelled
 
     def result(self) -> bool:
         """Advance simulated time until the command ends; return whether it succeeded in time."""
@@ -220,7 +216,7 @@ class FlightFuture:
     def cancel(self) -> None:
         """Mark the command as cancelled, unless it has ended."""
         if not self.done:
-            self._is_cancelled, self._success = True, False
+            self.cancelled, self._success = True, False
 
     def __repr__(self) -> str:
         """Return the name and the status."""

@@ -1,6 +1,7 @@
 """A simulated drone with its clock, arming, sensors, cameras and running command."""
 
 import copy
+import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any, Self
@@ -29,6 +30,7 @@ from drone_rl.sim.image_types import ImageRequest, images
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks import State
 from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
 
@@ -87,6 +89,8 @@ class Drone:
             if obstacles is None:
                 obstacles = worlds.task.obstacles(worlds.state)
         self._quadrotor = _quadrotor(dynamics, changes)
+        self.settings = self._quadrotor.settings
+        """Vehicle and wind."""
         x, y = checks.numbers(start, "start", 2, -checks.FARTHEST, checks.FARTHEST)
         place = [[x, y, self.settings.radius]]
         half = 0.5 * math.radians(checks.real(yaw, "yaw", unit="degrees"))
@@ -126,10 +130,18 @@ class Drone:
         """Cancel the running command."""
         self.cancel()
 
-    @property
-    def settings(self) -> DynamicsSettings:
-        """Vehicle and wind."""
-        return self._quadrotor.settings
+    def _repr_html_(self) -> str:
+        state = self.state
+        angles, contact = dataclasses.astuple(state.attitude), state.collision
+        rows = {
+            "time": f"{state.time:.2f} s",
+            "state": f"{state.landed}, {'armed' if state.armed else 'disarmed'}",
+            "position": "{:.2f}, {:.2f}, {:.2f} m".format(*state.position),
+            "velocity": "{:.2f}, {:.2f}, {:.2f} m/s".format(*state.velocity),
+            "roll, pitch, yaw": "{:.1f}, {:.1f}, {:.1f} degrees".format(*angles),
+            "last contact": f"{contact.thing}, {contact.time:.2f} s" if contact else "none",
+        }
+        return table(["drone", ""], list(rows.items()))
 
     @property
     def time(self) -> float:

@@ -153,13 +153,10 @@ class Sensors:
             settings: Rates, latencies and noise.
             seed: Seed of the noise.
         """
+        self.settings = settings
+        """Rates, latencies and noise."""
         self._suite = SensorSuite(settings, seed=seed)
         self._state = self._suite.start(body)
-
-    @property
-    def settings(self) -> SensorSettings:
-        """Rates, latencies and noise."""
-        return self._suite.settings
 
     @property
     def time(self) -> float:

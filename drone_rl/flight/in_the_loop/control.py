@@ -8,10 +8,9 @@ import dataclasses
 import math
 
 import numpy as np
-from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.in_the_loop.instruments import Readings, Vector
+from drone_rl.flight.in_the_loop.instruments import Readings, Vector, first_row
 from drone_rl.sim.dynamics import Goals, Mode
 from drone_rl.sim.dynamics.control import HEADING, Y, Z
 from drone_rl.utils.errors import InputError
@@ -153,7 +152,7 @@ def setpoint_of(
     if sideways not in _SIDEWAYS or heading not in _HEADINGS or height not in _HEIGHTS:
         names = ", ".join(mode.name.lower() for mode in goals.modes)
         raise InputError(f"modes={names} are no setpoint; give velocities or positions")
-    values, drifts = _first_row(goals.values), _first_row(goals.drifts)
+    values, drifts = first_row(goals.values), first_row(goals.drifts)
     wanted = values + drifts * since
     to_place = velocity_to(wanted[[0, Y, Z]], readings, settings)
     x, y = float(values[0]), float(values[Y])
@@ -168,10 +167,6 @@ def setpoint_of(
     if heading is Mode.RATE:
         return Setpoint(velocity, readings.heading, yaw_rate=float(wanted[HEADING]))
     return Setpoint(velocity, float(wanted[HEADING]))
-
-
-def _first_row(values: Tensor) -> Vector:
-    return values[0].detach().cpu().double().numpy()
 
 
 def _channel(share: float) -> int:

@@ -73,14 +73,14 @@ def measure(before: BodyState, after: BodyState, seconds: float, time: float) ->
         seconds: Length of the interval.
         time: Time of its end, seconds.
     """
-    position, velocity, attitude = map(_first, (after.position, after.velocity, after.attitude))
-    acceleration = (velocity - _first(before.velocity)) / seconds
+    position, velocity, attitude = map(first_row, (after.position, after.velocity, after.attitude))
+    acceleration = (velocity - first_row(before.velocity)) / seconds
     return Readings(
         time=time,
         position=position,
         velocity=velocity,
         attitude=attitude,
-        rates=rotation_between(_first(before.attitude), attitude) / seconds,
+        rates=rotation_between(first_row(before.attitude), attitude) / seconds,
         force=into_body(attitude, acceleration + np.array([0.0, 0.0, GRAVITY])),
     )
 
@@ -113,5 +113,6 @@ def into_body(attitude: Vector, vector: Vector) -> Vector:
     return vector + attitude[0] * twice + np.cross(axis, twice)
 
 
-def _first(values: torch.Tensor) -> Vector:
+def first_row(values: torch.Tensor) -> Vector:
+    """Convert the first row of a batch to NumPy, float64."""
     return values[0].detach().cpu().numpy().astype(np.float64)

@@ -63,3 +63,21 @@ def test_time_goes_on_for_a_lost_drone(drone):
 def test_ticks(drone):
     assert drone._ticks_of(0.3) == 100
     assert drone._ticks_of(0.301) == 101
+
+
+def test_a_notebook_shows_the_state_as_a_table(drone):
+    shown = drone._repr_html_()
+    for text in (
+        "0.00 s",
+        "landed, disarmed",
+        "1.00, 2.00, 0.30 m",
+        "0.00, 0.00, 0.00 m/s",
+        "0.0, 0.0, 90.0 degrees",
+        "none",
+    ):
+        assert f"<td>{text}</td>" in shown
+    drone.arm()
+    drone.advance(0.1)
+    shown = drone._repr_html_()
+    assert "landed, armed" in shown
+    assert f"<td>ground, {drone.state.collision.time:.2f} s</td>" in shown
