@@ -103,19 +103,15 @@ class VisualEntity(composer.Entity):
         """Add a geom of MuJoCo's type and size; `color` is RGB in [0, 1]."""
         self._mjcf_root: Any = mjcf.RootElement(model=name)
         shape = {"type": kind, "size": size, "rgba": (*color, 1.0)}
-        self._geom = self._mjcf_root.worldbody.add(
+        self.geom: Any = self._mjcf_root.worldbody.add(
             "geom", name="geom", contype=0, conaffinity=0, **shape
         )
+        """The geom's `mjcf.Element`."""
 
     @property
     def mjcf_model(self) -> Any:
         """The `mjcf.RootElement`."""
         return self._mjcf_root
-
-    @property
-    def geom(self) -> Any:
-        """The geom's `mjcf.Element`."""
-        return self._geom
 
 
 class Cube(VisualEntity):
@@ -182,19 +178,20 @@ class Drone(composer.Entity):
         """Make the drone, with a bounding box of so many metres, and its cameras."""
         self.camera_settings = camera
         self._mjcf_root: Any = mjcf.RootElement(model=name)
-        self._body = self._mjcf_root.worldbody.add("body", name="body")
+        self.body: Any = self._mjcf_root.worldbody.add("body", name="body")
+        """The rigid body's `mjcf.Element`."""
         visual = {"group": BODY_GROUP, "contype": 0, "conaffinity": 0}
         hull = {"size": (size * 0.3, size * 0.18, size * 0.1), "mass": _MASS_KG, **visual}
-        self._body.add("geom", name="hull", type="box", rgba=_LIGHT, **hull)
+        self.body.add("geom", name="hull", type="box", rgba=_LIGHT, **hull)
         rotor = {"size": (size * 0.2, size * 0.02), "mass": 0.0, **visual}
         for x, end in ((-1, "rear"), (1, "front")):
             for y, side in ((-1, "right"), (1, "left")):
                 place = (x * size * 0.3, y * size * 0.3, size * 0.12)
                 own = {"name": f"rotor_{end}_{side}", "pos": place, "rgba": _DARK, **rotor}
-                self._body.add("geom", type="cylinder", **own)
+                self.body.add("geom", type="cylinder", **own)
         for spec in DRONE_CAMERAS:
-            add_camera(self._body, spec, camera.vertical_fov)
-        add_camera(self._body, CHASE, vertical_fov=60.0)
+            add_camera(self.body, spec, camera.vertical_fov)
+        add_camera(self.body, CHASE, vertical_fov=60.0)
 
     def _build_observables(self) -> DroneObservables:
         return DroneObservables(self)
@@ -203,11 +200,6 @@ class Drone(composer.Entity):
     def mjcf_model(self) -> Any:
         """The `mjcf.RootElement`."""
         return self._mjcf_root
-
-    @property
-    def body(self) -> Any:
-        """The rigid body's `mjcf.Element`."""
-        return self._body
 
     @property
     def front_center(self) -> Any:

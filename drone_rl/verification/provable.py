@@ -24,7 +24,7 @@ from drone_rl.evaluation.rollouts import find_failures
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import describe, read_checkpoint
 from drone_rl.sim.tasks import FailureReplayTask
-from drone_rl.sim.tasks.failure_replay import inflated
+from drone_rl.sim.tasks.collect_cubes import inflated
 from drone_rl.training import Callback
 from drone_rl.training.callbacks import ForwardProgress, OngoingTraining
 from drone_rl.training.run_folder import (

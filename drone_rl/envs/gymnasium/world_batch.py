@@ -34,7 +34,7 @@ _MOST = float(np.finfo(np.float32).max)
 """Bound of unbounded numbers: Gymnasium's checker requires finite ones."""
 
 
-def picture_space(camera: CameraSettings) -> spaces.Box:
+def image_space(camera: CameraSettings) -> spaces.Box:
     """Return the space of RGB images. Shape: (height, width, 3)."""
     return spaces.Box(0, 255, (camera.height, camera.width, 3), np.uint8)
 
@@ -142,7 +142,7 @@ class WorldBatch:
         self.names = tuple(name for name in self.worlds.entries if name != END)
         """Entries of `info` that make up the state vector, in order."""
         self.observation_space: spaces.Box = (
-            picture_space(options.camera)
+            image_space(options.camera)
             if self.has_images
             else vector_space({name: self.worlds.entries[name] for name in self.names})
         )

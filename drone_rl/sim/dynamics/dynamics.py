@@ -61,25 +61,30 @@ class Dynamics(Protocol):
         ...
 
 
-class ComputerVision:
-    """Moves a step forward, left or right, at once and without turning."""
+class _Level:
+    """Drones that never tilt: without randomness and without contacts."""
 
-    actions = MOVES
     mount = "body"
     """A drone that never tilts needs no gimbal."""
     is_random = False
     needs_obstacles = False
+
+    def start(self, position: Tensor, seeds: Tensor | None = None) -> BodyState:
+        """Return drones that are level, face forward and are at rest."""
+        del seeds
+        return BodyState.at_rest(position)
+
+
+class ComputerVision(_Level):
+    """Moves a step forward, left or right, at once and without turning."""
+
+    actions = MOVES
 
     def __init__(self, step_length: float = 1.0) -> None:
         """Set the length of a move, metres."""
         self.step_length = step_length
         self.moves = torch.tensor(DIRECTIONS, dtype=torch.float64) * step_length
         """Metres, world frame. Shape: (number of actions, 3), float64."""
-
-    def start(self, position: Tensor, seeds: Tensor | None = None) -> BodyState:
-        """Return drones that are level and at rest."""
-        del seeds
-        return BodyState.at_rest(position)
 
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
@@ -90,23 +95,13 @@ class ComputerVision:
         return body.moved(body.position + moves[action])
 
 
-class Kinematic:
+class Kinematic(_Level):
     """Flies level at the commanded speeds, without inertia; a step moves first, and then turns."""
-
-    mount = "body"
-    """A drone that never tilts needs no gimbal."""
-    is_random = False
-    needs_obstacles = False
 
     def __init__(self, actions: ActionSettings, timestep: float = 0.1) -> None:
         """Take the greatest speeds, and the seconds that an action lasts."""
         self.actions = ContinuousActions.of(actions)
         self.timestep = timestep
-
-    def start(self, position: Tensor, seeds: Tensor | None = None) -> BodyState:
-        """Return drones that are level, face forward and are at rest."""
-        del seeds
-        return BodyState.at_rest(position)
 
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None

@@ -1,7 +1,6 @@
 """Tasks: what stands in the scene, how an episode starts, its rules, and what counts as success."""
 
-from drone_rl.sim.tasks.collect_cubes import CollectCubes
-from drone_rl.sim.tasks.failure_replay import FailureReplayTask
+from drone_rl.sim.tasks.collect_cubes import CollectCubes, FailureReplayTask
 from drone_rl.sim.tasks.pillars import Pillars
 from drone_rl.sim.tasks.registry import as_task, register_task
 from drone_rl.sim.tasks.task import (

@@ -11,7 +11,7 @@ from drone_rl.utils.errors import InputError
 spaces = pytest.importorskip("gymnasium.spaces", reason="Gymnasium is not installed")
 from drone_rl.envs.gymnasium.world_batch import (  # noqa: E402 (after the skip)
     action_space,
-    picture_space,
+    image_space,
     read_action,
     vector_space,
 )
@@ -25,7 +25,7 @@ class Thrusts:
 
 
 def test_a_picture_is_what_the_camera_takes():
-    space = picture_space(CameraSettings(width=7, height=5))
+    space = image_space(CameraSettings(width=7, height=5))
     assert space == spaces.Box(0, 255, (5, 7, 3), np.uint8)
 
 

@@ -6,7 +6,7 @@ import torch
 
 from drone_rl.config import TaskSettings
 from drone_rl.sim.tasks import CollectCubes, FailureReplayTask
-from drone_rl.sim.tasks.failure_replay import inflated
+from drone_rl.sim.tasks.collect_cubes import inflated
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import get_state, set_state, world_random_state
 
