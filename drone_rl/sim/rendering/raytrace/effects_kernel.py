@@ -3,26 +3,23 @@
 `plain_kernel.find_visible` finds the visible surfaces; then solids cast shadows, each within the
 rectangle of pixels around it and its shadow; then each pixel is coloured. This is a separate module
 so that training without effects need not compile it.
+
+The sun is the scene's first light. Planes cast no shadows, since they are visible from one side.
 """
 
 import warp as wp
 
 from drone_rl.sim.rendering.raytrace import structs_kernel as structs
-from drone_rl.sim.rendering.raytrace.intersection_kernel import BOX, PLANE
+from drone_rl.sim.rendering.raytrace.intersection_kernel import BOX, PLANE, intersect_solid
 from drone_rl.sim.rendering.raytrace.plain_kernel import find_visible, span_end
 from drone_rl.sim.rendering.raytrace.projection_kernel import bounding_rectangle, start_job
 from drone_rl.sim.rendering.raytrace.shading_kernel import shade_span_with_effects
-from drone_rl.sim.rendering.raytrace.shadows_kernel import (
-    CANDIDATE,
-    cast_box_shadow,
-    find_ground,
-    is_shadowed,
-    mark_candidates,
-    shadow_length,
-)
 from drone_rl.sim.rendering.raytrace.spans_kernel import fill
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+CANDIDATE = wp.constant(2)
+"""Mark of a pixel that may be in shadow."""
 
 
 @wp.kernel
@@ -86,3 +83,127 @@ def _cast_shadow(
         if dark[pixel] == CANDIDATE:
             dark[pixel] = int(is_shadowed(caster, rays[pixel], nearest[pixel], light))
         pixel += 1
+
+
+@wp.func
+def is_shadowed(geom_view: structs.GeomView, ray: wp.vec3, distance: float, sun: wp.vec3) -> bool:
+    """Return whether a geom shadows a point that is not on it.
+
+    Args:
+        geom_view: The geom.
+        ray: Of the point, in the camera's frame.
+        distance: Of the point along the ray.
+        sun: Direction of the sunlight, in the geom's frame.
+    """
+    place = geom_view.eye + distance * (geom_view.into @ ray)
+    along, _face = intersect_solid(geom_view.kind, geom_view.size, place, -sun)
+    return along >= 0.0
+
+
+_READ = f"""
+const float a = caster.into.data[0][0], b = caster.into.data[0][1], c = caster.into.data[0][2];
+const float d = caster.into.data[1][0], e = caster.into.data[1][1], f = caster.into.data[1][2];
+const float g = caster.into.data[2][0], h = caster.into.data[2][1], k = caster.into.data[2][2];
+const float x_eye = caster.eye[0], y_eye = caster.eye[1], z_eye = caster.eye[2];
+const wp::vec_t<3, float> *const seen = job.rays.data;
+const float *const far = job.nearest.data;
+const int *const owner = job.owner.data;
+int *const hidden = job.dark.data;
+const int own = geom * {structs.FACES}, next = own + {structs.FACES};
+"""
+"""Loads everything before the first write, which C++ must assume to alias."""
+_PLACE = """
+    const float u = seen[i][0], v = seen[i][1], w = seen[i][2];
+    const float x = x_eye + far[i] * (a * u + b * v + c * w);
+    const float y = y_eye + far[i] * (d * u + e * v + f * w);
+    const float z = z_eye + far[i] * (g * u + h * v + k * w);
+    const bool is_other = (owner[i] >= 0) & ((owner[i] < own) | (owner[i] >= next));
+"""
+"""Computes a pixel's surface point in the geom's frame, and whether it is another geom's."""
+
+
+@wp.func_native(f"""
+{_READ}
+const float x_per = 1.0f / (wp::abs(sun[0]) < 1e-9f ? 1e-9f : sun[0]);
+const float y_per = 1.0f / (wp::abs(sun[1]) < 1e-9f ? 1e-9f : sun[1]);
+const float z_per = 1.0f / (wp::abs(sun[2]) < 1e-9f ? 1e-9f : sun[2]);
+const float x_half = wp::abs(x_per) * caster.size[0];
+const float y_half = wp::abs(y_per) * caster.size[1];
+const float z_half = wp::abs(z_per) * caster.size[2];
+for (int i = first; i < last; ++i) {{
+    {_PLACE}
+    const float x_at = x * x_per, y_at = y * y_per, z_at = z * z_per;
+    float enter = x_at - x_half, leave = x_at + x_half;
+    enter = enter > y_at - y_half ? enter : y_at - y_half;
+    leave = leave < y_at + y_half ? leave : y_at + y_half;
+    enter = enter > z_at - z_half ? enter : z_at - z_half;
+    leave = leave < z_at + z_half ? leave : z_at + z_half;
+    hidden[i] |= (enter >= 0.0f) & (enter <= leave) & is_other;
+}}""")
+def cast_box_shadow(
+    job: structs.Job, first: int, last: int, geom: int, caster: structs.GeomView, sun: wp.vec3
+) -> None:
+    """Set `dark` to 1 for the pixels of a span that a box shadows.
+
+    Args:
+        job: Of the image.
+        first: First pixel.
+        last: One past the last pixel.
+        geom: Index of the caster, which does not shadow itself.
+        caster: The box.
+        sun: Direction of the sunlight, in the box's frame.
+    """
+
+
+@wp.func_native(f"""
+{_READ}
+const float x_sun = sun[0], y_sun = sun[1], z_sun = sun[2];
+const float speed = x_sun * x_sun + y_sun * y_sun + z_sun * z_sun;
+const float reach = 1.001f * speed * wp::dot(caster.reach, caster.reach), loss = 1e-5f * speed;
+for (int i = first; i < last; ++i) {{
+    {_PLACE}
+    const float p = y * z_sun - z * y_sun, q = z * x_sun - x * z_sun, r = x * y_sun - y * x_sun;
+    const bool is_near = p * p + q * q + r * r <= reach + loss * (x * x + y * y + z * z);
+    hidden[i] = ((hidden[i] == 0) & is_near & is_other) ? {CANDIDATE} : hidden[i];
+}}""")
+def mark_candidates(
+    job: structs.Job, first: int, last: int, geom: int, caster: structs.GeomView, sun: wp.vec3
+) -> None:
+    """Mark pixels whose sunlight passes the bounding sphere of a solid; see `cast_box_shadow`."""
+
+
+@wp.func
+def find_ground(job: structs.Job, sun: wp.vec3) -> int:
+    """Return the index of the plane on which all shadows end; -1 for none."""
+    ground = int(-1)
+    for geom in range(job.geom_views.shape[0]):
+        plane = job.geom_views[geom]
+        is_wide = _is_wide(plane.size[0], job.view.far) and _is_wide(plane.size[1], job.view.far)
+        if plane.kind == PLANE and is_wide and wp.dot(_upright(plane), sun) < 0.0:
+            ground = geom
+    return ground
+
+
+@wp.func
+def shadow_length(job: structs.Job, caster: structs.GeomView, ground: int, sun: wp.vec3) -> float:
+    """Return how far a geom's shadow can reach along the sunlight, metres."""
+    if ground < 0:
+        return job.view.far
+    plane = job.geom_views[ground]
+    up = _upright(plane)
+    highest = plane.eye[2] - wp.dot(up, caster.axes @ caster.eye)
+    along = wp.transpose(caster.axes) @ up
+    for i in range(3):
+        highest += wp.abs(along[i]) * caster.reach[i]
+    return wp.max(0.0, highest) / -wp.dot(up, sun)
+
+
+@wp.func
+def _upright(plane: structs.GeomView) -> wp.vec3:
+    """A plane's normal, world frame."""
+    return plane.axes @ wp.vec3(0.0, 0.0, 1.0)
+
+
+@wp.func
+def _is_wide(half: float, far: float) -> bool:
+    return half == 0.0 or half >= far

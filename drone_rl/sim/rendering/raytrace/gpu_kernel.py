@@ -3,6 +3,7 @@
 import warp as wp
 
 from drone_rl.sim.rendering.raytrace import structs_kernel as structs
+from drone_rl.sim.rendering.raytrace.effects_kernel import is_shadowed
 from drone_rl.sim.rendering.raytrace.intersection_kernel import (
     FAR_AWAY,
     PLANE,
@@ -13,7 +14,6 @@ from drone_rl.sim.rendering.raytrace.intersection_kernel import (
 )
 from drone_rl.sim.rendering.raytrace.projection_kernel import start_job, view_geom
 from drone_rl.sim.rendering.raytrace.shading_kernel import shade_span, shade_span_with_effects
-from drone_rl.sim.rendering.raytrace.shadows_kernel import is_shadowed
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -39,8 +39,10 @@ def render_pixels(
     """Render pixels without effects. Launch it with (num_images, num_pixels)."""
     row, pixel = wp.tid()
     job = _start(view, poses, scratch, row)
-    _cast_ray(job, pixel)
-    shade_span(job, materials, images, pixel, pixel + 1)
+    nearest, owner = _cast_ray(job, pixel)
+    if (view.what & structs.DISTANCES) != 0:
+        job.nearest[pixel] = nearest
+    shade_span(job, materials, images, pixel, pixel + 1, owner, nearest)
 
 
 @wp.kernel
@@ -55,7 +57,9 @@ def render_pixels_with_effects(
     """Render pixels with effects; see `render_pixels`."""
     row, pixel = wp.tid()
     job = _start(view, poses, scratch, row)
-    owner = _cast_ray(job, pixel)
+    nearest, owner = _cast_ray(job, pixel)
+    job.nearest[pixel] = nearest
+    job.owner[pixel] = owner
     job.dark[pixel] = 0
     if owner != structs.NO_GEOM and effects.shadows[job.world % effects.shadows.shape[0]] != 0:
         sun = materials.direction[job.world % materials.direction.shape[0], 0]
@@ -63,8 +67,7 @@ def render_pixels_with_effects(
             caster = job.geom_views[geom]
             if geom != owner // structs.FACES and caster.kind != PLANE:
                 light = wp.transpose(caster.axes) @ sun
-                ray, distance = job.rays[pixel], job.nearest[pixel]
-                job.dark[pixel] |= int(is_shadowed(caster, ray, distance, light))
+                job.dark[pixel] |= int(is_shadowed(caster, job.rays[pixel], nearest, light))
     shade_span_with_effects(job, materials, effects, images, pixel, pixel + 1)
 
 
@@ -77,8 +80,8 @@ def _start(
 
 
 @wp.func
-def _cast_ray(job: structs.Job, pixel: int) -> int:
-    """Find the nearest surface of a pixel; see `Scratch` and `plain_kernel.find_visible`."""
+def _cast_ray(job: structs.Job, pixel: int) -> tuple[float, int]:
+    """Return distance and owner of the nearest surface; see `plain_kernel.find_visible`."""
     ray = job.rays[pixel]
     nearest = float(FAR_AWAY)
     owner = int(structs.NO_GEOM)
@@ -94,6 +97,4 @@ def _cast_ray(job: structs.Job, pixel: int) -> int:
         if is_nearest(along, nearest, -ray[2], job.view.far):
             nearest = along
             owner = geom * structs.FACES + face
-    job.nearest[pixel] = nearest
-    job.owner[pixel] = owner
-    return owner
+    return nearest, owner

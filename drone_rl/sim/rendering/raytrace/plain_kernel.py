@@ -82,7 +82,7 @@ def render_image(
     start = int(0)
     while start < count:
         end = span_end(job.owner, start, count)
-        shade_span(job, materials, images, start, end)
+        shade_span(job, materials, images, start, end, job.owner[start], job.nearest[start])
         start = end
 
 

@@ -184,7 +184,8 @@ class GpuLauncher:
         """Render images."""
         view, geoms, device = launch.view, launch.geoms, self._device
         pixels, shape = view.height * view.width, (launch.num_images, len(geoms.kind))
-        scratch = make_scratch(launch.num_images, pixels, len(geoms.kind), device)
+        is_stored = launch.effects is not None or view.what & structs.DISTANCES
+        scratch = make_scratch(launch.num_images, pixels if is_stored else 1, shape[1], device)
         inputs = [view, geoms, launch.poses, scratch]
         wp.launch(gpu_kernel.view_geoms, shape, inputs=inputs, device=device)
         kernel = gpu_kernel.render_pixels

@@ -25,9 +25,14 @@ def shade_span(
     images: structs.Images,
     first: int,
     last: int,
+    owner: int,
+    distance: float,
 ) -> None:
-    """Write a span of the sky or of one flat face, or one pixel of a round face."""
-    shown = _find_surface(job, first, last)
+    """Write a span of the sky or of one flat face, or one pixel of a round face.
+
+    `owner` and `distance` are those of the first pixel.
+    """
+    shown = _find_surface(job, first, last, owner, distance)
     if shown.number == structs.NO_GEOM:
         shown.color = _bytes(materials.sky[job.world % materials.sky.shape[0]])
     else:
@@ -46,7 +51,7 @@ def shade_span_with_effects(
     last: int,
 ) -> None:
     """`shade_span` with fog, shadow, texture and a sky gradient."""
-    shown = _find_surface(job, first, last)
+    shown = _find_surface(job, first, last, job.owner[first], job.nearest[first])
     if shown.number == structs.NO_GEOM:
         up = wp.transpose(job.looking) @ wp.vec3(0.0, 0.0, 1.0)
         horizon = materials.sky[job.world % materials.sky.shape[0]]
@@ -63,16 +68,18 @@ def shade_span_with_effects(
 
 
 @wp.func
-def _find_surface(job: structs.Job, first: int, last: int) -> structs.PixelValue:
+def _find_surface(
+    job: structs.Job, first: int, last: int, owner: int, distance: float
+) -> structs.PixelValue:
     """Return what a span shows, without its colour; set its distance to 0 if that is the sky."""
     shown = structs.PixelValue()
     shown.number = structs.NO_GEOM
-    owner = job.owner[first]
     if owner == structs.NO_GEOM:
-        fill(job.nearest, first, last, 0.0)
+        if (job.view.what & structs.DISTANCES) != 0:
+            fill(job.nearest, first, last, 0.0)
     else:
         seen = job.geom_views[owner // structs.FACES]
-        into, distance = seen.into @ job.rays[first], job.nearest[first]
+        into = seen.into @ job.rays[first]
         shown.number = seen.number
         shown.face = owner % structs.FACES
         shown.face_normal = surface_normal(

@@ -16,6 +16,8 @@ DISTANCE = wp.constant(8)
 SEGMENTATION = wp.constant(16)
 NORMALS = wp.constant(32)
 """Modalities, one bit each: their sum is rendered in one pass."""
+DISTANCES = wp.constant(4 | 8)
+"""Modalities that are read from `Scratch.nearest`."""
 
 DRONE_FRAME = wp.constant(1)
 """The only frame that rotates. Frame 0 is the world, and frames from 2 are the props."""

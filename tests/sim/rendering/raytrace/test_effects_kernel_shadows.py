@@ -5,6 +5,13 @@ import pytest
 import warp as wp
 
 from drone_rl.sim.rendering.raytrace import structs_kernel
+from drone_rl.sim.rendering.raytrace.effects_kernel import (
+    cast_box_shadow,
+    find_ground,
+    is_shadowed,
+    mark_candidates,
+    shadow_length,
+)
 from drone_rl.sim.rendering.raytrace.intersection_kernel import (
     BOX,
     CYLINDER,
@@ -16,13 +23,6 @@ from drone_rl.sim.rendering.raytrace.projection_kernel import (
     bounding_rectangle,
     start_job,
     view_geom,
-)
-from drone_rl.sim.rendering.raytrace.shadows_kernel import (
-    cast_box_shadow,
-    find_ground,
-    is_shadowed,
-    mark_candidates,
-    shadow_length,
 )
 from tests.box_ahead import SIZE, array, geoms, poses, scratch, view
 
