@@ -58,10 +58,8 @@ def _signed(values: Values, signs: tuple[float, ...]) -> Values:
     return values * np.array(signs, dtype=values.dtype)
 
 
-EQUATOR_RADIUS = 6378137.0
-"""Of WGS84's ellipsoid, in metres."""
-FLATTENING = 1 / 298.257223563
-"""Of the same."""
+EQUATOR_RADIUS, FLATTENING = 6378137.0, 1 / 298.257223563
+"""Of WGS84's ellipsoid; the radius in metres."""
 _ECCENTRICITY_2 = FLATTENING * (2 - FLATTENING)
 
 
@@ -83,12 +81,7 @@ HOME = GeoPoint(47.641468, -122.140165, 122.0)
 def geo_from_world(position: Values, home: GeoPoint = HOME) -> Values:
     """Return latitude and longitude in degrees, altitude in metres.
 
-    Args:
-        position: Metres from home, world frame: north, west, up. Shape: (*, 3), float64.
-        home: The world's origin.
-
-    Returns:
-        Shape: (*, 3), float64.
+    Positions are metres from home, world frame: north, west, up. Shapes: (*, 3), float64.
     """
     meridian, _ = _radii(home.latitude)
     north, west, up = position[..., 0], position[..., 1], position[..., 2]

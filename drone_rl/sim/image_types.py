@@ -103,15 +103,9 @@ class ImageType(enum.IntEnum):
         return _MODALITIES[self]
 
 
-_MODALITIES: dict[ImageType, Modality] = {
-    ImageType.SCENE: "rgb",
-    ImageType.DEPTH_PLANAR: "depth",
-    ImageType.DEPTH_PERSPECTIVE: "distance",
-    ImageType.DEPTH_VIS: "depth",
-    ImageType.DISPARITY_NORMALIZED: "depth",
-    ImageType.SEGMENTATION: "segmentation",
-    ImageType.SURFACE_NORMALS: "normals",
-}
+_DISTANCES: tuple[Modality, ...] = ("depth", "distance", "depth", "depth")
+_MODALITIES: tuple[Modality, ...] = ("rgb", *_DISTANCES, "segmentation", "normals")
+"""By number of the image type."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -153,8 +147,8 @@ def images(
         worlds: Batch of environments to render.
         state: Their state; the current one by default.
         requests: Camera and type of each image.
-        height: Pixels; by default that of the policy's camera.
-        width: Pixels; the same. Cameras keep their vertical field of view.
+        height: Pixels, as `width`; by default that of the policy's camera.
+        width: See `height`. Cameras keep their vertical field of view.
         ids: Segmentation ids of the geoms, 0 to 255; AirSim's by default. Shape: (num_geoms,).
 
     Returns:

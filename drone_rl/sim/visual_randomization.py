@@ -128,12 +128,8 @@ class Appearances:
     ) -> None:
         """Read all textures; environments start in the middle of all ranges.
 
-        Args:
-            settings: Ranges.
-            num_worlds: Number of environments.
-            device: Of the renderer.
-            task: The original study's by default.
-            camera: The policy's.
+        The device is the renderer's, the camera the policy's, the task by default that of the
+        original study.
 
         Raises:
             InputError: A texture can't be read or is too large, or the camera or distractors do not

@@ -87,13 +87,9 @@ def _cast_shadow(
 
 @wp.func
 def is_shadowed(geom_view: structs.GeomView, ray: wp.vec3, distance: float, sun: wp.vec3) -> bool:
-    """Return whether a geom shadows a point that is not on it.
+    """Return whether a geom shadows a point that is not on it, at a distance along a ray.
 
-    Args:
-        geom_view: The geom.
-        ray: Of the point, in the camera's frame.
-        distance: Of the point along the ray.
-        sun: Direction of the sunlight, in the geom's frame.
+    The ray is in the camera's frame, the direction of the sunlight in the geom's.
     """
     place = geom_view.eye + distance * (geom_view.into @ ray)
     along, _face = intersect_solid(geom_view.kind, geom_view.size, place, -sun)
@@ -143,15 +139,10 @@ for (int i = first; i < last; ++i) {{
 def cast_box_shadow(
     job: structs.Job, first: int, last: int, geom: int, caster: structs.GeomView, sun: wp.vec3
 ) -> None:
-    """Set `dark` to 1 for the pixels of a span that a box shadows.
+    """Set `dark` to 1 for the pixels from `first` to before `last` that a box shadows.
 
-    Args:
-        job: Of the image.
-        first: First pixel.
-        last: One past the last pixel.
-        geom: Index of the caster, which does not shadow itself.
-        caster: The box.
-        sun: Direction of the sunlight, in the box's frame.
+    The box is the geom of index `geom` and does not shadow itself. The direction of the sunlight
+    is in the box's frame.
     """
 
 

@@ -43,18 +43,9 @@ def render_images(
     scratch: structs.Scratch,
     images: structs.Images,
 ) -> None:
-    """Render images one after the other, as one worker: launch it with a dimension of 1.
+    """Render images from `first` up to, not including, `last`, with scratch buffer `member`.
 
-    Args:
-        first: The first image.
-        last: One past the last image.
-        member: Which of the scratch buffers to use.
-        view: What to render.
-        geoms: Of the scene.
-        poses: Of all environments.
-        materials: Colours and light.
-        scratch: Buffers of all workers.
-        images: Written.
+    Launch it with a dimension of 1: each worker renders one image after the other.
     """
     for row in range(first, last):
         world = row // view.count

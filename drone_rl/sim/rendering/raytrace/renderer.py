@@ -118,9 +118,7 @@ class Raytracer:
     def kernel_inputs(self, view: View, num_workers: int) -> KernelInputs:
         """Return the arguments with which another kernel calls `plain_kernel.render_image`.
 
-        Args:
-            view: What to render, with the model's own appearance.
-            num_workers: Images that are rendered at the same time.
+        The appearance is the model's own; `num_workers` images are rendered at the same time.
 
         Raises:
             InputError: See `prepare`.
