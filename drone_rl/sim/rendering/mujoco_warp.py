@@ -118,7 +118,7 @@ class WarpRenderer:
             capacity = -(-self._capacity // count)
             with _BUILDING, wp.ScopedDevice(str(self.device)):
                 shards = [Shard(self.scene, single, camera, capacity) for _ in range(count)]
-                shards[0].warm_up()
+                shards[0].launch(1)  # compiles or loads the kernels; the other shards share them
             for shard in shards[1:]:
                 shard.share_kernel_of(shards[0])
             self._shards[single] = shards
@@ -159,10 +159,6 @@ class Shard:
         self._pixels = self._buffer(view.height, view.width)
         self._appearance = ModelAppearance(scene, self._model, capacity)
 
-    def warm_up(self) -> None:
-        """Compile or load the kernels on this thread; later calls may come from any thread."""
-        self._launch(1)
-
     def share_kernel_of(self, other: "Shard") -> None:
         """Reuse the kernel of another shard of the same model and view: loading takes long."""
         self._context._megakernel = other._context._megakernel
@@ -173,7 +169,7 @@ class Shard:
         self._qpos[:num_worlds] = torch.cat([poses.position, poses.attitude], dim=-1)
         self._mocap_pos[:num_worlds] = poses.props
         self._appearance.apply(appearance, num_worlds)
-        self._launch(num_worlds)
+        self.launch(num_worlds)
         rows = self._pixels[:num_worlds]
         is_rgb = self._modality == "rgb"
         out.copy_(rows[..., :3].flip(-1) if is_rgb else rows)
@@ -182,7 +178,8 @@ class Shard:
             color = (expand_color(sky, len(out)) * 255).to(out.device, torch.uint8)
             torch.where(rows[..., 3:] == 0, color[:, None, None], out, out=out)
 
-    def _launch(self, num_worlds: int) -> None:
+    def launch(self, num_worlds: int) -> None:
+        """Render to the buffers; the first launch compiles or loads the kernels."""
         self._data.nworld = num_worlds
         with on_torch_stream(self._qpos.device):
             mjw.kinematics(self._model, self._data)

@@ -25,7 +25,7 @@ def shard(scene):
     camera = mujoco.mj_name2id(scene.model, mujoco.mjtObj.mjOBJ_CAMERA, VIEW.cameras[0])
     with wp.ScopedDevice("cpu"):
         shard = Shard(scene, VIEW, camera, 3)
-        shard.warm_up()
+        shard.launch(1)
     return shard
 
 
