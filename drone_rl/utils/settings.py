@@ -19,9 +19,19 @@ from drone_rl.utils.schema import Flag, Instance, Kind, Maybe, Record, Text, as_
 S = TypeVar("S", bound="Settings")
 
 
+class _Frozen:
+    """Values that can't be assigned or deleted."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise dataclasses.FrozenInstanceError(f"cannot assign to field {name!r}")
+
+    def __delattr__(self, name: str) -> None:
+        raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
+
+
 @typing.dataclass_transform(kw_only_default=True, frozen_default=True)
 @dataclasses.dataclass(frozen=True)
-class Settings:
+class Settings(_Frozen):
     """Values that are checked before anything is built; each subclass is a frozen dataclass.
 
     A field is annotated with its type and its kind, as in `Annotated[int, Whole(1, 100)]`; of true
@@ -33,9 +43,17 @@ class Settings:
     """
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Make the subclass a frozen dataclass with keyword arguments."""
+        """Make the subclass a frozen dataclass with keyword arguments.
+
+        A subclass may repeat `@dataclasses.dataclass(frozen=True)`: the decorator finds the fields
+        as they were written, and no methods that it refuses to replace.
+        """
         super().__init_subclass__(**kwargs)
+        fields = {name: f for name, f in vars(cls).items() if isinstance(f, dataclasses.Field)}
         dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+        for name, field in fields.items():
+            setattr(cls, name, field)
+        del cls.__setattr__, cls.__delattr__
 
     def __post_init__(self) -> None:
         """Reads every value by its kind."""

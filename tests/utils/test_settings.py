@@ -1,11 +1,12 @@
 """Settings are checked wherever they come from, and a message begins with their name."""
 
-from typing import Annotated
+import dataclasses
+from typing import Annotated, Any
 
 import pytest
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Real, Several, Whole
+from drone_rl.utils.schema import Real, Several, Text, Whole
 from drone_rl.utils.settings import Settings, below, kinds_of, plain, snake_case, types_of
 
 
@@ -28,6 +29,36 @@ class Outer(Settings):
 
 class More(Outer):
     extra: str = "z"
+
+
+@dataclasses.dataclass(frozen=True)
+class Decorated(Inner):
+    y: Annotated[int, Whole(0, 9)] = 2
+    names: Annotated[tuple[str, ...], Several(Text(), 0, 9)] = dataclasses.field(
+        default_factory=lambda: ("a",)
+    )
+
+
+class MoreDecorated(Decorated):
+    z: Annotated[int, Whole(0, 9)] = 3
+
+
+@pytest.mark.parametrize("cls", [Inner, Decorated, MoreDecorated])
+def test_settings_are_frozen(cls):
+    made: Any = cls(x=3)
+    with pytest.raises(dataclasses.FrozenInstanceError, match="assign to field 'x'"):
+        made.x = 4
+    with pytest.raises(dataclasses.FrozenInstanceError, match="delete field 'x'"):
+        del made.x
+    assert made == cls(x=3) and hash(made) == hash(cls(x=3))
+
+
+def test_a_class_may_repeat_the_decorator():
+    assert Decorated(x=3).values() == {"x": 3, "y": 2, "names": ["a"]}
+    assert Decorated(names=["b"]).replace(y=4).names == ("b",)
+    with pytest.raises(InputError, match="y=10"):
+        Decorated(y=10)
+    assert list(MoreDecorated().values()) == ["x", "y", "names", "z"]
 
 
 def test_values_take_their_types():
