@@ -18,8 +18,8 @@ from benchmarks.evidence import (
 )
 from drone_rl.evaluation import evaluate as evaluation
 from drone_rl.evaluation import verdict_text as verdict
+from drone_rl.explanations.report.behavior import SOURCE
 from drone_rl.explanations.report.page import PARTS
-from drone_rl.explanations.report.verdict import SOURCE
 from drone_rl.robustness import shifts_text as shifts
 from drone_rl.sweeps import text as sweep
 from drone_rl.utils import text as seeds

@@ -16,7 +16,7 @@ MUTABLE = {
     "explanations.class_models:Attempts",
     "explanations.class_models:ClassModel",
     "explanations.heat_maps:Explainer",
-    "explanations.interventions:Intervention",
+    "explanations.truth:Intervention",
     "explanations.report.explanation:Explanation",
     "explanations.response:OutcomeMap",
     "explanations.response:ResponseMap",

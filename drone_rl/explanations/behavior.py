@@ -128,11 +128,8 @@ def find_pairs(
 ) -> list[Pair]:
     """Find similar frames with opposite actions, most opposed first; a frame is in one pair only.
 
-    Args:
-        dataset: Rollouts.
-        alike: Root mean square difference up to which observations are similar.
-        actions: Actions of the policy.
-        offset: Metres ahead and to the left of the next target, NaN without one. Shape: (T, 2).
+    Observations are similar up to a root mean square difference of `alike`. `offset` has the metres
+    ahead and to the left of the next target, NaN without one. Shape: (T, 2).
     """
     flat = dataset.observations.reshape(len(dataset), -1).astype(np.float64)
     probs = dataset.probabilities

@@ -21,16 +21,13 @@ NO_CHANGE = 1e-9
 def placebo_maps(
     observations: Tensor, absent: Tensor, others: Sequence[Tensor], seed: int = 0
 ) -> dict[str, Tensor]:
-    """Return maps that do not use the policy; a method must beat all of them.
+    """Return maps (T, h, w) that do not use the policy, by name; a method must beat all of them.
 
     Args:
         observations: Shape (T, C, h, w).
         absent: Observation of the scene without targets. Shape: (C, h, w).
         others: Alternatives of shape (T, C, h, w) each; see `scenes.alternatives`.
         seed: Seed of the noise.
-
-    Returns:
-        By name, shape (T, h, w), 0 or more.
     """
     count, _, height, width = observations.shape
     generator = torch.Generator().manual_seed(seed)

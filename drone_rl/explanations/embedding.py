@@ -50,12 +50,9 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
 def embed(
     originals: NDArray, *, perplexity: float = 30.0, seed: int = 0
 ) -> tuple[NDArray, dict[str, float]]:
-    """Embed points in the plane; the same points and seed give the same result (Eqs. 16 and 17).
+    """Embed points (T, *), one a row, in the plane (Eqs. 16 and 17); a seed below 2**32 fixes it.
 
-    Args:
-        originals: One row a point. Shape: (T, *).
-        perplexity: Effective number of neighbours of a point.
-        seed: Seed of the optimization; below 2**32.
+    The perplexity is the effective number of neighbours of a point.
 
     Returns:
         The points (T, 2) and their `faithfulness`.
@@ -99,9 +96,9 @@ def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> di
     true, drawn = _distances(originals, queries), _distances(points, queries)
     nearest = drawn.argsort(1, kind="stable")[:, 1 : k + 1]  # the query itself comes first
     ordered = np.sort(true, 1)
-    plane = np.take_along_axis(true, nearest, 1)
+    reached = np.take_along_axis(true, nearest, 1)
     # 1 is the nearest; the query itself is nearer than all
-    rank = np.stack([np.searchsorted(o, a) for o, a in zip(ordered, plane, strict=True)])
+    rank = np.stack([np.searchsorted(o, a) for o, a in zip(ordered, reached, strict=True)])
     strangers = np.maximum(rank - k, 0).sum()
     worst = len(queries) * k * (2 * count - 3 * k - 1) / 2
     as_near = (true <= ordered[:, [k]]).sum(1) - 1

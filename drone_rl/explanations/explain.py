@@ -24,7 +24,6 @@ from drone_rl.explanations import (
     behavior,
     class_models,
     embedding,
-    places,
     response,
     truth,
 )
@@ -60,7 +59,7 @@ SECTIONS: dict[str, Section] = {
     "embedding": embedding.section,
     "evaluation": behavior.evaluation_section,
     "flaws": behavior.flaws_section,
-    "places": places.section,
+    "places": response.places_section,
     "response": response.response_section,
     "shifts": behavior.shifts_section,
     "truth": truth.section,

@@ -87,11 +87,7 @@ def replaced(
 ) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
     """Evaluate the policy with one part of an observation replaced, for all parts that differ.
 
-    Args:
-        network: The policy's network.
-        observations: Shape (T, C, h, w).
-        other: Replacements. Shape: (T, C, h, w).
-        masks: The parts. Shape: (P, h, w), bool.
+    Observations and replacements are (T, C, h, w), the masks of the parts (P, h, w).
 
     Yields:
         In batches: indices of observations (n,) and of parts (n,), and the action probabilities

@@ -1,4 +1,4 @@
-"""Sections "response" (maps over the place of one target) and "asymmetry" (left against right)."""
+"""Sections on one target: "response" and "places" (maps over its place), and "asymmetry"."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -9,15 +9,23 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from drone_rl.config import TaskSettings
+from drone_rl.config.verification import PlacesSettings
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.rollouts import run_to_end
 from drone_rl.explanations.scenes import Scenes, empty_scene, place_target
 from drone_rl.policies import PictureNetwork
-from drone_rl.sim.actions import Actions
-from drone_rl.sim.tasks import Grid, State
+from drone_rl.sim.actions import MOVES, Actions
+from drone_rl.sim.tasks import CollectCubes, Grid, State
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_interval
-from drone_rl.utils.seeding import Stream, torch_generator
+from drone_rl.utils.seeding import Stream, legacy_seed, torch_generator
+from drone_rl.verification.prover.action_map import ActionMap, map_actions
+from drone_rl.verification.prover.arrangement import Window
+from drone_rl.verification.prover.cube_images import NOTHING, CameraModel, CubeImages
+from drone_rl.verification.prover.lattice import Lattice
+from drone_rl.verification.prover.policy_spec import check_task
 
 BLIND = 0.1
 """A policy is blind to a target that changes its action probabilities by less than this."""
@@ -94,14 +102,9 @@ def response_map(
     num_forward: int = 31,
     seed: int | None = None,
 ) -> ResponseMap:
-    """Evaluate the policy with one target at each place of a grid.
+    """Evaluate the policy with one target at each place of a grid; see `Task.grid`.
 
-    Args:
-        scenes: Renders the frames.
-        network: The policy's network.
-        num_lateral: Places sideways; see `Task.grid`.
-        num_forward: Places ahead.
-        seed: Seed of the places, see `shrink`; fixed places by default.
+    The seed is that of the places, see `shrink`; they are fixed by default.
     """
     fields, wishes = _over_grid(
         scenes,
@@ -147,11 +150,7 @@ def shrink(grid: Grid, seed: int, number: int = 0) -> Grid:
 
     Nobody can know these places beforehand and fit a policy to their frames. Places stay evenly
     spaced, and symmetric sideways. Each end moves by less than half the distance of two places.
-
-    Args:
-        grid: Of the task.
-        seed: Root of the random stream.
-        number: Of one grid among several from this seed.
+    `number` is that of one grid among several from this seed.
     """
     generator = torch_generator(seed, Stream.SCENES, number=number)
     near, far, aside = (0.5 * torch.rand(3, dtype=torch.float64, generator=generator)).tolist()
@@ -170,13 +169,10 @@ def _between(places: Tensor, first: float, last: float) -> Tensor:
 
 
 def find_blind(actions: Actions, wishes: Tensor, alone: Tensor, needed: Tensor) -> Tensor:
-    """Return where a turn is needed, not chosen, and the target has almost no effect.
+    """Return where a turn is needed, not chosen, and the target has almost no effect. (Z, F, L).
 
-    Args:
-        actions: Actions of the policy.
-        wishes: Action probabilities with a target there. Shape: (Z, F, L, A).
-        alone: Action probabilities without a target. Shape: (A,).
-        needed: The needed action, -1 where it is unknown. Shape: (L,).
+    `wishes` (Z, F, L, A) are action probabilities with a target there, `alone` (A,) those without
+    one; `needed` (L,) is -1 where the needed action is unknown.
     """
     unmoved = actions.distance(wishes, alone) < BLIND
     needs_turn = (needed >= 0) & actions.turns(needed)
@@ -254,13 +250,62 @@ def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, Any]:
     here, there = response.probabilities, actions.mirror(response.probabilities[:, :, ::-1])
     signed, distance = actions.leaning(here) - actions.leaning(there), actions.distance(here, there)
     at = np.unravel_index(distance.argmax(), distance.shape)
+    places = zip(("height", "forward", "lateral"), at, strict=True)
     return {
         "signed": float(signed.mean()),
         "absolute": float(distance.mean()),
         "worst": {
             "distance": float(distance.max()),
-            "height": float(response.height[at[0]]),
-            "forward": float(response.forward[at[1]]),
-            "lateral": float(response.lateral[at[2]]),
+            **{axis: float(getattr(response, axis)[i]) for axis, i in places},
         },
     }
+
+
+_COMPARED = 1000
+"""Rendered frames that are compared with the closed form."""
+
+
+def places_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Return "places", or why it is "refused" if no exact map is known for this configuration.
+
+    Arrays: "places_..." of the outlines, see `ActionMap.outlines`.
+    """
+    settings = PlacesSettings()
+    try:
+        found = _exact_map(context, settings)
+    except InputError as error:
+        return {"places": {"refused": str(error)}}, {}
+    arrays = {f"places_{name}": array for name, array in found.outlines().items()}
+    return {"places": found.summary(settings.logit_gap)}, arrays
+
+
+def _exact_map(context: Context, settings: PlacesSettings) -> ActionMap:
+    scenes, network = context.scenes, context.network
+    if not isinstance(scenes.task, CollectCubes):
+        raise InputError("its task is not that of collecting cubes")
+    if scenes.actions != MOVES:
+        raise InputError(f"it does not choose among {', '.join(MOVES.names)}")
+    if scenes.memory:
+        raise InputError("it sees a stack of frames, so what it does depends on the past")
+    task: TaskSettings = scenes.task.settings
+    check_task(task)
+    if not network.has_weights:
+        raise InputError("it is no torch module, so that nothing is known of its sums")
+    camera = CameraModel.of(task, scenes.worlds.camera)
+    images = CubeImages(scenes.worlds, Lattice(task), camera)
+    images.check(_COMPARED, np.random.RandomState(legacy_seed(context.seed.value)))
+
+    def render(faces: NDArray[np.uint8]) -> Tensor:
+        """Return observations from the cube's face at each pixel."""
+        shown = torch.from_numpy(faces).long()
+        is_open = (shown == NOTHING)[..., None]
+        return scenes.transform(torch.where(is_open, images.background, images.colors[shown]))
+
+    return map_actions(
+        camera,
+        Window(max(settings.nearest, task.cube_size), settings.farthest, settings.sideways),
+        render,
+        network.eval(),
+        touch_distance=task.touch_distance,
+        most_cells=settings.most_cells,
+    )

@@ -130,7 +130,7 @@ def collect(
     num_frames: int = 1,
     meta: dict[str, Any] | None = None,
 ) -> RolloutDataset:
-    """Collect whole episodes with sampled actions; only observations are rendered.
+    """Collect all steps of whole episodes with sampled actions; only observations are rendered.
 
     Args:
         env: A batch of environments.
@@ -138,9 +138,6 @@ def collect(
         num_episodes: Least number of episodes.
         num_frames: Least number of steps.
         meta: Origin of the policy.
-
-    Returns:
-        All steps, with `flown_fields` and "observations".
 
     Raises:
         InputError: num_frames is below 1.
@@ -296,9 +293,6 @@ def rollout(
         stays_active: Returns which environments stay active after a step, shape (n,), bool; it may
             change the states after the step.
         appearance: Appearance of the scenes; the task's by default.
-
-    Returns:
-        Final states.
     """
     device = state.body.position.device
     rows = torch.arange(len(state), device=device)

@@ -126,13 +126,9 @@ class Scenes:
 
 
 def place_target(scenes: Scenes, forward: Tensor, lateral: Tensor, height: float = 0.0) -> State:
-    """Return scenes with one target each; the drone is at its origin.
+    """Return T scenes with one target each, metres ahead of the drone and to its left, both (T,).
 
-    Args:
-        scenes: Renders the frames.
-        forward: Metres ahead of the drone. Shape: (T,).
-        lateral: Metres to its left. Shape: (T,).
-        height: Metres above it.
+    The drone is at its origin; the target is `height` metres above it.
     """
     worlds = scenes.worlds
     ahead, aside = forward.double(), lateral.double()

@@ -144,15 +144,10 @@ def make_trial(
     episode: NDArray,
     seed: int = 0,
 ) -> Trial:
-    """Measure which patches affect a policy on frames of its rollouts.
+    """Measure which patches affect a policy on some frames of T steps of its rollouts.
 
-    Args:
-        scenes: Renders the frames.
-        network: The policy's network.
-        state: T states of the environments, from `RolloutDataset.state()`.
-        actions: Actions taken there. Shape: (T,).
-        episode: Shape: (T,).
-        seed: See `draw_pictures`.
+    The states are those of `RolloutDataset.state()`, with the actions taken there; see
+    `draw_pictures` for the seed.
     """
     rows = sample_frames(episode, FRAMES_AN_EPISODE)
     chosen = state[torch.from_numpy(rows)].to(scenes.worlds.device)
@@ -190,15 +185,15 @@ def check_maps(
         "level": error rate of each method; "confidence" of each bound but the scores'.
     """
     level = ERROR_RATE / (num_methods or max(1, len(methods)))
-    maps = maps or {name: trial.maps(method) for name, method in methods.items()}
-    results = {n: check_method(trial, method, level, maps[n]) for n, method in methods.items()}
-    trusted = [name for name, method in results.items() if method["trusted"]]
+    maps = maps or {}
+    results = {n: check_method(trial, of, level, maps.get(n)) for n, of in methods.items()}
+    scores = {name: one["score"]["lower95"] for name, one in results.items() if one["trusted"]}
     return {
-        "trusted": max(trusted, key=lambda n: results[n]["score"]["lower95"]) if trusted else None,
+        "trusted": max(scores, key=lambda name: scores[name], default=None),
         "methods": results,
         "placebos": {
-            name: patches.summarise_scores(trial.scores(maps), trial.episode)
-            for name, maps in trial.placebos.items()
+            name: patches.summarise_scores(trial.scores(placebo), trial.episode)
+            for name, placebo in trial.placebos.items()
         },
         "frames": len(trial.episode),
         "frames_unmoved": trial.still,
@@ -260,17 +255,18 @@ def random_weights(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
     few = trial.thinned()
     own = float(few.scores(few.maps(method)).mean())
     others: list[float] = []
+    is_as_good = False
     count = math.ceil(1 / level) - 1
     for network in shuffled_networks(trial.network, trial.observations, count, trial.seed):
         others.append(float(few.scores(few.maps(method, network)).mean()))
-        if others[-1] >= own - 1e-9:
+        if is_as_good := others[-1] >= own - 1e-9:
             break
     return {
         "score": own,
         "best": max(others),
         "mean": float(np.mean(others)),
         "tried": len(others),
-        "as_good": int(others[-1] >= own - 1e-9),
+        "as_good": int(is_as_good),
     }
 
 
@@ -291,10 +287,8 @@ def _likeness(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
     own = few.maps(method)
     networks = shuffled_networks(trial.network, trial.observations, WEIGHT_SEEDS, trial.seed)
     seeds = np.stack([likeness(own, few.maps(method, network)) for network in networks])
-    return {
-        **_median(seeds.mean(0), few.episode, level),
-        "seeds": np.median(seeds, axis=1).tolist(),
-    }
+    medians = np.median(seeds, axis=1).tolist()
+    return {**_median(seeds.mean(0), few.episode, level), "seeds": medians}
 
 
 def _median(values: NDArray, episode: NDArray, level: float) -> dict[str, float | None]:

@@ -1,9 +1,11 @@
 """Section "truth": tests of the heat maps against the effects of changes to the scene.
 
 Besides the tests in `trust`: pixel-level deletion and insertion curves (Petsiuk et al., 2018), the
-heat by region, and the interventions.
+heat by region, and interventions. That an action's probability changes does not show that the
+outcome changes, so rollouts with and without a change are compared, each from the same frame.
 """
 
+import dataclasses
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -12,11 +14,17 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.explanations import interventions, trust
+from drone_rl.explanations import trust
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.hooks import actions_of, probabilities
-from drone_rl.explanations.scenes import Region
+from drone_rl.explanations.patches import sample_frames
+from drone_rl.explanations.rollouts import Step, rollout
+from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes
 from drone_rl.explanations.trust import Trial
+from drone_rl.policies import PictureNetwork
+from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.tasks import State
 from drone_rl.utils.intervals import episode_means, mean_bounds, mean_interval
 
 SHARES = (0.0, 0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
@@ -38,9 +46,9 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     episode, seed = context.episode, context.seed.value
     state = data.state(scenes.task, scenes.worlds.dynamics).to(context.device)
     trial = trust.make_trial(scenes, network, state, context.actions, episode, seed)
-    changes = interventions.intervene(scenes, network, state, data.tensor("regions"), seed=seed)
+    changes = intervene(scenes, network, state, data.tensor("regions"), seed=seed)
     shown = int(np.argmax(np.nan_to_num(changes[0].effect)))
-    outcomes = interventions.outcomes(scenes, network, state, episode)
+    outcomes = measure_outcomes(scenes, network, state, episode)
     maps = {name: one.numpy() for name, one in context.frame_maps.items()}
     numbers = {
         **_tests(context, trial),
@@ -83,10 +91,7 @@ def _integration_error(context: Context, trial: Trial) -> dict[str, float] | Non
 def heat_shares(maps: NDArray, regions: NDArray, episode: NDArray) -> dict[str, Any]:
     """Return the fractions of a map's heat on targets, horizon, ground and sky.
 
-    Args:
-        maps: Shape (T, H, W), 0 or more.
-        regions: `Region` of each pixel. Shape: (T, H, W).
-        episode: Shape (T,).
+    Maps (T, H, W) are 0 or more; `regions` has the `Region` of each pixel; `episode` is (T,).
 
     Returns:
         By region name, "share" of the heat and "chance": the region's fraction of the frame.
@@ -107,18 +112,13 @@ def heat_shares(maps: NDArray, regions: NDArray, episode: NDArray) -> dict[str, 
 def deletion_insertion(trial: Trial, maps: Tensor, absent: Tensor) -> dict[str, Any]:
     """Return the action's probability as the hottest pixels are replaced first, or restored first.
 
-    Pixels of the trial's T observations are replaced by the scene without targets. That scene has a
-    most probable action of its own, so results are given for each action separately.
-
-    Args:
-        trial: Observations, the actions taken, and their episodes.
-        maps: Shape (T, h, w).
-        absent: Observation of the scene without targets. Shape: (C, h, w).
+    Pixels are replaced by the scene without targets, `absent` (C, h, w). That scene has a most
+    probable action of its own, so results are given for each action taken. Maps are (T, h, w).
 
     Returns:
-        By name of the action taken: "frames"; for "deletion" (lower is better) and "insertion"
-        (higher is better) the "curve" at `SHARES`, a mean over episodes (None without frames), and
-        the "area" under it with its interval.
+        By name of the action: "frames"; for "deletion" (lower is better) and "insertion" (higher is
+        better) the "curve" at `SHARES`, a mean over episodes (None without frames), and the "area"
+        under it with its interval.
     """
     rank, actions = _ranks(maps), trial.actions
     curves = {"deletion": [], "insertion": []}
@@ -150,3 +150,171 @@ def _summary(curve: NDArray, episode: NDArray) -> dict[str, Any]:
         "curve": [float(m.mean()) for m in means] if len(curve) else None,
         "area": mean_bounds(episode_means(area, episode)),
     }
+
+
+OTHER_TARGETS = Appearance(
+    colors={SemanticClass.TARGET: (0.9, 0.85, 0.2), SemanticClass.OBSTACLE: (0.9, 0.85, 0.2)}
+)
+MOVED_METRES = 2.0
+FLIGHTS_AN_EPISODE = 2
+"""Frames of an episode from which rollouts start, evenly spaced."""
+PATIENCE = 80
+"""Steps after which a target that is neither reached nor passed counts as missed."""
+
+
+@dataclasses.dataclass
+class Intervention:
+    """One change to many scenes and its effect on the policy."""
+
+    name: str
+    area: Tensor  # (T, H, W) bool
+    """Changed pixels."""
+    effect: NDArray  # (T,)
+    """Distance of the action probabilities; NaN where there was nothing to change."""
+    frames: Tensor  # (T, H, W, 3) uint8
+    """Frames after the change."""
+
+
+def intervene(
+    scenes: Scenes, network: PictureNetwork, state: State, regions: Tensor, seed: int = 0
+) -> list[Intervention]:
+    """Remove, move and recolour the next target; as a control, change a patch of ground.
+
+    `regions` has the `Region` of each pixel (T, H, W); the seed is that of the patches' places.
+    """
+    before = scenes.frames(state)
+    base = probabilities(network, scenes.transform(before))
+    visible = regions == Region.NEXT_TARGET
+    ground = _patches(regions == Region.GROUND, visible.sum((1, 2)), seed)
+    recoloured = scenes.frames(state, OTHER_TARGETS)
+    repainted = scenes.frames(state, DARK_GROUND)
+    moved = scenes.frames(to_the_middle(scenes, state))
+    changes = {
+        "target taken away": (scenes.frames(scenes.task.without_next(state)), visible),
+        "target moved": (moved, (moved != before).any(-1)),
+        "target recoloured": (torch.where(visible[..., None], recoloured, before), visible),
+        "ground patch changed": (torch.where(ground[..., None], repainted, before), ground),
+    }
+    return [
+        Intervention(name, area, _effect(network, scenes, base, frames, area), frames)
+        for name, (frames, area) in changes.items()
+    ]
+
+
+def _effect(
+    network: PictureNetwork, scenes: Scenes, base: Tensor, frames: Tensor, area: Tensor
+) -> NDArray:
+    change = scenes.actions.distance(probabilities(network, scenes.transform(frames)), base)
+    return torch.where(area.flatten(1).any(1), change, torch.nan).double().cpu().numpy()
+
+
+def to_the_middle(scenes: Scenes, state: State) -> State:
+    """Move the next target sideways by up to `MOVED_METRES` towards the middle of the frame."""
+    lateral = scenes.task.next_offset(state)[:, 1].nan_to_num()
+    return scenes.task.next_moved(state, -lateral.clamp(-MOVED_METRES, MOVED_METRES))
+
+
+def _patches(ground: Tensor, size: Tensor, seed: int) -> Tensor:
+    """Return a square of ground in each frame, of about `size` pixels. Shape: (T, H, W)."""
+    rng = np.random.default_rng(seed)
+    patches = torch.zeros_like(ground)
+    for t, free in enumerate(ground):
+        places = free.nonzero()
+        if len(places) and size[t]:
+            row, column = places[int(rng.integers(len(places)))].tolist()
+            half = max(1, round(float(size[t]) ** 0.5)) // 2
+            rows = slice(max(0, row - half), row + half + 1)
+            columns = slice(max(0, column - half), column + half + 1)
+            patches[t, rows, columns] = free[rows, columns]
+    return patches
+
+
+@dataclasses.dataclass(frozen=True)
+class TargetRollouts:
+    """N rollouts, each until one target was reached or passed."""
+
+    collected: NDArray
+    """Whether the target was reached. Shape: (N,), bool."""
+    decided: NDArray
+    """Steps until then, or until the episode ended. Shape: (N,)."""
+    lateral: NDArray
+    """The drone's y after each step, metres; constant once decided. Shape: (N, steps + 1)."""
+
+
+def measure_outcomes(
+    scenes: Scenes, network: PictureNetwork, state: State, episode: NDArray
+) -> dict[str, Any]:
+    """Compare greedy rollouts with the next target moved, and with another ground.
+
+    They start from states of the data set (T of them); `episode` has shape (T,).
+
+    Returns:
+        Means over episodes with intervals: "collected", by variant ("as it was", "moved left",
+        "moved right"); "follows": metres that the drone moves sideways with the target per metre, 0
+        if it ignores it, 1 if it always goes there; "ground_changed": fraction whose outcome
+        differs with another ground. "flights": number of rollouts of each variant.
+    """
+    task = scenes.task
+    ahead = (~task.next_offset(state)[:, 0].isnan()).nonzero()[:, 0].cpu().numpy()
+    rows = ahead[sample_frames(episode[ahead], FLIGHTS_AN_EPISODE)]
+    start, group = state[torch.from_numpy(rows)].to(scenes.worlds.device), episode[rows]
+    target = task.next_target(start)
+    variants = {
+        "as it was": start,
+        "moved left": task.next_moved(start, MOVED_METRES),
+        "moved right": task.next_moved(start, -MOVED_METRES),
+    }
+    runs = {name: run_to_target(scenes, network, s, target) for name, s in variants.items()}
+    repainted = run_to_target(scenes, network, start, target, DARK_GROUND)
+
+    def mean(values: NDArray, low: float = 0.0) -> dict[str, Any]:
+        return mean_bounds(episode_means(values.astype(np.float64), group), low, 1.0)
+
+    return {
+        "flights": len(rows),
+        "collected": {name: mean(run.collected) for name, run in runs.items()},
+        "follows": mean(followed(runs["moved left"], runs["moved right"]), -1.0),
+        "ground_changed": mean(runs["as it was"].collected != repainted.collected),
+    }
+
+
+def run_to_target(
+    scenes: Scenes,
+    network: PictureNetwork,
+    state: State,
+    target: Tensor,
+    appearance: Appearance | None = None,
+) -> TargetRollouts:
+    """Step until one target of each environment is reached or passed; see `rollout`.
+
+    The states and the targets' numbers have shape (N,).
+    """
+    task = scenes.task
+    decided = torch.zeros_like(target)
+    lateral = [state.body.position[:, 1].clone()]
+
+    def stays_active(step: Step) -> Tensor:
+        after, goal = step.after, target[step.rows]
+        decided[step.rows] += 1
+        lateral.append(lateral[-1].clone())
+        lateral[-1][step.rows] = after.body.position[:, 1]
+        is_over = task.is_behind(after, goal) | task.is_reached(after, goal)
+        return ~is_over & (after.end_reason == 0) & (len(lateral) <= PATIENCE)
+
+    end = rollout(scenes, network, state, stays_active, appearance)
+    return TargetRollouts(
+        task.is_reached(end, target).cpu().numpy(),
+        decided.cpu().numpy(),
+        torch.stack(lateral, 1).cpu().numpy(),
+    )
+
+
+def followed(left: TargetRollouts, right: TargetRollouts) -> NDArray:
+    """Return how far the drone moved with a target, per metre that it was moved; in [-1, 1].
+
+    Both rollouts are compared at the step at which the first of them ends, so that a longer rollout
+    does not count as following.
+    """
+    when = np.minimum(left.decided, right.decided)
+    ends = [r.lateral[np.arange(len(when)), when] for r in (left, right)]
+    return ((ends[0] - ends[1]) / (2 * MOVED_METRES)).clip(-1.0, 1.0)

@@ -1,24 +1,48 @@
 """Explanations as a user asks for them; their report, made again."""
 
+from pathlib import Path
+
 import pytest
 
-from tests.cli.running import drone_rl, error_line
+import drone_rl
+from drone_rl.explanations.explain import Explanations
+from drone_rl.utils.seeding import RootSeed
+from tests.cli.running import error_line
+from tests.explanations.quick import quick
 
 
 @pytest.mark.slow
-def test_explain_then_report(tmp_path):
+def test_explain_then_report(in_process, tmp_path):
     few = ["frames=60", "episodes=8", "perplexity=5", "num_envs=32"]
-    done = drone_rl("explain", "policy=[good,poor]", *few, "hydra.run.dir=run", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    with quick():
+        done = in_process("explain", "policy=poor", "require=good", *few, "hydra.run.dir=run")
     assert "poor: poor" in done.stdout
+    assert done.returncode == 13  # poor, but 8 episodes are too few to be certain
     first = (tmp_path / "run" / "report.html").read_text()
-    done = drone_rl("report", "explanations=run", "hydra.run.dir=again", cwd=tmp_path)
+    done = in_process("report", "explanations=run", "hydra.run.dir=again")
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "again" / "report.html").read_text() == first
-    refused = drone_rl(
-        "explain", "policy=poor", "require=good", *few, "hydra.run.dir=no", cwd=tmp_path
-    )
-    assert refused.returncode == 13  # poor, but 8 episodes are too few to be certain
+
+
+def test_several_policies_are_explained_together(in_process, monkeypatch):
+    kinds = {"good": ("good", 0), "poor": ("poor", 13)}
+    seen = {}
+
+    def explain(policies, settings, **kwargs):
+        seen.update(names=[policy.name for policy in policies], frames=settings.frames, **kwargs)
+        verdicts = {
+            name: {"kind": kind, "certain": True, "sentence": "It is.", "exit_code": code}
+            for name, (kind, code) in kinds.items()
+        }
+        numbers = {name: {"verdict": verdict} for name, verdict in verdicts.items()}
+        return Explanations(Path("x"), Path("x/report.html"), numbers, RootSeed(1, is_fixed=True))
+
+    monkeypatch.setattr(drone_rl, "explain", explain)
+    done = in_process("explain", "policy=[good,poor]", "frames=150", "num_envs=7")
+    assert (done.returncode, seen["names"]) == (0, ["good", "poor"])
+    assert (seen["frames"], seen["num_envs"]) == (150, 7)
+    assert "good: good. It is." in done.stdout and "poor: poor. It is." in done.stdout
+    assert in_process("explain", "policy=[good,poor]", "require=good").returncode == 13
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from drone_rl.explanations.context import Context
 from drone_rl.explanations.explain import explain_policy
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import MLP
+from tests.explanations.quick import quick
 from tests.second_task import NUM_POSTS, Posts
 
 
@@ -35,9 +36,10 @@ def test_flights_are_recorded_as_the_task_remembers_them(context):
 
 def test_all_sections_are_made(context, tmp_path):
     """Nothing of an explanation needs cubes, only targets."""
-    numbers = explain_policy(
-        context.env, context.network, tmp_path, context.settings, name="posts", provenance={}
-    )
+    with quick():
+        numbers = explain_policy(
+            context.env, context.network, tmp_path, context.settings, name="posts", provenance={}
+        )
     assert numbers["verdict"]["num_cubes"] == NUM_POSTS
     assert [row["side"] for row in numbers["response"]["rows"]] == ["left", "right"]
     assert set(numbers["truth"]["outcomes"]["collected"]) == {

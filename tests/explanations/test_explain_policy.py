@@ -9,13 +9,17 @@ from drone_rl.explanations.explain import SECTIONS, explain_policy
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import MLP
 from drone_rl.utils.errors import InputError
+from tests.explanations.quick import quick
 
 SMALL = ExplainSettings(frames=60, episodes=6, perplexity=5, seed=3)
 
 
 def explain(env, network, folder, settings=SMALL, **kwargs):
     origin = {"policy": "a test", "trained": {}}
-    return explain_policy(env, network, folder, settings, name="test", provenance=origin, **kwargs)
+    with quick():
+        return explain_policy(
+            env, network, folder, settings, name="test", provenance=origin, **kwargs
+        )
 
 
 @pytest.mark.slow

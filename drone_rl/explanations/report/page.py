@@ -18,7 +18,6 @@ from drone_rl.explanations.report import (
     embedding,
     response,
     truth,
-    verdict,
 )
 from drone_rl.explanations.report.explanation import FRAME, Drawn, Explanation, Part
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
@@ -28,8 +27,8 @@ from drone_rl.utils.limits import ARRAYS_BYTES, Allowance
 from drone_rl.utils.text import percent, say
 
 PARTS: dict[str, Part] = {
-    "evaluation": verdict.EVALUATION_PART,
-    "shifts": verdict.SHIFTS_PART,
+    "evaluation": behavior.EVALUATION_PART,
+    "shifts": behavior.SHIFTS_PART,
     "dataset": behavior.DATASET_PART,
     "embedding": embedding.PART,
     "flaws": behavior.FLAWS_PART,
@@ -39,7 +38,7 @@ PARTS: dict[str, Part] = {
     "response": response.RESPONSE_PART,
     "places": response.PLACES_PART,
     "asymmetry": response.ASYMMETRY_PART,
-    "left_out": verdict.LEFT_OUT_PART,
+    "left_out": behavior.LEFT_OUT_PART,
 }
 """All parts in the order of the page, named like the sections in `explanations.explain.SECTIONS`.
 
@@ -108,14 +107,11 @@ def _explanations(folder: Path) -> list[Path]:
 
 
 def write_report(folders: Sequence[Path], target: Path) -> Path:
-    """Write report.html and, in figures/, each figure as PNG with its numbers.
+    """Write report.html, and figures with their numbers in figures/; return the page's path.
 
     Args:
         folders: One explanation each; several are shown side by side.
         target: Folder of the report.
-
-    Returns:
-        Path of report.html.
 
     Raises:
         InputError: An explanation can't be read or the report can't be written.
@@ -161,18 +157,19 @@ class Policy:
 
     def show(self, part: Part) -> dict[str, Any]:
         """Save the figures and numbers of a part; return what its template needs."""
-        for name, rows in part.tables(self.explanation).items():
+        explanation, numbers = self.explanation, self.explanation.numbers
+        for name, rows in part.tables(explanation).items():
             save_rows(rows, self.folder / f"{self.prefix}_{name}")
         for name in part.needs:
-            save_numbers(self.explanation.numbers[name], self.folder / f"{self.prefix}_{name}")
+            save_numbers(numbers[name], self.folder / f"{self.prefix}_{name}")
         return {
-            "name": self.explanation.name,
-            "numbers": self.explanation.numbers,
-            "actions": self.explanation.actions,
-            "pictures": _save(part.draw(self.explanation), self.folder, f"{self.prefix}_"),
-            "text": {n: say(one, self.explanation.numbers) for n, one in part.text.items()},
-            "terms": self.explanation.terms,
-            "extras": part.extras(self.explanation),
+            "name": explanation.name,
+            "numbers": numbers,
+            "actions": explanation.actions,
+            "pictures": _save(part.draw(explanation), self.folder, f"{self.prefix}_"),
+            "text": {name: say(sentences, numbers) for name, sentences in part.text.items()},
+            "terms": explanation.terms,
+            "extras": part.extras(explanation),
         }
 
 
@@ -185,7 +182,7 @@ def render_page(policies: Sequence[Policy]) -> str:
         title="Can these policies be trusted?" if policies[1:] else "Can this policy be trusted?",
         parts=_parts(environment, policies),
         policies=explanations,
-        sources=[say(verdict.SOURCE, {**e.numbers, "source": e.source}) for e in explanations],
+        sources=[say(behavior.SOURCE, {**e.numbers, "source": e.source}) for e in explanations],
         policy=content_security_policy(style, script),
         style=style,
         script=script,
@@ -216,17 +213,14 @@ def _parts(environment: jinja2.Environment, policies: Sequence[Policy]) -> list[
         for name, part in PARTS.items()
         if htmls[name]
     ]
-    others = [(p.explanation, _others(p.explanation)) for p in policies]
+    others = []
+    for explanation in (policy.explanation for policy in policies):
+        shown = FRAME.union(*(part.needs for part in PARTS.values() if part.fits(explanation)))
+        others.append((explanation, sorted(explanation.numbers.keys() - shown)))
     if any(keys for _, keys in others):
         html = Markup(environment.get_template("others.html").render(others=others))
         parts.append({"id": "others", "title": "Other numbers", "label": "Others", "html": html})
     return parts
-
-
-def _others(explanation: Explanation) -> list[str]:
-    """Return entries that no part shows, such as those of a newer version."""
-    shown = FRAME.union(*(part.needs for part in PARTS.values() if part.fits(explanation)))
-    return sorted(explanation.numbers.keys() - shown)
 
 
 def _render(template: jinja2.Template, part: Part, policies: Sequence[Policy]) -> Markup | None:

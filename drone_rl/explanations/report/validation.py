@@ -116,10 +116,7 @@ def check_sizes(
 ) -> None:
     """Refuse an explanation with a part that is too large to render or has another type.
 
-    Args:
-        numbers: `explanation.json`.
-        arrays: `arrays.npz`.
-        data: `dataset.npz`.
+    The arguments are the contents of `explanation.json`, `arrays.npz` and `dataset.npz`.
 
     Raises:
         InputError: There is one; the message names it.
@@ -197,8 +194,6 @@ def check_fit(
     actions: ShownActions,
 ) -> None:
     """Refuse an explanation whose arrays and numbers do not fit each other or its actions.
-
-    See `check_sizes` for the arguments.
 
     Raises:
         InputError: They do not; the message names the part.

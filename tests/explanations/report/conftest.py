@@ -12,6 +12,7 @@ from drone_rl.explanations.explain import explain_policy
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import SmallCNN
+from tests.explanations.quick import quick
 
 NASTY = '</script><b>"a" & b'
 """A name that would break a page that didn't escape it."""
@@ -26,7 +27,8 @@ def explanations(tmp_path_factory):
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,), generator=generator)
     settings = ExplainSettings(frames=180, episodes=6, perplexity=5)
     origin = {"policy": f"/somewhere/{NASTY}", "trained": {}}
-    explain_policy(env, network, root / "a", settings, name=NASTY, provenance=origin)
+    with quick(grids=False):
+        explain_policy(env, network, root / "a", settings, name=NASTY, provenance=origin)
     env.close()
     shutil.copytree(root / "a", root / "b")
     numbers = json.loads((root / "b" / "explanation.json").read_text())

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.explanations.explain import SECTIONS, explain_policy
+from drone_rl.explanations.explain import explain_policy
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.settings import ExplainSettings
 from tests.continuous import make_policy, make_worlds
+from tests.explanations.quick import quick
 
 NAMES = ["forward", "left", "right", "turn left", "turn right"]
 
@@ -24,8 +25,8 @@ def folder(tmp_path_factory):
         network.layers.logits.weight.mul_(20)
         network.layers.logits.bias.copy_(torch.tensor([1.0, 0.2, 0.0, 0.0, 0.0, 0.0]))
     settings = ExplainSettings(frames=40, episodes=6, perplexity=5)
-    sections = SECTIONS
-    explain_policy(env, network, folder, settings, name="fast", provenance={}, sections=sections)
+    with quick():
+        explain_policy(env, network, folder, settings, name="fast", provenance={})
     env.close()
     return folder
 

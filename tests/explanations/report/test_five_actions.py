@@ -10,6 +10,7 @@ from drone_rl.explanations.explain import SECTIONS, explain_policy
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import MLP
+from tests.explanations.quick import quick
 from tests.second_dynamics import Turning
 
 
@@ -24,7 +25,9 @@ def folder(tmp_path_factory):
         network.layers.logits.bias.copy_(torch.tensor([3.0, 0.0, 0.0, -2.0, 0.0]))
     settings = ExplainSettings(frames=40, episodes=6, perplexity=5)
     sections = {name: s for name, s in SECTIONS.items() if name != "evaluation"}
-    explain_policy(env, network, folder, settings, name="turning", provenance={}, sections=sections)
+    how = {"name": "turning", "provenance": {}, "sections": sections}
+    with quick():
+        explain_policy(env, network, folder, settings, **how)
     env.close()
     return folder
 

@@ -1,7 +1,7 @@
 import pytest
 
 from drone_rl.explanations.report.explanation import Explanation
-from drone_rl.explanations.report.truth_charts import heat_chart, truth_chart
+from drone_rl.explanations.report.truth import heat_chart, truth_chart
 
 SCORE = {"mean": 0.5, "lower95": 0.4, "upper95": 0.6}
 UNKNOWN = {"mean": None, "lower95": None, "upper95": None}

@@ -1,5 +1,5 @@
 from drone_rl.explanations.report.explanation import Explanation
-from drone_rl.explanations.report.truth_charts import curves_chart
+from drone_rl.explanations.report.truth import curves_chart
 from drone_rl.explanations.report.validation import METHOD_NAMES as NAMES
 
 

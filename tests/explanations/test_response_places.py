@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import numpy as np
 import torch
 
-from drone_rl.explanations import places
+from drone_rl.explanations import response
 from drone_rl.explanations.scenes import place_target
 from drone_rl.policies import ForeignNetwork
 from drone_rl.sim.actions import MOVES
@@ -13,13 +13,13 @@ from tests.five_actions import FIVE
 
 
 def test_a_map_of_near_places_is_that_of_the_policys_own_pictures(context, monkeypatch):
-    small = places.PlacesSettings(farthest=3.5, sideways=3.0)
-    monkeypatch.setattr(places, "PlacesSettings", lambda: small)
-    numbers, arrays = places.section(context)
+    small = response.PlacesSettings(farthest=3.5, sideways=3.0)
+    monkeypatch.setattr(response, "PlacesSettings", lambda: small)
+    numbers, arrays = response.places_section(context)
     told = numbers["places"]
     assert told["window"] == {"nearest": 2.5, "farthest": 3.5, "sideways": 3.0}
     assert set(arrays) == {"places_points", "places_ends", "places_labels"}
-    found = places._map(context, small)
+    found = response._exact_map(context, small)
     where = np.random.RandomState(0).uniform((2.5, -3.0), (3.5, 3.0), (100, 2))
     ahead, left = torch.from_numpy(where).T
     pictures = context.scenes.observe(place_target(context.scenes, ahead + camera_ahead(), left))
@@ -36,7 +36,7 @@ def test_why_there_is_none(context):
         network = changes.pop("network", None)
         changed = {name: getattr(scenes, name) for name in names} | changes
         given = SimpleNamespace(scenes=SimpleNamespace(**changed), network=network)
-        numbers, arrays = places.section(given)
+        numbers, arrays = response.places_section(given)
         assert arrays == {}
         return numbers["places"]["refused"]
 

@@ -5,14 +5,14 @@ import pytest
 import torch
 from torch import nn
 
-from drone_rl.explanations.interventions import (
+from drone_rl.explanations.scenes import empty_scene, place_target
+from drone_rl.explanations.truth import (
     PATIENCE,
     TargetRollouts,
     followed,
-    outcomes,
+    measure_outcomes,
     run_to_target,
 )
-from drone_rl.explanations.scenes import empty_scene, place_target
 from drone_rl.sim.actions import Move
 
 
@@ -54,7 +54,7 @@ def follower(scenes):
 
 
 def test_a_policy_that_looks_follows_the_cube_and_gets_it(scenes, starts, follower):
-    found = outcomes(scenes, follower, starts, np.arange(12))
+    found = measure_outcomes(scenes, follower, starts, np.arange(12))
     assert found["flights"] == 12
     assert found["collected"]["as it was"]["mean"] > 0.8
     assert found["collected"]["moved left"]["mean"] > 0.8
@@ -64,7 +64,7 @@ def test_a_policy_that_looks_follows_the_cube_and_gets_it(scenes, starts, follow
 
 @pytest.mark.parametrize("action", list(Move))
 def test_a_policy_that_does_not_look_follows_nothing(scenes, starts, action):
-    found = outcomes(scenes, Always(action), starts, np.arange(12))
+    found = measure_outcomes(scenes, Always(action), starts, np.arange(12))
     assert found["follows"]["mean"] == 0.0
     assert found["ground_changed"]["mean"] == 0.0
     assert found["ground_changed"]["upper95"] < 0.5  # twelve flights show no more than that
@@ -88,7 +88,7 @@ def test_a_policy_that_minds_the_ground_gets_another_outcome(scenes, starts, fea
     network = Afraid(Move.FORWARD)
     network.level = float(scenes.observe(starts)[0, 0, -1, 0]) - 0.3
     ahead = place_target(scenes, torch.full((6,), 9.0), torch.zeros(6))
-    found = outcomes(scenes, network, ahead, np.arange(6))
+    found = measure_outcomes(scenes, network, ahead, np.arange(6))
     assert found["ground_changed"]["mean"] == 1.0
     assert found["collected"]["as it was"]["mean"] == float(fears_dark)
     assert set(found["collected"]) == {"as it was", "moved left", "moved right"}
@@ -105,7 +105,7 @@ def test_flights_end_when_the_cube_is_decided(scenes):
 
 
 def test_patience_ends(scenes, monkeypatch):
-    monkeypatch.setattr("drone_rl.explanations.interventions.PATIENCE", 3)
+    monkeypatch.setattr("drone_rl.explanations.truth.PATIENCE", 3)
     state = place_target(scenes, torch.tensor([9.0]), torch.tensor([0.0]))
     flown = run_to_target(scenes, Always(Move.FORWARD), state, state.next_cube)
     assert (flown.collected.tolist(), flown.decided.tolist()) == ([False], [3])
@@ -136,5 +136,5 @@ def test_following_by_hand():
 
 
 def test_without_a_cube_nothing_flies(scenes, follower):
-    found = outcomes(scenes, follower, empty_scene(scenes), np.zeros(1))
+    found = measure_outcomes(scenes, follower, empty_scene(scenes), np.zeros(1))
     assert found["flights"] == 0 and found["follows"]["mean"] is None

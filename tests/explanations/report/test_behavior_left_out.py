@@ -1,4 +1,4 @@
-from drone_rl.explanations.report.verdict import LEFT_OUT_PART
+from drone_rl.explanations.report.behavior import LEFT_OUT_PART
 from drone_rl.utils.text import say
 
 

@@ -1,7 +1,7 @@
 import pytest
 
 from benchmarks.evidence import EXPLANATION, changed
-from drone_rl.explanations.report.verdict import ADVICE, SCOPE
+from drone_rl.explanations.report.behavior import ADVICE, SCOPE
 from drone_rl.utils.text import said, say
 
 

@@ -4,8 +4,8 @@ import torch
 
 from drone_rl.config import TaskSettings
 from drone_rl.explanations.hooks import probabilities
-from drone_rl.explanations.interventions import OTHER_TARGETS, _patches, intervene, to_the_middle
 from drone_rl.explanations.scenes import DARK_GROUND, Region, empty_scene, place_target
+from drone_rl.explanations.truth import OTHER_TARGETS, _patches, intervene, to_the_middle
 from drone_rl.sim.entities import FLOOR_COLOR
 from drone_rl.sim.rendering.scene import SemanticClass
 

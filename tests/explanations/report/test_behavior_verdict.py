@@ -1,6 +1,6 @@
 import pytest
 
-from drone_rl.explanations.report.verdict import EVALUATION_PART
+from drone_rl.explanations.report.behavior import EVALUATION_PART
 
 
 @pytest.mark.parametrize(

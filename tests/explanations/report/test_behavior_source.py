@@ -1,4 +1,4 @@
-from drone_rl.explanations.report.verdict import SOURCE
+from drone_rl.explanations.report.behavior import SOURCE
 from drone_rl.utils.text import say
 
 
