@@ -10,8 +10,8 @@ from torch import Tensor
 from torch.nn import functional
 
 from benchmarks.planted import reach
-from drone_rl.explanations import controls
-from drone_rl.explanations.controls import shuffled_networks
+from drone_rl.explanations import patches
+from drone_rl.explanations.patches import shuffled_networks
 from drone_rl.explanations.trust import MapOf
 from drone_rl.policies import PictureNetwork
 
@@ -24,24 +24,24 @@ def liars(absent: Tensor, other: PictureNetwork) -> dict[str, MapOf]:
         other: A policy that is not the one asked about.
     """
     height, width = absent.shape[-2:]
-    row = controls.horizon_row(absent)
+    row = patches.horizon_row(absent)
     fixed = {
-        "blob, upper left": controls.blob(height, width, 0.4, 0.3),
-        "blob, wide": controls.blob(height, width, 0.5, 0.5, 0.4),
-        "blob, narrow": controls.blob(height, width, 0.5, 0.5, 0.1),
-        "horizon, lower": controls.band(height, width, row + 0.1 * height),
-        "horizon, wide": controls.band(height, width, row, 0.2),
-        "horizon and blob": controls.band(height, width, row)
-        * controls.blob(height, width, 0.5, 0.5, 0.4),
+        "blob, upper left": patches.blob(height, width, 0.4, 0.3),
+        "blob, wide": patches.blob(height, width, 0.5, 0.5, 0.4),
+        "blob, narrow": patches.blob(height, width, 0.5, 0.5, 0.1),
+        "horizon, lower": patches.band(height, width, row + 0.1 * height),
+        "horizon, wide": patches.band(height, width, row, 0.2),
+        "horizon and blob": patches.band(height, width, row)
+        * patches.blob(height, width, 0.5, 0.5, 0.4),
     }
     return {
         **{name: _always(made) for name, made in fixed.items()},
         "cube detector": lambda n, x, a: _cubes(x, absent),
         "cubes on the horizon": lambda n, x, a: (
-            fixed["horizon, wide"] * (0.2 + controls.smoothed(_cubes(x, absent)))
+            fixed["horizon, wide"] * (0.2 + patches.smoothed(_cubes(x, absent)))
         ),
-        "smoothed difference": lambda n, x, a: controls.smoothed(
-            controls.difference(x, absent), 4
+        "smoothed difference": lambda n, x, a: patches.smoothed(
+            patches.difference(x, absent), 4
         ),
         "edges": lambda n, x, a: _edges(x),
         "brightness": lambda n, x, a: x.mean(1) - x.amin((1, 2, 3))[:, None, None],
@@ -58,10 +58,10 @@ def liars(absent: Tensor, other: PictureNetwork) -> dict[str, MapOf]:
         "coarse noise of the weights": lambda n, x, a: _coarse(fingerprint(n), height, width)
         .expand(len(x), -1, -1),
         "difference with noise of the weights": lambda n, x, a: (
-            controls.difference(x, absent) * _noise(fingerprint(n), 1, height, width)
+            patches.difference(x, absent) * _noise(fingerprint(n), 1, height, width)
         ),
         "cubes with noise of the weights": lambda n, x, a: (
-            (0.05 + controls.smoothed(_cubes(x, absent)))
+            (0.05 + patches.smoothed(_cubes(x, absent)))
             * _coarse(fingerprint(n), height, width)
         ),
         "horizon with noise of the weights": lambda n, x, a: (
@@ -93,7 +93,7 @@ def _always(made: Tensor) -> MapOf:
 
 
 def _cubes(observations: Tensor, absent: Tensor) -> Tensor:
-    return (controls.difference(observations, absent) > 0.05).float()
+    return (patches.difference(observations, absent) > 0.05).float()
 
 
 def _edges(observations: Tensor) -> Tensor:

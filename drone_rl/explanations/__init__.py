@@ -7,8 +7,8 @@ Shared:
 
 - `settings`, `explain`, `context`: settings, entry points, what sections share.
 - `rollouts`, `scenes`, `hooks`: recorded episodes, rendered scenes, outputs of layers.
-- `heat_maps`, `patches`, `controls`, `trust`: attribution methods, the measured effect of patches,
-  placebo maps, and the tests of heat maps.
+- `heat_maps`, `patches`, `trust`: attribution methods, the measured effects of patches with
+  controls, and the tests of heat maps.
 
 Sections: `behavior` (verdict, robustness, data set, contradictions, loops), `embedding` (t-SNE),
 `class_models`, `attribution`, `truth`, `response` (maps over a target's place, asymmetry).

@@ -29,7 +29,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
             "Class models need gradients of the logits with respect to the pixels, and this policy "
             "has none; give it as a torch function of floats, which the transform rgb makes."
         )
-    statistics = ImageStatistics.of(context.observations)
+    statistics = ImageStatistics.of(context.dataset.tensor("observations"))
 
     def optimize(objective: Objective) -> ClassModel:
         network = copy.deepcopy(context.network)  # it accumulates gradients
@@ -51,9 +51,9 @@ class ClassModelSettings:
     """Settings of the optimization."""
 
     objective: Objective = "logit"
-    """What is maximized: the action's probability (Eq. 18), or its logit minus the logits' mean."""
+    """Maximized: the action's probability (Eq. 18), or its logit minus the mean of the logits."""
     parameterisation: Literal["pixel", "fourier"] = "pixel"
-    """What is optimized: pixels, or their Fourier coefficients scaled by 1 / frequency."""
+    """The variables to optimize: pixels, or their Fourier coefficients scaled by 1 / frequency."""
     steps: int = 64
     """Steps of gradient ascent."""
     lr: float = 20.0
@@ -174,8 +174,7 @@ def visualise(
     seed: int = 0,
 ) -> Attempts:
     """Optimize observations for each action from random starts; the network is not changed."""
-    generator = torch.Generator().manual_seed(seed)
-    shape = network.in_shape
+    generator, shape = torch.Generator().manual_seed(seed), network.in_shape
     num_actions = len(actions_of(network).names)
     starts = torch.rand(settings.starts, *shape, generator=generator)
     start = statistics.low + (statistics.high - statistics.low) * starts
@@ -183,8 +182,8 @@ def visualise(
     action = torch.arange(num_actions).repeat_interleave(settings.starts)
     quick = accelerated_gradients(network, of="pixels") or network
     ascent = _Ascent(quick, action, statistics, settings, generator)
-    is_fourier = settings.parameterisation == "fourier"
-    reached = ascent.fourier(images) if is_fourier else ascent.pixels(images)
+    optimize = ascent.pixels if settings.parameterisation == "pixel" else ascent.fourier
+    reached = optimize(images)
     with torch.no_grad():
         each = actions_of(network).wish(network(reached)).gather(1, action[:, None])[:, 0]
     by_action = (num_actions, settings.starts)
@@ -205,10 +204,8 @@ def search(
 ) -> ClassModel:
     """Try a few settings, each from all starts."""
     tried = []
-    for parameterisation, blur in itertools.product(("pixel", "fourier"), (0.5, 0.9, 1.4)):
-        settings = ClassModelSettings(
-            objective=objective, parameterisation=parameterisation, blur=blur
-        )
+    for kind, blur in itertools.product(("pixel", "fourier"), (0.5, 0.9, 1.4)):
+        settings = ClassModelSettings(objective=objective, parameterisation=kind, blur=blur)
         tried.append(visualise(network, statistics, settings, seed=seed))
     return ClassModel(tried)
 
@@ -224,7 +221,7 @@ class _Ascent:
     generator: torch.Generator
 
     def value(self, images: Tensor) -> Tensor:
-        """Return what is maximized, on images shifted at random. Shape: (N,)."""
+        """Return the quantity to maximize, on images shifted at random. Shape: (N,)."""
         actions, outputs = actions_of(self.network), self.network(self.jitter(images))
         if self.settings.objective == "probability":
             return actions.wish(outputs).gather(1, self.action[:, None])[:, 0]
@@ -271,11 +268,9 @@ class _Ascent:
 
     def jitter(self, images: Tensor) -> Tensor:
         """Shift images at random, with edges repeated."""
-        reach = self.settings.jitter
-        shift = torch.randint(-reach, reach + 1, (2,), generator=self.generator).tolist()
+        reach, (height, width) = self.settings.jitter, images.shape[-2:]
+        top, left = torch.randint(0, 2 * reach + 1, (2,), generator=self.generator).tolist()
         padded = functional.pad(images, (reach,) * 4, mode="replicate")
-        height, width = images.shape[-2:]
-        top, left = reach + shift[0], reach + shift[1]
         return padded[..., top : top + height, left : left + width]
 
 

@@ -1,4 +1,4 @@
-"""What the sections of an explanation share: one policy, its environments, rollouts and heat maps.
+"""State that all sections share: a policy, its environments, rollouts and heat maps.
 
 Each shared value is computed when it is first needed and does not depend on who needs it first, so
 sections can run in any order.
@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import TransformedEnv
@@ -71,7 +70,7 @@ class Context:
     def restart(self) -> TensorDictModuleBase:
         """Return the environments to their first episodes; return an actor with a fresh stream."""
         self.env.base_env.load_state_dict(self._start)
-        generator = torch_generator(self.seed.value, Stream.REPORT, device=self.device)
+        generator = torch_generator(self.seed.value, Stream.REPORT, device=str(self.env.device))
         return make_actor(self.network, self.env.action_spec, generator)
 
     def aside(self) -> "Context":
@@ -120,29 +119,10 @@ class Context:
         return render_frames(self.flights, rows, self.scenes, self.network)
 
     @property
-    def device(self) -> str:
-        """Device of the environments."""
-        return str(self.env.device)
-
-    @property
-    def episode(self) -> NDArray:
-        """Episode of each frame of the data set. Shape: (T,)."""
-        return self.dataset.episode
-
-    @property
-    def observations(self) -> Tensor:
-        """Observations of the data set. Shape: (T, C, h, w)."""
-        return self.dataset.tensor("observations")
-
-    @property
-    def actions(self) -> Tensor:
-        """Actions taken. Shape: (T,)."""
-        return self.dataset.tensor("actions")
-
-    @property
     def maps(self) -> dict[str, Tensor]:
         """Heat maps of the actions taken, by method, on the observations. Shape: (T, h, w)."""
-        inputs, methods = (self.observations, self.actions), self.explainer.methods()
+        inputs = self.dataset.tensor("observations"), self.dataset.tensor("actions")
+        methods = self.explainer.methods()
         return self.shared("maps", lambda: {name: of(*inputs) for name, of in methods.items()})
 
     @property

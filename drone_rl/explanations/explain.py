@@ -19,14 +19,7 @@ from numpy.typing import NDArray
 from torchrl.envs import TransformedEnv
 
 from drone_rl.evaluation.rounding_sensitivity import require_function
-from drone_rl.explanations import (
-    attribution,
-    behavior,
-    class_models,
-    embedding,
-    response,
-    truth,
-)
+from drone_rl.explanations import attribution, behavior, class_models, embedding, response, truth
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.settings import ExplainSettings
@@ -233,16 +226,13 @@ def _run(
 ) -> dict[str, _Result]:
     """Run all sections, those in `ASIDE` in a second thread."""
     twin = context.aside()
+    results: dict[str, _Result] = {}
     with ThreadPoolExecutor(1) as pool:
-        waiting = {}
-        for title in (t for t in sections if t in ASIDE):
-            progress(f"{title} (aside)".replace("_", " "))
-            waiting[title] = pool.submit(_compute, sections[title], twin)
-        results: dict[str, _Result] = {}
-        for title in (t for t in sections if t not in ASIDE):
+        aside = {t: pool.submit(_compute, sections[t], twin) for t in sections if t in ASIDE}
+        for title in sorted(sections, key=ASIDE.__contains__):
             progress(title.replace("_", " "))
-            results[title] = _compute(sections[title], context)
-        results |= {title: future.result() for title, future in waiting.items()}
+            waiting = aside.get(title)
+            results[title] = waiting.result() if waiting else _compute(sections[title], context)
     return {title: results[title] for title in sections}
 
 

@@ -53,9 +53,10 @@ def response_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArra
 
 def asymmetry_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Return "asymmetry": on the "dataset" and on the "grid" of the response map."""
-    actions = context.scenes.actions
+    data, actions = context.dataset, context.scenes.actions
+    seen = data.tensor("observations")
     numbers = {
-        "dataset": asymmetry(context.network, context.observations, context.episode, actions),
+        "dataset": asymmetry(context.network, seen, data.episode, actions),
         "grid": grid_asymmetry(policy_response(context), actions),
     }
     return {"asymmetry": numbers}, {}
@@ -148,8 +149,8 @@ def _over_grid(
 def shrink(grid: Grid, seed: int, number: int = 0) -> Grid:
     """Move the outermost places inwards by random lengths, and all others in proportion.
 
-    Nobody can know these places beforehand and fit a policy to their frames. Places stay evenly
-    spaced, and symmetric sideways. Each end moves by less than half the distance of two places.
+    These places are unknown beforehand, so no policy can be fitted to their frames. Places stay
+    evenly spaced, and symmetric sideways. Each end moves by less than half the distance of two.
     `number` is that of one grid among several from this seed.
     """
     generator = torch_generator(seed, Stream.SCENES, number=number)

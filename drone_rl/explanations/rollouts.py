@@ -91,8 +91,7 @@ class RolloutDataset:
     def state(self, task: Task[Any], dynamics: Dynamics | None = None) -> State:
         """Return the environments' states, with the drones at rest.
 
-        What the state of `dynamics` has beyond a pose, such as rotor speeds, is as at the start of
-        an episode.
+        Other variables of `dynamics`, such as rotor speeds, are as at the start of an episode.
         """
         kept = {name: self.tensor(name) for name in (*task.remembered, "step")}
         attitude, place = self.tensor("attitude").double(), self.tensor("drone").double()
@@ -103,23 +102,14 @@ class RolloutDataset:
         return task.recall(kept, body)
 
     def save(self, path: str | Path, flights: "RolloutDataset | None" = None) -> None:
-        """Write the file, with all steps of the episodes as "flights/...".
-
-        Raises:
-            InputError: It can't be written.
-        """
+        """Write the file, with all steps of the episodes as "flights/..."."""
         arrays: dict[str, Any] = dict(self.arrays)  # Any: numpy's allow_pickle
         arrays |= {f"features/{name}": value for name, value in self.features.items()}
         if flights is not None:
             whole = flights.arrays.items()
             arrays |= {f"flights/{name}": value for name, value in whole if name not in SEEN}
         described = json.dumps({**self.meta, "features": list(self.features)})
-        try:
-            np.savez_compressed(path, meta=described, **arrays)
-        except OSError as error:
-            raise InputError(
-                f"data set {path} can't be written ({error.strerror}); choose another folder"
-            ) from error
+        np.savez_compressed(path, meta=described, **arrays)
 
 
 def collect(
@@ -130,14 +120,9 @@ def collect(
     num_frames: int = 1,
     meta: dict[str, Any] | None = None,
 ) -> RolloutDataset:
-    """Collect all steps of whole episodes with sampled actions; only observations are rendered.
+    """Collect at least so many whole episodes and steps of a policy, with sampled actions.
 
-    Args:
-        env: A batch of environments.
-        actor: The policy.
-        num_episodes: Least number of episodes.
-        num_frames: Least number of steps.
-        meta: Origin of the policy.
+    Only observations are rendered. `meta` is the origin of the policy.
 
     Raises:
         InputError: num_frames is below 1.
@@ -187,14 +172,9 @@ def render_frames(
     network: PictureNetwork,
     layers: tuple[str, ...] = (),
 ) -> RolloutDataset:
-    """Return some steps with rendered frames, ground truth, probabilities and features.
+    """Return some steps with rendered frames, ground truth, probabilities and outputs of layers.
 
-    Args:
-        flights: From `collect`.
-        rows: Indices of the steps. Shape: (T,).
-        scenes: Renders the frames.
-        network: The policy's network.
-        layers: Layers whose output is recorded.
+    The steps are given as indices (T,) into what `collect` returned.
 
     Raises:
         InputError: A layer doesn't exist.
@@ -286,13 +266,9 @@ def rollout(
 ) -> State:
     """Step all environments with the policy's most probable actions until none is active.
 
-    Args:
-        scenes: Renders and steps the environments.
-        network: The policy's network.
-        state: Initial states; a policy that stacks frames has seen only this one.
-        stays_active: Returns which environments stay active after a step, shape (n,), bool; it may
-            change the states after the step.
-        appearance: Appearance of the scenes; the task's by default.
+    At the initial states, a policy that stacks frames has seen only the first one. `stays_active`
+    returns which environments stay active after a step, (n,) bool, and may change the states after
+    the step. The appearance is the task's by default.
     """
     device = state.body.position.device
     rows = torch.arange(len(state), device=device)

@@ -24,7 +24,7 @@ PLACEMENTS = 3
 
 
 class Region(enum.IntEnum):
-    """What a pixel shows."""
+    """Content of a pixel."""
 
     NEXT_TARGET = 0
     OTHER_TARGET = 1

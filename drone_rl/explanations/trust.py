@@ -30,9 +30,15 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.explanations import patches
-from drone_rl.explanations.controls import likeness, placebo_maps, shuffled_networks
 from drone_rl.explanations.heat_maps import Explainer
-from drone_rl.explanations.patches import Grid, make_grid, sample_frames
+from drone_rl.explanations.patches import (
+    Grid,
+    likeness,
+    make_grid,
+    placebo_maps,
+    sample_frames,
+    shuffled_networks,
+)
 from drone_rl.explanations.scenes import Scenes, alternatives, empty_scene
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.tasks import State
@@ -52,7 +58,7 @@ MOST_ALIKE = 0.5
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Trial:
-    """What maps of one policy are tested against, on frames in which some patch affects it."""
+    """The reference for tests of one policy's maps: frames in which some patch affects it."""
 
     network: PictureNetwork
     observations: Tensor  # (T, C, h, w)

@@ -43,9 +43,9 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     columns): mean effect of each patch.
     """
     data, scenes, network = context.dataset, context.scenes, context.network
-    episode, seed = context.episode, context.seed.value
-    state = data.state(scenes.task, scenes.worlds.dynamics).to(context.device)
-    trial = trust.make_trial(scenes, network, state, context.actions, episode, seed)
+    episode, seed = data.episode, context.seed.value
+    state = data.state(scenes.task, scenes.worlds.dynamics).to(str(context.env.device))
+    trial = trust.make_trial(scenes, network, state, data.tensor("actions"), episode, seed)
     changes = intervene(scenes, network, state, data.tensor("regions"), seed=seed)
     shown = int(np.argmax(np.nan_to_num(changes[0].effect)))
     outcomes = measure_outcomes(scenes, network, state, episode)

@@ -1,7 +1,7 @@
 import torch
 
 from benchmarks.liars import fingerprint, liars, saliency
-from drone_rl.explanations.controls import placebo_maps
+from drone_rl.explanations.patches import placebo_maps
 from drone_rl.policies import MLP, SmallCNN
 
 SIZE = (1, 25, 64)

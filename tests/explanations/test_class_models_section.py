@@ -20,7 +20,7 @@ def test_both_objectives_are_sought_in_the_range_of_the_pictures(monkeypatch):
     observations = torch.linspace(-2, 2, 40).reshape(10, 1, 2, 2)
     network = SimpleNamespace(is_differentiable=True)
     context = SimpleNamespace(
-        observations=observations,
+        dataset=SimpleNamespace(tensor={"observations": observations}.get),
         network=network,
         seed=SimpleNamespace(value=7),
         scenes=SimpleNamespace(channels="rgb"),

@@ -38,14 +38,14 @@ def test_frames_are_of_the_flights_and_maps_of_the_frames(make_pipeline):
     env, actor = make_pipeline(num_envs=30)
     context = Context(env, actor.module[0].module, SMALL)
     data, flights = context.dataset, context.flights
-    assert len(np.unique(flights.episode)) == len(np.unique(context.episode)) == 30
-    assert len(data) == len(context.actions) == 60
+    assert len(np.unique(flights.episode)) == len(np.unique(data.episode)) == 30
+    assert len(data) == len(data.actions) == 60
     every = zip(flights.episode, flights.step, strict=True)
     step = {(int(e), int(s)): t for t, (e, s) in enumerate(every)}
     rows = [step[int(e), int(s)] for e, s in zip(data.episode, data.step, strict=True)]
     np.testing.assert_array_equal(data.actions, flights.actions[rows])
     assert context.dataset is data and context.maps is context.maps  # made once
-    first = context.explainer.saliency(context.observations[:2], context.actions[:2])
+    first = context.explainer.saliency(data.tensor("observations")[:2], data.tensor("actions")[:2])
     torch.testing.assert_close(context.maps["saliency"][:2], first)
     assert set(context.maps) == set(context.frame_maps)
 
@@ -60,7 +60,8 @@ def test_another_thread_has_the_same_data_and_a_network_of_its_own(make_pipeline
     assert twin.network is not network and twin.explainer.network is twin.network
     met = []
     handle = network.register_forward_hook(lambda *_: met.append("hook"))
-    assert torch.equal(twin.network(context.observations), network(context.observations))
+    seen = context.dataset.tensor("observations")
+    assert torch.equal(twin.network(seen), network(seen))
     handle.remove()
     assert met == ["hook"]
 

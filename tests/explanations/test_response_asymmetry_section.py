@@ -13,7 +13,7 @@ def test_frames_and_grid_are_compared_with_their_mirror_images(context):
     assert worst == sorted(worst, reverse=True)
     assert worst[0] >= found["dataset"]["absolute"]["mean"] >= 0
     frame = found["dataset"]["worst"][0]["frame"]
-    picture = context.observations[frame : frame + 1]
+    picture = context.dataset.tensor("observations")[frame : frame + 1]
     here, there = (context.network(p).detach().softmax(-1)[0] for p in (picture, picture.flip(-1)))
     by_hand = 0.5 * float((here - there[[0, 2, 1]]).abs().sum())
     assert worst[0] == pytest.approx(by_hand, abs=1e-5)

@@ -7,9 +7,8 @@ import pytest
 import torch
 
 from drone_rl.explanations import patches, trust
-from drone_rl.explanations.controls import placebo_maps
 from drone_rl.explanations.heat_maps import Explainer
-from drone_rl.explanations.patches import Grid
+from drone_rl.explanations.patches import Grid, placebo_maps
 from drone_rl.explanations.trust import (
     Pictures,
     Trial,

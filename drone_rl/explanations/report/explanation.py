@@ -62,11 +62,7 @@ class Explanation:
 
     @classmethod
     def load(cls, folder: Path, allowance: Allowance | None = None) -> "Explanation":
-        """Read a folder.
-
-        Args:
-            folder: Folder of the explanation.
-            allowance: Most bytes of the arrays of all explanations of a report.
+        """Read a folder; the allowance bounds the arrays of all explanations of a report.
 
         Raises:
             InputError: A file is missing, damaged, too large, or of another version.
@@ -121,7 +117,7 @@ def _nothing(_: Any) -> dict[str, Any]:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Part:
-    """What the report shows of a section.
+    """Display of a section in the report.
 
     A part is listed in `page.PARTS`; its template is `templates/sections/NAME.html`.
     """

@@ -1,4 +1,4 @@
-"""Build a report from explanations: one self-contained HTML file, with its figures beside it."""
+"""Build a report from explanations: one self-contained HTML file, and its figures as files."""
 
 import dataclasses
 import functools
@@ -40,10 +40,8 @@ PARTS: dict[str, Part] = {
     "asymmetry": response.ASYMMETRY_PART,
     "left_out": behavior.LEFT_OUT_PART,
 }
-"""All parts in the order of the page, named like the sections in `explanations.explain.SECTIONS`.
-
-Entries of an explanation that no part shows are printed as JSON.
-"""
+"""All parts in the order of the page, by the names of `explanations.explain.SECTIONS`; entries of
+an explanation that no part shows are printed as JSON."""
 STYLES = ("style.css", "report.css")
 """Files of the page's one style element."""
 SCRIPTS = ("map.js", "zoom.js")
@@ -73,9 +71,8 @@ def report(folders: Sequence[Path], target: Path) -> Path:
 def find_explanations(which: Sequence[str], outputs: str | Path = "outputs") -> list[Path]:
     """Return folders of explanations.
 
-    Args:
-        which: Folders of explanations, folders that contain such folders, or "latest" alone.
-        outputs: Folder that contains explanations.
+    `which` has such folders, folders that contain some, or "latest" alone, which is searched for
+    in `outputs`.
 
     Raises:
         InputError: There is none.
@@ -90,42 +87,35 @@ def find_explanations(which: Sequence[str], outputs: str | Path = "outputs") -> 
                 "run drone-rl explain first or give folders"
             )
         folders = [run]
-    return [found for folder in folders for found in _explanations(folder)]
-
-
-def _explanations(folder: Path) -> list[Path]:
-    """Return the folder itself or, if it is that of a whole command, all explanations in it."""
-    if (folder / "explanation.json").is_file():
-        return [folder]
-    found = sorted(path.parent for path in folder.glob("*/explanation.json"))
-    if not found:
-        raise InputError(
-            f"explanations={folder} holds no explanation.json; give a folder that drone-rl explain "
-            "wrote"
-        )
+    found: list[Path] = []
+    for folder in folders:
+        is_one = (folder / "explanation.json").is_file()
+        inside = [folder] if is_one else sorted(p.parent for p in folder.glob("*/explanation.json"))
+        if not inside:
+            raise InputError(
+                f"explanations={folder} holds no explanation.json; give a folder that drone-rl "
+                "explain wrote"
+            )
+        found += inside
     return found
 
 
 def write_report(folders: Sequence[Path], target: Path) -> Path:
     """Write report.html, and figures with their numbers in figures/; return the page's path.
 
-    Args:
-        folders: One explanation each; several are shown side by side.
-        target: Folder of the report.
+    The folders hold one explanation each; several are shown side by side.
 
     Raises:
         InputError: An explanation can't be read or the report can't be written.
     """
     allowance = Allowance(ARRAYS_BYTES)
     loaded = [Explanation.load(folder, allowance) for folder in folders]
-    policies = [
-        Policy(explanation, target / "figures", f"{number}_{to_file_name(explanation.name)}")
-        for number, explanation in enumerate(loaded)
-    ]
+    figures = target / "figures"
+    policies = [Policy(e, figures, f"{i}_{to_file_name(e.name)}") for i, e in enumerate(loaded)]
     for policy in policies:
         policy.check()
     try:
-        (target / "figures").mkdir(parents=True, exist_ok=True)
+        figures.mkdir(parents=True, exist_ok=True)
         path = target / "report.html"
         path.write_text(render_page(policies), encoding="utf-8")
     except jinja2.TemplateNotFound:
@@ -194,9 +184,7 @@ def _environment() -> jinja2.Environment:
     """Return the templates of this page, compiled once."""
     environment = page_environment("drone_rl.explanations.report")
     environment.filters |= {
-        "percent": lambda share: (
-            percent(share).replace("less than ", "<").replace("more than ", ">")
-        ),
+        "percent": lambda of: percent(of).replace("less than ", "<").replace("more than ", ">"),
         "json": functools.partial(json.dumps, indent=1),
     }
     return environment
@@ -225,8 +213,7 @@ def _parts(environment: jinja2.Environment, policies: Sequence[Policy]) -> list[
 
 def _render(template: jinja2.Template, part: Part, policies: Sequence[Policy]) -> Markup | None:
     """Return one part with all policies that it fits; None if there is none."""
-    fitting = [policy for policy in policies if part.fits(policy.explanation)]
-    if not fitting:
+    if not (fitting := [policy for policy in policies if part.fits(policy.explanation)]):
         return None
     together = part.compare([policy.explanation for policy in fitting])
     shared = _save(together, fitting[0].folder, "")

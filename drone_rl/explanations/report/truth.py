@@ -156,17 +156,13 @@ _FAILED = {
 }
 
 
-def _truth(evidence: Evidence) -> Mapping[str, Any]:
-    return evidence["truth"]
-
-
 def best_placebo(truth: Mapping[str, Any]) -> str:
     """Return the name of the placebo map with the highest score."""
     return max(truth["placebos"], key=lambda name: truth["placebos"][name]["mean"])
 
 
 def _is_trusted(evidence: Evidence) -> bool:
-    return _truth(evidence)["trusted"] is not None
+    return evidence["truth"]["trusted"] is not None
 
 
 def _refused(evidence: Evidence) -> list[str]:
@@ -174,7 +170,7 @@ def _refused(evidence: Evidence) -> list[str]:
     return [
         f"{METHOD_NAMES.get(name, name)} "
         f"({'; '.join(_reason(result, test) for test in result['failed'])})"
-        for name, result in _truth(evidence)["methods"].items()
+        for name, result in evidence["truth"]["methods"].items()
         if not result["trusted"]
     ]
 
@@ -192,7 +188,7 @@ def _is_above(value: float | None, bar: float) -> bool:
 
 
 def _has_outcomes(evidence: Evidence) -> bool:
-    return _truth(evidence).get("outcomes") is not None
+    return evidence["truth"].get("outcomes") is not None
 
 
 def _can_follow(evidence: Evidence) -> bool:
@@ -201,7 +197,7 @@ def _can_follow(evidence: Evidence) -> bool:
 
 
 def _outcome(evidence: Evidence, name: str) -> Mapping[str, Any]:
-    return _truth(evidence)["outcomes"][name]
+    return evidence["truth"]["outcomes"][name]
 
 
 def _follows(evidence: Evidence) -> bool:
@@ -213,7 +209,7 @@ def _next(evidence: Evidence) -> str:
 
 
 def _trusted(evidence: Evidence) -> str:
-    truth = _truth(evidence)
+    truth = evidence["truth"]
     name, rival = truth["trusted"], best_placebo(truth)
     score = truth["methods"][name]["score"]
     return (
@@ -225,11 +221,11 @@ def _trusted(evidence: Evidence) -> str:
 
 
 def _pointing(evidence: Evidence) -> Mapping[str, Any]:
-    return _truth(evidence)["methods"][_truth(evidence)["trusted"]]["pointing"]
+    return evidence["truth"]["methods"][evidence["truth"]["trusted"]]["pointing"]
 
 
 def _effect(evidence: Evidence, change: str) -> Mapping[str, Any]:
-    return _truth(evidence)["interventions"][change]
+    return evidence["truth"]["interventions"][change]
 
 
 def _target_counts(evidence: Evidence) -> bool:
@@ -239,7 +235,7 @@ def _target_counts(evidence: Evidence) -> bool:
 
 
 def _has_any(evidence: Evidence) -> bool:
-    return _truth(evidence)["frames"] > 0
+    return evidence["truth"]["frames"] > 0
 
 
 FINDINGS = (
@@ -263,7 +259,7 @@ FINDINGS = (
     Sentence(
         "truth.untested",
         "some patch affects the policy, and no method was tested",
-        lambda e: _has_any(e) and not _truth(e)["methods"],
+        lambda e: _has_any(e) and not e["truth"]["methods"],
         lambda e: (
             "No method could be tested: whether a map depends on the weights can't be measured "
             "where they are unknown. Give the policy as a torch module."
@@ -281,10 +277,11 @@ FINDINGS = (
     Sentence(
         "truth.left_out",
         "some frames were left out of the tests",
-        lambda e: _has_any(e) and _truth(e)["frames_unmoved"] > 0,
+        lambda e: _has_any(e) and e["truth"]["frames_unmoved"] > 0,
         lambda e: (
-            f"Of {_truth(e)['frames'] + _truth(e)['frames_unmoved']} frames "
-            f"{_truth(e)['frames_unmoved']} are left out, since no part of them affects the policy."
+            f"Of {e['truth']['frames'] + e['truth']['frames_unmoved']} frames "
+            f"{e['truth']['frames_unmoved']} are left out, since no part of them affects the "
+            "policy."
         ),
     ),
     Sentence(
@@ -293,8 +290,9 @@ FINDINGS = (
         _follows,
         lambda e: (
             f"When {_next(e)} is moved sideways, "
-            f"{plural(_truth(e)['outcomes']['flights'], 'rollout')} from these frames follow it by "
-            f"{_outcome(e, 'follows')['mean']:.2f} m per metre ({bounds(_outcome(e, 'follows'))})."
+            f"{plural(e['truth']['outcomes']['flights'], 'rollout')} from these frames follow it "
+            f"by {_outcome(e, 'follows')['mean']:.2f} m per metre "
+            f"({bounds(_outcome(e, 'follows'))})."
         ),
     ),
     Sentence(
@@ -340,12 +338,12 @@ FINDINGS = (
     Sentence(
         "truth.integral",
         "the error of integrated gradients was measured",
-        lambda e: _truth(e)["integration_error"] is not None,
+        lambda e: e["truth"]["integration_error"] is not None,
         lambda e: (
             "Integrated gradients differ from the change in probability that they must add up to "
-            f"by {_truth(e)['integration_error']['mean']:.4f} on average and "
-            f"{_truth(e)['integration_error']['max']:.4f} at most, "
-            f"on {plural(_truth(e)['integration_error']['pictures'], 'frame')}."
+            f"by {e['truth']['integration_error']['mean']:.4f} on average and "
+            f"{e['truth']['integration_error']['max']:.4f} at most, "
+            f"on {plural(e['truth']['integration_error']['pictures'], 'frame')}."
         ),
     ),
 )

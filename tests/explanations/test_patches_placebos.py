@@ -3,7 +3,7 @@ import math
 import pytest
 import torch
 
-from drone_rl.explanations.controls import (
+from drone_rl.explanations.patches import (
     band,
     blob,
     difference,

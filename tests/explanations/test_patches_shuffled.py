@@ -3,7 +3,7 @@ import pytest
 import torch
 from torch import nn
 
-from drone_rl.explanations.controls import likeness, shuffled_networks
+from drone_rl.explanations.patches import likeness, shuffled_networks
 from drone_rl.policies import MLP, ForeignNetwork, SmallCNN
 from drone_rl.sim.actions import MOVES
 
