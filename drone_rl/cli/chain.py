@@ -1,16 +1,13 @@
 """`drone-rl chain`."""
 
-import logging
 from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
-from drone_rl.cli.settings import PolicyCommandSettings
+from drone_rl.cli.settings import PolicyCommandSettings, finish
 from drone_rl.config.verification import ChanceSettings
+from drone_rl.utils.progress import silent
 from drone_rl.utils.schema import Real, Several
-
-_log = logging.getLogger(__name__)
 
 
 class Command(PolicyCommandSettings, ChanceSettings):
@@ -23,8 +20,6 @@ class Command(PolicyCommandSettings, ChanceSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
     """Compute the outcome probabilities; return the exit status and the success probability."""
-    from drone_rl.utils.progress import silent
-
     done = drone_rl.chances(
         settings.policy,
         settings.cubes or None,
@@ -33,7 +28,5 @@ def run(settings: Command, folder: Path) -> tuple[int, float]:
         outputs=settings.paths.outputs,
         progress=silent,
     )
-    done.save(folder / "chances.json")
-    print(done)
-    _log.info("written: %s", folder / "chances.json")
+    finish(done, folder / "chances.json")
     return 0, done.success

@@ -1,15 +1,12 @@
 """`drone-rl check`."""
 
-import logging
 from pathlib import Path
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
-from drone_rl.cli.settings import CommandSettings
+from drone_rl.cli.settings import CommandSettings, finish
 from drone_rl.config.configuration import TaskChanges, no_changes
 from drone_rl.config.verification import CheckSettings
-
-_log = logging.getLogger(__name__)
+from drone_rl.utils.progress import silent
 
 
 class Command(CommandSettings, CheckSettings):
@@ -25,8 +22,6 @@ class Command(CommandSettings, CheckSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, bool]:
     """Check a certificate; return the exit status and whether it is accepted."""
-    from drone_rl.utils.progress import silent
-
     done = drone_rl.check(
         settings.certificate,
         settings.policy,
@@ -35,7 +30,5 @@ def run(settings: Command, folder: Path) -> tuple[int, bool]:
         outputs=settings.paths.outputs,
         progress=silent,
     )
-    done.save(folder / "check.json")
-    print(done)
-    _log.info("written: %s", folder / "check.json")
+    finish(done, folder / "check.json")
     return done.exit_code, done.accepted

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
 from drone_rl.cli.settings import RolloutCommandSettings
 from drone_rl.config.commands import EvaluateSettings
+from drone_rl.utils.progress import log
 from drone_rl.utils.schema import Whole
 
 _log = logging.getLogger(__name__)
@@ -25,8 +25,6 @@ class Command(RolloutCommandSettings, EvaluateSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
     """Evaluate one policy; return the exit status and the success rate."""
-    from drone_rl.utils.progress import log
-
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)
     policy = policy.in_task(**settings.task)
     policy = policy.in_dynamics(**settings.dynamics) if settings.dynamics else policy

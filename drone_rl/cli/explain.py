@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.evaluation.rule import Kind
 from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.utils.progress import log
 from drone_rl.utils.schema import Listed, OneOf, Whole
 
 _log = logging.getLogger(__name__)
@@ -32,8 +32,6 @@ class Command(CommandSettings, ExplainSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:
     """Explain policies in a report; return the exit status and the report's path."""
-    from drone_rl.utils.progress import log
-
     loaded = [drone_rl.load_policy(p, outputs=settings.paths.outputs) for p in settings.policy]
     done = drone_rl.explain(
         [p.in_task(**settings.task).in_dynamics(**settings.dynamics) for p in loaded],

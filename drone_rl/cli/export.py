@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.commands import FlightSettings
 from drone_rl.utils.errors import InputError

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
 from drone_rl.cli.settings import RolloutCommandSettings
 from drone_rl.config import AppearanceSettings, RendererName
 from drone_rl.utils.schema import Whole

@@ -4,7 +4,6 @@ import logging
 from pathlib import Path
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
 from drone_rl.cli.settings import PolicyCommandSettings
 from drone_rl.config.verification import ProveSettings
 

@@ -1,8 +1,14 @@
-"""Settings that several commands share."""
+"""Settings and results that several commands share."""
+
+import logging
+from pathlib import Path
+from typing import Any
 
 from drone_rl.config.commands import PathsSettings
 from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.utils.settings import Settings
+
+_log = logging.getLogger(__name__)
 
 
 class CommandSettings(Settings):
@@ -26,3 +32,16 @@ class RolloutCommandSettings(PolicyCommandSettings):
 
     dynamics: DynamicsChanges = no_changes()
     """Changes of the policy's vehicle dynamics."""
+
+
+def finish(result: Any, path: Path, files: str = "") -> None:
+    """Save a result, print it, and log where it is.
+
+    Args:
+        result: It has a method `save`.
+        path: Argument of `save`.
+        files: Names of the files if the path is their folder.
+    """
+    result.save(path)
+    print(result)
+    _log.info("written: %s", f"{files} in {path}" if files else path)

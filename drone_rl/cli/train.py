@@ -3,7 +3,6 @@
 import functools
 import logging
 import signal
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,6 +18,7 @@ from drone_rl.cli.hydra.launchers import (
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.training import Logger, Tensorboard, TrainSettings
 from drone_rl.config.verification import ProvableSettings
+from drone_rl.utils.progress import silent
 from drone_rl.utils.schema import Instance, Several, Whole
 from drone_rl.verification.text import found
 
@@ -43,13 +43,6 @@ class Command(CommandSettings, TrainSettings):
     """Number of this run in a search, set by hydra/sweeper=optuna; none for none."""
 
 
-def _training(provable: ProvableSettings) -> Callable[..., Any]:
-    """Return the training function."""
-    if not provable.rounds:
-        return drone_rl.train
-    return functools.partial(drone_rl.train_until_proved, how=provable)
-
-
 def register() -> None:
     """Register the launchers and the sweeper with Hydra."""
     register_plugins(LocalLauncher, SlurmLauncher, RayLauncher, OptunaSweeper)
@@ -57,9 +50,9 @@ def register() -> None:
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
     """Train one policy; return the exit status and the running mean of rewards."""
-    train = _training(settings.provable)  # slow to import; not needed by a sweep
-    from drone_rl.utils.progress import silent
-
+    train = drone_rl.train  # slow to import; not needed by a sweep
+    if settings.provable.rounds:
+        train = functools.partial(drone_rl.train_until_proved, how=settings.provable)
     try:
         done = train(
             settings.narrowed(TrainSettings),

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
-from drone_rl.cli.settings import RolloutCommandSettings
+from drone_rl.cli.settings import RolloutCommandSettings, finish
 from drone_rl.config.commands import JudgeSettings
+from drone_rl.utils.progress import silent
 from drone_rl.utils.schema import OneOf
 
 _log = logging.getLogger(__name__)
@@ -29,9 +29,6 @@ class Command(RolloutCommandSettings, JudgeSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:
     """Judge one policy; return the exit status and the kind's name."""
-    from drone_rl.utils.progress import silent
-
-    outputs = settings.paths.outputs
     done = drone_rl.judge(
         settings.policy,
         settings,
@@ -40,12 +37,10 @@ def run(settings: Command, folder: Path) -> tuple[int, str]:
         certificate=settings.certificate,
         shifts=settings.shifts,
         require_domain=settings.require_domain,
-        outputs=outputs,
+        outputs=settings.paths.outputs,
         progress=silent,
     )
-    done.save(folder / "verdict.json")
-    print(done)
-    _log.info("written: %s", folder / "verdict.json")
+    finish(done, folder / "verdict.json")
     if settings.require == "proved" and done.verdict.evidence["proof"] is None:
         _log.info(
             "the policy has no certificate; make one with drone-rl prove, or give certificate="

@@ -275,27 +275,14 @@ def _unregistered(part: type[Variant], target: str, given: Mapping[str, Any]) ->
 class Changes:
     """The kind of a mapping with some settings of a class; the others keep their values."""
 
-    of: type[Settings]
-
-    def read(self, value: Any, where: str) -> dict[str, Any]:
-        """See `drone_rl.utils.schema.Kind`."""
-        given = as_mapping(value, where)
-        with below(where):
-            check_names(self.of, given)
-            kinds = kinds_of(self.of)
-            return {n: kinds[n].read(v, n) for n, v in given.items() if v is not None}
-
-
-@dataclasses.dataclass(frozen=True)
-class ChangesOfTask:
-    """The kind of a mapping with some settings of any task; values are read once it is known."""
+    of: type[Settings] | None = None
+    """The class; None for the settings of all tasks, whose values are checked by the task later."""
 
     @property
     def types(self) -> dict[str, Any]:
-        """The plain type of each setting of all tasks."""
-        return {
-            name: hint for settings in TASKS.values() for name, hint in types_of(settings).items()
-        }
+        """The plain type of each setting."""
+        classes = TASKS.values() if self.of is None else (self.of,)
+        return {name: hint for cls in classes for name, hint in types_of(cls).items()}
 
     def read(self, value: Any, where: str) -> dict[str, Any]:
         """See `drone_rl.utils.schema.Kind`."""
@@ -304,10 +291,14 @@ class ChangesOfTask:
             if name not in self.types:
                 known = ", ".join(self.types)
                 raise InputError(f"{where}.{name} is unknown; there are: {known}")
-        return {name: v for name, v in given.items() if v is not None}
+        given = {name: v for name, v in given.items() if v is not None}
+        if self.of is None:
+            return given
+        kinds = kinds_of(self.of)
+        return {name: kinds[name].read(v, f"{where}.{name}") for name, v in given.items()}
 
 
-TaskChanges = Annotated[Mapping[str, Any], ChangesOfTask()]
+TaskChanges = Annotated[Mapping[str, Any], Changes()]
 DynamicsChanges = Annotated[Mapping[str, Any], Changes(DynamicsSettings)]
 
 

@@ -2,9 +2,10 @@
 
 import logging
 import time
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from tqdm.auto import tqdm
+if TYPE_CHECKING:
+    from tqdm.auto import tqdm
 
 _log = logging.getLogger(__name__)
 
@@ -48,6 +49,8 @@ class Bar:
             return
         self._drawn_at = time.monotonic()
         if self._bar is None:
+            from tqdm.auto import tqdm  # slow to import
+
             self._bar = tqdm(total=total or None, leave=True)
         self._bar.total = total or None
         self._bar.set_postfix_str(text, refresh=False)

@@ -104,8 +104,10 @@ def test_an_output_that_is_full_is_one_line(tmp_path):
     assert done.stderr == "error: standard output can't be written (No space left on device)\n"
 
 
-@pytest.mark.parametrize("limit", [300, 3000])
-def test_a_full_disk_is_one_line_with_path_and_remedy(tmp_path, limit):
+@pytest.mark.parametrize(
+    ("limit", "file"), [(300, "config.yaml"), (3000, "full/.hydra/config.yaml")]
+)
+def test_a_full_disk_is_one_line_with_path_and_remedy(tmp_path, limit, file):
     """A limit on the sizes of files stands in for a full disk, of Hydra's files and of others."""
     code = (
         "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
@@ -117,7 +119,7 @@ def test_a_full_disk_is_one_line_with_path_and_remedy(tmp_path, limit):
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     line = error_line(done)
     assert len(done.stderr.splitlines()) == 1
-    assert "full" in line and "File too large" in line and "free some space" in line
+    assert file in line and "File too large" in line and "free some space" in line
 
 
 @pytest.mark.parametrize(

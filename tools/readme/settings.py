@@ -15,7 +15,7 @@ import yaml
 from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL
 from drone_rl.cli.main import COMMANDS
 from drone_rl.config import TASKS, BaseTaskSettings
-from drone_rl.config.configuration import Changes, ChangesOfTask, Variant
+from drone_rl.config.configuration import Changes, Variant
 from drone_rl.utils.schema import Flag, Instance, Kind, Listed, Maybe, OneOf, Several, Span
 from drone_rl.utils.settings import Settings, kinds_of, plain
 
@@ -132,8 +132,8 @@ def _may_be(kind: Kind) -> str:
         case Several():
             count = kind.most if kind.least == kind.most else f"{kind.least} to {kind.most}"
             return f"{count} values, each {_may_be(kind.kind)}"
-        case ChangesOfTask() | Changes():
-            return f"changes to the policy's {_link(getattr(kind, 'of', BaseTaskSettings))}"
+        case Changes():
+            return f"changes to the policy's {_link(kind.of or BaseTaskSettings)}"
         case OneOf():
             return " or ".join(f"`{name}`" for name in kind.names)
         case Listed():

@@ -23,6 +23,7 @@ from omegaconf import MISSING, DictConfig, OmegaConf
 
 from drone_rl.cli.hydra.help import check_choices, show_help
 from drone_rl.cli.hydra.messages import is_output_closed, one_line
+from drone_rl.cli.hydra.resuming import policies
 from drone_rl.config import (
     TASKS,
     ActionSettings,
@@ -33,13 +34,14 @@ from drone_rl.config import (
     TaskSettings,
 )
 from drone_rl.config.commands import PathsSettings
-from drone_rl.config.configuration import Changes, ChangesOfTask, Variant, from_config
+from drone_rl.config.configuration import Changes, Variant, from_config
 from drone_rl.config.learning import Collector, Objective, Optimiser, Returns, Scheduler
 from drone_rl.config.networks import Network
 from drone_rl.config.training import Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
 from drone_rl.config.verification import ProvableSettings
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Kind
 from drone_rl.utils.settings import Settings, kinds_of, plain, types_of
 
 GROUPS: dict[str, type[Settings]] = {
@@ -53,8 +55,8 @@ GROUPS: dict[str, type[Settings]] = {
 }
 """Groups whose files start from the schema `base_<group>`."""
 _CHANGED = (DynamicsSettings,)
-"""Settings of a policy that commands may change: a file of that group gives all of them, so its
-schema is one of changes, too."""
+"""Groups of which commands accept changes: a file of the group contains all of its settings, so its
+schema extends that of the changes."""
 PARTS: dict[str, type[Variant]] = {
     "network": Network,
     "returns": Returns,
@@ -107,11 +109,7 @@ def _choice_of(cls: type[Settings]) -> type:
     """A schema with the default of each field."""
     values = cls().values()
     fields = [
-        (
-            name,
-            _simple(hint),
-            dataclasses.field(default_factory=functools.partial(plain, values[name])),
-        )
+        (name, _simple(hint), dataclasses.field(default_factory=lambda n=name: plain(values[n])))
         for name, hint in types_of(cls).items()
     ]
     return dataclasses.make_dataclass(f"{cls.__name__}Choice", [*_named(cls), *fields])
@@ -149,20 +147,21 @@ def schema_of(cls: type[Settings], further: Sequence[tuple[str, Any, Any]] = ())
         cls: The settings.
         further: Name, type and default of further fields.
     """
-    fields = [*((name, *_field(cls, name)) for name in types_of(cls)), *further]
-    bases = (_changes_of(cls),) if cls in _CHANGED else ()
-    return dataclasses.make_dataclass(f"{cls.__name__}Schema", [*_named(cls), *fields], bases=bases)
+    types = types_of(cls)
+    fields = [(name, *_field(kind, types[name])) for name, kind in kinds_of(cls).items()]
+    bases = (_optional(tuple(types.items())),) if cls in _CHANGED else ()
+    name = f"{cls.__name__}Schema"
+    return dataclasses.make_dataclass(name, [*_named(cls), *fields, *further], bases=bases)
 
 
 @functools.cache
-def _changes_of(cls: type[Settings]) -> type:
-    """A dataclass of the same fields, of which none need be given."""
-    fields = [(n, _simple(h) | None, None) for n, h in types_of(cls).items()]
-    return dataclasses.make_dataclass(f"{cls.__name__}Changes", fields)
+def _optional(types: tuple[tuple[str, Any], ...]) -> type:
+    """A dataclass with these fields, each of which may be absent."""
+    return dataclasses.make_dataclass("Changes", [(n, _simple(h) | None, None) for n, h in types])
 
 
 def _named(cls: type[Settings]) -> list[tuple[str, Any, Any]]:
-    """What says which variant or task it is."""
+    """The field with the name of a variant or task."""
     if issubclass(cls, Variant):
         return [("_target_", str, cls.target)]
     if issubclass(cls, BaseTaskSettings) and cls is not TaskSettings:
@@ -170,21 +169,16 @@ def _named(cls: type[Settings]) -> list[tuple[str, Any, Any]]:
     return []
 
 
-def _field(cls: type[Settings], name: str) -> tuple[Any, Any]:
-    """A type that Hydra knows, and the value before any file gives one."""
-    kind, hint = kinds_of(cls)[name], types_of(cls)[name]
-    if isinstance(kind, ChangesOfTask):
-        changes = [(n, _simple(h) | None, None) for n, h in kind.types.items()]
-        schema = dataclasses.make_dataclass("TaskChanges", changes)
-        return schema, dataclasses.field(default_factory=schema)
+def _field(kind: Kind, hint: Any) -> tuple[Any, Any]:
+    """The type of a field in OmegaConf, and its value until a file sets one."""
     if isinstance(kind, Changes):
-        schema = _changes_of(kind.of)
+        schema = _optional(tuple(kind.types.items()))
         return schema, dataclasses.field(default_factory=schema)
     return _simple(hint), MISSING
 
 
 def _simple(hint: Any) -> Any:
-    """The type itself if it is made of numbers, texts and truth values, else any."""
+    """The type itself if it consists of int, float, str and bool, else Any."""
     arguments = typing.get_args(hint)
     if typing.get_origin(hint) is tuple:
         return hint if set(arguments) <= {int, float, str, ...} else Any
@@ -194,10 +188,11 @@ def _simple(hint: Any) -> Any:
     return hint if hint in (int, float, str, bool) else Any
 
 
-_MAY_ASK = re.compile(r"^[-+~]|^hydra(?!\.run\.)|^sweep|^experiment")
-"""Words on a command line that may ask for many runs, or for groups that do."""
-_ASKS = re.compile(r"mode:|sweep: (?!null)")
-"""What does so in a file."""
+_MULTIRUN_WORDS = re.compile(r"^[-+~]|^hydra(?!\.run\.)|^sweep|^experiment")
+"""Words on a command line that may start many runs, or select a group that does."""
+_MULTIRUN_TEXT = re.compile(r"mode:|sweep: (?!null)")
+"""Text that does so in a file."""
+_save_config = hydra_utils._save_config
 
 
 class Command(Protocol):
@@ -205,32 +200,28 @@ class Command(Protocol):
 
     __name__: str
     Command: type[Settings]
-    """What it can be told."""
 
     def run(self, settings: Any, folder: Path) -> tuple[int, object]:
-        """Does it. Returns the exit status and what a sweep makes best."""
+        """Run it; return the exit status and the value that a sweep maximises."""
         ...
 
 
 def conf_dir() -> Path:
-    """The configuration: of the checkout, or the copy inside an installed wheel."""
+    """Return the folder conf/ of the checkout, or its copy inside an installed wheel."""
     package = Path(__file__).resolve().parents[2]
-    beside = package.parent / "conf"
-    return beside if (beside / "train.yaml").is_file() else package / "conf"
+    checkout = package.parent / "conf"
+    return checkout if (checkout / "train.yaml").is_file() else package / "conf"
 
 
 def run_command(name: str, command: Command, overrides: Sequence[str]) -> int:
-    """Composes the settings of one command and runs it.
+    """Compose the settings of one command and run it; return the exit status.
 
     Args:
         name: Of its file in conf/.
         command: Its module.
-        overrides: As on the command line.
-
-    Returns:
-        Exit status.
+        overrides: As on the command line; `prepare` of the module may translate them first.
     """
-    overrides = getattr(command, "prepare", list)(overrides)
+    overrides = getattr(command, "prepare", policies)(overrides)
     check_choices(overrides, conf_dir())
     import_plugins(overrides)
     register_schemas(**{name: command.Command})
@@ -243,61 +234,56 @@ def run_command(name: str, command: Command, overrides: Sequence[str]) -> int:
     wrapped = hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name=name)(job)
     argv = sys.argv
     sys.argv = [f"drone-rl {name.replace('_', '-')}", *overrides]
+    mode = Hydra.get_mode if _may_be_multirun(name, overrides) else lambda *_, **__: RunMode.RUN
     try:
-        with _composed_once(name, overrides), _named_in_errors():
+        with (
+            _replaced(Hydra, "get_mode", mode),
+            _replaced(hydra_utils, "_save_config", _save_named),
+        ):
             wrapped()
     finally:
         sys.argv = argv
     return max(statuses, default=0)
 
 
-@contextlib.contextmanager
-def _composed_once(name: str, overrides: Sequence[str]) -> Iterator[None]:
-    """Spares Hydra its first composition, a quarter of a second in which it only looks for a mode.
+def _may_be_multirun(name: str, overrides: Sequence[str]) -> bool:
+    """Return whether Hydra must find out its mode, which costs a composition of the settings.
 
-    Only where neither what was typed nor the command's own file can ask for many runs. If another
-    file does, Hydra refuses its mode after the second composition.
+    If only a file of a group starts many runs, Hydra rejects the mode after its composition.
     """
     text = (conf_dir() / f"{name}.yaml").read_text()
-    if any(map(_MAY_ASK.search, overrides)) or _ASKS.search(text):
-        yield
-        return
-    asked = Hydra.get_mode
-    Hydra.get_mode = lambda *_, **__: RunMode.RUN
-    try:
-        yield
-    finally:
-        Hydra.get_mode = asked
+    return any(map(_MULTIRUN_WORDS.search, overrides)) or bool(_MULTIRUN_TEXT.search(text))
 
 
 @contextlib.contextmanager
-def _named_in_errors() -> Iterator[None]:
-    """Lets an error say which of Hydra's own files it is about."""
-    save = hydra_utils._save_config
-
-    def save_named(cfg: DictConfig, filename: str, output_dir: Path) -> None:
-        try:
-            save(cfg, filename, output_dir)
-        except OSError as error:
-            path = str(error.filename or output_dir / filename)
-            raise OSError(error.errno, error.strerror, path) from error
-
-    hydra_utils._save_config = save_named
+def _replaced(owner: Any, name: str, value: Any) -> Iterator[None]:
+    """Replace an attribute temporarily."""
+    before = getattr(owner, name)
+    setattr(owner, name, value)
     try:
         yield
     finally:
-        hydra_utils._save_config = save
+        setattr(owner, name, before)
+
+
+def _save_named(cfg: DictConfig, filename: str, output_dir: Path) -> None:
+    """Save a file as Hydra does; its path is part of every error."""
+    try:
+        _save_config(cfg, filename, output_dir)
+    except OSError as error:
+        path = str(error.filename or output_dir / filename)
+        raise OSError(error.errno, error.strerror, path) from error
 
 
 def read_settings(cls: type[Settings], config: DictConfig) -> Any:
-    """Composed settings, every reference resolved, as those of a command."""
+    """Resolve composed settings and check them as those of a command."""
     values: Any = OmegaConf.to_container(config, resolve=True)
     values.pop("plugins", None)
     return from_config(cls, values)
 
 
 def _job(command: Command, statuses: list[int]) -> Callable[[DictConfig], object]:
-    """What Hydra calls for each run."""
+    """Return the function that Hydra calls for each run."""
 
     def job(config: DictConfig) -> object:
         try:
@@ -314,5 +300,5 @@ def _job(command: Command, statuses: list[int]) -> Callable[[DictConfig], object
         return value
 
     job.__module__ = command.__name__
-    vars(job)["statuses"] = statuses  # where a launcher notes how jobs ended that ran elsewhere
+    vars(job)["statuses"] = statuses  # launchers append the statuses of other processes
     return job

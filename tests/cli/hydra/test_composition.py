@@ -10,8 +10,8 @@ from drone_rl.cli.hydra import composition
 from drone_rl.cli.hydra.composition import (
     Hydra,
     HydraConfig,
-    _composed_once,
     _job,
+    _may_be_multirun,
     conf_dir,
     read_settings,
 )
@@ -67,39 +67,27 @@ def test_a_signal_ends_a_whole_sweep(job):
 
 
 @pytest.mark.parametrize(
-    ("overrides", "is_spared"),
+    ("overrides", "may_be"),
     [
-        ([], True),
-        (["task.num_cubes=2", "seed=1", "hydra.run.dir=here"], True),
-        (["-m", "seed=1,2"], False),
-        (["--multirun", "seed=1,2"], False),
-        (["hydra.mode=MULTIRUN"], False),
-        (["sweep=seeds"], False),
-        (["experiment=mine"], False),
-        (["+more=seeds"], False),
+        ([], False),
+        (["task.num_cubes=2", "seed=1", "hydra.run.dir=here"], False),
+        (["-m", "seed=1,2"], True),
+        (["--multirun", "seed=1,2"], True),
+        (["hydra.mode=MULTIRUN"], True),
+        (["sweep=seeds"], True),
+        (["experiment=mine"], True),
+        (["+more=seeds"], True),
     ],
 )
-def test_hydra_looks_for_a_mode_where_one_may_be(overrides, is_spared):
-    asked = Hydra.get_mode
-    with _composed_once("train", overrides):
-        assert (Hydra.get_mode is not asked) is is_spared
-    assert Hydra.get_mode is asked
+def test_the_command_line_may_start_many_runs(overrides, may_be):
+    assert _may_be_multirun("train", overrides) is may_be
 
 
 @pytest.mark.parametrize("text", ["sweep: seeds", "hydra:\n  mode: MULTIRUN"])
-def test_hydra_looks_for_a_mode_where_the_file_has_one(text, monkeypatch, tmp_path):
+def test_a_file_may_start_many_runs(text, monkeypatch, tmp_path):
     (tmp_path / "mine.yaml").write_text(text)
     monkeypatch.setattr(composition, "conf_dir", lambda: tmp_path)
-    asked = Hydra.get_mode
-    with _composed_once("mine", []):
-        assert Hydra.get_mode is asked
-
-
-def test_hydra_looks_again_after_a_mistake():
-    asked = Hydra.get_mode
-    with pytest.raises(KeyError), _composed_once("train", []):
-        raise KeyError
-    assert Hydra.get_mode is asked
+    assert _may_be_multirun("mine", [])
 
 
 def test_settings_are_composed_once(monkeypatch, tmp_path):
@@ -111,15 +99,16 @@ def test_settings_are_composed_once(monkeypatch, tmp_path):
 
     monkeypatch.setattr(Hydra, "compose_config", count)
     monkeypatch.chdir(tmp_path)
-    done = []
+    done, get_mode = [], Hydra.get_mode
 
     def run(settings, folder):
-        done.append(settings.seed)
-        return 0, None
+        done.append((settings.seed, folder))
+        return 3, None
 
     monkeypatch.setattr(train, "run", run)
-    words = [f"hydra.run.dir={tmp_path}"]
-    assert composition.run_command("train", train, ["seed=3", *words]) == 0
-    assert (composed, done) == (["RUN"], [3])
-    assert composition.run_command("train", train, ["seed=4", *words, "hydra.mode=RUN"]) == 0
-    assert (composed[1:], done) == (["MULTIRUN", "RUN"], [3, 4])
+    overrides = ["seed=3", f"hydra.run.dir={tmp_path}"]
+    assert composition.run_command("train", train, overrides) == 3
+    assert (composed, done) == (["RUN"], [(3, tmp_path)])
+    assert Hydra.get_mode is get_mode
+    assert composition.run_command("train", train, [*overrides, "hydra.mode=RUN"]) == 3
+    assert composed[1:] == ["MULTIRUN", "RUN"]
