@@ -1,4 +1,4 @@
-"""`drone-rl COMMAND --help`, and the choices that a configuration group offers."""
+"""`drone-rl COMMAND --help`, and the choices of configuration groups."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -14,7 +14,7 @@ from drone_rl.utils.errors import InputError
 
 _KNOB = re.compile(r"(?P<indent> *)(?P<name>[A-Za-z_]\w*):(?= |$)")
 _NOT_SHOWN = ("hydra", "paths")
-"""Groups that nobody chooses from."""
+"""Groups without choices for users."""
 _EXAMPLES = """\
 examples
   drone-rl train seed=1 optimiser.lr=2e-3        change settings
@@ -24,12 +24,12 @@ examples
 
 
 def show_help(command: str, conf: Path, overrides: Sequence[str]) -> None:
-    """Prints what a command can be told, as it would be used now.
+    """Print the settings of a command with their values.
 
     Args:
         command: Name of its file in conf/.
         conf: That folder.
-        overrides: As on the command line; those that are flags say nothing.
+        overrides: As on the command line; flags are ignored.
     """
     typed = [o for o in overrides if not o.startswith("-")]
     GlobalHydra.instance().clear()
@@ -51,7 +51,7 @@ def show_help(command: str, conf: Path, overrides: Sequence[str]) -> None:
 
 
 def explained(values: Any, meanings: dict[str, str], prefix: str = "") -> Iterator[str]:
-    """Settings as lines of YAML, each below its comment."""
+    """Yield settings as lines of YAML, each below its comment."""
     indent = "  " * prefix.count(".")
     for name, value in values.items():
         if name == "_target_":
@@ -68,7 +68,7 @@ def explained(values: Any, meanings: dict[str, str], prefix: str = "") -> Iterat
 
 
 def comments(command: str, conf: Path, chosen: dict[str, str | None]) -> dict[str, str]:
-    """The comment above each setting, by its dotted name.
+    """Return the comment of each setting of a command by its dotted name.
 
     Args:
         command: Name of its file in conf/.
@@ -79,7 +79,7 @@ def comments(command: str, conf: Path, chosen: dict[str, str | None]) -> dict[st
     moved = read_comments(conf / "dynamics" / "computer_vision.yaml")
     found |= {f"dynamics.{key}": text for key, text in moved.items()}
     tasks = conf / "task"
-    for path in [*sorted(tasks.glob("*.yaml")), tasks / "collect_cubes.yaml"]:  # its words count
+    for path in [*sorted(tasks.glob("*.yaml")), tasks / "collect_cubes.yaml"]:  # the last one wins
         found |= {f"task.{key}": text for key, text in read_comments(path).items()}
     for group, name in chosen.items():
         for path in _with_parents(conf / group / f"{name}.yaml"):
@@ -88,7 +88,7 @@ def comments(command: str, conf: Path, chosen: dict[str, str | None]) -> dict[st
 
 
 def read_comments(path: Path) -> dict[str, str]:
-    """The comment above each setting of one file, by its dotted name within it."""
+    """Return the comment above each setting of one file by its dotted name."""
     found, above, where = {}, [], []
     for line in path.read_text().splitlines():
         knob = _KNOB.match(line)
@@ -105,7 +105,7 @@ def read_comments(path: Path) -> dict[str, str]:
 
 
 def _with_parents(path: Path) -> Iterator[Path]:
-    """The files that a file starts from, the first ones first, and itself."""
+    """The files of its defaults list, recursively, and the file."""
     if not path.is_file():
         return
     for entry in (yaml.safe_load(path.read_text()) or {}).get("defaults", ()):
@@ -115,26 +115,20 @@ def _with_parents(path: Path) -> Iterator[Path]:
 
 
 SCHEMA = "base_"
-"""What names of schemas begin with, see `drone_rl.cli.hydra.composition`."""
+"""Prefix of schemas' names, see `drone_rl.cli.hydra.composition`."""
 _NOT_FOUND = re.compile(
     r"Could not find '(?P<what>[^']+)' Available options in '[^']+': (?P<all>.*)"
 )
 _SEARCH_PATH = re.compile(r" ?Config search path: .*")
 _OWN_FOLDERS = ("--config-dir", "-cd", "hydra.searchpath")
-"""What adds folders of the user's own, whose files are not known here."""
+"""Options that add folders of the user."""
 
 
 def check_choices(overrides: Sequence[str], conf: Path) -> None:
-    """Makes sure that a command line chooses no schema, and no sweep that there is not.
-
-    Hydra takes both: a schema is to it one more file, and the group sweep is optional.
-
-    Args:
-        overrides: As on the command line.
-        conf: The folder of the configuration.
+    """Refuse command lines that choose a schema or an unknown sweep, both of which Hydra accepts.
 
     Raises:
-        InputError: It does; the message lists the choices.
+        InputError: The message lists the choices.
     """
     has_own = any(override.startswith(_OWN_FOLDERS) for override in overrides)
     for override in overrides:
@@ -154,7 +148,7 @@ def check_choices(overrides: Sequence[str], conf: Path) -> None:
 
 
 def without_schemas(text: str) -> str:
-    """A message of Hydra's, on one line: its choices without schemas, nor where it looked."""
+    """Remove schemas and the search path from a message of Hydra."""
     text = _SEARCH_PATH.sub("", text)
     found = _NOT_FOUND.search(text)
     if found is None:

@@ -11,7 +11,7 @@ import re
 import signal
 import sys
 import types
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
@@ -35,35 +35,33 @@ from drone_rl.utils.files import folder_lock, refuse_links
 from drone_rl.utils.schema import shown
 
 NAMESPACE = "hydra_plugins.drone_rl"
-"""Where Hydra wants plugins to live."""
+"""Module of the plugins, as in the files of conf/."""
 
 _log = logging.getLogger(__name__)
 
 
 class SweepLauncher(Launcher):
-    """Finishes what is unfinished of a sweep, then reports on all of it."""
+    """Finish the unfinished runs of a sweep, then report on all runs."""
 
     config: DictConfig
     hydra_context: HydraContext
     task_function: TaskFunction
+    executor: Callable[[Path], Executor]
+    """Makes the executor of a sweep's runs from the sweep's folder."""
 
     def setup(
         self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
     ) -> None:
-        """Takes what Hydra hands over."""
+        """Store Hydra's objects."""
         self.hydra_context, self.config = hydra_context, config
         self.task_function = task_function
         noted = Path(str(config.hydra.sweep.dir)) / "multirun.yaml"
         self._noted = noted, noted.read_bytes() if noted.is_file() else None
 
-    def executor(self, folder: Path) -> Executor:
-        """Where the processes run."""
-        raise NotImplementedError
-
     def launch(
         self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int
     ) -> Sequence[JobReturn]:
-        """Brings the runs to their end; one that fails stops no other."""
+        """Complete the runs; a failure does not stop the others."""
         setup_globals()
         configure_log(self.config.hydra.hydra_logging, self.config.hydra.verbose)
         folder = Path(str(self.config.hydra.sweep.dir)).absolute()
@@ -83,7 +81,7 @@ class SweepLauncher(Launcher):
         return [_job_return(run) for run in runs]
 
     def _leave_as_it_was(self) -> None:
-        """Undoes what Hydra's sweeper has noted of a sweep that is refused."""
+        """Restore multirun.yaml, which Hydra's sweeper wrote for a sweep that is refused."""
         path, content = self._noted
         if content is None:
             path.unlink(missing_ok=True)
@@ -91,10 +89,8 @@ class SweepLauncher(Launcher):
             path.write_bytes(content)
 
     def _finish(self, sweep: Sweep, runs: Sequence[Run]) -> int:
-        """Returns how many runs failed."""
-        from drone_rl.sweeps.report import (
-            write_sweep_report,  # slow to import; no single run needs it
-        )
+        """Return the number of failed runs."""
+        from drone_rl.sweeps.report import write_sweep_report  # slow to import
 
         failed = 0
         try:
@@ -111,7 +107,7 @@ class SweepLauncher(Launcher):
         return failed
 
     def _run(self, folder: Path, number: int, overrides: Sequence[str]) -> Run:
-        """A run in the folder that `hydra.sweep.subdir` names; composing it all would be slow."""
+        """A run in the folder `hydra.sweep.subdir`, resolved without a full composition."""
         config = copy.deepcopy(self.config)
         names = config.hydra.job.config.override_dirname
         left_out = tuple(f"{key}=" for key in names.exclude_keys)
@@ -124,54 +120,37 @@ class SweepLauncher(Launcher):
         return Run(number, tuple(overrides), folder / str(config.hydra.sweep.subdir)[:200])
 
     def _settings(self) -> dict[str, Any]:
-        everything = OmegaConf.to_container(self.config, resolve=False)
-        named = cast(dict[str, Any], everything)  # a configuration has names at its root
-        return {name: value for name, value in named.items() if name != "hydra"}
+        everything: Any = OmegaConf.to_container(self.config, resolve=False)
+        return {name: value for name, value in everything.items() if name != "hydra"}
 
 
 class LocalLauncher(SweepLauncher):
-    """`hydra/launcher=local`: side by side on this machine."""
+    """`hydra/launcher=local`: in parallel on this machine, see `LocalExecutor`."""
 
     def __init__(self, num_jobs: int | None) -> None:
-        """Sets how many at the same time; None for one a core."""
-        self._executor = LocalExecutor(num_jobs)
-
-    def executor(self, folder: Path) -> Executor:
-        """See `LocalExecutor`."""
-        del folder
-        return self._executor
+        executor = LocalExecutor(num_jobs)
+        self.executor = lambda _: executor
 
 
 class SlurmLauncher(SweepLauncher):
-    """`hydra/launcher=slurm`: on a Slurm cluster, by submitit."""
+    """`hydra/launcher=slurm`: on a Slurm cluster by submitit, see `SlurmExecutor`."""
 
     def __init__(self, **settings: Any) -> None:
-        """Sets the jobs' resources, see `SlurmExecutor`."""
-        self._settings_of_jobs = settings
-
-    def executor(self, folder: Path) -> Executor:
-        """See `SlurmExecutor`."""
-        return SlurmExecutor(folder / ".submitit", **self._settings_of_jobs)
+        self.executor = lambda folder: SlurmExecutor(folder / ".submitit", **settings)
 
 
 class RayLauncher(SweepLauncher):
-    """`hydra/launcher=ray`: on a Ray cluster."""
+    """`hydra/launcher=ray`: on a Ray cluster, see `RayExecutor`."""
 
     def __init__(self, **settings: Any) -> None:
-        """Sets the cluster and a run's share of it, see `RayExecutor`."""
-        self._cluster = settings
-
-    def executor(self, folder: Path) -> Executor:
-        """See `RayExecutor`."""
-        del folder
-        return RayExecutor(**self._cluster)
+        self.executor = lambda _: RayExecutor(**settings)
 
 
 def register_plugins(*plugins: type[Plugin]) -> None:
-    """Tells Hydra of plugins; called by the command line before it composes.
+    """Register plugins with Hydra; the command line calls it before it composes.
 
-    Hydra makes plugins of the namespace package `hydra_plugins` alone. Ours are made to go by a
-    name in it, so that this package need not install a second one beside itself.
+    Hydra instantiates plugins from the namespace package `hydra_plugins` only. These get a module
+    in it, so that this package does not install a second one.
     """
     package, _, name = NAMESPACE.partition(".")
     try:
@@ -188,13 +167,13 @@ def register_plugins(*plugins: type[Plugin]) -> None:
 
 
 def _command() -> list[str]:
-    """What the user typed, without the folder that follows from it."""
+    """The command that the user typed, without the sweep's folder that was added."""
     typed = [word for word in sys.argv[1:] if not word.startswith("hydra.sweep.dir=${")]
     return [*sys.argv[0].split(), *typed]
 
 
 def _job_return(run: Run) -> JobReturn:
-    """What a sweeper gets to see of a run: the running mean of rewards, or None if it failed."""
+    """A run's result for the sweeper: the running mean of rewards, or None if it failed."""
     result = read_result(run.folder)
     value = None if result is None else _number(result.get("running_reward"))
     job = JobReturn(
@@ -212,13 +191,13 @@ def _outcome(run: Run) -> str:
 
 
 def _number(value: object) -> float | None:
-    """A number out of a file, or none if it is something else there."""
+    """A number from a file; None if the file contains something else."""
     return float(value) if isinstance(value, int | float) else None
 
 
 @contextmanager
 def _sigterm_as_interrupt() -> Iterator[None]:
-    """SIGTERM stops a sweep as Ctrl-C does, so that its runs save their state."""
+    """Make SIGTERM stop a sweep as Ctrl-C does, so that its runs save their state."""
 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
@@ -231,46 +210,29 @@ def _sigterm_as_interrupt() -> Iterator[None]:
 
 
 class OptunaSweeper(Sweeper):
-    """Maximises the running mean of rewards at the end of a run."""
+    """Maximise the final running mean of rewards, see conf/hydra/sweeper/optuna.yaml."""
 
     config: DictConfig
     hydra_context: HydraContext
     launcher: Launcher
 
     def __init__(
-        self,
-        *,
-        num_trials: int,
-        batch: int,
-        seed: int,
-        prune: bool,
-        startup_trials: int,
-        report_frames: int,
-        params: dict[str, str],
+        self, *, num_trials: int, batch: int, seed: int, params: dict[str, str], **shared: Any
     ) -> None:
-        """Sets the search; see conf/hydra/sweeper/optuna.yaml.
-
-        Raises:
-            InputError: Optuna isn't installed, or a number is below 1.
-        """
         import_optuna()
-        if num_trials < 1 or batch < 1 or report_frames < 1:
+        frames = shared["report_frames"]
+        if num_trials < 1 or batch < 1 or frames < 1:
             raise InputError(
-                f"hydra.sweeper.num_trials={num_trials}, batch={batch} and report_frames="
-                f"{report_frames} must be 1 or more"
+                f"hydra.sweeper.num_trials={num_trials}, batch={batch} and report_frames={frames} "
+                "must be 1 or more"
             )
         self.num_trials, self.batch, self.seed = num_trials, batch, seed
-        self.params = dict(params)
-        self.shared = {
-            "prune": prune,
-            "startup_trials": startup_trials,
-            "report_frames": report_frames,
-        }
+        self.params, self.shared = dict(params), shared
 
     def setup(
         self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
     ) -> None:
-        """Takes what Hydra hands over."""
+        """Store Hydra's objects and make the launcher."""
         # set once, before use, though Hydra declares them optional
         self.hydra_context = hydra_context  # pyright: ignore[reportIncompatibleVariableOverride]
         self.config = config  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -279,7 +241,7 @@ class OptunaSweeper(Sweeper):
         )
 
     def sweep(self, arguments: list[str]) -> None:
-        """Asks for settings, runs them, tells the results, until all trials are done."""
+        """Sample settings, run them and report the results until all trials are done."""
         parser = OverridesParser.create(config_loader=self.hydra_context.config_loader)
         typed = parser.parse_overrides([f"{k}={v}" for k, v in self.params.items()] + arguments)
         last = {override.get_key_element(): override for override in typed}
@@ -325,10 +287,10 @@ class OptunaSweeper(Sweeper):
 
 
 def check_params(params: Mapping[str, Any], space: Mapping[str, Any]) -> None:
-    """Refuses what a journal says of a trial unless this search could have drawn it.
+    """Refuse parameters of a journal that this search can't have sampled.
 
     Raises:
-        InputError: A setting is not among those that are searched, or its value out of range.
+        InputError: A setting is not searched, or its value is out of range.
     """
     for name, value in params.items():
         if name not in space or not space[name]._contains(space[name].to_internal_repr(value)):
@@ -339,7 +301,7 @@ def check_params(params: Mapping[str, Any], space: Mapping[str, Any]) -> None:
 
 
 def distribution(override: Override) -> Any:
-    """Optuna's distribution for a range in Hydra's grammar."""
+    """Return Optuna's distribution of a range in Hydra's grammar."""
     d = import_optuna().distributions
     value = override.value()
     if isinstance(value, ChoiceSweep):

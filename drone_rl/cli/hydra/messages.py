@@ -1,4 +1,4 @@
-"""A user's mistake as one line, whoever noticed it."""
+"""User errors as one line, whichever library raised them."""
 
 import errno
 import logging
@@ -18,8 +18,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.imports import ignore_noise
 
 MISTAKES = (InputError, HydraException, OmegaConfBaseException, OSError)
-"""What a user can be blamed for; all else is a bug of ours and keeps its traceback."""
-
+"""Errors of a user; any other is a bug and keeps its traceback."""
 
 _FOLDER = "choose another folder with hydra.run.dir=..."
 _REMEDIES = {
@@ -34,11 +33,11 @@ _REMEDIES = {
 }
 """What to do about an error of the file system, by its number."""
 _UNKNOWN = ("is not in struct", "Could not override", "Could not load")
-"""What Hydra says of a name that does not exist."""
+"""Parts of Hydra's messages about names that don't exist."""
 
 
 def guarded(command: Callable[[], int]) -> int:
-    """Runs a command; a mistake becomes one line and an exit status of 2, Ctrl-C one of 130."""
+    """Run a command; a user's error is one line with exit status 2, Ctrl-C is exit status 130."""
     os.environ["HYDRA_FULL_ERROR"] = "1"  # let Hydra's own errors through to be shortened here
     logging.raiseExceptions = False  # a log that can't be written is no reason for a traceback
     ignore_noise()
@@ -60,10 +59,7 @@ def guarded(command: Callable[[], int]) -> int:
 
 
 def _errors_in_threads() -> list[OSError]:
-    """Collects errors of the file system in threads, such as TensorBoard's, in place of tracebacks.
-
-    What a thread can't write the command can't write either, most often, and then says so.
-    """
+    """Collect errors of the file system in threads, such as TensorBoard's, without tracebacks."""
     lost: list[OSError] = []
     show = threading.excepthook
 
@@ -78,23 +74,23 @@ def _errors_in_threads() -> list[OSError]:
 
 
 def is_mistake(error: Exception) -> bool:
-    """Whether a user can be blamed for an error; logging wraps those of its files."""
+    """Return whether an error is the user's; logging wraps those of its files."""
     is_wrapped = isinstance(error, ValueError) and isinstance(error.__cause__, OSError)
     return isinstance(error, MISTAKES) or is_wrapped
 
 
 def is_output_closed() -> bool:
-    """Whether nobody reads standard output any more, as after `| head`."""
-    look = select.poll()
+    """Return whether standard output is a closed pipe, as after `| head`."""
+    poll = select.poll()
     try:
-        look.register(sys.stdout.fileno(), select.POLLOUT)
-    except (OSError, ValueError):  # it is no file of the system's, as in tests
+        poll.register(sys.stdout.fileno(), select.POLLOUT)
+    except (OSError, ValueError):  # not a file descriptor, as in tests
         return False
-    return any(events & select.POLLERR for _, events in look.poll(0))
+    return any(events & select.POLLERR for _, events in poll.poll(0))
 
 
 def file_error(error: OSError) -> str:
-    """An error of the file system as one line: the path, the reason and a remedy."""
+    """Return an error of the file system as one line: path, reason and remedy."""
     reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
     path = error.filename
     if path is None and HydraConfig.initialized():
@@ -107,7 +103,7 @@ def file_error(error: OSError) -> str:
 
 
 def one_line(error: BaseException) -> str:
-    """The most telling message of an error and its causes, on one line."""
+    """Return the most specific message of an error and its causes on one line."""
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, InputError):
@@ -115,7 +111,7 @@ def one_line(error: BaseException) -> str:
         cause = cause.__cause__ or cause.__context__
     for cause in (error, error.__cause__):
         if isinstance(cause, OSError) and not isinstance(cause, HydraException):
-            return file_error(cause)  # a choice that Hydra does not find is an OSError, too
+            return file_error(cause)  # Hydra's error of an unknown choice is an OSError, too
     text = without_schemas(" ".join(str(error).split())) or type(error).__name__
     if isinstance(error.__cause__, OmegaConfBaseException):
         text += f": {str(error.__cause__).splitlines()[0]}"

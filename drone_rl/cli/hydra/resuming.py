@@ -4,6 +4,7 @@ import re
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import yaml
 from hydra.core.hydra_config import HydraConfig
@@ -16,33 +17,27 @@ from drone_rl.utils.overrides import must_be_typed, taken_over
 
 
 def policies(overrides: Sequence[str]) -> list[str]:
-    """Lets `checkpoint=good` say `policy=good`, in commands whose policy is trained already."""
+    """Translate `checkpoint=good` to `policy=good`, in commands on trained policies."""
     return [re.sub(r"^checkpoint=", "policy=", override) for override in overrides]
 
 
-def former(overrides: Sequence[str]) -> list[str]:
-    """What `networks` was given, in the words of old."""
-    return [re.sub(r"^(\+{0,2}|~)network(?=[.=])", r"\1policy", o) for o in overrides]
-
-
 def networks(overrides: Sequence[str]) -> list[str]:
-    """Lets `policy=mlp` and `policy.hidden=[64]` say `network=mlp` and so on, in trainings."""
+    """Translate `policy=mlp` to `network=mlp`, `policy.hidden=[64]` alike, in trainings."""
     return [re.sub(r"^(\+{0,2}|~)policy(?=[.=])", r"\1network", o) for o in overrides]
 
 
 _FOLDER = "hydra.sweep.dir=${paths.outputs}/${hydra.job.config_name}/multiruns/"
 _WRITE_NOTHING = ("hydra.output_subdir=null", "++hydra.job_logging.handlers.file.delay=true")
-"""Hydra would note the settings before anybody has checked them (`note_settings` does it after),
-and open a log."""
+"""Keep Hydra from writing settings before they are checked, and from opening a log."""
 _PLAIN = re.compile(r"[\w./+-]*")
-"""Values that mean the same to Hydra's grammar with and without quotes."""
+"""Values that Hydra parses alike with and without quotes."""
 
 
 def complete(overrides: Sequence[str]) -> list[str]:
-    """Makes `resume=FOLDER` mean the settings of that run and its folder; names a sweep's.
+    """Add the settings and the folder of the run that `resume=FOLDER` names; name a sweep's folder.
 
     Raises:
-        InputError: There is no such run, or it is not plain what its settings were.
+        InputError: There is no such run, or its settings are unclear.
     """
     typed = networks(overrides)
     if is_sweep(typed):
@@ -57,21 +52,18 @@ def complete(overrides: Sequence[str]) -> list[str]:
     if not (folder / "checkpoints" / "last.pt").is_file():
         raise InputError(f"resume={folder} has no checkpoints/last.pt; give the folder of a run")
     refuse_links(folder)
-    kept = networks(taken_over(folder, [*typed, *former(typed)]))
+    former = [re.sub(r"^(\+{0,2}|~)network(?=[.=])", r"\1policy", o) for o in typed]
+    kept = networks(taken_over(folder, [*typed, *former]))
     plain = [_resume(folder) if o.startswith("resume=") else o for o in typed]
     own = ["hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}", *_WRITE_NOTHING]
     return [*kept, *plain, *own]
 
 
 def check_folder(resume: str, folder: Path) -> None:
-    """Makes sure that a run goes on in its own folder.
-
-    Args:
-        resume: What was given.
-        folder: Where this command writes.
+    """Refuse to resume the run `resume` in another folder, given as hydra.run.dir.
 
     Raises:
-        InputError: Another folder was given as hydra.run.dir.
+        InputError: The folders differ.
     """
     if Path(resume).resolve() != folder.resolve():
         raise InputError(
@@ -81,30 +73,21 @@ def check_folder(resume: str, folder: Path) -> None:
 
 
 def note_settings(folder: Path) -> None:
-    """Writes the settings of this command into a run's folder, for whoever goes on with it.
-
-    Args:
-        folder: Of the run, which has accepted them.
-    """
+    """Write the accepted settings of this command into a run's folder, for `resume=`."""
     path = folder / ".hydra" / "overrides.yaml"
     path.parent.mkdir(exist_ok=True)
     write_atomically(path, yaml.safe_dump(_overrides(), allow_unicode=True, width=10_000))
 
 
 def resume_command(folder: Path) -> str:
-    """The shell command that goes on with the run of this command, from any working directory.
-
-    Args:
-        folder: Of the run.
-    """
+    """Return the shell command that resumes the run in a folder, from any working directory."""
     settings = [_resume(folder.absolute()), *must_be_typed(_overrides())]
     return shlex.join(["drone-rl", "train", *settings])
 
 
 def _overrides() -> list[str]:
-    """The settings of the command that runs, as Hydra knows them."""
-    found = OmegaConf.to_container(HydraConfig.get().overrides.task)
-    assert isinstance(found, list)
+    """The settings of the running command."""
+    found: Any = OmegaConf.to_container(HydraConfig.get().overrides.task)  # without interpolation
     return [str(override) for override in found]
 
 
@@ -114,6 +97,6 @@ def _resume(folder: Path) -> str:
 
 
 def _unquoted(value: str) -> str:
-    """A value whose quotes were meant for Hydra, without them."""
+    """A value without its quotes for Hydra."""
     is_quoted = len(value) > 1 and value[0] == value[-1] and value[0] in "'\""
     return re.sub(r"\\(.)", r"\1", value[1:-1]) if is_quoted else value

@@ -76,15 +76,13 @@ def test_an_interrupted_sweep_says_how_to_go_on(run, tmp_path, monkeypatch, capl
         def finish(self, runs):
             raise KeyboardInterrupt
 
-    class Launcher(SweepLauncher):
-        def executor(self, folder):
-            return Interrupted()
-
+    launcher = SweepLauncher()
+    launcher.executor = lambda folder: Interrupted()
     monkeypatch.setattr(
         "drone_rl.sweeps.report.write_sweep_report", lambda sweep: ("report.html", {})
     )
     caplog.set_level(logging.INFO)
     sweep = Sweep(tmp_path, "drone-rl train -m seed=0,1", {}, [run])
     with pytest.raises(KeyboardInterrupt):
-        Launcher()._finish(sweep, [run])
+        launcher._finish(sweep, [run])
     assert "go on with the same command: drone-rl train -m seed=0,1" in caplog.text
