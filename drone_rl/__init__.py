@@ -1,6 +1,6 @@
 """Train, evaluate and audit vision policies of a drone, with pip alone.
 
-What is listed here is imported when it is first used, so that `import drone_rl` is quick.
+Public names are imported when they are first used, so that `import drone_rl` is fast.
 """
 
 import importlib
@@ -201,23 +201,21 @@ __all__ = [
 ]
 
 when_imported("gymnasium", register)
-# dm_control looks for a screen; TorchRL derives classes from one that it deprecates
+# dm_control searches for a display; TorchRL derives classes from one that it deprecates
 import_quietly("dm_control._render.glfw_renderer", "GLFWError", "DISPLAY")
 import_quietly("torchrl.collectors.weight_update", "DeprecationWarning", "WeightUpdaterBase")
 
 
 def __getattr__(name: str) -> Any:
-    """Imports a public name when it is first asked for."""
+    """Import a public name when it is first used."""
     if name not in _HOMES:
         raise AttributeError(f"module 'drone_rl' has no attribute {name!r}")
-    from drone_rl.utils.imports import noise_held_back
-
-    with collecting_no_garbage(), noise_held_back():
+    with collecting_no_garbage():
         value = getattr(importlib.import_module(_HOMES[name]), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    """Returns all public names, imported or not."""
+    """Return all public names, imported or not."""
     return [*globals(), *__all__]

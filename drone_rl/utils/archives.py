@@ -1,4 +1,4 @@
-"""Zip archives and the arrays in them, read without trust: every size is known beforehand."""
+"""Safe reading of zip archives and arrays: every size is checked before memory is allocated."""
 
 import io
 import math
@@ -30,40 +30,37 @@ _CHUNK = 2**20
 """Bytes that are unpacked at a time."""
 _LAST_CHARACTER = 0x10FFFF
 _SURROGATES = 0xD800, 0xDFFF
-"""Numbers that are no characters."""
+"""Code points that are no characters."""
 _LONGEST_HEADER = 1000
-"""Characters before an array's numbers."""
+"""Characters of an array's header."""
 _HEADER = re.compile(
     r"\{'descr': '(?P<dtype>[<>|](b1|[iu][1248]|f[248]|U\d{1,6}))', "
     r"'fortran_order': (?P<by_column>True|False), "
     r"'shape': \((?P<shape>(\d{1,13}, ?)*(\d{1,13})?)\), \}\s*"
 )
-"""What NumPy writes before an array's numbers."""
+"""NumPy's header."""
 _DAMAGE = (
     *(zipfile.BadZipFile, zlib.error, struct.error),
     *(RuntimeError, EOFError, OSError, ValueError),
 )
-"""What the reading of a damaged archive raises."""
+"""Errors of damaged archives."""
 _ENTRY = b"PK\x01\x02"
-"""What each entry of an archive's directory begins with."""
+"""Begin of each entry of an archive's directory."""
 
 
 def read_members(
     content: bytes, where: str, *, most: int, methods: Collection[int] = (zipfile.ZIP_STORED,)
 ) -> Iterator[tuple[str, bytes]]:
-    """The files in an archive, one after another.
+    """Yield name and content of each file in an archive.
 
     Args:
         content: Of the archive.
-        where: Its name, for people.
-        most: Bytes that all of them together may have once unpacked.
-        methods: Of compression, that are accepted.
-
-    Yields:
-        Name and content.
+        where: Its name, for messages.
+        most: Largest number of bytes of all files together, unpacked.
+        methods: Accepted methods of compression.
 
     Raises:
-        InputError: The archive is damaged, or its directory tells of more than is allowed.
+        InputError: The archive is damaged, or its directory exceeds a limit.
     """
     return _members(content, where, Allowance(most), methods, lambda file, size, _: file.read(size))
 
@@ -71,12 +68,12 @@ def read_members(
 def read_arrays(
     path: Path, *, most: int = ARRAYS_BYTES, allowance: Allowance | None = None
 ) -> dict[str, NDArray]:
-    """The arrays of an .npz file: numbers and texts only, each as large as its bytes.
+    """Return the arrays of numbers and texts in an .npz file.
 
     Args:
         path: Of the file.
-        most: Bytes that all arrays together may have.
-        allowance: Bytes that they and those of other files may have, instead of `most`.
+        most: Largest number of bytes of all arrays together.
+        allowance: Bytes of the arrays in this file and others, instead of `most`.
 
     Raises:
         InputError: The file is unusable, or an array holds objects.
@@ -91,15 +88,7 @@ def read_arrays(
 
 
 def read_array(path: Path, most: int = ARRAYS_BYTES) -> NDArray:
-    """The array of an .npy file, see `read_arrays`.
-
-    Args:
-        path: Of the file.
-        most: Bytes that it may have.
-
-    Raises:
-        InputError: The file is unusable, or the array holds objects.
-    """
+    """Return the array in an .npy file of at most `most` bytes; see `read_arrays`."""
     content = read_bytes(path, most)
     return _array(io.BytesIO(content), len(content), str(path))
 
@@ -111,7 +100,7 @@ def _members(
     methods: Collection[int],
     read: Callable[[Any, int, str], T],
 ) -> Iterator[tuple[str, T]]:
-    """Name of each file in an archive, and what `read` makes of the opened file and its size."""
+    """Yield the name of each file and the result of `read` for the opened file and its size."""
     remedy = "the file was damaged or cut short"
     if content.count(_ENTRY) > MEMBERS:
         raise InputError(f"{where} holds more than {MEMBERS} files")
@@ -134,7 +123,7 @@ def _members(
 
 
 def _array(file: Any, size: int, where: str) -> NDArray:
-    """One array in NumPy's own format; NumPy itself would allocate what the header asks for."""
+    """Read one array; NumPy would allocate whatever the header states."""
     begin = file.read(12)
     start = {1: 10, 2: 12}.get(begin[6] if begin[:6] == b"\x93NUMPY" else 0, 0)
     length = int.from_bytes(begin[8:start], "little")
@@ -155,13 +144,13 @@ def _array(file: Any, size: int, where: str) -> NDArray:
 
 
 def _fill(flat: NDArray, file: Any, where: str) -> None:
-    """Reads an array's numbers piece by piece, so that they are never in memory twice."""
-    room = flat.view(np.uint8)
-    for begin in range(0, len(room), _CHUNK):
-        piece = file.read(min(_CHUNK, len(room) - begin))
-        if len(piece) < min(_CHUNK, len(room) - begin):
+    """Read an array's numbers in chunks, so that they are never in memory twice."""
+    buffer = flat.view(np.uint8)
+    for begin in range(0, len(buffer), _CHUNK):
+        piece = file.read(min(_CHUNK, len(buffer) - begin))
+        if len(piece) < min(_CHUNK, len(buffer) - begin):
             raise InputError(f"{where} is cut short")
-        room[begin : begin + len(piece)] = np.frombuffer(piece, np.uint8)
+        buffer[begin : begin + len(piece)] = np.frombuffer(piece, np.uint8)
     if flat.dtype.kind == "U" and len(flat):
         codes = flat.view(flat.dtype.newbyteorder("=")).view(np.uint32)
         codes = codes.byteswap() if flat.dtype.byteorder == ">" else codes

@@ -62,11 +62,7 @@ class ForeignError(ValueError):
 
 
 def unpickle(content: bytes, where: str) -> Any:
-    """What was saved, on the CPU.
-
-    Args:
-        content: Of the file.
-        where: Its name, for people.
+    """Return the saved object, on the CPU; `where` is the file's name for messages.
 
     Raises:
         InputError: It is no archive, or too large.
@@ -97,11 +93,11 @@ _DAMAGE = (
     *(pickle.UnpicklingError, EOFError, ValueError, TypeError, LookupError, AttributeError),
     *(RuntimeError, OverflowError, RecursionError),
 )
-"""What nonsensical instructions end in."""
+"""Errors of damaged instructions."""
 
 
 class _Rebuild:
-    """Stands for the function that makes a tensor of a storage."""
+    """Replacement of the function that builds a tensor from a storage."""
 
     __slots__ = ()
 
@@ -117,7 +113,7 @@ class _Rebuild:
 
 
 class _NewMapping:
-    """Stands for an ordered mapping, which is made empty and then filled."""
+    """Replacement of the class of ordered mappings."""
 
     __slots__ = ()
 
@@ -126,7 +122,7 @@ class _NewMapping:
 
 
 class _Unpickler(pickle._Unpickler):
-    """Python's own unpickler with the instructions that are needed left over."""
+    """Python's unpickler, restricted to the instructions of checkpoints."""
 
     dispatch: ClassVar[dict] = {
         code: pickle._Unpickler.dispatch[code] for code in _INSTRUCTIONS.values()
@@ -138,13 +134,13 @@ class _Unpickler(pickle._Unpickler):
         self._storages: dict[str, Tensor] = {}
 
     def load(self) -> Any:
-        """Runs the instructions."""
+        """Run the instructions."""
         used = _Watched(self.dispatch)
         self.dispatch = used  # pyright: ignore[reportAttributeAccessIssue] (of this load only)
         return super().load()
 
     def find_class(self, module: str, name: str) -> Any:
-        """The three things that a checkpoint names."""
+        """Return one of the three globals of a checkpoint."""
         if (module, name) == ("torch._utils", "_rebuild_tensor_v2"):
             return _Rebuild()
         if (module, name) == ("collections", "OrderedDict"):
@@ -154,7 +150,7 @@ class _Unpickler(pickle._Unpickler):
         raise ForeignError(f"{module}.{name}"[:80])
 
     def persistent_load(self, pid: Any) -> Tensor:
-        """A storage, as long as its bytes say."""
+        """Return a storage whose length matches its bytes."""
         kind, dtype, key, _, length = pid
         if kind != "storage" or not isinstance(dtype, torch.dtype) or not isinstance(key, str):
             raise ForeignError("a reference to something else than a storage")
@@ -169,21 +165,21 @@ class _Unpickler(pickle._Unpickler):
         return storage
 
     def _ignore_state(self) -> None:
-        """What modules note beside their parameters (versions of layers) is not needed."""
+        """Drop the versions of layers."""
         self.stack.pop()  # pyright: ignore[reportAttributeAccessIssue] (not in typeshed)
 
     dispatch[_INSTRUCTIONS["BUILD"]] = _ignore_state
 
 
 class _Watched(dict):
-    """Instructions, of which an unknown one means that the file is not ours."""
+    """Instructions; an unknown one means that the file is no checkpoint."""
 
     def __missing__(self, code: int) -> NoReturn:
         raise ForeignError(f"instruction {code}")
 
 
 def _tensor(content: bytes, dtype: torch.dtype) -> Tensor:
-    """A tensor that owns its numbers. Shape: (n,)."""
+    """A tensor with its own memory. Shape: (n,)."""
     if not content:
         return torch.empty(0, dtype=dtype)
     return torch.frombuffer(bytearray(content), dtype=dtype)
@@ -194,11 +190,7 @@ FORMAT_VERSION = 2
 
 
 def save_checkpoint(path: str | Path, state: Mapping[str, Any]) -> None:
-    """Writes a checkpoint atomically: whatever fails, the previous file stays as it was.
-
-    Args:
-        path: Where to; its folder must exist.
-        state: Tensors and plain values.
+    """Write a checkpoint of tensors and plain values; a failure leaves the previous file intact.
 
     Raises:
         InputError: The folder can't be written or the disk is full.
@@ -224,7 +216,7 @@ def save_checkpoint(path: str | Path, state: Mapping[str, Any]) -> None:
 
 
 def _reason(error: BaseException) -> str:
-    """What the system said; PyTorch hides it behind an error of its own."""
+    """The system's reason, which PyTorch hides behind its own error."""
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, OSError) and cause.strerror:
@@ -234,7 +226,7 @@ def _reason(error: BaseException) -> str:
 
 
 def load_checkpoint(path: str | Path) -> dict[str, Any]:
-    """Reads a checkpoint onto the CPU: tensors and plain values, whatever is in the file.
+    """Read tensors and plain values from a checkpoint onto the CPU.
 
     Raises:
         InputError: The file is missing, damaged, holds code, or is not a checkpoint of ours.
@@ -267,17 +259,14 @@ def load_checkpoint(path: str | Path) -> dict[str, Any]:
 
 
 def check_weights(weights: Any, expected: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Refuses all but finite tensors of the expected names, shapes and types.
+    """Return the weights of a file if they are finite and match the expected names and shapes.
 
     Args:
-        weights: Out of a file.
-        expected: The network's `state_dict`; it may lie on the meta device, without numbers.
-
-    Returns:
-        The weights.
+        weights: From a file.
+        expected: The network's `state_dict`, which may be on the meta device.
 
     Raises:
-        InputError: They differ; the first difference is named.
+        InputError: They differ; the message names the first difference.
     """
     found = dict(as_mapping(weights, "the policy's weights"))
     for name in [*expected, *(name for name in found if name not in expected)]:

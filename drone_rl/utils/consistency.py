@@ -1,8 +1,8 @@
-"""Shares, means and intervals that were read from files: refused unless they can be right.
+"""Consistency of rates, means and intervals in files.
 
-Whoever reads a file can't know whether its figures were measured. But a share follows from its
-counts, and so does its exact interval; and an interval of a mean can't be narrower than the
-narrowest that so many values give. So no file can claim more than its own counts allow.
+A reader can't know whether the figures of a file were measured. But a rate and its exact interval
+follow from its counts, and the interval of a mean has a least width for a number of values. So no
+file can claim more than its own counts allow. `where` names the checked part in messages.
 """
 
 import math
@@ -14,23 +14,19 @@ from drone_rl.utils.intervals import may_bound_mean, proportion
 from drone_rl.utils.schema import Kind, Real, Whole, as_mapping, shown
 
 MOST_VALUES = 10**9
-"""That one share or mean may be of."""
+"""Greatest count of one rate or mean."""
 COUNT = Whole(0, MOST_VALUES)
 _NUMBER = Real(-math.inf)
 _ROUNDING = 1e-6
 _COUNTS = ("episodes", "frames", "steps", "trials", "successes", "count", "goals", "pairs")
-"""Entries that count something where they are numbers."""
+"""Entries that are counts where they are numbers."""
 
 
 def check_intervals(given: Any, where: str) -> None:
-    """Check all shares, means and counts in a part of a file, whatever else it holds.
-
-    Args:
-        given: Plain data.
-        where: Its name, for messages.
+    """Check all rates, means and counts in plain data.
 
     Raises:
-        InputError: A share does not follow from its counts, a value is outside its interval, an
+        InputError: A rate does not follow from its counts, a value is outside its interval, an
             interval is narrower than its counts allow, or a count is negative.
     """
     waiting = [(given, where)]
@@ -44,7 +40,7 @@ def check_intervals(given: Any, where: str) -> None:
 
 
 def _check_entries(given: Mapping[str, Any], where: str) -> None:
-    """One mapping: its counts, and the share or mean that it may be."""
+    """Check the counts of one mapping, and its rate or mean."""
     for name in _COUNTS:
         if isinstance(given.get(name), int | float):
             read_entry(given, name, COUNT, where)
@@ -57,18 +53,15 @@ def _check_entries(given: Mapping[str, Any], where: str) -> None:
 
 
 def check_proportion(given: Any, where: str, trials: int | None = None) -> int:
-    """Check a share with an exact interval, of 95% or more.
+    """Check a rate from `utils.intervals.proportion` and return the successes.
 
     Args:
-        given: As `utils.intervals.proportion` returns it.
-        where: Its name, for messages.
-        trials: That it must be of.
-
-    Returns:
-        Successes.
+        given: The rate with its interval of at least 95%.
+        where: Its name.
+        trials: Required number of trials; None for any.
 
     Raises:
-        InputError: It does not follow from its counts.
+        InputError: The rate or its interval does not follow from its counts.
     """
     given = as_mapping(given, where)
     successes, total = (read_entry(given, key, COUNT, where) for key in ("successes", "trials"))
@@ -87,16 +80,13 @@ def check_proportion(given: Any, where: str, trials: int | None = None) -> int:
 def check_mean(
     given: Any, where: str, bounds: tuple[float, float] = (0.0, 1.0), count: int | None = None
 ) -> float | None:
-    """Check a mean of bounded values with an interval of 95% or more.
+    """Check a mean from `utils.intervals.mean_bounds` and return it.
 
     Args:
-        given: As `utils.intervals.mean_bounds` returns it.
-        where: Its name, for messages.
+        given: The mean with its interval of at least 95%.
+        where: Its name.
         bounds: Least and greatest possible value.
-        count: Of values that it must be of.
-
-    Returns:
-        The mean.
+        count: Required number of values; None for any.
 
     Raises:
         InputError: It is out of bounds, or its interval is narrower than the count allows.
@@ -117,16 +107,7 @@ def check_mean(
 
 
 def check_order(given: Mapping[str, Any], value: float, where: str) -> None:
-    """Check that an interval holds its value.
-
-    Args:
-        given: With "lower95" and "upper95".
-        value: That they bound.
-        where: Its name, for messages.
-
-    Raises:
-        InputError: It does not.
-    """
+    """Raise an `InputError` unless "lower95" and "upper95" bound a value."""
     value = _NUMBER.read(value, where)
     lower, upper = (read_entry(given, key, _NUMBER, where) for key in ("lower95", "upper95"))
     if not lower - _ROUNDING <= value <= upper + _ROUNDING:
@@ -136,16 +117,7 @@ def check_order(given: Mapping[str, Any], value: float, where: str) -> None:
 
 
 def check_width(given: Mapping[str, Any], narrowest: Mapping[str, Any], where: str) -> None:
-    """Check that an interval is at least as wide as one that holds.
-
-    Args:
-        given: With "lower95" and "upper95".
-        narrowest: As `given`, of an interval that holds.
-        where: Its name, for messages.
-
-    Raises:
-        InputError: It is narrower.
-    """
+    """Raise an `InputError` if "lower95" and "upper95" are inside those of a valid interval."""
     lower, upper = (read_entry(given, key, _NUMBER, where) for key in ("lower95", "upper95"))
     if lower > narrowest["lower95"] + _ROUNDING or upper < narrowest["upper95"] - _ROUNDING:
         raise InputError(
@@ -161,18 +133,15 @@ def check_mean_width(
     confidence: float,
     where: str,
 ) -> None:
-    """Check that the interval of a mean is at least as wide as one that holds.
+    """Raise an `InputError` if the interval of a mean is narrower than any valid one.
 
     Args:
         interval: Lower and upper end.
-        mean: Of the values; None of no values.
-        count: How many there are.
+        mean: Mean; None of no values.
+        count: Number of values.
         bounds: Least and greatest possible value.
         confidence: Coverage that the interval claims.
-        where: Its name, for messages.
-
-    Raises:
-        InputError: It is narrower.
+        where: Its name.
     """
     lower, upper = interval
     if mean is None:
@@ -187,16 +156,7 @@ def check_mean_width(
 
 
 def check_same(given: Any, expected: float | None, where: str) -> None:
-    """Check that a number is what other figures make it.
-
-    Args:
-        given: Out of a file.
-        expected: What it must be, but for rounding.
-        where: Its name, for messages.
-
-    Raises:
-        InputError: It is something else.
-    """
+    """Raise an `InputError` unless a value of a file equals the expected one up to rounding."""
     if expected is None and given is None:
         return
     if (
@@ -208,15 +168,5 @@ def check_same(given: Any, expected: float | None, where: str) -> None:
 
 
 def read_entry(given: Mapping[str, Any], key: str, kind: Kind, where: str) -> Any:
-    """Return an entry of a mapping that must be there.
-
-    Args:
-        given: Out of a file.
-        key: Of the entry.
-        kind: Of value that it must be.
-        where: Name of the mapping, for messages.
-
-    Raises:
-        InputError: It is missing or of another kind.
-    """
+    """Return an entry of a mapping; raise an `InputError` if it is missing or of another kind."""
     return kind.read(as_mapping(given, where).get(key), f"{where}.{key}")

@@ -1,9 +1,8 @@
 """Tables, figures and HTML pages of results.
 
-Pages show strings from files of unknown origin. Two independent defences keep these strings from
-being executed. Templates escape every value, so that a string reaches the page as text. And the
-page's Content-Security-Policy allows exactly the page's own script and style, by their hashes:
-no inline script, event handler, style attribute or request to another host.
+Pages show strings from files of unknown origin. Two defences keep them from execution. Templates
+escape every value. And the page's Content-Security-Policy allows exactly the page's script and
+style, by their hashes: no inline script, event handler, style attribute or request to another host.
 """
 
 import base64
@@ -21,11 +20,11 @@ if TYPE_CHECKING:
 
 
 def aligned(rows: Sequence[Sequence[str]], *, are_numbers: bool = False) -> str:
-    """A table as text, each column as wide as its longest cell.
+    """Return rows of texts as a table with aligned columns.
 
     Args:
-        rows: Texts, as many in each row as there are columns.
-        are_numbers: Whether cells stand at the right, but for those of the first column.
+        rows: Texts, one for each column.
+        are_numbers: Whether to right-align all columns but the first.
     """
     rest = str.rjust if are_numbers else str.ljust
     first, *others = (2 + max(map(len, column)) for column in zip(*rows, strict=True))
@@ -34,12 +33,7 @@ def aligned(rows: Sequence[Sequence[str]], *, are_numbers: bool = False) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table; every text is escaped.
-
-    Args:
-        head: Of the columns.
-        rows: Texts, as many as there are columns.
-    """
+    """Return rows of texts, one for each column, as an HTML table; every text is escaped."""
     cells = "".join(f"<th>{html.escape(text)}</th>" for text in head)
     lines = "".join(
         f"<tr>{''.join(f'<td>{html.escape(text)}</td>' for text in row)}</tr>" for row in rows
@@ -48,22 +42,19 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def paragraph(text: str) -> str:
-    """A paragraph, escaped."""
+    """Return a text as an HTML paragraph, escaped."""
     return f"<p>{html.escape(text)}</p>"
 
 
 def picture(figure: "Figure") -> str:
-    """A figure as an image that needs no file."""
+    """Return a figure as an embedded image."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=90)
     return f'<img src="data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}">'
 
 
 def page(document: str, height: int = 800) -> str:
-    """A whole HTML page inside another one, where its style and scripts touch nothing else.
-
-    Its scripts run in an origin of their own, so that they can't reach the notebook.
-    """
+    """Return an HTML page as an element of a notebook, which its scripts can't access."""
     return (
         f'<iframe sandbox="allow-scripts" srcdoc="{html.escape(document)}" '
         f'style="width: 100%; height: {height}px; border: 0"></iframe>'
@@ -71,10 +62,10 @@ def page(document: str, height: int = 800) -> str:
 
 
 def interval(figure: Mapping[str, Any], key: str) -> str:
-    """A rate and its 95% interval in percent.
+    """Return a rate and its 95% interval in percent.
 
     Args:
-        figure: With the rate, None of nothing, "lower95" and "upper95".
+        figure: The rate (None if there is none), "lower95" and "upper95".
         key: Of the rate.
     """
     if figure[key] is None:
@@ -91,9 +82,9 @@ _SOURCES = (
     "img-src data:",
     "media-src data:",
 )
-"""What every page may load: images and films that are part of it."""
+"""Sources of every page: embedded images and videos."""
 _TYPES = ("require-trusted-types-for 'script'", "trusted-types 'none'")
-"""Makes it an error of the page's own script to turn text into markup or into code."""
+"""Forbid the page's own script to turn text into markup or code."""
 
 
 def page_environment(*packages: str) -> "jinja2.Environment":

@@ -1,4 +1,4 @@
-"""Files that are whole or not there, read without trust; folders of one process at a time."""
+"""Safe reading of plain files, atomic writing, and locks on folders."""
 
 import contextlib
 import errno
@@ -24,21 +24,21 @@ from drone_rl.utils.limits import (
 )
 
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP)
-"""What file systems answer that know no locks."""
+"""Errors of file systems without locks."""
 _PROCESS = re.compile(r"[1-9][0-9]{0,6}")
-"""The number of a process at the end of a temporary file's name."""
+"""Process id at the end of a temporary file's name."""
 _FORMER_SUFFIX = re.compile(r"[a-z0-9_]{8}")
-"""Such an end in versions until 0.1, which chose it at random."""
+"""Random end of such a name in versions until 0.1."""
 _LONGEST_NUMBER = 19
-"""Digits of a whole number in a JSON file."""
+"""Digits of an integer in a JSON file."""
 
 
 def read_bytes(path: Path, most: int) -> bytes:
-    """The content of a plain file of bounded size, which is opened once and never waited for.
+    """Return the content of a plain file, which is opened once and without waiting.
 
     Args:
         path: Of the file.
-        most: Bytes that it may have.
+        most: Largest number of bytes.
 
     Raises:
         InputError: It can't be read, is no plain file, is empty or too large.
@@ -49,9 +49,9 @@ def read_bytes(path: Path, most: int) -> bytes:
             if not stat.S_ISREG(about.st_mode):
                 raise InputError(f"{path} is no plain file; give the path of a file")
             content = file.read(most + 1) if about.st_size <= most else None
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{path} can't be read ({reason}); give another file") from None
     if content is None or len(content) > most:
@@ -62,11 +62,7 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 
 def read_tail(path: Path, most: int) -> bytes:
-    """Read the last bytes of a plain file, such as a log.
-
-    Args:
-        path: Of the file.
-        most: How many bytes.
+    """Return the last `most` bytes of a plain file, such as a log.
 
     Raises:
         InputError: It can't be read or is no plain file.
@@ -83,29 +79,25 @@ def read_tail(path: Path, most: int) -> bytes:
 
 
 def newest(paths: Iterable[Path]) -> Path | None:
-    """The file or folder that was changed last; None if there is none."""
+    """Return the file or folder that was changed last; None of none."""
     return max(paths, key=lambda path: path.stat().st_mtime, default=None)
 
 
 def read_json(path: Path, most: int = SMALL_JSON_BYTES) -> Any:
-    """Plain data out of a JSON file.
-
-    Raises:
-        InputError: See `read_bytes` and `parse_json`.
-    """
+    """Return plain data from a JSON file; see `read_bytes` and `parse_json` for errors."""
     return parse_json(read_bytes(path, most), str(path))
 
 
 def parse_json(
     content: bytes | str, where: str, *, allow_nan: bool = False, most_values: int = JSON_VALUES
 ) -> Any:
-    """Plain data out of JSON, each key once, no number that isn't one or would fill a page.
+    """Return plain data from JSON with unique names, finite numbers and bounded integers.
 
     Args:
         content: The JSON.
-        where: Its name, for people.
+        where: Its name, for messages.
         allow_nan: Whether NaN and infinity are accepted.
-        most_values: Values and names that it may have.
+        most_values: Largest number of values and names.
 
     Raises:
         InputError: It is no such JSON.
@@ -145,20 +137,19 @@ _NUMBERS: dict[bool, dict[str, Any]] = {
     False: {"parse_int": _whole, "parse_float": _finite, "parse_constant": _finite},
     True: {"parse_int": _whole, "parse_float": float, "parse_constant": float},
 }
-"""How numbers are read, by whether NaN and infinity are accepted."""
+"""Parsers of numbers, by whether NaN and infinity are accepted."""
 
 
 def refuse_links(folder: Path, depth: int = 3, left: Allowance | None = None) -> None:
-    """Makes sure that what is written or read under a folder stays in it.
+    """Refuse a folder with links, so that reading and writing below it stays in it.
 
     Args:
-        folder: Which came from somewhere else, perhaps.
-        depth: Levels of folders to look at.
-        left: How many files and folders may still be looked at.
+        folder: A folder of unknown origin.
+        depth: Levels of folders to search.
+        left: Number of files and folders that it may contain.
 
     Raises:
-        InputError: Something in it is a link, or neither a file nor a folder, or it holds more
-            files than any run or sweep does.
+        InputError: It contains a link or a device, or too many files.
     """
     left = left or Allowance(FOLDER_ENTRIES, "files and folders")
     for entry in os.scandir(folder):
@@ -173,12 +164,12 @@ def refuse_links(folder: Path, depth: int = 3, left: Allowance | None = None) ->
 
 
 def to_file_name(name: str) -> str:
-    """A name that people gave, such as a path, as the name of one file on any system."""
+    """Return a name, such as a path, as the name of one file on any system."""
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")[-60:] or "policy"
 
 
 def write_atomically(path: Path, content: str | bytes) -> None:
-    """Writes a small file; whoever reads it finds the old one or the new one, never half.
+    """Write a small file so that readers get the old or the new content.
 
     Raises:
         OSError: It can't be written; its `filename` is the path.
@@ -187,10 +178,7 @@ def write_atomically(path: Path, content: str | bytes) -> None:
 
 
 def write_all_atomically(contents: Mapping[Path, str | bytes]) -> None:
-    """Write several files, none of them if one can't be written.
-
-    Args:
-        contents: What goes into each file.
+    """Write the contents of several files, or none if one can't be written.
 
     Raises:
         OSError: One can't be written; the error's `filename` is its path.
@@ -203,7 +191,7 @@ def write_all_atomically(contents: Mapping[Path, str | bytes]) -> None:
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
             temporary = temporary_of(now)
             temporary.unlink(missing_ok=True)
-            with temporary.open("xb") as file:  # never through a link that waits there
+            with temporary.open("xb") as file:  # refuses an existing link
                 temporaries[temporary] = now
                 file.write(content.encode() if isinstance(content, str) else content)
         for temporary, now in temporaries.items():
@@ -216,17 +204,12 @@ def write_all_atomically(contents: Mapping[Path, str | bytes]) -> None:
 
 
 def temporary_of(path: Path) -> Path:
-    """The file in which this process writes what is going to be another one."""
+    """Return the temporary file in which this process writes the content of a file."""
     return path.with_name(f".{path.name}.{os.getpid()}")
 
 
 def remove_leftovers(folder: Path, *names: str) -> None:
-    """Delete the temporary files that killed processes left of files with these names.
-
-    Args:
-        folder: In which they lie; it may be missing.
-        names: Of the files that were to be written.
-    """
+    """Delete the temporary files of killed processes for files with these names in a folder."""
     for name in names:
         for path in folder.glob(f".{name}.*"):
             suffix = path.name.removeprefix(f".{name}.")
@@ -237,7 +220,7 @@ def remove_leftovers(folder: Path, *names: str) -> None:
 
 
 def _is_alive(process: int) -> bool:
-    """Whether another process has this number."""
+    """Whether another process has this id."""
     if process == os.getpid():
         return False
     try:
@@ -251,14 +234,14 @@ def _is_alive(process: int) -> bool:
 
 @contextlib.contextmanager
 def folder_lock(folder: Path, *, patience_s: float = 1.0) -> Iterator[None]:
-    """Holds a folder while the process lives; the system lets go of it however it ends.
+    """Lock an existing folder; the system releases the lock when the process ends.
 
     Args:
-        folder: Must exist.
-        patience_s: How long to try, which outlasts a look by `is_locked`.
+        folder: The folder.
+        patience_s: Seconds to try, longer than `is_locked` takes.
 
     Raises:
-        InputError: Another process holds it.
+        InputError: Another process holds the lock.
     """
     with _open_lock(folder) as file:
         until = time.monotonic() + patience_s
@@ -272,7 +255,7 @@ def folder_lock(folder: Path, *, patience_s: float = 1.0) -> Iterator[None]:
 
 
 def is_locked(folder: Path) -> bool:
-    """Whether some process holds the folder."""
+    """Return whether a process has locked the folder."""
     try:
         with _open_lock(folder) as file:
             return not _try_lock(file.fileno())
@@ -281,7 +264,7 @@ def is_locked(folder: Path) -> bool:
 
 
 def _open_lock(folder: Path) -> Any:
-    """The file of a folder's lock, which is never another file by a link."""
+    """Open the file of a folder's lock, but no link."""
     return open(
         folder / ".lock",
         "ab",
@@ -290,7 +273,7 @@ def _open_lock(folder: Path) -> Any:
 
 
 def _open_at_once(path: str, flags: int) -> int:
-    """Opens without waiting for whoever might write into a pipe."""
+    """Open without waiting for the writer of a pipe."""
     return os.open(path, flags | os.O_NONBLOCK)
 
 

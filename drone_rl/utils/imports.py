@@ -1,4 +1,4 @@
-"""Actions when other packages are imported, and filters of what those packages print."""
+"""Actions and warnings when other packages are imported."""
 
 import contextlib
 import functools
@@ -13,11 +13,9 @@ from typing import Any
 
 
 def when_imported(name: str, do: Callable[[], None]) -> None:
-    """Call a function right after a package is imported, or now if it is imported already.
+    """Call a function right after a top-level package is imported, or now if it is already.
 
-    Args:
-        name: Name of the package, without dots.
-        do: The function; it must import nothing that imports that package.
+    The function must not import modules that import the package.
     """
     if sys.modules.get(name) is not None:  # None forbids the import
         do()
@@ -34,11 +32,11 @@ def when_imported(name: str, do: Callable[[], None]) -> None:
 
 
 def import_quietly(name: str, category: str, words: str) -> None:
-    """Hide one warning that a module of another package gives while it is imported.
+    """Hide a warning that a module of another package issues while it is imported.
 
     Args:
         name: Dotted name of the module.
-        category: Name of the warning's class, which a package not yet imported may define.
+        category: Name of the warning's class, which a package may define that is not imported yet.
         words: Text that the warning contains.
     """
 
@@ -86,12 +84,12 @@ ENVIRONMENTS = {
     "drone_rl/CollectCubes-v0": "collect_cubes",
     "drone_rl/Pillars-v0": "pillars",
 }
-"""By name, the class of the task's settings, which `gymnasium.make` takes as options."""
+"""Task of each Gymnasium environment; `gymnasium.make` takes its settings as options."""
 
 
 def register() -> None:
-    """Makes them known to Gymnasium; those that are known already stay as they are."""
-    import gymnasium  # slow to import, and not everybody has it
+    """Register the environments with Gymnasium unless they are registered already."""
+    import gymnasium  # an optional extra
 
     for name, task in ENVIRONMENTS.items():
         if name not in gymnasium.registry:
@@ -103,38 +101,9 @@ def register() -> None:
             )
 
 
-NOISE = ("DISPLAY", "GLFW", "WeightUpdaterBase")
-"""Words in warnings of dm_control, which looks for a screen, and of TorchRL, of its own classes."""
-
-
-def ignore_noise() -> None:
-    """Keeps warnings and log lines back that no user can do anything about.
-
-    Filters would not do: dm_control puts one of its own, that lets all through, before them.
-    """
-    show = warnings.showwarning
-
-    def show_the_rest(message: Warning | str, *args: Any, **kwargs: Any) -> None:
-        if not any(word in str(message) for word in NOISE):
-            show(message, *args, **kwargs)
-
-    warnings.showwarning = show_the_rest
-    from absl import logging  # slow to import
-
-    logging.set_verbosity(logging.WARNING)  # dm_control tells which OpenGL it found
-
-
-@contextlib.contextmanager
-def noise_held_back() -> Iterator[None]:
-    """The same for a while, such as an import: warnings are shown as before afterwards."""
-    with warnings.catch_warnings():
-        ignore_noise()
-        yield
-
-
 @contextlib.contextmanager
 def standard_error_closed() -> Iterator[None]:
-    """Lets nothing through to standard error, not even from below Python."""
+    """Discard all output to standard error, also of compiled code."""
     sys.stderr.flush()
     kept = os.dup(2)
     nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -151,32 +120,32 @@ NAME = "torch._dynamo"
 
 
 def leave_compiler_unloaded() -> None:
-    """Stands in for `torch._dynamo` in this process; for programs, not for libraries."""
+    """Delay the import of `torch._dynamo` in this process, which saves a program over a second."""
     sys.modules.setdefault(NAME, _Unloaded())
 
 
 class _Unloaded(ModuleType):
-    """Takes down what libraries say of their functions."""
+    """Placeholder of the module, which is imported when it is needed."""
 
     def __init__(self) -> None:
         super().__init__(NAME)
         self._allowed: list[Any] = []
 
     def allow_in_graph(self, function: Any) -> Any:
-        """Notes a function, or several, and returns it."""
+        """Record a function, or several, and return it."""
         self._allowed.append(function)
         return function
 
     def assume_constant_result(self, function: Any) -> Any:
-        """Marks a function, as the compiler itself does."""
+        """Mark a function as the compiler does."""
         function._dynamo_marked_constant = True
         return function
 
     def graph_break(self, *args: Any, **kwargs: Any) -> None:
-        """Does nothing, as ever outside of what is compiled."""
+        """Do nothing, as outside of compiled code."""
 
     def disable(self, function: Any = None, recursive: bool = True, **options: Any) -> Any:
-        """Returns the function as one that is not compiled, once there is anything that could."""
+        """Return a function that calls the compiler's version once the compiler is imported."""
         if function is None:
             return functools.partial(self.disable, recursive=recursive, **options)
         if not isinstance(function, FunctionType | MethodType):
@@ -194,8 +163,8 @@ class _Unloaded(ModuleType):
         return call
 
     def __getattr__(self, name: str) -> Any:
-        """Loads the compiler for everything else."""
-        if name.startswith("__") and name != "__path__":  # what inspection asks of every module
+        """Import the compiler for all other names."""
+        if name.startswith("__") and name != "__path__":  # inspection reads them of every module
             raise AttributeError(name)
         return getattr(self._load(), name)
 

@@ -1,4 +1,4 @@
-"""Intervals that hold: exact ones of shares, and of bounded means whatever their distribution."""
+"""Confidence intervals: exact ones of rates, and of bounded means for any distribution."""
 
 import math
 from typing import Any
@@ -8,12 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def proportion(successes: int, trials: int, confidence: float = 0.95) -> dict[str, Any]:
-    """A share with its exact (Clopper-Pearson) interval.
+    """Return a rate with its exact (Clopper-Pearson) interval.
 
-    Args:
-        successes: How many succeeded.
-        trials: Out of how many; 0 gives a share of None and the interval [0, 1].
-        confidence: Coverage of the interval.
+    Without trials the rate is None and the interval [0, 1]. `confidence` is the coverage.
     """
     from scipy.special import betaincinv  # slow to import, and trainings report no interval
 
@@ -32,13 +29,13 @@ def proportion(successes: int, trials: int, confidence: float = 0.95) -> dict[st
 def mean_bounds(
     values: ArrayLike, low: float = 0.0, high: float = 1.0, confidence: float = 0.95
 ) -> dict[str, Any]:
-    """A mean of bounded values with an interval that holds for any distribution and any number.
+    """Return a mean of bounded values with an interval that is valid for any distribution.
 
-    One value an episode (a share, an average over its frames, a paired difference) makes it an
-    interval whatever the dependence within episodes; no normality and no large sample is assumed.
-    A mean is refuted by who would have grown rich betting against it: the capital of fixed bets is
-    a martingale if the mean is true, so that it grows tenfold with probability 0.1 at most (Ville;
-    Waudby-Smith and Ramdas, 2024). A mixture of bets makes the order of the values irrelevant.
+    With one value for each episode the interval is valid for any dependence within episodes; it
+    assumes no normality and no large sample. It contains the means that bets don't refute: the
+    capital of fixed bets is a martingale if the mean is true, so that it grows tenfold with
+    probability 0.1 at most (Ville; Waudby-Smith and Ramdas, 2024). A mixture of bets makes the
+    order of the values irrelevant.
 
     Args:
         values: Independent and identically distributed, each from `low` to `high`. Shape: (n,).
@@ -82,13 +79,7 @@ def may_bound_mean(
     mean: the capital of a bet grows by a concave function of each value, and so by Jensen's
     inequality most where the values are alike.
 
-    Args:
-        interval: Lower and upper end.
-        mean: Of the values.
-        count: How many there are.
-        low: Least possible value.
-        high: Greatest possible value.
-        confidence: Coverage of the interval.
+    The arguments are those of `mean_bounds`, and the interval's ends.
     """
     z, lower, upper = ((value - low) / (high - low) for value in (mean, *interval))
     stakes, needed = _bets(count, (1.0 - confidence) / 2)
@@ -129,15 +120,14 @@ def _wealth(distinct: NDArray, counts: NDArray, stakes: NDArray, mean: float) ->
 
 
 def median_bounds(values: ArrayLike, confidence: float = 0.95) -> tuple[float, float] | None:
-    """An interval of the median by order statistics, exact for any distribution.
+    """Return an interval of the median by order statistics, exact for any distribution.
 
     Args:
         values: Independent; infinite ones (censored times) are allowed. Shape: (n,).
         confidence: Least coverage.
 
     Returns:
-        Two of the values; None if even the least and the greatest don't hold the median so surely
-        (fewer than six values at 95%).
+        Two of the values; None of too few (fewer than six at 95%).
     """
     from scipy.special import bdtr  # see `proportion`
 
@@ -150,14 +140,14 @@ def median_bounds(values: ArrayLike, confidence: float = 0.95) -> tuple[float, f
 
 
 def episode_means(values: NDArray, episode: NDArray) -> NDArray:
-    """The mean of each episode over its frames that say something.
+    """Return the mean of each episode over its frames with values.
 
     Args:
-        values: One a frame; NaN where a frame says nothing. Shape: (T,).
+        values: One for each frame; NaN for none. Shape: (T,).
         episode: The episode of each frame. Shape: (T,).
 
     Returns:
-        Shape: (E,), the episodes in which some frame does.
+        Shape: (E,), one for each episode with values.
     """
     known = np.isfinite(values)
     _, number = np.unique(episode[known], return_inverse=True)
@@ -168,19 +158,18 @@ def episode_means(values: NDArray, episode: NDArray) -> NDArray:
 def mean_interval(
     values: NDArray, episode: NDArray, low: float = 0.0, high: float = 1.0
 ) -> dict[str, Any]:
-    """The mean over episodes of their means, with a 95% interval that counts episodes.
+    """Return the mean over episodes of their means, with a 95% interval that counts episodes.
 
-    Frames of one episode are alike, so that an interval that took them for independent would be
-    far too narrow. Episodes are independent, and that is all that this one assumes.
+    Frames of one episode are alike, so that an interval for independent frames would be too narrow.
 
     Args:
-        values: One a frame, from `low` to `high`; NaN where a frame says nothing. Shape: (T,).
+        values: One for each frame, from `low` to `high`; NaN for none. Shape: (T,).
         episode: The episode of each frame. Shape: (T,).
         low: Least possible value.
         high: Greatest possible value.
 
     Returns:
-        "mean", "lower95", "upper95" (None where there is no frame), "frames" and "episodes".
+        "mean", "lower95", "upper95" (None without frames), "frames" and "episodes".
     """
     means = episode_means(values, episode)
     bounds = mean_bounds(means, low, high)

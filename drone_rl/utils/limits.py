@@ -1,8 +1,8 @@
-"""How much a file may hold: the one table of sizes that all readers check before they allocate.
+"""Limits on files, which all readers check before they allocate memory.
 
-Whatever is in a file, reading it takes less than 1 GiB of memory and about two seconds. A reader
-takes its limits from here and checks them on what the file states (its size, a directory, a
-header, the number of separators) before it makes anything of the content.
+Reading any file takes less than 1 GiB of memory and about two seconds. Readers check the limits on
+what a file states (its size, a directory, a header, the number of separators) before they parse
+the content. `where` names the file or a part of it in messages.
 """
 
 import math
@@ -13,96 +13,52 @@ from numpy.typing import NDArray
 
 from drone_rl.utils.errors import InputError
 
-# Sizes of files, bytes.
-SMALL_JSON_BYTES = 10**6
-"""A JSON file of no other kind: the state of a training, the reason of a failure."""
-RESULT_BYTES = 2**18
-"""`result.json`."""
-SWEEP_RESULTS_BYTES = 2**24
-"""`result.json` and `failure.json` of all runs of a sweep together."""
-SWEEP_BYTES = 2**24
-"""`sweep.json`."""
-EXPLANATION_BYTES = 2**22
-"""`explanation.json`."""
-SHIFTS_BYTES = 2**26
-"""`shifts.json`, most of which are images."""
+# Sizes of files in bytes
+SMALL_JSON_BYTES = 10**6  # state of a training, reason of a failure
+RESULT_BYTES = 2**18  # result.json
+SWEEP_RESULTS_BYTES = 2**24  # result.json and failure.json of all runs of a sweep together
+SWEEP_BYTES = 2**24  # sweep.json
+EXPLANATION_BYTES = 2**22  # explanation.json
+SHIFTS_BYTES = 2**26  # shifts.json, most of which are images
 CERTIFICATE_BYTES = 2**25
-"""A certificate."""
-LEDGER_BYTES = 2**24
-"""Results of benchmarks."""
-YAML_BYTES = 2**16
-"""A YAML file: overrides of a run, a domain that is required."""
-METRICS_BYTES = 2**24
-"""`metrics.csv` of one run."""
-LOG_BYTES = 2**16
-"""The end of a log that is searched for an error."""
-JOURNAL_BYTES = 2**23
-"""The journal of a search by Optuna."""
-CHECKPOINT_BYTES = 2**28
-"""A checkpoint; also what it unpacks to."""
-ARCHIVE_BYTES = 2**28
-"""An `.npz` file as it lies on the disk."""
-ARRAYS_BYTES = 5 * 2**26
-"""The `.npz` files of one command together, unpacked."""
+LEDGER_BYTES = 2**24  # results of benchmarks
+YAML_BYTES = 2**16  # overrides of a run, a required domain
+METRICS_BYTES = 2**24  # metrics.csv of one run
+SWEEP_METRICS_BYTES = 2**26  # metrics.csv of all runs of a sweep together
+LOG_BYTES = 2**16  # end of a log that is searched for an error
+JOURNAL_BYTES = 2**23  # journal of a search by Optuna
+CHECKPOINT_BYTES = 2**28  # a checkpoint; also unpacked
+ARCHIVE_BYTES = 2**28  # an .npz file, compressed
+ARRAYS_BYTES = 5 * 2**26  # the .npz files of one command together, unpacked
 
-# Counts.
-JSON_VALUES = 2**18
-"""Values and names in a JSON file."""
-EXPLANATION_VALUES = 2**16
-"""Those in `explanation.json`."""
-CERTIFICATE_VALUES = 3 * 2**19
-"""Those in a certificate, nearly all of them borders of boxes."""
-JSON_DEPTH = 64
-"""Levels of lists and mappings in a JSON file."""
-YAML_DEPTH = 16
-"""The same in a YAML file."""
-YAML_VALUES = 2000
-"""Values and names in a YAML file."""
-PICKLED_BYTES = 2**20
-"""Instructions in a checkpoint: everything but the numbers of its tensors."""
-MEMBERS = 10_000
-"""Files in one archive."""
-DIMENSIONS = 8
-"""Of an array."""
-ELEMENTS = 2**30
-"""Of an array; also of one without any, if its dimensions of 0 were 1."""
-METRICS_ROWS = 2**17
-"""Updates in `metrics.csv`."""
-METRICS_CELLS = 2**21
-"""Cells in `metrics.csv`."""
-SWEEP_METRICS_BYTES = 2**26
-"""`metrics.csv` of all runs of a sweep together."""
-SWEEP_METRICS_ROWS = 2**19
-"""Updates in these."""
-SWEEP_METRICS_CELLS = 2**23
-"""Cells in these."""
-FOLDER_ENTRIES = 50_000
-"""Files and folders below a folder that is searched for links."""
+# Counts
+JSON_VALUES = 2**18  # values and names in a JSON file
+EXPLANATION_VALUES = 2**16  # those in explanation.json
+CERTIFICATE_VALUES = 3 * 2**19  # those in a certificate, nearly all of them borders of boxes
+JSON_DEPTH = 64  # levels of lists and mappings in a JSON file
+YAML_DEPTH = 16  # those in a YAML file
+YAML_VALUES = 2000  # values and names in a YAML file
+PICKLED_BYTES = 2**20  # instructions in a checkpoint: everything but the numbers of its tensors
+MEMBERS = 10_000  # files in one archive
+DIMENSIONS = 8  # of an array
+ELEMENTS = 2**30  # of an array; also of one without any, if its dimensions of 0 were 1
+METRICS_ROWS = 2**17  # updates in metrics.csv
+METRICS_CELLS = 2**21  # cells in metrics.csv
+SWEEP_METRICS_ROWS = 2**19  # updates in metrics.csv of all runs of a sweep together
+SWEEP_METRICS_CELLS = 2**23  # cells in these
+FOLDER_ENTRIES = 50_000  # files and folders below a folder that is searched for links
 
 
 class Allowance:
     """A limit that several files share, such as the arrays of all explanations in a report."""
 
     def __init__(self, most: int, unit: str = "bytes") -> None:
-        """Sets the limit.
-
-        Args:
-            most: The sum that may be taken.
-            unit: What is counted, for messages.
-        """
+        """Set the sum that may be taken and its unit for messages."""
         self.left = most
         self._most, self._unit = most, unit
 
     def take(self, amount: int, where: str) -> None:
-        """Takes a part of what is left.
-
-        Args:
-            amount: How much.
-            where: Name of the file, for messages.
-
-        Raises:
-            InputError: Less is left.
-        """
+        """Take an amount for a file; raise an `InputError` if less is left."""
         if amount > self.left:
             left = "" if self.left == self._most else f", of which {self.left} are left"
             raise InputError(
@@ -113,16 +69,7 @@ class Allowance:
 
 
 def check_json_size(content: bytes | str, where: str, most: int = JSON_VALUES) -> None:
-    """Refuses JSON with too many values, by its separators and before it is parsed.
-
-    Args:
-        content: The JSON; separators within texts count, too.
-        where: Its name, for messages.
-        most: Values and names that it may have.
-
-    Raises:
-        InputError: It may have more.
-    """
+    """Raise an `InputError` if JSON may have more values, by its separators before it is parsed."""
     if isinstance(content, str):
         count = sum(content.count(mark) for mark in ",[{")
     else:
@@ -132,11 +79,7 @@ def check_json_size(content: bytes | str, where: str, most: int = JSON_VALUES) -
 
 
 def check_depth(value: Any, where: str, most: int = JSON_DEPTH) -> None:
-    """Refuses plain data in which lists and mappings are nested too deeply.
-
-    Raises:
-        InputError: They are.
-    """
+    """Raise an `InputError` if lists and mappings are nested more than `most` times."""
     level = [value]
     for _ in range(most):
         level = [inner for outer in level for inner in _containers(outer)]
@@ -154,16 +97,15 @@ def _containers(value: Any) -> Iterator[Any]:
 
 
 def check_shape(shape: Sequence[int], itemsize: int, most: int, where: str) -> int:
-    """Refuses the shape of an array that would be too large, also where a dimension is 0.
+    """Check the shape that a file states for an array and return the number of elements.
+
+    A dimension of 0 counts as 1, so that no array without elements has a huge shape.
 
     Args:
-        shape: As a file states it.
+        shape: The shape.
         itemsize: Bytes of one element.
         most: Bytes that the array may have.
-        where: Its name, for messages.
-
-    Returns:
-        Number of elements.
+        where: Its name.
 
     Raises:
         InputError: It is too large, has too many dimensions, or elements of no size.
@@ -176,16 +118,7 @@ def check_shape(shape: Sequence[int], itemsize: int, most: int, where: str) -> i
 
 
 def check_indices(values: NDArray[Any], most: int, where: str) -> None:
-    """Refuses an array that is not one of whole numbers from 0 to below a limit.
-
-    Args:
-        values: Out of a file, to be used as indices or to be counted.
-        most: The first number that is too high.
-        where: Name of the array, for messages.
-
-    Raises:
-        InputError: A value is out of range or no whole number.
-    """
+    """Raise an `InputError` unless an array has integers from 0 to below `most` only."""
     if values.dtype.kind not in "iub":
         raise InputError(f"{where} is of type {values.dtype}, not of whole numbers")
     if values.size and not (int(values.min()) >= 0 and int(values.max()) < most):

@@ -1,8 +1,7 @@
-"""Bounds on memory and on the time that Python's garbage collector takes.
+"""Bounds on memory and on the time of Python's garbage collector.
 
 Batches differ in length, and two caches grow with every new length: the C library keeps freed
-blocks, of which ever fewer fit, and oneDNN compiles a kernel for each input shape and keeps a
-thousand of them.
+blocks, and oneDNN keeps a thousand kernels, one for each input shape.
 """
 
 import contextlib
@@ -13,16 +12,16 @@ import os
 from collections.abc import Callable, Iterator
 
 KEPT_KERNELS = 128
-"""Enough for two layers and every number of up to 32 worlds under way at a time, and a batch."""
+"""Enough for two layers, up to 32 active environments, and a batch."""
 
 
 def bound_kernels() -> None:
-    """Lets oneDNN keep so many kernels; without effect once one has run in this process."""
+    """Limit oneDNN's cache of kernels; no effect once a kernel has run in this process."""
     os.environ.setdefault("ONEDNN_PRIMITIVE_CACHE_CAPACITY", str(KEPT_KERNELS))
 
 
 def return_freed_memory() -> None:
-    """Gives blocks that were freed back to the system, where the C library can: on Linux."""
+    """Release freed memory to the operating system, on Linux."""
     _trim()(0)
 
 
@@ -36,7 +35,7 @@ def _trim() -> Callable[[int], int]:
 
 @contextlib.contextmanager
 def collecting_no_garbage() -> Iterator[None]:
-    """Lets Python's collector rest, as during imports: they leave none, and it costs a fifth."""
+    """Disable Python's collector, as during imports, where it takes a fifth of the time."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -47,18 +46,17 @@ def collecting_no_garbage() -> Iterator[None]:
 
 
 def look_for_garbage_rarely() -> None:
-    """Lets Python's collector look once in 50,000 new objects, not in 700: it finds next to none.
+    """Make Python's collector run once in 50,000 new objects instead of 700; for programs.
 
-    For programs, not for libraries: half a million objects come with torch, and looking through
-    them, even once, takes a third of a second. So when there are more than these, whatever is there
-    is set aside for good, and only what is made from then on is looked at.
+    Imports create half a million objects, which the collector would traverse in a third of a second
+    or more. They are excluded from collection when it first runs.
     """
     gc.set_threshold(700_000, 50, 100)
     gc.callbacks.append(_from_now_on)
 
 
 def _from_now_on(phase: str, info: dict[str, int]) -> None:
-    """Is called before the first look: it finds nothing to look at."""
+    """Exclude all existing objects before the first collection."""
     del phase, info
     gc.callbacks.remove(_from_now_on)
     gc.freeze()

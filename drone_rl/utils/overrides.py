@@ -1,7 +1,7 @@
-"""Settings of an earlier run (`key=value`), as they stand in its folder: never believed unchecked.
+"""Overrides (`key=value`) in the folder of an earlier run, checked before they are used.
 
-On a command line a setting may name classes, files and programs. In a file of which nobody knows
-who wrote it, it may not.
+On a command line an override may name classes, files and programs. In a file of unknown origin it
+may not.
 """
 
 import re
@@ -15,12 +15,9 @@ from drone_rl.utils.readers import read_yaml
 from drone_rl.utils.schema import Kind, Several, Text, shown
 
 _OF_ONE_FOLDER = re.compile(r"\+{0,2}(resume|trial|paths(\.\w+)?)")
-"""Settings that say where a run was or which sweep it was a part of: not what it learns.
-
-The folder that is given counts, so that a run can be moved or copied.
-"""
+"""Overrides of a run's place and sweep, which don't change what it learns; a run can be moved."""
 MOST_OVERRIDES = 200
-"""Settings of one run."""
+"""Overrides of one run."""
 _LONGEST = 500
 _NAME = r"[A-Za-z]\w*"
 _HARMLESS = re.compile(rf"(\+{{0,2}}{_NAME}([./@]{_NAME})*=.*|~{_NAME}([./@]{_NAME})*)")
@@ -38,11 +35,11 @@ _TAKEN_OVER = (
     rf"~transforms\.{_NAME}",
     rf"collector\.(num_envs|num_threads|num_cpus|max_lost_workers)={_SCALAR}",
 )
-"""What a resumed run takes over: what is learned and how, chosen by name, in plain values."""
+"""Overrides that a resumed run takes from the file: choices by name and plain values."""
 
 
 class _Command:
-    """A training's command, which people may copy into a shell: it does what it seems to do."""
+    """A training's command that is safe to copy into a shell."""
 
     def read(self, value: Any, where: str) -> str:
         """See `drone_rl.utils.schema.Kind`."""
@@ -60,14 +57,14 @@ class _Command:
 
 
 COMMAND: Kind = _Command()
-"""The kind of text that says how something was trained."""
+"""The kind of a training's command."""
 
 
 def check_harmless(override: str, where: str) -> str:
-    """A setting that may be shown to people, who may copy it into a shell.
+    """Return an override that is safe to copy into a shell.
 
     Raises:
-        InputError: It names Python, Hydra's own settings or another setting's value.
+        InputError: It names code, a setting of Hydra or the value of another setting.
     """
     text = Text(_LONGEST).read(override, where)
     key = text.partition("=")[0].lstrip("+~")
@@ -79,13 +76,10 @@ def check_harmless(override: str, where: str) -> str:
 
 
 def read_overrides(folder: Path) -> list[str]:
-    """The settings of a run as Hydra noted them; none if it noted none.
-
-    Args:
-        folder: Of the run.
+    """Return the overrides that Hydra recorded in a run's folder, if any.
 
     Raises:
-        InputError: The file is damaged or a setting is not harmless.
+        InputError: The file is damaged or an override is not harmless.
     """
     path = folder / ".hydra" / "overrides.yaml"
     if not path.exists():
@@ -96,14 +90,14 @@ def read_overrides(folder: Path) -> list[str]:
 
 
 def taken_over(folder: Path, typed: Collection[str]) -> list[str]:
-    """The settings of a run that goes on, except those that are typed anew.
+    """Return the recorded overrides of a resumed run, except those on the command line.
 
     Args:
         folder: Of the run.
-        typed: Settings on the command line, which say more than any file may.
+        typed: Overrides on the command line, which are not restricted.
 
     Raises:
-        InputError: A setting may not be taken over from a file.
+        InputError: An override may not be taken from a file.
     """
     keys = {_key(override) for override in typed}
     found = [o for o in read_overrides(folder) if _key(o) not in keys and not _is_of_one_folder(o)]
@@ -116,7 +110,7 @@ def taken_over(folder: Path, typed: Collection[str]) -> list[str]:
 
 
 def must_be_typed(overrides: Iterable[str]) -> list[str]:
-    """The settings of a run that `taken_over` refuses, so that a person gives them again."""
+    """Return the overrides of a run that `taken_over` refuses."""
     return [
         override
         for override in overrides

@@ -1,4 +1,4 @@
-"""How long work says how far it is: a bar, a log, nothing, or whatever else is called."""
+"""Progress of long work: a bar, lines in the log, or nothing."""
 
 import logging
 import time
@@ -11,33 +11,27 @@ _log = logging.getLogger(__name__)
 
 
 class Progress(Protocol):
-    """Is called now and then by all that takes long."""
+    """A function that long work calls repeatedly."""
 
     def __call__(self, text: str, done: int = 0, total: int = 0) -> None:
-        """Takes note.
-
-        Args:
-            text: What is being done.
-            done: How much of it.
-            total: Of how much, at most; 0 where nobody knows.
-        """
+        """Report that `done` of at most `total` (0 if unknown) steps of `text` are done."""
         ...
 
 
 def silent(text: str, done: int = 0, total: int = 0) -> None:
-    """Says nothing."""
+    """Report nothing."""
 
 
 def log(text: str, done: int = 0, total: int = 0) -> None:
-    """One line in the log."""
+    """Write one line to the log."""
     _log.info("%s", f"[{done}/{total}] {text}" if total else text)
 
 
 class Bar:
-    """A bar, in a notebook or a terminal; ends when all is done."""
+    """A progress bar in a notebook or a terminal, closed when the work is done."""
 
     def __init__(self, interval_s: float = 0.1) -> None:
-        """Sets the least time between two looks."""
+        """Set the least time between two updates."""
         self._interval_s = interval_s
         self._bar: tqdm | None = None
         self._drawn_at = 0.0
@@ -59,7 +53,7 @@ class Bar:
             self.close()
 
     def close(self) -> None:
-        """Ends the bar; the next call begins another."""
+        """Close the bar; the next call opens another."""
         if self._bar is not None:
             self._bar.close()
         self._bar = None

@@ -1,4 +1,4 @@
-"""Where a result comes from: versions, git revision, machine."""
+"""Provenance of results: versions, git revision, machine."""
 
 import os
 import platform
@@ -7,21 +7,13 @@ from importlib import metadata
 from pathlib import Path
 
 PACKAGES = (
-    "drone-rl",
-    "torch",
-    "torchrl",
-    "tensordict",
-    "mujoco",
-    "mujoco-warp",
-    "warp-lang",
-    "dm_control",
-    "hydra-core",
-    "numpy",
+    *("drone-rl", "torch", "torchrl", "tensordict", "mujoco", "mujoco-warp", "warp-lang"),
+    *("dm_control", "hydra-core", "numpy"),
 )
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python and of the packages that results depend on."""
+    """Return the versions of Python and of the packages that results depend on."""
     installed = {"python": platform.python_version()}
     for name in PACKAGES:
         try:
@@ -32,7 +24,7 @@ def versions() -> dict[str, str]:
 
 
 def git_revision() -> str | None:
-    """Commit of the checkout that runs, with "-dirty" if changed; None outside a checkout."""
+    """Return the commit of the checkout, with "-dirty" if changed; None outside a checkout."""
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():
         return None
@@ -44,23 +36,20 @@ def git_revision() -> str | None:
 
 
 def num_cores() -> int:
-    """Cores that this process may use."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def machine() -> dict[str, str | int | None]:
-    """Processor and system."""
-    return {
-        "system": platform.platform(),
-        "processor": platform.machine(),
-        "cores": num_cores(),
-    }
+    """Return processor and system."""
+    names = {"system": platform.platform(), "processor": platform.machine()}
+    return {**names, "cores": num_cores()}
 
 
 def provenance() -> dict:
-    """All of it, as plain values."""
+    """Return versions, revision and machine as plain values."""
     return {"versions": versions(), "git_revision": git_revision(), "machine": machine()}
 
 

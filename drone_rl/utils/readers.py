@@ -1,4 +1,4 @@
-"""Readers of YAML and CSV files that accept plain data only, bounded in size."""
+"""Readers of YAML and CSV files that accept plain data of bounded size only."""
 
 import csv
 import io
@@ -43,24 +43,12 @@ def with_present_names(figures: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def read_yaml(path: Path, most: int = YAML_BYTES) -> Any:
-    """Read plain data from a YAML file.
-
-    Args:
-        path: Of the file.
-        most: Bytes that it may have.
-
-    Raises:
-        InputError: It can't be read, is too large or damaged, or holds more than plain data.
-    """
+    """Return plain data from a YAML file; see `read_bytes` and `parse_yaml` for errors."""
     return parse_yaml(read_bytes(path, most), str(path))
 
 
 def parse_yaml(content: bytes | str, where: str) -> Any:
-    """Read plain data from YAML.
-
-    Args:
-        content: The YAML.
-        where: Its name, for messages.
+    """Return plain data from YAML; `where` is its name for messages.
 
     Raises:
         InputError: It is damaged, too large, or holds anchors, aliases, tags or a name twice.
@@ -109,7 +97,7 @@ class _PlainLoader(yaml.SafeLoader):
 
 
 class TablesAllowance:
-    """What the tables of one command may have together: bytes, rows and cells."""
+    """Limits on all tables of one command together."""
 
     def __init__(
         self,
@@ -117,21 +105,17 @@ class TablesAllowance:
         rows: int = SWEEP_METRICS_ROWS,
         cells: int = SWEEP_METRICS_CELLS,
     ) -> None:
-        """Sets the limits."""
         self.size = Allowance(size)
         self.rows = Allowance(rows, "rows")
         self.cells = Allowance(cells, "cells")
 
 
 def read_table(path: Path, allowance: TablesAllowance | None = None) -> Iterator[list[str]]:
-    """Read the rows of a CSV file, its header first; empty rows are left out.
+    """Yield the rows of a CSV file, its header first, without empty rows.
 
     Args:
         path: Of the file.
-        allowance: What this file and others may have together.
-
-    Yields:
-        The cells of each row.
+        allowance: Limits on this file and others together.
 
     Raises:
         InputError: The file can't be read, is too large, or is no CSV.
@@ -162,4 +146,4 @@ def _size(path: Path) -> int:
     try:
         return path.stat().st_size
     except (OSError, ValueError):
-        return 0  # the reader says what is wrong
+        return 0  # the reader reports the error

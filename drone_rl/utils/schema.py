@@ -1,6 +1,7 @@
-"""What plain data out of a file may be: types and bounds, checked before anything is made of it.
+"""Kinds of plain data: types and bounds, checked before anything is built from a file.
 
-Each kind has one method, `read(value, where)`, that returns the value or refuses it by name.
+Each kind has one method, `read(value, where)`. It returns the value, or raises an `InputError` that
+begins with the name `where`.
 """
 
 import dataclasses
@@ -14,7 +15,7 @@ from drone_rl.utils.errors import InputError
 LONGEST_TEXT = 4000
 """Characters of one text in a file."""
 MOST_VALUES = 20_000
-"""Values that a freely shaped part of a file may hold."""
+"""Values of a part of a file without a schema."""
 DEEPEST = 12
 """Levels of such a part."""
 _MOST_BITS = 10_000
@@ -25,26 +26,18 @@ class Kind(Protocol):
     """One kind of value."""
 
     def read(self, value: Any, where: str) -> Any:
-        """The value, if it is of this kind.
-
-        Args:
-            value: Out of a file.
-            where: Its name, for people.
-
-        Raises:
-            InputError: It is of another type or out of bounds.
-        """
+        """Return a value of this kind; raise an `InputError` about `where` for any other."""
         ...
 
 
 @dataclasses.dataclass(frozen=True)
 class Whole:
-    """A whole number; neither true nor 3.0 is one."""
+    """An integer; neither true nor 3.0 is one."""
 
     low: int
     high: float = math.inf
     unit: str = ""
-    """What it counts or measures in, for people."""
+    """Unit, for documentation."""
 
     def read(self, value: Any, where: str) -> int:
         """See `Kind`."""
@@ -54,7 +47,7 @@ class Whole:
 
     @property
     def words(self) -> str:
-        """What it may be, for people."""
+        """The range in words."""
         if self.high == math.inf:
             return f"a whole number of {self.low} or more"
         return f"a whole number from {self.low} to {self.high}"
@@ -67,11 +60,11 @@ class Real:
     low: float
     high: float = math.inf
     is_above: bool = False
-    """Whether it must be greater than `low`, not only as great."""
+    """Whether `low` is excluded."""
     is_below: bool = False
-    """Whether it must be less than `high`."""
+    """Whether `high` is excluded."""
     unit: str = ""
-    """What it measures in, for people; empty for rates, shares and other bare numbers."""
+    """Unit, for documentation; empty for rates and other bare numbers."""
 
     def read(self, value: Any, where: str) -> float:
         """See `Kind`."""
@@ -87,7 +80,7 @@ class Real:
 
     @property
     def words(self) -> str:
-        """What it may be, for people."""
+        """The range in words."""
         low, high = f"{self.low:g}", f"{self.high:g}"
         if self.high == math.inf:
             return f"a number above {low}" if self.is_above else f"a number of {low} or more"
@@ -128,7 +121,7 @@ class Instance:
     of: type
 
     def read(self, value: Any, where: str) -> Any:
-        """See `Kind`; a class may offer instances by name."""
+        """See `Kind`; a class with `from_name` accepts names."""
         if isinstance(value, str) and hasattr(self.of, "from_name"):
             return self.of.from_name(value, where)
         if not isinstance(value, self.of):
@@ -154,7 +147,7 @@ class Text:
 
 @dataclasses.dataclass(frozen=True)
 class FileName:
-    """The name of one file in a folder, without its ending: no path, and none that is hidden."""
+    """The name of a file without its suffix; no path and no hidden file."""
 
     longest: int = 150
 
@@ -183,7 +176,7 @@ class Maybe:
 
 @dataclasses.dataclass(frozen=True)
 class Several:
-    """So many values of one kind, as a tuple."""
+    """A list of values of one kind, as a tuple."""
 
     kind: Kind
     least: int
@@ -201,7 +194,7 @@ class Several:
 
 @dataclasses.dataclass(frozen=True)
 class Span:
-    """One value of a kind, or a range of them: the pair of its lowest and its highest."""
+    """A value of a kind, or a range: the pair of its lowest and highest value."""
 
     kind: Kind
 
@@ -229,7 +222,7 @@ class Listed:
     """One text or a list of them, as a tuple."""
 
     what: str
-    """What each names."""
+    """The thing that each names."""
     most: int = 1000
 
     def read(self, value: Any, where: str) -> tuple[str, ...]:
@@ -245,7 +238,7 @@ class Listed:
 
 @dataclasses.dataclass(frozen=True)
 class Record:
-    """Exactly these keys, each with a value of its kind."""
+    """A mapping with exactly these keys."""
 
     fields: Mapping[str, Kind]
     optional: frozenset[str] = frozenset()
@@ -271,7 +264,7 @@ class Record:
 
 @dataclasses.dataclass(frozen=True)
 class Plain:
-    """Any plain data, not too much of it: texts, numbers, true, false, none, lists, mappings."""
+    """Any plain data of limited size: texts, numbers, true, false, none, lists, mappings."""
 
     most: int = MOST_VALUES
     deepest: int = DEEPEST
@@ -293,18 +286,14 @@ class Plain:
 
 
 def as_mapping(value: Any, where: str) -> Mapping[str, Any]:
-    """A mapping with texts as keys.
-
-    Raises:
-        InputError: It is something else.
-    """
+    """Return a mapping whose keys are texts; raise an `InputError` for anything else."""
     if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
         raise InputError(f"{where}={shown(value)} must be a mapping from names to values")
     return value
 
 
 def shown(value: Any) -> str:
-    """A value as it may stand in a message: short, on one line."""
+    """Return a value for a message: short, on one line."""
     if value is not None and not isinstance(value, str | int | float):
         return f"({type(value).__name__})"
     if isinstance(value, int) and value.bit_length() > _MOST_BITS:  # Python refuses to write it
@@ -314,7 +303,7 @@ def shown(value: Any) -> str:
 
 
 def _inside(item: Any, where: str) -> Sequence[Any]:
-    """What a list or mapping holds; a single value is checked and holds nothing."""
+    """The values of a list or mapping; a single value is checked and contains nothing."""
     if isinstance(item, Mapping):
         for key in as_mapping(item, where):
             Text().read(key, f"a name in {where}")

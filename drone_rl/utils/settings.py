@@ -1,7 +1,6 @@
-"""Settings: frozen dataclasses whose fields carry type, bounds, default and meaning.
+"""Settings: frozen dataclasses whose fields have type, bounds, default and description.
 
-A setting stands in code in one such field and nowhere else: what files may say, what Hydra accepts
-and what is passed in Python are all checked by it.
+A setting is defined in one such field, which checks files, Hydra's values and Python's arguments.
 """
 
 import contextlib
@@ -56,30 +55,22 @@ class Settings(_Frozen):
         del cls.__setattr__, cls.__delattr__
 
     def __post_init__(self) -> None:
-        """Reads every value by its kind."""
+        """Check every value by its kind."""
         for name, kind in kinds_of(type(self)).items():
             object.__setattr__(self, name, kind.read(getattr(self, name), name))
         self.check()
 
     def check(self) -> None:
-        """Refuses values that are in bounds, each by itself, but don't go together."""
+        """Raise an `InputError` if valid values don't go together."""
 
     def replace(self, **changes: Any) -> Self:
-        """The same with other values.
-
-        Raises:
-            InputError: There is no such setting, or its value can't be.
-        """
+        """Return a copy with other values; raise an `InputError` for unknown or invalid ones."""
         check_names(type(self), changes)
         return dataclasses.replace(self, **changes)
 
     @classmethod
     def read(cls, data: Any, where: str) -> Self:
-        """Settings out of plain data that has every field and no other.
-
-        Args:
-            data: A mapping.
-            where: Its name, for people.
+        """Return settings from a mapping that has every field and no other.
 
         Raises:
             InputError: See `Settings`; the message begins with `where`.
@@ -89,34 +80,30 @@ class Settings(_Frozen):
             return cls(**values)
 
     def narrowed(self, cls: type[S]) -> S:
-        """Those of a class that this one extends, without what was added."""
+        """Return the settings of a base class."""
         return cls(**{field.name: getattr(self, field.name) for field in dataclasses.fields(cls)})
 
     def values(self) -> dict[str, Any]:
-        """The fields by name; other settings in them as mappings, tuples as lists."""
+        """Return the fields by name as plain data."""
         return {f.name: plain(getattr(self, f.name)) for f in dataclasses.fields(self)}
 
 
 @functools.cache
 def kinds_of(cls: type[Settings]) -> Mapping[str, Kind]:
-    """What each field may be, in order."""
+    """Return the kind of each field, in order."""
     hints = typing.get_type_hints(cls, include_extras=True)
     return {field.name: _kind(hints[field.name]) for field in dataclasses.fields(cls)}
 
 
 @functools.cache
 def types_of(cls: type[Settings]) -> Mapping[str, Any]:
-    """The plain type of each field, in order."""
+    """Return the plain type of each field, in order."""
     hints = typing.get_type_hints(cls)
     return {field.name: hints[field.name] for field in dataclasses.fields(cls)}
 
 
 def check_names(cls: type[Settings], given: Mapping[str, Any]) -> None:
-    """Refuses names that are no settings.
-
-    Raises:
-        InputError: There is one; those that exist are named.
-    """
+    """Raise an `InputError` for names that are no settings; it lists those that exist."""
     for name in given:
         if name not in kinds_of(cls):
             raise InputError(f"{name} is unknown; there are: {', '.join(kinds_of(cls))}")
@@ -124,11 +111,7 @@ def check_names(cls: type[Settings], given: Mapping[str, Any]) -> None:
 
 @contextlib.contextmanager
 def below(where: str) -> Iterator[None]:
-    """Puts the name of what holds the settings before that of the setting, in errors from within.
-
-    Args:
-        where: Such as "task", which makes "task.num_cubes=0 ..." of "num_cubes=0 ...".
-    """
+    """Prefix errors about settings, such as "num_cubes=0 ..." with "task." if that is `where`."""
     try:
         yield
     except InputError as error:
@@ -136,12 +119,12 @@ def below(where: str) -> Iterator[None]:
 
 
 def snake_case(cls: type) -> str:
-    """The name of a class as a file would be called."""
+    """Return the name of a class in snake case."""
     return re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
 
 
 def plain(value: Any) -> Any:
-    """A setting's value as plain data."""
+    """Return a setting's value as plain data: settings as mappings, tuples as lists."""
     if isinstance(value, Settings):
         return value.values()
     if isinstance(value, Mapping):

@@ -13,39 +13,39 @@ ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "
 
 
 def bounds(interval: Mapping[str, Any], show: Callable[[float], str] = "{:.2f}".format) -> str:
-    """The 95% interval of a number."""
+    """Return a 95% interval in words."""
     return f"95%: {show(interval['lower95'])} to {show(interval['upper95'])}"
 
 
 def among(share: Mapping[str, Any]) -> str:
-    """A share as a count of so many."""
+    """Return a rate as a count of so many."""
     return f"{share['successes']} of {share['trials']}"
 
 
 def listed(parts: Sequence[str], last: str = "and") -> str:
-    """A list in a sentence."""
+    """Return a list in a sentence."""
     if len(parts) < 2:
         return "".join(parts)
     return f"{', '.join(parts[:-1])} {last} {parts[-1]}"
 
 
 def plural(count: int, noun: str) -> str:
-    """A count with its noun, whose plural is regular."""
+    """Return a count with its noun, whose plural is regular."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def ordinal(number: int) -> str:
-    """What people call the thing with this index."""
+    """Return the ordinal of an index from 0."""
     return ORDINALS[number] if number < len(ORDINALS) else f"{number + 1}th"
 
 
 def all_cubes(count: int) -> str:
-    """All cubes of a task that has so many."""
+    """Return all cubes of a task in words."""
     return "the cube" if count == 1 else f"all {count} cubes"
 
 
 def exact(share: float, is_all: bool = False) -> str:
-    """A share in nine digits; 1 only of what is all, not of what is only nearly all."""
+    """Return a rate with nine digits; 1 only if it is exactly 1."""
     text = f"{share:.9g}"
     return text if is_all or text != "1" else "more than 0.999999999"
 
@@ -69,17 +69,17 @@ class Sentence:
 
 
 def say(sentences: Iterable[Sentence], evidence: Evidence) -> str:
-    """All that may be said, in order, as one paragraph."""
+    """Return the permitted sentences as one paragraph."""
     return " ".join(s.text(evidence) for s in sentences if s.may(evidence))
 
 
 def said(sentences: Iterable[Sentence], evidence: Evidence) -> dict[str, str]:
-    """All that may be said, by the sentences' names."""
+    """Return the permitted sentences by name."""
     return {s.name: s.text(evidence) for s in sentences if s.may(evidence)}
 
 
 def percent(share: float) -> str:
-    """A share for people; never 0% or 100% of what is only nearly none or nearly all."""
+    """Return a rate in percent; 0% and 100% only if it is exactly 0 or 1."""
     text = f"{100 * share:.0f}%"
     if text == "100%" and share < 1:
         return "more than 99%"
@@ -91,35 +91,25 @@ SEED_KEYS = ("seed", "seed_is_fixed")
 
 
 def is_fixed(evidence: Evidence) -> bool:
-    """Whether the seed was known before the analysis; results that do not say so count as fixed."""
+    """Return whether the seed was known before the analysis; true if that is not recorded."""
     return bool(evidence.get("seed_is_fixed", True))
 
 
 def seed_of(evidence: Evidence) -> int | None:
-    """The seed, which older results have among their settings; None if it is not recorded."""
+    """Return the seed, which older results have in their settings; None if it is not recorded."""
     settings = evidence.get("settings")
     older = settings.get("seed") if isinstance(settings, Mapping) else None
     return evidence.get("seed", older)
 
 
 def seed_line(evidence: Evidence, what: str = "environments") -> str:
-    """The seed and where it comes from, for a terminal or a page.
-
-    Args:
-        evidence: A result.
-        what: The seed's streams were used for.
-    """
+    """Return the seed of a result and its origin; `what` is sampled from its streams."""
     seed, kind = seed_of(evidence), "fixed" if is_fixed(evidence) else "fresh"
     return f"{what}: seed {'not recorded' if seed is None else seed} ({kind})"
 
 
 def fixed_seed(name: str, what: str = "environments") -> Sentence:
-    """The warning that belongs to each claim from a seed that was known before.
-
-    Args:
-        name: Of the sentence.
-        what: The seed's streams were used for.
-    """
+    """Return the warning about a seed that was known before; `what` is sampled from its streams."""
 
     def text(evidence: Evidence) -> str:
         seed = seed_of(evidence)

@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import Callable
 
+from absl import logging as absl_logging
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
@@ -15,7 +16,6 @@ from omegaconf.errors import OmegaConfBaseException
 
 from drone_rl.cli.hydra.help import without_schemas
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.imports import ignore_noise
 
 MISTAKES = (InputError, HydraException, OmegaConfBaseException, OSError)
 """Errors of a user; any other is a bug and keeps its traceback."""
@@ -40,7 +40,7 @@ def guarded(command: Callable[[], int]) -> int:
     """Run a command; a user's error is one line with exit status 2, Ctrl-C is exit status 130."""
     os.environ["HYDRA_FULL_ERROR"] = "1"  # let Hydra's own errors through to be shortened here
     logging.raiseExceptions = False  # a log that can't be written is no reason for a traceback
-    ignore_noise()
+    absl_logging.set_verbosity(absl_logging.WARNING)  # dm_control logs the OpenGL that it found
     lost = _errors_in_threads()
     try:
         status = command()

@@ -6,6 +6,7 @@ import sys
 import threading
 
 import pytest
+from absl import logging as absl_logging
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException, MissingConfigException
 from omegaconf import OmegaConf
@@ -49,6 +50,12 @@ def test_hydras_where_and_omegaconfs_what():
 )
 def test_what_hydra_leaves_out(text, remedy):
     assert remedy in one_line(HydraException(text))
+
+
+def test_lines_of_other_libraries_are_hidden():
+    absl_logging.set_verbosity(absl_logging.INFO)
+    assert guarded(lambda: 0) == 0
+    assert absl_logging.get_verbosity() == absl_logging.WARNING
 
 
 def test_an_unknown_choice_is_no_file(capsys):
