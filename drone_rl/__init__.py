@@ -10,63 +10,77 @@ from drone_rl.utils.imports import import_quietly, register, when_imported
 from drone_rl.utils.memory import collecting_no_garbage
 
 if TYPE_CHECKING:
-    from drone_rl.config import (
-        ActionSettings,
-        CameraSettings,
-        DynamicsSettings,
-        PillarsSettings,
-        TaskSettings,
-    )
-    from drone_rl.config.commands import (
-        BodiesSettings,
-        EvaluateSettings,
-        JudgeSettings,
-        ShiftSettings,
-    )
-    from drone_rl.config.registry import (
-        register_collector,
-        register_learner,
-        register_network,
-        register_returns,
-        register_transform,
-    )
-    from drone_rl.config.sensors import SensorSettings
-    from drone_rl.config.training import TrainerSettings, TrainSettings
-    from drone_rl.config.verification import (
-        ChanceSettings,
-        CheckSettings,
-        PlacesSettings,
-        ProvableSettings,
-        ProveSettings,
-    )
-    from drone_rl.envs.gymnasium.environments import DroneWorld, DroneWorlds
-    from drone_rl.envs.sb3.worlds import Sb3Worlds
-    from drone_rl.evaluation.evaluate import Evaluation, evaluate
-    from drone_rl.explanations.explain import Explanations, explain
-    from drone_rl.explanations.settings import ExplainSettings
-    from drone_rl.flight.commands.command import FlightFuture, PilotError
-    from drone_rl.flight.commands.pilot import Pilot, Sticks
-    from drone_rl.flight.commands.state import PilotState, Sensors, Trajectory
-    from drone_rl.flight.commands.yaw import Drivetrain, YawMode
-    from drone_rl.policies.environment import make_env
-    from drone_rl.policies.external_policy import ForeignPolicy, policy_from
-    from drone_rl.policies.policy import Policy, load_policy
-    from drone_rl.policies.sb3 import Sb3Logits, Sb3Trunk
-    from drone_rl.robustness.shifts import Shifts, shifts
-    from drone_rl.sim.image_types import ImageRequest, ImageType
-    from drone_rl.sim.tasks import register_task
-    from drone_rl.training.run_folder import Training
-    from drone_rl.training.train import train
-    from drone_rl.utils.errors import InputError
-    from drone_rl.verdicts.coverage import Coverage
-    from drone_rl.verdicts.dynamics_sweep import Bodies, bodies
-    from drone_rl.verdicts.judge import Judgement, Judgements, judge
-    from drone_rl.verdicts.onnx_export import export_onnx
-    from drone_rl.verification.chances import Chances, chances
-    from drone_rl.verification.check import Check, check
-    from drone_rl.verification.places import Places, places
-    from drone_rl.verification.provable import train_until_proved
-    from drone_rl.verification.prove import Proof, load_proof, prove
+    from drone_rl.config import ActionSettings as ActionSettings
+    from drone_rl.config import CameraSettings as CameraSettings
+    from drone_rl.config import DynamicsSettings as DynamicsSettings
+    from drone_rl.config import PillarsSettings as PillarsSettings
+    from drone_rl.config import TaskSettings as TaskSettings
+    from drone_rl.config.commands import BodiesSettings as BodiesSettings
+    from drone_rl.config.commands import EvaluateSettings as EvaluateSettings
+    from drone_rl.config.commands import JudgeSettings as JudgeSettings
+    from drone_rl.config.commands import ShiftSettings as ShiftSettings
+    from drone_rl.config.registry import register_collector as register_collector
+    from drone_rl.config.registry import register_learner as register_learner
+    from drone_rl.config.registry import register_network as register_network
+    from drone_rl.config.registry import register_returns as register_returns
+    from drone_rl.config.registry import register_transform as register_transform
+    from drone_rl.config.sensors import SensorSettings as SensorSettings
+    from drone_rl.config.training import TrainerSettings as TrainerSettings
+    from drone_rl.config.training import TrainSettings as TrainSettings
+    from drone_rl.config.verification import ChanceSettings as ChanceSettings
+    from drone_rl.config.verification import CheckSettings as CheckSettings
+    from drone_rl.config.verification import PlacesSettings as PlacesSettings
+    from drone_rl.config.verification import ProvableSettings as ProvableSettings
+    from drone_rl.config.verification import ProveSettings as ProveSettings
+    from drone_rl.envs.gymnasium.environments import DroneWorld as DroneWorld
+    from drone_rl.envs.gymnasium.environments import DroneWorlds as DroneWorlds
+    from drone_rl.envs.sb3.worlds import Sb3Worlds as Sb3Worlds
+    from drone_rl.evaluation.evaluate import Evaluation as Evaluation
+    from drone_rl.evaluation.evaluate import evaluate as evaluate
+    from drone_rl.explanations.explain import Explanations as Explanations
+    from drone_rl.explanations.explain import explain as explain
+    from drone_rl.explanations.settings import ExplainSettings as ExplainSettings
+    from drone_rl.flight.commands.command import FlightFuture as FlightFuture
+    from drone_rl.flight.commands.command import PilotError as PilotError
+    from drone_rl.flight.commands.pilot import Pilot as Pilot
+    from drone_rl.flight.commands.pilot import Sticks as Sticks
+    from drone_rl.flight.commands.state import PilotState as PilotState
+    from drone_rl.flight.commands.state import Sensors as Sensors
+    from drone_rl.flight.commands.state import Trajectory as Trajectory
+    from drone_rl.flight.commands.yaw import Drivetrain as Drivetrain
+    from drone_rl.flight.commands.yaw import YawMode as YawMode
+    from drone_rl.policies.environment import make_env as make_env
+    from drone_rl.policies.external_policy import ForeignPolicy as ForeignPolicy
+    from drone_rl.policies.external_policy import policy_from as policy_from
+    from drone_rl.policies.policy import Policy as Policy
+    from drone_rl.policies.policy import load_policy as load_policy
+    from drone_rl.policies.sb3 import Sb3Logits as Sb3Logits
+    from drone_rl.policies.sb3 import Sb3Trunk as Sb3Trunk
+    from drone_rl.robustness.shifts import Shifts as Shifts
+    from drone_rl.robustness.shifts import shifts as shifts
+    from drone_rl.sim.image_types import ImageRequest as ImageRequest
+    from drone_rl.sim.image_types import ImageType as ImageType
+    from drone_rl.sim.tasks import register_task as register_task
+    from drone_rl.training.run_folder import Training as Training
+    from drone_rl.training.train import train as train
+    from drone_rl.utils.errors import InputError as InputError
+    from drone_rl.verdicts.coverage import Coverage as Coverage
+    from drone_rl.verdicts.dynamics_sweep import Bodies as Bodies
+    from drone_rl.verdicts.dynamics_sweep import bodies as bodies
+    from drone_rl.verdicts.judge import Judgement as Judgement
+    from drone_rl.verdicts.judge import Judgements as Judgements
+    from drone_rl.verdicts.judge import judge as judge
+    from drone_rl.verdicts.onnx_export import export_onnx as export_onnx
+    from drone_rl.verification.chances import Chances as Chances
+    from drone_rl.verification.chances import chances as chances
+    from drone_rl.verification.check import Check as Check
+    from drone_rl.verification.check import check as check
+    from drone_rl.verification.places import Places as Places
+    from drone_rl.verification.places import places as places
+    from drone_rl.verification.provable import train_until_proved as train_until_proved
+    from drone_rl.verification.prove import Proof as Proof
+    from drone_rl.verification.prove import load_proof as load_proof
+    from drone_rl.verification.prove import prove as prove
 
 __version__ = "0.1.0"
 
@@ -126,79 +140,7 @@ _PLACES = {
 }
 _HOMES = {name: f"drone_rl.{module}" for module, names in _PLACES.items() for name in names}
 
-__all__ = [
-    "ActionSettings",
-    "Bodies",
-    "BodiesSettings",
-    "CameraSettings",
-    "ChanceSettings",
-    "Chances",
-    "Check",
-    "CheckSettings",
-    "Coverage",
-    "Drivetrain",
-    "DroneWorld",
-    "DroneWorlds",
-    "DynamicsSettings",
-    "EvaluateSettings",
-    "Evaluation",
-    "ExplainSettings",
-    "Explanations",
-    "FlightFuture",
-    "ForeignPolicy",
-    "ImageRequest",
-    "ImageType",
-    "InputError",
-    "JudgeSettings",
-    "Judgement",
-    "Judgements",
-    "PillarsSettings",
-    "Pilot",
-    "PilotError",
-    "PilotState",
-    "Places",
-    "PlacesSettings",
-    "Policy",
-    "Proof",
-    "ProvableSettings",
-    "ProveSettings",
-    "Sb3Logits",
-    "Sb3Trunk",
-    "Sb3Worlds",
-    "SensorSettings",
-    "Sensors",
-    "ShiftSettings",
-    "Shifts",
-    "Sticks",
-    "TaskSettings",
-    "TrainSettings",
-    "TrainerSettings",
-    "Training",
-    "Trajectory",
-    "YawMode",
-    "bodies",
-    "chances",
-    "check",
-    "evaluate",
-    "explain",
-    "export_onnx",
-    "judge",
-    "load_policy",
-    "load_proof",
-    "make_env",
-    "places",
-    "policy_from",
-    "prove",
-    "register_collector",
-    "register_learner",
-    "register_network",
-    "register_returns",
-    "register_task",
-    "register_transform",
-    "shifts",
-    "train",
-    "train_until_proved",
-]
+__all__ = [*_HOMES]  # pyright: ignore[reportUnsupportedDunderAll] (aliases above are public)
 
 when_imported("gymnasium", register)
 # dm_control searches for a display; TorchRL derives classes from one that it deprecates

@@ -39,7 +39,6 @@ class JudgeSettings(FlightSettings):
     episodes: Annotated[int, Whole(1, unit="episodes")] = 400
     """Held-out episodes of the greedy and the sampled policy, the baselines and the oracle."""
     num_envs: Annotated[int, Whole(1, unit="worlds")] = 400
-    """Environments in a batch; bounds memory."""
     sampled: bool = True
     """Evaluate the policy with sampled actions, too; reported next to the verdict."""
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
@@ -73,7 +72,6 @@ class BodiesSettings(JudgeSettings):
     episodes: Annotated[int, Whole(1, unit="episodes")] = 400
     """Held-out greedy episodes of each policy under each dynamics; all get the same scenes."""
     num_envs: Annotated[int, Whole(1, unit="worlds")] = 400
-    """Environments in a batch; bounds memory."""
     sampled: bool = False
     """Evaluate with sampled actions, too."""
     certificate_flights: Annotated[int, Whole(0, 10_000_000, "flights")] = 0

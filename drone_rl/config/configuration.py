@@ -1,4 +1,4 @@
-"""Settings as nested plain data and back, as in checkpoints and in what Hydra composes."""
+"""Conversion of settings to and from nested plain data, as in checkpoints and Hydra's configs."""
 
 import dataclasses
 import functools
@@ -49,11 +49,7 @@ class Variant(Settings):
     """Whether the class declares all settings, so that files may contain them."""
 
     def make(self, *args: Any, **kwargs: Any) -> Any:
-        """Build the part.
-
-        Args:
-            args: Objects that the part is built from, such as parameters.
-            kwargs: The same by name.
+        """Build the part from objects, such as parameters, and the settings.
 
         Raises:
             InputError: The class can't be imported, or does not accept these settings.
@@ -89,12 +85,8 @@ class Variant(Settings):
     def named(cls, name: object, where: str) -> type[Self]:
         """Return the variant with a registered name.
 
-        Args:
-            name: The name.
-            where: Name of the setting, for messages.
-
         Raises:
-            InputError: No part of that name is registered.
+            InputError: No part of that name is registered; `where` is the setting's name.
         """
         for load in (lambda: None, load_entry_points):
             load()
@@ -120,11 +112,7 @@ def load_entry_points() -> None:
 
 
 def locate(target: str) -> Any:
-    """Import an object by its dotted name.
-
-    Raises:
-        InputError: There is no such object.
-    """
+    """Import an object by its dotted name; raise an `InputError` if there is none."""
     module, _, name = target.rpartition(".")
     try:
         return getattr(importlib.import_module(module), name)
@@ -148,7 +136,7 @@ def as_config(settings: Settings) -> dict[str, Any]:
 
 
 def from_config(cls: type[S], config: Any, where: str = "") -> S:
-    """Read settings from plain data; fields that are left out keep their defaults.
+    """Read settings from plain data; missing fields have their defaults.
 
     Args:
         cls: Class of the settings.
@@ -169,7 +157,7 @@ def from_config(cls: type[S], config: Any, where: str = "") -> S:
 
 
 def variant_of(part: type[Variant], config: Any, where: str) -> Variant:
-    """Read a variant from plain data; nothing is imported before it is built.
+    """Read a variant of a part from plain data; nothing is imported before it is built.
 
     Args:
         part: Class of the part.
@@ -231,15 +219,17 @@ def _read(hint: Any, value: Any, where: str) -> Any:
             for k, v in items
             if v is not None
         )
-    hint = _without_none(hint) if value is not None else hint
-    is_read = isinstance(value, Settings | str)
-    if not isinstance(hint, type) or not issubclass(hint, Settings) or is_read:
+    if value is None or isinstance(value, Settings | str):
         return value
-    if issubclass(hint, Variant):
-        return variant_of(hint, value, where)
-    if issubclass(hint, BaseTaskSettings) and hint is not TaskSettings:
-        hint, value = named_settings(value, where)
-    return from_config(hint, value, where)
+    classes = [of for of in (typing.get_args(hint) or (hint,)) if of is not types.NoneType]
+    cls = classes[0]
+    if len(classes) > 1 or not isinstance(cls, type) or not issubclass(cls, Settings):
+        return value
+    if issubclass(cls, Variant):
+        return variant_of(cls, value, where)
+    if issubclass(cls, BaseTaskSettings) and cls is not TaskSettings:
+        cls, value = named_settings(value, where)
+    return from_config(cls, value, where)
 
 
 def _with_target(part: type[Variant], name: str, value: Any) -> Any:
@@ -248,13 +238,6 @@ def _with_target(part: type[Variant], name: str, value: Any) -> Any:
         return value
     known = next((v for v in part.variants() if v.registered_name() == name), None)
     return value if known is None else {"_target_": known.target, **value}
-
-
-def _without_none(hint: Any) -> Any:
-    """The class of the settings in an optional field."""
-    inner = [of for of in typing.get_args(hint) if of is not types.NoneType]
-    is_settings = len(inner) == 1 and isinstance(inner[0], type) and issubclass(inner[0], Settings)
-    return inner[0] if is_settings else hint
 
 
 def _unregistered(part: type[Variant], target: str, given: Mapping[str, Any]) -> Variant:
@@ -310,15 +293,12 @@ def no_changes() -> Any:
 def check_same_config(
     saved: Mapping[str, Any], now: Mapping[str, Any], may_change: Iterable[str]
 ) -> None:
-    """Refuse to resume with other settings.
+    """Raise an `InputError` if a resumed run or sweep has other settings than at its start.
 
     Args:
-        saved: Configuration that the run or sweep began with.
+        saved: Configuration at the start.
         now: Configuration of this command.
         may_change: Dotted keys, and groups of them, that don't change what is learned.
-
-    Raises:
-        InputError: A setting differs; the message has both values.
     """
     allowed = tuple(may_change)
     before, after = _flatten(saved), _flatten(now)

@@ -162,11 +162,6 @@ class ActionSettings(Settings):
     yaw_rate: Annotated[float, Real(0.0, 720.0, unit="degrees/s")] = 45.0
     """Largest yaw rate command, in degrees/s; 0 for none."""
 
-    @property
-    def is_first(self) -> bool:
-        """Whether these are the default actions."""
-        return self == MOVES_SETTINGS
-
 
 MOVES_SETTINGS = ActionSettings()
 """The default actions: three moves."""

@@ -58,7 +58,6 @@ class TimeBaseline(_Discounted):
 
     target: ClassVar[str] = "time_baseline"
     scale: bool = True
-    """Whether to divide a batch's returns by their root mean square."""
     decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.9
     """Weight of the old mean at each batch, 0 to below 1."""
     max_steps: Annotated[int, Whole(1, 100_000, "steps")] = 300
@@ -70,9 +69,7 @@ class LeaveOneOut(_Discounted):
 
     target: ClassVar[str] = "leave_one_out"
     scale: bool = True
-    """Whether to divide a batch's returns by their root mean square."""
     gamma: Rate = 0.95
-    """Discount rate, 0 to 1."""
 
 
 class BatchNormalised(_Discounted):
@@ -88,7 +85,6 @@ class Gae(_Discounted):
     scale: bool = True
     """Whether to standardise a batch's advantages."""
     gamma: Rate = 0.95
-    """Discount rate, 0 to 1."""
     lmbda: Rate = 0.95
     """GAE's lambda, 0 to 1; 0 looks one step ahead."""
 
@@ -248,7 +244,6 @@ class A2c(WithCritic):
 
     target: ClassVar[str] = "torchrl.objectives.A2CLoss"
     num_steps: Annotated[int, Whole(2, 4096)] = 16
-    """Steps of each environment in a batch."""
 
 
 class Ppo(WithCritic):

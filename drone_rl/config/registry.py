@@ -65,13 +65,10 @@ def learns(*objectives: type[Objective]) -> Callable[[F], F]:
 
 
 def register_network(name: str) -> Callable[[F], F]:
-    """Register a network; a decorator of its class.
+    """Register a network under a name in settings and policy files; a decorator of its class.
 
     The class is called as `cls(in_shape, num_actions, *, generator, **settings)` and derives from
     `drone_rl.policies.PolicyNetwork`. Its settings class is `cls.Settings`.
-
-    Args:
-        name: Name in settings and policy files.
 
     Raises:
         InputError: The name is invalid or taken, or a parameter has no default or no plain type.
@@ -99,13 +96,8 @@ def register_transform(
 def register_returns(name: str) -> Callable[[F], F]:
     """Register a return estimator; a decorator of a class derived from `ReturnEstimator`.
 
-    The class accepts `scale`, for example by passing keyword arguments on to `ReturnEstimator`.
-
-    Args:
-        name: Name in settings.
-
-    Raises:
-        InputError: See `register_network`.
+    The class accepts `scale`, for example by passing keyword arguments on to `ReturnEstimator`. See
+    `register_network` for errors.
     """
     return lambda factory: _register(Returns, name, factory, 0)
 
@@ -115,13 +107,7 @@ def register_learner(name: str) -> Callable[[F], F]:
 
     It is called as `factory(settings, collecting, **own)`, with the training's settings and what
     `make_collector` of `drone_rl.training.components` returned, and returns a
-    `drone_rl.training.learners.Learner`.
-
-    Args:
-        name: Name in settings.
-
-    Raises:
-        InputError: See `register_network`.
+    `drone_rl.training.learners.Learner`. See `register_network` for errors.
     """
 
     def register(factory: F) -> F:
@@ -142,13 +128,7 @@ def register_collector(name: str) -> Callable[[F], F]:
 
     It is called as `factory(settings, task, **own)`, with the training's settings and the task to
     collect from (None for the task of the settings), and returns a
-    `drone_rl.training.components.Components`.
-
-    Args:
-        name: Name in settings.
-
-    Raises:
-        InputError: See `register_network`.
+    `drone_rl.training.components.Components`. See `register_network` for errors.
     """
     return lambda factory: _register(Collector, name, factory, 2)
 

@@ -20,6 +20,9 @@ class Frame(NamedTuple):
 class Transform(Variant):
     """Settings of a transform."""
 
+    needs: ClassVar[str] = ""
+    """Required input: "bytes" for RGB bytes of the camera, "floats", or any."""
+
     def output(self, frame: Frame) -> Frame | None:
         """Return shape and type of the transformed image; None if only a call can tell.
 
@@ -29,18 +32,15 @@ class Transform(Variant):
         Raises:
             InputError: The transform can't process such images.
         """
-        return frame
-
-    def _of_bytes(self, frame: Frame, channels: int) -> Frame:
-        if frame.is_float or frame.shape[-1] != 3:
+        if self.needs == "bytes" and (frame.is_float or frame.shape[-1] != 3):
             raise InputError(
                 f"the transform {self.name} needs the camera's own RGB; let it come first"
             )
-        return Frame((channels, *frame.shape[:2]), True)
-
-    def _of_floats(self, frame: Frame) -> Frame:
-        if not frame.is_float:
+        if self.needs == "floats" and not frame.is_float:
             raise InputError(f"the transform {self.name} needs floats; let gray come first")
+        return self._transformed(frame)
+
+    def _transformed(self, frame: Frame) -> Frame:
         return frame
 
 
@@ -48,20 +48,20 @@ class Gray(Transform):
     """RGB bytes to gray from 0 to 1."""
 
     target: ClassVar[str] = "gray"
+    needs: ClassVar[str] = "bytes"
 
-    def output(self, frame: Frame) -> Frame:
-        """See `Transform`."""
-        return self._of_bytes(frame, 1)
+    def _transformed(self, frame: Frame) -> Frame:
+        return Frame((1, *frame.shape[:2]), True)
 
 
 class Rgb(Transform):
     """RGB bytes to colours from 0 to 1."""
 
     target: ClassVar[str] = "rgb"
+    needs: ClassVar[str] = "bytes"
 
-    def output(self, frame: Frame) -> Frame:
-        """See `Transform`."""
-        return self._of_bytes(frame, 3)
+    def _transformed(self, frame: Frame) -> Frame:
+        return Frame((3, *frame.shape[:2]), True)
 
 
 class Chromaticity(Transform):
@@ -71,8 +71,7 @@ class Chromaticity(Transform):
     floor: Annotated[float, Real(0.0, 3.0, is_above=True)] = 0.15
     """Added to the sum of red, green and blue, so that the dark is gray."""
 
-    def output(self, frame: Frame) -> Frame:
-        """See `Transform`."""
+    def _transformed(self, frame: Frame) -> Frame:
         if not frame.is_float or frame.shape[0] != 3:
             raise InputError("the transform chromaticity needs three colors; let rgb come before")
         return Frame((2, *frame.shape[1:]), True)
@@ -87,8 +86,7 @@ class Standardize(Transform):
     std: Annotated[float, Real(1e-6, 1000.0)] = 0.21
     """Deviation that becomes 1."""
 
-    def output(self, frame: Frame) -> Frame:
-        """See `Transform`."""
+    def _transformed(self, frame: Frame) -> Frame:
         return Frame(frame.shape, True)
 
 
@@ -101,8 +99,7 @@ class Crop(Transform):
     bottom: Annotated[int, Whole(1, 1024, "pixels")] = 30
     """First row that is not kept."""
 
-    def output(self, frame: Frame) -> Frame:
-        """See `Transform`."""
+    def _transformed(self, frame: Frame) -> Frame:
         rows = frame.shape[-2]
         if not self.top < self.bottom <= rows:
             raise InputError(
@@ -116,14 +113,14 @@ class Resize(Transform):
     """Averaging over areas; nothing where images already have the size."""
 
     target: ClassVar[str] = "resize"
+    needs: ClassVar[str] = "floats"
     height: Annotated[int, Whole(1, 1024, "pixels")] = 25
     """Pixels down."""
     width: Annotated[int, Whole(1, 1024, "pixels")] = 64
     """Pixels across."""
 
-    def output(self, frame: Frame) -> Frame:
-        """See `Transform`."""
-        return Frame((self._of_floats(frame).shape[0], self.height, self.width), True)
+    def _transformed(self, frame: Frame) -> Frame:
+        return Frame((frame.shape[0], self.height, self.width), True)
 
 
 DEFAULT_TRANSFORMS = (Gray(), Resize(), Standardize())
@@ -141,8 +138,7 @@ class Stack(Transform):
         """Return the arguments of TorchRL's transform; the dimension is that of channels."""
         return {**self.values(), "dim": -3, "in_keys": ["pixels"]}
 
-    def output(self, frame: Frame) -> Frame:
-        """See `Transform`."""
+    def _transformed(self, frame: Frame) -> Frame:
         return Frame((frame.shape[0] * self.N, *frame.shape[1:]), frame.is_float)
 
 
@@ -162,20 +158,15 @@ class Blur(Transform):
     """Gaussian blur."""
 
     target: ClassVar[str] = "blur"
+    needs: ClassVar[str] = "floats"
     width: Annotated[float, Real(0.0, 16.0, unit="pixels")] = 0.5
     """Standard deviation of the Gaussian."""
-
-    def output(self, frame: Frame) -> Frame:
-        """See `Transform`."""
-        return self._of_floats(frame)
 
 
 class Fault(Transform):
     """Camera fault that is random or has memory."""
 
-    def output(self, frame: Frame) -> Frame:
-        """See `Transform`."""
-        return self._of_floats(frame)
+    needs: ClassVar[str] = "floats"
 
 
 class Noise(Fault):
@@ -204,10 +195,9 @@ class DeadRows(Fault):
         if len(set(self.rows)) < len(self.rows):
             raise InputError(f"rows={list(self.rows)} names a row twice; name each once")
 
-    def output(self, frame: Frame) -> Frame:
-        """See `Transform`."""
+    def _transformed(self, frame: Frame) -> Frame:
         with below(f"transforms.{self.name}"):
-            self.check_height(self._of_floats(frame).shape[-2])
+            self.check_height(frame.shape[-2])
         return frame
 
     def check_height(self, height: int) -> None:
@@ -218,11 +208,11 @@ class DeadRows(Fault):
         """
         if max(self.rows, default=0) >= height:
             raise InputError(
-                f"rows={list(self.rows)} of a picture of {height} rows; give at most {height - 1}"
+                f"rows={list(self.rows)} of an image of {height} rows; give at most {height - 1}"
             )
         if self.count + len(self.rows) > height:
             raise InputError(
-                f"count={self.count} of a picture of {height} rows, of which {len(self.rows)} are "
+                f"count={self.count} of an image of {height} rows, of which {len(self.rows)} are "
                 f"always dead; give at most {height - len(self.rows)}"
             )
 

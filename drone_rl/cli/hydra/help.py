@@ -34,10 +34,11 @@ def show_help(command: str, conf: Path, overrides: Sequence[str]) -> None:
     typed = [o for o in overrides if not o.startswith("-")]
     GlobalHydra.instance().clear()
     with initialize_config_dir(str(conf), version_base="1.3"):
-        full = compose(command, typed, return_hydra_config=True)
-        config = compose(command, typed)
-    chosen = {k: v for k, v in full.hydra.runtime.choices.items() if "/" not in k and "@" not in k}
-    values = OmegaConf.to_container(config, resolve=False)
+        config = compose(command, typed, return_hydra_config=True)
+    choices = config.hydra.runtime.choices
+    chosen = {k: v for k, v in choices.items() if "/" not in k and "@" not in k}
+    values: Any = OmegaConf.to_container(config, resolve=False)
+    del values["hydra"]
     print(f"drone-rl {command.replace('_', '-')} [setting=value ...]\n")
     print((conf / f"{command}.yaml").read_text().split("\ndefaults:")[0], end="\n\n")
     groups = {g: sorted(p.stem for p in (conf / g).glob("*.yaml")) for g in chosen}

@@ -16,10 +16,15 @@ def commands():
     return {name: importlib.import_module(f"drone_rl.cli.{name}").Command for name in MODULES}
 
 
-@pytest.fixture
-def config():
-    """What Hydra makes of a command and overrides."""
+@pytest.fixture(scope="session")
+def registered():
+    """Schemas of all commands."""
     register_schemas(**commands())
+
+
+@pytest.fixture
+def config(registered):
+    """What Hydra makes of a command and overrides."""
     with initialize_config_dir(str(conf_dir()), version_base="1.3"):
         yield compose
 

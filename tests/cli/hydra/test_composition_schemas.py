@@ -1,6 +1,7 @@
 """Every file of conf/ is typed, composes, builds what it names, and says what the code says."""
 
 import dataclasses
+import itertools
 import re
 import typing
 from pathlib import Path
@@ -67,12 +68,20 @@ def test_every_variant_has_a_file(part):
         assert re.search(rf"\bbase_{name}\b", text) or f": {name}" in text, name
 
 
-@pytest.mark.parametrize(("group", "name"), files(*composition.PARTS, *composition.SEVERAL))
-def test_every_setting_of_every_choice_is_typed(group, name, config):
-    chosen = config("train", [f"{group}={name}"])[group]
-    steps = chosen.values() if group in composition.SEVERAL else [chosen]
-    for step in steps:
-        assert dataclasses.is_dataclass(typing.cast(typing.Any, step)._metadata.object_type)
+def together(*groups):
+    """The files of groups, one of each group at a time: every file once."""
+    names = [[path.stem for path in sorted((CONF / g).glob("*.yaml"))] for g in groups]
+    return [dict(zip(groups, row, strict=True)) for row in itertools.zip_longest(*names)]
+
+
+@pytest.mark.parametrize("chosen", together(*PARTS))
+def test_every_setting_of_every_choice_is_typed(chosen, config):
+    names = {group: name for group, name in chosen.items() if name is not None}
+    composed = config("train", [f"{group}={name}" for group, name in names.items()])
+    for group in names:
+        part = composed[group]
+        for step in part.values() if group in composition.SEVERAL else [part]:
+            assert dataclasses.is_dataclass(typing.cast(typing.Any, step)._metadata.object_type)
 
 
 @pytest.mark.parametrize(
@@ -120,10 +129,11 @@ def test_every_experiment_and_sweep_composes_and_describes_a_policy(group, name,
 @pytest.mark.parametrize("name", [name for _, name in files("sweep")])
 def test_every_value_of_every_sweep_is_understood(name, settings):
     sweep = yaml.safe_load((CONF / "sweep" / f"{name}.yaml").read_text())
-    for setting, values in sweep["hydra"]["sweeper"]["params"].items():
-        if "(" not in str(values):
-            for value in str(values).split(","):
-                settings("train", f"sweep={name}", f"{setting}={value}")
+    params = sweep["hydra"]["sweeper"]["params"]
+    listed = {k: str(v).split(",") for k, v in params.items() if "(" not in str(v)}
+    for row in itertools.zip_longest(*listed.values()):
+        told = [f"{k}={v}" for k, v in zip(listed, row, strict=True) if v is not None]
+        settings("train", f"sweep={name}", *told)
 
 
 @pytest.mark.parametrize(
