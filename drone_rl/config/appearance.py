@@ -104,19 +104,19 @@ _NARROWEST, _WIDEST = 1.0, 170.0
 def check_appearance(
     settings: AppearanceSettings, camera: CameraSettings, things: Things | None, task: str
 ) -> None:
-    """Refuses what can't stand where it would.
-
-    Args:
-        settings: How worlds look.
-        camera: The policy's.
-        things: Where targets and obstacles stand; none where nothing is known of that.
-        task: Its name.
+    """Check appearance, camera and positions of a task's things (None if unknown) together.
 
     Raises:
-        InputError: Distractors have no place, the camera is in something when an episode begins, or
-            it sees too much or too little.
+        InputError: Distractors have no place, the camera starts inside an object, or its field of
+            view is too wide or narrow.
     """
-    _check_view(settings, camera)
+    own = camera.horizontal_fov
+    for widening in _ends(settings.camera_widening):
+        if not _NARROWEST <= own + widening <= _WIDEST:
+            raise InputError(
+                f"appearance.camera_widening={widening:g} makes a field of view of "
+                f"{own + widening:g} degrees; give {_NARROWEST - own:g} to {_WIDEST - own:g}"
+            )
     if things is None:
         if _ends(settings.distractors)[1]:
             raise InputError(
@@ -125,7 +125,11 @@ def check_appearance(
             )
         return
     (_, forward), (most_right, most_left), (lowest, _) = _sides(settings.camera_offset)
-    _check_height(lowest, things)
+    if things.altitude + lowest < _LEAST_HEIGHT:
+        raise InputError(
+            f"appearance.camera_offset={lowest:g} up puts the camera into the ground; give "
+            f"{_LEAST_HEIGHT - things.altitude:g} or more"
+        )
     aside = max(most_left, -most_right)
     reach = things.first - things.size / 2 - FRONT[0]
     if forward >= reach:
@@ -133,38 +137,20 @@ def check_appearance(
             f"appearance.camera_offset={forward:g} forward puts the camera into the first thing "
             f"that stands there; give less than {reach:g}"
         )
-    room = things.bound + _ends(settings.distractor_distance)[0]
-    if _ends(settings.distractors)[1] and aside >= room:
+    limit = things.bound + _ends(settings.distractor_distance)[0]
+    if _ends(settings.distractors)[1] and aside >= limit:
         raise InputError(
             f"appearance.camera_offset={aside:g} aside puts the camera into a distractor; give "
-            f"less than {room:g}, or a greater distractor_distance"
-        )
-
-
-def _check_view(settings: AppearanceSettings, camera: CameraSettings) -> None:
-    own = camera.horizontal_fov
-    for widening in _ends(settings.camera_widening):
-        if not _NARROWEST <= own + widening <= _WIDEST:
-            raise InputError(
-                f"appearance.camera_widening={widening:g} makes a field of view of "
-                f"{own + widening:g} degrees; give {_NARROWEST - own:g} to {_WIDEST - own:g}"
-            )
-
-
-def _check_height(lowest: float, things: Things) -> None:
-    if things.altitude + lowest < _LEAST_HEIGHT:
-        raise InputError(
-            f"appearance.camera_offset={lowest:g} up puts the camera into the ground; give "
-            f"{_LEAST_HEIGHT - things.altitude:g} or more"
+            f"less than {limit:g}, or a greater distractor_distance"
         )
 
 
 def _ends(value: Any) -> tuple[float, float]:
-    """The lowest and the highest that a value can be."""
+    """Lowest and highest value."""
     return value if isinstance(value, tuple) else (value, value)
 
 
 def _sides(value: Any) -> list[tuple[float, float]]:
-    """The same of each of three."""
+    """Lowest and highest value of each of three."""
     low, high = value if isinstance(value[0], tuple) else (value, value)
     return [*zip(low, high, strict=True)]

@@ -48,6 +48,12 @@ class Variant(Settings):
     is_known: ClassVar[bool] = True
     """Whether the class declares all settings, so that files may contain them."""
 
+    def __init_subclass__(cls, *, target: str = "", **kwargs: Any) -> None:
+        """Set the registered name of a variant, as in `class Adam(Optimiser, target=...)`."""
+        if target:
+            cls.target = target
+        super().__init_subclass__(**kwargs)
+
     def make(self, *args: Any, **kwargs: Any) -> Any:
         """Build the part from objects, such as parameters, and the settings.
 
@@ -131,8 +137,8 @@ def as_config(settings: Settings) -> dict[str, Any]:
     target = {"_target_": settings.target} if isinstance(settings, Variant) else {}
     if isinstance(settings, Variant) and not settings.is_known:
         return {**target, **settings.values()}
-    hints = types_of(type(settings))
-    return {**target, **{n: _as_config(hint, getattr(settings, n)) for n, hint in hints.items()}}
+    hints = types_of(type(settings)).items()
+    return {**target, **{n: _plain(getattr(settings, n), bool(_several(h))) for n, h in hints}}
 
 
 def from_config(cls: type[S], config: Any, where: str = "") -> S:
@@ -184,18 +190,14 @@ def variant_of(part: type[Variant], config: Any, where: str) -> Variant:
         return _unregistered(known, target, values)
 
 
-def _as_config(hint: Any, value: Any) -> Any:
+def _plain(value: Any, is_several: bool) -> Any:
+    """A value as plain data; several variants in order, each under a unique name."""
     if isinstance(value, Settings):
         return as_config(value)
-    if _several(hint):
-        return _named(value)
-    return plain(value)
-
-
-def _named(variants: tuple[Variant, ...]) -> dict[str, Any]:
-    """Several variants in order, each under a unique name."""
+    if not is_several:
+        return plain(value)
     named: dict[str, Any] = {}
-    for variant in variants:
+    for variant in value:
         name = variant.name if variant.name not in named else f"{variant.name}_{len(named)}"
         named[name] = as_config(variant)
     return named

@@ -123,11 +123,7 @@ class DynamicsSettings(Settings):
             )
 
     def check_air(self) -> None:
-        """Refuses moving air where nothing feels it: whoever asks for both has forgotten the mode.
-
-        Raises:
-            InputError: There is wind, or there are gusts, in computer-vision mode.
-        """
+        """Raise an `InputError` for wind or gusts without effect, in computer-vision mode."""
         if self.is_computer_vision and (any(self.wind) or self.gusts):
             name, value = ("wind", list(self.wind)) if any(self.wind) else ("gusts", self.gusts)
             raise InputError(

@@ -21,42 +21,32 @@ class _Discounted(Returns):
     """Discount rate, 0 to 1."""
 
 
-class TotalReward(Returns):
+class TotalReward(Returns, target="total_reward"):
     """The whole episode's reward at every step (Eq. 12)."""
 
-    target: ClassVar[str] = "total_reward"
 
-
-class LinearRamp(Returns):
+class LinearRamp(Returns, target="linear_ramp"):
     """The episode's reward times a ramp over the episode (variant 1)."""
 
-    target: ClassVar[str] = "linear_ramp"
 
-
-class RewardToGo(_Discounted):
+class RewardToGo(_Discounted, target="reward_to_go"):
     """Discounted return (Eq. 14; the original's variant 2)."""
 
-    target: ClassVar[str] = "reward_to_go"
 
-
-class Standardised(_Discounted):
+class Standardised(_Discounted, target="standardised"):
     """Discounted return, standardised over each episode (Algorithm 4; variant 0)."""
 
-    target: ClassVar[str] = "standardised"
 
-
-class SuccessScaled(_Discounted):
+class SuccessScaled(_Discounted, target="success_scaled"):
     """Discounted return scaled by exp(reward - max_reward) (variant 3)."""
 
-    target: ClassVar[str] = "success_scaled"
     max_reward: Annotated[float, Real(0.0, 1e6)] = 3.0
     """Reward of a perfect episode: the task's cubes."""
 
 
-class TimeBaseline(_Discounted):
+class TimeBaseline(_Discounted, target="time_baseline"):
     """Discounted return minus a running mean for each time step (variant 4)."""
 
-    target: ClassVar[str] = "time_baseline"
     scale: bool = True
     decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.9
     """Weight of the old mean at each batch, 0 to below 1."""
@@ -64,24 +54,20 @@ class TimeBaseline(_Discounted):
     """Time steps that have a mean of their own: the task's limit."""
 
 
-class LeaveOneOut(_Discounted):
+class LeaveOneOut(_Discounted, target="leave_one_out"):
     """Discounted return minus the other episodes' mean at the same time step."""
 
-    target: ClassVar[str] = "leave_one_out"
     scale: bool = True
     gamma: Rate = 0.95
 
 
-class BatchNormalised(_Discounted):
+class BatchNormalised(_Discounted, target="batch_normalised"):
     """Discounted return, normalised over the batch."""
 
-    target: ClassVar[str] = "batch_normalised"
 
-
-class Gae(_Discounted):
+class Gae(_Discounted, target="gae"):
     """Generalised advantage estimates, for objectives with a critic."""
 
-    target: ClassVar[str] = "gae"
     scale: bool = True
     """Whether to standardise a batch's advantages."""
     gamma: Rate = 0.95
@@ -111,16 +97,13 @@ class Episodes(Collector):
     faster on a CPU. It samples actions in another order: results for a seed depend on it."""
 
 
-class Threads(Episodes):
+class Threads(Episodes, target="threads"):
     """Batches of complete episodes from threads of this process."""
 
-    target: ClassVar[str] = "threads"
 
-
-class Ray(Episodes):
+class Ray(Episodes, target="ray"):
     """Batches of complete episodes from workers on a Ray cluster."""
 
-    target: ClassVar[str] = "ray"
     num_threads: Annotated[int, Whole(1, unit="workers")] = 2
     """Workers, each with its part of the environments and its own stream of actions: results for a
     seed depend on it."""
@@ -132,13 +115,12 @@ class Ray(Episodes):
     """Workers that may be lost, and replaced, before training stops."""
 
 
-class Rollouts(Collector):
+class Rollouts(Collector, target="rollouts"):
     """Batches of a fixed number of steps of each environment, from threads.
 
     The objective sets the number of steps. Episodes continue in the next batch.
     """
 
-    target: ClassVar[str] = "rollouts"
     num_envs: Annotated[int, Whole(1, unit="worlds")] = 64
     """Environments."""
 
@@ -152,18 +134,16 @@ class Optimiser(Variant):
     """Settings of an optimizer."""
 
 
-class Adam(Optimiser):
+class Adam(Optimiser, target="torch.optim.Adam"):
     """Adam."""
 
-    target: ClassVar[str] = "torch.optim.Adam"
     lr: LearningRate = 1e-3
     """Learning rate."""
 
 
-class Sgd(Optimiser):
+class Sgd(Optimiser, target="torch.optim.SGD"):
     """Plain stochastic gradient ascent (Eq. 13)."""
 
-    target: ClassVar[str] = "torch.optim.SGD"
     lr: LearningRate = 1e-4
     """Learning rate; the original study's."""
 
@@ -172,20 +152,18 @@ class Scheduler(Variant):
     """Settings of a learning-rate schedule."""
 
 
-class Constant(Scheduler):
+class Constant(Scheduler, target="torch.optim.lr_scheduler.ConstantLR"):
     """Constant learning rate."""
 
-    target: ClassVar[str] = "torch.optim.lr_scheduler.ConstantLR"
     factor: Annotated[float, Real(0.0, 1.0)] = 1.0
     """Factor on the learning rate."""
     total_iters: Annotated[int, Whole(0, unit="updates")] = 0
     """Updates for which the factor holds."""
 
 
-class StepDecay(Scheduler):
+class StepDecay(Scheduler, target="torch.optim.lr_scheduler.StepLR"):
     """The original study's schedule: 0.99 times the rate every 5 updates."""
 
-    target: ClassVar[str] = "torch.optim.lr_scheduler.StepLR"
     step_size: Annotated[int, Whole(1, unit="updates")] = 5
     """Updates from one decay to the next."""
     gamma: Annotated[float, Real(0.0, 1.0)] = 0.99
@@ -204,10 +182,9 @@ class Objective(Variant):
     """Other parts that the objective requires, and selects unless they are given."""
 
 
-class Reinforce(Objective):
+class Reinforce(Objective, target="reinforce"):
     """REINFORCE without a critic."""
 
-    target: ClassVar[str] = "reinforce"
     entropy_coeff: Weight = 0.01
     """Weight of the entropy bonus, which keeps a policy exploring; 0 for none."""
     reduction: Annotated[str, OneOf(("mean", "sum"))] = "mean"
@@ -239,17 +216,15 @@ class WithCritic(Objective):
         return {"functional": False, **values}
 
 
-class A2c(WithCritic):
+class A2c(WithCritic, target="torchrl.objectives.A2CLoss"):
     """Advantage actor-critic: one step of the optimiser from each batch."""
 
-    target: ClassVar[str] = "torchrl.objectives.A2CLoss"
     num_steps: Annotated[int, Whole(2, 4096)] = 16
 
 
-class Ppo(WithCritic):
+class Ppo(WithCritic, target="torchrl.objectives.ClipPPOLoss"):
     """Proximal policy optimisation with clipped ratios: several passes over each batch."""
 
-    target: ClassVar[str] = "torchrl.objectives.ClipPPOLoss"
     clip_epsilon: Annotated[float, Real(0.0, 1.0, is_above=True)] = 0.2
     """Clipping range of the probability ratio."""
     epochs: Annotated[int, Whole(1)] = 2

@@ -1,6 +1,6 @@
 """Settings of a policy's network."""
 
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from drone_rl.config.configuration import Variant
 from drone_rl.utils.schema import Several, Whole
@@ -13,10 +13,9 @@ class Network(Variant):
     """Settings of a network."""
 
 
-class SmallCnn(Network):
+class SmallCnn(Network, target="small_cnn"):
     """Network for small images: a tenth of the original's cost."""
 
-    target: ClassVar[str] = "small_cnn"
     patch: Annotated[int, Whole(1, 64, "pixels")] = 4
     """Size and stride of the first convolution, pixels."""
     channels: Channels = (16, 32)
@@ -25,19 +24,17 @@ class SmallCnn(Network):
     """Widths of the linear layers before the logits."""
 
 
-class OriginalCnn(Network):
+class OriginalCnn(Network, target="original_cnn"):
     """The original study's network."""
 
-    target: ClassVar[str] = "original_cnn"
     channels: Channels = (6, 16)
     """Output channels of the 5x5 convolutions, each followed by pooling."""
     hidden: Widths = (120, 84)
     """Widths of the linear layers before the logits."""
 
 
-class Mlp(Network):
+class Mlp(Network, target="mlp"):
     """Linear layers on the flattened image."""
 
-    target: ClassVar[str] = "mlp"
     hidden: Widths = (128, 64)
     """Widths of the linear layers before the logits."""

@@ -10,7 +10,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Whole
 
 _TRIED, _LEAST_OPEN = 400, 20
-"""Rows that are drawn to see whether a field can be crossed, and how many of them must be open."""
+"""Rows that are sampled to check that a field can be crossed, and how many must be open."""
 
 
 @add_task
@@ -119,7 +119,7 @@ class PillarsSettings(BaseTaskSettings):
             )
 
     def _rows(self) -> Iterator[list[float]]:
-        """Rows as they may come: the y of their pillars."""
+        """Sample rows: the y of their pillars."""
         source = random.Random(0)
         for _ in range(_TRIED):
             yield [source.uniform(-self.spread, self.spread) for _ in range(self.row_size)]

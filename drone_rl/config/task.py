@@ -1,4 +1,4 @@
-"""What the settings of every task have in common, and the tasks by name."""
+"""Base class of tasks' settings, and the tasks by name."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
@@ -22,11 +22,11 @@ class Things(NamedTuple):
     color: tuple[float, float, float]
     """Red, green, blue in [0, 1]."""
     bound: float
-    """They stand with |y| at most this."""
+    """Largest |y|."""
     first: float
-    """Their x, from this on."""
+    """Least x."""
     last: float
-    """And up to this."""
+    """Largest x."""
     altitude: float
     """z at which the drone starts."""
 
@@ -35,15 +35,15 @@ class BaseTaskSettings(Settings):
     """Base class of a task's settings."""
 
     name: ClassVar[str]
-    """What files call the task."""
+    """Name of the task in files."""
 
     @property
     def things(self) -> Things | None:
-        """Where its things stand; none where that can't be said."""
+        """Positions of targets and obstacles; None if unknown."""
         return None
 
     def values(self) -> dict[str, Any]:
-        """See `Settings.values`; the task is named, but for the first that there was."""
+        """See `Settings.values`; a task other than `FIRST` has its name."""
         named = {} if self.name == FIRST else {"name": self.name}
         return {**named, **super().values()}
 
@@ -61,11 +61,7 @@ def add_task(settings: S) -> S:
 
 
 def settings_of(name: object, where: str = "task.name") -> type[BaseTaskSettings]:
-    """Return the class of a task's settings.
-
-    Args:
-        name: Name of the task.
-        where: Name of the setting, for messages.
+    """Return the class of a task's settings; `where` is the setting's name for messages.
 
     Raises:
         InputError: There is no such task.
@@ -78,26 +74,13 @@ def settings_of(name: object, where: str = "task.name") -> type[BaseTaskSettings
 def named_settings(data: Any, where: str) -> tuple[type[BaseTaskSettings], Mapping[str, Any]]:
     """Return the class of a task's settings and the values without the name.
 
-    Args:
-        data: A mapping; without "name" it describes the first task.
-        where: Name of the mapping, for messages.
-
-    Raises:
-        InputError: There is no such task.
+    A mapping without "name" describes the first task. See `settings_of` for errors.
     """
     given = dict(as_mapping(data, where))
     return settings_of(given.pop("name", FIRST), f"{where}.name"), given
 
 
 def read_task(data: Any, where: str) -> BaseTaskSettings:
-    """Read settings of a task from plain data that has every field and no other.
-
-    Args:
-        data: See `named_settings`.
-        where: Name of the mapping, for messages.
-
-    Raises:
-        InputError: See `Settings.read`.
-    """
+    """Read settings of a task from plain data; see `named_settings` and `Settings.read`."""
     cls, given = named_settings(data, where)
     return cls.read(given, where)

@@ -1,7 +1,7 @@
 """Settings of a training."""
 
 import re
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, Self
 
 from drone_rl.config import (
     ActionSettings,
@@ -166,10 +166,9 @@ class Logger(Variant):
             ) from error
 
 
-class Tensorboard(Logger):
+class Tensorboard(Logger, target="torchrl.record.loggers.tensorboard.TensorboardLogger"):
     """TensorBoard event files."""
 
-    target: ClassVar[str] = "torchrl.record.loggers.tensorboard.TensorboardLogger"
     exp_name: str = "tensorboard"
     """Folder of this logger under log_dir."""
     log_dir: str = "outputs"

@@ -44,30 +44,27 @@ class Transform(Variant):
         return frame
 
 
-class Gray(Transform):
+class Gray(Transform, target="gray"):
     """RGB bytes to gray from 0 to 1."""
 
-    target: ClassVar[str] = "gray"
     needs: ClassVar[str] = "bytes"
 
     def _transformed(self, frame: Frame) -> Frame:
         return Frame((1, *frame.shape[:2]), True)
 
 
-class Rgb(Transform):
+class Rgb(Transform, target="rgb"):
     """RGB bytes to colours from 0 to 1."""
 
-    target: ClassVar[str] = "rgb"
     needs: ClassVar[str] = "bytes"
 
     def _transformed(self, frame: Frame) -> Frame:
         return Frame((3, *frame.shape[:2]), True)
 
 
-class Chromaticity(Transform):
+class Chromaticity(Transform, target="chromaticity"):
     """Fractions of red and blue in each pixel, minus a third: 0 for every gray level."""
 
-    target: ClassVar[str] = "chromaticity"
     floor: Annotated[float, Real(0.0, 3.0, is_above=True)] = 0.15
     """Added to the sum of red, green and blue, so that the dark is gray."""
 
@@ -77,10 +74,9 @@ class Chromaticity(Transform):
         return Frame((2, *frame.shape[1:]), True)
 
 
-class Standardize(Transform):
+class Standardize(Transform, target="standardize"):
     """Shifted and scaled: (x - mean) / std."""
 
-    target: ClassVar[str] = "standardize"
     mean: Annotated[float, Real(-1000.0, 1000.0)] = 0.53
     """Gray level that becomes 0."""
     std: Annotated[float, Real(1e-6, 1000.0)] = 0.21
@@ -90,10 +86,9 @@ class Standardize(Transform):
         return Frame(frame.shape, True)
 
 
-class Crop(Transform):
+class Crop(Transform, target="crop"):
     """The rows that are kept, from top (included) to bottom (excluded)."""
 
-    target: ClassVar[str] = "crop"
     top: Annotated[int, Whole(0, 1023, "pixels")] = 5
     """First row."""
     bottom: Annotated[int, Whole(1, 1024, "pixels")] = 30
@@ -109,10 +104,9 @@ class Crop(Transform):
         return Frame((*frame.shape[:-2], self.bottom - self.top, frame.shape[-1]), frame.is_float)
 
 
-class Resize(Transform):
+class Resize(Transform, target="resize"):
     """Averaging over areas; nothing where images already have the size."""
 
-    target: ClassVar[str] = "resize"
     needs: ClassVar[str] = "floats"
     height: Annotated[int, Whole(1, 1024, "pixels")] = 25
     """Pixels down."""
@@ -127,10 +121,9 @@ DEFAULT_TRANSFORMS = (Gray(), Resize(), Standardize())
 """The resize leaves the default camera's images as they are: networks get 25x64 from any camera."""
 
 
-class Stack(Transform):
+class Stack(Transform, target="torchrl.envs.CatFrames"):
     """The newest frames as channels, oldest first."""
 
-    target: ClassVar[str] = "torchrl.envs.CatFrames"
     N: Annotated[int, Whole(1, 16, "frames")] = 2
     """Frames."""
 
@@ -142,22 +135,17 @@ class Stack(Transform):
         return Frame((frame.shape[0] * self.N, *frame.shape[1:]), frame.is_float)
 
 
-class EpisodeReward(Transform):
+class EpisodeReward(Transform, target="torchrl.envs.RewardSum"):
     """Sum of the episode's rewards so far, as "episode_reward"."""
 
-    target: ClassVar[str] = "torchrl.envs.RewardSum"
 
-
-class StepCount(Transform):
+class StepCount(Transform, target="torchrl.envs.StepCounter"):
     """Steps of the episode so far, as "step_count"."""
 
-    target: ClassVar[str] = "torchrl.envs.StepCounter"
 
-
-class Blur(Transform):
+class Blur(Transform, target="blur"):
     """Gaussian blur."""
 
-    target: ClassVar[str] = "blur"
     needs: ClassVar[str] = "floats"
     width: Annotated[float, Real(0.0, 16.0, unit="pixels")] = 0.5
     """Standard deviation of the Gaussian."""
@@ -169,20 +157,18 @@ class Fault(Transform):
     needs: ClassVar[str] = "floats"
 
 
-class Noise(Fault):
+class Noise(Fault, target="noise"):
     """Sensor noise, clipped at black and white."""
 
-    target: ClassVar[str] = "noise"
     strength: Annotated[float, Real(0.0, 1.0)] = 0.02
     """Standard deviation; from black to white is 1."""
     correlation_time: Annotated[float, Real(0.0, 10_000.0, unit="frames")] = 0.0
     """Time after which the correlation of a pixel's noise has fallen to 1/e; white noise at 0."""
 
 
-class DeadRows(Fault):
+class DeadRows(Fault, target="dead_rows"):
     """Dead rows of the sensor."""
 
-    target: ClassVar[str] = "dead_rows"
     count: Annotated[int, Whole(0, 1024, "rows")] = 1
     """Rows sampled for each episode, in addition to `rows`."""
     rows: Annotated[tuple[int, ...], Several(Whole(0, 1023, "rows"), 0, 1024)] = ()
@@ -217,26 +203,23 @@ class DeadRows(Fault):
             )
 
 
-class FrozenFrames(Fault):
+class FrozenFrames(Fault, target="frozen_frames"):
     """Frames that repeat the previous one at random."""
 
-    target: ClassVar[str] = "frozen_frames"
     share: Annotated[float, Real(0.0, 1.0)] = 0.05
     """Probability of each frame to repeat."""
 
 
-class LateFrames(Fault):
+class LateFrames(Fault, target="late_frames"):
     """Delayed frames; until the first arrives, the episode's first frame."""
 
-    target: ClassVar[str] = "late_frames"
     frames: Annotated[int, Whole(0, 16, "frames")] = 1
     """Delay."""
 
 
-class Shift(Fault):
+class Shift(Fault, target="shift"):
     """Image shifted by a constant of each episode, as by a misaligned camera."""
 
-    target: ClassVar[str] = "shift"
     down: Annotated[int, Whole(0, 1023, "pixels")] = 4
     """Largest shift up or down; uniformly distributed."""
     across: Annotated[int, Whole(0, 1023, "pixels")] = 6

@@ -5,24 +5,15 @@ from typing import Any
 
 
 class InputError(ValueError):
-    """A mistake in what the user gave: a setting, a file, a device.
+    """A user's mistake: an invalid setting, file or device.
 
-    The message is one line that names the value received and the remedy. The command line prints
-    it without a traceback and exits with a non-zero status; any other exception is a bug of ours.
+    The message is one line with the value and the remedy. The command line prints it without a
+    traceback and exits with a non-zero status; any other exception is a bug.
     """
 
 
 def extra(module: str, name: str, setting: str) -> Any:
-    """Imports a module of an optional extra.
-
-    Args:
-        module: To import.
-        name: The extra that brings it.
-        setting: What asked for it.
-
-    Raises:
-        InputError: It isn't installed.
-    """
+    """Import a module of the extra `name`, or raise an `InputError` about `setting`."""
     try:
         return importlib.import_module(module)
     except ImportError as error:

@@ -8,7 +8,7 @@ from drone_rl.utils.errors import InputError
 
 def test_the_chapters_moves_are_first():
     assert ActionSettings() == MOVES_SETTINGS
-    assert not ActionSettings(kind="velocity").is_first
+    assert ActionSettings(kind="velocity") != MOVES_SETTINGS
 
 
 @pytest.mark.parametrize(
