@@ -1,7 +1,6 @@
 """A simulated drone with its clock, arming, sensors, cameras and running command."""
 
 import copy
-import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any, Self
@@ -30,7 +29,6 @@ from drone_rl.sim.image_types import ImageRequest, images
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks import State
 from drone_rl.sim.worlds import Worlds
-from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
 
@@ -131,17 +129,7 @@ class Drone:
         self.cancel()
 
     def _repr_html_(self) -> str:
-        state = self.state
-        angles, contact = dataclasses.astuple(state.attitude), state.collision
-        rows = {
-            "time": f"{state.time:.2f} s",
-            "state": f"{state.landed}, {'armed' if state.armed else 'disarmed'}",
-            "position": "{:.2f}, {:.2f}, {:.2f} m".format(*state.position),
-            "velocity": "{:.2f}, {:.2f}, {:.2f} m/s".format(*state.velocity),
-            "roll, pitch, yaw": "{:.1f}, {:.1f}, {:.1f} degrees".format(*angles),
-            "last contact": f"{contact.thing}, {contact.time:.2f} s" if contact else "none",
-        }
-        return table(["drone", ""], list(rows.items()))
+        return self.state._repr_html_()
 
     @property
     def time(self) -> float:
