@@ -101,7 +101,9 @@ def test_variants_are_listed_below_their_parts():
 def test_commands_point_at_the_groups_that_they_take():
     train = list_commands().partition("### drone-rl train")[2].partition("### ")[0]
     assert "| `camera` | [camera](#camera) |  |  |" in train
-    assert "| `transforms` | [transforms](#transforms) |  | `gray`, `resize`, `standardize` |" in train
+    assert (
+        "| `transforms` | [transforms](#transforms) |  | `gray`, `resize`, `standardize`" in train
+    )
     assert "changes to the policy's [task](#task)" in list_commands()
 
 

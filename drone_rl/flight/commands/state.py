@@ -28,6 +28,7 @@ from drone_rl.sim.sensors import (
     MagnetometerReading,
     SensorSuite,
 )
+from drone_rl.utils.display import table
 
 Triple = tuple[float, float, float]
 
@@ -130,6 +131,18 @@ class PilotState:
     def speed(self) -> float:
         """Metres per second."""
         return math.hypot(*self.velocity)
+
+    def _repr_html_(self) -> str:
+        angles, contact = dataclasses.astuple(self.attitude), self.collision
+        rows = {
+            "time": f"{self.time:.2f} s",
+            "state": f"{self.landed}, {'armed' if self.armed else 'disarmed'}",
+            "position": "{:.2f}, {:.2f}, {:.2f} m".format(*self.position),
+            "velocity": "{:.2f}, {:.2f}, {:.2f} m/s".format(*self.velocity),
+            "roll, pitch, yaw": "{:.1f}, {:.1f}, {:.1f} degrees".format(*angles),
+            "last contact": f"{contact.thing}, {contact.time:.2f} s" if contact else "none",
+        }
+        return table(["drone", ""], list(rows.items()))
 
 
 def _triple(rows: Tensor) -> Triple:
