@@ -59,7 +59,7 @@ def test_same_complete_episodes_as_on_threads_and_a_killed_worker_changes_nothin
     with caplog.at_level(logging.WARNING):
         ray.kill(on_ray.workers[0])
         second = on_ray.collect()
-    assert "another flies its unfinished episodes" in caplog.text
+    assert "another runs its unfinished episodes" in caplog.text
     assert_same(second, on_threads.collect())
     on_ray.load_state_dict(state)
     assert_same(on_ray.collect(), second)

@@ -137,12 +137,12 @@ def test_pictures_are_of_the_foretold_shape(camera, transforms, shape):
         (
             "transforms",
             [GRAY, {**DEAD, "count": 26}],
-            r"^transforms\.dead_rows\.count=26 of a picture of 25 rows",
+            r"^transforms\.dead_rows\.count=26 of an image of 25 rows",
         ),
         (
             "transforms",
             [GRAY, {**DEAD, "rows": [25]}],
-            r"^transforms\.dead_rows\.rows=\[25\] of a picture of 25 rows",
+            r"^transforms\.dead_rows\.rows=\[25\] of an image of 25 rows",
         ),
         (
             "transforms",

@@ -124,7 +124,7 @@ def test_bad_requests_are_refused(worlds):
         worlds.render(worlds.state, worlds.view("no_such_camera"))
     with pytest.raises(InputError, match="segmentation or normals"):
         worlds.view(modality="heat")
-    with pytest.raises(InputError, match="is more than one picture; take render_all"):
+    with pytest.raises(InputError, match="is more than one image; call render_all"):
         worlds.render(worlds.state, worlds.view(modality=("rgb", "depth")))
 
 

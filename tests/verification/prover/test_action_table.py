@@ -17,7 +17,7 @@ EYE = CameraModel(
 
 
 class Network(nn.Module):
-    """Three logits of a picture of 5x8 pixels, which depend on where it is dark."""
+    """Three logits of an image of 5x8 pixels, which depend on where it is dark."""
 
     def __init__(self):
         super().__init__()

@@ -12,7 +12,7 @@ from drone_rl.verification.prover.bounds import NetworkBounds
 
 
 class Linear(nn.Module):
-    """Logits of a picture of two pixels."""
+    """Logits of an image of two pixels."""
 
     def __init__(self, weight, bias, *before):
         super().__init__()
