@@ -29,8 +29,7 @@ from drone_rl.utils.schema import Flag, Kind, Maybe, OneOf, Real, Several, Text,
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_NOT_SETTINGS = {"in_keys", "out_keys", "values"}
-"""Parameters of every `PixelTransform`."""
+_KEYS = {"in_keys", "out_keys"}
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,60}")
 _KINDS: dict[Any, Kind] = {
     int: Whole(-(2**63), 2**63 - 1),
@@ -91,7 +90,7 @@ def register_transform(
         InputError: See `register_network`.
     """
     own = {"output": lambda self, frame: output(frame, self) if output else None}
-    return lambda factory: _register(Transform, name, factory, 0, _NOT_SETTINGS, own)
+    return lambda factory: _register(Transform, name, factory, 0, _KEYS, own)
 
 
 def register_returns(name: str) -> Callable[[F], F]:

@@ -219,7 +219,8 @@ class Blur(PixelTransform):
 
     def __init__(self, width: float = settings.Blur.width) -> None:
         """See `drone_rl.config.transforms.Blur`."""
-        super().__init__(values=settings.Blur(width=width))
+        super().__init__()
+        self.values = settings.Blur(width=width)
         self.width = width
 
     def _apply_transform(self, obs: Tensor) -> Tensor:

@@ -23,13 +23,12 @@ Keys = list[NestedKey] | None
 class PixelTransform(ObservationTransform):
     """A stateless transform of images, applied at reset and at every step."""
 
-    def __init__(
-        self, in_keys: Keys = None, out_keys: Keys = None, *, values: Settings | None = None
-    ) -> None:
+    values: Settings | None = None
+    """Its settings, for `repr`."""
+
+    def __init__(self, in_keys: Keys = None, out_keys: Keys = None) -> None:
         in_keys = in_keys if in_keys is not None else ["pixels"]
         super().__init__(in_keys=in_keys, out_keys=out_keys or list(in_keys))
-        self.values = values
-        """Its settings, for `repr`."""
 
     def __repr__(self) -> str:
         return call_text(self, self.values) if self.values else super().__repr__()
@@ -96,7 +95,8 @@ class ChromaticityPixels(PixelTransform):
     """
 
     def __init__(self, floor: float = settings.Chromaticity.floor, **keys: Keys) -> None:
-        super().__init__(values=settings.Chromaticity(floor=floor), **keys)
+        super().__init__(**keys)
+        self.values = settings.Chromaticity(floor=floor)
         self.floor = float(floor)
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
@@ -118,7 +118,8 @@ class CropRows(PixelTransform):
     """
 
     def __init__(self, top: int, bottom: int, **keys: Keys) -> None:
-        super().__init__(values=settings.Crop(top=top, bottom=bottom), **keys)
+        super().__init__(**keys)
+        self.values = settings.Crop(top=top, bottom=bottom)
         if not top < bottom:
             raise InputError(f"CropRows({top}, {bottom}) keeps no row; give 0 <= top < bottom")
         self.top, self.bottom = top, bottom
@@ -141,7 +142,8 @@ class Resize(PixelTransform):
     """
 
     def __init__(self, *, height: int, width: int, **keys: Keys) -> None:
-        super().__init__(values=settings.Resize(height=height, width=width), **keys)
+        super().__init__(**keys)
+        self.values = settings.Resize(height=height, width=width)
         self.height, self.width = height, width
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
@@ -167,7 +169,8 @@ class StandardizePixels(PixelTransform):
         std: float = settings.Standardize.std,
         **keys: Keys,
     ) -> None:
-        super().__init__(values=settings.Standardize(mean=mean, std=std), **keys)
+        super().__init__(**keys)
+        self.values = settings.Standardize(mean=mean, std=std)
         self.mean, self.std = float(mean), float(std)
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
