@@ -1,10 +1,11 @@
-"""`python -m tools.conf [--check]`: writes the files of conf/ that hold the defaults of settings.
+"""`python -m tools.conf [--check]`: writes defaults and descriptions of settings into conf/.
 
-The defaults and their descriptions are defined in `drone_rl/config`. A generated file keeps its
-head, up to the first empty line; the settings below are generated. Files with other values than the
-defaults are written by hand.
+Both are defined in the classes of the settings. A file keeps its head, up to the first empty line.
+In the files of groups' defaults all settings are generated; in files of commands, transforms and
+loggers the comment above each setting. Files of a group with other values are written by hand.
 """
 
+import importlib
 import re
 import sys
 import textwrap
@@ -14,10 +15,11 @@ from typing import Any
 
 import yaml
 
-from drone_rl.cli.hydra.composition import GROUPS, PARTS, conf_dir
+from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL, conf_dir
+from drone_rl.cli.main import COMMANDS
 from drone_rl.config import TASKS
 from drone_rl.utils.settings import Settings
-from tools.readme.settings import meanings
+from tools.readme.settings import about, meanings
 
 _START = re.compile(r"^defaults: \[(base_\w+), _self_\]$", re.MULTILINE)
 _PARTLY_OF_OTHERS = ("a2c", "ppo")
@@ -48,6 +50,46 @@ def generated_files(conf: Path) -> Iterator[tuple[Path, type[Settings]]]:
                 yield path, bases[found[1] if found else f"base_{path.stem}"]
 
 
+def described_files(conf: Path) -> Iterator[tuple[Path, dict[str, str]]]:
+    """Yield the files of commands, transforms and loggers, each with its settings' descriptions.
+
+    Args:
+        conf: The folder conf/.
+    """
+    for name in COMMANDS:
+        module = importlib.import_module(f"drone_rl.cli.{name.replace('-', '_')}")
+        yield conf / f"{name.replace('-', '_')}.yaml", {**meanings(module.Command)}
+    for group, part in SEVERAL.items():
+        words = {}
+        for variant in part.variants():
+            name = variant.registered_name()
+            words[name] = about(variant)
+            words |= {f"{name}.{key}": text for key, text in meanings(variant).items()}
+        yield from ((path, words) for path in sorted((conf / group).glob("*.yaml")))
+
+
+def describe(text: str, words: dict[str, str]) -> str:
+    """Return a file of settings with a description above each of them.
+
+    Args:
+        text: The file, whose head and values are kept.
+        words: Descriptions of settings by name, those of a group as "group.name".
+    """
+    head, separator, body = text.partition("\n\n")
+    lines, group = [head, ""], ""
+    for line in body.splitlines():
+        name = line.partition(":")[0].strip()
+        is_inside = line.startswith("  ")
+        group = group if is_inside else name
+        description = words.get(f"{group}.{name}" if is_inside else name)
+        if description:
+            while lines[-1].lstrip().startswith("#"):
+                lines.pop()
+            lines += _comment(description, "  " * is_inside)
+        lines.append(line)
+    return "\n".join(lines) + "\n" if separator else text
+
+
 def make_text(path: Path, settings: type[Settings]) -> str:
     """Return what a file should contain.
 
@@ -58,10 +100,18 @@ def make_text(path: Path, settings: type[Settings]) -> str:
     head = path.read_text().partition("\n\n")[0].rstrip("\n")
     words, lines = meanings(settings), [head, ""]
     for name, value in settings().values().items():
-        comment = re.sub(r"\bnone\b(?= (for|of|keeps|takes|starts))", "null", words[name])
-        lines += textwrap.wrap(comment, 100, initial_indent="# ", subsequent_indent="# ")
+        lines += _comment(words[name])
         lines.append(f"{name}: {_shown(value)}")
     return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def _comment(words: str, indent: str = "") -> list[str]:
+    """A description as lines of a comment, with YAML's word for none."""
+    text = re.sub(r"\bnone\b(?= (for|of|keeps|takes|starts|accepts|requires))", "null", words)
+    start = f"{indent}# "
+    return textwrap.wrap(
+        text, 100, initial_indent=start, subsequent_indent=start, break_on_hyphens=False
+    )
 
 
 def _shown(value: Any) -> str:
@@ -76,8 +126,10 @@ def _shown(value: Any) -> str:
 def main(arguments: list[str]) -> int:
     """Write the files, or check them; returns the exit status."""
     stale = []
-    for path, settings in generated_files(conf_dir()):
-        text = make_text(path, settings)
+    conf = conf_dir()
+    texts = {path: make_text(path, settings) for path, settings in generated_files(conf)}
+    texts |= {path: describe(path.read_text(), words) for path, words in described_files(conf)}
+    for path, text in texts.items():
         if path.read_text() != text:
             stale.append(path)
             if "--check" not in arguments:

@@ -13,11 +13,12 @@ class Command(CommandSettings, CheckSettings):
     """Settings of `drone-rl check`."""
 
     certificate: str = "latest"
-    """The certificate, see `drone_rl.check`."""
+    """Certificate: a file of drone-rl prove, or latest for the newest one."""
     policy: str | None = None
-    """Its policy; none takes the policy of the package that it names."""
+    """Policy of the certificate, as a file, the folder of a run, latest, or a shipped policy's
+    name; none takes the shipped policy that the certificate names."""
     task: TaskChanges = no_changes()
-    """Required settings of its task; none accepts any."""
+    """Settings that the certificate's task must have, as in task.num_cubes=5; none accepts any."""
 
 
 def run(settings: Command, folder: Path) -> tuple[int, bool]:

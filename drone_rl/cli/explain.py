@@ -19,15 +19,17 @@ class Command(CommandSettings, ExplainSettings):
     """Settings of `drone-rl explain`."""
 
     policy: Annotated[Any, Listed("policy")] = ("latest",)
-    """One or several policies, see `drone_rl.load_policy`."""
-    num_envs: Annotated[int, Whole(1, unit="worlds")] = 128
-    """Environments in one batch; bounds memory."""
+    """Policy, or a list of policies that one report compares, as in policy=[good,poor]: files,
+    folders of runs, latest, or names of shipped policies."""
+    num_envs: Annotated[int, Whole(1, unit="environments")] = 128
+    """Environments in a batch; bounds memory."""
     require: Annotated[str, OneOf(tuple(Kind))] | None = None
-    """Refuse (exit status 10 to 13, or 18) a policy whose verdict is not this; none accepts all."""
+    """Kind of verdict to require, such as good; other kinds end with exit status 10 to 13 or 18.
+    none accepts all kinds."""
     task: TaskChanges = no_changes()
-    """Changes of the policy's task."""
+    """Changes of the policy's task settings (see conf/task), as in task.num_cubes=5."""
     dynamics: DynamicsChanges = no_changes()
-    """Changes of the policy's vehicle dynamics."""
+    """Changes of the vehicle dynamics (see conf/dynamics), as in dynamics=quadrotor."""
 
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:

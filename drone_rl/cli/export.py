@@ -19,17 +19,19 @@ class Command(CommandSettings, FlightSettings):
     """Settings of `drone-rl export`."""
 
     policy: str = "latest"
-    """The policy, see `drone_rl.load_policy`."""
+    """Policy: a .pt file, the folder of a run, or latest."""
     name: Annotated[str, FileName()] = "policy"
-    """Name of the files."""
+    """Name of the files, without extension."""
     format: Annotated[str, OneOf(("safetensors", "onnx"))] = "safetensors"
-    """safetensors with a model card for this program, or an ONNX model for any."""
+    """safetensors with a model card, or onnx, an ONNX model of RGB image to action
+    probabilities."""
     command: Annotated[str, COMMAND] | None = None
-    """The command that trained it, for the card; none names the run's own settings."""
+    """Training command for the card; none takes the run's own settings."""
     certificate: str | None = None
-    """Certificate for the card; none takes the one next to the policy."""
+    """Certificate file for the card; none takes the one next to the policy, if it matches."""
     shifts: str | None = None
-    """Result of drone-rl shifts for the card; none takes the policy's, or its newest."""
+    """File shifts.json for the card; none takes the one next to the policy, otherwise the newest
+    under outputs/shifts of this network and task."""
 
     def check(self) -> None:
         """Refuse quotes for the card with an ONNX model, which has no card."""

@@ -21,11 +21,11 @@ class Command(RolloutCommandSettings):
     viewer: bool = False
     """Whether to open dm_control's viewer, which needs a display, instead of recording."""
     device: str = "cpu"
-    """Device of rendering and policy: cpu, cuda or cuda:N."""
+    """Device of renderer and policy: cpu, cuda or cuda:N."""
     renderer: RendererName = "raytrace"
-    """Renderer: raytrace (built in) or mujoco_warp (MuJoCo Warp)."""
+    """Renderer: raytrace, this package's ray tracer, or mujoco_warp, MuJoCo Warp's."""
     appearance: AppearanceSettings | None = None
-    """Visual appearance; none for that of the policy's training."""
+    """Appearance of the scenes (see conf/appearance); none for that of the policy's training."""
 
 
 def run(settings: Command, folder: Path) -> tuple[int, None]:

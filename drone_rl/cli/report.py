@@ -14,7 +14,8 @@ class Command(CommandSettings):
     """Settings of `drone-rl report`."""
 
     explanations: Annotated[Any, Listed("folder")] = ("latest",)
-    """Folders with an explanation.json, or latest for those of the newest explanation."""
+    """Folder with an explanation.json, or a list of folders that one report compares; latest for
+    those of the newest explanation."""
 
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:

@@ -22,16 +22,17 @@ class PolicyCommandSettings(CommandSettings):
     """Settings of a command on one policy and its task."""
 
     policy: str = "latest"
-    """The policy, see `drone_rl.load_policy`."""
+    """Policy: a .pt or .safetensors file, the folder of a run, latest, or a shipped policy's
+    name."""
     task: TaskChanges = no_changes()
-    """Changes of the policy's task."""
+    """Changes of the policy's task settings (see conf/task), as in task.num_cubes=5."""
 
 
 class RolloutCommandSettings(PolicyCommandSettings):
     """Settings of a command that rolls out one policy."""
 
     dynamics: DynamicsChanges = no_changes()
-    """Changes of the policy's vehicle dynamics."""
+    """Changes of the vehicle dynamics (see conf/dynamics), as in dynamics=quadrotor."""
 
 
 def finish(result: Any, path: Path, files: str = "") -> None:

@@ -17,11 +17,11 @@ class Command(CommandSettings):
     folder: str = "latest"
     """Folder of the sweep, or latest for the newest one."""
     picture: str | None = None
-    """PNG of verdicts, sides and entropies to write as well; none for none."""
+    """PNG file of verdicts, one-sided policies and entropies to write, too; none for none."""
     judge: bool = False
-    """Whether to judge the last.pt of every finished run again, by the current rule."""
+    """Whether to repeat the verdict on each finished run's last.pt with the current rule."""
     episodes: Annotated[int, Whole(1, unit="episodes")] = 200
-    """Episodes of such a verdict, in selection environments."""
+    """Episodes of such a verdict, in environments for selection."""
     device: str = "cpu"
     """Device of these episodes: cpu, cuda or cuda:N."""
 

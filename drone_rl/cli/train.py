@@ -38,9 +38,9 @@ class Command(CommandSettings, TrainSettings):
     resume: str | None = None
     """Folder of a run to resume with its own settings; none starts a new one."""
     provable: ProvableSettings = ProvableSettings()
-    """Training until the policy is verified."""
+    """Training until a proof succeeds."""
     trial: Annotated[int, Whole(0)] | None = None
-    """Number of this run in a search, set by hydra/sweeper=optuna; none for none."""
+    """Number of this run in a search, which hydra/sweeper=optuna sets; none for no search."""
 
 
 def register() -> None:

@@ -17,14 +17,18 @@ class Command(RolloutCommandSettings, JudgeSettings):
     """Settings of `drone-rl verdict`."""
 
     certificate: str | None = None
-    """Certificate to quote; none takes the one next to the policy, if any."""
+    """Certificate file to quote; none takes the one next to the policy, if it matches:
+    certificate.json in the folder of a run, NAME.certificate.json next to NAME.safetensors."""
     require: Annotated[str, OneOf(("good", "proved"))] | None = None
-    """good: 0 only for a certain good, else the verdict's own exit status. proved: 0 only if a
-    re-checked certificate says so of every placement, else 16. None: by kind."""
+    """Requirement for exit status 0: good, the policy is certainly good; proved, a certificate
+    proves success from every placement and rollouts re-checked it, otherwise 16; null, any certain
+    kind has its own exit status."""
     shifts: str | None = None
-    """Result of drone-rl shifts to quote; none takes the policy's, or its newest."""
+    """File shifts.json to quote; none takes the one next to the policy, otherwise the newest under
+    outputs/shifts of this network and task."""
     require_domain: str | None = None
-    """Refuse (exit status 17) a policy that is not good in the domain of this file; none: any."""
+    """Operating domain in which the policy must be good, otherwise exit status 17: a YAML or JSON
+    file with a range for each axis, such as domain.yaml of drone-rl shifts; null requires none."""
 
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:

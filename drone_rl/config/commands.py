@@ -17,7 +17,7 @@ class FlightSettings(OnDevice):
     seed: Annotated[int, Whole(0)] | None = None
     """Root of the held-out environments' random streams; null takes a fresh one from the operating
     system, which is printed and recorded."""
-    num_envs: Annotated[int, Whole(1, unit="worlds")] = 250
+    num_envs: Annotated[int, Whole(1, unit="environments")] = 250
     """Environments in a batch; bounds memory."""
 
     @property
@@ -38,16 +38,17 @@ class JudgeSettings(FlightSettings):
 
     episodes: Annotated[int, Whole(1, unit="episodes")] = 400
     """Held-out episodes of the greedy and the sampled policy, the baselines and the oracle."""
-    num_envs: Annotated[int, Whole(1, unit="worlds")] = 400
+    num_envs: Annotated[int, Whole(1, unit="environments")] = 400
     sampled: bool = True
     """Evaluate the policy with sampled actions, too; reported next to the verdict."""
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
-    """A good policy succeeds in more than this share of the oracle's episodes."""
-    certificate_flights: Annotated[int, Whole(0, 10_000_000, "flights")] = 1000
-    """Rollouts that re-check a certificate, as `drone-rl check` does; with 0 it proves nothing."""
+    """A good policy succeeds in more than this fraction of the oracle's episodes."""
+    certificate_flights: Annotated[int, Whole(0, 10_000_000, "rollouts")] = 1000
+    """Rollouts that re-check a quoted certificate, as drone-rl check does; with 0 it proves
+    nothing."""
     domain_flights: Annotated[int, Whole(0, 100_000, "episodes")] = 200
-    """New episodes at each strength of a sample of those of a required domain; with 0 it is not
-    covered."""
+    """New episodes at each sampled strength of the required domain, the ends of each range and two
+    random ones within it; with 0 it is not covered."""
 
 
 BODIES = (
@@ -66,19 +67,19 @@ class BodiesSettings(JudgeSettings):
     """Settings of a dynamics sweep: policies and dynamics."""
 
     policies: Annotated[tuple[str, ...], Listed("policy", most=64)] = ("good", "proved")
-    """Policies: files, folders of runs, latest, or names of the package's policies."""
+    """Policies: files, folders of runs, latest, or names of shipped policies."""
     bodies: Annotated[tuple[str, ...], Several(OneOf(BODIES), 1, len(BODIES))] = BODIES
     """Dynamics to test."""
     episodes: Annotated[int, Whole(1, unit="episodes")] = 400
     """Held-out greedy episodes of each policy under each dynamics; all get the same scenes."""
-    num_envs: Annotated[int, Whole(1, unit="worlds")] = 400
+    num_envs: Annotated[int, Whole(1, unit="environments")] = 400
     sampled: bool = False
     """Evaluate with sampled actions, too."""
-    certificate_flights: Annotated[int, Whole(0, 10_000_000, "flights")] = 0
+    certificate_flights: Annotated[int, Whole(0, 10_000_000, "rollouts")] = 0
     """Rollouts that re-check a certificate; with 0 the table's verdicts prove nothing."""
     domain_flights: Annotated[int, Whole(0, 100_000, "episodes")] = 0
     """New episodes that check a required operating domain; the table requires none."""
-    loop_flights: Annotated[int, Whole(0, 1000, "flights")] = 0
+    loop_flights: Annotated[int, Whole(0, 1000, "rollouts")] = 0
     """Real-time rollouts of each policy with Betaflight in the loop; 0 for none."""
 
     def check(self) -> None:
@@ -95,7 +96,7 @@ class ShiftSettings(OnDevice):
     """Settings of robustness tests."""
 
     axes: Annotated[Any, Maybe(Listed("axis"))] = None
-    """Axes, or groups of axes; none for all axes of the task."""
+    """Axes or groups of axes, as in axes=[sun,fog]; none for all axes of the task."""
     strengths: Annotated[tuple[int, ...], Several(Whole(1, 5), 1, 5)] = (1, 2, 3, 4, 5)
     """Strengths to test of the five of each axis, in rising order."""
     modes: Annotated[tuple[str, ...], Several(OneOf(MODES), 1, 3)] = MODES
@@ -110,7 +111,7 @@ class ShiftSettings(OnDevice):
     """Root of the held-out environments' random streams; null takes a fresh one from the operating
     system, which is printed and recorded."""
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
-    """A good policy succeeds in more than this share of the oracle's episodes."""
+    """A good policy succeeds in more than this fraction of the oracle's episodes."""
     possible_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
     """A strength is impossible if the oracle's success rate is certainly below this."""
 
@@ -144,19 +145,19 @@ class BenchSettings(Settings):
     """Settings of the benchmarks."""
 
     only: Annotated[tuple[str, ...], Listed("benchmark")] | None = None
-    """Benchmarks to run; none for all without a result of this revision."""
+    """Names of benchmarks or of groups of them; none for all without a result of this revision."""
     quick: bool = False
     """Run a short version of each benchmark with rough results."""
     seeds: Annotated[tuple[int, ...], Several(Whole(0), 1, 1000)] = (0, 1, 2, 3, 4)
     """Seeds of the timed trainings."""
     episodes: Annotated[int, Whole(1, unit="episodes")] = 1000
     """Held-out episodes of each trained policy."""
-    num_envs: Annotated[int, Whole(1, unit="worlds")] = 512
+    num_envs: Annotated[int, Whole(1, unit="environments")] = 512
     """Environments in a batch of the speed benchmarks."""
     memory_frames: Annotated[int, Whole(1, unit="frames")] = 1_000_000
     """Frames over which memory must stay constant."""
     device: str = "cpu"
-    """Where worlds are drawn and policies run: cpu, cuda or cuda:N."""
+    """Device of renderer and policies: cpu, cuda or cuda:N."""
     folder: str = "outputs/bench"
     """Folder of results.json and the plots."""
 

@@ -78,7 +78,7 @@ class Gae(_Discounted, target="gae"):
 class Collector(Variant):
     """Settings of a collector."""
 
-    num_envs: Annotated[int, Whole(1, unit="worlds")] = 16
+    num_envs: Annotated[int, Whole(1, unit="environments")] = 16
     """Environments, each with one episode or with as many steps as the others in a batch."""
     num_threads: Annotated[int, Whole(1, unit="threads")] = 1
     """Groups of environments that are collected in parallel, each by its own thread or worker. Each
@@ -121,7 +121,7 @@ class Rollouts(Collector, target="rollouts"):
     The objective sets the number of steps. Episodes continue in the next batch.
     """
 
-    num_envs: Annotated[int, Whole(1, unit="worlds")] = 64
+    num_envs: Annotated[int, Whole(1, unit="environments")] = 64
     """Environments."""
 
 

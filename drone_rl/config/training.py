@@ -104,7 +104,7 @@ class TrainSettings(Settings):
     renderer: RendererName = "raytrace"
     """Renderer: raytrace, this package's ray tracer, or mujoco_warp, MuJoCo Warp's."""
     evaluate_after: Annotated[int, Whole(0, unit="episodes")] = 0
-    """Episodes, in worlds to choose by, of the verdict at the end; 0 for none."""
+    """Episodes, in environments for selection, of the verdict on last.pt at the end; 0 for none."""
 
     def check(self) -> None:
         """Refuse parts that don't work together."""

@@ -11,7 +11,7 @@ from drone_rl.utils.settings import Settings
 class CheckSettings(OnDevice):
     """Settings of a certificate check."""
 
-    flights: Annotated[int, Whole(1, 10_000_000, "flights")] = 2000
+    flights: Annotated[int, Whole(1, 10_000_000, "rollouts")] = 2000
     """Rollouts from corners, centres, random points and borders of the boxes."""
     seed: Annotated[int, Whole(0)] | None = None
     """Seed of the rollouts' placements; null takes a fresh one from the operating system, which is
@@ -37,7 +37,7 @@ class ProveSettings(Rendered):
 
     logit_gap: Annotated[float, Real(0.0, 1.0)] = 1e-4
     """Logits closer than this count as equal because sums are rounded."""
-    compared: Annotated[int, Whole(1, 10_000_000, "pictures")] = 4_000
+    compared: Annotated[int, Whole(1, 10_000_000, "images")] = 4_000
     """Random images for which renderer and closed form must agree before the proof begins."""
     limit_s: Annotated[float, Real(0.0, unit="s")] | None = None
     """Seconds after which the proof stops and can be resumed; none for no limit."""
@@ -55,14 +55,14 @@ class PlacesSettings(Rendered):
     nearest: Annotated[float, Real(0.0, 1000.0, unit="m")] = 2.5
     """Metres from the camera to the centre of a cube, straight ahead, at least."""
     farthest: Annotated[float, Real(0.0, 1000.0, unit="m")] = 20.0
-    """The same at most."""
+    """Metres from the camera to the centre of a cube, straight ahead, at most."""
     sideways: Annotated[float, Real(0.001, 1000.0, unit="m")] = 8.0
-    """Metres to the left or right, at most."""
+    """Metres to the left or right of the camera, at most."""
     logit_gap: Annotated[float, Real(0.0, 1.0)] = 1e-4
     """Logits closer than this count as equal because sums are rounded."""
-    compared: Annotated[int, Whole(1, 10_000_000, "pictures")] = 4_000
+    compared: Annotated[int, Whole(1, 10_000_000, "images")] = 4_000
     """Random images for which renderer and closed form must agree before results are claimed."""
-    most_cells: Annotated[int, Whole(1, unit="pictures")] = 1_000_000
+    most_cells: Annotated[int, Whole(1, unit="images")] = 1_000_000
     """Distinct images of one cube at which the map stops; bounds memory."""
 
     def check(self) -> None:
@@ -84,7 +84,7 @@ class ProvableSettings(Settings):
     """Fraction of a round's episodes that begin at failures; the others begin anywhere."""
     margin: Annotated[float, Real(0.0, 1_000.0, unit="m")] = 0.2
     """Metres by which replayed placements extend beyond a failure, to either side."""
-    flights: Annotated[int, Whole(0, unit="flights")] = 5_000
+    flights: Annotated[int, Whole(0, unit="rollouts")] = 5_000
     """Greedy rollouts that search for failures before each proof; a failure skips the proof."""
     enough: Annotated[int, Whole(1, unit="failures")] = 50
     """Failures after which the search by rollouts ends."""

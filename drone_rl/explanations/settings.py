@@ -21,22 +21,22 @@ class ExplainSettings(Settings):
     frames: Annotated[int, Whole(1, unit="frames")] = 600
     """Frames that are analysed, spread evenly over the episodes of the data set."""
     data_episodes: Annotated[int, Whole(MIN_EPISODES, unit="episodes")] = MIN_EPISODES
-    """Least number of complete episodes in the data set."""
+    """Least number of complete episodes with sampled actions in the data set."""
     episodes: Annotated[int, Whole(1, unit="episodes")] = 400
     """Episodes on which the verdict rests."""
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
     """A good policy succeeds in more than this fraction of the oracle's episodes."""
     layer: str | None = None
-    """Layer whose features are embedded; the last one before the logits by default."""
+    """Layer whose features t-SNE embeds; none for the last one before the logits."""
     grad_cam_layer: str | None = None
-    """Layer of Grad-CAM; the last convolution's nonlinearity by default."""
+    """Layer of Grad-CAM; none for the last convolution's nonlinearity."""
     perplexity: Annotated[float, Real(1.0, unit="neighbours")] = 30.0
-    """Of t-SNE."""
+    """Perplexity of t-SNE."""
     seed: Annotated[int, Whole(0)] | None = None
     """Root of all random streams, those of the held-out environments included; null takes a fresh
     one from the operating system, which is printed and recorded."""
     renderer: RendererName = "raytrace"
-    """Renderer: raytrace, this project's ray tracer, or mujoco_warp, MuJoCo Warp's."""
+    """Renderer: raytrace, this package's ray tracer, or mujoco_warp, MuJoCo Warp's."""
 
     def check(self) -> None:
         """Check that each episode has a frame, and the perplexity."""

@@ -6,7 +6,7 @@ import yaml
 
 from drone_rl.utils.schema import Real
 from drone_rl.utils.settings import Settings
-from tools.conf import generated_files, main, make_text
+from tools.conf import describe, generated_files, main, make_text
 
 
 def test_the_generated_files_are_current(capsys):
@@ -33,10 +33,27 @@ def test_a_file_keeps_its_head_and_gets_comments_and_values(tmp_path):
     assert "name: null\n# Switch.\nis_on: true\n" in text
 
 
+def test_descriptions_are_written_above_settings():
+    head = "# drone-rl some: an example.\ndefaults:\n  - base_some\n\n"
+    words = {
+        "rate": "Learning rate; none for no learning.",
+        "blur": "Blur.",
+        "blur.width": "Width.",
+    }
+    old = "# Old words,\n# of two lines.\nrate: 7\nwidth: 8\n# Old.\nblur:\n  width: 9\n"
+    new = (
+        "# Learning rate; null for no learning.\nrate: 7\nwidth: 8\n"
+        "# Blur.\nblur:\n  # Width.\n  width: 9\n"
+    )
+    assert describe(head + old, words) == head + new
+    assert describe("# Nothing below.\nrate: 7\n", words) == "# Nothing below.\nrate: 7\n"
+
+
 def test_a_stale_file_is_reported_and_written_again(tmp_path, monkeypatch):
     path = tmp_path / "some.yaml"
     path.write_text("# Some settings.\n\nold: 3\n")
     monkeypatch.setattr("tools.conf.generated_files", lambda _: [(path, Some)])
+    monkeypatch.setattr("tools.conf.described_files", lambda _: [])
     assert main(["--check"]) == 1 and "old" in path.read_text()
     assert main([]) == 0 and "old" not in path.read_text()
     assert main(["--check"]) == 0

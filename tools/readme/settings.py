@@ -1,4 +1,4 @@
-"""Every setting as Markdown: what it may be, its unit, its default and what it means."""
+"""Tables of all settings in Markdown: allowed values, unit, default and meaning."""
 
 import ast
 import dataclasses
@@ -23,18 +23,18 @@ BAR = "&#124;"
 """A bar within a cell."""
 _TASK = "task"
 _OR = {Maybe: "; or null", Span: ", or a range of it"}
-_HEAD = "| setting | may be | unit | default | meaning |\n| --- | --- | --- | --- | --- |"
+_HEAD = "| setting | values | unit | default | meaning |\n| --- | --- | --- | --- | --- |"
 
 
 def list_groups() -> str:
-    """The groups that have settings of their own, such as task and camera, each with a table."""
+    """Return a table for each group of settings, such as task and camera."""
     return "\n\n".join(
         [
             f"### {_TASK}",
-            _about(BaseTaskSettings),
-            *(f"**`{n}`** {_about(cls)}\n\n{make_table(cls, 'task.')}" for n, cls in TASKS.items()),
+            about(BaseTaskSettings),
+            *(f"**`{n}`** {about(cls)}\n\n{make_table(cls, 'task.')}" for n, cls in TASKS.items()),
             *(
-                f"### {group}\n\n{_about(cls)}\n\n{make_table(cls, f'{group}.')}"
+                f"### {group}\n\n{about(cls)}\n\n{make_table(cls, f'{group}.')}"
                 for group, cls in GROUPS.items()
             ),
         ]
@@ -42,12 +42,12 @@ def list_groups() -> str:
 
 
 def list_parts() -> str:
-    """The parts of a training that come in variants, and the settings of each variant."""
+    """Return the parts of a training that have variants, with a table for each variant."""
     return "\n\n".join(_part(group, part) for group, part in {**PARTS, **SEVERAL}.items())
 
 
 def list_commands() -> str:
-    """What each command can be told besides."""
+    """Return a table of the settings of each command."""
     lines = []
     for name in COMMANDS:
         module = importlib.import_module(f"drone_rl.cli.{name.replace('-', '_')}")
@@ -56,8 +56,8 @@ def list_commands() -> str:
 
 
 def list_presets(conf: Path) -> str:
-    """Ready-made sets of settings, by what their files say first."""
-    rows = ["| command | what it is |", "| --- | --- |"]
+    """Return a table of the ready-made sets, described by the first comment of their files."""
+    rows = ["| command | description |", "| --- | --- |"]
     for group in ("experiment", "sweep"):
         for path in sorted((conf / group).glob("*.yaml")):
             _, _, words = first_comment(path).partition(": ")
@@ -66,10 +66,10 @@ def list_presets(conf: Path) -> str:
 
 
 def make_table(cls: type[Settings], prefix: str = "") -> str:
-    """A table of the settings of a class.
+    """Return a table of the settings of a class.
 
     Args:
-        cls: Which.
+        cls: The class.
         prefix: Before the name of each, such as "task.".
     """
     defaults, words = cls(), meanings(cls)
@@ -83,7 +83,7 @@ def make_table(cls: type[Settings], prefix: str = "") -> str:
 
 @functools.cache
 def meanings(cls: type) -> Mapping[str, str]:
-    """What a class says below each of its fields, and what those say that it is made of."""
+    """Return the docstring of each field of a class, inherited fields included."""
     found: dict[str, str] = {}
     for part in reversed(cls.__mro__):
         if dataclasses.is_dataclass(part):
@@ -93,17 +93,17 @@ def meanings(cls: type) -> Mapping[str, str]:
 
 
 def first_comment(path: Path) -> str:
-    """The first lines of a file of settings that are for people."""
+    """Return the first comment of a file of settings, without directives to Hydra."""
     lines = [line for line in path.read_text().splitlines() if not line.startswith("# @package")]
     count = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
     return " ".join(line.removeprefix("#").strip() for line in lines[:count])
 
 
 def _part(group: str, part: type[Variant]) -> str:
-    lines = [f"### {group}", _about(part)]
+    lines = [f"### {group}", about(part)]
     for variant in part.variants():
         name = variant.registered_name()
-        lines.append(f"**`{name}`** {_about(variant)}")
+        lines.append(f"**`{name}`** {about(variant)}")
         if kinds_of(variant):
             inside = f"{name}." if group in SEVERAL else ""
             lines.append(make_table(variant, f"{group}.{inside}"))
@@ -118,12 +118,13 @@ def _documented(body: Any) -> Iterator[tuple[str, str]]:
             yield field.target.id, " ".join(below.value.value.split())
 
 
-def _about(cls: type) -> str:
+def about(cls: type) -> str:
+    """Return the first paragraph of a class's docstring."""
     return (inspect.getdoc(cls) or "").partition("\n\n")[0].replace("\n", " ")
 
 
 def _may_be(kind: Kind) -> str:
-    """What a kind takes, in words."""
+    """The allowed values of a kind, in words."""
     match kind:
         case Maybe() | Span():
             return f"{_may_be(kind.kind)}{_OR[type(kind)]}"
@@ -144,7 +145,7 @@ def _may_be(kind: Kind) -> str:
 
 
 def _link(cls: type) -> str:
-    """A group by its name, as a link to its settings."""
+    """A link to the settings of a group."""
     groups = {
         BaseTaskSettings: _TASK,
         **{c: g for g, c in GROUPS.items()},
@@ -159,7 +160,7 @@ def _unit(kind: Kind) -> str:
 
 
 def _shown(value: Any) -> str:
-    """A default as it would be typed; of parts their names."""
+    """A default as typed on the command line; for parts their names."""
     several = value if isinstance(value, tuple) else (value,)
     if several and all(isinstance(one, Variant) for one in several):
         return ", ".join(f"`{one.name}`" for one in several)
