@@ -1,7 +1,7 @@
-"""Can a policy be trusted that Stable-Baselines3 trained by itself, on colours and its own network?
+"""Judge and explain a policy that Stable-Baselines3 trained with its own CnnPolicy on RGB images.
 
-python examples/judge_sb3.py               # trains for two minutes, then judges and explains
-python examples/judge_sb3.py ppo.zip       # judges and explains a model that it saved
+python examples/judge_sb3.py               # train for two minutes, then judge and explain
+python examples/judge_sb3.py ppo.zip       # judge and explain a saved model
 """
 
 import sys
@@ -13,31 +13,31 @@ import drone_rl
 from drone_rl.config.transforms import Rgb
 
 CAMERA = drone_rl.CameraSettings(width=64, height=40)
-"""At least 36 pixels each way, which their CnnPolicy needs."""
+"""CnnPolicy needs at least 36 pixels in each direction."""
 
 
 def train(frames: int = 40_000, *, num_envs: int = 32, steps: int = 128, seed: int = 0) -> PPO:
-    """Trains their CnnPolicy on the camera's frames as they are."""
-    worlds = gymnasium.make_vec(
+    """Train CnnPolicy on RGB images."""
+    envs = gymnasium.make_vec(
         "drone_rl/CollectCubes-v0", num_envs=num_envs, autoreset_mode="SameStep", camera=CAMERA
     )
-    env = drone_rl.Sb3Worlds(worlds)
-    how = {"batch_size": 512, "n_epochs": 4, "learning_rate": 1e-3, "ent_coef": 0.01}
-    model = PPO("CnnPolicy", env, n_steps=steps, seed=seed, **how)
+    env = drone_rl.Sb3Worlds(envs)
+    options = {"batch_size": 512, "n_epochs": 4, "learning_rate": 1e-3, "ent_coef": 0.01}
+    model = PPO("CnnPolicy", env, n_steps=steps, seed=seed, **options)
     model.learn(frames)
     env.close()
     return model
 
 
 def trust(model: PPO, folder: str = "outputs/explain/sb3", **settings: int) -> None:
-    """Prints the verdict, and leaves a report of what it sees.
+    """Print the verdict and write a report.
 
     Args:
-        model: With a policy that sees the camera's frames, RGB bytes.
-        folder: Of the report.
-        settings: Of the explanation, see `drone_rl.ExplainSettings`.
+        model: A model whose observations are RGB images, uint8.
+        folder: Folder of the report.
+        settings: Settings of the explanation, see `drone_rl.ExplainSettings`.
     """
-    logits = drone_rl.Sb3Logits(model)  # or any callable from pictures to logits
+    logits = drone_rl.Sb3Logits(model)  # or any callable from images to logits
     policy = drone_rl.policy_from(logits, camera=CAMERA, transforms=[Rgb()], name="PPO of SB3")
     print(drone_rl.judge(policy, episodes=settings.get("episodes", 400)))
     print(drone_rl.explain(policy, folder=folder, **settings).report)

@@ -1,7 +1,7 @@
-"""Flies a policy that is an ONNX model: pictures go to onnxruntime, and actions come back.
+"""Run a policy as an ONNX model: onnxruntime maps images to actions.
 
 drone-rl export policy=good format=onnx hydra.run.dir=exported
-python examples/run_onnx.py exported/policy.onnx      # three cubes in each of ten episodes
+python examples/run_onnx.py exported/policy.onnx      # prints 3.0 (three cubes) ten times
 """
 
 import json
@@ -15,12 +15,12 @@ from drone_rl.envs import DroneEnv
 
 
 def fly(path: str, episodes: int = 10, seed: int = 0) -> list[float]:
-    """The reward of each episode, flown by the most probable actions."""
+    """Return the reward of each episode of the greedy policy."""
     session = onnxruntime.InferenceSession(path)
-    about = session.get_modelmeta().custom_metadata_map
-    told = {key: json.loads(text) for key, text in about.items()}
-    task = TaskSettings.read(told["task"], "task")
-    camera = CameraSettings.read(told["camera"], "camera")
+    metadata = session.get_modelmeta().custom_metadata_map
+    read = {key: json.loads(text) for key, text in metadata.items()}
+    task = TaskSettings.read(read["task"], "task")
+    camera = CameraSettings.read(read["camera"], "camera")
     env, rewards = DroneEnv(1, task, camera, seed=seed), []
     for _ in range(episodes):
         state, reward = env.reset(), 0.0

@@ -1,4 +1,4 @@
-"""Trains our environment with nothing but TorchRL's own collector, our loss and our returns.
+"""Train with TorchRL's own collector and drone_rl's environment, returns and loss.
 
 python examples/train_with_torchrl.py     # to 2.97 of 3 cubes: half a minute on two cores
 """
@@ -18,12 +18,12 @@ from drone_rl.policies import SmallCNN, make_actor
 
 @dataclasses.dataclass
 class Training:
-    """What came of it."""
+    """Result of a training."""
 
     network: nn.Module
     frames: int = 0
     running_reward: float = 0.0
-    """Of the episodes, of which each leaves 99%."""
+    """Exponential mean of the episode reward, with a decay of 0.99 per episode."""
 
 
 def train(
@@ -35,15 +35,15 @@ def train(
     lr: float = 2e-3,
     seed: int = 0,
 ) -> Training:
-    """Trains until the running mean of the episodes' rewards reaches the target.
+    """Train until the running mean of the episode reward reaches the target.
 
     Args:
-        target: Of 3 cubes.
-        max_frames: Stop after so many in any case.
-        num_envs: Worlds.
-        steps: Of each world in a batch: a first, aimless episode takes about 130, a good one 45.
+        target: Cubes per episode, of 3.
+        max_frames: Largest number of frames.
+        num_envs: Number of environments.
+        steps: Steps of each environment in a batch. Random episodes take about 130, good ones 45.
         lr: Learning rate.
-        seed: Of worlds, weights and actions.
+        seed: Seed of environments, weights and actions.
     """
     pipeline = Compose(GrayPixels(), StandardizePixels(), RewardSum())
     env = TransformedEnv(DroneEnv(num_envs, seed=seed), pipeline)

@@ -1,4 +1,4 @@
-"""Examples are programs beside the package: each is loaded by its file."""
+"""Loads examples, which are programs outside the package, from their files."""
 
 import importlib.util
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The example runs as it stands, in short form, and is short itself."""
+"""Runs the example in a short version, and limits its length."""
 
 from pathlib import Path
 
@@ -27,5 +27,5 @@ def test_a_model_is_trained_saved_judged_and_explained(example, tmp_path, capsys
     assert "What is left out" not in page
 
 
-def test_it_is_short():
+def test_length():
     assert len(PATH.read_text().splitlines()) <= 50

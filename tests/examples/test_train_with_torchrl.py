@@ -1,4 +1,4 @@
-"""The example runs as it stands, in short form, and is short itself."""
+"""Runs the example in a short version, and limits its length."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ def test_it_stops_at_the_target(example):
     assert example.train(num_envs=4, steps=160, max_frames=9600, target=0.0).frames == 640
 
 
-def test_it_is_short():
+def test_length():
     assert len(PATH.read_text().splitlines()) <= 85
 
 
