@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from omegaconf import OmegaConf
 
-from drone_rl.cli.hydra.help import comments, explained, read_comments, show_help
+from drone_rl.cli.hydra.help import _with_parents, comments, explained, read_comments, show_help
 from tests.cli.hydra.conftest import MODULES
 
 CONF = Path(__file__).parents[3] / "conf"
@@ -30,7 +30,7 @@ def test_a_file_says_what_the_files_do_that_it_starts_from():
     assert found["transforms.gray"] == "RGB bytes to gray from 0 to 1."
     assert found["transforms.crop.top"] == "First row."
     assert found["task.spacing"] == "Distance in x from one cube to the next."
-    assert found["seed"].startswith("Root of every random stream")
+    assert found["seed"].startswith("Root of all random streams")
 
 
 def test_values_stand_below_their_comments():
@@ -58,7 +58,7 @@ def test_every_knob_of_every_file_has_a_comment(path):
     if path.parent.name == "hydra":
         return
     values = OmegaConf.to_container(OmegaConf.load(path), resolve=False)
-    found = read_comments(path)
+    found = {name for file in _with_parents(path) for name in read_comments(file)}
     for name, value in (values or {}).items():
         if name == "defaults" or isinstance(value, dict):
             continue
