@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binom, multinomial
 
-from benchmarks.simulated import bench_false_certain
+from benchmarks.simulated_policies import bench_false_certain
 from drone_rl.utils.intervals import mean_bounds, median_bounds, proportion
 
 NEGLIGIBLE = 1e-10

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.commands import watch
-from benchmarks.parts import default_pipeline
+from benchmarks.pipeline import default_pipeline
 from drone_rl.explanations import embedding
 from drone_rl.explanations.hooks import feature_layer
 from drone_rl.explanations.response import response_map

@@ -11,7 +11,7 @@ import mujoco_warp as mjw
 import torch
 import warp as wp
 
-from benchmarks.parts import default_collector, paired, rate
+from benchmarks.pipeline import default_collector, paired, rate
 from drone_rl.config import CameraSettings, DynamicsSettings
 from drone_rl.sim.dynamics import FlightState, Quadrotor
 from drone_rl.sim.worlds import Worlds

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from benchmarks.parts import make_worlds, paired, random_walk
+from benchmarks.pipeline import make_worlds, paired, random_walk
 from drone_rl.utils.errors import extra
 
 _STEPS = 10

@@ -20,9 +20,9 @@ from safetensors.torch import save
 from benchmarks.hostile_arrays import hostile_arrays
 from benchmarks.hostile_case import NO_FILES, Case, Make, nested, zipped
 from benchmarks.hostile_claims import hostile_claims
+from benchmarks.hostile_explanations import hostile_explanations
 from benchmarks.hostile_folders import hostile_folders, make_run
 from benchmarks.hostile_json import hostile_json
-from benchmarks.hostile_parts import hostile_parts
 from benchmarks.hostile_policies import hostile_policies
 from benchmarks.hostile_runs import hostile_runs
 from drone_rl.config import COMPUTER_VISION, MINIMAL, MOVES_SETTINGS
@@ -90,7 +90,7 @@ def hostile_files(folder: Path) -> list[Case]:
         *hostile_json(folder, run),
         *hostile_arrays(folder),
         *hostile_claims(folder, DESCRIPTION),
-        *hostile_parts(folder),
+        *hostile_explanations(folder),
         *hostile_runs(folder, run),
     ]
 

@@ -8,8 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from benchmarks.liars import liars
-from benchmarks.planted import Planted, plant, reach
+from benchmarks.adversarial_maps import liars
+from benchmarks.known_map_policies import Planted, plant, reach
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.trust import Pictures, Trial, check_maps, draw_pictures

@@ -98,7 +98,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "coverage": Benchmark(
         lambda s: bench_coverage(s.quick),
         "truth",
-        ("utils/intervals", "evaluation", "benchmarks/coverage", "benchmarks/simulated"),
+        ("utils/intervals", "evaluation", "benchmarks/coverage", "benchmarks/simulated_policies"),
     ),
     "sentences": Benchmark(
         lambda s: bench_sentences(),
@@ -158,7 +158,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "maps": Benchmark(
         lambda s: bench_maps(s.runs, s.quick),
         "truth",
-        (*_EXPLAINING, "benchmarks/maps", "benchmarks/liars"),
+        (*_EXPLAINING, "benchmarks/maps", "benchmarks/adversarial_maps"),
     ),
     "explain": Benchmark(
         lambda s: bench_explain(s.runs, s.quick),
@@ -168,7 +168,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "verdicts": Benchmark(
         lambda s: bench_verdicts(s.runs, s.device, s.quick),
         "truth",
-        (*_JUDGING, "benchmarks/verdicts", "benchmarks/scripted"),
+        (*_JUDGING, "benchmarks/verdicts", "benchmarks/scripted_policies"),
     ),
     "fragile_honest": Benchmark(
         lambda s: bench_fragile_honest(s.runs / "fragile_honest", s.seeds, s.quick),
@@ -222,8 +222,8 @@ BENCHMARKS: dict[str, Benchmark] = {
         (
             *_PROVING,
             "benchmarks/tampering",
-            "benchmarks/tampered_parts",
-            "benchmarks/tampered_wholes",
+            "benchmarks/tampered_inconsistent",
+            "benchmarks/tampered_consistent",
         ),
     ),
     "places": Benchmark(lambda s: bench_places(s.quick), "proof", (*_PROVING, "benchmarks/places")),

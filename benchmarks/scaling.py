@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.parts import make_worlds, random_walk
+from benchmarks.pipeline import make_worlds, random_walk
 from drone_rl.config import CameraSettings
 
 

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from benchmarks import plants
+from benchmarks import evidence_changes
 from benchmarks.evidence import (
     CARD,
     EVALUATION,
@@ -85,15 +85,15 @@ PLANTS = (
     *(
         Plant(of, f"{of}.fixed_seed", lie)
         for of in _FIXED_SEEDS
-        for lie in (plants.FRESH, plants.OTHER_SEED)
+        for lie in (evidence_changes.FRESH, evidence_changes.OTHER_SEED)
     ),
-    *_plants("verdict", plants.OF_VERDICTS),
-    *_plants("evaluation", plants.OF_EVALUATIONS),
-    *_plants("explanation", (*plants.OF_REPORTS, *plants.OF_MAPS)),
-    *_plants("card", plants.OF_CARDS),
-    *_plants("shifts", plants.OF_SHIFTS),
-    *_plants("sweep", plants.OF_SWEEPS),
-    *_plants("setting", plants.OF_SETTINGS),
+    *_plants("verdict", evidence_changes.OF_VERDICTS),
+    *_plants("evaluation", evidence_changes.OF_EVALUATIONS),
+    *_plants("explanation", (*evidence_changes.OF_REPORTS, *evidence_changes.OF_MAPS)),
+    *_plants("card", evidence_changes.OF_CARDS),
+    *_plants("shifts", evidence_changes.OF_SHIFTS),
+    *_plants("sweep", evidence_changes.OF_SWEEPS),
+    *_plants("setting", evidence_changes.OF_SETTINGS),
 )
 
 

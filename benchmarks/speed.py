@@ -10,7 +10,7 @@ from typing import Any
 
 import torch
 
-from benchmarks.parts import default_collector, make_worlds, paired, random_walk, rate
+from benchmarks.pipeline import default_collector, make_worlds, paired, random_walk, rate
 from drone_rl.config import AppearanceSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.sim.rendering import View

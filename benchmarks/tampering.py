@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.tampered_parts import PARTS
-from benchmarks.tampered_wholes import WHOLES
+from benchmarks.tampered_consistent import WHOLES
+from benchmarks.tampered_inconsistent import PARTS
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verification.check import check

@@ -14,7 +14,7 @@ from typing import Any
 import torch
 
 from benchmarks.commands import call
-from benchmarks.scripted import PILOTS, Pilot, ScriptedPolicy
+from benchmarks.scripted_policies import PILOTS, Pilot, ScriptedPolicy
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, run_baselines

@@ -2,7 +2,7 @@ import json
 from pathlib import Path
 
 from benchmarks import verdicts
-from benchmarks.scripted import PILOTS
+from benchmarks.scripted_policies import PILOTS
 
 
 def entry(kind, certain, truth):

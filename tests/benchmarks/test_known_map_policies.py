@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from benchmarks.planted import (
+from benchmarks.known_map_policies import (
     WINDOWS,
     _span,
     convolution,

@@ -3,7 +3,7 @@ import json
 
 import pytest
 
-from benchmarks.tampered_wholes import WHOLES
+from benchmarks.tampered_consistent import WHOLES
 from drone_rl.verification.checker.certificate import parse_certificate
 from drone_rl.verification.checker.consistency import find_inconsistencies
 from tests.benchmarks.test_tampering import CERTIFICATE

@@ -99,7 +99,7 @@ ARRAYS: Mapping[str, tuple[str, NDArray[Any]]] = {
 """Arrays of `arrays.npz`, and what they are replaced by."""
 
 
-def hostile_parts(folder: Path) -> list[Case]:
+def hostile_explanations(folder: Path) -> list[Case]:
     """Makes the folders.
 
     Args:

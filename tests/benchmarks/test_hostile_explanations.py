@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks import hostile_parts as made
+from benchmarks import hostile_explanations as made
 from benchmarks.evidence import changed
 from drone_rl.explanations.report.validation import check_fit, check_sizes
 from drone_rl.sim.vocabulary import SHOWN_MOVES

@@ -5,7 +5,7 @@ import functools
 import pytest
 import torch
 
-from benchmarks.scripted import PILOTS, ScriptedPolicy
+from benchmarks.scripted_policies import PILOTS, ScriptedPolicy
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import run_baselines
 from drone_rl.evaluation.judge import judge

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from benchmarks.planted import reach
+from benchmarks.known_map_policies import reach
 from drone_rl.explanations import patches
 from drone_rl.explanations.patches import shuffled_networks
 from drone_rl.explanations.trust import MapOf

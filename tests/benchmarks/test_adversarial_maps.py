@@ -1,6 +1,6 @@
 import torch
 
-from benchmarks.liars import fingerprint, liars, saliency
+from benchmarks.adversarial_maps import fingerprint, liars, saliency
 from drone_rl.explanations.patches import placebo_maps
 from drone_rl.policies import MLP, SmallCNN
 

@@ -1,7 +1,7 @@
 import copy
 import json
 
-from benchmarks.tampered_parts import PARTS, largest
+from benchmarks.tampered_inconsistent import PARTS, largest
 from tests.benchmarks.test_tampering import CERTIFICATE
 
 

@@ -2,15 +2,15 @@
 
 import pytest
 
-from benchmarks import parts
-from benchmarks.parts import default_pipeline, make_worlds, paired, random_walk, rate
+from benchmarks import pipeline
+from benchmarks.pipeline import default_pipeline, make_worlds, paired, random_walk, rate
 
 
 @pytest.fixture
 def clock(monkeypatch):
     """A clock that work turns on by the seconds it is said to take."""
     now = [0.0]
-    monkeypatch.setattr(parts.time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(pipeline.time, "perf_counter", lambda: now[0])
 
     def work(items, *seconds):
         left = list(seconds)

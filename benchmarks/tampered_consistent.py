@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from benchmarks.tampered_parts import Data, Way, largest
+from benchmarks.tampered_inconsistent import Data, Way, largest
 from drone_rl.policies.policy import load_policy
 from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.checker.consistency import MOST_MISSING, volume

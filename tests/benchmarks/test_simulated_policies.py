@@ -1,8 +1,17 @@
 import numpy as np
 import pytest
 
-from benchmarks import simulated
-from benchmarks.simulated import A, L, R, Simulated, _join, _mixture, judge_samples, policies
+from benchmarks import simulated_policies
+from benchmarks.simulated_policies import (
+    A,
+    L,
+    R,
+    Simulated,
+    _join,
+    _mixture,
+    judge_samples,
+    policies,
+)
 from drone_rl.evaluation.rule import Kind, Rule
 
 
@@ -64,7 +73,7 @@ def test_who_is_far_from_thresholds_is_judged_right():
 
 def test_intervals_that_are_too_narrow_are_found_out(monkeypatch):
     """At exactly 0.9, whoever trusts the mean is often certain and wrong."""
-    exact = simulated.estimate
+    exact = simulated_policies.estimate
 
     def narrow(*args):
         found = exact(*args)
@@ -73,8 +82,8 @@ def test_intervals_that_are_too_narrow_are_found_out(monkeypatch):
 
     policy = policies()["all or nothing, success +0.00"]
     assert sampled(policy, 400, 100).count(Kind.GOOD) == 0
-    monkeypatch.setattr(simulated, "estimate", narrow)
+    monkeypatch.setattr(simulated_policies, "estimate", narrow)
     assert sampled(policy, 400, 100).count(Kind.GOOD) > 20
-    monkeypatch.setattr(simulated, "EPISODES", (400,))
-    monkeypatch.setattr(simulated, "policies", lambda: {"on the edge": policy})
-    assert simulated.bench_false_certain(quick=True)["false_certain_rate"] > 0.2
+    monkeypatch.setattr(simulated_policies, "EPISODES", (400,))
+    monkeypatch.setattr(simulated_policies, "policies", lambda: {"on the edge": policy})
+    assert simulated_policies.bench_false_certain(quick=True)["false_certain_rate"] > 0.2
