@@ -20,7 +20,7 @@ from benchmarks.maps import bench_maps
 from benchmarks.memory import bench_memory
 from benchmarks.mutants import bench_mutants
 from benchmarks.onnx_export import bench_onnx
-from benchmarks.peers.side_by_side import bench_peers
+from benchmarks.peers.comparison import bench_peers
 from benchmarks.places import bench_places
 from benchmarks.proving import bench_many_cubes, bench_provable, bench_prove, bench_tampering
 from benchmarks.render_truth import bench_render_truth

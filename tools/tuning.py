@@ -3,7 +3,7 @@
     python -m tools.tuning [NAME ...]
 
 Each setting is tried from seeds that `drone-rl bench peers` does not use; the one with the least
-mean time from the start of the process until it is solved is what `contenders.py` and `conf` have.
+mean time from the start of the process until it is solved is what `benchmarks/peers/settings.py` and `conf` have.
 It takes half an hour on two cores. One training that is not solved rules a setting out.
 """
 
@@ -15,7 +15,7 @@ from pathlib import Path
 from statistics import mean
 from typing import Any
 
-from benchmarks.peers.side_by_side import train_ours, train_theirs
+from benchmarks.peers.comparison import train_ours, train_theirs
 
 SEEDS = (100, 101)
 MOST_FRAMES = 200_000

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.peers.contenders import LABELS, THEIRS
+from benchmarks.peers.settings import LABELS, THEIRS
 
 COLORS = {
     "start and imports": "0.8",

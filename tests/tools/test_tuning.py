@@ -1,6 +1,6 @@
 """Everybody is tuned with the same care, and what was found is what is used."""
 
-from benchmarks.peers import contenders
+from benchmarks.peers import settings as peers
 from tools import tuning
 
 
@@ -8,13 +8,13 @@ def test_all_have_as_many_settings_and_none_twice():
     tried = [*tuning.OURS.values(), *tuning.THEIRS.values()]
     assert {len(settings) for settings in tried} == {6}
     assert all(len({str(one) for one in settings}) == 6 for settings in tried)
-    assert [*tuning.OURS, *tuning.THEIRS] == [*contenders.LABELS]
+    assert [*tuning.OURS, *tuning.THEIRS] == [*peers.LABELS]
 
 
 def test_the_settings_that_are_measured_are_of_those_that_were_tried():
     for name in ("a2c", "ppo"):
-        assert " ".join(contenders.OURS[name]) in tuning.OURS[name]
-    for name, settings in contenders.THEIRS.items():
+        assert " ".join(peers.OURS[name]) in tuning.OURS[name]
+    for name, settings in peers.THEIRS.items():
         assert dict(settings) in tuning.THEIRS[name]
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from benchmarks.peers.contenders import LABELS, OURS, THEIRS
+from benchmarks.peers.settings import LABELS, OURS, THEIRS
 from tools.readme.tables import UNKNOWN
 
 _SHOWN = {

@@ -4,8 +4,8 @@ import inspect
 
 import pytest
 
-from benchmarks.peers.contenders import LABELS, OURS, THEIRS
 from benchmarks.peers.program import PEERS
+from benchmarks.peers.settings import LABELS, OURS, THEIRS
 
 
 def test_everybody_has_settings_and_a_name():

@@ -2,9 +2,9 @@
 
 import pytest
 
-from benchmarks.peers import side_by_side
-from benchmarks.peers.contenders import LABELS, OURS, THEIRS
-from benchmarks.peers.side_by_side import bench_peers, train_ours, train_theirs
+from benchmarks.peers import comparison
+from benchmarks.peers.comparison import bench_peers, train_ours, train_theirs
+from benchmarks.peers.settings import LABELS, OURS, THEIRS
 
 KEYS = {"seconds", "seconds_without_imports", "frames", "is_solved", "success_lower95"}
 
@@ -26,8 +26,8 @@ def test_lists_by_seed_in_the_order_of_seeds_by_turns(tmp_path, monkeypatch):
         assert (settings, max_frames) == (THEIRS[name], 1_000_000 if episodes else 1)
         return measured(name, seed, episodes)
 
-    monkeypatch.setattr(side_by_side, "train_ours", ours)
-    monkeypatch.setattr(side_by_side, "train_theirs", theirs)
+    monkeypatch.setattr(comparison, "train_ours", ours)
+    monkeypatch.setattr(comparison, "train_theirs", theirs)
     told_all = bench_peers(tmp_path / "runs" / "peers", [5, 4], 3, quick=False)
     found = told_all["peers"]
     assert told_all["solve_over_best_peer"] == pytest.approx(14.5 / 16.5)

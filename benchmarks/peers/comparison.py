@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.commands import train
-from benchmarks.peers.contenders import OURS, THEIRS
 from benchmarks.peers.plot import plot
 from benchmarks.peers.program import success_lower95
+from benchmarks.peers.settings import OURS, THEIRS
 
 Measured = dict[str, Any]
 
@@ -38,12 +38,12 @@ def bench_peers(folder: Path, seeds: Sequence[int], episodes: int, quick: bool) 
         "solve_over_best_peer": the mean of our default's "seconds" over the best other's.
     """
     if not quick:  # or the first would read all files from the disk for the others
-        for start in _contenders(folder / "starts", 0, quick=True).values():
+        for start in _trainings(folder / "starts", 0, quick=True).values():
             start(seed=seeds[0])
-    contenders = _contenders(folder, episodes, quick)
-    found: dict[str, dict[str, list]] = {name: {} for name in contenders}
+    trainings = _trainings(folder, episodes, quick)
+    found: dict[str, dict[str, list]] = {name: {} for name in trainings}
     for seed in seeds[:1] if quick else seeds:
-        for name, measure in contenders.items():
+        for name, measure in trainings.items():
             for key, value in measure(seed=seed).items():
                 found[name].setdefault(key, []).append(value)
     plot(found, folder.parent.parent / "peers.png")
@@ -52,20 +52,20 @@ def bench_peers(folder: Path, seeds: Sequence[int], episodes: int, quick: bool) 
     return {"peers": found, "solve_over_best_peer": means["reinforce"] / best}
 
 
-def _contenders(folder: Path, episodes: int, quick: bool) -> dict[str, Callable[..., Measured]]:
+def _trainings(folder: Path, episodes: int, quick: bool) -> dict[str, Callable[..., Measured]]:
     """A training by each, of a seed."""
-    contenders: dict[str, Callable[..., Measured]] = {}
+    trainings: dict[str, Callable[..., Measured]] = {}
     for name, arguments in OURS.items():
         short = ("trainer.total_frames=1",) if quick else ()
-        contenders[name] = functools.partial(
+        trainings[name] = functools.partial(
             train_ours, (*arguments, *short), episodes=episodes, folder=folder / name
         )
     for name, settings in THEIRS.items():
         most = 1 if quick else 1_000_000
-        contenders[name] = functools.partial(
+        trainings[name] = functools.partial(
             train_theirs, name, settings, episodes=episodes, max_frames=most
         )
-    return contenders
+    return trainings
 
 
 def train_ours(arguments: Sequence[str], *, seed: int, episodes: int, folder: Path) -> Measured:
