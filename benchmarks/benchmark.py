@@ -1,4 +1,4 @@
-"""A benchmark: what it runs, and the code that its figures are of."""
+"""Definition of a benchmark, and the setup of a measurement."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -10,35 +10,35 @@ import torch
 from drone_rl.config.commands import BenchSettings
 
 Figures = Mapping[str, Any]
-"""Plain values by key. No two benchmarks make the same key."""
+"""Plain values by key. No two benchmarks return the same key."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Setup:
-    """Where and how thoroughly to measure."""
+    """Folder, device and sizes of a measurement."""
 
     folder: Path
-    """Of the results; runs of commands are kept below it."""
+    """Folder of the results; `runs` is below it."""
     quick: bool
-    """Whether a rough figure will do."""
+    """Whether to take a short, rough measurement."""
     device: str
-    """Where worlds are drawn and policies run: cpu, cuda or cuda:N."""
+    """Device of rendering and policies: cpu, cuda or cuda:N."""
     num_envs: int
-    """Worlds in a batch of the speed benchmarks; a quick one takes 64."""
+    """Environments in a batch of the speed benchmarks, unless quick; see `batch_size`."""
     seeds: tuple[int, ...]
-    """Of the trainings that are timed."""
+    """Seeds of the timed trainings."""
     episodes: int
-    """Held-out ones of each trained policy."""
+    """Held-out episodes that evaluate each trained policy."""
     memory_frames: int
-    """Over which memory must stay flat."""
+    """Number of frames over which memory must not grow."""
 
     @classmethod
-    def of(cls, settings: BenchSettings, folder: Path) -> Self:
-        """What the settings ask for.
+    def from_settings(cls, settings: BenchSettings, folder: Path) -> Self:
+        """Return the setup that the settings of `drone-rl bench` describe.
 
         Args:
-            settings: The command's.
-            folder: Of the results.
+            settings: Settings of the command.
+            folder: Folder of the results.
         """
         return cls(
             folder=folder,
@@ -51,29 +51,29 @@ class Setup:
         )
 
     @property
-    def worlds(self) -> int:
-        """Worlds in a batch."""
+    def batch_size(self) -> int:
+        """Number of environments in a batch: 64 if quick."""
         return 64 if self.quick else self.num_envs
 
     @property
     def threads(self) -> int:
-        """That draw."""
+        """Number of rendering threads."""
         return 1 if self.device.startswith("cuda") else torch.get_num_threads()
 
     @property
     def runs(self) -> Path:
-        """Folder of what commands leave."""
+        """Working folder of the commands that benchmarks run."""
         return self.folder / "work"  # runs/ holds the logs of drone-rl bench itself
 
 
 @dataclasses.dataclass(frozen=True)
 class Benchmark:
-    """One that runs alone."""
+    """A function that measures figures, and the code that it measures."""
 
     run: Callable[[Setup], Figures]
-    """Measures."""
+    """Measure and return the figures."""
     group: str
-    """Those that are run by one name."""
+    """Name of the group of benchmarks that it belongs to."""
     measures: tuple[str, ...]
-    """Packages and modules of drone_rl, modules of benchmarks, and conf, that decide its figures:
-    when one changes, the figures are out of date."""
+    """Packages and modules of drone_rl, modules of benchmarks, and conf. If one of them changes,
+    the figures are out of date."""

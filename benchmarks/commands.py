@@ -1,4 +1,4 @@
-"""Commands as a user starts them, each in a process of its own."""
+"""Run commands of `drone-rl` in separate processes, as a user does."""
 
 import os
 import subprocess
@@ -17,10 +17,16 @@ def call(
     program: tuple[str, ...] = PROGRAM,
     environment: Mapping[str, str] | None = None,
 ) -> None:
-    """Runs `drone-rl`, or a `program` that takes the same arguments, in an added environment.
+    """Run `drone-rl`.
+
+    Args:
+        args: Arguments of the command.
+        statuses: Exit statuses that count as success.
+        program: Another program that takes the same arguments.
+        environment: Additional environment variables.
 
     Raises:
-        RuntimeError: Its exit status is none of `statuses`.
+        RuntimeError: The exit status is not in `statuses`.
     """
     done = subprocess.run(
         [*program, *args],
@@ -34,17 +40,17 @@ def call(
 
 
 def train(run: Path, *args: str) -> tuple[float, Any]:
-    """Runs `drone-rl train`.
+    """Run `drone-rl train`.
 
     Args:
         run: Folder of the run.
-        args: Others.
+        args: Overrides.
 
     Returns:
-        Seconds from the start of the command to its end, and what is in result.json.
+        Seconds from the start of the command to its end, and the content of result.json.
 
     Raises:
-        RuntimeError: It failed.
+        RuntimeError: The command failed.
     """
     begin = time.perf_counter()
     call("train", *args, f"hydra.run.dir={run}")
@@ -52,13 +58,13 @@ def train(run: Path, *args: str) -> tuple[float, Any]:
 
 
 def watch(*args: str) -> tuple[float, float]:
-    """Runs `drone-rl` with arguments.
+    """Run `drone-rl` and monitor its memory.
 
     Returns:
-        Seconds from start to end, and the peak of its memory in MiB.
+        Seconds from start to end, and peak resident memory (MiB).
 
     Raises:
-        RuntimeError: It failed.
+        RuntimeError: The command failed.
     """
     begin, peak = time.perf_counter(), 0.0
     process = subprocess.Popen(
@@ -73,7 +79,7 @@ def watch(*args: str) -> tuple[float, float]:
 
 
 def memory_status(pid: int) -> dict[str, float]:
-    """Memory of a process in MiB, as the kernel counts it."""
+    """Return the "Vm..." fields of /proc/PID/status in MiB; empty if the process has ended."""
     try:
         lines = Path(f"/proc/{pid}/status").read_text().splitlines()
     except OSError:

@@ -1,10 +1,10 @@
 # pyright: reportOptionalMemberAccess=false, reportAttributeAccessIssue=false
 # pyright: reportArgumentType=false
-# (dm_control's models of XML are untyped.)
-"""dm_control's own pixel path, for comparison: one world, drawn by OpenGL.
+# (dm_control's XML models are untyped.)
+"""Speed of dm_control's pixel observations: one environment, rendered with OpenGL.
 
-Run as a program (`python -m benchmarks.dm_control QUALITY SECONDS`) with MUJOCO_GL=egl, since
-OpenGL's platform is chosen when dm_control is imported.
+Run as a program (`python -m benchmarks.dm_control QUALITY SECONDS`) with MUJOCO_GL=egl, because
+dm_control chooses OpenGL's platform when it is imported.
 """
 
 import json
@@ -24,10 +24,10 @@ _PLAIN = dict.fromkeys(("shadow", "reflection", "skybox", "fog", "haze"), False)
 
 
 def default_rate(seconds: float) -> float:
-    """Steps a second with pixels, at MuJoCo's default quality.
+    """Return the steps per second with pixel observations at MuJoCo's default quality.
 
-    Shadows from a shadow map of 4096 texels and 4 samples a pixel, as in a dm_control scene in
-    which nobody has touched the quality settings.
+    The shadow map has 4096 texels and each pixel 4 samples, as in a dm_control scene with default
+    quality settings.
     """
     task = ComposerTask()
     root = task.root_entity.mjcf_model
@@ -38,10 +38,10 @@ def default_rate(seconds: float) -> float:
 
 
 def tuned_rate(seconds: float) -> float:
-    """Steps a second with pixels, with everything dear turned off by hand.
+    """Return the steps per second with pixel observations and all slow options turned off.
 
-    No shadows, one sample a pixel, all scene flags off, and one camera kept instead of one made for
-    every picture.
+    There are no shadows, one sample for each pixel, no scene flags, and one camera for all frames
+    instead of a new one for each frame.
     """
     task = ComposerTask(pixels=False)
     root = task.root_entity.mjcf_model
@@ -67,15 +67,15 @@ def _environment(task: ComposerTask) -> composer.Environment:
     )
 
 
-def _rate(env: composer.Environment, draw: Callable[[], object], seconds: float) -> float:
+def _rate(env: composer.Environment, render: Callable[[], object], seconds: float) -> float:
     actions = np.random.RandomState(0)
     timestep = env.reset()
     env.step(0)
-    draw()
+    render()
     frames, begin = 0, time.perf_counter()
     while time.perf_counter() - begin < seconds:
         timestep = env.reset() if timestep.last() else env.step(actions.randint(3))
-        draw()
+        render()
         frames += 1
     return frames / (time.perf_counter() - begin)
 

@@ -1,4 +1,4 @@
-"""How long explanations take."""
+"""Time and memory of explanations."""
 
 import json
 import time
@@ -15,7 +15,7 @@ from drone_rl.explanations.scenes import Scenes
 
 
 def bench_explain(folder: Path, quick: bool) -> dict[str, Any]:
-    """The whole of `drone-rl explain policy=good`, and its dearest parts."""
+    """Measure `drone-rl explain policy=good` and its slowest parts."""
     run = folder / "explain"
     frames = 100 if quick else 600
     small = ["frames=100", "episodes=20", "perplexity=10"] if quick else []

@@ -1,39 +1,39 @@
-"""Frames a second of the Gymnasium vector environment over the batched environment itself."""
+"""Speed of the Gymnasium vector environment relative to the batched TorchRL environment."""
 
 import numpy as np
 
-from benchmarks.pipeline import make_worlds, paired, random_walk
+from benchmarks.pipeline import make_drone_env, paired, random_walk
 from drone_rl.utils.errors import extra
 
 _STEPS = 10
-"""Of a batch between two looks at the clock."""
+"""Steps of a batch in a call of `walk`."""
 
 
 def bench_gymnasium(num_envs: int, device: str, quick: bool) -> dict[str, float]:
-    """Random actions in both by turns; each frame that is observed counts, those of resets too.
+    """Take random actions in both environments alternately and count all observations.
 
     Args:
-        num_envs: Worlds in each batch.
-        device: Where they are drawn.
-        quick: Whether a rough figure will do.
+        num_envs: Number of environments in each batch.
+        device: Rendering device.
+        quick: Whether to take a short, rough measurement.
 
     Returns:
-        "gym_over_batched", the median ratio of rounds, and both rates: "gym_fps" and
-        "batched_beside_gym_fps".
+        "gym_over_batched", the median ratio of all rounds; "gym_fps" and
+        "batched_beside_gym_fps", the frames per second of both.
 
     Raises:
-        InputError: Gymnasium isn't installed.
+        InputError: Gymnasium is not installed.
     """
     extra("gymnasium", "gym", "drone-rl bench gymnasium")
     from drone_rl.envs.gymnasium.environments import DroneWorlds
 
-    worlds, env = DroneWorlds(num_envs, device=device), make_worlds(num_envs, device)
-    draw = np.random.default_rng(0)
-    worlds.reset(seed=0)
+    vector, env = DroneWorlds(num_envs, device=device), make_drone_env(num_envs, device)
+    rng = np.random.default_rng(0)
+    vector.reset(seed=0)
 
     def walk() -> int:
         for _ in range(_STEPS):
-            worlds.step(draw.integers(0, 3, num_envs))
+            vector.step(rng.integers(0, 3, num_envs))
         return _STEPS * num_envs
 
     for work in (walk, lambda: random_walk(env, _STEPS)):
@@ -44,6 +44,6 @@ def bench_gymnasium(num_envs: int, device: str, quick: bool) -> dict[str, float]
         seconds=0.5 if quick else 4.0,
         rounds=1 if quick else 9,
     )
-    worlds.close()
+    vector.close()
     env.close()
     return {"gym_over_batched": ratio, "gym_fps": ours, "batched_beside_gym_fps": batched}

@@ -1,6 +1,6 @@
-"""Measured figures in a file: each benchmark's with the code, the day and the machine they are of.
+"""Store measured figures in a file, with the revision, the date and the machine of each benchmark.
 
-The file holds the figures by their keys and, under "benchmarks", where each benchmark's come from.
+The file maps keys to figures. Its entry "benchmarks" holds the origin of each benchmark's figures.
 """
 
 import dataclasses
@@ -19,7 +19,7 @@ from drone_rl.utils.limits import LEDGER_BYTES
 from drone_rl.utils.provenance import git_revision, num_cores
 
 ORIGINS = "benchmarks"
-"""The entry that is no figure."""
+"""Key of the entry that holds the origins."""
 _ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -30,31 +30,31 @@ class Origin:
     revision: str | None
     """Commit of the checkout, with "-dirty" if it was changed; None outside one."""
     date: str
-    """Day, as YYYY-MM-DD."""
+    """Date of the measurement, YYYY-MM-DD."""
     machine: str
-    """Processor and system."""
+    """Cores, processor and operating system."""
     code: str | None
-    """Digest of the code that was measured; None if unknown."""
+    """Digest of the measured code; None if unknown."""
     settings: dict[str, Any]
-    """Of the measurement."""
+    """Settings of the measurement."""
     keys: tuple[str, ...]
-    """Its figures."""
+    """Keys of the benchmark's figures."""
 
 
 class Ledger:
-    """A file of figures."""
+    """A results file: figures by key, and the origin of each benchmark's figures."""
 
     def __init__(self, path: Path) -> None:
-        """Reads the file; one that is not there yet is empty.
+        """Read the file; a missing file counts as empty.
 
         Raises:
-            InputError: It can't be read.
+            InputError: The file is not a results file.
         """
         self.path = path
         self.figures: dict[str, Any] = {}
-        """By key."""
+        """Figures by key."""
         self.origins: dict[str, Origin] = {}
-        """By the benchmarks' names."""
+        """Origins by benchmark."""
         if path.exists():
             self._read(read_json(path, LEDGER_BYTES))
 
@@ -66,11 +66,11 @@ class Ledger:
                 self.origins[name] = origin
         except (AttributeError, KeyError, TypeError) as error:
             raise InputError(
-                f"{self.path} holds no figures of benchmarks ({error!r}); move it away"
+                f"{self.path} is not a benchmark results file ({error!r}); move it away"
             ) from error
 
     def add(self, name: str, figures: Figures, origin: Origin) -> None:
-        """Puts a benchmark's figures in place of its older ones, and writes the file."""
+        """Replace a benchmark's figures and write the file."""
         if name in self.origins:
             for key in self.origins[name].keys:
                 self.figures.pop(key, None)
@@ -81,19 +81,19 @@ class Ledger:
         write_atomically(self.path, text + "\n")
 
     def of(self, name: str) -> dict[str, Any]:
-        """The figures of one benchmark, empty if it was not run."""
+        """Return the figures of one benchmark; empty if it has not run."""
         keys = self.origins[name].keys if name in self.origins else ()
         return {key: self.figures[key] for key in keys}
 
     def is_current(self, name: str, code: str, settings: dict[str, Any]) -> bool:
-        """Whether a benchmark was run with just this code, these settings and this machine."""
+        """Return whether the figures come from this code, these settings and this machine."""
         origin = self.origins.get(name)
-        here = (code, settings, describe_machine())
-        return origin is not None and (origin.code, origin.settings, origin.machine) == here
+        current = (code, settings, describe_machine())
+        return origin is not None and (origin.code, origin.settings, origin.machine) == current
 
 
 def make_origin(code: str, settings: dict[str, Any]) -> Origin:
-    """The origin of figures that are measured here and now."""
+    """Return the origin of figures measured now on this machine; `keys` is empty."""
     return Origin(
         revision=git_revision(),
         date=datetime.date.today().isoformat(),
@@ -105,15 +105,15 @@ def make_origin(code: str, settings: dict[str, Any]) -> Origin:
 
 
 def digest_code(measures: Iterable[str], root: Path = _ROOT) -> str:
-    """A digest of packages, modules and settings.
+    """Return a digest of source files and settings.
 
     Args:
-        measures: Packages and modules below drone_rl, such as "sim", or modules of benchmarks, such
-            as "benchmarks/speed"; "conf" means the settings.
-        root: Of the checkout.
+        measures: Packages and modules of drone_rl, such as "sim", or modules of benchmarks, such
+            as "benchmarks/speed"; "conf" stands for the YAML files in conf/.
+        root: Folder of the checkout.
 
     Raises:
-        FileNotFoundError: There is no such package or module.
+        FileNotFoundError: A package or module does not exist.
     """
     files = []
     for name in sorted(measures):
@@ -129,7 +129,7 @@ def digest_code(measures: Iterable[str], root: Path = _ROOT) -> str:
 
 
 def describe_machine() -> str:
-    """Cores, processor and system in a line."""
+    """Return cores, processor and operating system in one line."""
     return f"{num_cores()} cores, {_processor()}, {platform.system()}"
 
 

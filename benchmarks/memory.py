@@ -1,4 +1,4 @@
-"""Memory of a whole training: its peak, and what is never given back."""
+"""Memory of a whole training: its peak and its growth."""
 
 import json
 import os
@@ -15,46 +15,47 @@ from drone_rl.utils.imports import leave_compiler_unloaded
 from drone_rl.utils.memory import look_for_garbage_rarely
 
 SETTLING_FRAMES = 100_000
-"""After which a training has seen what it will see: numbers of worlds, lengths of batches."""
+"""Frames after which a training has met all batch lengths and numbers of active environments."""
 
 
 def bench_memory(folder: Path, frames: int, device: str, quick: bool) -> dict[str, Any]:
-    """Trains on past the target, in a process of its own that watches its resident memory.
+    """Train in a separate process without a target and record its resident memory.
 
     Args:
-        folder: For the run.
-        frames: Over which memory must stay flat, after the first `SETTLING_FRAMES`.
-        device: Where to train.
-        quick: Whether a few thousand will do.
+        folder: Folder of the run.
+        frames: Number of frames over which growth is measured, after the first `SETTLING_FRAMES`.
+        device: Device of the training.
+        quick: Whether to train a few thousand frames only.
 
     Returns:
-        The peak, and the growth.
+        The peak (MiB) and the growth (MiB per million frames).
 
     Raises:
         RuntimeError: The training failed.
     """
     settling, frames = (1_000, 40_000) if quick else (SETTLING_FRAMES, frames)
-    given = [sys.executable, "-m", __name__, str(folder / "memory"), str(settling + frames), device]
-    done = subprocess.run(given, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    arguments = [str(folder / "memory"), str(settling + frames), device]
+    command = [sys.executable, "-m", __name__, *arguments]
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     if done.returncode != 0:
-        raise RuntimeError(f"the training for the memory benchmark failed: {done.returncode}")
-    noted = json.loads(done.stdout)
+        raise RuntimeError(f"the training of the memory benchmark failed: status {done.returncode}")
+    measured = json.loads(done.stdout)
     return {
-        "peak_memory_mib": noted["peak"],
-        "memory_growth_mib_per_million_frames": growth(noted["samples"], settling),
+        "peak_memory_mib": measured["peak"],
+        "memory_growth_mib_per_million_frames": growth(measured["samples"], settling),
         "memory_frames": frames,
     }
 
 
 def growth(samples: Sequence[tuple[int, float]], settling: int) -> float | None:
-    """Slope of the line through what is resident between two updates, once that has settled.
+    """Return the slope of a straight line fitted to the resident memory after each update.
 
     Args:
-        samples: Frames and resident memory, MiB.
-        settling: Frames before which a sample does not count.
+        samples: Pairs of frames and resident memory (MiB).
+        settling: Samples before this number of frames are ignored.
 
     Returns:
-        MiB for a million frames; None where there are too few samples.
+        MiB per million frames; None if there are fewer than 3 samples.
     """
     settled = np.array([s for s in samples if s[0] >= settling])
     if len(settled) < 3:
@@ -63,7 +64,7 @@ def growth(samples: Sequence[tuple[int, float]], settling: int) -> float | None:
 
 
 def main(folder: str, frames: str, device: str) -> None:
-    """Trains as `drone-rl train` does, and prints what was resident after each update."""
+    """Train as `drone-rl train` does and print the resident memory after each update."""
     look_for_garbage_rarely()
     leave_compiler_unloaded()
     import drone_rl
@@ -74,17 +75,17 @@ def main(folder: str, frames: str, device: str) -> None:
 
     samples: list[tuple[int, float]] = []
 
-    class Note(Callback):
-        """What stays when an update is over: within one, memory swings by a hundred MiB."""
+    class RecordMemory(Callback):
+        """Record the resident memory after each update; within one it varies by 100 MiB."""
 
         def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
             return_freed_memory()
             samples.append((training.progress.frames, memory_status(os.getpid())["VmRSS"]))
 
     limits = TrainerSettings(target_share=None, total_frames=int(frames))
-    drone_rl.train(folder=folder, trainer=limits, device=device, callbacks=[Note()])
+    drone_rl.train(folder=folder, trainer=limits, device=device, callbacks=[RecordMemory()])
     peak = memory_status(os.getpid())["VmHWM"]
-    print(json.dumps({"peak": peak, "samples": samples}))  # noqa: T201 -- what it is for
+    print(json.dumps({"peak": peak, "samples": samples}))  # noqa: T201 -- the parent process reads it
 
 
 if __name__ == "__main__":

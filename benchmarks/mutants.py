@@ -1,4 +1,4 @@
-"""How many small changes of the program its tests notice, as `make mutants` found."""
+"""Mutation score of the test suite, as measured by `make mutants`."""
 
 import hashlib
 import json
@@ -12,26 +12,27 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def bench_mutants(root: Path = ROOT) -> dict[str, Any]:
-    """Reads docs/mutants.json, the list that `make mutants` keeps, and counts it again.
+    """Read docs/mutants.json, which `make mutants` writes, and count its outcomes.
 
-    Its survivors may have been run again, with tests written for them; the score at first sight is
-    the one from before. A mutant whose tests ran into the time limit counts as killed. Equivalent
-    ones, each listed with its reason, count neither way.
+    Survivors may have been tested again after tests were written for them; the score at first
+    sight is the score before that. A mutant whose tests time out counts as killed. Equivalent
+    mutants, listed with a reason, are not counted.
 
     Args:
-        root: The checkout.
+        root: Folder of the checkout.
 
     Raises:
-        InputError: There is no list, or one of its modules has changed since, so that the figure
-            would be of another program.
+        InputError: The list is missing, or a module has changed since it was written.
     """
     path = root / "docs" / "mutants.json"
     if not path.exists():
-        raise InputError(f"{path} is not there; run `make mutants` in a checkout")
+        raise InputError(f"{path} does not exist; run `make mutants` in a checkout")
     kept = json.loads(path.read_text())
     stale = [name for name, digest in kept["modules"].items() if _digest(root / name) != digest]
     if stale:
-        raise InputError(f"changed since the last `make mutants`: {', '.join(stale)}; run it again")
+        raise InputError(
+            f"modules changed since the last `make mutants`: {', '.join(stale)}; run it again"
+        )
     counts = Counter(mutant["outcome"] for mutant in kept["mutants"])
     killed = counts["killed"] + counts["timeout"]
     judged = killed + counts["survived"]

@@ -1,4 +1,4 @@
-"""Do the policies that travel with the package do the same as ONNX models?"""
+"""Agreement of the shipped policies with their ONNX exports."""
 
 from pathlib import Path
 
@@ -8,15 +8,15 @@ from drone_rl.verdicts.onnx_export import export_onnx
 
 
 def bench_onnx(folder: Path, quick: bool) -> dict[str, float]:
-    """Exports them and compares each with PyTorch on 10,000 pictures of its own flights.
+    """Export the policies and compare each with PyTorch on 10,000 observations of its rollouts.
 
     Args:
-        folder: Where the models are left.
-        quick: Whether one of them will do.
+        folder: Folder of the exported models.
+        quick: Whether to export only one policy.
 
     Returns:
-        "onnx_max_difference" in any probability, "onnx_actions_differ" (pictures of which another
-        action is the most probable), and "onnx_frames" that were compared.
+        "onnx_max_difference" of any probability, "onnx_actions_differ" (frames with another
+        greedy action), and "onnx_frames" (compared frames).
     """
     folder.mkdir(parents=True, exist_ok=True)
     names = [name for name in policy_names() if load_policy(name).description.frames == 1]

@@ -1,4 +1,4 @@
-"""The default pipeline, for benchmarks that time its parts."""
+"""Components of the default pipeline, and functions that measure their speed."""
 
 import statistics
 import time
@@ -28,7 +28,7 @@ from drone_rl.training.components import make_collector
 def default_collector(
     num_envs: int, device: str, dynamics: DynamicsSettings = COMPUTER_VISION
 ) -> ThreadedCollector:
-    """The collector of `drone-rl train`, with a policy that has learned nothing yet."""
+    """Return the collector of `drone-rl train` with an untrained policy."""
     settings = TrainSettings(collector=Threads(num_envs=num_envs), device=device, dynamics=dynamics)
     collector = make_collector(settings).collector
     assert isinstance(collector, ThreadedCollector)
@@ -36,7 +36,7 @@ def default_collector(
 
 
 def default_pipeline(num_envs: int) -> tuple[TransformedEnv, ProbabilisticActor, PolicyNetwork]:
-    """Worlds on all cores, a policy that has learned nothing yet, and its network."""
+    """Return an environment with transforms, an actor with an untrained policy, and its network."""
     env = make_env(num_envs)
     shape = tuple(env.observation_spec["pixels"].shape[1:])
     network = SmallCNN(shape, 3, hidden=(128,), generator=torch.Generator().manual_seed(0))
@@ -44,7 +44,7 @@ def default_pipeline(num_envs: int) -> tuple[TransformedEnv, ProbabilisticActor,
 
 
 def random_walk(env: DroneEnv, steps: int, seed: int = 0) -> int:
-    """Steps a batch with random actions, resetting what ends. Returns the frames made."""
+    """Step a batch with random actions and automatic resets; return the number of frames."""
     generator = torch.Generator(env.device).manual_seed(seed)
     state = env.reset()
     for _ in range(steps):
@@ -53,7 +53,7 @@ def random_walk(env: DroneEnv, steps: int, seed: int = 0) -> int:
     return steps * env.batch_size[0]
 
 
-def make_worlds(
+def make_drone_env(
     num_envs: int,
     device: str,
     num_cubes: int = 3,
@@ -61,13 +61,18 @@ def make_worlds(
     camera: CameraSettings | None = None,
     appearance: AppearanceSettings | None = None,
 ) -> DroneEnv:
-    """A batch of worlds on all cores."""
+    """Return an environment without transforms."""
     task = TaskSettings(num_cubes=num_cubes)
     return DroneEnv(num_envs, task, camera, device=device, renderer=renderer, appearance=appearance)
 
 
 def rate(work: Callable[[], int], seconds: float) -> float:
-    """Items a second of work that is repeated until the time is up."""
+    """Repeat some work until the time is up; return the items per second.
+
+    Args:
+        work: Function that returns the number of items that it processed.
+        seconds: Minimum duration.
+    """
     done, begin = 0, time.perf_counter()
     while time.perf_counter() - begin < seconds:
         done += work()
@@ -77,10 +82,16 @@ def rate(work: Callable[[], int], seconds: float) -> float:
 def paired(
     first: Callable[[], int], second: Callable[[], int], seconds: float, rounds: int
 ) -> tuple[float, float, float]:
-    """Rates of two kinds of work in turn, so that a drift of the machine hits both.
+    """Measure two functions alternately, so that a drift of the machine's speed affects both.
+
+    Args:
+        first: Function that returns the number of items that it processed.
+        second: Function to compare with.
+        seconds: Minimum duration of each measurement.
+        rounds: Number of measurements of each.
 
     Returns:
-        The median rate of each and the median of the ratios first / second.
+        The median rate of each (items per second) and the median of the ratios first / second.
     """
     rates = [(rate(first, seconds), rate(second, seconds)) for _ in range(rounds)]
     return (

@@ -1,9 +1,9 @@
-"""All benchmarks, by name."""
+"""The registry of all benchmarks, by name."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from benchmarks.benchmark import Benchmark
+from benchmarks.benchmark import Benchmark, Setup
 from benchmarks.coverage import bench_coverage
 from benchmarks.domain_axes import bench_domain_axes
 from benchmarks.exact_coverage import bench_exact_coverage
@@ -42,38 +42,40 @@ from benchmarks.training import (
 from benchmarks.verdicts import bench_verdicts
 from drone_rl.utils.errors import InputError
 
-_DRAWING = ("sim", "envs")
-_COLLECTING = (*_DRAWING, "policies", "collectors")
+_RENDERING = ("sim", "envs")
+_COLLECTING = (*_RENDERING, "policies", "collectors")
 _TRAINING = (*_COLLECTING, "objectives", "training")
-_JUDGING = (*_DRAWING, "policies", "evaluation", "verdicts")
-_PROVING = (*_DRAWING, "policies", "verification/prover", "verification/checker")
+_JUDGING = (*_RENDERING, "policies", "evaluation", "verdicts")
+_PROVING = (*_RENDERING, "policies", "verification/prover", "verification/checker")
 _EXPLAINING = (*_JUDGING, "explanations")
 _CLAIMS = ("evaluation", "robustness", "verification", "verdicts", "explanations", "sweeps")
 
 
-def _trained_in_flight(asked: Any, experiment: str, seeds: Sequence[int]) -> dict[str, Any]:
-    runs = asked.runs / experiment
-    return bench_flight_training(experiment, runs, seeds, asked.episodes, asked.device, asked.quick)
+def _flight_training(setup: Setup, experiment: str, seeds: Sequence[int]) -> dict[str, Any]:
+    runs = setup.runs / experiment
+    return bench_flight_training(experiment, runs, seeds, setup.episodes, setup.device, setup.quick)
 
 
 BENCHMARKS: dict[str, Benchmark] = {
     "render": Benchmark(
-        lambda s: bench_render(s.worlds, s.device, s.quick), "main", (*_DRAWING, "benchmarks/speed")
+        lambda s: bench_render(s.batch_size, s.device, s.quick),
+        "main",
+        (*_RENDERING, "benchmarks/speed"),
     ),
     "collector": Benchmark(
-        lambda s: bench_collector(s.worlds, s.device, s.quick),
+        lambda s: bench_collector(s.batch_size, s.device, s.quick),
         "main",
         (*_COLLECTING, "benchmarks/speed"),
     ),
     "dm_control": Benchmark(
-        lambda s: bench_dm_control(s.worlds, s.device, s.quick),
+        lambda s: bench_dm_control(s.batch_size, s.device, s.quick),
         "main",
-        (*_DRAWING, "benchmarks/speed", "benchmarks/dm_control"),
+        (*_RENDERING, "benchmarks/speed", "benchmarks/dm_control"),
     ),
     "scaling": Benchmark(
         lambda s: bench_scaling(s.folder, s.device, s.quick),
         "main",
-        (*_DRAWING, "benchmarks/scaling"),
+        (*_RENDERING, "benchmarks/scaling"),
     ),
     "memory": Benchmark(
         lambda s: bench_memory(s.runs, s.memory_frames, s.device, s.quick),
@@ -260,7 +262,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "onnx": Benchmark(
         lambda s: bench_onnx(s.runs / "onnx", s.quick),
         "guests",
-        (*_DRAWING, "policies", "evaluation", "verdicts/export", "benchmarks/onnx_export"),
+        (*_RENDERING, "policies", "evaluation", "verdicts/export", "benchmarks/onnx_export"),
     ),
     "peers": Benchmark(
         lambda s: bench_peers(s.runs / "peers", s.seeds[:3], s.episodes, s.quick),
@@ -268,9 +270,9 @@ BENCHMARKS: dict[str, Benchmark] = {
         (*_TRAINING, "config", "cli", "conf", "benchmarks/peers"),
     ),
     "gymnasium": Benchmark(
-        lambda s: bench_gymnasium(s.worlds, s.device, s.quick),
+        lambda s: bench_gymnasium(s.batch_size, s.device, s.quick),
         "guests",
-        (*_DRAWING, "benchmarks/gymnasium"),
+        (*_RENDERING, "benchmarks/gymnasium"),
     ),
     "flight_speed": Benchmark(
         lambda s: bench_flight_speed(s.quick), "flight", (*_COLLECTING, "benchmarks/flight_speed")
@@ -284,40 +286,41 @@ BENCHMARKS: dict[str, Benchmark] = {
         ("sim", "flight/commands", "benchmarks/flight_paths"),
     ),
     "flight_moves": Benchmark(
-        lambda s: _trained_in_flight(s, "flight", s.seeds),
+        lambda s: _flight_training(s, "flight", s.seeds),
         "flight",
         (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
     ),
     "flight_velocity": Benchmark(
-        lambda s: _trained_in_flight(s, "flight_velocity", s.seeds[:3]),
+        lambda s: _flight_training(s, "flight_velocity", s.seeds[:3]),
         "flight",
         (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
     ),
     "flight_pillars": Benchmark(
-        lambda s: _trained_in_flight(s, "flight_pillars", s.seeds[:3]),
+        lambda s: _flight_training(s, "flight_pillars", s.seeds[:3]),
         "flight",
         (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
     ),
 }
 GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))
-"""Names of several at once: the main job, whether what is said is true, proofs, many trainings,
-what works with programs of others, drones in flight."""
+"""Names of groups of benchmarks: main (speed and training), truth (correctness of claims), many
+(sweeps), proof, hours (long proofs), guests (third-party software), room (revisions and start-up
+time), flight (vehicle dynamics)."""
 
 
-def find_benchmarks(words: Iterable[str]) -> list[str]:
-    """The benchmarks that words name, each once, in the order of the words.
+def find_benchmarks(names: Iterable[str]) -> list[str]:
+    """Return the benchmarks of some names and groups, each once, in the order of the arguments.
 
     Args:
-        words: Names of benchmarks and of groups.
+        names: Names of benchmarks and of groups.
 
     Raises:
-        InputError: A word names neither.
+        InputError: A name is neither a benchmark's nor a group's.
     """
-    names: dict[str, None] = {}
-    for word in words:
-        named = [n for n, b in BENCHMARKS.items() if word in (n, b.group)]
-        if not named:
+    found: dict[str, None] = {}
+    for name in names:
+        matches = [n for n, b in BENCHMARKS.items() if name in (n, b.group)]
+        if not matches:
             known = ", ".join((*GROUPS, *BENCHMARKS))
-            raise InputError(f"benchmark {word!r} is unknown; use some of: {known}")
-        names |= dict.fromkeys(named)
-    return list(names)
+            raise InputError(f"benchmark {name!r} is unknown; use some of: {known}")
+        found |= dict.fromkeys(matches)
+    return list(found)

@@ -1,4 +1,4 @@
-"""Runs benchmarks one after the other, and goes on where an earlier command stopped."""
+"""Run benchmarks in sequence; skip those whose figures are current."""
 
 import logging
 import shutil
@@ -20,19 +20,19 @@ def run_benchmarks(
     again: bool,
     benchmarks: Mapping[str, Benchmark] = BENCHMARKS,
 ) -> dict[str, str]:
-    """Measures, and notes each benchmark's figures as soon as they are known.
+    """Run benchmarks and store the figures of each as soon as it ends.
 
-    One that can't be run stops no other.
+    A benchmark that fails does not stop the others.
 
     Args:
-        names: Which, in this order.
-        setup: Where and how thoroughly.
-        ledger: Where figures are noted.
-        again: Whether to measure what was measured before with just this code and setup.
-        benchmarks: All that there are.
+        names: The benchmarks to run, in this order.
+        setup: Device, sizes and folder of the measurement.
+        ledger: Results file to write.
+        again: Whether to repeat benchmarks whose figures are current.
+        benchmarks: All known benchmarks by name.
 
     Returns:
-        Why those failed that did, by name.
+        The error message of each benchmark that failed, by name.
     """
     shutil.rmtree(setup.runs, ignore_errors=True)
     failures = {}
@@ -40,7 +40,7 @@ def run_benchmarks(
     for name in names:
         code = digest_code(benchmarks[name].measures)
         if not again and ledger.is_current(name, code, settings):
-            _log.info("benchmark %s: measured already with just this code; name it to repeat", name)
+            _log.info("benchmark %s: figures are current; name the benchmark to repeat it", name)
             continue
         _log.info("benchmark %s", name)
         try:
@@ -52,7 +52,7 @@ def run_benchmarks(
 
 
 def _settings(setup: Setup) -> dict[str, object]:
-    """What two measurements must share for their figures to be the same kind."""
+    """Return the settings that two measurements must share to be comparable."""
     return {
         "quick": setup.quick,
         "device": setup.device,

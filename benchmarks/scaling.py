@@ -1,4 +1,4 @@
-"""Cost must grow linearly with worlds, frames, cubes and pixels."""
+"""Time of a rollout against the numbers of environments, frames, cubes and pixels."""
 
 import statistics
 import time
@@ -7,30 +7,37 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.pipeline import make_worlds, random_walk
+from benchmarks.pipeline import make_drone_env, random_walk
 from drone_rl.config import CameraSettings
 
 
 def bench_scaling(folder: Path, device: str, quick: bool) -> dict[str, Any]:
-    """Times random flight against the number of worlds, frames, cubes and pixels, and draws it.
+    """Measure the time of random rollouts for several sizes and plot it to scaling.png.
+
+    Time must grow linearly with the numbers of environments, frames, cubes and pixels.
+
+    Args:
+        folder: Folder of the plot.
+        device: See `Setup`.
+        quick: See `Setup`.
 
     Returns:
-        For each, the sizes, the seconds and the share of the variance that a line explains.
+        For each of the four the sizes, the seconds and the R² of a straight line.
     """
-    worlds = (32, 64, 128) if quick else (32, 64, 128, 256, 512)
+    num_envs = (32, 64, 128) if quick else (32, 64, 128, 256, 512)
     cubes = (1, 4, 8) if quick else (1, 2, 4, 8, 16)
     larger = range(1, 4 if quick else 6)
     cameras = [CameraSettings(width=64 * k, height=25 * k) for k in larger]
     steps = 5 if quick else 20
     series = {
-        "worlds": {n: _seconds(make_worlds(n, device), steps, quick) for n in worlds},
+        "worlds": {n: _seconds(make_drone_env(n, device), steps, quick) for n in num_envs},
         "frames": {
-            64 * k * steps: _seconds(make_worlds(64, device), k * steps, quick)
+            64 * k * steps: _seconds(make_drone_env(64, device), k * steps, quick)
             for k in ((1, 2, 3) if quick else (1, 2, 4, 8))
         },
-        "cubes": {n: _seconds(make_worlds(128, device, n), steps, quick) for n in cubes},
+        "cubes": {n: _seconds(make_drone_env(128, device, n), steps, quick) for n in cubes},
         "pixels": {
-            c.width * c.height: _seconds(make_worlds(128, device, camera=c), steps, quick)
+            c.width * c.height: _seconds(make_drone_env(128, device, camera=c), steps, quick)
             for c in cameras
         },
     }
@@ -43,7 +50,7 @@ def bench_scaling(folder: Path, device: str, quick: bool) -> dict[str, Any]:
 
 
 def _seconds(env: Any, steps: int, quick: bool) -> float:
-    """Median time of a few random flights."""
+    """Return the median time of a few random rollouts."""
     random_walk(env, 2)
     times = []
     for _ in range(1 if quick else 5):

@@ -1,4 +1,4 @@
-"""How long a policy's flights under all conditions take, and how wide the range is."""
+"""Time of `drone-rl shifts` with the shipped good policy, and the policy's operating domain."""
 
 import time
 from typing import Any
@@ -9,20 +9,21 @@ from drone_rl.utils.progress import silent
 
 
 def bench_shifts(quick: bool) -> dict[str, Any]:
-    """Flies the shipped good policy under every condition.
+    """Evaluate the shipped good policy under every perturbation.
 
     Args:
-        quick: Whether to fly few episodes, and to look for no range.
+        quick: Whether to run few episodes and skip the operating domain.
 
     Returns:
-        "shift_suite_s": seconds from the policy's file to pictures, all axes at five strengths,
-        200 episodes each, constantly different; "shift_suite_axes": how many; "shift_area": mean
-        area under success over strength; "shift_domain": the sentence.
+        "shift_suite_s": seconds to load the policy and evaluate all axes at five constant strengths
+        with 200 episodes each, figures included; "shift_suite_axes": the number of axes;
+        "shift_area": mean area under success rate over strength; "shift_domain": the sentence
+        about the operating domain.
     """
     begin = time.perf_counter()
     episodes = 20 if quick else 200
-    flown = ShiftSettings(seed=0, modes=("constant",))
-    suite = shifts("good", flown, episodes=episodes, domain=False, progress=silent)
+    settings = ShiftSettings(seed=0, modes=("constant",))
+    suite = shifts("good", settings, episodes=episodes, domain=False, progress=silent)
     seconds = time.perf_counter() - begin
     found = {
         "shift_suite_s": seconds,
@@ -30,6 +31,6 @@ def bench_shifts(quick: bool) -> dict[str, Any]:
         "shift_area": suite.area,
     }
     if not quick:
-        whole = shifts("good", flown, strengths=[5], progress=silent)
-        found["shift_domain"] = whole.sentence
+        complete = shifts("good", settings, strengths=[5], progress=silent)
+        found["shift_domain"] = complete.sentence
     return found

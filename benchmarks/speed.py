@@ -1,4 +1,4 @@
-"""Frames a second: drawing alone, the collector, and dm_control's own pixel path."""
+"""Frames per second of the renderer, the collector and dm_control's pixel observations."""
 
 import dataclasses
 import json
@@ -10,7 +10,7 @@ from typing import Any
 
 import torch
 
-from benchmarks.pipeline import default_collector, make_worlds, paired, random_walk, rate
+from benchmarks.pipeline import default_collector, make_drone_env, paired, random_walk, rate
 from drone_rl.config import AppearanceSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.sim.rendering import View
@@ -19,7 +19,7 @@ from drone_rl.sim.worlds import Worlds
 
 SIZES = ((25, 64), (64, 64), (100, 256))
 """Heights and widths at which renderers are compared."""
-_COMPARED_WORLDS = 128
+_COMPARED_ENVS = 128
 BLOCKS = AppearanceSettings(
     sun_elevation=40.0,
     sun_azimuth=140.0,
@@ -38,27 +38,32 @@ BLOCKS = AppearanceSettings(
 )
 """`appearance=blocks`: with the ground and three cubes, 30 geoms."""
 _COLLECTED = (16, 32, 64, 128, 256)
-"""Numbers of worlds that are tried."""
+"""Batch sizes at which the collector is measured."""
 
 
 def bench_render(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
-    """Raw drawing of a batch of worlds on all cores.
+    """Measure the renderer on a batch of environments, on all cores.
+
+    Args:
+        num_envs: Number of environments in the batch.
+        device: See `Setup`.
+        quick: See `Setup`.
 
     Returns:
-        Frames a second at 25x64 and 64x64 pixels, and at the latter with `appearance=blocks`; how
-        many times as many as by MuJoCo Warp's renderer, and the time of all modalities in one pass
-        over that of RGB.
+        Frames per second at 25x64 and 64x64 pixels, and at 64x64 with `appearance=blocks`; the
+        speed relative to MuJoCo Warp's renderer; the time of a pass with all modalities divided by
+        that of an RGB pass.
     """
     seconds = 0.5 if quick else 10.0
-    env = make_worlds(num_envs, device)
+    env = make_drone_env(num_envs, device)
     env.reset()
-    frames = rate(partial(_draw, env.worlds), seconds)
-    larger = partial(_draw, env.worlds, env.worlds.view(height=64, width=64))
+    frames = rate(partial(_render, env.worlds), seconds)
+    larger = partial(_render, env.worlds, env.worlds.view(height=64, width=64))
     frames_64 = rate(larger, seconds)
     env.close()
-    blocks = make_worlds(num_envs, device, appearance=BLOCKS)
+    blocks = make_drone_env(num_envs, device, appearance=BLOCKS)
     blocks.reset()
-    frames_blocks = rate(partial(_draw_looks, blocks), seconds)
+    frames_blocks = rate(partial(_render_appearance, blocks), seconds)
     blocks.close()
     return {
         "raw_render_fps": frames,
@@ -70,73 +75,73 @@ def bench_render(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
 
 
 def _all_over_rgb(device: str, seconds: float) -> float:
-    """Time of a picture of all modalities over that of one in colours, in turn."""
-    env = make_worlds(_COMPARED_WORLDS, device)
+    """Return the time of a pass with all modalities divided by that of an RGB pass."""
+    env = make_drone_env(_COMPARED_ENVS, device)
     env.reset()
     view = env.worlds.view(modality=MODALITIES, height=64, width=64)
-    work = [partial(_draw, env.worlds, dataclasses.replace(view, modalities=("rgb",)))]
-    work.append(partial(_draw, env.worlds, view))
-    for draw in work:
-        draw()
+    work = [partial(_render, env.worlds, dataclasses.replace(view, modalities=("rgb",)))]
+    work.append(partial(_render, env.worlds, view))
+    for render in work:
+        render()
     _, _, ratio = paired(*work, seconds=seconds, rounds=9)
     env.close()
     return ratio
 
 
 def _over_warp(height: int, width: int, device: str, seconds: float) -> float:
-    """Frames a second of the default renderer over those of MuJoCo Warp's, in turn."""
+    """Return the speed of the default renderer divided by that of MuJoCo Warp's renderer."""
     ours, theirs = (
-        make_worlds(_COMPARED_WORLDS, device, renderer=renderer)
+        make_drone_env(_COMPARED_ENVS, device, renderer=renderer)
         for renderer in ("raytrace", "mujoco_warp")
     )
     view = ours.worlds.view(height=height, width=width)
-    work = [partial(_draw, env.worlds, view) for env in (ours, theirs)]
+    work = [partial(_render, env.worlds, view) for env in (ours, theirs)]
     for env in (ours, theirs):
         env.reset()
-    for draw in work:
-        draw()
+    for render in work:
+        render()
     _, _, ratio = paired(*work, seconds=seconds, rounds=3)
     for env in (ours, theirs):
         env.close()
     return ratio
 
 
-def _draw_looks(env: DroneEnv) -> int:
-    """Draws every world as it looks, at 64x64 pixels."""
+def _render_appearance(env: DroneEnv) -> int:
+    """Render every environment with its own appearance at 64x64 pixels."""
     every = torch.arange(env.worlds.num_worlds)
     view = env.worlds.view(height=64, width=64)
     return len(env.worlds.render(env.worlds.state, view, env.looks.drawn(every)))
 
 
-def _draw(worlds: Worlds, view: View | None = None) -> int:
-    pictures = worlds.render_all(worlds.state, view or worlds.policy_view)
-    return len(next(iter(pictures.values())))
+def _render(worlds: Worlds, view: View | None = None) -> int:
+    images = worlds.render_all(worlds.state, view or worlds.policy_view)
+    return len(next(iter(images.values())))
 
 
 def bench_collector(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
-    """The collector, policy and pipeline included, over MuJoCo Warp's drawing of a batch.
+    """Measure the default collector, with policy and transforms.
 
-    That drawing alone was the limit until our own ray tracer took its place.
+    It is compared with MuJoCo Warp's renderer, which limited the speed before the ray tracer.
 
     Args:
-        num_envs: Worlds that MuJoCo Warp draws.
+        num_envs: Number of environments that MuJoCo Warp renders.
         device: See `Setup`.
         quick: See `Setup`.
 
     Returns:
-        Frames a second with as many worlds as are fastest, and how many these are; with 16; and of
-        drawing.
+        Frames per second at the fastest batch size, this size, frames per second with 16
+        environments, those of MuJoCo Warp, and the ratio to these.
     """
     seconds = 0.5 if quick else 4.0
     rates = {count: _collected(count, device, seconds) for count in _COLLECTED}
     best = max(rates, key=lambda count: rates[count])
-    env = make_worlds(num_envs, device, renderer="mujoco_warp")
+    env = make_drone_env(num_envs, device, renderer="mujoco_warp")
     env.reset()
     collector = default_collector(best, device)
     collector.collect()
-    collected, drawn, ratio = paired(
+    collected, rendered, ratio = paired(
         lambda: len(collector.collect()),
-        lambda: _draw(env.worlds),
+        lambda: _render(env.worlds),
         seconds=seconds,
         rounds=1 if quick else 9,
     )
@@ -146,13 +151,13 @@ def bench_collector(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
         "collector_fps": collected,
         "collector_worlds": best,
         "collector_fps_16": rates[16],
-        "raw_render_beside_collector_fps": drawn,
+        "raw_render_beside_collector_fps": rendered,
         "collector_over_raw": ratio,
     }
 
 
 def _collected(num_envs: int, device: str, seconds: float) -> float:
-    """Frames a second of the default's collector, with so many worlds."""
+    """Return the frames per second of the default collector."""
     collector = default_collector(num_envs, device)
     collector.collect()
     collected = rate(lambda: len(collector.collect()), seconds)
@@ -161,8 +166,8 @@ def _collected(num_envs: int, device: str, seconds: float) -> float:
 
 
 def bench_dm_control(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
-    """The batched environment over dm_control's pixel path, as it comes and tuned by hand."""
-    env = make_worlds(num_envs, device)
+    """Compare the batched environment with dm_control's pixel observations, default and tuned."""
+    env = make_drone_env(num_envs, device)
     seconds = 0.5 if quick else 5.0
     results: dict[str, Any] = {}
     random_walk(env, 2)
@@ -177,7 +182,7 @@ def bench_dm_control(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
 
 
 def _dm_control_rate(quality: str, seconds: float) -> float | None:
-    """None where there is no EGL."""
+    """Return the frames per second of dm_control; None without EGL."""
     command = [sys.executable, "-m", "benchmarks.dm_control", quality, str(seconds)]
     environment = {**os.environ, "MUJOCO_GL": "egl"}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)

@@ -1,4 +1,4 @@
-"""How long a user waits: for an import, for the first update of a training, for a verdict."""
+"""Time until an import, the first update of a training and a verdict are done."""
 
 import os
 import statistics
@@ -11,28 +11,28 @@ from benchmarks.commands import PROGRAM, call
 
 _IMPORT = "import time; t = time.perf_counter(); import {}; print(time.perf_counter() - t)"
 TORCH_S = 1.0
-"""Of `import torch` on the machine for which the figures were asked."""
-_LOOK_S = 0.005
-"""Time between two looks for the first update."""
+"""Seconds of `import torch` on the reference machine."""
+_POLL_S = 0.005
+"""Seconds between two checks for the first update."""
 
 
 def bench_startup(folder: Path, device: str, quick: bool) -> dict[str, float]:
-    """Seconds from the start of a command to what it is for, kernels cached; medians of three.
+    """Measure start-up times with cached kernels; medians of three.
 
     Args:
-        folder: Where the commands work.
-        device: Where they draw.
-        quick: Whether once is enough.
+        folder: Working folder of the commands.
+        device: Device of the commands.
+        quick: Whether to measure once.
 
     Returns:
-        "import_s" of the package alone, "start_to_first_update_s" of `drone-rl train`,
-        "first_compile_s" that the same takes longer where no kernels are cached, "verdict_s"
-        of `drone-rl verdict policy=good`, with its 400 episodes; "import_torch_s", which tells how
-        fast the machine is, and the three times as they would be where that takes 1 s.
+        "import_s" of the package, "start_to_first_update_s" of `drone-rl train`, "first_compile_s"
+        (additional time without cached kernels), "verdict_s" of `drone-rl verdict policy=good`
+        with its 400 episodes; "import_torch_s", a measure of the machine's speed, and the three
+        times scaled to a machine on which it is 1 s.
     """
     times = range(1 if quick else 3)
-    import_seconds()  # the first one compiles Python's files
-    first_update_seconds(folder / "warm", device)  # and this one the kernels
+    import_seconds()  # compiles Python files
+    first_update_seconds(folder / "warm", device)  # compiles kernels
     cold = first_update_seconds(folder / "cold", device, folder / "kernels")
     updates = [first_update_seconds(folder / f"update_{i}", device) for i in times]
     verdicts = [verdict_seconds(folder / f"verdict_{i}", device) for i in times]
@@ -51,40 +51,40 @@ def bench_startup(folder: Path, device: str, quick: bool) -> dict[str, float]:
 
 
 def import_seconds(name: str = "drone_rl") -> float:
-    """Of an import in a fresh interpreter."""
+    """Return the seconds of an import in a new interpreter."""
     command = [sys.executable, "-c", _IMPORT.format(name)]
     return float(subprocess.run(command, capture_output=True, check=True).stdout)
 
 
 def first_update_seconds(folder: Path, device: str, kernels: Path | None = None) -> float:
-    """Of `drone-rl train`, until metrics.csv tells of an update.
+    """Return the seconds from the start of `drone-rl train` to the first row of metrics.csv.
 
     Args:
-        folder: Its own.
-        device: Where it draws.
-        kernels: Folder of the cache of kernels; the usual one by default.
+        folder: Folder of the run.
+        device: Device of the training.
+        kernels: Folder of the kernel cache; Warp's default if None.
 
     Raises:
-        RuntimeError: It ended without one.
+        RuntimeError: The command ended without an update.
     """
     metrics, begin = folder / "metrics.csv", time.perf_counter()
-    told = ["trainer.total_frames=1", f"device={device}", f"hydra.run.dir={folder}"]
-    nowhere = subprocess.DEVNULL
+    settings = ["trainer.total_frames=1", f"device={device}", f"hydra.run.dir={folder}"]
+    null = subprocess.DEVNULL
     cache = {} if kernels is None else {"WARP_CACHE_PATH": str(kernels)}
     process = subprocess.Popen(
-        [*PROGRAM, "train", *told], stdout=nowhere, stderr=nowhere, env={**os.environ, **cache}
+        [*PROGRAM, "train", *settings], stdout=null, stderr=null, env={**os.environ, **cache}
     )
     while not (metrics.is_file() and metrics.stat().st_size):
         if process.poll() is not None:
             raise RuntimeError(f"drone-rl train ended with status {process.returncode}")
-        time.sleep(_LOOK_S)
+        time.sleep(_POLL_S)
     seconds = time.perf_counter() - begin
     process.wait()
     return seconds
 
 
 def verdict_seconds(folder: Path, device: str) -> float:
-    """Of `drone-rl verdict policy=good`."""
+    """Return the seconds of `drone-rl verdict policy=good`."""
     begin = time.perf_counter()
     call("verdict", "policy=good", f"device={device}", f"hydra.run.dir={folder}")
     return time.perf_counter() - begin

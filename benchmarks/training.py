@@ -1,4 +1,4 @@
-"""Whole trainings, as a user starts them: time to solve and success."""
+"""Whole trainings by the commands that a user runs: time to solve, and success rate."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -13,12 +13,13 @@ from benchmarks.commands import call, train
 def bench_solve(
     folder: Path, seeds: Sequence[int], episodes: int, device: str, quick: bool
 ) -> dict[str, Any]:
-    """Trains with the defaults from each seed and evaluates each policy, greedy.
+    """Train the default from each seed and evaluate the greedy policies.
 
     Returns:
-        Per seed: seconds from the start of the command to its end, whether it reached the target
-        and the lower end of the exact 95% interval of the share of complete episodes. And
-        "learning_fps", the median of frames a second of collecting and learning together.
+        For each seed the seconds and frames until the command ends, and the lower bound of the
+        exact 95% interval of the success rate; the median seconds; the number of seeds that
+        reached the target; "learning_fps", the median frames per second of collection and updates
+        together.
     """
     tried = seeds[:1] if quick else seeds
     settings = ["experiment=smoke"] if quick else []
@@ -35,11 +36,11 @@ def bench_solve(
 
 
 def bench_seeds(folder: Path, device: str, quick: bool) -> dict[str, Any]:
-    """Trains with the defaults from 20 seeds that no setting was chosen by, and evaluates each.
+    """Train the default from 20 seeds that selected no setting, and evaluate the policies.
 
     Returns:
-        How many reach the target, and of each the seconds from the start of the command to its
-        end, the frames, and the lower end of the share of 1,000 episodes with everything done.
+        The number of seeds that reach the target; for each seed the seconds and frames until the
+        command ends, and the lower bound of the success rate in 1,000 episodes.
     """
     tried, settings = (range(2), ["experiment=smoke"]) if quick else (range(200, 220), [])
     done = train_and_evaluate(folder, tried, settings, 50 if quick else 1000, device)
@@ -52,10 +53,10 @@ def bench_seeds(folder: Path, device: str, quick: bool) -> dict[str, Any]:
 
 
 def bench_large(folder: Path, device: str, quick: bool) -> dict[str, Any]:
-    """Trains `experiment=large` for a while.
+    """Train `experiment=large` for a fixed number of frames.
 
     Returns:
-        Frames a second of collecting and learning together, kernels loaded.
+        Frames per second of collection and updates together, with cached kernels.
     """
     frames = 500 if quick else 20_000
     limits = (f"trainer.total_frames={frames}", "trainer.target_share=null")
@@ -67,12 +68,12 @@ def bench_large(folder: Path, device: str, quick: bool) -> dict[str, Any]:
 def bench_pillars(
     folder: Path, seeds: Sequence[int], episodes: int, device: str, quick: bool
 ) -> dict[str, Any]:
-    """Trains `experiment=pillars` from each seed and evaluates each policy, greedy.
+    """Train `experiment=pillars` from each seed and evaluate the greedy policies.
 
     Returns:
-        Per seed: "pillars_train_s", seconds from the start of the command to its end;
-        "pillars_lower95" of the share of held-out episodes that cross the line and touch no
-        pillar; "pillars_frames".
+        For each seed "pillars_train_s", seconds until the command ends, "pillars_frames", and
+        "pillars_lower95" of the rate of held-out episodes that cross the line without touching a
+        pillar; "pillars_solved", the number of seeds that reached the target.
     """
     tried = seeds[:1] if quick else seeds
     settings = ["experiment=pillars", *(["trainer.total_frames=4000"] if quick else [])]
@@ -88,17 +89,18 @@ def bench_pillars(
 def train_and_evaluate(
     folder: Path, seeds: Sequence[int], settings: Iterable[str], episodes: int, device: str
 ) -> dict[str, list]:
-    """Trains from each seed and evaluates, by the commands that a user gives.
+    """Train from each seed and evaluate each policy, by the commands that a user runs.
 
     Args:
-        folder: For the runs.
-        seeds: Of the trainings.
-        settings: Of each.
-        episodes: Held-out flights of each policy.
-        device: Where to train.
+        folder: Folder of the runs.
+        seeds: Seeds of the trainings.
+        settings: Overrides of every training.
+        episodes: Held-out episodes of each policy.
+        device: Device of training and evaluation.
 
     Returns:
-        Per seed: "seconds" of the command, "frames", "trained_s", "reason" and "lower95".
+        Lists with a value for each seed: "seconds" of the command, "frames", "trained_s" (seconds
+        of the training loop), "reason" and "lower95".
     """
     names = ("seconds", "frames", "trained_s", "reason", "lower95")
     results: dict[str, list] = {name: [] for name in names}
@@ -130,20 +132,20 @@ _BRIEF = ("trainer.total_frames=4000", "trainer.confirm_episodes=0")
 def bench_flight_training(
     experiment: str, folder: Path, seeds: Sequence[int], episodes: int, device: str, quick: bool
 ) -> dict[str, Any]:
-    """Trains an experiment from each seed and evaluates each policy, greedy.
+    """Train an experiment with vehicle dynamics from each seed and evaluate the greedy policies.
 
     Args:
-        experiment: Its name, which is also the first part of the figures'.
-        folder: For the runs.
-        seeds: Of the trainings.
-        episodes: Held-out flights of each policy.
-        device: Where to train.
-        quick: Whether one seed, trained for a moment, will do.
+        experiment: Name of the experiment, and prefix of the figures' keys.
+        folder: Folder of the runs.
+        seeds: Seeds of the trainings.
+        episodes: Held-out episodes of each policy.
+        device: Device of training and evaluation.
+        quick: Whether to train only one seed, briefly.
 
     Returns:
-        Per seed: "..._time_to_solve_s", seconds from the start of the command to its end,
-        "..._frames", and "..._success_lower95", the lower end of the exact 95% interval of the
-        share of flights in which everything was done; "..._solved", how many reached the target.
+        For each seed "..._time_to_solve_s", seconds until the command ends, "..._frames", and
+        "..._success_lower95", the lower bound of the exact 95% interval of the success rate;
+        "..._solved", the number of seeds that reached the target.
     """
     tried = seeds[:1] if quick else seeds
     settings = [f"experiment={experiment}", *(_BRIEF if quick else ())]

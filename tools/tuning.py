@@ -1,10 +1,10 @@
-"""Tunes our learners and their peers with the same care: as many settings, the same seeds.
+"""Tune our learners and the third-party baselines: the same number of settings, the same seeds.
 
     python -m tools.tuning [NAME ...]
 
-Each setting is tried from seeds that `drone-rl bench peers` does not use; the one with the least
-mean time from the start of the process until it is solved is what `benchmarks/peers/settings.py` and `conf` have.
-It takes half an hour on two cores. One training that is not solved rules a setting out.
+Each setting is trained from seeds that `drone-rl bench peers` does not use. A setting with an
+unsolved training is excluded. `benchmarks/peers/settings.py` and `conf` have the setting with the
+lowest mean time from the start of the process until solved. It takes half an hour on two cores.
 """
 
 import json

@@ -63,7 +63,7 @@ def run(settings: Command, output_dir: Path) -> tuple[int, None]:
 
     folder = Path(settings.folder) / "quick" if settings.quick else Path(settings.folder)
     folder.mkdir(parents=True, exist_ok=True)
-    setup = Setup.of(settings, folder)
+    setup = Setup.from_settings(settings, folder)
     ledger = Ledger(folder / "results.json")
     names = (
         list(registry.BENCHMARKS)

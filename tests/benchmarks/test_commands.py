@@ -1,4 +1,4 @@
-"""Commands in processes of their own: how they end, how long they take, what they need."""
+"""Commands in separate processes: exit status, duration, memory."""
 
 import os
 import sys
@@ -13,13 +13,13 @@ def python(code):
     return (sys.executable, "-c", code)
 
 
-def test_a_command_gets_its_arguments_and_what_is_added_to_its_environment(tmp_path):
+def test_a_command_gets_its_arguments_and_additional_environment_variables(tmp_path):
     code = "import os, sys; open(sys.argv[1], 'w').write(os.environ['TIDE'] + os.environ['PATH'])"
     call(str(tmp_path / "x"), program=python(code), environment={"TIDE": "low "})
     assert (tmp_path / "x").read_text() == f"low {os.environ['PATH']}"
 
 
-def test_a_status_that_is_not_expected_is_an_error_with_the_last_words():
+def test_an_unexpected_status_is_an_error_with_the_end_of_stderr():
     program = python("import sys; sys.stderr.write('x' * 999 + 'too late'); sys.exit(11)")
     call("verdict", program=program, statuses=(0, 11))
     with pytest.raises(RuntimeError, match=r"drone-rl verdict failed: x+too late$") as error:
@@ -27,7 +27,7 @@ def test_a_status_that_is_not_expected_is_an_error_with_the_last_words():
     assert len(str(error.value)) < 600
 
 
-def test_time_and_peak_of_memory_are_watched(monkeypatch):
+def test_watch_returns_time_and_peak_memory(monkeypatch):
     code = "import time; kept = bytearray(80 * 2**20); del kept; time.sleep(0.4)"
     monkeypatch.setattr(commands, "PROGRAM", python(code))
     seconds, peak = watch()
@@ -38,7 +38,7 @@ def test_time_and_peak_of_memory_are_watched(monkeypatch):
         watch("explain")
 
 
-def test_a_training_is_timed_and_its_result_is_read(monkeypatch, tmp_path):
+def test_train_returns_its_time_and_the_result_file(monkeypatch, tmp_path):
     code = """
 import json, os, sys, time
 assert sys.argv[1:3] == ["train", "seed=3"], sys.argv
@@ -57,7 +57,7 @@ json.dump({"frames": 7}, open(run + "/result.json", "w"))
     assert 0.3 < seconds < 20
 
 
-def test_memory_of_a_process():
+def test_memory_status_of_a_process():
     status = memory_status(os.getpid())
     assert status["VmHWM"] >= status["VmRSS"] > 10
     assert memory_status(2**22 + 1) == {}

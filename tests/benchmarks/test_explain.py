@@ -6,7 +6,7 @@ from benchmarks import explain
 
 
 @pytest.mark.parametrize(("quick", "frames"), [(True, 100), (False, 600)])
-def test_the_command_is_watched_and_its_files_are_read(monkeypatch, tmp_path, quick, frames):
+def test_figures_come_from_the_command_and_its_files(monkeypatch, tmp_path, quick, frames):
     calls = []
 
     def watch(*args):

@@ -1,4 +1,4 @@
-"""The ratio of the vector environment and the batched one, with rates made by hand."""
+"""Ratio of the vector and the batched environment, with given rates."""
 
 import sys
 
@@ -11,10 +11,10 @@ pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
 
 
 def test_the_same_frames_are_counted_on_both_sides(monkeypatch):
-    asked = []
+    calls = []
 
     def paired(first, second, seconds, rounds):
-        asked.append((seconds, rounds))
+        calls.append((seconds, rounds))
         return first(), second(), 0.9
 
     monkeypatch.setattr(bench, "paired", paired)
@@ -24,10 +24,10 @@ def test_the_same_frames_are_counted_on_both_sides(monkeypatch):
         "batched_beside_gym_fps": 30,
     }
     bench.bench_gymnasium(2, "cpu", quick=False)
-    assert asked == [(0.5, 1), (4.0, 9)]
+    assert calls == [(0.5, 1), (4.0, 9)]
 
 
-def test_without_gymnasium_one_line_tells_what_to_install(monkeypatch):
+def test_without_gymnasium_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "gymnasium", None)
     with pytest.raises(InputError, match=r"^drone-rl bench gymnasium needs .*drone-rl\[gym\]"):
         bench.bench_gymnasium(2, "cpu", quick=True)

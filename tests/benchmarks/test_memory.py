@@ -1,4 +1,4 @@
-"""The line through what is resident, and a training that is watched."""
+"""Memory growth by hand, and a monitored training."""
 
 import pytest
 
@@ -6,12 +6,12 @@ from benchmarks.memory import bench_memory, growth
 
 
 def test_growth_by_hand():
-    """2 MiB in 20,000 frames, once it has settled."""
+    """2 MiB in 20,000 frames after settling."""
     samples = [(0, 300.0), (50, 500.0), (100, 600.0), (10_100, 601.0), (20_100, 602.0)]
     assert growth(samples, 100) == pytest.approx(100.0)
 
 
-def test_samples_that_do_not_count():
+def test_samples_before_settling_are_ignored():
     settled = [(100, 600.0), (200, 600.0), (300, 600.0)]
     assert growth([(99, 1.0), *settled], 100) == pytest.approx(0.0, abs=1e-6)
 
@@ -21,7 +21,7 @@ def test_too_few_samples(samples):
     assert growth(samples, 100) is None
 
 
-def test_a_training_is_watched(tmp_path):
+def test_the_memory_of_a_training_is_recorded(tmp_path):
     result = bench_memory(tmp_path, 1_000_000, "cpu", quick=True)
     assert 200 < result["peak_memory_mib"] < 4096
     assert isinstance(result["memory_growth_mib_per_million_frames"], float)
@@ -29,6 +29,6 @@ def test_a_training_is_watched(tmp_path):
     assert (tmp_path / "memory" / "metrics.csv").is_file()
 
 
-def test_a_training_that_failed(tmp_path):
-    with pytest.raises(RuntimeError, match="failed: 1"):
+def test_a_failed_training_is_an_error(tmp_path):
+    with pytest.raises(RuntimeError, match="failed: status 1"):
         bench_memory(tmp_path, 1, "no such device", quick=True)

@@ -1,4 +1,4 @@
-"""What is told of several policies: the worst of them, and all that differs."""
+"""Agreement with ONNX: the largest difference, and the sum of differing actions."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from benchmarks.onnx_export import bench_onnx
 from drone_rl.verdicts.onnx_export import Agreement
 
 
-def test_a_shipped_policy_does_the_same_as_an_onnx_model(tmp_path):
+def test_a_shipped_policy_agrees_with_its_onnx_model(tmp_path):
     found = bench_onnx(tmp_path / "models", quick=True)
     assert found["onnx_max_difference"] <= 1e-5
     assert found["onnx_actions_differ"] == 0
@@ -16,7 +16,7 @@ def test_a_shipped_policy_does_the_same_as_an_onnx_model(tmp_path):
 
 
 @pytest.mark.parametrize("quick", [True, False])
-def test_the_worst_of_all_is_told(tmp_path, monkeypatch, quick):
+def test_the_largest_difference_and_the_sums_are_returned(tmp_path, monkeypatch, quick):
     found = iter([Agreement(10, 1e-7, 1), Agreement(20, 3e-7, 0), Agreement(5, 2e-7, 2)])
     monkeypatch.setattr(onnx_export, "policy_names", lambda: ["good", "poor", "proved"])
     monkeypatch.setattr(onnx_export, "export_onnx", lambda policy, target: next(found))

@@ -10,12 +10,12 @@ from drone_rl.utils.errors import InputError
 
 @pytest.fixture
 def bench(tmp_path):
-    """Runs benchmarks `one`, `broken` and `two`; tells what ran and what failed."""
+    """Run the benchmarks `one`, `broken` and `two`; return those that ran, and the failures."""
 
     def command(names=("one", "broken", "two"), again=False, broken=InputError, **changes):
         ran = []
 
-        def of(name):
+        def make_benchmark(name):
             def measure(setup):
                 ran.append(name)
                 if name == "broken":
@@ -26,22 +26,22 @@ def bench(tmp_path):
 
         given = {"folder": tmp_path, "quick": False, "device": "cpu", "num_envs": 2, "seeds": (0,)}
         setup = Setup(**given | {"episodes": 1, "memory_frames": 1} | changes)
-        all_of_them = {name: of(name) for name in ("one", "broken", "two")}
+        benchmarks = {name: make_benchmark(name) for name in ("one", "broken", "two")}
         ledger = Ledger(tmp_path / "results.json")
-        failures = run_benchmarks(names, setup, ledger, again=again, benchmarks=all_of_them)
+        failures = run_benchmarks(names, setup, ledger, again=again, benchmarks=benchmarks)
         return ran, failures
 
     return command
 
 
-def test_one_that_fails_stops_no_other(bench, tmp_path):
+def test_a_failure_does_not_stop_other_benchmarks(bench, tmp_path):
     assert bench() == (["one", "broken", "two"], {"broken": "out of order"})
     content = json.loads((tmp_path / "results.json").read_text())
     assert (content["one_s"], content["two_s"]) == (1, 3)
     assert content["benchmarks"].keys() == {"one", "two"}
 
 
-def test_it_goes_on_where_it_was_stopped(bench, tmp_path):
+def test_a_second_command_continues_after_an_interrupt(bench, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         bench(broken=KeyboardInterrupt)
     assert "one_s" in json.loads((tmp_path / "results.json").read_text())
@@ -49,15 +49,15 @@ def test_it_goes_on_where_it_was_stopped(bench, tmp_path):
     assert bench()[0] == ["broken"]
 
 
-def test_what_was_asked_for_is_measured_again(bench):
+def test_again_and_new_settings_repeat_a_benchmark(bench):
     bench()
     assert bench(["one"], again=True)[0] == ["one"]
     assert bench(["one"], seeds=(1,))[0] == ["one"]
     assert bench(["one"], seeds=(1,))[0] == []
 
 
-def test_runs_of_an_earlier_command_are_gone(bench, tmp_path):
-    log = tmp_path / "runs" / "2026-01-01" / "bench.log"  # of the command itself
+def test_runs_of_an_earlier_command_are_deleted_but_not_its_log(bench, tmp_path):
+    log = tmp_path / "runs" / "2026-01-01" / "bench.log"
     log.parent.mkdir(parents=True)
     log.touch()
     (tmp_path / "work" / "train_0").mkdir(parents=True)

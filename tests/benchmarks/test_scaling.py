@@ -4,18 +4,18 @@ from benchmarks import scaling
 from benchmarks.scaling import bench_scaling
 
 
-def test_a_straight_line_explains_everything_and_a_bend_does_not():
+def test_r_squared_is_one_for_a_straight_line_only():
     assert scaling._r_squared({1: 3.0, 2: 5.0, 4: 9.0}) == pytest.approx(1.0)
-    # by hand: the line through 0, 0, 3 at 0, 1, 2 misses by 1.5 of a variance of 6
+    # by hand: the fit to 0, 0, 3 at 0, 1, 2 has residual sum of squares 1.5; the total is 6
     assert scaling._r_squared({0: 0.0, 1: 0.0, 2: 3.0}) == pytest.approx(1 - 1.5 / 6)
 
 
-def test_times_are_taken_by_worlds_frames_cubes_and_pixels(monkeypatch, tmp_path):
-    def make_worlds(n, device, cubes=3, camera=None):
+def test_times_are_measured_by_environments_frames_cubes_and_pixels(monkeypatch, tmp_path):
+    def make_drone_env(n, device, cubes=3, camera=None):
         return n, cubes * (camera.width if camera else 1)
 
-    monkeypatch.setattr(scaling, "make_worlds", make_worlds)
-    monkeypatch.setattr(scaling, "_seconds", lambda worlds, steps, _: worlds[0] * worlds[1] * steps)
+    monkeypatch.setattr(scaling, "make_drone_env", make_drone_env)
+    monkeypatch.setattr(scaling, "_seconds", lambda env, steps, _: env[0] * env[1] * steps)
     found = bench_scaling(tmp_path, "cpu", quick=True)["scaling"]
     assert found["worlds"]["sizes"] == [32, 64, 128]
     assert found["worlds"]["seconds"] == [480, 960, 1920]

@@ -1,4 +1,4 @@
-"""What the benchmarks of speed divide by what, with rates made by hand."""
+"""Ratios of the speed benchmarks, with given rates."""
 
 from types import SimpleNamespace
 
@@ -17,11 +17,11 @@ def view(modality=("rgb",), **size):
 
 
 @pytest.fixture
-def worlds(monkeypatch):
-    """Worlds of which nothing is drawn; tells who drew and whether they were closed."""
-    made = []
+def envs(monkeypatch):
+    """Replace environments by stubs that render nothing; return those that were created."""
+    created = []
 
-    def make_worlds(num_envs, device, renderer="raytrace", appearance=None):
+    def make_drone_env(num_envs, device, renderer="raytrace", appearance=None):
         env = SimpleNamespace(closed=False, renderer=renderer)
         env.looks = SimpleNamespace(drawn=lambda worlds: [appearance] * len(worlds))
         env.worlds = SimpleNamespace(state=None, policy_view=None, view=view, num_worlds=num_envs)
@@ -29,20 +29,20 @@ def worlds(monkeypatch):
         env.worlds.render = lambda state, view, looks: looks
         env.reset = lambda: None
         env.close = lambda: setattr(env, "closed", True)
-        made.append(env)
+        created.append(env)
         return env
 
-    monkeypatch.setattr(speed, "make_worlds", make_worlds)
+    monkeypatch.setattr(speed, "make_drone_env", make_drone_env)
     monkeypatch.setattr(speed, "random_walk", lambda env, steps: 2 * steps)
-    return made
+    return created
 
 
-def test_raw_drawing(worlds, monkeypatch):
+def test_rendering_rates(envs, monkeypatch):
     monkeypatch.setattr(speed, "rate", lambda work, seconds: work() * seconds)
-    asked = []
+    calls = []
 
     def paired(first, second, seconds, rounds):
-        asked.append((first.args[1], second.args[1]))
+        calls.append((first.args[1], second.args[1]))
         return first(), second(), 11.0 + rounds
 
     monkeypatch.setattr(speed, "paired", paired)
@@ -53,25 +53,27 @@ def test_raw_drawing(worlds, monkeypatch):
         "render_over_warp": {"25x64": 14.0, "64x64": 14.0, "100x256": 14.0},
         "render_all_over_rgb": 20.0,
     }
-    assert asked[2] == (view(height=100, width=256),) * 2
-    colours, everything = asked[3]
-    assert (colours.modalities, len(everything.modalities)) == (("rgb",), 6)
-    assert [env.renderer for env in worlds[2:]] == [*["raytrace", "mujoco_warp"] * 3, "raytrace"]
-    assert all(env.closed for env in worlds)
+    assert calls[2] == (view(height=100, width=256),) * 2
+    rgb, all_modalities = calls[3]
+    assert (rgb.modalities, len(all_modalities.modalities)) == (("rgb",), 6)
+    assert [env.renderer for env in envs[2:]] == [*["raytrace", "mujoco_warp"] * 3, "raytrace"]
+    assert all(env.closed for env in envs)
 
 
-def test_the_blocks_that_are_timed_are_those_of_the_settings():
-    told = yaml.safe_load((conf_dir() / "appearance" / "blocks.yaml").read_text())
-    del told["defaults"]
-    assert from_config(AppearanceSettings, told) == speed.BLOCKS
+def test_the_measured_blocks_are_those_of_the_configuration():
+    settings = yaml.safe_load((conf_dir() / "appearance" / "blocks.yaml").read_text())
+    del settings["defaults"]
+    assert from_config(AppearanceSettings, settings) == speed.BLOCKS
 
 
-def test_collecting_over_drawing(worlds, monkeypatch):
-    made, calls = [], []
+def test_the_collector_is_compared_with_rendering(envs, monkeypatch):
+    events, calls = [], []
 
     def default_collector(num_envs, device):
-        made.append(num_envs)
-        return SimpleNamespace(collect=lambda: "b" * num_envs, shutdown=lambda: made.append("shut"))
+        events.append(num_envs)
+        return SimpleNamespace(
+            collect=lambda: "b" * num_envs, shutdown=lambda: events.append("shutdown")
+        )
 
     monkeypatch.setattr(speed, "default_collector", default_collector)
     monkeypatch.setattr(speed, "rate", lambda work, seconds: seconds * (100 - abs(work() - 65)))
@@ -88,13 +90,13 @@ def test_collecting_over_drawing(worlds, monkeypatch):
         "raw_render_beside_collector_fps": 8.0,
         "collector_over_raw": 0.7,
     }
-    assert calls == [(64, 6, 4.0, 9)]  # frames of a batch, and letters of "frames"
-    assert made[::2] == [16, 32, 64, 128, 256, 64] and made[1::2] == ["shut"] * 6
-    assert worlds[0].closed and worlds[0].renderer == "mujoco_warp"
+    assert calls == [(64, 6, 4.0, 9)]  # frames of a batch, and the length of "frames"
+    assert events[::2] == [16, 32, 64, 128, 256, 64] and events[1::2] == ["shutdown"] * 6
+    assert envs[0].closed and envs[0].renderer == "mujoco_warp"
 
 
 @pytest.mark.parametrize(("single", "ratio"), [(4.0, 5.0), (None, None)])
-def test_batched_over_dm_control(worlds, monkeypatch, single, ratio):
+def test_batched_over_dm_control(envs, monkeypatch, single, ratio):
     monkeypatch.setattr(speed, "rate", lambda work, seconds: float(work()))
     monkeypatch.setattr(speed, "_dm_control_rate", lambda quality, seconds: single)
     found = speed.bench_dm_control(2, "cpu", quick=True)
@@ -111,9 +113,7 @@ def test_batched_over_dm_control(worlds, monkeypatch, single, ratio):
     ("status", "printed", "frames"),
     [(0, 'noise\n{"frames_per_second": 7.5}\n', 7.5), (1, "", None)],
 )
-def test_the_rate_of_dm_control_is_that_of_a_process_of_its_own(
-    monkeypatch, status, printed, frames
-):
+def test_the_rate_of_dm_control_comes_from_a_separate_process(monkeypatch, status, printed, frames):
     calls = []
 
     def run(command, **kwargs):

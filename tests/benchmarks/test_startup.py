@@ -1,22 +1,22 @@
-"""What is timed, without waiting for it."""
+"""Start-up times, with short programs instead of the commands."""
 
 import pytest
 
 from benchmarks import startup
 
 
-def test_an_import_takes_less_than_a_user_notices():
+def test_an_import_takes_less_than_a_second():
     assert 0 < startup.import_seconds() < 1.0
 
 
-def test_a_training_is_timed_to_its_first_update(tmp_path, monkeypatch):
+def test_a_training_is_timed_until_its_first_update(tmp_path, monkeypatch):
     code = "import sys, pathlib, time; f = pathlib.Path(sys.argv[-1].split('=')[1]); f.mkdir()\n"
     code += "(f / 'metrics.csv').write_text('update'); time.sleep(0.2)"
     monkeypatch.setattr(startup, "PROGRAM", ("python", "-c", code))
     assert startup.first_update_seconds(tmp_path / "run", "cpu") > 0
 
 
-def test_kernels_may_be_kept_elsewhere(tmp_path, monkeypatch):
+def test_the_kernel_cache_can_be_in_another_folder(tmp_path, monkeypatch):
     code = "import os, sys, pathlib; f = pathlib.Path(sys.argv[-1].split('=')[1]); f.mkdir()\n"
     code += "(f / 'metrics.csv').write_text(os.environ['WARP_CACHE_PATH'])"
     monkeypatch.setattr(startup, "PROGRAM", ("python", "-c", code))
@@ -24,14 +24,14 @@ def test_kernels_may_be_kept_elsewhere(tmp_path, monkeypatch):
     assert (tmp_path / "run" / "metrics.csv").read_text() == str(tmp_path / "kernels")
 
 
-def test_a_training_that_ends_without_one_is_an_error(tmp_path, monkeypatch):
+def test_a_training_that_ends_without_an_update_is_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr(startup, "PROGRAM", ("python", "-c", "raise SystemExit(3)"))
     with pytest.raises(RuntimeError, match="status 3"):
         startup.first_update_seconds(tmp_path / "run", "cpu")
 
 
-def test_medians_of_three_after_a_first_run(tmp_path, monkeypatch):
-    seconds = iter([9.0, 12.0, 4.0, 5.0, 3.0])  # of the second one kernels are compiled
+def test_figures_are_medians_of_three_after_a_warm_up(tmp_path, monkeypatch):
+    seconds = iter([9.0, 12.0, 4.0, 5.0, 3.0])  # the second run compiles kernels
     monkeypatch.setattr(startup, "first_update_seconds", lambda *_: next(seconds))
     monkeypatch.setattr(startup, "verdict_seconds", lambda *_: 6.0)
     monkeypatch.setattr(startup, "import_seconds", lambda name="": 2.0 if name == "torch" else 0.1)

@@ -1,4 +1,4 @@
-"""Figures of whole trainings: what is read of them."""
+"""Figures of whole trainings, from the files that the commands write."""
 
 import json
 
@@ -8,7 +8,7 @@ from benchmarks.training import bench_large, bench_pillars, bench_seeds, bench_s
 
 
 def record_calls(monkeypatch, folder):
-    """The commands, each of which leaves what it would."""
+    """Replace the commands by a stub that writes their files; return the list of calls."""
     commands = []
 
     def call(*command):
@@ -26,7 +26,7 @@ def record_calls(monkeypatch, folder):
     return commands
 
 
-def test_solving_gathers_what_each_seed_left(monkeypatch, tmp_path):
+def test_solve_collects_the_results_of_each_seed(monkeypatch, tmp_path):
     commands = record_calls(monkeypatch, tmp_path)
     result = bench_solve(tmp_path, [3, 4], 100, "cpu", False)
     assert [c[0] for c in commands] == ["train", "evaluate"] * 2
@@ -39,7 +39,7 @@ def test_solving_gathers_what_each_seed_left(monkeypatch, tmp_path):
     assert len(bench_solve(tmp_path, [3, 4], 100, "cpu", True)["frames_to_solve"]) == 1
 
 
-def test_pillars_are_trained_by_their_experiment(monkeypatch, tmp_path):
+def test_pillars_uses_its_experiment(monkeypatch, tmp_path):
     commands = record_calls(monkeypatch, tmp_path)
     result = bench_pillars(tmp_path, [3, 4], 100, "cpu", False)
     assert [c[0] for c in commands] == ["train", "evaluate"] * 2
@@ -48,7 +48,7 @@ def test_pillars_are_trained_by_their_experiment(monkeypatch, tmp_path):
     assert result["pillars_frames"] == [10, 30] and len(result["pillars_train_s"]) == 2
 
 
-def test_twenty_other_seeds(monkeypatch, tmp_path):
+def test_seeds_trains_twenty_other_seeds(monkeypatch, tmp_path):
     commands = record_calls(monkeypatch, tmp_path)
     result = bench_seeds(tmp_path, "cpu", False)
     trainings = commands[::2]
@@ -59,7 +59,7 @@ def test_twenty_other_seeds(monkeypatch, tmp_path):
     assert len(bench_seeds(tmp_path, "cpu", True)["seeds_s"]) == 2
 
 
-def test_large_pictures_are_timed_once_kernels_are_loaded(monkeypatch, tmp_path):
+def test_large_is_measured_with_cached_kernels(monkeypatch, tmp_path):
     commands = record_calls(monkeypatch, tmp_path)
     assert bench_large(tmp_path, "cpu", False) == {"learning_fps_large": 40.0}  # 20 in 0.5 s
     assert len(commands) == 2 and all("experiment=large" in c for c in commands)
