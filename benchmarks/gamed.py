@@ -1,4 +1,4 @@
-"""`drone-rl bench truth`, adversarial policies: none may be called good and certain, or proved."""
+"""Adversarial policies; none of them may be judged good and certain, or proved."""
 
 import logging
 from collections.abc import Iterator
@@ -13,27 +13,28 @@ _log = logging.getLogger(__name__)
 
 
 def bench_gamed(folder: Path) -> dict[str, int]:
-    """Judge every adversarial policy as a user would, with default settings.
+    """Judge every adversarial policy with default settings.
 
     Args:
-        folder: For the policies' files; made if need be.
+        folder: Folder of the policies' files; created if missing.
 
     Returns:
-        "gamed_verdicts": how many deceived the program; "gamed_total": how many tried.
+        "gamed_verdicts": number of policies that are judged good or proved; "gamed_total": number
+        of policies.
     """
-    found = [(case.name, case.called_good()) for case in all_cases(folder)]
+    found = [(case.name, case.is_judged_good()) for case in all_cases(folder)]
     for name, is_deceived in found:
         if is_deceived:
-            _log.warning("%s: called good", name)
+            _log.warning("%s: judged good", name)
     deceived = sum(is_deceived for _, is_deceived in found)
     return {"gamed_verdicts": deceived, "gamed_total": len(found)}
 
 
 def all_cases(folder: Path) -> Iterator[GamedCase]:
-    """The cases of all modules.
+    """Yield the cases of all modules.
 
     Args:
-        folder: Each module gets a folder of its own below it.
+        folder: Each module writes into its own subfolder.
     """
     for module in _MODULES:
         yield from module.cases(folder / module.__name__.rpartition(".")[2])

@@ -1,4 +1,4 @@
-"""One adversarial policy and the judgement that it tries to deceive."""
+"""An adversarial policy and the analysis that it attacks."""
 
 import dataclasses
 from collections.abc import Callable
@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 @dataclasses.dataclass(frozen=True)
 class GamedCase:
-    """One adversarial policy, and whether the program was deceived by it."""
+    """An adversarial policy and a function that runs the attacked analysis."""
 
     name: str
-    """Of the case, unique in its module."""
-    called_good: Callable[[], bool]
-    """Run the judgement; return whether the program called the policy good and certain, or proved,
-    with a status of success."""
+    """Unique in its module."""
+    is_judged_good: Callable[[], bool]
+    """Run the analysis; return whether it ends with a status of success, which means that the
+    policy is judged good and certain, or proved."""

@@ -1,4 +1,4 @@
-"""Forged certificates, invented files and trivial tasks that ask to be called good or proved."""
+"""Forged certificates, forged operating domains and trivial tasks."""
 
 import functools
 import json
@@ -25,16 +25,16 @@ from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.checker.checker import Simulator
 
 _AXIS, _VALUE = "dead_rows", 12.0
-"""A condition in which the invented file says that a policy is good, which fails there."""
+"""A perturbation under which the policy fails although the forged file says that it is good."""
 _TRIVIAL = {"lateral_bound": 0.5}
-_FLIGHTS = 300
+_EPISODES = 300
 
 
 def cases(folder: Path) -> list[GamedCase]:
-    """All attempts, each made when it is run.
+    """Return all cases; each writes its files when it runs.
 
     Args:
-        folder: Where policies and forged files are written, a folder for each.
+        folder: Each case writes policy and forged file into its own subfolder.
     """
     forged: dict[str, Callable[[Policy], dict[str, Any]]] = {
         "a certificate of one box without steps": lambda policy: one_box(policy, {}),
@@ -47,7 +47,7 @@ def cases(folder: Path) -> list[GamedCase]:
         "the certificate of another policy under this name": _renamed,
         "the certificate of another policy with this hash": _rehashed,
     }
-    made = [
+    found = [
         GamedCase(name, functools.partial(_is_proved, folder / str(i), "right_and_forward", forge))
         for i, (name, forge) in enumerate(forged.items())
     ]
@@ -60,7 +60,7 @@ def cases(folder: Path) -> list[GamedCase]:
         _is_proved, folder / "few", "right_and_forward", plausible, certificate_flights=1
     )
     return [
-        *made,
+        *found,
         GamedCase("a certificate of a policy that fails in corners only", rare),
         GamedCase("a certificate that nobody re-checks", unchecked),
         GamedCase("a certificate that one rollout re-checks", few),
@@ -75,11 +75,11 @@ def cases(folder: Path) -> list[GamedCase]:
 
 
 def one_box(policy: Policy, steps: dict[str, float]) -> dict[str, Any]:
-    """A certificate that everything is collected from every placement.
+    """Return a certificate that states full success from every placement of the cubes.
 
     Args:
-        policy: Of which.
-        steps: Shares of the placements by number of steps.
+        policy: The policy that the certificate names.
+        steps: Fractions of the placements by number of steps.
     """
     task: Any = policy.task
     bound, cubes = task.lateral_bound, task.num_cubes
@@ -99,9 +99,9 @@ def certificate_of(
     Args:
         policy: The policy that it names.
         outcomes: See `drone_rl.verification.checker.Outcome`.
-        undecided: Boxes.
-        share_undecided: Their fraction of all placements.
-        finished: Whether the proof is said to be complete.
+        undecided: Undecided boxes.
+        share_undecided: Fraction of the placements in undecided boxes.
+        finished: Whether the certificate states that the proof is complete.
     """
     return {
         "format": "drone_rl certificate",
@@ -120,30 +120,32 @@ def certificate_of(
 
 
 def steps_of(policy: Policy, total: float = 0.98, high: float | None = None) -> dict[str, float]:
-    """Estimate how frequent each number of steps is from random placements, as a forger can.
+    """Estimate the fraction of placements by number of steps from random placements.
+
+    An attacker can do the same, so these numbers of steps are plausible.
 
     Args:
         policy: The policy, in its task.
         total: Sum of the returned fractions.
-        high: Largest y of the first cube, metres; the task's by default.
+        high: Largest y of the first cube, metres; the task's bound by default.
     """
     task: Any = policy.task
     bound, cubes, rng = task.lateral_bound, task.num_cubes, np.random.default_rng(7)
-    places = rng.uniform(-bound, bound, (_FLIGHTS, cubes))
-    places[:, 0] = rng.uniform(-bound, bound if high is None else high, _FLIGHTS)
+    places = rng.uniform(-bound, bound, (_EPISODES, cubes))
+    places[:, 0] = rng.uniform(-bound, bound if high is None else high, _EPISODES)
     with closing(Simulator(policy.description, policy.state["policy"])) as simulator:
         steps = simulator.fly(places).steps
     numbers, counts = np.unique(steps, return_counts=True)
     pairs = zip(numbers.tolist(), counts.tolist(), strict=True)
-    return {str(number): total * count / _FLIGHTS for number, count in pairs}
+    return {str(number): total * count / _EPISODES for number, count in pairs}
 
 
-def invented(policy: Policy, folder: Path) -> dict[str, Any]:
-    """A `shifts.json` that goes together, of a policy that is good whatever is different.
+def forged_shifts(policy: Policy, folder: Path) -> dict[str, Any]:
+    """Return a consistent `shifts.json` that states success under every perturbation.
 
     Args:
-        policy: Of which.
-        folder: Where the honest file is written that it is made from.
+        policy: The policy that the file names.
+        folder: Folder of the honest measurement that is changed.
     """
     how: dict[str, Any] = {"axes": [_AXIS], "modes": ["constant"], "domain": False, "episodes": 20}
     honest = shifts(policy, progress=silent, **how)
@@ -159,13 +161,13 @@ def invented(policy: Policy, folder: Path) -> dict[str, Any]:
     subject = make_policy_spec(policy, ShiftSettings())
     (axis,) = find_axes([_AXIS], subject)
     with closing(PairedEvaluator(subject, 1, data["settings"]["seed"])) as evaluator:
-        prober = _Liar(evaluator)
+        prober = _ForgedProber(evaluator)
         data["domain"] = {"plain": prober.plain, "ranges": {_AXIS: prober.search(axis)}}
     return data
 
 
-class _Liar(Prober):
-    """Finds a policy good under every condition."""
+class _ForgedProber(Prober):
+    """A prober that finds the policy good under every condition."""
 
     def __init__(self, evaluator: PairedEvaluator) -> None:
         self._evaluator = evaluator
@@ -177,7 +179,7 @@ class _Liar(Prober):
 
 
 def _always_won(plain: dict[str, Any], episodes: int) -> dict[str, Any]:
-    """Figures of a policy that succeeds in all episodes, as the oracle does."""
+    """Return the figures of a policy that succeeds in all episodes, like the oracle."""
     mean = {"mean": 1.0, "lower95": 0.9, "upper95": 1.0, "count": episodes}
     ends = dict.fromkeys(plain["ends"], 0)
     return {
@@ -191,26 +193,26 @@ def _always_won(plain: dict[str, Any], episodes: int) -> dict[str, Any]:
     }
 
 
-def _copied(name: str, folder: Path) -> Policy:
-    """A policy that travels with the package, in a file of its own."""
+def _copy_shipped(name: str, folder: Path) -> Policy:
+    """Copy a shipped policy to a folder and load the copy."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "policy.safetensors"
     shutil.copy(load_policy(name).path, path)
     return load_policy(path)
 
 
-def _proved() -> dict[str, Any]:
+def _honest_certificate() -> dict[str, Any]:
     return json.loads(certificate_path(load_policy("proved").path).read_text())
 
 
 def _renamed(policy: Policy) -> dict[str, Any]:
-    data = _proved()
+    data = _honest_certificate()
     data["policy"]["name"] = policy.name
     return data
 
 
 def _rehashed(policy: Policy) -> dict[str, Any]:
-    data = _proved()
+    data = _honest_certificate()
     data["policy"] = one_box(policy, {})["policy"]
     return data
 
@@ -218,19 +220,19 @@ def _rehashed(policy: Policy) -> dict[str, Any]:
 def _is_proved(
     folder: Path, name: str, forge: Callable[[Policy], dict[str, Any]], **how: Any
 ) -> bool:
-    policy = _copied(name, folder)
+    policy = _copy_shipped(name, folder)
     certificate_path(policy.path).write_text(json.dumps(forge(policy)))
     done = judge(policy, episodes=20, sampled=False, progress=silent, **how)
     return done.verdict.is_proved or done.status("proved") == 0
 
 
 def _is_covered(folder: Path, name: str) -> bool:
-    policy = _copied(name, folder)
-    shifts_path(policy.path).write_text(json.dumps(invented(policy, folder)))
-    needs = folder / "needs.json"
-    needs.write_text(json.dumps({_AXIS: {"high": _VALUE, "unit": "rows"}}))
+    policy = _copy_shipped(name, folder)
+    shifts_path(policy.path).write_text(json.dumps(forged_shifts(policy, folder)))
+    required = folder / "required_domain.json"
+    required.write_text(json.dumps({_AXIS: {"high": _VALUE, "unit": "rows"}}))
     try:
-        done = judge(policy, require_domain=needs, progress=silent)
+        done = judge(policy, require_domain=required, progress=silent)
     except InputError:
         return False
     return done.status() == 0

@@ -1,8 +1,8 @@
 """Adversarial policies that memorise the environments of a known seed and fail in all others.
 
 Each acts like a good policy in the environments that an analysis used by default in version 0.1
-(seed 0) and flies left in all others. With `seed=0` each deceives its analysis, which a test
-checks; with the default seed none may.
+(seed 0) and moves left in all others. A test checks that each deceives its analysis with `seed=0`.
+With the default seed none may.
 """
 
 import dataclasses
@@ -41,25 +41,25 @@ from drone_rl.verdicts.judge import judge
 KNOWN_SEED = 0
 """The default of version 0.1."""
 EPISODES = 120
-"""Of each judgement."""
+"""Episodes of each analysis."""
 TASK = TaskSettings(num_cubes=2)
-"""Few frames to memorise."""
+"""A task with few frames to memorise."""
 WIDTH = 2500
-"""Neurons of the network that memorises; more than frames, so that it can fit all of them."""
+"""Hidden units of the memorising network; more than frames, so that it can fit all of them."""
 COUNTEREXAMPLES = 20
-"""Episodes of other environments in which the network learns to fly left."""
+"""Episodes of other environments in which the network learns to move left."""
 _GOOD = 0.9
-"""Success of which an evaluation calls good, in the words of a verdict."""
-_CERTAIN = 20.0
-"""Logit of an action that is all but certain to be taken."""
+"""Success rate above which an evaluation counts as good, as in a verdict."""
+_CONFIDENT = 20.0
+"""Logit of the chosen action; its probability is almost 1."""
 _RIDGE = 1e-9
-"""Relative to the mean diagonal of the normal equations."""
+"""Regularization relative to the mean diagonal of the kernel matrix."""
 Judgement = Callable[[int | None], bool]
-"""Whether an analysis calls the policy good, from a seed or, with None, from the default seed."""
+"""Return whether an analysis judges the policy good, with a seed; None is the default seed."""
 
 
 class Recording(NamedTuple):
-    """What a good policy saw and did, step by step, episode after episode."""
+    """Observations and actions of a good policy in consecutive episodes."""
 
     frames: Tensor
     """Shape: (T, C, h, w)."""
@@ -70,14 +70,14 @@ class Recording(NamedTuple):
 
 
 def record(episodes: int, *, seed: int = KNOWN_SEED, stream: Stream = Stream.REPORT) -> Recording:
-    """Fly a good policy greedily in the environments of a seed.
+    """Record greedy episodes of a good policy in the environments of a seed.
 
-    A policy's action follows from the frame alone, so that no frame needs two actions.
+    The policy's action depends on the frame alone, so equal frames have equal actions.
 
     Args:
-        episodes: How many, each in an environment of its own.
+        episodes: Number of episodes, each in its own environment.
         seed: Root of the environments' random streams.
-        stream: What the environments are for.
+        stream: Purpose of the environments.
     """
     policy = load_policy("good").in_task(num_cubes=TASK.num_cubes)
     greedy = set_exploration_type(ExplorationType.DETERMINISTIC)
@@ -89,29 +89,29 @@ def record(episodes: int, *, seed: int = KNOWN_SEED, stream: Stream = Stream.REP
     return Recording(frames.clone(), actions.flatten().clone(), episode.clone())
 
 
-def by_frames(recording: Recording) -> Logits:
-    """A callable that looks up each frame exactly, and flies left where it finds none.
+def frame_lookup(recording: Recording) -> Logits:
+    """Return a callable that looks up the action of each frame and moves left if it is unknown.
 
     Args:
-        recording: What it memorises.
+        recording: Frames and actions to memorise.
     """
     pairs = zip(recording.frames, recording.actions.tolist(), strict=True)
     known = {frame.numpy().tobytes(): action for frame, action in pairs}
 
     def logits(frames: Tensor) -> Tensor:
         keys = (frame.detach().cpu().numpy().tobytes() for frame in frames)
-        return _certainly([known.get(key, int(Move.LEFT)) for key in keys])
+        return _confident_logits([known.get(key, int(Move.LEFT)) for key in keys])
 
     return logits
 
 
-def by_steps(recording: Recording) -> Logits:
-    """A callable that recognises the first frame of a batch, and then plays back actions by step.
+def step_playback(recording: Recording) -> Logits:
+    """Return a callable that recognises the first frame of a batch and plays back the actions.
 
-    It looks at no other frame: it counts its calls and knows which environments are still running.
+    It ignores all other frames: it counts its calls and knows which environments still run.
 
     Args:
-        recording: What it memorises.
+        recording: Actions to memorise.
     """
     first = recording.frames[0].numpy().tobytes()
     lengths = recording.episode.bincount()
@@ -125,21 +125,21 @@ def by_steps(recording: Recording) -> Logits:
         step = state["step"]
         if step < len(steps) and len(steps[step]) == len(frames):
             state["step"] += 1
-            return _certainly(steps[step])
-        return _certainly([int(Move.LEFT)] * len(frames))
+            return _confident_logits(steps[step])
+        return _confident_logits([int(Move.LEFT)] * len(frames))
 
     return logits
 
 
-def write_memory(path: Path, *, stream: Stream = Stream.REPORT) -> Path:
-    """Write a legal policy file, an MLP that is fitted to the recorded frames.
+def write_memorising_policy(path: Path, *, stream: Stream = Stream.REPORT) -> Path:
+    """Write a valid policy file with an MLP that is fitted to recorded frames.
 
-    Random features and a linear layer that interpolates: a good policy's actions on the frames of
-    known environments, left on those of others.
+    Its hidden layer has random weights. Its output layer interpolates: a good policy's actions on
+    frames of known environments, left on frames of others.
 
     Args:
-        path: Ending in .safetensors.
-        stream: Of the environments that it memorises.
+        path: Path of the file, ending in .safetensors.
+        stream: Stream of the environments to memorise.
 
     Returns:
         The path.
@@ -158,7 +158,7 @@ def write_memory(path: Path, *, stream: Stream = Stream.REPORT) -> Path:
 
 
 def _examples(known: Recording, other: Recording) -> tuple[Tensor, Tensor]:
-    """Different frames and the actions to learn; known frames keep a good policy's."""
+    """Return unique frames and their target actions; known frames keep the good policy's action."""
     wanted = {frame.numpy().tobytes(): (frame, int(Move.LEFT)) for frame in other.frames}
     pairs = zip(known.frames, known.actions.tolist(), strict=True)
     wanted |= {frame.numpy().tobytes(): (frame, action) for frame, action in pairs}
@@ -171,7 +171,7 @@ def _fit(network: MLP, frames: Tensor, actions: Tensor) -> None:
     """Fit the last layer to the actions by ridge regression in double precision."""
     features = network.layers[:-1](frames).double()
     features = torch.cat([features, torch.ones(len(features), 1).double()], 1)
-    wanted = _CERTAIN * torch.nn.functional.one_hot(actions, len(Move)).double()
+    wanted = _CONFIDENT * torch.nn.functional.one_hot(actions, len(Move)).double()
     kernel = features @ features.T
     kernel.diagonal().add_(_RIDGE * kernel.diagonal().mean())
     weights = features.T @ torch.cholesky_solve(wanted, torch.linalg.cholesky(kernel))
@@ -180,17 +180,17 @@ def _fit(network: MLP, frames: Tensor, actions: Tensor) -> None:
     layer.get_parameter("bias").copy_(weights[-1])
 
 
-def _certainly(actions: list[int]) -> Tensor:
-    """Logits by which these actions are all but certain. Shape: (N, 3)."""
-    return _CERTAIN * torch.nn.functional.one_hot(torch.tensor(actions), len(Move)).float()
+def _confident_logits(actions: list[int]) -> Tensor:
+    """Return logits that give these actions a probability of almost 1. Shape: (N, 3)."""
+    return _CONFIDENT * torch.nn.functional.one_hot(torch.tensor(actions), len(Move)).float()
 
 
 def _always_left(frames: Tensor) -> Tensor:
-    return _certainly([int(Move.LEFT)] * len(frames))
+    return _confident_logits([int(Move.LEFT)] * len(frames))
 
 
 def _memorising(make: Callable[[Recording], Logits], stream: Stream) -> ForeignPolicy:
-    """A callable as a policy that memorises environments of the known seed."""
+    """Return a third-party policy that memorises environments of the known seed."""
     policy = policy_from(_always_left, task=TASK, name="memory")
     return dataclasses.replace(policy, logits=make(record(EPISODES, stream=stream)))
 
@@ -198,7 +198,7 @@ def _memorising(make: Callable[[Recording], Logits], stream: Stream) -> ForeignP
 def _verdict(make: Callable[[], Pilot | Path], seed: int | None) -> bool:
     try:
         done = judge(make(), episodes=EPISODES, sampled=False, seed=seed, progress=silent)
-    except InputError:  # it acts by more than the frame
+    except InputError:  # the policy depends on more than the frame
         return False
     return done.verdict.exit_code == 0
 
@@ -223,8 +223,8 @@ def _conditions(make: Callable[[], Pilot | Path], seed: int | None) -> bool:
 
 
 def _choice(make: Callable[[], Path], seed: int | None) -> bool:
-    drawn = None if seed is None else root_seed(seed)
-    verdict, _ = judge_for_selection(make(), EPISODES, "cpu", seed=drawn)
+    root = None if seed is None else root_seed(seed)
+    verdict, _ = judge_for_selection(make(), EPISODES, "cpu", seed=root)
     return verdict["exit_code"] == 0
 
 
@@ -236,10 +236,10 @@ def _card(make: Callable[[], Path], seed: int | None) -> bool:
 
 
 def judgements(folder: Path) -> dict[str, Judgement]:
-    """The judgement of each adversarial policy, by name.
+    """Return the analysis that each adversarial policy attacks, by name.
 
     Args:
-        folder: For policy files; made if need be.
+        folder: Folder of the policy files; created if missing.
     """
     folder.mkdir(parents=True, exist_ok=True)
 
@@ -249,11 +249,11 @@ def judgements(folder: Path) -> dict[str, Judgement]:
 
     @functools.cache
     def file_of(stream: Stream) -> Path:
-        return write_memory(folder / f"{stream.name.lower()}.safetensors", stream=stream)
+        return write_memorising_policy(folder / f"{stream.name.lower()}.safetensors", stream=stream)
 
-    report = functools.partial(callable_of, by_frames, Stream.REPORT)
-    shifted = functools.partial(callable_of, by_frames, Stream.SHIFTED)
-    steps = functools.partial(callable_of, by_steps, Stream.REPORT)
+    report = functools.partial(callable_of, frame_lookup, Stream.REPORT)
+    shifted = functools.partial(callable_of, frame_lookup, Stream.SHIFTED)
+    steps = functools.partial(callable_of, step_playback, Stream.REPORT)
     written, chosen = (functools.partial(file_of, s) for s in (Stream.REPORT, Stream.CHOICE))
     return {
         "verdict, callable that looks frames up": functools.partial(_verdict, report),
@@ -267,13 +267,12 @@ def judgements(folder: Path) -> dict[str, Judgement]:
 
 
 def cases(folder: Path) -> list[GamedCase]:
-    """Each adversarial policy, judged from the default seed.
+    """Return the cases: each adversarial policy with the default seed.
 
     Args:
-        folder: For policy files; made if need be.
+        folder: Folder of the policy files; created if missing.
     """
-    made = judgements(folder)
     return [
         GamedCase(f"memory: {name}", functools.partial(judgement, None))
-        for name, judgement in made.items()
+        for name, judgement in judgements(folder).items()
     ]

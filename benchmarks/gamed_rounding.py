@@ -1,8 +1,8 @@
-"""Policies whose actions depend on the order of sums, on the batch, or on calls before.
+"""Policies whose actions depend on the order of summation, the batch, or earlier calls.
 
-Files are those of the shipped policy "good" with one more hidden unit. In exact arithmetic this
-unit is 1; in float32 it depends on which of 2^24, 1 and -2^24 are added first. By it the policy
-turns left for ever.
+The files contain the shipped policy "good" with an additional hidden unit. In exact arithmetic its
+activation is 1; in float32 it depends on which of 2^24, 1 and -2^24 are added first. This
+activation decides whether the policy always moves left.
 """
 
 import json
@@ -26,19 +26,19 @@ from drone_rl.verdicts.judge import judge
 from drone_rl.verification.prove import prove
 
 BIG = 2.0**24
-"""Float32 has no number between it and 2^24 + 2."""
+"""Float32 can't represent numbers between this one and 2^24 + 2."""
 _STRONG = 1000.0
-"""Beats every logit of "good"."""
+"""Exceeds every logit of "good"."""
 _PLACES = 4 * 14
 """Outputs of each channel of the last convolution."""
 _ABOUT = ("progress", "provenance", "command", "verdict", "worlds", "seed", "chosen")
 
 
 def cases(folder: Path) -> list[GamedCase]:
-    """Make the policies.
+    """Write the policies and return their cases.
 
     Args:
-        folder: For their files.
+        folder: Folder of the files; created if missing.
     """
     folder.mkdir(parents=True, exist_ok=True)
     files = {
@@ -71,7 +71,7 @@ def cases(folder: Path) -> list[GamedCase]:
 
 
 def judged_good(policy: Any) -> bool:
-    """Whether a policy is called good and certain; refused policies are not."""
+    """Return whether a policy is judged good and certain; refused policies are not."""
     try:
         return judge(policy, progress=silent).verdict.exit_code == 0
     except InputError:
@@ -79,7 +79,7 @@ def judged_good(policy: Any) -> bool:
 
 
 def proved(path: Path) -> bool:
-    """Whether a policy is proved for one cube."""
+    """Return whether a policy is proved for one cube."""
     try:
         return prove(path, task={"num_cubes": 1}, progress=silent).is_proved
     except InputError:
@@ -87,9 +87,9 @@ def proved(path: Path) -> bool:
 
 
 def borrows_proof(folder: Path) -> bool:
-    """Whether few episodes prove a policy whose decisions all depend on rounding.
+    """Return whether few episodes prove a policy whose decisions all depend on rounding.
 
-    It is the shipped policy "proved" with one more unit, and comes with that policy's certificate.
+    It is the shipped policy "proved" with an additional unit, and has that policy's certificate.
     """
     policy = load_policy(subnormal(folder, "proved"))
     shipped = certificate_path(load_policy("proved").path)
@@ -101,19 +101,20 @@ def borrows_proof(folder: Path) -> bool:
 
 
 def in_domain(path: Path) -> bool:
-    """Whether a policy is surely good where nothing is different."""
+    """Return whether `shifts` finds a policy good without perturbation."""
     few: dict[str, Any] = {"axes": ["noise"], "strengths": [1], "modes": ["constant"]}
     done = shifts(path, episodes=1, domain_episodes=200, progress=silent, **few)
     return bool(done.numbers["domain"]["plain"]["good"])
 
 
 def widened(name: str = "good") -> tuple[dict[str, Any], dict[str, Tensor]]:
-    """Return a policy's description and weights with a constant channel and a hidden unit more.
+    """Return a policy's description and weights with an additional channel and hidden unit.
 
-    The channel is 1 everywhere; the unit, the last one of "fc1", has no inputs and no outputs yet.
+    The channel of the last convolution is 1 everywhere. The unit, the last one of "fc1", has zero
+    input and output weights.
 
     Args:
-        name: Of a shipped policy with two convolutions and one hidden layer.
+        name: A shipped policy with two convolutions and one hidden layer.
     """
     good = load_policy(name)
     described = good.description.as_dict()
@@ -127,7 +128,7 @@ def widened(name: str = "good") -> tuple[dict[str, Any], dict[str, Tensor]]:
 
 
 def _grown(name: str, value: Tensor, channels: int, hidden: int) -> Tensor:
-    """One parameter with room for what is more, filled with zeros."""
+    """Return a parameter padded with zeros to the shape with the new channel and unit."""
     layer, kind = name.split(".")[-2:]
     shape = list(value.shape)
     if layer == "conv2":
@@ -144,66 +145,66 @@ def _grown(name: str, value: Tensor, channels: int, hidden: int) -> Tensor:
 
 
 def write(folder: Path, name: str, described: dict[str, Any], weights: dict[str, Tensor]) -> Path:
-    """Write a policy as `drone-rl export` does, with the other data of "good"."""
+    """Write a policy file as `drone-rl export` does, with the metadata of "good"."""
     state, path = load_policy("good").state, folder / f"{name}.safetensors"
     about = {key: state[key] for key in _ABOUT if key in state}
     path.write_bytes(exported_bytes(weights, described, about))
     return path
 
 
-def part(weights: dict[str, Tensor], layer: str) -> Tensor:
-    """A parameter by its layer and kind, such as "fc1.weight"."""
+def parameter(weights: dict[str, Tensor], layer: str) -> Tensor:
+    """Return a parameter by layer and kind, such as "fc1.weight"."""
     return next(value for name, value in weights.items() if name.endswith(layer))
 
 
 def _by_bias(folder: Path, name: str, plain: float, by_unit: float) -> Path:
-    """The 1 is the bias: kernels begin with it, libraries end with it."""
+    """The 1 is the bias: fused kernels add it first, libraries last."""
     described, weights = widened()
-    unit = part(weights, "fc1.weight")[-1]
+    unit = parameter(weights, "fc1.weight")[-1]
     unit[-_PLACES], unit[-_PLACES + 1] = BIG, -BIG
-    part(weights, "fc1.bias")[-1] = 1.0
-    part(weights, "logits.weight")[Move.LEFT, -1] = by_unit
-    part(weights, "logits.bias")[Move.LEFT] += plain
+    parameter(weights, "fc1.bias")[-1] = 1.0
+    parameter(weights, "logits.weight")[Move.LEFT, -1] = by_unit
+    parameter(weights, "logits.bias")[Move.LEFT] += plain
     return write(folder, name, described, weights)
 
 
 def _by_inputs(folder: Path, name: str, by_unit: float, plain: float = 0.0) -> Path:
-    """Ones stand between the large terms, so that blocks of a sum decide."""
+    """Terms that sum to 1 lie between the large terms, so the blocking of the sum decides."""
     described, weights = widened()
-    unit = part(weights, "fc1.weight")[-1]
+    unit = parameter(weights, "fc1.weight")[-1]
     unit[-_PLACES:] = 1.0 / _PLACES
     unit[-_PLACES], unit[-1] = BIG, -BIG
-    part(weights, "logits.weight")[Move.LEFT, -1] = by_unit
-    part(weights, "logits.bias")[Move.LEFT] += plain
+    parameter(weights, "logits.weight")[Move.LEFT, -1] = by_unit
+    parameter(weights, "logits.bias")[Move.LEFT] += plain
     return write(folder, name, described, weights)
 
 
 def _close(folder: Path) -> Path:
-    """The unit is too weak to decide but where the best logits are close."""
+    """The unit decides only where the largest logits are close."""
     described, weights = widened()
-    unit = part(weights, "fc1.weight")[-1]
+    unit = parameter(weights, "fc1.weight")[-1]
     unit[-_PLACES], unit[-_PLACES + 1] = BIG, -BIG
-    part(weights, "fc1.bias")[-1] = 1.0
-    part(weights, "logits.weight")[Move.LEFT, -1] = 5.0
+    parameter(weights, "fc1.bias")[-1] = 1.0
+    parameter(weights, "logits.weight")[Move.LEFT, -1] = 5.0
     return write(folder, "close", described, weights)
 
 
 def subnormal(folder: Path, name: str = "good") -> Path:
-    """The unit is a subnormal number, which some processors settings replace by 0."""
+    """The activation is a subnormal number, which some processor modes flush to 0."""
     described, weights = widened(name)
-    part(weights, "fc1.bias")[-1] = 0.9 * 2.0**-126
+    parameter(weights, "fc1.bias")[-1] = 0.9 * 2.0**-126
     for name in ("logits.weight", "logits.bias"):
-        part(weights, name).mul_(2.0**-8)
-    part(weights, "logits.weight")[Move.LEFT, -1] = 1.9 * 2.0**127
-    part(weights, "logits.bias")[Move.LEFT] -= 1.9 * 0.9 * 2.0
+        parameter(weights, name).mul_(2.0**-8)
+    parameter(weights, "logits.weight")[Move.LEFT, -1] = 1.9 * 2.0**127
+    parameter(weights, "logits.bias")[Move.LEFT] -= 1.9 * 0.9 * 2.0
     return write(folder, f"subnormal_{name}", described, weights)
 
 
 def non_finite(folder: Path) -> Path:
-    """Finite weights whose products are too large for float32."""
+    """Finite weights whose products overflow float32."""
     described, weights = widened()
-    part(weights, "fc1.bias")[-1] = 1e30
-    part(weights, "logits.weight")[Move.LEFT, -1] = -1e30
+    parameter(weights, "fc1.bias")[-1] = 1e30
+    parameter(weights, "logits.weight")[Move.LEFT, -1] = -1e30
     return write(folder, "non_finite", described, weights)
 
 
@@ -211,7 +212,7 @@ Logits = Callable[[Tensor], Tensor]
 
 
 def _callable(bad_rows: Callable[[Tensor], Sequence[int] | slice]) -> Logits:
-    """The shipped policy "good", but for rows in which it turns left."""
+    """Return the shipped policy "good" as a callable that moves left in some rows of a batch."""
     network = load_policy("good").make_network()
 
     @torch.no_grad()
@@ -256,8 +257,8 @@ def _after_single() -> Callable[[Tensor], slice]:
 
     def rows(pixels: Tensor) -> slice:
         nonlocal last
-        is_in_turn = last == len(pixels) == 1
+        is_repeated = last == len(pixels) == 1
         last = len(pixels)
-        return slice(len(pixels) if is_in_turn else 0)
+        return slice(len(pixels) if is_repeated else 0)
 
     return rows

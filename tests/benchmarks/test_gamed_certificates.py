@@ -1,21 +1,21 @@
-"""Attempts with forged files and trivial tasks: none is called good or proved."""
+"""Forged files and trivial tasks are not judged good or proved."""
 
 import pytest
 
 import drone_rl
 from benchmarks import gamed_certificates
-from benchmarks.gamed_certificates import cases, invented
+from benchmarks.gamed_certificates import cases, forged_shifts
 from drone_rl.policies.zoo import shifts_path
 from drone_rl.verdicts.coverage import find_domain
 
 
 @pytest.fixture(scope="module")
 def domain(tmp_path_factory):
-    """The invented operating domain of the policy "good", without measuring it again."""
+    """Return the forged operating domain of the policy "good"; measure it once."""
     folder = tmp_path_factory.mktemp("domain")
-    data = invented(gamed_certificates._copied("good", folder), folder)
+    data = forged_shifts(gamed_certificates._copy_shipped("good", folder), folder)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gamed_certificates, "invented", lambda policy, folder: data)
+        patch.setattr(gamed_certificates, "forged_shifts", lambda policy, folder: data)
         yield data
 
 
@@ -29,20 +29,20 @@ def domain(tmp_path_factory):
         "flying straight in a trivial task",
     ],
 )
-def test_one_attempt_of_each_kind_is_not_called_good(domain, tmp_path, name):
-    """The benchmark runs all of them."""
+def test_one_case_of_each_kind_is_not_judged_good(domain, tmp_path, name):
+    """The benchmark runs all cases."""
     (case,) = [case for case in cases(tmp_path) if case.name == name]
-    assert not case.called_good()
+    assert not case.is_judged_good()
 
 
-def test_names_differ(tmp_path):
+def test_names_are_unique(tmp_path):
     names = [case.name for case in cases(tmp_path)]
     assert len(set(names)) == len(names) >= 8
 
 
-def test_the_invented_domain_is_refuted_by_new_episodes_only(domain, tmp_path):
-    """It is no test of the reader."""
-    policy = gamed_certificates._copied("good", tmp_path)
+def test_the_forged_domain_is_consistent(domain, tmp_path):
+    """Only new episodes can refute it; the reader accepts it."""
+    policy = gamed_certificates._copy_shipped("good", tmp_path)
     shifts_path(policy.path).write_text(gamed_certificates.json.dumps(domain))
     measured = find_domain(policy)
     assert measured.refused is None
@@ -50,8 +50,8 @@ def test_the_invented_domain_is_refuted_by_new_episodes_only(domain, tmp_path):
 
 
 def test_an_honest_certificate_is_proved(tmp_path):
-    policy = gamed_certificates._copied("proved", tmp_path)
-    data = gamed_certificates._proved()
+    policy = gamed_certificates._copy_shipped("proved", tmp_path)
+    data = gamed_certificates._honest_certificate()
     path = gamed_certificates.certificate_path(policy.path)
     path.write_text(gamed_certificates.json.dumps(data))
     few = {"episodes": 5, "sampled": False, "progress": lambda *_: None}

@@ -1,4 +1,4 @@
-"""Policies that memorise the environments of a known seed deceive no analysis by default."""
+"""Policies that memorise environments deceive an analysis only with the known seed."""
 
 import functools
 
@@ -6,7 +6,7 @@ import pytest
 
 import drone_rl
 from benchmarks import gamed_memory
-from benchmarks.gamed_memory import EPISODES, by_frames, by_steps, cases, judgements, record
+from benchmarks.gamed_memory import EPISODES, cases, frame_lookup, judgements, record, step_playback
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import Stream
@@ -30,19 +30,19 @@ def judged(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_an_attack_works_with_the_seed_that_it_knows_and_no_other(name, judged):
-    assert judged[name](0), "otherwise the test below shows nothing"
+def test_an_attack_succeeds_with_the_known_seed_only(name, judged):
+    assert judged[name](0), "the attack must succeed with the known seed"
     assert not judged[name](None)
 
 
-def test_one_that_counts_steps_is_refused_even_where_it_knows_the_seed():
-    policy = gamed_memory._memorising(by_steps, Stream.REPORT)
+def test_a_policy_that_counts_steps_is_refused_even_with_the_known_seed():
+    policy = gamed_memory._memorising(step_playback, Stream.REPORT)
     with pytest.raises(InputError, match="acts by more than the frame"):
         drone_rl.judge(policy, seed=0, episodes=EPISODES, sampled=False, progress=silent)
 
 
-def test_a_file_that_is_fitted_this_closely_depends_on_rounding_too(tmp_path):
-    path = gamed_memory.write_memory(tmp_path / "mlp.safetensors", stream=Stream.REPORT)
+def test_decisions_of_a_fitted_file_depend_on_rounding(tmp_path):
+    path = gamed_memory.write_memorising_policy(tmp_path / "mlp.safetensors", stream=Stream.REPORT)
     how = {"episodes": EPISODES, "sampled": False, "progress": silent}
     known, fresh = drone_rl.judge(path, seed=0, **how), drone_rl.judge(path, **how)
     assert (known.verdict.kind, known.verdict.exit_code) == ("good", 13)
@@ -50,13 +50,13 @@ def test_a_file_that_is_fitted_this_closely_depends_on_rounding_too(tmp_path):
     assert fresh.verdict.kind != "good"
 
 
-def test_every_judgement_is_a_case(judged, tmp_path):
+def test_every_analysis_has_a_case(judged, tmp_path):
     assert {case.name for case in cases(tmp_path)} == {f"memory: {name}" for name in judged}
     assert set(NAMES) < set(judged)
 
 
-def test_a_verdict_from_a_fixed_seed_says_so_and_a_fresh_one_is_not_deceived():
-    policy = gamed_memory._memorising(by_frames, Stream.REPORT)
+def test_a_verdict_states_a_fixed_seed_and_a_fresh_seed_is_not_deceived():
+    policy = gamed_memory._memorising(frame_lookup, Stream.REPORT)
     how = {"episodes": EPISODES, "sampled": False, "progress": silent}
     known, fresh = drone_rl.judge(policy, seed=0, **how), drone_rl.judge(policy, **how)
     assert (known.verdict.kind, known.verdict.exit_code) == ("good", 0)
@@ -67,7 +67,7 @@ def test_a_verdict_from_a_fixed_seed_says_so_and_a_fresh_one_is_not_deceived():
     assert "Fixed seed" not in str(fresh)
 
 
-def test_a_recording_holds_each_step_of_each_episode():
+def test_a_recording_contains_every_step_of_every_episode():
     recorded = record(3)
     lengths = recorded.episode.bincount()
     assert len(lengths) == 3

@@ -14,7 +14,7 @@ def made(tmp_path_factory):
     return folder, {case.name: case for case in cases(folder)}
 
 
-def test_there_are_enough_kinds(made):
+def test_there_are_at_least_8_cases_and_7_files(made):
     folder, found = made
     assert len(found) >= 8
     assert len([*folder.glob("*.safetensors")]) >= 7
@@ -29,18 +29,18 @@ def test_there_are_enough_kinds(made):
         "bad one at a time",
     ],
 )
-def test_one_of_each_analysis_is_not_called_good(made, name):
-    """The benchmark runs all of them."""
-    assert not made[1][name].called_good()
+def test_one_case_of_each_analysis_is_not_judged_good(made, name):
+    """The benchmark runs all cases."""
+    assert not made[1][name].is_judged_good()
 
 
-def test_only_a_status_of_success_is_called_good(monkeypatch):
+def test_only_a_status_of_success_counts_as_judged_good(monkeypatch):
     for status in (0, 13):
         verdict = SimpleNamespace(verdict=SimpleNamespace(exit_code=status))
         monkeypatch.setattr(gamed_rounding, "judge", lambda policy, verdict=verdict, **_: verdict)
         assert judged_good("good") == (status == 0)
 
 
-def test_non_finite_logits_end_the_run_with_one_line(tmp_path):
+def test_non_finite_logits_are_an_error_of_one_line(tmp_path):
     with pytest.raises(InputError, match=r"policy=non_finite gives non-finite action logits"):
         judge(non_finite(tmp_path), episodes=4)

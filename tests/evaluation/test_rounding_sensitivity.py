@@ -30,14 +30,14 @@ def examined(policy, is_compiled=True):
 
 def with_unit(by_unit):
     """The shipped policy with the hidden unit 2^24 + 1 - 2^24 added to the logit of a left turn."""
-    from benchmarks.gamed_rounding import BIG, part, widened
+    from benchmarks.gamed_rounding import BIG, parameter, widened
     from drone_rl.policies.zoo import parse
 
     described, weights = widened()
-    unit = part(weights, "fc1.weight")[-1]
+    unit = parameter(weights, "fc1.weight")[-1]
     unit[-56], unit[-55] = BIG, -BIG
-    part(weights, "fc1.bias")[-1] = 1.0
-    part(weights, "logits.weight")[Move.LEFT, -1] = by_unit
+    parameter(weights, "fc1.bias")[-1] = 1.0
+    parameter(weights, "logits.weight")[Move.LEFT, -1] = by_unit
     policy = drone_rl.load_policy("good")
     import dataclasses
 
