@@ -1,6 +1,6 @@
-"""Heat maps that know nothing of the policy they are asked about, made to get past the tests.
+"""Adversarial heat maps: they do not explain the policy, but are designed to pass the tests.
 
-None is one of the placebos that the procedure compares with; some hide behind the weights.
+None is one of the placebos of the test procedure. Some depend on the weights only as a hash does.
 """
 
 import hashlib
@@ -9,19 +9,19 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from benchmarks.known_map_policies import reach
+from benchmarks.known_map_policies import path_weights
 from drone_rl.explanations import patches
 from drone_rl.explanations.patches import shuffled_networks
 from drone_rl.explanations.trust import MapOf
 from drone_rl.policies import PictureNetwork
 
 
-def liars(absent: Tensor, other: PictureNetwork) -> dict[str, MapOf]:
-    """Liars by name.
+def adversarial_maps(absent: Tensor, other: PictureNetwork) -> dict[str, MapOf]:
+    """Return adversarial maps by name.
 
     Args:
         absent: The scene without cubes. Shape: (C, h, w).
-        other: A policy that is not the one asked about.
+        other: Another policy than the explained one.
     """
     height, width = absent.shape[-2:]
     row = patches.horizon_row(absent)
@@ -35,7 +35,7 @@ def liars(absent: Tensor, other: PictureNetwork) -> dict[str, MapOf]:
         * patches.blob(height, width, 0.5, 0.5, 0.4),
     }
     return {
-        **{name: _always(made) for name, made in fixed.items()},
+        **{name: _constant(heat) for name, heat in fixed.items()},
         "cube detector": lambda n, x, a: _cubes(x, absent),
         "cubes on the horizon": lambda n, x, a: (
             fixed["horizon, wide"] * (0.2 + patches.smoothed(_cubes(x, absent)))
@@ -47,7 +47,7 @@ def liars(absent: Tensor, other: PictureNetwork) -> dict[str, MapOf]:
         "brightness": lambda n, x, a: x.mean(1) - x.amin((1, 2, 3))[:, None, None],
         "darkness": lambda n, x, a: x.amax((1, 2, 3))[:, None, None] - x.mean(1),
         "other noise": lambda n, x, a: _noise(1, len(x), height, width),
-        "weights of another policy": lambda n, x, a: reach(other, x, a),
+        "weights of another policy": lambda n, x, a: path_weights(other, x, a),
         "saliency of another policy": lambda n, x, a: saliency(other, x, a),
         "saliency of shuffled weights": lambda n, x, a: saliency(
             next(shuffled_networks(n, x, 1, fingerprint(n))), x, a
@@ -74,7 +74,7 @@ def liars(absent: Tensor, other: PictureNetwork) -> dict[str, MapOf]:
 
 
 def fingerprint(network: PictureNetwork) -> int:
-    """A number that any change of a weight changes."""
+    """Return a hash of a network's weights."""
     digest = hashlib.sha256()
     for value in network.state_dict().values():
         digest.update(value.contiguous().numpy().tobytes())
@@ -82,14 +82,14 @@ def fingerprint(network: PictureNetwork) -> int:
 
 
 def saliency(network: PictureNetwork, observations: Tensor, actions: Tensor) -> Tensor:
-    """Size of the derivative of the action's logit by each pixel. Shape: (T, h, w)."""
+    """Return the absolute gradient of the action's logit. Shape: (T, h, w)."""
     x = observations.detach().clone().requires_grad_()
     chosen = network(x).gather(1, actions[:, None]).sum()
     return torch.autograd.grad(chosen, x)[0].abs().sum(1)
 
 
-def _always(made: Tensor) -> MapOf:
-    return lambda network, x, a: made.expand(len(x), -1, -1)
+def _constant(heat: Tensor) -> MapOf:
+    return lambda network, x, a: heat.expand(len(x), -1, -1)
 
 
 def _cubes(observations: Tensor, absent: Tensor) -> Tensor:
@@ -107,13 +107,13 @@ def _noise(seed: int, count: int, height: int, width: int) -> Tensor:
 
 
 def _coarse(seed: int, height: int, width: int) -> Tensor:
-    """Noise as coarse as the patches, so that luck counts most. Shape: (1, height, width)."""
+    """Return noise as coarse as the patches, which varies most by chance. Shape: (1, h, w)."""
     return functional.interpolate(_noise(seed, 1, 5, 8)[:, None], (height, width))[:, 0]
 
 
 def _if_strong(network: PictureNetwork, x: Tensor, guess: Tensor, absent: Tensor) -> Tensor:
-    """A guess that drowns in noise where the policy hardly minds the pictures."""
+    """Return a guess with noise; the noise alone if the policy hardly depends on the image."""
     with torch.no_grad():
         spread = (network(x).softmax(-1) - network(absent[None]).softmax(-1)).abs().mean()
-    drowned = _noise(fingerprint(network), len(x), *x.shape[-2:])
-    return guess * (spread > 0.01) + 0.2 * drowned
+    noise = _noise(fingerprint(network), len(x), *x.shape[-2:])
+    return guess * (spread > 0.01) + 0.2 * noise

@@ -1,4 +1,7 @@
-"""Are liars trusted, and true maps found? On policies of many kinds, some planted."""
+"""Reliability of the tests of heat maps.
+
+The benchmark counts how many adversarial maps pass the tests, and how many true maps do.
+"""
 
 import time
 from pathlib import Path
@@ -8,8 +11,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from benchmarks.adversarial_maps import liars
-from benchmarks.known_map_policies import Planted, plant, reach
+from benchmarks.adversarial_maps import adversarial_maps
+from benchmarks.known_map_policies import KnownMapPolicy, make_policies, path_weights
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.trust import Pictures, Trial, check_maps, draw_pictures
@@ -19,15 +22,21 @@ from drone_rl.policies.zoo import load_exported, parse, policy_names, policy_pat
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, WorldState
 
 NUM_METHODS = 5
-"""Methods that an explanation tries; a candidate is judged as one of so many."""
+"""Number of methods of an explanation, for the correction for multiple tests."""
 
 
 def bench_maps(folder: Path, quick: bool) -> dict[str, Any]:
-    """How many liars are trusted, and how many true maps of planted policies.
+    """Count trusted adversarial maps, and trusted true maps of policies with known maps.
 
     Args:
-        folder: Not used: nothing is written.
-        quick: Whether to take a few policies and episodes only.
+        folder: Not used.
+        quick: Whether to use only a few policies and episodes.
+
+    Returns:
+        "placebo_maps_...": trusted adversarial maps, their total, the number of policies and the
+        names of trusted maps by policy; "planted_maps_...": the fraction of true maps that are
+        trusted, their number, the failed tests of the others, and trusted maps of blind policies;
+        "maps_s": seconds.
     """
     del folder
     begin = time.perf_counter()
@@ -35,49 +44,58 @@ def bench_maps(folder: Path, quick: bool) -> dict[str, Any]:
     scenes = Scenes(env)
     state, episode = imagined(scenes, 14 if quick else 40, 4 if quick else 6)
     pictures = draw_pictures(scenes, state, episode)
-    planted = plant(pictures.absent, pictures.observations, expert(scenes, state))
-    planted = planted[::7] if quick else planted
-    missing = {p.name: trusts(pictures, p) for p in planted}
-    looking = [p for p in planted if not p.is_blind]
-    policies = {p.name: p.network for p in looking[:: 3 if quick else 2]}
+    known = make_policies(pictures.absent, pictures.observations, expert(scenes, state))
+    known = known[::7] if quick else known
+    failed = {p.name: failed_tests(pictures, p) for p in known}
+    seeing = [p for p in known if not p.is_blind]
+    policies = {p.name: p.network for p in seeing[:: 3 if quick else 2]}
     policies |= shipped(pictures) if not quick else {}
     policies |= untrained(pictures, 1 if quick else 4)
-    lied = {name: believed(pictures, network) for name, network in policies.items()}
+    trusted = {name: trusted_adversarial(pictures, network) for name, network in policies.items()}
     env.close()
     return {
-        "placebo_maps_trusted": sum(len(names) for names, _ in lied.values()),
-        "placebo_maps_total": sum(tried for _, tried in lied.values()),
-        "placebo_maps_policies": len(lied),
-        "placebo_maps_believed": {n: names for n, (names, _) in lied.items() if names},
-        "planted_maps_found": float(np.mean([not missing[p.name] for p in looking])),
-        "planted_maps_total": len(looking),
-        "planted_maps_missed": {p.name: missing[p.name] for p in looking if missing[p.name]},
-        "planted_maps_blind_trusted": sum(not missing[p.name] for p in planted if p.is_blind),
-        "planted_maps_blind_total": len(planted) - len(looking),
+        "placebo_maps_trusted": sum(len(names) for names, _ in trusted.values()),
+        "placebo_maps_total": sum(total for _, total in trusted.values()),
+        "placebo_maps_policies": len(trusted),
+        "placebo_maps_believed": {n: names for n, (names, _) in trusted.items() if names},
+        "planted_maps_found": float(np.mean([not failed[p.name] for p in seeing])),
+        "planted_maps_total": len(seeing),
+        "planted_maps_missed": {p.name: failed[p.name] for p in seeing if failed[p.name]},
+        "planted_maps_blind_trusted": sum(not failed[p.name] for p in known if p.is_blind),
+        "planted_maps_blind_total": len(known) - len(seeing),
         "maps_s": time.perf_counter() - begin,
     }
 
 
-def trusts(pictures: Pictures, planted: Planted) -> list[str]:
-    """The tests that the true map of a planted policy fails; none if it is trusted."""
-    trial = _trial(pictures, planted.network)
-    checks = check_maps(trial, {"true": reach}, num_methods=NUM_METHODS)
+def failed_tests(pictures: Pictures, policy: KnownMapPolicy) -> list[str]:
+    """Return the tests that the true map of a policy fails; none if it is trusted."""
+    trial = _trial(pictures, policy.network)
+    checks = check_maps(trial, {"true": path_weights}, num_methods=NUM_METHODS)
     return checks["methods"]["true"]["failed"]
 
 
-def believed(pictures: Pictures, network: PictureNetwork) -> tuple[list[str], int]:
-    """Names of the liars that are trusted on a policy, and how many there were."""
+def trusted_adversarial(pictures: Pictures, network: PictureNetwork) -> tuple[list[str], int]:
+    """Return the names of the adversarial maps that are trusted on a policy, and their total."""
     trial = _trial(pictures, network)
     other = SmallCNN(network.in_shape, 3, generator=torch.Generator().manual_seed(99))
-    candidates = liars(pictures.absent, other)
+    candidates = adversarial_maps(pictures.absent, other)
     methods = check_maps(trial, candidates, num_methods=NUM_METHODS)["methods"]
     return [name for name, method in methods.items() if method["trusted"]], len(candidates)
 
 
 def imagined(scenes: Scenes, episodes: int, frames: int) -> tuple[WorldState, np.ndarray]:
-    """Worlds with the drone at random places on its way, some in each of many episodes."""
+    """Return states with the drone at random positions, several of each episode.
+
+    Args:
+        scenes: Scenes of the default task.
+        episodes: Number of episodes.
+        frames: Number of states of each episode.
+
+    Returns:
+        The states, and the episode of each.
+    """
     task = scenes.worlds.task
-    assert isinstance(task, CollectCubes)  # whose cubes the planted policies look for
+    assert isinstance(task, CollectCubes)  # the policies with known maps look for cubes
     settings = task.settings
     random_state = np.random.RandomState(0)
     cubes = torch.stack([CollectCubes(settings).draw(random_state) for _ in range(episodes)])
@@ -90,17 +108,17 @@ def imagined(scenes: Scenes, episodes: int, frames: int) -> tuple[WorldState, np
 
 
 def expert(scenes: Scenes, state: WorldState) -> Tensor:
-    """What the next cube calls for, if there is one. Shape: (T,)."""
+    """Return the action that approaches the next cube. Shape: (T,)."""
     return scenes.needed(scenes.task.next_offset(state))
 
 
 def shipped(pictures: Pictures) -> dict[str, PictureNetwork]:
-    """The policies that travel with the package and choose among moves on such pictures."""
+    """Return the shipped policies with discrete moves and this image shape, by name."""
     networks = {}
     for name in policy_names():
         exported = load_exported(policy_path(name))
         description = parse(exported["description"])
-        is_of_moves = description.actions.kind == "moves"  # others' outputs are no three logits
+        is_of_moves = description.actions.kind == "moves"  # else outputs are not three logits
         if description.input.shape != tuple(pictures.absent.shape) or not is_of_moves:
             continue
         parameters = exported["policy"]
@@ -111,7 +129,7 @@ def shipped(pictures: Pictures) -> dict[str, PictureNetwork]:
 
 
 def untrained(pictures: Pictures, count: int = 4) -> dict[str, PictureNetwork]:
-    """Policies of random weights, with opinions."""
+    """Return policies with random weights and confident outputs, by name."""
     networks = {}
     for seed in range(count):
         generator = torch.Generator().manual_seed(seed)

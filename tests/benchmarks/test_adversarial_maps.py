@@ -1,13 +1,13 @@
 import torch
 
-from benchmarks.adversarial_maps import fingerprint, liars, saliency
+from benchmarks.adversarial_maps import adversarial_maps, fingerprint, saliency
 from drone_rl.explanations.patches import placebo_maps
 from drone_rl.policies import MLP, SmallCNN
 
 SIZE = (1, 25, 64)
 
 
-def made():
+def make_inputs():
     absent = torch.zeros(SIZE)
     absent[:, :12] = 1.0
     x = absent.repeat(3, 1, 1, 1)
@@ -17,10 +17,10 @@ def made():
     return absent, x, network, other
 
 
-def test_no_liar_is_one_of_the_placebos_and_no_two_are_alike():
-    absent, x, network, other = made()
+def test_adversarial_maps_differ_from_placebos_and_from_each_other():
+    absent, x, network, other = make_inputs()
     actions = torch.tensor([0, 1, 2])
-    maps = {n: liar(network, x, actions) for n, liar in liars(absent, other).items()}
+    maps = {n: f(network, x, actions) for n, f in adversarial_maps(absent, other).items()}
     assert len(maps) >= 20
     maps |= {f"placebo {n}": m for n, m in placebo_maps(x, absent, [x + 1, -x]).items()}
     flat = {n: m.expand(3, -1, -1).flatten() / m.max() for n, m in maps.items()}
@@ -32,17 +32,15 @@ def test_no_liar_is_one_of_the_placebos_and_no_two_are_alike():
             assert not torch.allclose(flat[first], flat[second], atol=1e-3), (first, second)
 
 
-def test_some_liars_change_with_every_weight_and_some_with_none():
-    absent, x, network, other = made()
+def test_some_maps_change_with_every_weight_and_some_with_none():
+    absent, x, network, other = make_inputs()
     actions = torch.tensor([0, 1, 2])
-    found = liars(absent, other)
-    before = {n: liar(network, x, actions) for n, liar in found.items()}
+    found = adversarial_maps(absent, other)
+    before = {n: f(network, x, actions) for n, f in found.items()}
     assert fingerprint(network) == fingerprint(network)
     with torch.no_grad():
         network.layers.fc1.bias[3] += 1e-6
-    changed = {
-        n for n, liar in found.items() if not torch.equal(before[n], liar(network, x, actions))
-    }
+    changed = {n for n, f in found.items() if not torch.equal(before[n], f(network, x, actions))}
     assert {n for n in found if "of the weights" in n} <= changed
     assert "saliency of shuffled weights" in changed
     assert not changed & {"edges", "cube detector", "saliency of another policy"}

@@ -9,15 +9,15 @@ from drone_rl.explanations.scenes import Scenes
 from drone_rl.sim.actions import Move
 
 
-def test_no_liar_is_believed_and_true_maps_are_found(tmp_path):
+def test_no_adversarial_map_is_trusted_and_true_maps_are_found(tmp_path):
     found = bench_maps(tmp_path, quick=True)
     assert found["placebo_maps_trusted"] == 0 and found["placebo_maps_total"] >= 60
     assert found["planted_maps_found"] == 1.0 and found["planted_maps_total"] >= 3
     assert found["planted_maps_blind_trusted"] == 0 and found["planted_maps_blind_total"] >= 1
 
 
-def test_policies_of_the_package_that_choose_among_moves_are_tried():
-    """Not `flight_velocity`, whose six outputs are no logits of moves, nor those of two frames."""
+def test_shipped_policies_with_discrete_moves_are_used():
+    """`flight_velocity` has continuous actions, and others have two frames; they are left out."""
     networks = shipped(SimpleNamespace(absent=torch.zeros(1, 25, 64)))
     assert {"good", "poor", "proved", "flight"} <= networks.keys()
     assert not networks.keys() & {"flight_velocity", "robust", "pillars_good"}
@@ -29,7 +29,7 @@ def scenes(make_pipeline):
     return Scenes(make_pipeline()[0])
 
 
-def test_imagined_worlds_are_such_as_flights_meet(scenes):
+def test_imagined_states_can_occur_in_episodes(scenes):
     state, episode = imagined(scenes, 10, 4)
     assert episode.tolist() == np.repeat(np.arange(10), 4).tolist()
     assert torch.equal(state.cubes[0], state.cubes[3]) and not torch.equal(
@@ -42,7 +42,7 @@ def test_imagined_worlds_are_such_as_flights_meet(scenes):
     assert state.present.any(1).all()
 
 
-def test_the_expert_turns_to_the_next_cube(scenes):
+def test_the_expert_moves_towards_the_next_cube(scenes):
     state, _ = imagined(scenes, 10, 4)
     offset = state.cubes[torch.arange(40), state.next_cube, 1] - state.drone[:, 1]
     wanted = expert(scenes, state)
