@@ -1,6 +1,6 @@
-"""Evidence as the program's files hold it, small and made by hand, for sentences to be tried on.
+"""Small hand-written evidence in the form of the program's files, for tests of sentences.
 
-Every entry that a sentence reads is there; nothing here was measured.
+It contains every entry that a sentence reads. Nothing was measured.
 """
 
 import copy
@@ -13,19 +13,19 @@ Plain = dict[str, Any]
 
 
 def changed(evidence: Mapping[str, Any], changes: Mapping[str, Any]) -> Plain:
-    """A copy of evidence with some entries replaced.
+    """Return a copy of evidence with some entries replaced.
 
     Args:
-        evidence: Left as it is.
-        changes: New values by path, as "greedy.shares.left.mean" or "rows.0.share".
+        evidence: The original, which is not changed.
+        changes: New values by path, such as "greedy.shares.left.mean" or "rows.0.share".
     """
     result: Plain = copy.deepcopy(dict(evidence))
     for path, value in changes.items():
-        *way, last = path.split(".")
-        where: Any = result
-        for key in way:
-            where = where[int(key) if isinstance(where, list) else key]
-        where[int(last) if isinstance(where, list) else last] = value
+        *parents, last = path.split(".")
+        node: Any = result
+        for key in parents:
+            node = node[int(key) if isinstance(node, list) else key]
+        node[int(last) if isinstance(node, list) else last] = value
     return result
 
 
@@ -38,7 +38,7 @@ def _share(successes: int, trials: int, lower: float, upper: float) -> Plain:
     return {"share": successes / trials, "lower95": lower, "upper95": upper, **counts}
 
 
-def _flights(success: float, left: float, ahead: float, right: float) -> Plain:
+def _episodes(success: float, left: float, ahead: float, right: float) -> Plain:
     every = (left + ahead + right) / 3
     shares = {"all": every, "left": left, "ahead": ahead, "right": right}
     return {
@@ -55,7 +55,7 @@ def _row(by: str, value: str, failed: int, episodes: int) -> Plain:
 
 
 FIXED_SEED: Plain = {"seed": 0, "seed_is_fixed": True}
-"""What a result says of a seed that the user gave."""
+"""Entries of a result with a fixed seed."""
 
 EVALUATION: Plain = {
     **FIXED_SEED,
@@ -70,7 +70,7 @@ EVALUATION: Plain = {
         "differing": 0,
     },
 }
-"""What `evaluation.json` says of its seed and its arithmetic."""
+"""Entries of `evaluation.json` about seed and arithmetic."""
 VERDICT: Plain = {
     "kind": "none of these",
     **FIXED_SEED,
@@ -94,15 +94,15 @@ VERDICT: Plain = {
         "unexplained": 0,
         "decides": False,
     },
-    "greedy": _flights(0.6, 0.5, 1.0, 0.9),
-    "sampled": _flights(0.4, 0.4, 0.9, 0.8),
+    "greedy": _episodes(0.6, 0.5, 1.0, 0.9),
+    "sampled": _episodes(0.4, 0.4, 0.9, 0.8),
     "drawing": _mean(-0.2, -0.3, -0.1),
     "baselines": {
-        "random": _flights(0.03, 0.2, 0.4, 0.2),
-        "forward": _flights(0.02, 0.0, 1.0, 0.0),
-        "left": _flights(0.0, 0.0, 0.0, 0.0),
-        "right": _flights(0.0, 0.0, 0.0, 0.0),
-        "oracle": _flights(1.0, 1.0, 1.0, 1.0),
+        "random": _episodes(0.03, 0.2, 0.4, 0.2),
+        "forward": _episodes(0.02, 0.0, 1.0, 0.0),
+        "left": _episodes(0.0, 0.0, 0.0, 0.0),
+        "right": _episodes(0.0, 0.0, 0.0, 0.0),
+        "oracle": _episodes(1.0, 1.0, 1.0, 1.0),
     },
     "failures": {
         "rows": [_row("side", "left", 150, 300), _row("end", "step_limit", 40, 400)],
@@ -110,7 +110,7 @@ VERDICT: Plain = {
         "bound": _share(160, 400, 0.35, 0.45),
     },
 }
-"""`verdict.json` of a policy that collects half of the cubes on its left."""
+"""Content of `verdict.json` of a policy that collects half of the cubes on its left."""
 
 
 PROOF: Plain = {
@@ -126,7 +126,7 @@ PROOF: Plain = {
     "seed_is_fixed": False,
     "agreeing": 400,
 }
-"""What a verdict quotes of a certificate that says: from every placement."""
+"""Entries of a verdict about a certificate of success from every placement."""
 
 
 def _method(trusted: bool, failed: list[str], score: float) -> Plain:
@@ -257,7 +257,7 @@ EXPLANATION: Plain = {
         "grid": {"absolute": 0.25},
     },
 }
-"""`explanation.json` of that policy."""
+"""Content of `explanation.json` of the same policy."""
 
 CARD: Plain = {
     "verdict": {**VERDICT, "sentence": "It collects 60%."},
@@ -266,7 +266,7 @@ CARD: Plain = {
     "chosen": {"runs": 10, "episodes": 200},
     "task": {"num_cubes": 3, "cube_size": 2.5, "lateral_bound": 6.0, "vertical_bound": 0.0},
 }
-"""What the card of an exported policy is made of."""
+"""Evidence for the model card of an exported policy."""
 
 _OF_SIX = {"certain": 4, **_share(6, 6, 0.5, 1.0)}
 GROUP: Plain = {
@@ -279,7 +279,7 @@ GROUP: Plain = {
     "frames_to_solve": {"more_than": None},
     "verdicts": {"good": {**_OF_SIX, "successes": 5}},
 }
-"""One setting of a sweep."""
+"""Results of one setting of a sweep."""
 _RUN = {"state": "finished", "verdict": "good", "certain": True, "entropy": 0.5}
 SWEEP: Plain = {
     "finished": 6,
@@ -309,7 +309,7 @@ SWEEP: Plain = {
         {**_RUN, "state": "damaged", "certain": None}, {**_RUN, "state": "unfinished"},
     ],
 }  # fmt: skip
-"""`summary.json` of a small sweep with something of everything."""
+"""Content of `summary.json` of a small sweep with runs in every state."""
 
 
 def _level(number: int, value: float, position: float, successes: int, oracle: int) -> Plain:

@@ -1,15 +1,19 @@
-"""Changes of evidence that make one sentence false: its name, the change, what holds before."""
+"""Changes of evidence that make one sentence false.
+
+Each row contains the name of the sentence, the change, and optionally changes that are made before
+so that the sentence appears.
+"""
 
 from benchmarks.evidence import EXPLANATION, HIGHER, PROOF, SHIFTS, SWEEP, VERDICT
 
-FRESH = {"seed_is_fixed": False}
+FRESH_SEED = {"seed_is_fixed": False}
 OTHER_SEED = {"seed": 193287468211}
-_ALL_LUCK = {"baselines.forward.success.share": 0.95}
-_SURE = {"failures.largest": None, "failures.bound.successes": 0}
+_TRIVIAL = {"baselines.forward.success.share": 0.95}
+_NO_FAILURES = {"failures.largest": None, "failures.bound.successes": 0}
 _IN_WIND = {"unlike": {"wind": {"own": [0.0, 0.0, 0.0], "flown": [5.0, 0.0, 0.0]}}}
-_OPEN = {"certain": False, "enough": 1600}
+_UNDECIDED = {"certain": False, "enough": 1600}
 _PROVED = {"proof": PROOF}
-_IN_PART = {"proof": {**PROOF, "every": False, "share": 0.6, "lost": 0.3, "undecided": 0.1}}
+_PARTLY_PROVED = {"proof": {**PROOF, "every": False, "share": 0.6, "lost": 0.3, "undecided": 0.1}}
 _REFUSED = {"proof": {"refused": "it is of another network"}}
 _ROUNDED = {"certain": False, "rounding.decides": True}
 OF_VERDICTS = (
@@ -17,9 +21,9 @@ OF_VERDICTS = (
     ("kind", {"kind": "good"}),
     ("kind", {"kind": "one-sided (right)"}),
     ("kind", {"greedy.shares.all.mean": 0.3}, {"kind": "poor", "greedy.shares.all.mean": 0.35}),
-    ("open", {"certain": True}, _OPEN),
-    ("open", {"enough": None}, _OPEN),
-    ("open", {"rounding.decides": True}, _OPEN),
+    ("open", {"certain": True}, _UNDECIDED),
+    ("open", {"enough": None}, _UNDECIDED),
+    ("open", {"rounding.decides": True}, _UNDECIDED),
     ("rounding", {"rounding.decides": False}, _ROUNDED),
     ("rounding", {"rounding.unexplained": 3}, _ROUNDED),
     ("arithmetic", {"rounding": None}),
@@ -29,11 +33,11 @@ OF_VERDICTS = (
     ("proof.every", {"proof.every": False}, _PROVED),
     ("proof.every", _REFUSED, _PROVED),
     ("proof.every", {"num_cubes": 2}, _PROVED),
-    ("proof.share", _PROVED, _IN_PART),
-    ("proof.share", _REFUSED, _IN_PART),
-    ("proof.share", {"proof.share": 0.5}, _IN_PART),
-    ("proof.share", {"proof.lost": 0.4, "proof.undecided": 0.0}, _IN_PART),
-    ("proof.share", {"proof.finished": False}, _IN_PART),
+    ("proof.share", _PROVED, _PARTLY_PROVED),
+    ("proof.share", _REFUSED, _PARTLY_PROVED),
+    ("proof.share", {"proof.share": 0.5}, _PARTLY_PROVED),
+    ("proof.share", {"proof.lost": 0.4, "proof.undecided": 0.0}, _PARTLY_PROVED),
+    ("proof.share", {"proof.finished": False}, _PARTLY_PROVED),
     ("proof.basis", {"proof": None}, _PROVED),
     ("proof.basis", {"proof.checked": 2000}, _PROVED),
     ("proof.basis", {"proof.wrong_at_most": None}, _PROVED),
@@ -44,23 +48,23 @@ OF_VERDICTS = (
     ("proof.refused", {"proof.refused": "it contradicts itself"}, _REFUSED),
     ("shares", {f"greedy.shares.{side}.mean": 1.0 for side in ("left", "ahead", "right")}),
     ("shares", {"greedy.shares.left": {"mean": None, "count": 0}}),
-    ("baselines", _ALL_LUCK),
+    ("baselines", _TRIVIAL),
     ("baselines", {"baselines.oracle.shares.all.mean": 0.7}),
-    ("pointless", {"baselines.forward.success.share": 0.3}, _ALL_LUCK),
-    ("pointless", {"kind": "good, but trivial"}, _ALL_LUCK),
-    ("kind", {"baselines.forward.success.share": 0.92}, {**_ALL_LUCK, "kind": "good, but trivial"}),
+    ("pointless", {"baselines.forward.success.share": 0.3}, _TRIVIAL),
+    ("pointless", {"kind": "good, but trivial"}, _TRIVIAL),
+    ("kind", {"baselines.forward.success.share": 0.92}, {**_TRIVIAL, "kind": "good, but trivial"}),
     ("hopeless", {"baselines.oracle.success.upper95": 0.6},
      {"baselines.oracle.success.upper95": 0.4}),
     ("failures.largest", {"failures.largest": None}),
     ("failures.largest", {"failures.largest.value": "right"}),
     ("failures.largest", {"failures.rows.1.lower95": 0.0}),
-    ("failures.never", {"failures.largest": VERDICT["failures"]["largest"]}, _SURE),
-    ("failures.never", {"failures.bound.upper95": 0.2}, _SURE),
+    ("failures.never", {"failures.largest": VERDICT["failures"]["largest"]}, _NO_FAILURES),
+    ("failures.never", {"failures.bound.upper95": 0.2}, _NO_FAILURES),
     ("unlike", {"unlike": {}}, _IN_WIND),
     ("unlike", {"unlike": {"wind": {"own": [0.0, 0.0, 0.0], "flown": [8.0, 0.0, 0.0]}}}, _IN_WIND),
     ("drawing", {"drawing.upper95": 0.05}),
     ("drawing", {"drawing": None}),
-    ("fixed_seed", FRESH),
+    ("fixed_seed", FRESH_SEED),
     ("fixed_seed", OTHER_SEED),
     ("fixed_seed", {"seed": None}),
 )  # fmt: skip
@@ -86,16 +90,16 @@ _NO_SIDE = {"asymmetry.dataset.signed.upper95": 0.1}
 _NO_MAP = {"places": {"refused": "it has a memory"}}
 _ALL_HEIGHTS = {"response.rows": [*EXPLANATION["response"]["rows"], *HIGHER]}
 _LEFT_BLIND = "response.rows.0.blind"
-_FLOWN = {"shifts": SHIFTS, "verdict.kind": "good", "verdict.certain": True}
-_UNFLOWN = {"shifts": {"refused": "it is of another task"}}
+_MEASURED = {"shifts": SHIFTS, "verdict.kind": "good", "verdict.certain": True}
+_REFUSED_SHIFTS = {"shifts": {"refused": "it is of another task"}}
 _OTHER_KIND = {"verdict.kind": "poor", "verdict.certain": True}
 OF_REPORTS = (
     ("source.file", {"source": "b/explanation.json"}),
     ("source.file", {"date": None}),
     ("source.file", {"provenance.git_revision": None}),
-    ("explanation.fixed_seed", FRESH),
+    ("explanation.fixed_seed", FRESH_SEED),
     ("explanation.fixed_seed", OTHER_SEED),
-    ("domain.quoted", {"shifts.seed_is_fixed": False}, _FLOWN),
+    ("domain.quoted", {"shifts.seed_is_fixed": False}, _MEASURED),
     ("advice.more", {"verdict.certain": True}, _NOT_CERTAIN),
     ("advice.more", {"verdict.enough": None}, _NOT_CERTAIN),
     ("advice.more", {"verdict.rounding.decides": True}, _NOT_CERTAIN),
@@ -103,14 +107,14 @@ OF_REPORTS = (
     ("advice.use", {"verdict.kind": "poor"}, _CERTAIN_GOOD),
     ("advice.refuse", _CERTAIN_GOOD),
     ("advice.refuse", {"verdict.exit_code": 10}),
-    ("scope.one_look", _FLOWN),
-    ("scope.one_look", {"shifts.axes.blur.group": "color"}, _FLOWN),
-    ("domain.quoted", _UNFLOWN, _FLOWN),
-    ("domain.quoted", {"shifts.domain.ranges.blur.high": 1.0}, _FLOWN),
-    ("domain.quoted", _OTHER_KIND, _FLOWN),
-    ("domain.quoted", {"verdict.good_share": 0.99}, _FLOWN),
-    ("domain.refused", _FLOWN, _UNFLOWN),
-    ("domain.refused", {"shifts.refused": "it is of another network"}, _UNFLOWN),
+    ("scope.one_look", _MEASURED),
+    ("scope.one_look", {"shifts.axes.blur.group": "color"}, _MEASURED),
+    ("domain.quoted", _REFUSED_SHIFTS, _MEASURED),
+    ("domain.quoted", {"shifts.domain.ranges.blur.high": 1.0}, _MEASURED),
+    ("domain.quoted", _OTHER_KIND, _MEASURED),
+    ("domain.quoted", {"verdict.good_share": 0.99}, _MEASURED),
+    ("domain.refused", _MEASURED, _REFUSED_SHIFTS),
+    ("domain.refused", {"shifts.refused": "it is of another network"}, _REFUSED_SHIFTS),
     ("dataset.size", {"dataset.episodes": 31}),
     ("dataset.actions", _ONE_ACTION),
     ("dataset.one_action", {"dataset.action_shares": [0.001, 0.999, 0.0]}, _ONE_ACTION),
@@ -167,7 +171,7 @@ _NONE_TRUSTED = {
     "truth.methods.saliency.failed": ["likeness"],
 }
 _UNMOVED = {**_NONE_TRUSTED, "truth.frames": 0}
-_NOT_ALONG = {"truth.outcomes.follows.lower95": -0.1}
+_NOT_FOLLOWING = {"truth.outcomes.follows.lower95": -0.1}
 OF_MAPS = (
     ("truth.trusted", _NONE_TRUSTED),
     ("truth.trusted", {"truth.placebos.ones.mean": 0.9}),
@@ -186,17 +190,17 @@ OF_MAPS = (
     ("truth.untested", {"truth.frames": 0}, {"truth.methods": {}, "truth.trusted": None}),
     ("truth.unmoved", {"truth.frames": 5}, _UNMOVED),
     ("truth.left_out", {"truth.frames_unmoved": 0}),
-    ("truth.follows", _NOT_ALONG),
+    ("truth.follows", _NOT_FOLLOWING),
     ("truth.follows", {"truth.outcomes.follows.mean": 0.7}),
-    ("truth.follows_not", {"truth.outcomes.follows.lower95": 0.1}, _NOT_ALONG),
+    ("truth.follows_not", {"truth.outcomes.follows.lower95": 0.1}, _NOT_FOLLOWING),
     ("truth.ground", {"truth.outcomes.ground_changed.upper95": 0.4}),
     ("truth.patch", {"truth.interventions.ground patch changed.upper95": 0.5}),
     ("truth.target", {"truth.interventions.ground patch changed.upper95": 0.31}),
     ("truth.target", {"truth.interventions.target taken away.lower95": 0.19}),
     ("truth.integral", {"truth.integration_error": None}),
 )
-_OTHER_RULE = {"verdict.certain": False}
-_BODY = {
+_UNCERTAIN = {"verdict.certain": False}
+_DYNAMICS = {
     "mode": "simple_flight",
     "wind": [0.0, 3.0, 4.0],
     "gusts": 1.5,
@@ -205,7 +209,7 @@ _BODY = {
     "tick": 0.003,
 }
 OF_CARDS = (
-    ("card.verdict", _OTHER_RULE),
+    ("card.verdict", _UNCERTAIN),
     ("card.verdict", {"verdict.kind": "good"}),
     ("card.reported", {"worlds": "choice"}),
     ("card.reported", {"verdict.proof": PROOF}),
@@ -213,12 +217,12 @@ OF_CARDS = (
     ("card.chosen", {"chosen.episodes": None}),
     ("card.not_chosen", {"chosen": {"runs": 3, "episodes": 200}}, {"chosen": None}),
     ("card.tested", {"task.vertical_bound": 1.2}),
-    ("card.tested", _FLOWN),
-    ("card.body", {"dynamics": None}, {"dynamics": _BODY}),
-    ("card.body", {"dynamics.wind": [0.0, 0.0, 0.0]}, {"dynamics": _BODY}),
-    ("card.domain", {"shifts": None}, _FLOWN),
-    ("card.domain", {"shifts.domain.ranges.sun.low": 40.0}, _FLOWN),
-    ("card.domain", _OTHER_KIND, _FLOWN),
+    ("card.tested", _MEASURED),
+    ("card.body", {"dynamics": None}, {"dynamics": _DYNAMICS}),
+    ("card.body", {"dynamics.wind": [0.0, 0.0, 0.0]}, {"dynamics": _DYNAMICS}),
+    ("card.domain", {"shifts": None}, _MEASURED),
+    ("card.domain", {"shifts.domain.ranges.sun.low": 40.0}, _MEASURED),
+    ("card.domain", _OTHER_KIND, _MEASURED),
     ("card.greedy_only", {"verdict.sampled": VERDICT["sampled"]}, {"verdict.sampled": None}),
 )
 _ALL_CERTAIN = {"certain": 5}
@@ -278,13 +282,13 @@ _NOT_GOOD = {
     "domain.ranges.blur.positions": None,
     "domain.ranges.brightness.positions": None,
 }
-_SURE_BLUR = "axes.blur.levels.1.modes.constant.unchanged"
+_UNCHANGED_BLUR = "axes.blur.levels.1.modes.constant.unchanged"
 _TOO_FEW = {"domain.ranges.brightness.failed.0.bad": False}
 OF_SHIFTS = (
     ("shifts.good", _NOT_GOOD),
     ("shifts.good", {"domain.ranges.sun.low": 40.0}),
     ("shifts.good", {"domain.ranges.sun.high_open": False}),
-    ("shifts.good", {_SURE_BLUR: True}),
+    ("shifts.good", {_UNCHANGED_BLUR: True}),
     ("shifts.good", {"domain": None}),
     ("shifts.not", _NOT_GOOD),
     ("shifts.not", _TOO_FEW),
@@ -294,7 +298,7 @@ OF_SHIFTS = (
     ("shifts.too_few", {"domain.ranges.brightness.failed.0.bad": True}, _TOO_FEW),
     ("shifts.none", {"domain.plain.good": True}, _NOT_GOOD),
     ("shifts.none", {"domain": None}, _NOT_GOOD),
-    ("shifts.untested", {_SURE_BLUR: False}, {_SURE_BLUR: True}),
+    ("shifts.untested", {_UNCHANGED_BLUR: False}, {_UNCHANGED_BLUR: True}),
     ("shifts.impossible", {"axes.sun.levels.1.impossible": False}),
     ("shifts.impossible", {"axes.sun.levels.1.oracle.share": 0.3}),
     ("shifts.impossible", {"domain.ranges.brightness.failed.0.impossible": False},
@@ -302,6 +306,6 @@ OF_SHIFTS = (
     ("shifts.together", {"together.refused": "task.cube_size=99"}),
     ("shifts.together", {"together.modes.constant.success.share": 0.5}),
     ("shifts.scope", _NOT_GOOD),
-    ("shifts.fixed_seed", FRESH),
+    ("shifts.fixed_seed", FRESH_SEED),
     ("shifts.fixed_seed", OTHER_SEED),
 )  # fmt: skip

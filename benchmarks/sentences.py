@@ -1,4 +1,4 @@
-"""Does each sentence change or go when its evidence does? Liars are planted under every one."""
+"""Conditions of sentences: each must change or disappear when a change makes it false."""
 
 import dataclasses
 from collections.abc import Iterable, Mapping
@@ -27,7 +27,7 @@ from drone_rl.utils.text import Sentence, said
 from drone_rl.verdicts import export as card
 
 Changes = Mapping[str, Any]
-SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
+SENTENCES: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
     "verdict": (verdict.SENTENCES, VERDICT),
     "evaluation": (evaluation.EVALUATION, EVALUATION),
     "explanation": (
@@ -43,63 +43,67 @@ SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
     "chances": (seeds.CHANCES, FIXED_SEED),
     "check": (seeds.CHECK, FIXED_SEED),
 }
-"""All sentences of the program, by what they are said of, with evidence of that kind."""
+"""All sentences of the program and evidence for them, by subject."""
 NO_CLAIMS = {"card.intervals", "card.use"}
-"""Sentences that say what is meant or how to read, and not what was found."""
+"""Sentences that explain terms or usage and state no finding."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Plant:
+class EvidenceChange:
     """A change of evidence that makes one sentence false."""
 
-    of: str
-    """A key of `SPOKEN`."""
+    subject: str
+    """A key of `SENTENCES`."""
     name: str
-    """The sentence."""
-    lie: Changes
-    """What becomes of the evidence; see `changed`."""
+    """Name of the sentence."""
+    change: Changes
+    """New values that make the sentence false; see `changed`."""
     given: Changes = dataclasses.field(default_factory=dict)
-    """What must be so before, so that the sentence is said."""
+    """New values that are set first, so that the sentence appears."""
 
     @property
-    def said(self) -> tuple[str | None, str | None]:
-        """What the sentence says before and after; None where it is not said."""
-        sentences, evidence = SPOKEN[self.of]
+    def texts(self) -> tuple[str | None, str | None]:
+        """The sentence before and after the change; None if it does not appear."""
+        sentences, evidence = SENTENCES[self.subject]
         before = changed(evidence, self.given)
-        after = changed(before, self.lie)
+        after = changed(before, self.change)
         return said(sentences, before).get(self.name), said(sentences, after).get(self.name)
 
     @property
     def is_flipped(self) -> bool:
-        """Whether it was said, and then no more or otherwise."""
-        before, after = self.said
+        """Whether the sentence appears before the change and disappears or differs after it."""
+        before, after = self.texts
         return before is not None and before != after
 
 
-def _plants(of: str, rows: Iterable[tuple[Any, ...]]) -> list[Plant]:
-    return [Plant(of, *row) for row in rows]
+def _changes(subject: str, rows: Iterable[tuple[Any, ...]]) -> list[EvidenceChange]:
+    return [EvidenceChange(subject, *row) for row in rows]
 
 
 _FIXED_SEEDS = ("evaluation", "bodies", "looped", "chances", "check")
-PLANTS = (
+CHANGES = (
     *(
-        Plant(of, f"{of}.fixed_seed", lie)
-        for of in _FIXED_SEEDS
-        for lie in (evidence_changes.FRESH, evidence_changes.OTHER_SEED)
+        EvidenceChange(subject, f"{subject}.fixed_seed", change)
+        for subject in _FIXED_SEEDS
+        for change in (evidence_changes.FRESH_SEED, evidence_changes.OTHER_SEED)
     ),
-    *_plants("verdict", evidence_changes.OF_VERDICTS),
-    *_plants("evaluation", evidence_changes.OF_EVALUATIONS),
-    *_plants("explanation", (*evidence_changes.OF_REPORTS, *evidence_changes.OF_MAPS)),
-    *_plants("card", evidence_changes.OF_CARDS),
-    *_plants("shifts", evidence_changes.OF_SHIFTS),
-    *_plants("sweep", evidence_changes.OF_SWEEPS),
-    *_plants("setting", evidence_changes.OF_SETTINGS),
+    *_changes("verdict", evidence_changes.OF_VERDICTS),
+    *_changes("evaluation", evidence_changes.OF_EVALUATIONS),
+    *_changes("explanation", (*evidence_changes.OF_REPORTS, *evidence_changes.OF_MAPS)),
+    *_changes("card", evidence_changes.OF_CARDS),
+    *_changes("shifts", evidence_changes.OF_SHIFTS),
+    *_changes("sweep", evidence_changes.OF_SWEEPS),
+    *_changes("setting", evidence_changes.OF_SETTINGS),
 )
 
 
 def bench_sentences() -> dict[str, int]:
-    """How many of the planted changes turn or take the sentence that they make false."""
+    """Count the changes whose sentence changes or disappears.
+
+    Returns:
+        "sentences_flipped", and "sentences_total", the number of all changes.
+    """
     return {
-        "sentences_flipped": sum(plant.is_flipped for plant in PLANTS),
-        "sentences_total": len(PLANTS),
+        "sentences_flipped": sum(change.is_flipped for change in CHANGES),
+        "sentences_total": len(CHANGES),
     }

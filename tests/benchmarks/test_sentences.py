@@ -5,51 +5,53 @@ import pytest
 
 import drone_rl
 from benchmarks.evidence import changed
-from benchmarks.sentences import NO_CLAIMS, PLANTS, SPOKEN, Plant, bench_sentences
+from benchmarks.sentences import CHANGES, NO_CLAIMS, SENTENCES, EvidenceChange, bench_sentences
 from drone_rl.utils.text import Sentence
 
 
-@pytest.mark.parametrize("plant", PLANTS, ids=lambda p: f"{p.of}: {p.name}: {sorted(p.lie)}")
-def test_a_false_sentence_goes_or_changes(plant):
-    before, after = plant.said
-    assert before is not None, "the sentence must be said before"
+@pytest.mark.parametrize(
+    "change", CHANGES, ids=lambda c: f"{c.subject}: {c.name}: {sorted(c.change)}"
+)
+def test_a_false_sentence_disappears_or_changes(change):
+    before, after = change.texts
+    assert before is not None, "the sentence must appear before the change"
     assert after != before
 
 
-def test_no_sentence_is_without_a_plant():
-    spoken = {(of, s.name) for of, (sentences, _) in SPOKEN.items() for s in sentences}
-    planted = {(plant.of, plant.name) for plant in PLANTS}
-    assert planted <= spoken
-    assert {name for _, name in spoken - planted} == NO_CLAIMS
+def test_every_sentence_with_a_claim_has_a_change():
+    known = {(subject, s.name) for subject, (texts, _) in SENTENCES.items() for s in texts}
+    changed_ones = {(change.subject, change.name) for change in CHANGES}
+    assert changed_ones <= known
+    assert {name for _, name in known - changed_ones} == NO_CLAIMS
 
 
-def test_names_are_told_apart():
-    for sentences, _ in SPOKEN.values():
+def test_names_of_sentences_are_unique():
+    for sentences, _ in SENTENCES.values():
         names = [s.name for s in sentences]
         assert len(set(names)) == len(names)
 
 
-def test_every_sentence_of_the_package_is_spoken():
-    spoken = {id(s) for sentences, _ in SPOKEN.values() for s in sentences}
+def test_every_sentence_of_the_package_is_registered():
+    known = {id(s) for sentences, _ in SENTENCES.values() for s in sentences}
     for module in pkgutil.walk_packages(drone_rl.__path__, "drone_rl."):
         for value in vars(importlib.import_module(module.name)).values():
             found = value if isinstance(value, tuple) else (value,)
-            assert all(id(s) in spoken for s in found if isinstance(s, Sentence)), module.name
+            assert all(id(s) in known for s in found if isinstance(s, Sentence)), module.name
 
 
-def test_a_sentence_that_stays_is_not_counted_as_flipped():
-    stays = Plant("explanation", "loops.some", {"dataset.frames": 7})
+def test_a_sentence_that_stays_or_never_appears_is_not_flipped():
+    stays = EvidenceChange("explanation", "loops.some", {"dataset.frames": 7})
     assert not stays.is_flipped
-    never_said = Plant("explanation", "loops.none", {"loops.longest": 7})
-    assert not never_said.is_flipped
+    absent = EvidenceChange("explanation", "loops.none", {"loops.longest": 7})
+    assert not absent.is_flipped
 
 
-def test_the_figures():
+def test_all_sentences_are_flipped():
     found = bench_sentences()
     assert found["sentences_flipped"] == found["sentences_total"] >= 40
 
 
-def test_changes_go_to_their_place_and_leave_the_evidence_alone():
+def test_changed_replaces_values_by_path_in_a_copy():
     evidence = {"a": {"b": [1, {"c": 2}]}}
     assert changed(evidence, {"a.b.1.c": 3, "d": 4}) == {"a": {"b": [1, {"c": 3}]}, "d": 4}
     assert evidence == {"a": {"b": [1, {"c": 2}]}}

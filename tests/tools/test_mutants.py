@@ -86,7 +86,7 @@ def test_the_whole_package_is_mutated():
 def test_tests_of_pages_and_tools_are_not_run():
     found = targets.test_files(ROOT)
     assert "tests/evaluation/test_metrics.py" in found
-    assert "tests/benchmarks/test_sentences.py" in found  # plants in all that is said
+    assert "tests/benchmarks/test_sentences.py" in found  # changes every sentence
     assert not any("/tools/" in name or "/docs/" in name for name in found)
 
 
