@@ -1,8 +1,8 @@
-"""Whether the intervals that are shown hold the truth as often as they say, by exact enumeration.
+"""Exact coverage of the reported confidence intervals, by enumeration.
 
-An interval sees what episodes gave, one value each, so that a way in which cubes or frames of an
-episode depend on one another is a distribution of that value. For few episodes and few values every
-outcome can be listed with its probability; nothing is drawn, and a coverage is exact.
+An interval is computed from one value for each episode. So a kind of dependence between cubes or
+frames of an episode is a distribution of this value. With few episodes and few values all outcomes
+can be enumerated with their probabilities. The coverage is exact; nothing is sampled.
 """
 
 import dataclasses
@@ -18,16 +18,16 @@ from benchmarks.simulated_policies import bench_false_certain
 from drone_rl.utils.intervals import mean_bounds, median_bounds, proportion
 
 NEGLIGIBLE = 1e-10
-"""Outcomes less probable than this are not looked at and count as missed."""
+"""Outcomes with a lower probability are skipped and count as not covered."""
 SIZES = {2: (1, 2, 5, 13, 30, 100, 400), 3: (1, 2, 5, 13, 30), 4: (1, 2, 5, 13), 5: (1, 2, 5, 8)}
-"""Numbers of episodes that are tried, by the number of values; intervals are shown from one on."""
+"""Numbers of episodes by number of values; intervals are reported from 1 episode on."""
 MEDIAN_SIZES = (6, 7, 13, 30)
-"""The same for medians, which are shown from six on."""
+"""Numbers of values for medians, which are reported from 6 values on."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """What an episode gives, and how probably."""
+    """Distribution of the value of an episode."""
 
     values: tuple[float, ...]
     probabilities: tuple[float, ...]
@@ -36,12 +36,12 @@ class Outcome:
 
     @property
     def mean(self) -> float:
-        """The truth that an interval should hold."""
+        """The true mean, which an interval should contain."""
         return float(np.dot(self.values, self.probabilities))
 
 
 def _thirds(*probabilities: float) -> Outcome:
-    """The share of three cubes: none, one, two, all."""
+    """Return a distribution of the fraction of three cubes: none, one, two, all."""
     return Outcome((0.0, 1 / 3, 2 / 3, 1.0), probabilities)
 
 
@@ -71,20 +71,24 @@ OUTCOMES: Mapping[str, Outcome] = {
     "frames, all alike": Outcome((0.4, 0.45, 0.5, 0.55), (0.2, 0.3, 0.3, 0.2)),
     "frames, signed scores": Outcome((-0.2, 0.05, 0.9), (0.5, 0.4, 0.1), low=-1.0),
 }
-"""Kinds of dependence within episodes, as what is seen of each."""
+"""Distributions of an episode's value for kinds of dependence within episodes."""
 TIMES: Mapping[str, Outcome] = {
     "times, a third never": Outcome((1.0, 2.0, np.inf), (0.3, 0.37, 0.33)),
     "times, nearly half never": Outcome((1.0, 2.0, np.inf), (0.1, 0.45, 0.45)),
     "times, two groups": Outcome((1.0, 9.0), (0.55, 0.45)),
 }
-"""What medians are taken of; infinite for what did not come to an end."""
+"""Distributions of times, for medians; infinite if the event never happens."""
 
 
 def bench_coverage(quick: bool) -> dict[str, Any]:
-    """Coverage of every kind of interval that is shown, and how often a verdict is surely wrong.
+    """Compute the coverage of all kinds of intervals, and the rate of certain but wrong verdicts.
 
     Args:
-        quick: Whether to look at the smallest samples only, and draw few verdicts.
+        quick: Whether to use only the smallest samples and few simulated verdicts.
+
+    Returns:
+        "interval_coverage_min", the lowest coverage; "interval_coverage_least", its row;
+        "interval_coverage", all rows; and the figures of `bench_false_certain`.
     """
     rows = [*_proportions(quick), *_means(quick), *_medians(quick)]
     least = min(rows, key=lambda row: row["coverage"])
@@ -97,12 +101,12 @@ def bench_coverage(quick: bool) -> dict[str, Any]:
 
 
 def coverage(outcome: Outcome, episodes: int, holds: Callable[[NDArray], bool]) -> float:
-    """The exact probability that an interval of so many episodes holds the truth.
+    """Return the exact probability that an interval contains the true value.
 
     Args:
-        outcome: What an episode gives.
-        episodes: How many.
-        holds: Whether the interval made of these values does. Shape: (episodes,).
+        outcome: Distribution of the value of an episode.
+        episodes: Number of episodes.
+        holds: Return whether the interval of some values contains it. Shape: (episodes,).
     """
     counts = np.array(list(_compositions(episodes, len(outcome.values))))
     probabilities = multinomial.pmf(counts, episodes, outcome.probabilities)
@@ -123,14 +127,14 @@ def _means(quick: bool) -> Iterator[dict[str, Any]]:
 
 
 def _proportions(quick: bool) -> Iterator[dict[str, Any]]:
-    """Over all true shares: coverage is least beside the ends of the intervals."""
+    """Return the minimum over all true rates, which is next to the bounds of the intervals."""
     for episodes in SIZES[2][: 3 if quick else None]:
         intervals = [proportion(k, episodes) for k in range(episodes + 1)]
         low, high = (np.array([f[end] for f in intervals]) for end in ("lower95", "upper95"))
         ends = np.concatenate([low, high])
         truths = np.concatenate([ends - 1e-9, ends + 1e-9]).clip(0.0, 1.0)[:, None]
-        held = (low <= truths) & (truths <= high)
-        least = (binom.pmf(np.arange(episodes + 1), episodes, truths) * held).sum(1).min()
+        covered = (low <= truths) & (truths <= high)
+        least = (binom.pmf(np.arange(episodes + 1), episodes, truths) * covered).sum(1).min()
         yield _row("share", "any share of episodes", episodes, float(least))
 
 
@@ -138,8 +142,8 @@ def _medians(quick: bool) -> Iterator[dict[str, Any]]:
     for episodes in MEDIAN_SIZES[: 2 if quick else None]:
         ranks = median_bounds(range(1, episodes + 1))
         if ranks is None:
-            raise ValueError(f"median_bounds shows nothing of {episodes} values")
-        lower, upper = ranks  # held if so many values lie below the median
+            raise ValueError(f"median_bounds returns no interval of {episodes} values")
+        lower, upper = ranks  # covered if the number of values below the median is in between
         below = binom.cdf(upper - 1, episodes, 0.5) - binom.cdf(lower - 1, episodes, 0.5)
         yield _row("median", "any continuous distribution", episodes, float(below))
         for name, outcome in TIMES.items():
@@ -158,7 +162,7 @@ def _median(outcome: Outcome) -> float:
 
 
 def _compositions(total: int, parts: int) -> Iterator[tuple[int, ...]]:
-    """All ways to share a number out to so many places."""
+    """Yield all tuples of `parts` non-negative integers with a sum of `total`."""
     for bars in itertools.combinations(range(total + parts - 1), parts - 1):
         edges = (-1, *bars, total + parts - 1)
         yield tuple(b - a - 1 for a, b in itertools.pairwise(edges))

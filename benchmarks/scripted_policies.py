@@ -1,4 +1,4 @@
-"""Policies made by hand, each with a flaw that is known, to try verdicts on. They see the truth."""
+"""Scripted policies with known flaws, for tests of verdicts. They read the true state."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -16,123 +16,124 @@ from drone_rl.sim.tasks.collect_cubes import Side
 
 
 @dataclasses.dataclass
-class Sight:
-    """What a pilot knows of the next cube in each of `n` worlds. Shapes: (n,); metres."""
+class State:
+    """State of the drone and its next cube in `n` environments. Shapes: (n,); metres."""
 
     lateral: Tensor
-    """How far to the left of the drone it stands."""
+    """Distance of the cube to the left of the drone."""
     height: Tensor
-    """How much higher it stands."""
+    """Height of the cube above the drone."""
     side: Tensor
-    """`Side` on which it stood when it became the next one."""
+    """`Side` of the cube when it became the next one."""
     number: Tensor
-    """Its index."""
+    """Index of the cube."""
     x: Tensor
-    """The drone's place, world frame."""
+    """Position of the drone, world frame."""
     y: Tensor
     first_y: Tensor
-    """That of the episode's first cube."""
-    luck: Tensor
-    """A number from 0 to 1 that is drawn with each episode."""
-    cube_luck: Tensor
-    """One that is drawn with each cube."""
+    """Lateral position of the episode's first cube."""
+    episode_random: Tensor
+    """A pseudo-random number from 0 to 1 for each episode."""
+    cube_random: Tensor
+    """A pseudo-random number from 0 to 1 for each cube."""
     touch: float
-    """Distance up to which drone and cube touch."""
+    """Largest distance at which drone and cube touch."""
 
 
-Choice = Callable[[Sight], Tensor]
-"""Actions by what is seen. Shape: (n,)."""
-Condition = Callable[[Sight], Tensor]
-"""Whether something holds. Shape: (n,), bool."""
+Behavior = Callable[[State], Tensor]
+"""Return actions. Shape: (n,)."""
+Condition = Callable[[State], Tensor]
+"""Return whether a condition holds. Shape: (n,), bool."""
 
 
-def seek(sight: Sight) -> Tensor:
-    """Lines up with the next cube, then flies at it, as the oracle does."""
-    tolerance = max(0.5, 0.5 * sight.touch)
-    right = torch.where(sight.lateral < -tolerance, Move.RIGHT.value, Move.FORWARD.value)
-    return torch.where(sight.lateral > tolerance, Move.LEFT.value, right)
+def seek(state: State) -> Tensor:
+    """Align with the next cube, then fly towards it, as the oracle does."""
+    tolerance = max(0.5, 0.5 * state.touch)
+    right = torch.where(state.lateral < -tolerance, Move.RIGHT.value, Move.FORWARD.value)
+    return torch.where(state.lateral > tolerance, Move.LEFT.value, right)
 
 
-def straight(sight: Sight) -> Tensor:
-    """Flies on."""
-    return torch.full_like(sight.number, Move.FORWARD)
+def straight(state: State) -> Tensor:
+    """Fly straight."""
+    return torch.full_like(state.number, Move.FORWARD)
 
 
-def leave(sight: Sight) -> Tensor:
-    """Flies left, out of the field in the end."""
-    return torch.full_like(sight.number, Move.LEFT)
+def leave(state: State) -> Tensor:
+    """Fly left until the drone leaves the field."""
+    return torch.full_like(state.number, Move.LEFT)
 
 
-def dither(sight: Sight) -> Tensor:
-    """Goes left and right in turn for ever."""
-    return torch.where(sight.y.round() % 2 == 0, Move.LEFT.value, Move.RIGHT.value)
+def dither(state: State) -> Tensor:
+    """Alternate between left and right until the step limit."""
+    return torch.where(state.y.round() % 2 == 0, Move.LEFT.value, Move.RIGHT.value)
 
 
-def dodge(sight: Sight) -> Tensor:
-    """Flies around the next cube."""
-    is_near = sight.lateral.abs() <= sight.touch + 0.5
+def dodge(state: State) -> Tensor:
+    """Fly around the next cube."""
+    is_near = state.lateral.abs() <= state.touch + 0.5
     return torch.where(is_near, Move.LEFT.value, Move.FORWARD.value)
 
 
-def avoid(sight: Sight) -> Tensor:
-    """Turns the wrong way, and flies on when well beside the cube."""
-    away = torch.where(sight.lateral > 0, Move.RIGHT.value, Move.LEFT.value)
-    return torch.where(sight.lateral.abs() < 5.0, away, Move.FORWARD.value)
+def avoid(state: State) -> Tensor:
+    """Move away from the next cube, then fly straight."""
+    away = torch.where(state.lateral > 0, Move.RIGHT.value, Move.LEFT.value)
+    return torch.where(state.lateral.abs() < 5.0, away, Move.FORWARD.value)
 
 
-def zigzag(sight: Sight) -> Tensor:
-    """Lines up, then goes forward in every second step only, and over to the other side between."""
-    over = torch.where(sight.lateral > 0, Move.LEFT.value, Move.RIGHT.value)
-    is_turn = (sight.x.round() + sight.y.round()) % 2 == 0
-    lined_up = torch.where(is_turn, over, Move.FORWARD.value)
-    return torch.where(sight.lateral.abs() <= 1.0, lined_up, seek(sight))
+def zigzag(state: State) -> Tensor:
+    """Align with the next cube, then alternate between forward and sideways moves."""
+    over = torch.where(state.lateral > 0, Move.LEFT.value, Move.RIGHT.value)
+    is_turn = (state.x.round() + state.y.round()) % 2 == 0
+    aligned = torch.where(is_turn, over, Move.FORWARD.value)
+    return torch.where(state.lateral.abs() <= 1.0, aligned, seek(state))
 
 
-def when(condition: Condition, then: Choice, otherwise: Choice = seek) -> Choice:
-    """One way of flying in some situations, another one in all others."""
-    return lambda sight: torch.where(condition(sight), then(sight), otherwise(sight))
+def when(condition: Condition, then: Behavior, otherwise: Behavior = seek) -> Behavior:
+    """Return a behavior that switches between two others."""
+    return lambda state: torch.where(condition(state), then(state), otherwise(state))
 
 
 @dataclasses.dataclass(frozen=True)
-class Pilot:
-    """A way to fly, and what its task has that the default has not."""
+class Script:
+    """A behavior and the task for it."""
 
-    choose: Choice
+    choose: Behavior
     task: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    """Settings that differ from the default task."""
     confidence: float = 1.0
-    """Probability of its choice where actions are drawn; the other actions share the rest."""
+    """Probability of the chosen action if actions are sampled; the others are equally likely."""
 
     @property
     def settings(self) -> TaskSettings:
-        """Its task's."""
+        """Settings of the task."""
         return TaskSettings(**self.task)
 
 
 class ScriptedPolicy(TensorDictModuleBase):
-    """Flies as a pilot does."""
+    """A policy that runs a script."""
 
-    def __init__(self, pilot: Pilot, generator: torch.Generator | None = None) -> None:
-        """Takes the pilot.
+    def __init__(self, script: Script, generator: torch.Generator | None = None) -> None:
+        """Store the script.
 
         Args:
-            pilot: Decides.
-            generator: Source of drawn actions; needed where the pilot's confidence is below 1.
+            script: Chooses the actions.
+            generator: Random generator of sampled actions; required if confidence is below 1.
         """
         super().__init__()
         names = ("drone", "cube_positions", "next_cube", "side")
-        # tensordict's annotation knows no keys of two strings
+        # tensordict does not annotate nested keys
         self.in_keys = [("info", n) for n in names]  # pyright: ignore[reportAttributeAccessIssue]
         self.out_keys = ["action"]
-        self.pilot, self.generator = pilot, generator
-        self.touch = pilot.settings.touch_distance
+        self.script, self.generator = script, generator
+        self.touch = script.settings.touch_distance
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Writes the action of each world."""
+        """Write the action of each environment."""
         drone, cubes, index, side = (tensordict.get(key) for key in self.in_keys)
         drone, cubes = drone.double(), cubes.double()
         last = cubes.shape[-2] - 1
         row = torch.arange(len(cubes)), index[..., 0].clamp(max=last)
-        sight = Sight(
+        state = State(
             lateral=cubes[row][:, 1] - drone[:, 1],
             height=cubes[row][:, 2] - drone[:, 2],
             side=side[row],
@@ -140,82 +141,87 @@ class ScriptedPolicy(TensorDictModuleBase):
             x=drone[:, 0],
             y=drone[:, 1],
             first_y=cubes[:, 0, 1],
-            luck=_fraction(cubes[:, 0, 1]),
-            cube_luck=_fraction(cubes[row][:, 1]),
+            episode_random=_fraction(cubes[:, 0, 1]),
+            cube_random=_fraction(cubes[row][:, 1]),
             touch=self.touch,
         )
-        action = self.pilot.choose(sight)
-        action = torch.where(sight.number > last, Move.FORWARD.value, action)
-        return tensordict.set("action", self._draw(action))
+        action = self.script.choose(state)
+        action = torch.where(state.number > last, Move.FORWARD.value, action)
+        return tensordict.set("action", self._sample(action))
 
-    def _draw(self, action: Tensor) -> Tensor:
-        if self.pilot.confidence == 1 or exploration_type() != ExplorationType.RANDOM:
+    def _sample(self, action: Tensor) -> Tensor:
+        if self.script.confidence == 1 or exploration_type() != ExplorationType.RANDOM:
             return action
         shift = torch.randint(1, len(Move), action.shape, generator=self.generator)
-        keeps = torch.rand(action.shape, generator=self.generator) < self.pilot.confidence
+        keeps = torch.rand(action.shape, generator=self.generator) < self.script.confidence
         return torch.where(keeps, action, (action + shift) % len(Move))
 
 
 def _fraction(y: Tensor) -> Tensor:
-    """Digits of a place that nothing else depends on, as a number from 0 to 1."""
+    """Return a number from 0 to 1 from digits of a position that affect nothing else."""
     return (y * 997.0) % 1.0
 
 
-def _from(number: int, then: Choice) -> Choice:
+def _from(number: int, then: Behavior) -> Behavior:
+    """Switch to another behavior from a cube on."""
     return when(lambda s: s.number >= number, then)
 
 
-def _at(side: Side, share: float, then: Choice) -> Choice:
-    """Flies so for this share of the cubes that appear on a side."""
-    return when(lambda s: (s.side == side) & (s.cube_luck < share), then)
+def _at(side: Side, share: float, then: Behavior) -> Behavior:
+    """Use another behavior for a fraction of the cubes on a side."""
+    return when(lambda s: (s.side == side) & (s.cube_random < share), then)
 
 
-def _beside(share: float) -> Choice:
-    """Misses this share of the cubes that are not ahead."""
-    return when(lambda s: (s.side != Side.AHEAD) & (s.cube_luck < share), straight)
+def _beside(share: float) -> Behavior:
+    """Miss a fraction of the cubes that are not ahead."""
+    return when(lambda s: (s.side != Side.AHEAD) & (s.cube_random < share), straight)
 
 
 _HIGH = {"vertical_bound": 1.2, "altitude": 5.0}
 
-PILOTS = {
-    "all cubes": Pilot(seek),
-    "all cubes, slowly": Pilot(zigzag),
-    "first cube only, then straight on": Pilot(_from(1, straight)),
-    "first cube only, then leaves": Pilot(_from(1, leave)),
-    "first two cubes only": Pilot(_from(2, straight)),
-    "dithers at the third cube": Pilot(_from(2, dither)),
-    "dithers at far first cubes": Pilot(
+SCRIPTS = {
+    "all cubes": Script(seek),
+    "all cubes, slowly": Script(zigzag),
+    "first cube only, then straight on": Script(_from(1, straight)),
+    "first cube only, then leaves": Script(_from(1, leave)),
+    "first two cubes only": Script(_from(2, straight)),
+    "dithers at the third cube": Script(_from(2, dither)),
+    "dithers at far first cubes": Script(
         when(lambda s: (s.number == 0) & (s.first_y.abs() > 4.0), dither)
     ),
-    "dodges cubes ahead": Pilot(_at(Side.AHEAD, 1.0, dodge)),
-    "dodges 35% of the cubes ahead": Pilot(_at(Side.AHEAD, 0.35, dodge)),
-    "sees 4 m sideways": Pilot(when(lambda s: s.lateral.abs() > 4.0, straight)),
-    "sees 2.5 m sideways": Pilot(when(lambda s: s.lateral.abs() > 2.5, straight)),
-    "blind to higher cubes": Pilot(when(lambda s: s.height > 0, straight), _HIGH),
-    "blind to much lower cubes": Pilot(when(lambda s: s.height < -0.6, straight), _HIGH),
-    "blind on its left": Pilot(_at(Side.LEFT, 1.0, straight)),
-    "blind on its right": Pilot(_at(Side.RIGHT, 1.0, straight)),
-    "half blind on its right": Pilot(_at(Side.RIGHT, 0.5, straight)),
-    "finds three cubes of ten on its left": Pilot(_at(Side.LEFT, 0.7, straight)),
-    "finds one cube of ten on its left": Pilot(_at(Side.LEFT, 0.9, straight)),
-    "loses one episode in 13": Pilot(when(lambda s: (s.luck < 1 / 13) & (s.number == 1), leave)),
-    "loses one episode in 50": Pilot(when(lambda s: (s.luck < 0.02) & (s.number == 1), leave)),
-    "leaves when the first cube is far": Pilot(when(lambda s: s.first_y.abs() > 5.6, leave)),
-    "all or nothing, nine in ten": Pilot(when(lambda s: s.luck < 0.1, leave)),
-    "misses the last cube in one of ten": Pilot(
-        when(lambda s: (s.luck < 0.1) & (s.number == 2), avoid)
+    "dodges cubes ahead": Script(_at(Side.AHEAD, 1.0, dodge)),
+    "dodges 35% of the cubes ahead": Script(_at(Side.AHEAD, 0.35, dodge)),
+    "sees 4 m sideways": Script(when(lambda s: s.lateral.abs() > 4.0, straight)),
+    "sees 2.5 m sideways": Script(when(lambda s: s.lateral.abs() > 2.5, straight)),
+    "blind to higher cubes": Script(when(lambda s: s.height > 0, straight), _HIGH),
+    "blind to much lower cubes": Script(when(lambda s: s.height < -0.6, straight), _HIGH),
+    "blind on its left": Script(_at(Side.LEFT, 1.0, straight)),
+    "blind on its right": Script(_at(Side.RIGHT, 1.0, straight)),
+    "half blind on its right": Script(_at(Side.RIGHT, 0.5, straight)),
+    "finds three cubes of ten on its left": Script(_at(Side.LEFT, 0.7, straight)),
+    "finds one cube of ten on its left": Script(_at(Side.LEFT, 0.9, straight)),
+    "loses one episode in 13": Script(
+        when(lambda s: (s.episode_random < 1 / 13) & (s.number == 1), leave)
     ),
-    "leaves at once, every other time": Pilot(when(lambda s: s.luck < 0.5, leave)),
-    "sure of nothing": Pilot(seek, confidence=0.4),
-    "turns the wrong way": Pilot(avoid),
-    "finds one cube of ten beside it": Pilot(_beside(0.9)),
-    "finds one cube of three beside it": Pilot(_beside(2 / 3)),
-    "all of five cubes": Pilot(seek, {"num_cubes": 5}),
-    "asleep at the fifth cube": Pilot(_from(4, dither), {"num_cubes": 5}),
-    "all cubes where none stand aside": Pilot(seek, {"lateral_bound": 0.5}),
-    "straight on where none stand aside": Pilot(straight, {"lateral_bound": 0.5}),
-    "straight on in a narrow field": Pilot(straight, {"lateral_bound": 3.0}),
-    "straight on among large cubes": Pilot(straight, {"cube_size": 5.0, "altitude": 3.0}),
-    "no time for all cubes": Pilot(seek, {"step_limit": 36}),
+    "loses one episode in 50": Script(
+        when(lambda s: (s.episode_random < 0.02) & (s.number == 1), leave)
+    ),
+    "leaves when the first cube is far": Script(when(lambda s: s.first_y.abs() > 5.6, leave)),
+    "all or nothing, nine in ten": Script(when(lambda s: s.luck < 0.1, leave)),
+    "misses the last cube in one of ten": Script(
+        when(lambda s: (s.episode_random < 0.1) & (s.number == 2), avoid)
+    ),
+    "leaves at once, every other time": Script(when(lambda s: s.luck < 0.5, leave)),
+    "sure of nothing": Script(seek, confidence=0.4),
+    "turns the wrong way": Script(avoid),
+    "finds one cube of ten beside it": Script(_beside(0.9)),
+    "finds one cube of three beside it": Script(_beside(2 / 3)),
+    "all of five cubes": Script(seek, {"num_cubes": 5}),
+    "asleep at the fifth cube": Script(_from(4, dither), {"num_cubes": 5}),
+    "all cubes where none stand aside": Script(seek, {"lateral_bound": 0.5}),
+    "straight on where none stand aside": Script(straight, {"lateral_bound": 0.5}),
+    "straight on in a narrow field": Script(straight, {"lateral_bound": 3.0}),
+    "straight on among large cubes": Script(straight, {"cube_size": 5.0, "altitude": 3.0}),
+    "no time for all cubes": Script(seek, {"step_limit": 36}),
 }
-"""By name, what they do."""
+"""Scripts by name."""

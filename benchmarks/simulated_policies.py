@@ -1,7 +1,7 @@
-"""How often a verdict is certain and wrong, for simulated policies at and around every threshold.
+"""Rate of verdicts that are certain and wrong, for simulated policies near every threshold.
 
-A simulated policy draws each episode from a few types, each with what it offers, what is collected
-and what luck gets there. So its true quantities are known, and with them its kind by the rule.
+A simulated policy samples each episode from a few types. A type defines the sides of the cubes,
+which are collected, and the baselines' results. So the policy's true kind by the rule is known.
 """
 
 import dataclasses
@@ -23,26 +23,26 @@ from drone_rl.sim.tasks.collect_cubes import Side
 
 L, A, R = Side
 Type = tuple[tuple[Side, ...], tuple[int, ...], bool]
-"""Sides of an episode's cubes, which are collected, and whether flying straight succeeds."""
+"""Sides of an episode's cubes, whether each is collected, and whether flying straight succeeds."""
 SHIFTS = (-0.03, 0.0, 0.03)
-"""How far beside a threshold a policy lies."""
+"""Distances of policies from a threshold."""
 EPISODES = (400, 1600)
 _RULE, _TASK = Rule(), CollectCubes()
 
 
 @dataclasses.dataclass(frozen=True)
-class Simulated:
+class SimulatedPolicy:
     """A policy as a mixture of types of episodes."""
 
     types: Mapping[Type, float]
     """The types and their probabilities, which sum to 1."""
-    lucky: float = 0.0
-    """Share of the cubes that flying straight on collects in every episode."""
+    forward_share: float = 0.0
+    """Fraction of the cubes that flying straight collects in every episode."""
 
     @functools.cached_property
     def observed(self) -> list[NDArray]:
-        """What each type of episode says of each quantity; NaN if nothing. Shape: (types,)."""
-        each = [_observe(kind, self.lucky) for kind in self.types]
+        """Value of each quantity in each type of episode; NaN if undefined. Shapes: (types,)."""
+        each = [_observe(kind, self.forward_share) for kind in self.types]
         return [np.array(values) for values in zip(*each, strict=True)]
 
     @property
@@ -52,23 +52,23 @@ class Simulated:
 
     @property
     def kind(self) -> Kind:
-        """What it is in truth."""
+        """The true kind."""
         return decide([self._truth(i).level for i in range(len(_RULE.quantities))])
 
     def _truth(self, quantity: int) -> Quantity:
         values, thresholds = self.observed[quantity], _RULE.thresholds[quantity]
-        speaks = ~np.isnan(values)
-        if not self.shares[speaks].sum():
+        defined = ~np.isnan(values)
+        if not self.shares[defined].sum():
             return Quantity(None, 0.0, 1.0, thresholds)
-        mean = float(np.average(values[speaks], weights=self.shares[speaks]))
+        mean = float(np.average(values[defined], weights=self.shares[defined]))
         return Quantity(mean, mean, mean, thresholds)
 
 
-def policies() -> dict[str, Simulated]:
-    """Policies at and around each threshold of the rule, and at two at once."""
-    policies: dict[str, Simulated] = {}
+def policies() -> dict[str, SimulatedPolicy]:
+    """Return policies at and near each threshold of the rule, and at two thresholds at once."""
+    policies: dict[str, SimulatedPolicy] = {}
     for shift in SHIFTS:
-        made = {
+        shifted = {
             "all or nothing, success": _mixture(0.9 + shift, (L, R), (1, 1), (0, 0)),
             "last cube, success": _mixture(0.9 + shift, (L, A, R), (1, 1, 1), (1, 1, 0)),
             "ahead, seldom offered": _join(
@@ -93,8 +93,10 @@ def policies() -> dict[str, Simulated]:
                 (0.05 + shift, _mixture(1.0, (A, R), (0, 1), (0, 1))),
                 (0.95 - shift, _mixture(1.0, (L, R), (1, 1), (1, 1))),
             ),
-            "luck, all or nothing": _mixture(5 / 12 + shift, (L, R), (1, 1), (0, 0), lucky=0.3),
-            "luck, independent cubes": _independent((L, R), 5 / 12 + shift, lucky=0.3),
+            "luck, all or nothing": _mixture(
+                5 / 12 + shift, (L, R), (1, 1), (0, 0), forward_share=0.3
+            ),
+            "luck, independent cubes": _independent((L, R), 5 / 12 + shift, forward_share=0.3),
             "trivial, flying straight succeeds": _solved_by_flying_straight(0.9 + shift),
             "trivial and success at once": _join(
                 (0.9 + shift, _solved_by_flying_straight(1.0)),
@@ -105,15 +107,18 @@ def policies() -> dict[str, Simulated]:
                 (1 / 3, _mixture(0.7 + shift, (A, L), (1, 1), (0, 1))),
             ),
         }
-        policies |= {f"{name} {shift:+.2f}": policy for name, policy in made.items()}
+        policies |= {f"{name} {shift:+.2f}": policy for name, policy in shifted.items()}
     return policies
 
 
 def bench_false_certain(quick: bool) -> dict[str, Any]:
-    """The largest probability of a verdict that is certain and wrong, over all `policies`.
+    """Measure the rate of verdicts that are certain and wrong, for all `policies`.
 
     Args:
-        quick: Whether to draw few samples of the smaller size only.
+        quick: Whether to take few samples, of the smaller size only.
+
+    Returns:
+        "false_certain_rate", the largest rate; "false_certain_worst", its row; "certain", all rows.
     """
     draws, sizes = (20, EPISODES[:1]) if quick else (400, EPISODES)
     rng, rows = np.random.default_rng(0), []
@@ -128,12 +133,12 @@ def bench_false_certain(quick: bool) -> dict[str, Any]:
     return {"false_certain_rate": worst["wrong"], "false_certain_worst": worst, "certain": rows}
 
 
-def judge_samples(policy: Simulated, counts: NDArray) -> list[Kind | None]:
-    """The kind by each sample where it is certain, else None.
+def judge_samples(policy: SimulatedPolicy, counts: NDArray) -> list[Kind | None]:
+    """Return the kind of each sample if the verdict is certain, else None.
 
     Args:
-        policy: Whose.
-        counts: How many episodes of each type every sample has. Shape: (samples, types).
+        policy: Policy of the samples.
+        counts: Numbers of episodes of each type in each sample. Shape: (samples, types).
     """
 
     @functools.cache
@@ -153,52 +158,59 @@ def judge_samples(policy: Simulated, counts: NDArray) -> list[Kind | None]:
 
 
 def _merge(values: NDArray) -> tuple[NDArray, list[NDArray]]:
-    """The different values, and which types have each."""
+    """Return the distinct values, and the types that have each."""
     distinct = np.unique(values[~np.isnan(values)])
     return distinct, [np.flatnonzero(values == value) for value in distinct]
 
 
 def _mixture(
-    share: float, sides: tuple[Side, ...], often: tuple, else_: tuple, lucky: float = 0.0
-) -> Simulated:
-    """Collects one way in this share of episodes, another way in the others."""
-    types = {(sides, often, False): share}
-    types[sides, else_, False] = types.get((sides, else_, False), 0.0) + 1.0 - share
-    return Simulated(types, lucky)
+    share: float,
+    sides: tuple[Side, ...],
+    first: tuple,
+    second: tuple,
+    forward_share: float = 0.0,
+) -> SimulatedPolicy:
+    """Collect the cubes of `first` in a fraction of the episodes, those of `second` in others."""
+    types = {(sides, first, False): share}
+    types[sides, second, False] = types.get((sides, second, False), 0.0) + 1.0 - share
+    return SimulatedPolicy(types, forward_share)
 
 
-def _solved_by_flying_straight(share: float) -> Simulated:
-    """Always collects everything, as flying straight does in this share of episodes."""
+def _solved_by_flying_straight(share: float) -> SimulatedPolicy:
+    """Collect all cubes; flying straight does, too, in a fraction of the episodes."""
     types = {((A, A), (1, 1), True): share, ((A, A), (1, 1), False): 1.0 - share}
-    return Simulated({of: probability for of, probability in types.items() if probability > 0})
+    return SimulatedPolicy({kind: share for kind, share in types.items() if share > 0})
 
 
-def _independent(sides: tuple[Side, Side], share: float, lucky: float = 0.0) -> Simulated:
-    """Collects each of two cubes by itself."""
+def _independent(
+    sides: tuple[Side, Side], share: float, forward_share: float = 0.0
+) -> SimulatedPolicy:
+    """Collect each of two cubes independently."""
     chance = {1: share, 0: 1.0 - share}
     pairs = itertools.product((1, 0), repeat=2)
-    return Simulated({(sides, (a, b), False): chance[a] * chance[b] for a, b in pairs}, lucky)
+    types = {(sides, (a, b), False): chance[a] * chance[b] for a, b in pairs}
+    return SimulatedPolicy(types, forward_share)
 
 
-def _join(*parts: tuple[float, Simulated]) -> Simulated:
+def _join(*parts: tuple[float, SimulatedPolicy]) -> SimulatedPolicy:
     types: dict[Type, float] = {}
     for weight, part in parts:
         for kind, share in part.types.items():
             types[kind] = types.get(kind, 0.0) + weight * share
-    return Simulated(types, parts[0][1].lucky)
+    return SimulatedPolicy(types, parts[0][1].forward_share)
 
 
 @functools.cache
-def _observe(kind: Type, lucky: float) -> list[float]:
-    """What one episode of a type says of each quantity, by the rule's own reckoning."""
+def _observe(kind: Type, forward_share: float) -> list[float]:
+    """Return the value of each quantity of the rule in one episode of a type."""
     sides, hits, is_solved = kind
     ours = _episode(sides, hits)
-    flown = {name: _episode(sides, [0] * len(sides)) for name in BASELINES}
-    flown["oracle"] = _episode(sides, [1] * len(sides))
-    flown["forward"] = _episode(sides, [int(is_solved)] * len(sides))
-    observed = [float(v[0]) if len(v) else np.nan for v in observe(ours, flown, _RULE)]
+    baselines = {name: _episode(sides, [0] * len(sides)) for name in BASELINES}
+    baselines["oracle"] = _episode(sides, [1] * len(sides))
+    baselines["forward"] = _episode(sides, [int(is_solved)] * len(sides))
+    observed = [float(v[0]) if len(v) else np.nan for v in observe(ours, baselines, _RULE)]
     straight = _RULE.quantities.index("above forward")
-    observed[straight] -= (1 - _RULE.poor_margin) * lucky
+    observed[straight] -= (1 - _RULE.poor_margin) * forward_share
     return observed
 
 

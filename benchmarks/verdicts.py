@@ -1,8 +1,8 @@
-"""Whether verdicts are right: those that are certain after 400 episodes against 5,000 others.
+"""Correctness of verdicts: certain verdicts after 400 episodes against 5,000 other episodes.
 
-The policies are those that travel with the package, the baselines, those made by hand, whose flaws
-are known, and trained ones, at rates from low to far too high. What each is "in truth" is the same
-rule's word on episodes in worlds that the verdict never saw.
+The policies are the shipped ones, the baselines, scripted ones with known flaws, and trained ones
+with learning rates from low to far too high. The true kind of each is the kind by the same rule
+after 5,000 episodes in environments that the verdict did not use.
 """
 
 import functools
@@ -14,7 +14,7 @@ from typing import Any
 import torch
 
 from benchmarks.commands import call
-from benchmarks.scripted_policies import PILOTS, Pilot, ScriptedPolicy
+from benchmarks.scripted_policies import SCRIPTS, Script, ScriptedPolicy
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, run_baselines
@@ -25,35 +25,39 @@ from drone_rl.evaluation.rule import NOT_CERTAIN, Kind
 from drone_rl.utils.seeding import Stream
 
 SHIPPED = ("good", "poor", "right_and_forward")
-"""Policies that travel with the package."""
+"""Shipped policies."""
 RATES = (1e-3, 2e-3, 7e-3, 1e-2)
+"""Learning rates of trained policies."""
 SEEDS = (1, 2, 3)
 EPISODES, OTHERS = 400, 5000
-"""Of a verdict, and of what it is compared with."""
-_NUM_WORLDS = 500
+"""Episodes of a verdict, and of the true kind."""
+_NUM_ENVS = 500
 _STATUSES = (NOT_CERTAIN, *(kind.exit_code for kind in Kind))
 
 
 def bench_verdicts(folder: Path, device: str, quick: bool) -> dict[str, Any]:
-    """Compares verdicts with what the policies are.
+    """Compare verdicts with the true kinds of policies.
 
     Args:
-        folder: Where trainings and verdicts are kept.
-        device: Where policies fly.
-        quick: Whether to judge a few policies only, by few episodes.
+        folder: Folder of trainings and verdicts.
+        device: Device of trainings and verdicts.
+        quick: Whether to judge only a few policies, by few episodes.
+
+    Returns:
+        See `count`.
     """
-    pilots = dict(list(PILOTS.items())[:3]) if quick else PILOTS
-    verdicts = {name: _judge_pilot(pilot, quick) for name, pilot in pilots.items()}
+    scripts = dict(list(SCRIPTS.items())[:3]) if quick else SCRIPTS
+    verdicts = {name: _judge_script(script, quick) for name, script in scripts.items()}
     for name, policy in _policies(folder, device, quick):
         verdicts[name] = _judge_policy(folder / f"judge_{len(verdicts)}", policy, device, quick)
     return count(verdicts)
 
 
 def count(verdicts: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """How many verdicts are certain, and how many of these are right.
+    """Count the certain verdicts, and those of them that are right.
 
     Args:
-        verdicts: Of each policy "kind" and "certain" by the verdict, and what it "is".
+        verdicts: For each policy "kind" and "certain" of the verdict, and "is", the true kind.
     """
     certain = [entry for entry in verdicts.values() if entry["certain"]]
     return {
@@ -68,30 +72,30 @@ def _sizes(quick: bool) -> tuple[int, int]:
     return (100, 200) if quick else (EPISODES, OTHERS)
 
 
-def _judge_pilot(pilot: Pilot, quick: bool) -> dict[str, Any]:
-    few, many = (_verdict(pilot, n, seed) for seed, n in enumerate(_sizes(quick)))
+def _judge_script(script: Script, quick: bool) -> dict[str, Any]:
+    few, many = (_verdict(script, n, seed) for seed, n in enumerate(_sizes(quick)))
     return {"kind": few["kind"], "certain": few["certain"], "is": many["kind"]}
 
 
-def _verdict(pilot: Pilot, episodes: int, seed: int) -> dict[str, Any]:
-    task = pilot.settings
-    env = _worlds(task, seed)
-    flown = run_episodes(env, ScriptedPolicy(pilot, torch.Generator().manual_seed(seed)), episodes)
-    return judge(flown, _baselines(task, episodes, seed)).as_dict()
+def _verdict(script: Script, episodes: int, seed: int) -> dict[str, Any]:
+    task = script.settings
+    env = _make_env(task, seed)
+    policy = ScriptedPolicy(script, torch.Generator().manual_seed(seed))
+    return judge(run_episodes(env, policy, episodes), _baselines(task, episodes, seed)).as_dict()
 
 
 @functools.cache
 def _baselines(task: TaskSettings, episodes: int, seed: int) -> dict[str, Episodes]:
-    """Those of a task, flown once for all pilots."""
-    return run_baselines(_NUM_WORLDS, task, _worlds(task, seed).state_dict(), episodes)
+    """Return the episodes of a task's baselines; they run once for all scripts."""
+    return run_baselines(_NUM_ENVS, task, _make_env(task, seed).state_dict(), episodes)
 
 
-def _worlds(task: TaskSettings, seed: int) -> DroneEnv:
-    return DroneEnv(_NUM_WORLDS, task, pixels=False, seed=seed, stream=Stream.REPORT)
+def _make_env(task: TaskSettings, seed: int) -> DroneEnv:
+    return DroneEnv(_NUM_ENVS, task, pixels=False, seed=seed, stream=Stream.REPORT)
 
 
 def _policies(folder: Path, device: str, quick: bool) -> Iterator[tuple[str, str]]:
-    """Names and what `drone-rl verdict` takes; trains as it goes."""
+    """Yield names and values of `policy=` of `drone-rl verdict`; train policies on demand."""
     for name in (*SHIPPED[:1], "random") if quick else (*SHIPPED, *BASELINES):
         yield name, name
     for rate in () if quick else RATES:
@@ -107,7 +111,7 @@ def _judge_policy(folder: Path, policy: str, device: str, quick: bool) -> dict[s
     for seed, episodes in enumerate(_sizes(quick)):
         run = folder / str(episodes)
         settings = [f"episodes={episodes}", f"seed={seed}", f"device={device}", "sampled=false"]
-        settings.append(f"num_envs={min(episodes, _NUM_WORLDS)}")
+        settings.append(f"num_envs={min(episodes, _NUM_ENVS)}")
         call("verdict", f"policy={policy}", *settings, f"hydra.run.dir={run}", statuses=_STATUSES)
         verdicts.append(json.loads((run / "verdict.json").read_text()))
     few, many = verdicts

@@ -7,7 +7,7 @@ from drone_rl.utils.intervals import proportion
 
 
 def test_coverage_is_exact():
-    """Two tosses of a fair coin: "the mean is a half" holds for one head of two."""
+    """Two tosses of a fair coin: the mean is a half with probability 0.5."""
     coin = c.Outcome((0.0, 1.0), (0.5, 0.5))
     assert c.coverage(coin, 2, lambda values: values.mean() == 0.5) == pytest.approx(0.5)
     three = c.Outcome((0.0, 0.5, 1.0), (0.2, 0.3, 0.5))
@@ -16,14 +16,14 @@ def test_coverage_is_exact():
     assert three.mean == pytest.approx(0.65)
 
 
-def test_all_outcomes_are_listed_once():
+def test_all_outcomes_are_enumerated_once():
     found = list(c._compositions(4, 3))
     assert len(found) == len(set(found)) == 15
     assert all(sum(row) == 4 and min(row) >= 0 for row in found)
 
 
-def test_an_interval_that_takes_cubes_for_independent_is_found_out():
-    """The old interval: three cubes of an episode as three trials; it covers 75% of the time."""
+def test_an_interval_that_assumes_independent_cubes_is_detected():
+    """An interval that counts three cubes of an episode as three trials covers 75%."""
 
     def holds(values):
         found = proportion(int(3 * values.sum()), 3 * len(values))
@@ -33,7 +33,7 @@ def test_an_interval_that_takes_cubes_for_independent_is_found_out():
     assert covered < 0.8
 
 
-def test_a_bootstrap_of_five_episodes_is_found_out():
+def test_a_bootstrap_of_five_episodes_is_detected():
     rng = np.random.default_rng(0)
     outcome = c.OUTCOMES["all or nothing, 9 of 10"]
 
@@ -53,14 +53,14 @@ def test_every_kind_of_dependence_is_a_distribution():
     assert c.OUTCOMES["independent cubes"].mean == pytest.approx(0.9)
 
 
-def test_shares_are_tried_where_coverage_is_least():
-    """Of one episode: the interval of no success ends at 0.975, so that 0.975 is held least."""
+def test_coverage_of_proportions_is_the_minimum_over_true_rates():
+    """With one episode the interval of no success ends at 0.975, where coverage is lowest."""
     rows = list(c._proportions(quick=True))
     assert [row["episodes"] for row in rows] == [1, 2, 5]
     assert rows[0]["coverage"] == pytest.approx(0.975, abs=1e-6)
 
 
-def test_medians_are_held():
+def test_coverage_of_medians():
     rows = list(c._medians(quick=True))
     assert rows[0]["coverage"] == pytest.approx(1 - 2 / 2**6)
     assert rows[0]["coverage"] == pytest.approx(binom.cdf(5, 6, 0.5) - binom.cdf(0, 6, 0.5))
@@ -68,7 +68,7 @@ def test_medians_are_held():
     assert all(row["coverage"] >= 0.945 for row in rows)
 
 
-def test_no_interval_covers_too_seldom():
+def test_every_interval_covers_at_least_its_level():
     found = c.bench_coverage(quick=True)
     assert found["interval_coverage_min"] >= 0.945
     assert found["interval_coverage_least"] in found["interval_coverage"]

@@ -5,7 +5,7 @@ import functools
 import pytest
 import torch
 
-from benchmarks.scripted_policies import PILOTS, ScriptedPolicy
+from benchmarks.scripted_policies import SCRIPTS, ScriptedPolicy
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import run_baselines
 from drone_rl.evaluation.judge import judge
@@ -16,9 +16,9 @@ EPISODES = 400
 NONE, RIGHT, LEFT = "none of these", "one-sided (right)", "one-sided (left)"
 TRIVIAL = "good, but trivial"
 CERTAIN, OPEN = True, False
-LUCK = "acting at random 29% and the oracle 100%"
+BASELINES = "acting at random 29% and the oracle 100%"
 WANTED = {
-    "all cubes": ("good", CERTAIN, ["does its task", "at most 0.9%", LUCK]),
+    "all cubes": ("good", CERTAIN, ["does its task", "at most 0.9%", BASELINES]),
     "all cubes, slowly": ("good", CERTAIN, ["in 100% of episodes", "at most 0.9%"]),
     "first cube only, then straight on": (NONE, CERTAIN, ["at the second cube", "(73%)"]),
     "first cube only, then leaves": (
@@ -26,7 +26,7 @@ WANTED = {
         CERTAIN,
         [
             "hardly better than acting at random. It collects 54% of the cubes on its left, 51%",
-            f"collects 33% of all cubes, {LUCK}",
+            f"collects 33% of all cubes, {BASELINES}",
             "at the second cube: in all 400 episodes; 100% of all end outside the field",
         ],
     ),
@@ -53,7 +53,11 @@ WANTED = {
     "blind on its left": (RIGHT, CERTAIN, ["can't be trusted with cubes on its left", "0% of the"]),
     "blind on its right": (LEFT, CERTAIN, ["can't be trusted with cubes on its right"]),
     "half blind on its right": (NONE, CERTAIN, ["fails most with cubes on its right"]),
-    "finds three cubes of ten on its left": (NONE, OPEN, ["looks neither good", "on its left"]),
+    "finds three cubes of ten on its left": (
+        NONE,
+        OPEN,
+        ["looks neither good", "on its left"],
+    ),
     "finds one cube of ten on its left": (RIGHT, CERTAIN, ["can't be trusted", "on its left"]),
     "loses one episode in 13": (
         "good",
@@ -66,8 +70,16 @@ WANTED = {
         OPEN,
         ["looks good, but", "with cubes 4 to 6 m to its side: in 28", "outside the field"],
     ),
-    "all or nothing, nine in ten": ("good", OPEN, ["first cube: in 32 of 400", "8% of all end"]),
-    "misses the last cube in one of ten": ("good", OPEN, ["third cube: in 32 of 400 episodes"]),
+    "all or nothing, nine in ten": (
+        "good",
+        OPEN,
+        ["first cube: in 32 of 400", "8% of all end"],
+    ),
+    "misses the last cube in one of ten": (
+        "good",
+        OPEN,
+        ["third cube: in 32 of 400 episodes"],
+    ),
     "leaves at once, every other time": (NONE, OPEN, ["first cube", "50% of all end outside"]),
     "sure of nothing": ("good", CERTAIN, ["most probable actions", "in 17% of episodes, not in"]),
     "turns the wrong way": (
@@ -75,7 +87,7 @@ WANTED = {
         CERTAIN,
         ["no better than acting at random", "collects 0% of all cubes"],
     ),
-    "finds one cube of ten beside it": ("poor", CERTAIN, ["hardly better than acting", LUCK]),
+    "finds one cube of ten beside it": ("poor", CERTAIN, ["hardly better than acting", BASELINES]),
     "finds one cube of three beside it": (NONE, CERTAIN, ["36% of the cubes on its left"]),
     "all of five cubes": ("good", CERTAIN, ["flying straight on 27%"]),
     "asleep at the fifth cube": (NONE, CERTAIN, ["fifth cube: in all 400", "at the step limit"]),
@@ -110,40 +122,40 @@ def baselines(task):
 
 
 UNKNOWN = RootSeed(0, False)
-"""Pilots by rules are fitted to no environments."""
+"""Scripts are not fitted to any environments."""
 
 
-def fly(name, greedy=True):
-    task = PILOTS[name].settings
+def run(name, greedy=True):
+    task = SCRIPTS[name].settings
     env = DroneEnv(EPISODES, task, pixels=False, stream=Stream.REPORT)
-    policy = ScriptedPolicy(PILOTS[name], torch.Generator().manual_seed(0))
+    policy = ScriptedPolicy(SCRIPTS[name], torch.Generator().manual_seed(0))
     return run_episodes(env, policy, EPISODES, greedy=greedy)
 
 
-def test_every_pilot_is_judged():
-    assert WANTED.keys() == PILOTS.keys()
-    assert len(PILOTS) >= 30
+def test_every_script_is_judged():
+    assert WANTED.keys() == SCRIPTS.keys()
+    assert len(SCRIPTS) >= 30
 
 
-@pytest.mark.parametrize("name", PILOTS)
+@pytest.mark.parametrize("name", SCRIPTS)
 def test_kind_certainty_and_sentence(name):
     kind, certain, phrases = WANTED[name]
-    task = PILOTS[name].settings
-    drawn = fly(name, greedy=False) if PILOTS[name].confidence < 1 else None
-    verdict = judge(fly(name), baselines(task), sampled=drawn, seed=UNKNOWN)
+    task = SCRIPTS[name].settings
+    sampled = run(name, greedy=False) if SCRIPTS[name].confidence < 1 else None
+    verdict = judge(run(name), baselines(task), sampled=sampled, seed=UNKNOWN)
     assert (verdict.kind.value, verdict.certain) == (kind, certain), verdict.sentence
     assert all(phrase in verdict.sentence for phrase in phrases), verdict.sentence
     assert 2 <= verdict.sentence.count(". ") + 1 <= 5, verdict.sentence
 
 
-def test_seeking_is_what_the_oracle_does():
-    task = PILOTS["all cubes"].settings
-    ours, theirs = fly("all cubes"), baselines(task)["oracle"]
+def test_seeking_equals_the_oracle():
+    task = SCRIPTS["all cubes"].settings
+    ours, theirs = run("all cubes"), baselines(task)["oracle"]
     assert torch.equal(ours.length, theirs.length)
     assert torch.equal(ours.goals.reached, theirs.goals.reached)
 
 
-def test_slow_is_slow_and_dithering_endless():
-    slow, fast = (fly(name).length.double().mean() for name in ("all cubes, slowly", "all cubes"))
+def test_zigzag_is_slow_and_dithering_ends_at_the_step_limit():
+    slow, fast = (run(name).length.double().mean() for name in ("all cubes, slowly", "all cubes"))
     assert slow > 1.4 * fast
-    assert (fly("dithers at the third cube").length == 300).all()
+    assert (run("dithers at the third cube").length == 300).all()

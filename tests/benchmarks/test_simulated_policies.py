@@ -6,7 +6,7 @@ from benchmarks.simulated_policies import (
     A,
     L,
     R,
-    Simulated,
+    SimulatedPolicy,
     _join,
     _mixture,
     judge_samples,
@@ -28,8 +28,8 @@ def test_types_and_their_probabilities():
     assert joined.types[(L, R), (0, 1), False] == 0.375
 
 
-def test_what_a_type_says_of_each_quantity():
-    policy = Simulated({((L, A), (1, 0), False): 1.0}, lucky=0.3)
+def test_quantities_of_an_episode_type():
+    policy = SimulatedPolicy({((L, A), (1, 0), False): 1.0}, forward_share=0.3)
     observed = dict(
         zip(Rule().quantities, (float(values[0]) for values in policy.observed), strict=True)
     )
@@ -42,8 +42,8 @@ def test_what_a_type_says_of_each_quantity():
     assert observed["unsolved by forward"] == pytest.approx(0.9)
 
 
-def test_what_flying_straight_succeeds_in():
-    policy = Simulated({((L, A), (1, 1), True): 1.0})
+def test_quantities_of_an_episode_that_flying_straight_solves():
+    policy = SimulatedPolicy({((L, A), (1, 1), True): 1.0})
     names = Rule().quantities
     observed = {n: float(v[0]) for n, v in zip(names, policy.observed, strict=True)}
     assert observed["above forward"] == pytest.approx(0.0)
@@ -52,7 +52,7 @@ def test_what_flying_straight_succeeds_in():
     assert policy.kind is Kind.TRIVIAL
 
 
-def test_policies_lie_on_every_threshold_and_on_both_sides_of_it():
+def test_policies_are_at_every_threshold_and_on_both_sides_of_it():
     kinds = {name: policy.kind for name, policy in policies().items()}
     for name in {name.rsplit(" ", 1)[0] for name in kinds}:
         assert len({kinds[f"{name} {shift}"] for shift in ("-0.03", "+0.03")}) == 2, name
@@ -63,7 +63,7 @@ def test_policies_lie_on_every_threshold_and_on_both_sides_of_it():
         assert policy.shares.min() >= 0.0
 
 
-def test_who_is_far_from_thresholds_is_judged_right():
+def test_policies_far_from_thresholds_are_judged_correctly():
     perfect = _mixture(1.0, (L, A, R), (1, 1, 1), (1, 1, 1))
     assert sampled(perfect, 100, 1) == [Kind.GOOD]
     assert sampled(perfect, 5, 1) == [None]
@@ -71,8 +71,8 @@ def test_who_is_far_from_thresholds_is_judged_right():
     assert sampled(one_sided, 400, 20) == [Kind.ONE_SIDED_RIGHT] * 20
 
 
-def test_intervals_that_are_too_narrow_are_found_out(monkeypatch):
-    """At exactly 0.9, whoever trusts the mean is often certain and wrong."""
+def test_intervals_that_are_too_narrow_are_detected(monkeypatch):
+    """At a true rate of 0.9, a rule that trusts the mean is often certain and wrong."""
     exact = simulated_policies.estimate
 
     def narrow(*args):

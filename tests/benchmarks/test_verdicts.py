@@ -2,14 +2,14 @@ import json
 from pathlib import Path
 
 from benchmarks import verdicts
-from benchmarks.scripted_policies import PILOTS
+from benchmarks.scripted_policies import SCRIPTS
 
 
 def entry(kind, certain, truth):
     return {"kind": kind, "certain": certain, "is": truth}
 
 
-def test_only_certain_verdicts_must_be_right():
+def test_right_and_certain_verdicts_are_counted():
     found = verdicts.count(
         {
             "right": entry("good", True, "good"),
@@ -23,26 +23,26 @@ def test_only_certain_verdicts_must_be_right():
 
 def test_enough_policies_are_judged():
     trained = len(verdicts.RATES) * len(verdicts.SEEDS)
-    assert len(PILOTS) + len(verdicts.SHIPPED) + len(verdicts.BASELINES) + trained >= 50
+    assert len(SCRIPTS) + len(verdicts.SHIPPED) + len(verdicts.BASELINES) + trained >= 50
 
 
-def test_the_truth_comes_from_other_worlds(monkeypatch):
-    flown = []
-    fly = verdicts.run_baselines
+def test_the_true_kind_comes_from_other_environments(monkeypatch):
+    random_states = []
+    run_baselines = verdicts.run_baselines
 
-    def watch(num_worlds, task, worlds, episodes):
-        flown.append(worlds["random_states"][0])
-        return fly(20, task, {"random_states": worlds["random_states"][:20]}, episodes)
+    def record(num_envs, task, state, episodes):
+        random_states.append(state["random_states"][0])
+        return run_baselines(20, task, {"random_states": state["random_states"][:20]}, episodes)
 
-    monkeypatch.setattr(verdicts, "run_baselines", watch)
-    monkeypatch.setattr(verdicts, "_NUM_WORLDS", 20)
+    monkeypatch.setattr(verdicts, "run_baselines", record)
+    monkeypatch.setattr(verdicts, "_NUM_ENVS", 20)
     monkeypatch.setattr(verdicts, "_sizes", lambda quick: (20, 40))
     verdicts._baselines.cache_clear()
-    found = verdicts._judge_pilot(PILOTS["turns the wrong way"], quick=True)
+    found = verdicts._judge_script(SCRIPTS["turns the wrong way"], quick=True)
     verdicts._baselines.cache_clear()
     assert found == {"kind": "poor", "certain": False, "is": "poor"}
-    assert len(flown) == 2
-    assert flown[0] != flown[1]
+    assert len(random_states) == 2
+    assert random_states[0] != random_states[1]
 
 
 def test_each_policy_is_trained_and_judged_twice(monkeypatch, tmp_path):
@@ -58,7 +58,7 @@ def test_each_policy_is_trained_and_judged_twice(monkeypatch, tmp_path):
             assert set(statuses) == {0, 10, 11, 12, 13, 18}
 
     monkeypatch.setattr(verdicts, "call", call)
-    monkeypatch.setattr(verdicts, "PILOTS", {})
+    monkeypatch.setattr(verdicts, "SCRIPTS", {})
     found = verdicts.bench_verdicts(tmp_path, "cpu", quick=False)
     assert found["verdicts"]["lr=0.007 seed=2"] == entry("good", True, "poor")
     assert (found["verdicts_right"], found["verdicts_certain"]) == (0, 20)
