@@ -1,4 +1,4 @@
-"""Archives of arrays that lie about their sizes, their types or what their numbers count."""
+"""Malicious array archives: false sizes, types, indices or counts."""
 
 import io
 import json
@@ -16,10 +16,10 @@ _NUMBERS = {"format": "drone_rl explanation", "format_version": 3, "name": "x"}
 
 
 def hostile_arrays(folder: Path) -> list[Case]:
-    """Makes folders of explanations, each with one file that lies.
+    """Create folders of explanations, each with one malicious archive; return their cases.
 
     Args:
-        folder: Where to.
+        folder: Parent folder.
     """
     cases = []
     for file, contents in (("arrays", _arrays()), ("dataset", _data())):
@@ -29,12 +29,14 @@ def hostile_arrays(folder: Path) -> list[Case]:
             (here / "explanation.json").write_text(json.dumps(_NUMBERS))
             for other in ("arrays", "dataset"):
                 (here / f"{other}.npz").write_bytes(content if other == file else _npz())
-            cases.append((here.name, ["report", f"explanations={here}"], "arrays that lie"))
+            cases.append(
+                (here.name, ["report", f"explanations={here}"], "a malicious array archive")
+            )
     return [*cases, *_together(folder), *_numbers(folder)]
 
 
 def _arrays() -> dict[str, bytes]:
-    """What can be wrong with an archive or with what an array says of itself."""
+    """Return archives with invalid structure or invalid headers, by name."""
     zeros = np.zeros
     headers: dict[str, Any] = {
         "dimensions_of_0": ((0, 2**40), "<f8", b""),
@@ -50,8 +52,8 @@ def _arrays() -> dict[str, bytes]:
         "no_characters": ((1,), "<U1", b"\xff\xff\xff\x7f"),
         "call": ("__import__('os').system('touch ran')", "<f8", bytes(8)),
     }
-    made = {name: zipped({"a.npy": _npy(*of)}) for name, of in headers.items()}
-    made |= {
+    archives = {name: zipped({"a.npy": _npy(*of)}) for name, of in headers.items()}
+    return archives | {
         "long_header": zipped({"a.npy": _npy((1,), "<f8" + " " * 60_000, bytes(8))}),
         "version_3": zipped({"a.npy": _npy((1,), "<f8", bytes(8)).replace(b"Y\x01", b"Y\x03", 1)}),
         "no_array": zipped({"a.npy": b"hello"}),
@@ -82,11 +84,10 @@ def _arrays() -> dict[str, bytes]:
         "patches": _npz(patch_effects=zeros((2000, 2000))),
         "many_arrays": _npz(**{f"x{i}": zeros(1) for i in range(3000)}),
     }
-    return made
 
 
 def _data() -> dict[str, bytes]:
-    """What numbers that are counted or used as indices can be."""
+    """Return archives with invalid counts, indices or frames, by name."""
     return {
         "episode_2_33": _npz(**{"flights/episode": np.array([2**33])}),
         "episode_2_40": _npz(**{"flights/episode": np.array([0, 2**40])}),
@@ -110,7 +111,7 @@ def _data() -> dict[str, bytes]:
 
 
 def _together(folder: Path) -> list[Case]:
-    """Files that are small enough one by one, but not together."""
+    """Create archives that are small enough individually, but too large together."""
     here = folder / "explanation_arrays_two_of_2_28"
     here.mkdir()
     (here / "explanation.json").write_text(json.dumps(_NUMBERS))
@@ -129,7 +130,7 @@ def _together(folder: Path) -> list[Case]:
 
 
 def _numbers(folder: Path) -> list[Case]:
-    """Lists and mappings that a figure would show entry by entry."""
+    """Create explanations with too long lists, mappings and texts."""
     parts: dict[str, Any] = {
         "key_steps": {"attribution": {"film": {"key_steps": [{"step": 0, "why": "x"}] * 1000}}},
         "methods": {"truth": {"methods": {str(i): {} for i in range(1000)}}},
@@ -162,15 +163,15 @@ def _npy(shape: Any, dtype: str, data: bytes) -> bytes:
 
 
 def _shorter(size: int) -> bytes:
-    """An archive whose directory says that its file has 100 bytes once it is unpacked."""
+    """Return an archive whose directory declares an unpacked size of 100 bytes."""
     content = zipped({"a.npy": _npy((size // 8,), "<f8", bytes(size))}, zipfile.ZIP_DEFLATED)
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        said = archive.infolist()[0].file_size
-    return content.replace(struct.pack("<L", said), struct.pack("<L", 100))
+        unpacked = archive.infolist()[0].file_size
+    return content.replace(struct.pack("<L", unpacked), struct.pack("<L", 100))
 
 
 def _overlapping() -> bytes:
-    """A directory in which 1000 files have the content of the first, of a megabyte."""
+    """Return an archive in which 1000 entries share the content of the first, a megabyte."""
     content = zipped({"a.npy": bytes(2**20)}, zipfile.ZIP_DEFLATED)
     begin = content.index(b"PK\x01\x02")
     end = content.index(b"PK\x05\x06")
@@ -181,7 +182,7 @@ def _overlapping() -> bytes:
 
 
 def _flagged() -> bytes:
-    """An archive whose file is said to be encrypted."""
+    """Return an archive whose entry is flagged as encrypted."""
     content = bytearray(zipped({"a.npy": _npy((1,), "<f8", bytes(8))}))
     content[content.index(b"PK\x01\x02") + 8] |= 1
     content[6] |= 1

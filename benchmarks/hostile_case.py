@@ -1,4 +1,4 @@
-"""The form of a case of a malicious file, and files that are hard to read."""
+"""Definition of a case of a malicious file, and helpers that create such files."""
 
 import os
 import zipfile
@@ -53,7 +53,7 @@ def npz(arrays: Mapping[str, np.ndarray]) -> bytes:
     return file.getvalue()
 
 
-NO_FILES: Mapping[str, Make] = {
+NOT_REGULAR: Mapping[str, Make] = {
     "empty": Path.touch,
     "folder": Path.mkdir,
     "pipe": os.mkfifo,
@@ -61,4 +61,4 @@ NO_FILES: Mapping[str, Make] = {
     "loop": lambda path: path.symlink_to(path),
     "sparse": sparse,
 }
-"""What may lie where a plain file is expected."""
+"""Objects that can be where a regular file is expected."""

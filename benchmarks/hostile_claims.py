@@ -1,4 +1,4 @@
-"""Certificates and robustness measurements whose parts are of other sizes, types or numbers."""
+"""Malicious certificates and robustness measurements: wrong sizes, types or numbers."""
 
 import copy
 import json
@@ -10,15 +10,15 @@ from benchmarks.hostile_case import Case
 
 Data = dict[str, Any]
 _EDGE = 6.0
-"""Metres to either side at which cubes are placed at most."""
+"""Largest lateral distance of cubes, metres."""
 
 
 def hostile_claims(folder: Path, description: Data) -> list[Case]:
-    """Makes the files.
+    """Write the files and return their cases.
 
     Args:
-        folder: Where to.
-        description: Of a policy of one cube.
+        folder: Folder of the files.
+        description: Description of a policy for one cube.
     """
     cases = []
     for name, change in _certificates().items():
@@ -28,14 +28,14 @@ def hostile_claims(folder: Path, description: Data) -> list[Case]:
         path.write_text(json.dumps(data))
         command = "check" if len(cases) % 2 else "verdict"
         arguments = [command, "policy=good", f"certificate={path}"]
-        cases.append((path.name, arguments, "a certificate that can't be"))
+        cases.append((path.name, arguments, "an invalid certificate"))
     for name, change in _shifts().items():
         data = _measured(description)
         change(data)
         path = folder / f"measured_{name}.json"
         path.write_text(json.dumps(data))
         arguments = ["verdict", "policy=good", f"shifts={path}"]
-        cases.append((path.name, arguments, "measurements that can't be"))
+        cases.append((path.name, arguments, "invalid measurements"))
     return cases
 
 
@@ -62,16 +62,16 @@ def _certificates() -> dict[str, Callable[[Data], Any]]:
     def outcome(**changes: Any) -> Callable[[Data], Any]:
         return lambda data: data["outcomes"][0].update(changes)
 
-    def boxes(*made: Any) -> Callable[[Data], Any]:
-        return outcome(boxes=[*made])
+    def boxes(*values: Any) -> Callable[[Data], Any]:
+        return outcome(boxes=[*values])
 
     def task(**changes: Any) -> Callable[[Data], Any]:
         return lambda data: data["policy"]["description"]["task"].update(changes)
 
-    def of_cubes(count: int, made: list) -> Callable[[Data], Any]:
+    def of_cubes(count: int, values: list) -> Callable[[Data], Any]:
         def change(data: Data) -> None:
             task(num_cubes=count)(data)
-            outcome(collected=[True] * count, boxes=made)(data)
+            outcome(collected=[True] * count, boxes=values)(data)
 
         return change
 

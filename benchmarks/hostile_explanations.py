@@ -1,6 +1,6 @@
-"""Explanations with one number or array that does not belong to the others.
+"""Explanations with one number or array that is inconsistent with the others.
 
-The rest is valid and has a long film, which takes seconds to render: a reader that starts to render
+The rest is valid and contains a long film, which takes seconds to render. So a reader that renders
 before it has checked everything is too slow.
 """
 
@@ -17,12 +17,12 @@ from benchmarks.hostile_case import Case, npz
 from drone_rl.explanations.report.explanation import FORMAT, FORMAT_VERSION
 
 STEPS = 400
-"""Of the film."""
+"""Steps of the film."""
 FRAMES = 50
 
 
 def numbers() -> dict[str, Any]:
-    """Return `explanation.json` of a valid explanation."""
+    """Return the content of `explanation.json` of a valid explanation."""
     film = {"heat_by": [None] * STEPS, "key_steps": [{"step": 0, "why": "start"}] * 6}
     frame = {"format": FORMAT, "format_version": FORMAT_VERSION, "name": "x"}
     parts = {key: EXPLANATION[key] for key in ("attribution", "places", "asymmetry")}
@@ -32,7 +32,7 @@ def numbers() -> dict[str, Any]:
 
 
 def arrays() -> dict[str, NDArray[Any]]:
-    """Return `arrays.npz` of it."""
+    """Return the content of its `arrays.npz`."""
     zeros = np.zeros
     return {
         "film_frames": zeros((STEPS, 25, 64, 3), np.uint8),
@@ -52,7 +52,7 @@ def arrays() -> dict[str, NDArray[Any]]:
 
 
 def data() -> dict[str, NDArray[Any]]:
-    """Return `dataset.npz` of it."""
+    """Return the content of its `dataset.npz`."""
     return {
         "frames": np.zeros((FRAMES, 25, 64, 3), np.uint8),
         "probabilities": np.full((FRAMES, 3), 1 / 3),
@@ -83,7 +83,7 @@ NUMBERS: Mapping[str, tuple[str, Any]] = {
     "worst_frame_late": ("asymmetry.dataset.worst", [{"frame": FRAMES, "distance": 0.5}]),
     "pair_negative": ("contradictions.list", [{"kind": "unknown", "left": -1, "right": 0}]),
 }
-"""Entries of `explanation.json`, and what they are replaced by."""
+"""Paths in `explanation.json` and their invalid values, by case."""
 ARRAYS: Mapping[str, tuple[str, NDArray[Any]]] = {
     "heights_2": ("response_height", np.zeros(2)),
     "heights_none": ("response_height", np.zeros(0)),
@@ -96,23 +96,23 @@ ARRAYS: Mapping[str, tuple[str, NDArray[Any]]] = {
     "class_models_of_2_actions": ("class_model_logit", np.zeros((2, 1, 25, 64))),
     "map_of_other_frames": ("tsne_features", np.zeros((FRAMES - 1, 2))),
 }
-"""Arrays of `arrays.npz`, and what they are replaced by."""
+"""Names in `arrays.npz` and their invalid arrays, by case."""
 
 
 def hostile_explanations(folder: Path) -> list[Case]:
-    """Makes the folders.
+    """Create the folders and return their cases.
 
     Args:
-        folder: Where to.
+        folder: Parent folder.
     """
-    made = {name: (changed(numbers(), dict([change])), {}) for name, change in NUMBERS.items()}
-    made |= {name: (numbers(), dict([change])) for name, change in ARRAYS.items()}
+    contents = {name: (changed(numbers(), dict([change])), {}) for name, change in NUMBERS.items()}
+    contents |= {name: (numbers(), dict([change])) for name, change in ARRAYS.items()}
     cases = []
-    for name, (of, others) in made.items():
+    for name, (of, others) in contents.items():
         here = folder / f"explanation_part_{name}"
         here.mkdir()
         (here / "explanation.json").write_text(json.dumps(of))
         for file, content in (("arrays", {**arrays(), **others}), ("dataset", data())):
             (here / f"{file}.npz").write_bytes(npz(content))
-        cases.append((here.name, ["report", f"explanations={here}"], "a part that fits no other"))
+        cases.append((here.name, ["report", f"explanations={here}"], "an inconsistent part"))
     return cases

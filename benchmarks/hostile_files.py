@@ -1,6 +1,6 @@
-"""Hostile inputs of every kind: what an attacker could put where the program opens a file.
+"""Malicious inputs of every kind that the program reads.
 
-Each would run, read, write, delete or allocate something if it were believed.
+Each would run, read, write, delete or allocate something if the program accepted it.
 """
 
 import copy
@@ -18,7 +18,7 @@ import torch
 from safetensors.torch import save
 
 from benchmarks.hostile_arrays import hostile_arrays
-from benchmarks.hostile_case import NO_FILES, Case, Make, nested, zipped
+from benchmarks.hostile_case import NOT_REGULAR, Case, Make, nested, zipped
 from benchmarks.hostile_claims import hostile_claims
 from benchmarks.hostile_explanations import hostile_explanations
 from benchmarks.hostile_folders import hostile_folders, make_run
@@ -50,9 +50,9 @@ DESCRIPTION: dict[str, Any] = {
     "transforms": [{"name": "gray"}, {"name": "standardize", "mean": 0.5, "std": 0.2}],
     "network": {"name": "small_cnn", "patch": 4, "channels": [2], "hidden": []},
 }
-"""A policy that would be accepted."""
-_LOOK = MINIMAL.values()
-_FLIGHT = {**COMPUTER_VISION.values(), "mode": "simple_flight"}
+"""Description of a valid policy."""
+_APPEARANCE = MINIMAL.values()
+_DYNAMICS = {**COMPUTER_VISION.values(), "mode": "simple_flight"}
 _ACTIONS = MOVES_SETTINGS.values()
 _PROGRESS = {"frames": 1, "episodes": 1, "updates": 1, "seconds": 1.0, "running_reward": 0.5}
 _ORIGIN = {"versions": {"torch": "2"}, "git_revision": None}
@@ -65,13 +65,13 @@ ABOUT = {
 
 
 def hostile_files(folder: Path) -> list[Case]:
-    """Makes the files.
+    """Write the files.
 
     Args:
-        folder: Where to; gets a folder `canary` that no command may touch or tell of.
+        folder: Folder of the files; its subfolder `canary` is off limits to all commands.
 
     Returns:
-        Of each case its name, the arguments for `drone-rl`, and what would go wrong.
+        For each case its name, the arguments of `drone-rl`, and the attack.
     """
     canary = folder / "canary"
     canary.mkdir(parents=True)
@@ -84,7 +84,7 @@ def hostile_files(folder: Path) -> list[Case]:
         return make_run(path, state)
 
     return [
-        *(*_exported(folder), *_old(folder), *_checkpoints(folder), *_no_files(folder)),
+        *(*_exported(folder), *_old(folder), *_checkpoints(folder), *_not_regular(folder)),
         *hostile_folders(folder, state),
         *hostile_policies(folder, weights(), _about()),
         *hostile_json(folder, run),
@@ -96,7 +96,7 @@ def hostile_files(folder: Path) -> list[Case]:
 
 
 def weights() -> dict[str, torch.Tensor]:
-    """Those of `DESCRIPTION`."""
+    """Return weights of `DESCRIPTION`."""
     expected = parse(DESCRIPTION).expected_weights()
     return {name: torch.full(value.shape, 0.1) for name, value in expected.items()}
 
@@ -104,12 +104,12 @@ def weights() -> dict[str, torch.Tensor]:
 def exported(
     description: Any = DESCRIPTION, tensors: Mapping[str, Any] | None = None, **about: Any
 ) -> bytes:
-    """An exported policy's content."""
+    """Return the content of an exported policy file."""
     return save(dict(tensors or weights()), _about(description, **about))
 
 
 def _about(description: Any = DESCRIPTION, **about: Any) -> dict[str, str]:
-    """What an exported policy's file says besides weights."""
+    """Return the metadata of an exported policy file."""
     return {
         "format": "drone_rl policy",
         "description": description if isinstance(description, str) else json.dumps(description),
@@ -118,7 +118,7 @@ def _about(description: Any = DESCRIPTION, **about: Any) -> dict[str, str]:
 
 
 def checkpoint_state(**changes: Any) -> dict[str, Any]:
-    """A checkpoint's content, as far as flying needs it."""
+    """Return the content of a checkpoint, as far as evaluation needs it."""
     state = {
         "format": "drone_rl checkpoint",
         "format_version": 2,
@@ -133,7 +133,7 @@ def checkpoint_state(**changes: Any) -> dict[str, Any]:
 
 
 def changed(where: str, value: Any) -> dict[str, Any]:
-    """`DESCRIPTION` with one value changed; `...` takes it away."""
+    """Return `DESCRIPTION` with one value replaced, or removed if the new value is `...`."""
     data, *keys = copy.deepcopy(DESCRIPTION), *where.split(".")
     part: Any = data
     for key in keys[:-1]:
@@ -151,7 +151,7 @@ def _exported(folder: Path) -> list[Case]:
 
 
 def _descriptions(folder: Path) -> dict[str, bytes]:
-    """Policies that are described as none can be."""
+    """Return files with invalid descriptions, by name."""
     described = {
         "cubes": ("task.num_cubes", 10**9),
         "steps": ("task.step_limit", 0),
@@ -161,18 +161,18 @@ def _descriptions(folder: Path) -> dict[str, bytes]:
         "tiny_steps": ("task.step_length", 1e-320),
         "home": ("task.spacing", "${oc.env:HOSTILE_SECRET}"),
         "camera": ("camera", {"width": 4096, "height": 4096, "horizontal_fov": 90.0}),
-        "fog": ("appearance", {**_LOOK, "fog_visibility": 0.0}),
+        "fog": ("appearance", {**_APPEARANCE, "fog_visibility": 0.0}),
         "texture": (
             "appearance",
-            {**_LOOK, "ground_texture": [str(folder / "canary" / "secret.txt")]},
+            {**_APPEARANCE, "ground_texture": [str(folder / "canary" / "secret.txt")]},
         ),
-        "heavy": ("dynamics", {**_FLIGHT, "mass": 1e9}),
-        "no_such_body": ("dynamics", {**_FLIGHT, "inertia": [1.0, 1.0, 9.0]}),
-        "wind_nan": ("dynamics", {**_FLIGHT, "wind": [float("nan"), 0.0, 0.0]}),
-        "wind_of_four": ("dynamics", {**_FLIGHT, "wind": [0.0] * 4}),
-        "endless_step": ("dynamics", {**_FLIGHT, "control_ticks": 10**9}),
-        "no_tick": ("dynamics", {**_FLIGHT, "tick": 0.0}),
-        "mode": ("dynamics", {**_FLIGHT, "mode": "os.system"}),
+        "heavy": ("dynamics", {**_DYNAMICS, "mass": 1e9}),
+        "no_such_body": ("dynamics", {**_DYNAMICS, "inertia": [1.0, 1.0, 9.0]}),
+        "wind_nan": ("dynamics", {**_DYNAMICS, "wind": [float("nan"), 0.0, 0.0]}),
+        "wind_of_four": ("dynamics", {**_DYNAMICS, "wind": [0.0] * 4}),
+        "endless_step": ("dynamics", {**_DYNAMICS, "control_ticks": 10**9}),
+        "no_tick": ("dynamics", {**_DYNAMICS, "tick": 0.0}),
+        "mode": ("dynamics", {**_DYNAMICS, "mode": "os.system"}),
         "wind_without_air": ("dynamics", {**COMPUTER_VISION.values(), "wind": [5.0, 0.0, 0.0]}),
         "half_dynamics": ("dynamics", {"mode": "simple_flight"}),
         "no_dynamics": ("dynamics", None),
@@ -201,7 +201,7 @@ def _descriptions(folder: Path) -> dict[str, bytes]:
 
 
 def _weights() -> dict[str, bytes]:
-    """Weights that are no numbers, or not the described network's."""
+    """Return files with weights that are not finite or do not fit the network, by name."""
     own = weights()
     bias, weight = "layers.logits.bias", "layers.logits.weight"
     return {
@@ -219,7 +219,7 @@ def _weights() -> dict[str, bytes]:
 
 
 def _texts() -> dict[str, bytes]:
-    """Texts that are no JSON, too much of it, or meant for a terminal or a shell."""
+    """Return files with invalid or huge JSON, or text for a terminal or a shell, by name."""
     return {
         "deep": exported('{"a":' * 50_000 + "1" + "}" * 50_000),
         "huge_number": exported('{"format": 1' + "0" * 400 + "}"),
@@ -234,7 +234,7 @@ def _texts() -> dict[str, bytes]:
 
 
 def _damages() -> dict[str, bytes]:
-    """Files that end too early, too late, or say something else of their own size."""
+    """Return truncated or extended files and files with a false size, by name."""
     whole = exported()
     return {
         "truncated": whole[: len(whole) // 2],
@@ -246,7 +246,7 @@ def _damages() -> dict[str, bytes]:
 
 
 def _old(folder: Path) -> list[Case]:
-    """Files from before descriptions, whose settings name Python."""
+    """Write files in an old format whose settings name Python objects."""
     canary = folder / "canary"
     config = {
         "task": {"_target_": "drone_rl.config.TaskSettings", **DESCRIPTION["task"]},
@@ -322,18 +322,18 @@ def _checkpoints(folder: Path) -> list[Case]:
     return [_policy(folder, f"checkpoint_{name}.pt", c) for name, c in contents.items()]
 
 
-def _no_files(folder: Path) -> list[Case]:
-    """What lies where a file should be."""
+def _not_regular(folder: Path) -> list[Case]:
+    """Create objects that are not regular files."""
     here = folder / "no_files"
     here.mkdir()
     secret = folder / "canary" / "secret.txt"
-    makers: dict[str, Make] = {**NO_FILES, "secret": lambda path: path.symlink_to(secret)}
+    makers: dict[str, Make] = {**NOT_REGULAR, "secret": lambda path: path.symlink_to(secret)}
     cases = []
     for name, make in makers.items():
         for ending in ("pt", "safetensors"):
             path = here / f"{name}.{ending}"
             make(path)
-            cases.append((f"no_file_{path.name}", _command(path, len(cases)), "no plain file"))
+            cases.append((f"no_file_{path.name}", _command(path, len(cases)), "not a regular file"))
     return cases
 
 
@@ -343,13 +343,13 @@ def _policy(folder: Path, name: str, content: bytes) -> Case:
 
 
 def _command(path: Path, number: int) -> list[str]:
-    """One of the commands that open a policy."""
+    """Return one of the commands that open a policy."""
     commands = ("verdict", "evaluate", "explain", "play", "export")
     return [commands[number % len(commands)], f"policy={path}"]
 
 
 class _Call:
-    """Becomes a call when it is unpickled."""
+    """An object that calls a function when it is unpickled."""
 
     def __init__(self, function: Callable[..., Any], *arguments: Any) -> None:
         self.call = function, arguments
@@ -365,7 +365,7 @@ def _saved(state: Any) -> bytes:
 
 
 def _longer_storage(content: bytes) -> bytes:
-    """The first convolution's 32 numbers are said to be 65,535, most of them not its own."""
+    """Return a checkpoint whose first convolution declares 65,535 instead of 32 numbers."""
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     (program,) = (name for name in members if name.endswith("data.pkl"))

@@ -1,4 +1,4 @@
-"""Hostile folders: of runs to go on with, of sweeps and of explanations."""
+"""Malicious folders of resumed runs, sweeps and explanations."""
 
 import io
 import json
@@ -17,17 +17,17 @@ from benchmarks.hostile_case import Case, nested, npz
 
 
 def hostile_folders(folder: Path, state: Mapping[str, Any]) -> list[Case]:
-    """Makes the folders.
+    """Create the folders and return their cases.
 
     Args:
-        folder: Where to; has a folder `canary`.
-        state: Of a checkpoint that could be flown.
+        folder: Parent folder; contains a folder `canary`.
+        state: State of a valid checkpoint.
     """
     return [*_runs(folder, state), *_sweeps(folder), *_explanations(folder)]
 
 
 def _runs(folder: Path, state: Mapping[str, Any]) -> list[Case]:
-    """Of trainings that are gone on with."""
+    """Create runs that are resumed."""
     canary = folder / "canary"
     overrides: dict[str, Any] = {
         "target": ["policy._target_=os.system"],
@@ -51,7 +51,7 @@ def _runs(folder: Path, state: Mapping[str, Any]) -> list[Case]:
     for name, content in overrides.items():
         run = make_run(folder / f"resume_{name}", state)
         (run / ".hydra" / "overrides.yaml").write_text(yaml.safe_dump(content))
-        cases.append((run.name, ["train", f"resume={run}"], "settings out of a file"))
+        cases.append((run.name, ["train", f"resume={run}"], "overrides that a run can't have"))
     raw = {
         "python_object": "- !!python/object/apply:os.system ['touch ran']\n",
         "aliases": "a: &a [x]\nb: &b [*a,*a]\n" + "- *b\n" * 10,
@@ -60,7 +60,7 @@ def _runs(folder: Path, state: Mapping[str, Any]) -> list[Case]:
     for name, text in raw.items():
         run = make_run(folder / f"resume_{name}", state)
         (run / ".hydra" / "overrides.yaml").write_text(text)
-        cases.append((run.name, ["train", f"resume={run}"], "YAML that does more than say"))
+        cases.append((run.name, ["train", f"resume={run}"], "YAML that is more than plain data"))
     links = {"metrics.csv": "secret.txt", "run.yaml": "ran", ".lock": "ran", "tensorboard": "keep"}
     for name, target in links.items():
         run = make_run(folder / f"resume_link_{name.strip('.').replace('.', '_')}", state)
@@ -70,12 +70,12 @@ def _runs(folder: Path, state: Mapping[str, Any]) -> list[Case]:
     for name, content in broken.items():
         run = make_run(folder / f"resume_state_{name}", content)
         (run / ".hydra" / "overrides.yaml").write_text("- experiment=smoke\n- logger=csv\n")
-        cases.append((run.name, ["train", f"resume={run}"], "a state that fits no training"))
+        cases.append((run.name, ["train", f"resume={run}"], "an invalid training state"))
     return cases
 
 
 def make_run(run: Path, state: Any) -> Path:
-    """A run's folder with a checkpoint; `state` is what that holds."""
+    """Create a run's folder with a checkpoint that contains `state`."""
     (run / ".hydra").mkdir(parents=True)
     (run / "checkpoints").mkdir()
     torch.save(state, run / "checkpoints" / "last.pt")
@@ -117,13 +117,15 @@ def _sweeps(folder: Path) -> list[Case]:
         (sweep / "sweep.json").write_text(text)
         again = ["train", "-m", "seed=0,1", "hydra/launcher=local", f"hydra.sweep.dir={sweep}"]
         report = ["sweep-report", f"folder={sweep}"]
-        cases.append((sweep.name, again if i % 3 == 0 else report, "a sweep's own file"))
+        cases.append((sweep.name, again if i % 3 == 0 else report, "an invalid sweep.json"))
     for name, make in {"pipe": os.mkfifo, "link": _link_to(folder / "canary")}.items():
         sweep = folder / f"sweep_{name}"
         sweep.mkdir()
         (sweep / "sweep.json").write_text(json.dumps(good))
         make(sweep / "0")
-        cases.append((sweep.name, ["sweep-report", f"folder={sweep}"], "a run that is no folder"))
+        cases.append(
+            (sweep.name, ["sweep-report", f"folder={sweep}"], "a run that is not a folder")
+        )
     return cases
 
 
@@ -142,7 +144,7 @@ def _explanations(folder: Path) -> list[Case]:
         "objects": (numbers(name="x"), npz({"a": np.array([folder], dtype=object)})),
         "bomb": (numbers(name="x"), npz({"a": np.zeros(2**27)})),
         "no_archive": (numbers(name="x"), b"PK\x03\x04 and so on"),
-        "giant": (numbers(name="x"), _lying()),
+        "giant": (numbers(name="x"), _false_header()),
     }
     cases = []
     for name, (text, archive) in kinds.items():
@@ -151,26 +153,28 @@ def _explanations(folder: Path) -> list[Case]:
         (here / "explanation.json").write_text(text)
         for file in ("arrays.npz", "dataset.npz"):
             (here / file).write_bytes(archive)
-        cases.append((here.name, ["report", f"explanations={here}"], "an explanation's files"))
+        cases.append(
+            (here.name, ["report", f"explanations={here}"], "invalid files of an explanation")
+        )
     for name, make in {"pipe": os.mkfifo, "zeros": _link_to(Path("/dev/zero"))}.items():
         here = folder / f"explanation_{name}"
         shutil.copytree(folder / "explanation_missing_numbers", here)
         (here / "arrays.npz").unlink()
         make(here / "arrays.npz")
-        cases.append((here.name, ["report", f"explanations={here}"], "no plain file"))
+        cases.append((here.name, ["report", f"explanations={here}"], "not a regular file"))
     return cases
 
 
-def _lying() -> bytes:
-    """An array whose header asks for terabytes."""
+def _false_header() -> bytes:
+    """Return an array file whose header declares terabytes."""
     file = io.BytesIO()
     np.savez(file, a=np.zeros(3))
     with zipfile.ZipFile(file) as archive:
         content = archive.read("a.npy").replace(b"(3,), }         ", b"(399999999999,), }")
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w") as archive:
+    target = io.BytesIO()
+    with zipfile.ZipFile(target, "w") as archive:
         archive.writestr("a.npy", content)
-    return made.getvalue()
+    return target.getvalue()
 
 
 def _link_to(target: Path) -> Callable[[Path], None]:

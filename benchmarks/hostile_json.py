@@ -1,11 +1,11 @@
-"""JSON and YAML that is damaged, too large or of another kind, for each command that reads some."""
+"""Malicious JSON and YAML files: damaged, too large or of another kind, for each reader."""
 
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.hostile_case import NO_FILES, Case
+from benchmarks.hostile_case import NOT_REGULAR, Case
 
 _MIB = 2**20
 JSON: Mapping[str, bytes] = {
@@ -34,7 +34,7 @@ JSON: Mapping[str, bytes] = {
     "long_text": b'{"format": "' + b"a" * (3 * _MIB) + b'"}',
     "long_name": b'{"' + b"a" * (3 * _MIB) + b'": 1}',
 }
-"""Contents that are no file of any of our formats."""
+"""Contents that are not valid in any of the program's formats."""
 
 YAML: Mapping[str, bytes] = {
     "cut": b"fog: {low: 40",
@@ -70,17 +70,17 @@ YAML: Mapping[str, bytes] = {
     "not_a_number": b"fog: {low: .nan, unit: m of sight}",
     "too_large_a_file": b"# " + b"a" * 70_000 + b"\nfog: {low: 1}",
 }
-"""Contents that are plain data of none of our kinds, or more than plain data."""
+"""Contents that are valid data of another kind, or more than plain data."""
 
 
 def hostile_json(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]:
-    """Makes the files.
+    """Write the files and return their cases.
 
     Args:
-        folder: Where to.
-        checkpoint: Makes a run's folder with a checkpoint in it.
+        folder: Folder of the files.
+        checkpoint: Create a run's folder with a checkpoint.
     """
-    made = [
+    cases = [
         *_for(folder, "certificate", JSON, ".json", _arguments("check", "certificate")),
         *_for(folder, "shifts", JSON, ".json", _arguments("verdict", "policy=good shifts")),
         *_for(folder, "domain", JSON, ".json", _arguments("verdict", "policy=good require_domain")),
@@ -88,18 +88,18 @@ def hostile_json(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]
     ]
     for kind, contents in (("sweep", JSON), ("explanation", JSON)):
         for name, content in contents.items():
-            made.append(_in_folder(folder, kind, name, content))
+            cases.append(_in_folder(folder, kind, name, content))
     for name, content in YAML.items():
         run = checkpoint(folder / f"run_overrides_{name}")
         (run / ".hydra" / "overrides.yaml").write_bytes(content)
-        made.append((run.name, ["train", f"resume={run}"], "overrides that are none"))
+        cases.append((run.name, ["train", f"resume={run}"], "invalid overrides"))
     for name, content in JSON.items():
         run = checkpoint(folder / f"run_rounds_{name}")
         (run / ".hydra" / "overrides.yaml").write_text("- experiment=smoke\n- logger=csv\n")
         (run / "provable.json").write_bytes(content)
         command = ["train", f"resume={run}", "provable.rounds=1"]
-        made.append((run.name, command, "rounds of a training that are none"))
-    return [*made, *_needs(folder)]
+        cases.append((run.name, command, "invalid rounds of a training"))
+    return [*cases, *_required_domains(folder)]
 
 
 def _arguments(command: str, setting: str) -> Callable[[Path], list[str]]:
@@ -118,11 +118,11 @@ def _for(
     for name, content in contents.items():
         path = folder / f"{kind}_{name}{ending}"
         path.write_bytes(content)
-        cases.append((path.name, command(path), f"no {kind} but {name}"))
-    for name, make in NO_FILES.items():
+        cases.append((path.name, command(path), f"instead of a {kind}: {name}"))
+    for name, make in NOT_REGULAR.items():
         path = folder / f"{kind}_no_file_{name}{ending}"
         make(path)
-        cases.append((path.name, command(path), "no plain file"))
+        cases.append((path.name, command(path), "not a regular file"))
     return cases
 
 
@@ -131,12 +131,12 @@ def _in_folder(folder: Path, kind: str, name: str, content: bytes) -> Case:
     here.mkdir()
     (here / f"{kind}.json").write_bytes(content)
     if kind == "sweep":
-        return here.name, ["sweep-report", f"folder={here}"], "a sweep's own file"
-    return here.name, ["report", f"explanations={here}"], "an explanation's own file"
+        return here.name, ["sweep-report", f"folder={here}"], "an invalid sweep.json"
+    return here.name, ["report", f"explanations={here}"], "an invalid explanation.json"
 
 
-def _needs(folder: Path) -> list[Case]:
-    """Domains that are required, of which none can be."""
+def _required_domains(folder: Path) -> list[Case]:
+    """Write invalid required domains."""
     ranges: dict[str, Any] = {
         "unknown_axis": {"luck": {"low": 1, "unit": "x"}},
         "unknown_key": {"fog": {"low": 1, "unit": "m of sight", "eval": "x"}},
@@ -156,5 +156,5 @@ def _needs(folder: Path) -> list[Case]:
         path = folder / f"needs_{name}.json"
         path.write_text(json.dumps(content))
         command = ["verdict", "policy=good", f"require_domain={path}"]
-        cases.append((path.name, command, "a domain that is none"))
+        cases.append((path.name, command, "an invalid required domain"))
     return cases

@@ -1,4 +1,4 @@
-"""Policies in files whose tensors lie about their storages, their sizes or their types."""
+"""Malicious policy files: false storages, sizes or types of tensors, and malicious pickles."""
 
 import json
 import struct
@@ -16,24 +16,24 @@ _STORAGES = {
     **{"Float": 4, "Double": 8, "Half": 2, "BFloat16": 2, "Long": 8, "Int": 4},
     **{"Short": 2, "Char": 1, "Byte": 1, "Bool": 1, "ComplexFloat": 8, "ComplexDouble": 16},
 }
-"""Types of storages and bytes of an element."""
+"""Bytes of an element by storage type."""
 _COMMANDS = ("chain", "prove", "places", "shifts", "bodies", "verdict", "evaluate", "export")
 
 
 def hostile_policies(
     folder: Path, weights: Mapping[str, torch.Tensor], texts: Mapping[str, str]
 ) -> list[Case]:
-    """Makes the files.
+    """Write the files and return their cases.
 
     Args:
-        folder: Where to.
-        weights: Of a policy that would be accepted.
-        texts: What its exported file says besides weights.
+        folder: Folder of the files.
+        weights: Weights of a valid policy.
+        texts: Metadata of its exported file.
     """
-    made = {f"storage_{name}.pt": content for name, content in _storages().items()}
-    made |= {f"program_{name}.pt": content for name, content in _programs().items()}
-    made |= {f"header_{n}.safetensors": c for n, c in _headers(weights, texts).items()}
-    cases = [_case(folder, name, content) for name, content in made.items()]
+    files = {f"storage_{name}.pt": content for name, content in _storages().items()}
+    files |= {f"program_{name}.pt": content for name, content in _programs().items()}
+    files |= {f"header_{n}.safetensors": c for n, c in _headers(weights, texts).items()}
+    cases = [_case(folder, name, content) for name, content in files.items()]
     return [*cases, _twelve_types(folder)]
 
 
@@ -41,11 +41,11 @@ def _case(folder: Path, name: str, content: bytes) -> Case:
     path = folder / name
     path.write_bytes(content)
     command = _COMMANDS[sum(map(ord, name)) % len(_COMMANDS)]
-    return name, [command, f"policy={path}"], "tensors that lie"
+    return name, [command, f"policy={path}"], "malicious tensors"
 
 
 def _twelve_types(folder: Path) -> Case:
-    """One storage of 256 MiB under all types that there are."""
+    """Write a checkpoint that refers to one storage of 256 MiB with every type."""
     path, size = folder / "storage_twelve_types.pt", 2**28 - 2**16
     tensors = {name: _tensor(name, size // each, (4,)) for name, each in _STORAGES.items()}
     with zipfile.ZipFile(path, "w") as archive:
@@ -58,7 +58,7 @@ def _twelve_types(folder: Path) -> Case:
 
 def _storages() -> dict[str, bytes]:
     four = bytes(16)
-    lies: dict[str, tuple[bytes, bytes]] = {
+    contents: dict[str, tuple[bytes, bytes]] = {
         "two_types": (_state({"a": _tensor("Float", 4, (4,)), "b": _tensor("Int", 4, (4,))}), four),
         "two_lengths": (
             _state({"a": _tensor("Float", 4, (4,)), "b": _tensor("Float", 8, (8,))}),
@@ -79,11 +79,11 @@ def _storages() -> dict[str, bytes]:
         "absent": (_state({"a": _tensor("Float", 4, (4,), key="7")}), four),
         "key_as_path": (_state({"a": _tensor("Float", 4, (4,), key="../../x")}), four),
     }
-    return {name: _archive(program, data) for name, (program, data) in lies.items()}
+    return {name: _archive(program, data) for name, (program, data) in contents.items()}
 
 
 def _programs() -> dict[str, bytes]:
-    """Instructions that would take long, much memory, or go on to other types."""
+    """Return checkpoints with pickles that are slow, large or not plain data, by name."""
     laughs = b"\x80\x02]q\x00" + b"".join(
         b"](" + b"h" + bytes([i]) * 1 + (b"h" + bytes([i])) * 9 + b"eq" + bytes([i + 1])
         for i in range(30)
@@ -111,7 +111,7 @@ def _programs() -> dict[str, bytes]:
         "reference": b"\x80\x02X\x01\x00\x00\x00aQ.",
         "call_of_a_text": b"\x80\x02X\x01\x00\x00\x00a)R.",
     }
-    made = {name: _archive(program) for name, program in programs.items()}
+    archives = {name: _archive(program) for name, program in programs.items()}
     whole = _state({"a": _tensor("Float", 4, (4,))})
     members = {
         "path_above": {"../data.pkl": whole},
@@ -121,7 +121,7 @@ def _programs() -> dict[str, bytes]:
         "no_program": {"a/data/0": bytes(16)},
         "module": {"a/data.pkl": whole, "a/code/__torch__.py": b"import os"},
     }
-    return made | {name: zipped(content) for name, content in members.items()}
+    return archives | {name: zipped(content) for name, content in members.items()}
 
 
 def _headers(weights: Mapping[str, torch.Tensor], texts: Mapping[str, str]) -> dict[str, bytes]:
@@ -173,7 +173,7 @@ def _archive(program: bytes, data: bytes = b"") -> bytes:
 
 
 def _state(tensors: Mapping[str, bytes]) -> bytes:
-    """Instructions for a checkpoint with these tensors as its weights."""
+    """Return the pickle of a checkpoint with these tensors as its weights."""
     entries = b"".join(_text(name) + tensor for name, tensor in tensors.items())
     about = _text("format") + _text("drone_rl checkpoint") + _text("format_version") + b"K\x02"
     return b"\x80\x02}(" + about + _text("policy") + b"}(" + entries + b"uu."
@@ -188,7 +188,7 @@ def _tensor(
     offset: int = 0,
     key: str = "0",
 ) -> bytes:
-    """Instructions for a tensor."""
+    """Return the pickle instructions of a tensor."""
     stride = stride if stride is not None else (1,) * len(size)
     storage = b"(" + _text("storage") + b"ctorch\n%sStorage\n" % kind.encode() + _text(key)
     storage += _text("cpu") + _whole(length) + b"tQ"

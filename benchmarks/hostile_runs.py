@@ -1,4 +1,4 @@
-"""Folders of runs and sweeps with files that are damaged, too large, or no files."""
+"""Malicious files in folders of runs and sweeps: damaged, too large, or not regular files."""
 
 import io
 import json
@@ -21,15 +21,15 @@ METRICS: dict[str, bytes] = {
     "lines": _HEADER + b"\n" * 2**19,
     "many_rows": _HEADER + _ROW * 200_000,
 }
-"""Contents of `metrics.csv` that no training wrote."""
+"""Invalid contents of `metrics.csv`."""
 
 
 def hostile_runs(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]:
-    """Makes the folders.
+    """Create the folders and return their cases.
 
     Args:
-        folder: Where to.
-        checkpoint: Makes a run's folder with a checkpoint in it.
+        folder: Parent folder.
+        checkpoint: Create a run's folder with a checkpoint.
     """
     return [
         *_resumed(folder, checkpoint),
@@ -41,7 +41,7 @@ def hostile_runs(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]
 
 
 def _resumed(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]:
-    """A run to go on with, in which something is of another kind."""
+    """Create runs to resume in which one entry is not a regular file."""
     kinds: dict[str, tuple[str, Make]] = {
         "lock_folder": (".lock", Path.mkdir),
         "lock_pipe": (".lock", os.mkfifo),
@@ -52,23 +52,23 @@ def _resumed(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]:
         "log_pipe": ("train.log", os.mkfifo),
         "rounds_folder": ("provable.json", Path.mkdir),
         "socket": ("x.socket", _socket),
-        "many_files": ("tensorboard", lambda path: _many(path, 50_100)),
+        "many_files": ("tensorboard", lambda path: _many_links(path, 50_100)),
     }
     cases = []
     for name, (where, make) in kinds.items():
-        run = _begun(folder / f"resumed_{name}", checkpoint)
+        run = _started_run(folder / f"resumed_{name}", checkpoint)
         if where.endswith("overrides.yaml"):
             (run / where).unlink()
         make(run / where)
         command = ["train", f"resume={run}"]
         if name == "rounds_folder":
             command.append("provable.rounds=1")
-        cases.append((run.name, command, "no plain file in a run"))
+        cases.append((run.name, command, "not a regular file in a run"))
     return cases
 
 
 def _proofs(folder: Path) -> list[Case]:
-    """A proof's state to go on with, that is none."""
+    """Create proofs to resume with an invalid state."""
     file = io.BytesIO()
     np.savez(file, subject=np.zeros(4, np.uint8), counts=np.zeros(6))
     states: dict[str, bytes | Make] = {
@@ -86,7 +86,7 @@ def _proofs(folder: Path) -> list[Case]:
         put(here / "state.npz", content)
         settings = ["task.num_cubes=1", "compared=1", f"hydra.run.dir={here}"]
         command = ["prove", "policy=right_and_forward", *settings]
-        cases.append((here.name, command, "a proof's state that is none"))
+        cases.append((here.name, command, "an invalid state of a proof"))
     return cases
 
 
@@ -94,25 +94,27 @@ def _sweeps(folder: Path) -> list[Case]:
     cases = []
     for name, content in METRICS.items():
         sweep = _sweep(folder / f"{NOTED}metrics_{name}", {"0": content})
-        cases.append((sweep.name, ["sweep-report", f"folder={sweep}"], "metrics that are none"))
-    made: dict[str, Make] = {
+        cases.append((sweep.name, ["sweep-report", f"folder={sweep}"], "invalid metrics"))
+    makers: dict[str, Make] = {
         "metrics_large": lambda run: (run / "metrics.csv").write_bytes(_HEADER + _ROW * 3 * 10**6),
         "metrics_sparse": lambda run: sparse(run / "metrics.csv"),
         "metrics_folder": lambda run: (run / "metrics.csv").mkdir(),
         "metrics_missing": lambda run: None,
     }
-    for name, make in made.items():
+    for name, make in makers.items():
         sweep = _sweep(folder / f"{NOTED}{name}", {"0": None})
         make(sweep / "0")
-        cases.append((sweep.name, ["sweep-report", f"folder={sweep}"], "metrics that are none"))
+        cases.append((sweep.name, ["sweep-report", f"folder={sweep}"], "invalid metrics"))
     sweep = _sweep(folder / f"{NOTED}sweep_of_60_mb", {str(i): None for i in range(4)})
     for i in range(4):
         (sweep / str(i) / "metrics.csv").write_bytes(_HEADER + _ROW * 3 * 10**6)
-    cases.append((sweep.name, ["sweep-report", f"folder={sweep}"], "60 MB of metrics a run"))
+    cases.append((sweep.name, ["sweep-report", f"folder={sweep}"], "60 MB of metrics for each run"))
     for name in ("summary.csv", "summary.json", "report.html"):
         sweep = _sweep(folder / f"sweep_{name.replace('.', '_')}_folder", {"0": None})
         (sweep / name).mkdir()
-        cases.append((sweep.name, ["sweep-report", f"folder={sweep}"], "a folder to write to"))
+        cases.append(
+            (sweep.name, ["sweep-report", f"folder={sweep}"], "a folder instead of an output file")
+        )
     sweep = _sweep(folder / "sweep_of_large_results", {"0": None})
     data = json.loads((sweep / "sweep.json").read_text())
     data["runs"] = [{"number": i, "overrides": [], "folder": str(i)} for i in range(70)]
@@ -126,7 +128,7 @@ def _sweeps(folder: Path) -> list[Case]:
 
 
 def _journals(folder: Path) -> list[Case]:
-    """Searches by Optuna to go on with, whose journals are none."""
+    """Create Optuna searches to resume with invalid journals."""
     line = b'{"op_code": 7, "worker_id": "x", "trial_id": 0, "step": 1}\n'
     journals: dict[str, bytes | Make] = {
         "text": b"hello\n",
@@ -146,12 +148,12 @@ def _journals(folder: Path) -> list[Case]:
         put(here / "optuna.journal", content)
         settings = ["hydra/sweeper=optuna", "hydra/launcher=local", f"hydra.sweep.dir={here}"]
         command = ["train", "-m", *settings, "optimiser.lr=interval(1e-4,1e-1)"]
-        cases.append((here.name, command, "a journal that is none"))
+        cases.append((here.name, command, "an invalid journal"))
     return cases
 
 
 def _targets() -> list[Case]:
-    """Names and places to write to that lead elsewhere, or can't be."""
+    """Return cases of output names and paths that are outside the folder or not writable."""
     names = {
         "above": "../x",
         "below": "a/b",
@@ -170,18 +172,18 @@ def _targets() -> list[Case]:
         "self": "/proc/self/x",
     }.items():
         command = ["check", "certificate=none.json", f"hydra.run.dir={where}"]
-        cases.append((f"target_{name}", command, "a place that can't be written to"))
+        cases.append((f"target_{name}", command, "a path that is not writable"))
     return cases
 
 
-def _begun(run: Path, checkpoint: Callable[[Path], Path]) -> Path:
+def _started_run(run: Path, checkpoint: Callable[[Path], Path]) -> Path:
     run = checkpoint(run)
     (run / ".hydra" / "overrides.yaml").write_text("- experiment=smoke\n- logger=csv\n")
     return run
 
 
 def _sweep(sweep: Path, metrics: dict[str, bytes | None]) -> Path:
-    """The folder of a sweep whose runs came to their ends."""
+    """Create the folder of a sweep with finished runs and given metrics."""
     sweep.mkdir()
     runs = [{"number": int(n), "overrides": [f"seed={n}"], "folder": n} for n in metrics]
     about = {"format": "drone_rl sweep", "command": "drone-rl train -m seed=0,1", "settings": {}}
@@ -197,7 +199,7 @@ def _sweep(sweep: Path, metrics: dict[str, bytes | None]) -> Path:
     return sweep
 
 
-def _many(folder: Path, count: int) -> None:
+def _many_links(folder: Path, count: int) -> None:
     folder.mkdir()
     first = folder / "0"
     first.touch()
@@ -206,9 +208,9 @@ def _many(folder: Path, count: int) -> None:
 
 
 def _socket(path: Path) -> None:
-    with socket.socket(socket.AF_UNIX) as made:
+    with socket.socket(socket.AF_UNIX) as unix_socket:
         here = os.open(path.parent, os.O_RDONLY)
         try:
-            made.bind(f"/proc/self/fd/{here}/{path.name}")  # a path may have 108 bytes
+            unix_socket.bind(f"/proc/self/fd/{here}/{path.name}")  # paths are limited to 108 bytes
         finally:
             os.close(here)

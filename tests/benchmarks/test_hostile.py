@@ -1,4 +1,4 @@
-"""Hostile files are refused, and what refuses them wrongly is noticed."""
+"""Malicious files are refused, and wrong reactions are detected."""
 
 import math
 import os
@@ -13,8 +13,8 @@ from benchmarks.hostile import SECRET
 
 
 @pytest.mark.slow
-def test_hostile_files_are_refused(tmp_path):
-    """A sample; the benchmark opens all of them."""
+def test_malicious_files_are_refused(tmp_path):
+    """A sample; the benchmark opens all files."""
     outcomes = hostile.run_all(tmp_path, every=31)
     assert len(outcomes) >= 12
     assert len({outcome["name"] for outcome in outcomes}) == len(outcomes)
@@ -34,17 +34,17 @@ def accept():
     sys.exit(0)
 
 
-def talk():
+def warn():
     sys.stderr.write("warning\n")
     refuse()
 
 
-def tell():
+def print_secret():
     sys.stdout.write(SECRET)
     refuse()
 
 
-def leave():
+def write_secret():
     with open("left", "w") as file:
         file.write(SECRET)
     refuse()
@@ -56,8 +56,8 @@ def allocate():
 
 
 def grow():
-    kept = bytearray(os.urandom(2**20)) * 1000
-    kept[-1] = 1
+    memory = bytearray(os.urandom(2**20)) * 1000
+    memory[-1] = 1
     refuse()
 
 
@@ -76,23 +76,23 @@ def die():
         (refuse, ""),
         (crash, "ended with status 1: .*TypeError"),
         (accept, "ended with status 0"),
-        (talk, "printed 'warning"),
-        (tell, "told the secret"),
-        (leave, "told the secret"),
+        (warn, "printed 'warning"),
+        (print_secret, "revealed the secret"),
+        (write_secret, "revealed the secret"),
         (allocate, "ended with status 1: .*MemoryError"),
         (work, "(ended by signal 14|took)"),
         (die, "ended by signal 9"),
     ],
 )
-def test_what_is_no_refusal_is_noticed(tmp_path, monkeypatch, main, wrong):
-    monkeypatch.setattr(hostile, "PATIENCE_S", 1)
+def test_wrong_reactions_are_detected(tmp_path, monkeypatch, main, wrong):
+    monkeypatch.setattr(hostile, "TIMEOUT_S", 1)
     found = hostile._fork(main, ["x"], tmp_path)["wrong"]
     assert re.fullmatch(wrong + ".*" if wrong else "", found, re.S), found
 
 
-def test_growth_is_measured(tmp_path, monkeypatch):
-    monkeypatch.setattr(hostile, "MOST_MEMORY", 2**29)
-    monkeypatch.setattr(hostile, "MOST_SECONDS", math.inf)
+def test_memory_growth_is_measured(tmp_path, monkeypatch):
+    monkeypatch.setattr(hostile, "MAX_MEMORY", 2**29)
+    monkeypatch.setattr(hostile, "MAX_SECONDS", math.inf)
     monkeypatch.setattr(hostile.resource, "setrlimit", lambda *args: None)
     found = hostile._fork(grow, ["x"], tmp_path)
     assert "MiB" in found["wrong"]
@@ -100,7 +100,7 @@ def test_growth_is_measured(tmp_path, monkeypatch):
     assert 0 < found["seconds"] < 30
 
 
-def test_a_canary_that_was_touched_is_seen(tmp_path):
+def test_a_changed_canary_is_detected(tmp_path):
     (tmp_path / "a").write_text("a")
     before = hostile._snapshot(tmp_path)
     assert hostile._snapshot(tmp_path) == before
@@ -111,7 +111,7 @@ def test_a_canary_that_was_touched_is_seen(tmp_path):
     assert hostile._snapshot(tmp_path) != changed
 
 
-def test_counts(tmp_path, monkeypatch):
+def test_refused_files_are_counted(tmp_path, monkeypatch):
     refused = {"name": "a", "wrong": "", "mib": 7.0, "seconds": 0.5}
     outcomes = [refused, {"name": "b", "wrong": "it did", "mib": 3.0, "seconds": 1.5}]
     monkeypatch.setattr(hostile, "run_all", lambda folder: outcomes)
@@ -123,10 +123,10 @@ def test_counts(tmp_path, monkeypatch):
     }
 
 
-def test_a_folder_of_any_name_is_opened_from_everywhere(tmp_path, monkeypatch):
-    told = []
+def test_a_relative_folder_becomes_absolute(tmp_path, monkeypatch):
+    commands = []
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(hostile.subprocess, "run", lambda command, **_: told.append(command))
+    monkeypatch.setattr(hostile.subprocess, "run", lambda command, **_: commands.append(command))
     (tmp_path / "outcomes.json").write_text("[]")
     hostile.run_all(Path("."), 3)
-    assert told[0][-2:] == [str(tmp_path), "3"]
+    assert commands[0][-2:] == [str(tmp_path), "3"]

@@ -1,4 +1,4 @@
-"""Archives that lie, each in its own way."""
+"""Malicious archives have the defects that their names state."""
 
 import io
 import zipfile
@@ -6,25 +6,30 @@ import zipfile
 import numpy as np
 import pytest
 
-from benchmarks import hostile_arrays as made
+from benchmarks import hostile_arrays
 
 
-def test_a_directory_that_says_less_than_there_is():
-    with zipfile.ZipFile(io.BytesIO(made._shorter(10**6))) as archive:
+def test_a_directory_that_declares_too_few_bytes():
+    with zipfile.ZipFile(io.BytesIO(hostile_arrays._shorter(10**6))) as archive:
         (member,) = archive.infolist()
         assert member.file_size == 100
         with pytest.raises(zipfile.BadZipFile):
             archive.open(member).read(100)
 
 
-def test_a_thousand_files_of_one_content():
-    content = made._overlapping()
+def test_a_thousand_entries_share_one_content():
+    content = hostile_arrays._overlapping()
     assert len(content) < 100_000
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         assert sum(member.file_size for member in archive.infolist()) == 1000 * 2**20
 
 
-def test_an_array_made_by_hand_is_one():
-    content = made.zipped({"a.npy": made._npy((2,), "<f8", np.array([1.0, 2.0]).tobytes())})
+def test_a_hand_written_array_is_valid():
+    content = hostile_arrays.zipped(
+        {"a.npy": hostile_arrays._npy((2,), "<f8", np.array([1.0, 2.0]).tobytes())}
+    )
     assert np.load(io.BytesIO(content))["a"].tolist() == [1.0, 2.0]
-    assert np.load(io.BytesIO(made._data()["episode_2_40"]))["flights/episode"].max() == 2**40
+    assert (
+        np.load(io.BytesIO(hostile_arrays._data()["episode_2_40"]))["flights/episode"].max()
+        == 2**40
+    )

@@ -1,8 +1,8 @@
-"""Each case has one part that is refused, and is valid without it."""
+"""Each case is refused because of one part; the rest is valid."""
 
 import pytest
 
-from benchmarks import hostile_explanations as made
+from benchmarks import hostile_explanations
 from benchmarks.evidence import changed
 from drone_rl.explanations.report.validation import check_fit, check_sizes
 from drone_rl.sim.vocabulary import SHOWN_MOVES
@@ -10,21 +10,27 @@ from drone_rl.utils.errors import InputError
 
 
 def check(numbers, arrays):
-    check_sizes(numbers, arrays, made.data())
-    check_fit(numbers, arrays, made.data(), SHOWN_MOVES)
+    check_sizes(numbers, arrays, hostile_explanations.data())
+    check_fit(numbers, arrays, hostile_explanations.data(), SHOWN_MOVES)
 
 
-def test_the_rest_is_valid():
-    check(made.numbers(), made.arrays())
+def test_the_unchanged_explanation_is_valid():
+    check(hostile_explanations.numbers(), hostile_explanations.arrays())
 
 
-@pytest.mark.parametrize("name", made.NUMBERS)
-def test_a_number_is_refused(name):
+@pytest.mark.parametrize("name", hostile_explanations.NUMBERS)
+def test_an_inconsistent_number_is_refused(name):
     with pytest.raises(InputError):
-        check(changed(made.numbers(), dict([made.NUMBERS[name]])), made.arrays())
+        check(
+            changed(hostile_explanations.numbers(), dict([hostile_explanations.NUMBERS[name]])),
+            hostile_explanations.arrays(),
+        )
 
 
-@pytest.mark.parametrize("name", made.ARRAYS)
-def test_an_array_is_refused(name):
+@pytest.mark.parametrize("name", hostile_explanations.ARRAYS)
+def test_an_inconsistent_array_is_refused(name):
     with pytest.raises(InputError):
-        check(made.numbers(), {**made.arrays(), **dict([made.ARRAYS[name]])})
+        check(
+            hostile_explanations.numbers(),
+            {**hostile_explanations.arrays(), **dict([hostile_explanations.ARRAYS[name]])},
+        )

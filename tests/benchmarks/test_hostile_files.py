@@ -1,4 +1,4 @@
-"""Hostile files differ from a good one by what makes them hostile, and by nothing else."""
+"""Malicious files differ from a valid one in one part only."""
 
 import pytest
 
@@ -13,14 +13,14 @@ from benchmarks.hostile_files import (
 from drone_rl.policies.zoo import load_exported, parse
 
 
-def test_the_file_that_they_are_made_from_is_accepted(tmp_path):
+def test_the_unchanged_file_is_accepted(tmp_path):
     path = tmp_path / "good.safetensors"
     path.write_bytes(exported())
     assert load_exported(path)["description"] == DESCRIPTION
     assert checkpoint_state()["policy"].keys() == weights().keys()
 
 
-def test_one_value_is_changed_or_taken_away_and_the_original_stays():
+def test_changed_replaces_or_removes_one_value_in_a_copy():
     assert changed("task.spacing", 1.5)["task"] == {**DESCRIPTION["task"], "spacing": 1.5}
     assert changed("network.channels.0", 9)["network"]["channels"] == [9]
     assert "camera" not in changed("camera", ...)
@@ -41,7 +41,7 @@ def test_each_case_has_a_name_a_command_and_a_reason(cases):
     assert all(command and why for _, command, why in found)
 
 
-def test_there_is_a_canary_to_watch(cases):
+def test_the_canary_exists(cases):
     folder, _ = cases
     assert (folder / "canary" / "secret.txt").read_text()
     assert (folder / "canary" / "keep" / "me.txt").exists()

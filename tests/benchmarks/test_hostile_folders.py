@@ -19,7 +19,7 @@ def test_runs_sweeps_and_explanations_are_opened_by_their_commands(cases):
     assert len({name for name, *_ in found}) == len(found)
 
 
-def test_a_pipe_and_an_endless_device_stand_in_for_arrays(cases):
+def test_arrays_can_be_a_pipe_or_an_endless_device(cases):
     folder, _ = cases
     pipe = folder / "explanation_pipe" / "arrays.npz"
     assert stat.S_ISFIFO(pipe.stat().st_mode)

@@ -1,4 +1,4 @@
-"""Each content is what its name says, for each reader."""
+"""Malicious JSON and YAML for each reader."""
 
 import json
 
@@ -19,7 +19,7 @@ def cases(tmp_path_factory):
     return hostile_json(folder, run)
 
 
-def test_every_reader_meets_every_content(cases):
+def test_every_reader_gets_every_content(cases):
     names = {name for name, *_ in cases}
     assert len(names) == len(cases)
     for reader in ("certificate_{}.json", "shifts_{}.json", "sweep_file_{}", "run_rounds_{}"):
@@ -27,7 +27,7 @@ def test_every_reader_meets_every_content(cases):
     assert names >= {f"domain_{content}.yaml" for content in YAML}
 
 
-def test_contents():
+def test_contents_have_the_defects_that_their_names_state():
     assert json.loads(JSON["many_names"])["299999"] == 0
     with pytest.raises(RecursionError):
         json.loads(JSON["deep_lists"])
