@@ -1,4 +1,4 @@
-"""Whether every axis of an operating domain is enforced in its direction, from file to verdict."""
+"""Enforcement of required operating domains on every axis, from the file to the verdict."""
 
 import dataclasses
 import json
@@ -15,23 +15,23 @@ from drone_rl.utils.seeding import root_seed
 from drone_rl.verdicts.coverage import Coverage, find_domain, recheck_domain, require
 
 POLICY = "robust"
-"""Good beyond no difference on every axis."""
+"""A policy that is good in a range of positive width on every axis."""
 NEAR = 1e-3
-"""Part of a limit by which a required range ends inside or outside of it."""
+"""Relative distance from a limit at which a required range ends inside or outside."""
 
 
 def bench_domain_axes(folder: Path, quick: bool) -> dict[str, Any]:
     """Search the operating domain of a policy and require ranges around its limits.
 
     Args:
-        folder: For `shifts.json`, `domain.yaml` and the required ranges.
-        quick: Whether to search two axes only, by few episodes.
+        folder: Folder of `shifts.json`, `domain.yaml` and the required ranges.
+        quick: Whether to search only two axes, with few episodes.
 
     Returns:
-        "domain_axes": how many axes were searched; "domain_axes_right": of how many a range just
-        inside each limit is accepted, one just outside is refused, and the file that the program
-        itself wrote is accepted; "domain_axes_wrong": the others by name, with what went wrong;
-        "domain_axes_contradicted": what new episodes say against the program's own file.
+        "domain_axes": number of axes; "domain_axes_right": number of axes on which a range just
+        inside each limit is accepted, one just outside is refused, and the program's own file is
+        accepted; "domain_axes_wrong": problems of the other axes, by name;
+        "domain_axes_contradicted": contradictions of new episodes to the program's own file.
     """
     folder.mkdir(parents=True, exist_ok=True)
     policy = load_policy(POLICY)
@@ -58,7 +58,7 @@ def bench_domain_axes(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def _problems(policy: Policy, folder: Path, name: str) -> Iterator[str]:
-    """What is accepted or refused wrongly along an axis."""
+    """Yield what is wrongly accepted or refused on an axis."""
     own = _required(policy, folder, folder / "domain.yaml")
     if name not in own.needs or name in own.lacking:
         yield "the program's own file is refused"
@@ -76,7 +76,7 @@ def _required(policy: Policy, folder: Path, needs: Path) -> Coverage:
 def _ranges(
     policy: Policy, folder: Path, name: str
 ) -> Iterator[tuple[Mapping[str, float | str], bool]]:
-    """Ranges that end near each limit, and whether they lie inside."""
+    """Yield ranges that end near each limit, and whether they are inside."""
     measured = find_domain(policy, folder)
     assert measured is not None and measured.numbers is not None
     found, of = measured.numbers["domain"]["ranges"][name], policy.description
@@ -85,7 +85,7 @@ def _ranges(
         axis = dataclasses.replace(axis, neutral=axis.own(_as_subject(of)))
     for end, sign in axis.signs.items():
         if found["positions"] is None or found[f"{end}_open"] is None:
-            continue  # nothing was tried on that side
+            continue  # this side was not measured
         limit = found["positions"][0 if sign < 0 else 1]
         for is_inside in (True, False):
             strength = _near(axis, limit, sign, is_inside)
@@ -95,14 +95,14 @@ def _ranges(
 
 
 def _as_subject(of: Any) -> Any:
-    """A description has the task, camera and appearance that strengths are told by."""
+    """Return a description, which has the task, camera and appearance that axes need."""
     return of
 
 
 def _near(axis: Axis, limit: float, sign: int, is_inside: bool) -> float:
-    """A strength just inside or outside of a limit; inside of none there is only no difference."""
+    """Return a strength just inside or outside a limit."""
     if axis.whole:
         return axis.at(limit) if is_inside else axis.at(limit) + sign
     width = max(abs(limit), NEAR * min(abs(axis.position(s)) for s in axis.strengths))
     moved = limit - sign * NEAR * width if is_inside else limit + sign * NEAR * width
-    return axis.at(moved if sign * moved > 0 else 0.0)
+    return axis.at(moved if sign * moved > 0 else 0.0)  # 0 is no perturbation

@@ -1,8 +1,8 @@
-"""Verdicts by flights against the truth: how often do their intervals hold the exact share?
+"""Coverage of the intervals of verdicts, measured against exact success rates.
 
-The policies are those of short trainings, looked at while they learn: what each succeeds from is a
-proof's word, exact to the last placement. Those that always succeed, or never, prove nothing of an
-interval and are left out, as are those that share their success with one that is taken already.
+The policies are checkpoints of short trainings. A proof gives the exact success rate of each over
+all placements of the cube. Policies that succeed always or never do not test an interval and are
+left out, and so are policies with the success rate of an earlier one.
 """
 
 import dataclasses
@@ -24,39 +24,43 @@ from drone_rl.verification.prove import prove
 
 POLICIES, REPEATS, EPISODES = 20, 20, 400
 SEEDS = range(30)
-"""Of trainings, as many of them as it takes."""
+"""Seeds of trainings; only as many as necessary are used."""
 STAGES = (64, 128, 192, 256)
-"""Episodes after which a training is looked at."""
+"""Episodes after which a checkpoint of a training is kept."""
 UNDECIDED = 1e-4
-"""Share of the placements that a proof may leave open, at most."""
+"""Largest fraction of placements that a proof may leave undecided."""
 TRIVIAL = 0.005
-"""Success less than this from none or from all is no trial."""
+"""Policies with a success rate within this distance of 0 or 1 are left out."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Truth:
-    """The exact share of placements from which a policy succeeds, as far as it is decided."""
+    """The exact fraction of placements from which a policy succeeds, and the undecided fraction."""
 
     success: float
     undecided: float
 
     @property
-    def is_trial(self) -> bool:
-        """Whether it is far enough from none and from all to try an interval."""
+    def is_informative(self) -> bool:
+        """Whether the success rate is far enough from 0 and 1 to test an interval."""
         return TRIVIAL < self.success < 1 - TRIVIAL
 
-    def is_held(self, interval: Mapping[str, float]) -> bool:
-        """Whether an interval holds the share, whatever becomes of what is undecided."""
+    def is_covered(self, interval: Mapping[str, float]) -> bool:
+        """Return whether an interval can contain the success rate."""
         low, high = interval["lower95"], interval["upper95"]
         return low <= self.success + self.undecided and self.success <= high
 
 
 def bench_exact_coverage(folder: Path, quick: bool) -> dict[str, Any]:
-    """Flies verdicts on policies of which the truth is known.
+    """Judge policies with exactly known success rates.
 
     Args:
-        folder: Where trainings are kept.
-        quick: Whether to look at one policy that travels with the package, by a few flights.
+        folder: Folder of the trainings.
+        quick: Whether to judge only one shipped policy, by few episodes.
+
+    Returns:
+        The figures of `count`, and "verdict_coverage_exact_left_out", numbers of policies that are
+        left out, by reason.
     """
     most, repeats, episodes = (1, 3, 50) if quick else (POLICIES, REPEATS, EPISODES)
     rows: list[dict[str, Any]] = []
@@ -64,23 +68,24 @@ def bench_exact_coverage(folder: Path, quick: bool) -> dict[str, Any]:
     for name, policy in _policies(folder, quick):
         proof = prove(policy, compared=500, progress=silent)
         truth = Truth(proof.success, proof.undecided)
-        why = _why_not(truth, [row["success"] for row in rows])
-        if why is not None:
-            left_out[why] += 1
+        reason = _reason_to_leave_out(truth, [row["success"] for row in rows])
+        if reason is not None:
+            left_out[reason] += 1
             continue
-        held = [truth.is_held(i) for i in _intervals(policy, len(rows), repeats, episodes)]
-        of = {"held": sum(held), "verdicts": len(held)}
-        rows.append({"policy": name, **dataclasses.asdict(truth), **of})
+        covered = [truth.is_covered(i) for i in _intervals(policy, len(rows), repeats, episodes)]
+        counts = {"held": sum(covered), "verdicts": len(covered)}
+        rows.append({"policy": name, **dataclasses.asdict(truth), **counts})
         if len(rows) == most:
             break
     return count(rows) | {"verdict_coverage_exact_left_out": left_out}
 
 
 def count(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """The figures.
+    """Return the figures of all policies.
 
     Args:
-        rows: Of each policy how many "verdicts" it got, how many "held" the truth, and more.
+        rows: For each policy the number of "verdicts", the number that "held" the true success
+            rate, and other entries.
     """
     held, total = (sum(row[key] for row in rows) for key in ("held", "verdicts"))
     return {
@@ -91,27 +96,27 @@ def count(rows: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def _why_not(truth: Truth, taken: list[float]) -> str | None:
-    """Why a policy is left out; None if it isn't."""
+def _reason_to_leave_out(truth: Truth, earlier: list[float]) -> str | None:
+    """Return why a policy is left out; None if it is used."""
     if truth.undecided > UNDECIDED:
         return "undecided"
-    if not truth.is_trial:
+    if not truth.is_informative:
         return "always or never"
-    return "as another" if any(abs(truth.success - t) <= UNDECIDED for t in taken) else None
+    return "as another" if any(abs(truth.success - e) <= UNDECIDED for e in earlier) else None
 
 
 def _intervals(
     policy: Policy, seed: int, repeats: int, episodes: int
 ) -> Iterator[Mapping[str, float]]:
-    """The intervals of success that verdicts state, each of episodes in worlds of its own."""
+    """Yield the success intervals of verdicts, each from other environments."""
     with policy.flying(episodes, seed=seed) as (env, actor):
-        for _ in range(repeats):  # the worlds' streams go on: no two verdicts share a world
+        for _ in range(repeats):  # random streams continue, so verdicts share no environment
             verdict = judge_policy(env, actor, episodes, sampled=False)
             yield verdict.evidence["greedy"]["success"]
 
 
 def _policies(folder: Path, quick: bool) -> Iterator[tuple[str, Policy]]:
-    """Names and policies, each in the task of one cube; trains as it goes."""
+    """Yield names and policies for the task with one cube; train on demand."""
     if quick:
         yield "right_and_forward", load_policy("right_and_forward").in_task(num_cubes=1)
         return
@@ -135,13 +140,13 @@ def _policies(folder: Path, quick: bool) -> Iterator[tuple[str, Policy]]:
 
 
 class _Keep(Callback):
-    """Keeps the checkpoints of all stages; each was written as the last one just before."""
+    """Copy the last checkpoint at each stage; it was written just before."""
 
     def __init__(self, folder: Path) -> None:
-        """Takes the folder of the checkpoints."""
+        """Store the folder of the checkpoints."""
         self.folder = folder
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
-        """Keeps the last checkpoint if it is time."""
+        """Copy the last checkpoint if a stage is reached."""
         if (episodes := training.progress.episodes) in STAGES:
             shutil.copyfile(self.folder / "last.pt", self.folder / f"after_{episodes}.pt")

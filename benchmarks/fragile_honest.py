@@ -16,13 +16,14 @@ def bench_fragile_honest(folder: Path, seeds: Sequence[int], quick: bool) -> dic
     """Judge the shipped policies and default trainings.
 
     Args:
-        folder: For the trainings.
-        seeds: Of these.
-        quick: Whether a few policies and episodes will do.
+        folder: Folder of the trainings.
+        seeds: Seeds of the trainings.
+        quick: Whether to use only a few policies and episodes.
 
     Returns:
-        "fragile_honest": how many are not certain through rounding, of "fragile_honest_total"; and
-        the largest rates of fragile frames and of episodes with one.
+        "fragile_honest": number of policies that are not certain because of rounding, out of
+        "fragile_honest_total"; "fragile_frames_most" and "fragile_episodes_most": the largest
+        rates of fragile frames, and of episodes with fragile frames.
     """
     names = ["good", "poor"] if quick else policy_names()
     policies: list[Any] = [load_policy(name) for name in names]

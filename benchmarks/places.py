@@ -1,4 +1,4 @@
-"""How long the exact map takes, and whether the closed form that it rests on is the renderer's."""
+"""Time of exact maps, and correctness of the closed-form images that they use."""
 
 import statistics
 from contextlib import closing
@@ -17,15 +17,15 @@ _BATCH = 2000
 
 
 def bench_places(quick: bool) -> dict[str, Any]:
-    """Times maps of the shipped policies, and compares pictures at random places.
+    """Measure maps of the shipped policies and compare closed-form images with rendered ones.
 
     Args:
-        quick: Whether to map once and compare few.
+        quick: Whether to compute one map and compare few images.
 
     Returns:
-        "places_s": median seconds of a map, from the policy's file on; "places_cells": in the
-        default window; "places_wrong": pictures that are not the renderer's, of
-        "places_compared", those of "places_drawn" that lie on no border.
+        "places_s": median seconds of a map, with loading; "places_cells": cells of a map in the
+        default window; "places_wrong": images that differ from the renderer's, out of
+        "places_compared", those of "places_drawn" images that are not on a border of cells.
     """
     names = ("good",) if quick else ("good", "poor", "right_and_forward")
     maps = [places(name, progress=silent).numbers for name in names]
@@ -33,8 +33,8 @@ def bench_places(quick: bool) -> dict[str, Any]:
     wrong = compared = 0
     for cubes in (2, 3):
         policy = load_policy("good").in_task(num_cubes=cubes)
-        made = make_policy_spec(policy.description, policy.make_network(), 0.0)
-        with closing(made) as spec:
+        policy_spec = make_policy_spec(policy.description, policy.make_network(), 0.0)
+        with closing(policy_spec) as spec:
             for begin in range(0, count // 2, _BATCH):
                 size = min(_BATCH, count // 2 - begin)
                 found = compare(
@@ -57,20 +57,21 @@ def compare(
     count: int,
     random_state: np.random.RandomState,
 ) -> tuple[int, int]:
-    """Draws and works out pictures from places that are on no lattice.
+    """Compare rendered and closed-form images at random positions.
 
     Args:
-        images: Of a task with moves of a metre.
-        farthest: x that the drone gets to at most, metres.
-        num_cubes: Of the task.
-        count: How many pictures.
-        random_state: Draws drones' and cubes' places.
+        images: Images of a task with moves of 1 m.
+        farthest: Largest x of the drone, metres.
+        num_cubes: Number of cubes of the task.
+        count: Number of images.
+        random_state: Random state of the positions of drone and cubes.
 
     Returns:
-        How many differ though they are on no border, and how many are on none.
+        The number of different images that are not on a border, and the number of images that are
+        not on a border.
     """
     cubes = random_state.uniform(-8.0, 8.0, (count, num_cubes))
     where: NDArray[Any] = random_state.uniform([0.0, -8.0], [farthest, 8.0], (count, 2))
-    drawn, (made, is_clear) = images.render(cubes, where), images.closed_form(cubes, where)
-    differs = (drawn != made).flatten(1).any(-1).numpy()
+    rendered, (computed, is_clear) = images.render(cubes, where), images.closed_form(cubes, where)
+    differs = (rendered != computed).flatten(1).any(-1).numpy()
     return int((differs & is_clear).sum()), int(is_clear.sum())

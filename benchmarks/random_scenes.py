@@ -1,6 +1,6 @@
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo's compiled bindings are untyped.)
-"""Scenes that nobody has arranged: solids of all kinds, sizes and attitudes, seen from anywhere."""
+"""Random scenes: solids of all kinds, sizes and orientations, and a random camera."""
 
 import mujoco
 import numpy as np
@@ -11,12 +11,12 @@ from drone_rl.sim.rendering.scene import SemanticClass
 
 CAMERA = "camera"
 NUDGED = ("left", "right", "up", "down")
-"""Cameras in the same place, turned a little."""
+"""Cameras at the same position, slightly rotated."""
 _TURNS = ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
 NEAR, FAR = 0.02, 60.0
-"""Metres along the axis within which OpenGL draws."""
+"""Near and far plane of OpenGL, metres."""
 SLICES = 400
-"""Of OpenGL's round solids: of 1.5 m radius, they are flatter than 0.05 mm."""
+"""Slices of OpenGL's round solids; with a radius of 1.5 m their facets are within 0.05 mm."""
 _XML = f"""<mujoco>
 <statistic extent="1"/>
 <visual>
@@ -35,8 +35,7 @@ _XML = f"""<mujoco>
   {"".join(f'<camera name="{name}" pos="1 2 3"/>' for name in (CAMERA, *NUDGED))}
 </worldbody></mujoco>"""
 _PLANES = 3
-"""The first geoms, of which OpenGL keeps the sizes that it was given first: the ground, a large
-plane, a small one."""
+"""The first geoms: the ground, a large plane and a small one. OpenGL keeps their initial sizes."""
 _SOLIDS = tuple(
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}"))
     for name in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX")
@@ -44,29 +43,26 @@ _SOLIDS = tuple(
 
 
 class RandomScenes:
-    """One model that becomes one scene after the other."""
+    """A model that is changed into one random scene after the other."""
 
     def __init__(self, seed: int, nudge: float = 0.0) -> None:
-        """Compiles it.
+        """Compile the model.
 
         Args:
-            seed: Of the scenes.
-            nudge: By how much of a picture's height other cameras see its middle elsewhere.
+            seed: Seed of the scenes.
+            nudge: Image shift of the rotated cameras as a fraction of the image height.
         """
         self.model = mujoco.MjModel.from_xml_string(_XML)
         self._nudge = nudge
         self._random = np.random.RandomState(seed)
 
-    def draw(self) -> Scene:
-        """Makes the next scene.
+    def sample(self) -> Scene:
+        """Sample the next scene, which replaces the previous one.
 
-        In a box of 6 m eight solids and a small plane stand in and before each other, and the
-        camera among them, in one of them or with one behind it. The ground lies below them, and a
-        large plane passes 3 cm to 2.7 m from the camera, so that it is seen at grazing angles.
-        Planes are turned so that they are seen from above: OpenGL shows them from below, too.
-
-        Returns:
-            It; the next one takes its place.
+        Eight solids and a small plane are in a cube of 6 m and can intersect and occlude each
+        other. The camera is among them and can be inside one. The ground is below them. A large
+        plane is 3 cm to 2.7 m from the camera, so that it appears at grazing angles. Planes are
+        oriented so that the camera sees their front, because OpenGL renders the back, too.
         """
         model, random = self.model, self._random
         count, solids = model.ngeom, slice(_PLANES, None)
@@ -75,7 +71,7 @@ class RandomScenes:
         model.geom_size[solids] = np.exp(random.uniform(np.log(0.1), np.log(1.5), (number, 3)))
         model.geom_rgba[:, :3] = random.uniform(0.0, 1.0, (count, 3))
         model.geom_pos[1:] = random.uniform(-3.0, 3.0, (count - 1, 3))
-        model.geom_quat[1:] = _attitudes(random, count - 1)
+        model.geom_quat[1:] = _orientations(random, count - 1)
         model.cam_pos[:] = random.uniform(-3.0, 3.0, 3)
         model.cam_quat[0] = _looking(model.cam_pos[0] - random.uniform(-2.0, 2.0, 3), random)
         model.cam_fovy[:] = random.uniform(30.0, 120.0)
@@ -92,25 +88,25 @@ class RandomScenes:
         return Scene(model, (SemanticClass.OBSTACLE,) * count, (-1,) * count, (0.0, 0.0, 0.0))
 
 
-def _attitudes(random: np.random.RandomState, count: int) -> NDArray[np.float64]:
-    """Quaternions, all attitudes alike. Shape: (count, 4)."""
-    drawn = random.normal(size=(count, 4))
-    return drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
+def _orientations(random: np.random.RandomState, count: int) -> NDArray[np.float64]:
+    """Sample uniform unit quaternions. Shape: (count, 4)."""
+    normal = random.normal(size=(count, 4))
+    return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
 def _looking(back: NDArray[np.float64], random: np.random.RandomState) -> NDArray[np.float64]:
-    """The attitude, however rolled, of a camera that has a vector behind it. Shape: (4,)."""
+    """Sample the orientation of a camera with a given backward axis. Shape: (4,)."""
     back = back / np.linalg.norm(back)
     side = np.cross(random.normal(size=3), back)
     side /= np.linalg.norm(side)
-    attitude = np.zeros(4)
+    quaternion = np.zeros(4)
     axes = np.stack([side, np.cross(back, side), back], axis=1)
-    mujoco.mju_mat2Quat(attitude, axes.flatten())
-    return attitude
+    mujoco.mju_mat2Quat(quaternion, axes.flatten())
+    return quaternion
 
 
 def _normal(model: mujoco.MjModel, plane: int) -> NDArray[np.float64]:
-    """Of a plane, world frame."""
+    """Return the normal of a plane, world frame."""
     normal = np.zeros(3)
     mujoco.mju_rotVecQuat(normal, np.array([0.0, 0.0, 1.0]), model.geom_quat[plane])
     return normal

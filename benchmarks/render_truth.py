@@ -1,9 +1,9 @@
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo's compiled bindings are untyped.)
-"""Our pictures against MuJoCo's own by OpenGL, of scenes that nobody has arranged.
+"""Images of the ray tracer compared with MuJoCo's OpenGL renderer, in random scenes.
 
-Run as a program (`python -m benchmarks.render_truth SCENES`) with MUJOCO_GL=egl, since OpenGL's
-platform is chosen when MuJoCo is imported.
+Run as a program (`python -m benchmarks.render_truth SCENES`) with MUJOCO_GL=egl, because MuJoCo
+chooses OpenGL's platform when it is imported.
 """
 
 import dataclasses
@@ -25,51 +25,49 @@ from drone_rl.sim.rendering import Poses, Raytracer, Scene, View
 from drone_rl.utils.errors import InputError
 
 SIZE = 128
-"""Pixels across and down."""
+"""Width and height of images in pixels."""
 LARGE = 30
-"""Pixels of a geom, more than which its overlap is told."""
+"""Overlap is computed for geoms with more pixels than this."""
 ENOUGH = 0.98
-"""Overlap of a geom in both pictures."""
+"""Required overlap of a geom in both images."""
 _CREASE = 0.9
-"""Cosine of the angle between neighbouring normals below which an edge of a solid lies between."""
+"""Cosine of the angle between the normals of neighbouring pixels below which they have a crease."""
 _SNAP = 1 / 256
-"""Pixels to which OpenGL rounds where corners are."""
-_PLAIN = ("SHADOW", "REFLECTION", "SKYBOX", "FOG", "HAZE")
+"""Resolution of the positions of corners in OpenGL, pixels."""
+_DISABLED = ("SHADOW", "REFLECTION", "SKYBOX", "FOG", "HAZE")
 _MODALITIES = ("rgb", "depth", "segmentation", "normals")
 
-Picture = dict[str, NDArray[Any]]
-"""What a scene shows, by modality. Shapes: (height, width, *)."""
+Images = dict[str, NDArray[Any]]
+"""Images of a scene by modality. Shapes: (height, width, *)."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Compared:
-    """How two pictures of a scene differ."""
+class Difference:
+    """Difference between the images of two renderers."""
 
     inner_wrong: int
-    """Pixels on no edge in which another geom is seen."""
+    """Number of pixels away from edges that show different geoms."""
     overlaps: tuple[float, ...]
-    """Of each geom that is large in one of them: pixels in both over pixels in any, but for those
-    in which OpenGL's own rounding decides what is seen."""
+    """Intersection over union of the pixels of each large geom, without pixels in which the result
+    depends on OpenGL's rounding."""
     depth_m: float
-    """Greatest difference on no edge beyond what OpenGL's own rounding explains."""
+    """Largest depth difference away from edges that OpenGL's rounding does not explain, metres."""
     rgb: int
-    """Greatest difference of a colour within a face, levels of 255."""
+    """Largest color difference within a face, levels of 255."""
 
 
-def compare(ours: Picture, theirs: Picture) -> Compared:
-    """Compares two pictures of a scene.
+def compare(ours: Images, theirs: Images) -> Difference:
+    """Compare the images of two renderers.
 
-    OpenGL keeps n (f - d) / (d (f - n)) of a depth d between the ends n and f of what it draws, in
-    float32, out of which MuJoCo computes d, in float32 again: two roundings by 2^-24 at most, each
-    of which is d^2 / n times as large in d. It also moves corners by up to half of `_SNAP`, and so
-    surfaces by as much as their depth changes over that.
-
-    It also renders round solids as facets, see `facet_errors`.
+    For a depth d between the near plane n and the far plane f, OpenGL stores n (f - d) / (d (f - n))
+    in float32, and MuJoCo computes d from it in float32. Each of the two roundings is at most 2^-24
+    and is amplified by d^2 / n. OpenGL also moves corners by up to half of `_SNAP`, which changes
+    depth by its slope. It renders round solids as facets, see `facet_errors`.
 
     Args:
-        ours: All of `_MODALITIES`; as "facets" what `facet_errors` returns; and as "nudged"
-            segmentations by cameras that are turned by `_SNAP`, shape (4, height, width).
-        theirs: The same without normals.
+        ours: Images of all `_MODALITIES`; "facets", the result of `facet_errors`; "nudged",
+            segmentations by cameras that are rotated by `_SNAP`, shape (4, height, width).
+        theirs: Images of the same modalities without normals.
     """
     seen, other = ours["segmentation"], theirs["segmentation"]
     drawn = (ours["depth"] == 0) | (ours["depth"] >= NEAR)
@@ -82,7 +80,7 @@ def compare(ours: Picture, theirs: Picture) -> Compared:
     explained = 2 * 2.0**-24 * depth**2 / NEAR + _SNAP * _slope(depth) + ours["facets"]
     beyond = np.abs(depth - theirs["depth"]) - explained
     colors = np.abs(ours["rgb"].astype(int) - theirs["rgb"]).max(-1)
-    return Compared(
+    return Difference(
         inner_wrong=int((inner & (seen != other)).sum()),
         overlaps=tuple(_overlap(seen == g, other == g, sure) for g in large),
         depth_m=float(beyond[both].max(initial=0.0)),
@@ -91,18 +89,18 @@ def compare(ours: Picture, theirs: Picture) -> Compared:
 
 
 class OpenGL:
-    """MuJoCo's own renderer, without shadows and the like."""
+    """MuJoCo's OpenGL renderer without shadows and other effects."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
-        """Starts it; the model may be changed later, but for its planes."""
+        """Create the renderer; the sizes of the model's planes must not change afterwards."""
         self._renderer = mujoco.Renderer(model, SIZE, SIZE)
 
-    def draw(self, model: mujoco.MjModel) -> Picture:
-        """Colours, depth and segmentation."""
+    def render(self, model: mujoco.MjModel) -> Images:
+        """Return RGB, depth and segmentation images."""
         data, renderer = mujoco.MjData(model), self._renderer
         mujoco.mj_forward(model, data)
         renderer.update_scene(data, camera=CAMERA)
-        for name in _PLAIN:
+        for name in _DISABLED:
             renderer.scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{name}")] = 0
         rgb = renderer.render().copy()
         renderer.enable_depth_rendering()
@@ -114,39 +112,39 @@ class OpenGL:
         return {"rgb": rgb, "depth": depth, "segmentation": segmentation}
 
     def close(self) -> None:
-        """Ends it."""
+        """Release the OpenGL context."""
         self._renderer.close()
 
 
-def draw(scene: Scene) -> Picture:
-    """The same by our own renderer, and what `compare` needs besides."""
+def render(scene: Scene) -> Images:
+    """Return the ray tracer's images with "facets" and "nudged", see `compare`."""
     renderer = Raytracer(scene, num_worlds=1, num_shards=1)
     cameras = (CAMERA, *NUDGED)
     view = View(cameras=cameras, height=SIZE, width=SIZE, modalities=_MODALITIES)
     still = Poses(torch.zeros(1, 3), torch.tensor([[1.0, 0.0, 0.0, 0.0]]), torch.zeros(1, 0, 3))
-    pictures = renderer.render(view, still)
+    batch = renderer.render(view, still)
     renderer.close()
-    drawn: Picture = {modality: several[0, 0].numpy() for modality, several in pictures.items()}
-    drawn["facets"] = facet_errors(scene, drawn)
-    return {**drawn, "nudged": pictures["segmentation"][0, 1:].numpy()}
+    images: Images = {modality: values[0, 0].numpy() for modality, values in batch.items()}
+    images["facets"] = facet_errors(scene, images)
+    return {**images, "nudged": batch["segmentation"][0, 1:].numpy()}
 
 
-def facet_errors(scene: Scene, ours: Picture) -> NDArray[Any]:
-    """Return the error of OpenGL's depth that follows from its facets.
+def facet_errors(scene: Scene, ours: Images) -> NDArray[Any]:
+    """Return the error of OpenGL's depth that its facets cause.
 
     OpenGL divides a round solid of radius r into `SLICES` slices of 2 pi / SLICES and as many
     stacks of pi / SLICES. A facet lies below the surface by the sagittas of both, at most
-    s = r (2 - cos(pi / SLICES) - cos(pi / (2 SLICES))): 0.06 mm for r = 1.5 m. A ray that meets the
-    surface at an angle with cosine c to the normal therefore goes up to s / c too far. Measured: a
-    ball of 1.36 m at c = 0.05 differs by 0.76 mm, while our depth differs by 0.001 mm from that
-    computed in float64.
+    s = r (2 - cos(pi / SLICES) - cos(pi / (2 SLICES))): 0.06 mm for r = 1.5 m. If a ray meets the
+    surface at an angle with cosine c to the normal, its length is up to s / c too large. Measured
+    for a sphere of 1.36 m at c = 0.05: OpenGL differs by 0.76 mm, and the ray tracer by 0.001 mm
+    from the depth in float64.
 
     Args:
-        scene: Whose camera `CAMERA` is fixed to the world.
-        ours: "depth", "segmentation" and "normals" of its image.
+        scene: A scene in which the camera `CAMERA` is fixed to the world.
+        ours: "depth", "segmentation" and "normals" of the ray tracer.
 
     Returns:
-        Metres along the camera's axis, where a geom is seen. Shape: (height, width).
+        Largest error along the camera's axis, metres, for pixels of geoms. Shape: (height, width).
     """
     model, camera = scene.model, scene.camera(CAMERA)
     half = np.tan(np.radians(model.cam_fovy[camera]) / 2)
@@ -164,20 +162,20 @@ def facet_errors(scene: Scene, ours: Picture) -> NDArray[Any]:
     return sagittas[ours["segmentation"]] / np.maximum(cosines, 1e-6)
 
 
-def compare_scenes(count: int, seed: int = 0) -> list[Compared]:
-    """Compares so many random scenes; needs MUJOCO_GL=egl."""
+def compare_scenes(count: int, seed: int = 0) -> list[Difference]:
+    """Compare the renderers in random scenes; requires MUJOCO_GL=egl."""
     scenes = RandomScenes(seed, nudge=_SNAP / SIZE)
     opengl = OpenGL(scenes.model)
     try:
-        drawn = (scenes.draw() for _ in range(count))
-        return [compare(draw(scene), opengl.draw(scene.model)) for scene in drawn]
+        sampled = (scenes.sample() for _ in range(count))
+        return [compare(render(scene), opengl.render(scene.model)) for scene in sampled]
     finally:
         opengl.close()
 
 
-def summary(compared: Iterable[Compared]) -> dict[str, Any]:
-    """Figures over scenes, by their names in results.json."""
-    every = list(compared)
+def summary(differences: Iterable[Difference]) -> dict[str, Any]:
+    """Return the figures of all scenes, by key."""
+    every = list(differences)
     overlaps = [overlap for c in every for overlap in c.overlaps]
     return {
         "render_truth_scenes": len(every),
@@ -191,10 +189,10 @@ def summary(compared: Iterable[Compared]) -> dict[str, Any]:
 
 
 def bench_render_truth(quick: bool) -> dict[str, Any]:
-    """Figures of 1,000 scenes, 50 if quick.
+    """Compare the renderers in 1,000 random scenes, 50 if quick.
 
     Raises:
-        InputError: They can't be rendered by OpenGL here. No figures would look like a measurement.
+        InputError: OpenGL is not available; an empty result could pass for a measurement.
     """
     command = [sys.executable, "-m", "benchmarks.render_truth", "50" if quick else "1000"]
     environment = {**os.environ, "MUJOCO_GL": "egl"}
@@ -209,24 +207,24 @@ def bench_render_truth(quick: bool) -> dict[str, Any]:
 
 
 def _windows(values: NDArray[Any]) -> NDArray[Any]:
-    """Of each pixel the 3x3 pixels around it. Shape: (height, width, *, 3, 3)."""
+    """Return the 3x3 neighbourhood of each pixel. Shape: (height, width, *, 3, 3)."""
     around = [(1, 1), (1, 1), *[(0, 0)] * (values.ndim - 2)]
     return sliding_window_view(np.pad(values, around, mode="edge"), (3, 3), axis=(0, 1))
 
 
 def _edges(segmentation: NDArray[Any]) -> NDArray[np.bool_]:
-    """Pixels around which not everything is one geom."""
+    """Return whether the neighbourhood of each pixel shows more than one geom."""
     return (_windows(segmentation) != segmentation[..., None, None]).any((-2, -1))
 
 
 def _creases(normals: NDArray[Any]) -> NDArray[np.bool_]:
-    """Pixels around which a surface is bent sharply."""
+    """Return whether the neighbourhood of each pixel has a crease."""
     cosines = (_windows(normals) * normals[..., None, None]).sum(2)
     return (cosines < _CREASE).any((-2, -1))
 
 
 def _slope(depth: NDArray[Any]) -> NDArray[Any]:
-    """How much depth changes from pixel to pixel, at most."""
+    """Return the largest change of depth to a neighbouring pixel."""
     return np.abs(_windows(depth) - depth[..., None, None]).max((-2, -1))
 
 

@@ -1,8 +1,8 @@
-"""What a training in worlds that look otherwise gains elsewhere, what it costs, and why.
+"""Ablation of `experiment=robust`: gain under new kinds of shift, and cost without shift.
 
-Each arm of the ablation is trained, and all are flown in the very same worlds. What is measured are
-the kinds of shift of which `experiment=robust` touches nothing, as its settings say
-(`conditions.touched`), so that nobody chooses them.
+Each arm of the ablation is trained, and all policies are evaluated in the same environments. The
+kinds of shift that are new to `experiment=robust` follow from its settings (`untouched_kinds`), so
+nobody selects them.
 """
 
 import dataclasses
@@ -24,7 +24,7 @@ from drone_rl.training.run_folder import last_of, settings_of
 
 DEFAULT, ALL = "default", "all"
 ALL_KINDS = "all_kinds"
-"""What the mean over all kinds of shift is called: no training can choose what is in it."""
+"""Key of the mean over all kinds of shift, which does not depend on a training."""
 ARMS: Mapping[str, tuple[str, ...]] = {
     DEFAULT: (),
     "none": ("experiment=robust", "appearance=minimal", "transforms=chromaticity"),
@@ -34,84 +34,84 @@ ARMS: Mapping[str, tuple[str, ...]] = {
     "all but the camera": ("experiment=robust", "appearance=relit"),
     ALL: ("experiment=robust",),
 }
-"""Settings of each arm's trainings. Those of the ablation see colors as `ALL` does."""
-_AT_ONCE = 2
-"""Trainings, of which each takes one thread for the most part."""
+"""Settings of each arm's trainings. All arms but the default have the color transform of `ALL`."""
+_PARALLEL = 2
+"""Number of parallel trainings; each uses mainly one thread."""
 _BRIEF = ("trainer.total_frames=1000", "trainer.confirm_episodes=0")
 
 
 def bench_robust(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, Any]:
-    """Trains each arm from each seed, and flies all of them along all axes.
+    """Train each arm from each seed and evaluate all policies along all axes.
 
     Args:
-        folder: For the runs.
-        seeds: Of the trainings; each gain is of two policies of one seed.
-        quick: Whether one seed, trained for a moment, will do.
+        folder: Folder of the runs.
+        seeds: Seeds of the trainings; a gain compares two policies of the same seed.
+        quick: Whether to train only one seed, briefly.
 
     Returns:
-        In points, means over seeds: "robust_gain_points" on kinds of shift that training does not
-        touch, "robust_room_points", all that could be gained there, "robust_gain_all_kinds_points"
-        on all kinds, touched or not, and "robust_cost_points" where nothing is different.
-        "robust_untouched": the kinds that are not. "robust_arms": by arm, lists over
-        seeds of "frames", "plain", "untouched" and each kind's mean share of successful flights.
+        In percentage points, means over seeds: "robust_gain_points" under new kinds of shift,
+        "robust_room_points", the largest possible gain there, "robust_gain_all_kinds_points" under
+        all kinds, and "robust_cost_points" without shift. "robust_untouched": the new kinds.
+        "robust_arms": by arm, lists over seeds of "frames", "plain", "untouched" and the mean
+        success rate under each kind.
     """
     seeds, brief = (seeds[:1], _BRIEF) if quick else (seeds, ())
     runs = {
         (arm, seed): folder / f"{arm.replace(' ', '_')}_{seed}" for arm in ARMS for seed in seeds
     }
 
-    def frames_of(one: tuple[str, int]) -> int:
-        _, result = train(runs[one], f"seed={one[1]}", *ARMS[one[0]], *brief)
+    def train_run(key: tuple[str, int]) -> int:
+        _, result = train(runs[key], f"seed={key[1]}", *ARMS[key[0]], *brief)
         return result["frames"]
 
-    with ThreadPoolExecutor(_AT_ONCE) as pool:
-        frames = dict(zip(runs, pool.map(frames_of, runs), strict=True))
+    with ThreadPoolExecutor(_PARALLEL) as pool:
+        frames = dict(zip(runs, pool.map(train_run, runs), strict=True))
     kinds = untouched_kinds(settings_of(read_checkpoint(last_of(runs[ALL, seeds[0]]))["config"]))
-    shares = fly(runs.values(), 5, 1) if quick else fly(runs.values(), 100)
-    told = {arm: [_told(shares[runs[arm, s]], kinds) for s in seeds] for arm in ARMS}
+    shares = success_rates(runs.values(), 5, 1) if quick else success_rates(runs.values(), 100)
+    rows = {arm: [_row(shares[runs[arm, s]], kinds) for s in seeds] for arm in ARMS}
     return {
-        **_points(told[DEFAULT], told[ALL]),
+        **_points(rows[DEFAULT], rows[ALL]),
         "robust_untouched": kinds,
         "robust_arms": {
             arm: {
                 "frames": [frames[arm, seed] for seed in seeds],
-                **{name: [one[name] for one in told[arm]] for name in told[arm][0]},
+                **{name: [row[name] for row in rows[arm]] for name in rows[arm][0]},
             }
             for arm in ARMS
         },
     }
 
 
-def fly(
+def success_rates(
     runs: Iterable[Path], episodes: int, strengths: int | None = None
 ) -> dict[Path, dict[str, float]]:
-    """How often policies succeed along every axis, all in the same worlds of minimal look.
+    """Return the success rates of policies along every axis, in environments of minimal appearance.
 
     Args:
         runs: Folders of trainings.
-        episodes: In each condition.
-        strengths: How many of each axis; all by default.
+        episodes: Episodes under each condition.
+        strengths: Number of strengths of each axis; all by default.
     """
-    asked = ShiftSettings(episodes=episodes)
-    subjects = {str(run): _in_plain_worlds(run, asked) for run in runs}
+    settings = ShiftSettings(episodes=episodes)
+    subjects = {str(run): _plain_spec(run, settings) for run in runs}
     evaluator = PairedEvaluator(next(iter(subjects.values())), episodes, seed=0)
     try:
         axes = [
             dataclasses.replace(axis, strengths=axis.strengths[:strengths])
             for axis in find_axes(None, evaluator.subject)
         ]
-        found = compare(evaluator, subjects, axes, possible_share=asked.possible_share)
+        found = compare(evaluator, subjects, axes, possible_share=settings.possible_share)
     finally:
         evaluator.close()
     return {Path(name): shares for name, shares in found.items()}
 
 
-def _in_plain_worlds(run: Path, asked: ShiftSettings) -> PolicySpec:
-    """A policy, wherever it was trained; faults of its camera are none of the flights'."""
-    return dataclasses.replace(make_policy_spec(load_policy(run), asked), appearance=MINIMAL)
+def _plain_spec(run: Path, settings: ShiftSettings) -> PolicySpec:
+    """Return a policy with minimal appearance and without the camera faults of its training."""
+    return dataclasses.replace(make_policy_spec(load_policy(run), settings), appearance=MINIMAL)
 
 
-def _told(shares: Mapping[str, float], untouched: Sequence[str]) -> dict[str, float]:
+def _row(shares: Mapping[str, float], untouched: Sequence[str]) -> dict[str, float]:
     kinds = by_kind(shares, GROUPS)
     axes = [s for name, s in shares.items() if name in AXES and AXES[name].group in untouched]
     return {
@@ -124,7 +124,7 @@ def _told(shares: Mapping[str, float], untouched: Sequence[str]) -> dict[str, fl
 
 
 def _points(default: Sequence[Mapping[str, float]], robust: Sequence[Mapping[str, float]]) -> Any:
-    """Differences between policies of one seed, and what there was to gain."""
+    """Return differences between policies of the same seed, in percentage points."""
     gains, by_axis, everywhere, losses = (
         [100 * (r[name] - d[name]) for d, r in zip(default, robust, strict=True)]
         for name in ("untouched", "untouched_axes", ALL_KINDS, PLAIN)

@@ -4,7 +4,7 @@ A training is exposed to an axis if one of the settings that `TOUCHED_BY` names 
 default, and to a kind of shift if it is exposed to one of its axes.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
@@ -28,7 +28,7 @@ _OBJECTS = (
 )
 _LIGHT = _below("appearance", "sun_strength", "sun_color", "ambient_strength")
 _TURNED = ("transforms.shift", "appearance.camera_turn")
-"""A shifted image looks as if the camera had been turned."""
+"""Shifting the image approximates a rotation of the camera."""
 _MOVED = ("appearance.camera_offset",)
 _DISTRACTORS = _below(
     *("appearance", "distractors", "distractor_size", "distractor_color", "distractor_distance")
@@ -58,8 +58,7 @@ TOUCHED_BY: dict[str, tuple[str, ...]] = {
     "step_length": ("task.step_length",),
     "action_delay": ("transforms.late_frames",),
 }
-"""By axis, settings of a training that expose a policy to such a shift: a training in which one of
-them differs from its default knows the axis."""
+"""By axis, the settings that expose a training to it if they differ from their defaults."""
 
 
 def changed(settings: TrainSettings) -> set[str]:
@@ -99,20 +98,18 @@ def compare(
     axes: Iterable[Axis],
     *,
     possible_share: float = 0.9,
-    tell: Callable[[str], None] = lambda _: None,
 ) -> dict[str, dict[str, float]]:
     """Return the success rate of each policy along each axis.
 
     Args:
-        evaluator: Runs all of them, in the task, camera and appearance of its subject.
-        subjects: The policies, by name.
-        axes: Which.
+        evaluator: Runs all policies in the task, camera and appearance of its own policy.
+        subjects: Policies by name.
+        axes: Axes of perturbation.
         possible_share: Success rate of the oracle below which a strength is left out.
-        tell: Called with the axis that is running.
 
     Returns:
-        By policy and by axis, and `PLAIN`: the mean success rate over possible strengths; an axis
-        without any is left out.
+        For each policy, by axis the mean success rate over possible strengths, and by `PLAIN` that
+        without perturbation. An axis without possible strengths is left out.
     """
     makers = {
         name: lambda s=s: PolicyAgent(s.network, s.transforms, evaluator.episodes)
@@ -120,7 +117,6 @@ def compare(
     }
     found = {name: {PLAIN: _share(evaluator, Condition(), make())} for name, make in makers.items()}
     for axis in axes:
-        tell(axis.name)
         conditions = [axis.make(strength, evaluator.subject) for strength in axis.strengths]
         possible = [c for c in conditions if _is_possible(evaluator, c, possible_share)]
         for name, make in makers.items():
@@ -136,7 +132,7 @@ def by_kind(shares: Mapping[str, float], kinds: Iterable[str]) -> dict[str, floa
 
 
 def mean(values: Sequence[float]) -> float:
-    """Return the mean of one value or more."""
+    """Return the mean of at least one value."""
     return sum(values) / len(values)
 
 

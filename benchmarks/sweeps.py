@@ -1,4 +1,4 @@
-"""What sweeps gain, cost and survive: two runs at once, the launcher, kills, the Ray collector."""
+"""Sweeps: speed-up of parallel runs, overhead of the launcher, kills, and the Ray collector."""
 
 import contextlib
 import csv
@@ -25,13 +25,13 @@ _BARE = (sys.executable, "-m", "benchmarks.sweeps")
 
 
 def bench_sweeps(folder: Path, device: str, quick: bool) -> dict[str, Any]:
-    """Times the same trainings bare and alone, in a sweep one at a time, and two at once.
+    """Measure the same trainings as single commands, in a sweep, and in a sweep of two jobs.
 
-    Bare trainings write no metrics, no events and no checkpoints on their way.
+    Single ("bare") trainings write no metrics, events and checkpoints before their end.
 
     Returns:
-        Seconds of each, trainings an hour two at once over one at a time, and the share of time
-        that launcher and logging add to the bare trainings.
+        Seconds of each, the speed-up of two parallel jobs, and the relative overhead of launcher
+        and logging.
     """
     seeds, episodes = (2, 20) if quick else (4, 250)
     training = [
@@ -66,11 +66,11 @@ def bench_sweeps(folder: Path, device: str, quick: bool) -> dict[str, Any]:
 
 
 def bench_kills(folder: Path, device: str, quick: bool) -> dict[str, Any]:
-    """Runs a sweep twice, the second time killed (kill -9) at three random moments.
+    """Run a sweep twice; kill the second one (SIGKILL) at three random times and resume it.
 
     Returns:
-        How often it was killed, and how many of its runs ended with the same parameters and the
-        same result as in the sweep that was never killed.
+        The number of kills, the number of runs, and the number of runs with the same parameters
+        and results in both sweeps.
     """
     count = 4 if quick else 12
     settings = [
@@ -91,7 +91,7 @@ def bench_kills(folder: Path, device: str, quick: bool) -> dict[str, Any]:
         with contextlib.suppress(subprocess.TimeoutExpired):
             sweep.wait(moment)
         kills += sweep.poll() is None
-        _kill_all_that_name(str(killed))
+        _kill_processes(str(killed))
         sweep.wait()
     _seconds(PROGRAM, "-m", *settings, f"hydra.sweep.dir={killed}")
     same = [_outcome(run) == _outcome(killed / run.name) for run in sorted(whole.glob("[0-9]*"))]
@@ -99,10 +99,10 @@ def bench_kills(folder: Path, device: str, quick: bool) -> dict[str, Any]:
 
 
 def bench_ray(folder: Path, device: str, quick: bool) -> dict[str, Any]:
-    """Frames a second of the Ray collector over the plain one, on the same two cores.
+    """Compare the Ray collector with the default collector on the same cores.
 
     Returns:
-        The median rates and the median of their ratio; None where Ray isn't installed.
+        The median frames per second of both and the median of their ratio; None without Ray.
     """
     if importlib.util.find_spec("ray") is None:
         return {"ray_fps": None, "ray_over_plain": None}
@@ -128,23 +128,23 @@ def bench_ray(folder: Path, device: str, quick: bool) -> dict[str, Any]:
 
 
 def _seconds(program: tuple[str, ...], *args: str) -> float:
-    """Time of one command."""
+    """Return the time of one command."""
     begin = time.perf_counter()
     call("train", *args, program=program, environment=THREADS)
     return time.perf_counter() - begin
 
 
-def _kill_all_that_name(words: str) -> None:
-    """Ends (kill -9) every process with these words on its command line, but for this one."""
-    for name in os.listdir("/proc"):  # what ends meanwhile has no file any more
-        with contextlib.suppress(OSError, ValueError):
-            number, said = int(name), Path("/proc", name, "cmdline").read_bytes()
-            if number != os.getpid() and words.encode() in said:
-                os.kill(number, signal.SIGKILL)
+def _kill_processes(text: str) -> None:
+    """Kill every other process with a text in its command line."""
+    for name in os.listdir("/proc"):
+        with contextlib.suppress(OSError, ValueError):  # processes can end meanwhile
+            pid, command = int(name), Path("/proc", name, "cmdline").read_bytes()
+            if pid != os.getpid() and text.encode() in command:
+                os.kill(pid, signal.SIGKILL)
 
 
 def _outcome(run: Path) -> tuple[dict[str, Any], dict[str, list]]:
-    """What a run came to, but for the time it took and its verdict, whose seed is fresh."""
+    """Return result and parameters of a run, without time and verdict (which has a fresh seed)."""
     result = json.loads((run / "result.json").read_text())
     del result["seconds"]
     result.pop("verdict", None)
@@ -153,7 +153,7 @@ def _outcome(run: Path) -> tuple[dict[str, Any], dict[str, list]]:
 
 
 def _collected_rate(path: Path) -> float:
-    """Frames a second of collecting alone, without the first batch, which starts the workers."""
+    """Return the frames per second of collection, without the first batch (it starts workers)."""
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
     seconds = sum(float(row["time/collect_s"]) for row in rows[1:])
@@ -161,7 +161,7 @@ def _collected_rate(path: Path) -> float:
 
 
 def _train_bare() -> None:
-    """`drone-rl` with nothing written between the first and the last update."""
+    """Run `drone-rl` without writing files between the first and the last update."""
     for callback in (CsvCallback, LoggerCallback, CheckpointCallback):
         setattr(callback, "on_update", lambda *_: None)  # noqa: B010 (a method replaced on purpose)
     runpy.run_module("drone_rl.cli.main", run_name="__main__", alter_sys=True)

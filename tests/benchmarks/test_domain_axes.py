@@ -1,4 +1,4 @@
-"""Every axis from the search to a required range, by a policy whose limits are known."""
+"""Required ranges on every axis, for a policy with known limits."""
 
 import json
 
@@ -14,12 +14,12 @@ from tests.robustness.making import shifts_of
 robust = drone_rl.load_policy(domain_axes.POLICY)
 
 
-class Made:
-    """The result of `drone_rl.shifts` of a policy that is good up to the third strength."""
+class FakeShifts:
+    """A result of `drone_rl.shifts` for a policy that is good up to the third strength."""
 
-    def __init__(self, names, change=lambda numbers: numbers):
-        made = change(shifts_of(robust, axes=names))
-        self.pictures, self.numbers = made["pictures"], made
+    def __init__(self, names):
+        self.numbers = shifts_of(robust, axes=names)
+        self.pictures = self.numbers["pictures"]
 
     def save(self, folder):
         (folder / "shifts.json").write_text(json.dumps(self.numbers))
@@ -28,8 +28,8 @@ class Made:
 
 @pytest.fixture
 def count(tmp_path, monkeypatch):
-    def run(made):
-        monkeypatch.setattr(domain_axes, "shifts", lambda *a, **k: made)
+    def run(result):
+        monkeypatch.setattr(domain_axes, "shifts", lambda *a, **k: result)
         monkeypatch.setattr(
             domain_axes, "recheck_domain", lambda *a: type("R", (), {"contradictions": ()})
         )
@@ -39,14 +39,14 @@ def count(tmp_path, monkeypatch):
 
 
 def test_every_axis_is_enforced_in_its_direction(count):
-    found = count(Made(tuple(AXES)))
+    found = count(FakeShifts(tuple(AXES)))
     assert found["domain_axes_wrong"] == {}
     assert found["domain_axes_right"] == found["domain_axes"] == len(AXES) == 22
     assert found["domain_axes_contradicted"] == []
 
 
-def test_two_sided_axes_are_tried_at_both_ends(tmp_path, count):
-    count(Made(("sun", "fog", "blur")))
+def test_two_sided_axes_are_tested_at_both_ends(tmp_path, count):
+    count(FakeShifts(("sun", "fog", "blur")))
     folder = tmp_path / "bench"
     tried = {
         name: {
@@ -63,12 +63,12 @@ def test_two_sided_axes_are_tried_at_both_ends(tmp_path, count):
     assert tried["blur"] == {("high", True), ("high", False)}
 
 
-def test_an_axis_that_is_enforced_the_other_way_round_is_found(count, monkeypatch):
-    """As limits of fog were: the greatest visibility in place of the least."""
+def test_an_axis_that_is_enforced_in_the_wrong_direction_is_found(count, monkeypatch):
+    """For example, a largest visibility in fog is required instead of a smallest one."""
     monkeypatch.setattr(
         "drone_rl.verdicts.coverage.lacking",
         lambda numbers, name, need: None if need["low"] is None else "reversed",
     )
-    found = count(Made(("fog", "blur")))
+    found = count(FakeShifts(("fog", "blur")))
     assert "the program's own file is refused" in found["domain_axes_wrong"]["fog"]
     assert found["domain_axes_right"] == 0

@@ -1,4 +1,4 @@
-"""How often intervals of verdicts hold the truth, by hand."""
+"""Coverage of intervals of verdicts, by hand."""
 
 import pytest
 
@@ -10,26 +10,26 @@ from benchmarks.exact_coverage import Truth
     ("success", "undecided", "held"),
     [
         (0.5, 0.0, True),
-        (0.6, 0.0, True),  # the ends belong to the interval
+        (0.6, 0.0, True),  # intervals are closed
         (0.4, 0.0, True),
         (0.61, 0.0, False),
         (0.39, 0.0, False),
-        (0.39, 0.02, True),  # what is undecided may reach into it
+        (0.39, 0.02, True),  # undecided placements can move the rate into the interval
         (0.3, 0.05, False),
     ],
 )
-def test_an_interval_holds_what_may_be_true(success, undecided, held):
-    assert Truth(success, undecided).is_held({"lower95": 0.4, "upper95": 0.6}) == held
+def test_an_interval_covers_every_possible_rate(success, undecided, held):
+    assert Truth(success, undecided).is_covered({"lower95": 0.4, "upper95": 0.6}) == held
 
 
-def test_who_is_left_out_and_why():
+def test_reasons_to_leave_out_a_policy():
     assert e._why_not(Truth(0.5, 0.0), [0.3, 0.6]) is None
     assert e._why_not(Truth(0.5, 0.0), [0.3, 0.50005]) == "as another"
     assert e._why_not(Truth(1.0, 0.0), []) == e._why_not(Truth(0.0, 0.0), []) == "always or never"
     assert e._why_not(Truth(0.9, 2e-4), []) == "undecided"
 
 
-def test_counts_are_of_verdicts():
+def test_coverage_counts_verdicts():
     rows = [
         {"policy": "a", "held": 19, "verdicts": 20},
         {"policy": "b", "held": 20, "verdicts": 20},
@@ -41,8 +41,8 @@ def test_counts_are_of_verdicts():
     assert found["verdict_coverage_exact_policies"] == rows
 
 
-def test_a_quick_look(tmp_path):
-    """The policy right_and_forward gets every cube from the right up to y = 1.65 of -6 to 6."""
+def test_the_quick_benchmark(tmp_path):
+    """The policy right_and_forward collects cubes at y from -6 to 1.65 of -6 to 6."""
     found = e.bench_exact_coverage(tmp_path, quick=True)
     assert found["verdict_coverage_exact_total"] == 3
     (row,) = found["verdict_coverage_exact_policies"]
@@ -50,7 +50,7 @@ def test_a_quick_look(tmp_path):
     assert row["held"] == found["verdict_coverage_exact_held"] >= 2
 
 
-def test_stages_of_a_training_are_kept(tmp_path, monkeypatch):
+def test_checkpoints_of_all_stages_are_kept(tmp_path, monkeypatch):
     monkeypatch.setattr(e, "SEEDS", range(1))
     monkeypatch.setattr(e, "STAGES", (16, 32))
     named = dict(e._policies(tmp_path, quick=False))

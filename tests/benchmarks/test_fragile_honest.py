@@ -16,13 +16,13 @@ FOUND = {
 @pytest.mark.parametrize(
     ("quick", "episodes", "count", "total"), [(True, 50, 1, 3), (False, 400, 2, 4)]
 )
-def test_those_that_rounding_decides_are_counted(
+def test_policies_whose_verdict_depends_on_rounding_are_counted(
     monkeypatch, tmp_path, quick, episodes, count, total
 ):
-    trained, asked = [], set()
+    trained, sizes = [], set()
 
     def judge(policy, settings, progress):
-        asked.add(settings.episodes)
+        sizes.add(settings.episodes)
         evidence = {"rounding": FOUND[policy]}
         return SimpleNamespace(verdict=SimpleNamespace(evidence=evidence))
 
@@ -38,5 +38,5 @@ def test_those_that_rounding_decides_are_counted(
         "fragile_episodes_most": 0.06 if quick else 1.0,
     }
     assert trained == [("seed_7", "seed=7"), ("seed_8", "seed=8")][: total - 2]
-    assert asked == {episodes}
+    assert sizes == {episodes}
     assert BENCHMARKS["fragile_honest"].group == "truth"

@@ -16,7 +16,7 @@ def subject():
     made.close()
 
 
-def test_the_figures(monkeypatch):
+def test_time_cells_and_compared_images(monkeypatch):
     numbers = {"seconds": 2.0, "cells": 7}
     monkeypatch.setattr(places, "places", lambda *_, **__: type("P", (), {"numbers": numbers}))
     found = bench_places(quick=True)
@@ -24,7 +24,7 @@ def test_the_figures(monkeypatch):
     assert 380 <= found["places_compared"] <= found["places_drawn"] == 400
 
 
-def test_a_closed_form_that_is_wrong_is_noticed(subject, monkeypatch):
+def test_a_wrong_closed_form_is_detected(subject, monkeypatch):
     random_state = np.random.RandomState(0)
     assert compare(subject.images, 35.0, 2, 20, random_state)[0] == 0
     monkeypatch.setattr("drone_rl.verification.prover.cube_images.camera_ahead", lambda: 0.9)

@@ -1,4 +1,4 @@
-"""What counts as a difference, by pictures made by hand; and some scenes by OpenGL itself."""
+"""Differences between hand-made images; and a comparison with OpenGL in a few scenes."""
 
 import json
 import subprocess
@@ -8,83 +8,83 @@ import numpy as np
 import pytest
 
 from benchmarks import render_truth
-from benchmarks.render_truth import Compared, compare, compare_scenes, summary
+from benchmarks.render_truth import Difference, compare, compare_scenes, summary
 from drone_rl.utils.errors import InputError
 
 
-def picture():
-    """Geom 3 fills 8 x 8 pixels of 12 x 12, 4 m away, gray; it looks at the camera."""
-    made = {
+def make_images():
+    """Return images of geom 3: 8 x 8 of 12 x 12 pixels, 4 m away, gray, facing the camera."""
+    images = {
         "rgb": np.zeros((12, 12, 3), np.uint8),
         "depth": np.zeros((12, 12), np.float32),
         "segmentation": np.full((12, 12), -1, np.int32),
         "normals": np.zeros((12, 12, 3), np.float32),
     }
     inside = (slice(2, 10), slice(2, 10))
-    made["rgb"][inside], made["depth"][inside] = 100, 4.0
-    made["segmentation"][inside], made["normals"][inside] = 3, [-1.0, 0.0, 0.0]
-    made["nudged"] = np.stack([made["segmentation"]] * 4)
-    made["facets"] = np.zeros((12, 12))
-    return made
+    images["rgb"][inside], images["depth"][inside] = 100, 4.0
+    images["segmentation"][inside], images["normals"][inside] = 3, [-1.0, 0.0, 0.0]
+    images["nudged"] = np.stack([images["segmentation"]] * 4)
+    images["facets"] = np.zeros((12, 12))
+    return images
 
 
-def test_the_same_pictures_do_not_differ():
-    assert compare(picture(), picture()) == Compared(0, (1.0,), 0.0, 0)
+def test_equal_images_do_not_differ():
+    assert compare(make_images(), make_images()) == Difference(0, (1.0,), 0.0, 0)
 
 
-def test_another_geom_within_is_wrong_and_on_an_edge_is_not():
-    theirs = picture()
+def test_another_geom_counts_as_wrong_except_on_an_edge():
+    theirs = make_images()
     theirs["segmentation"][2, 5] = -1  # a pixel of the edge
-    found = compare(picture(), theirs)
+    found = compare(make_images(), theirs)
     assert found.inner_wrong == 0 and found.overlaps == (63 / 64,)
     theirs["segmentation"][4:9, 4:9] = 7  # another geom, of 3 x 3 pixels on no edge
-    assert compare(picture(), theirs).inner_wrong == 9
-    assert min(compare(picture(), theirs).overlaps) == (63 - 25) / 64  # 25 are too few to count
+    assert compare(make_images(), theirs).inner_wrong == 9
+    assert min(compare(make_images(), theirs).overlaps) == (63 - 25) / 64  # 25 are too few to count
 
 
-def test_where_opengls_rounding_decides_a_geom_need_not_overlap():
-    ours, theirs = picture(), picture()
+def test_overlap_ignores_pixels_that_depend_on_opengls_rounding():
+    ours, theirs = make_images(), make_images()
     theirs["segmentation"][2, 5:7] = -1
-    ours["nudged"][3, 2, 5] = -1  # turned a little, ours has the same there
+    ours["nudged"][3, 2, 5] = -1  # the rotated camera shows the same there
     assert compare(ours, theirs).overlaps == (62 / 63,)
 
 
-def test_depth_differs_but_for_what_opengl_rounds():
-    theirs = picture()
+def test_the_depth_difference_excludes_opengls_rounding():
+    theirs = make_images()
     theirs["depth"][5, 5] += 0.003
-    rounding = 2 * 2.0**-24 * 16 / 0.02  # of 4 m, with the near end at 2 cm
-    assert compare(picture(), theirs).depth_m == pytest.approx(0.003 - rounding, abs=1e-6)
+    rounding = 2 * 2.0**-24 * 16 / 0.02  # at 4 m, with the near plane at 2 cm
+    assert compare(make_images(), theirs).depth_m == pytest.approx(0.003 - rounding, abs=1e-6)
     theirs["depth"][5, 5] = 4.0 + rounding / 2
-    assert compare(picture(), theirs).depth_m == 0.0
+    assert compare(make_images(), theirs).depth_m == 0.0
     theirs["depth"][2, 2] = 9.0  # on an edge
-    assert compare(picture(), theirs).depth_m == 0.0
+    assert compare(make_images(), theirs).depth_m == 0.0
 
 
-def test_a_steep_surface_may_be_off_by_a_fraction_of_a_pixel():
-    ours, theirs = picture(), picture()
-    ours["depth"][2:10, 2:10] += np.arange(8) * 2.56  # 2.56 m a pixel: 10 mm in 1 / 256 of it
+def test_a_steep_surface_may_differ_by_a_fraction_of_a_pixel():
+    ours, theirs = make_images(), make_images()
+    ours["depth"][2:10, 2:10] += np.arange(8) * 2.56  # 2.56 m per pixel: 10 mm in 1 / 256 pixel
     theirs["depth"] = ours["depth"] + np.float32(0.012) * (ours["depth"] > 0)
     assert 0 < compare(ours, theirs).depth_m < 0.002 + 1e-6
 
 
-def test_colours_differ_within_faces_only():
-    ours, theirs = picture(), picture()
+def test_colors_are_compared_within_faces_only():
+    ours, theirs = make_images(), make_images()
     theirs["rgb"][5, 5] = 103
     assert compare(ours, theirs).rgb == 3
-    ours["normals"][5:10, 2:10] = [0.0, 1.0, 0.0]  # a crease runs through there
+    ours["normals"][5:10, 2:10] = [0.0, 1.0, 0.0]  # a crease
     assert compare(ours, theirs).rgb == 0
 
 
-def test_what_opengl_cuts_off_because_it_is_near_is_left_out():
-    ours, theirs = picture(), picture()
+def test_surfaces_before_opengls_near_plane_are_ignored():
+    ours, theirs = make_images(), make_images()
     ours["depth"][2:10, 2:10] = 0.01
     theirs["segmentation"][:] = -1
     assert compare(ours, theirs).inner_wrong == 0
 
 
-def test_figures_over_scenes():
-    compared = [Compared(0, (1.0, 0.99), 0.0001, 1), Compared(2, (0.97,), 0.0005, 2)]
-    assert summary(compared) == {
+def test_figures_of_all_scenes():
+    differences = [Difference(0, (1.0, 0.99), 0.0001, 1), Difference(2, (0.97,), 0.0005, 2)]
+    assert summary(differences) == {
         "render_truth_scenes": 2,
         "render_truth_inner_wrong": 2,
         "render_truth_geoms": 3,
@@ -96,11 +96,11 @@ def test_figures_over_scenes():
 
 
 @pytest.mark.parametrize("status", [0, 1])
-def test_a_process_of_its_own_draws_by_opengl_or_says_why_not(monkeypatch, status):
-    asked, found = [], {"render_truth_scenes": 50}
+def test_a_separate_process_renders_with_opengl_or_the_error_has_its_reason(monkeypatch, status):
+    calls, found = [], {"render_truth_scenes": 50}
 
     def run(command, env, **kwargs):
-        asked.append((command[-1], env["MUJOCO_GL"]))
+        calls.append((command[-1], env["MUJOCO_GL"]))
         printed = f"noise\n{json.dumps(found)}\n"
         return SimpleNamespace(returncode=status, stdout=printed, stderr="Traceback\nno EGL\n")
 
@@ -110,11 +110,11 @@ def test_a_process_of_its_own_draws_by_opengl_or_says_why_not(monkeypatch, statu
     else:
         with pytest.raises(InputError, match=r"needs OpenGL by EGL, which failed \(no EGL\)"):
             render_truth.bench_render_truth(quick=True)
-    assert asked == [("50", "egl")]
+    assert calls == [("50", "egl")]
 
 
 @pytest.mark.render
-def test_random_scenes_are_drawn_as_by_opengl(egl):
+def test_images_of_random_scenes_equal_opengls(egl):
     figures = summary(compare_scenes(12, seed=1))
     assert figures["render_truth_inner_wrong"] == 0
     assert figures["render_truth_geoms"] > 40

@@ -1,11 +1,11 @@
-"""What trainings in other worlds gain: figures by hand, of runs that nobody flew."""
+"""Figures of the ablation, from given success rates."""
 
 import json
 
 import pytest
 
 from benchmarks import commands, robust
-from benchmarks.robust import ARMS, bench_robust, fly
+from benchmarks.robust import ARMS, bench_robust, success_rates
 from benchmarks.robust_comparison import PLAIN
 from drone_rl.config import AppearanceSettings
 from drone_rl.config.configuration import as_config
@@ -13,14 +13,14 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.config.transforms import Gray, Noise, Shift, Standardize
 from drone_rl.robustness.axes import AXES
 
-LOOKS = AppearanceSettings(
+APPEARANCE = AppearanceSettings(
     exposure=(0.5, 2.0), fog_visibility=(40.0, 100.0), ground_color=((0, 0, 0), (1, 1, 1))
 )
 
 
 @pytest.fixture
 def called(monkeypatch, tmp_path):
-    """Trainings that take no time; those of the arm "all" know looks, shifts and noise."""
+    """Replace trainings by a stub; the arm "all" has visual randomization, shift and noise."""
     commands_, arms = [], list(ARMS)
 
     def call(*command):
@@ -29,18 +29,18 @@ def called(monkeypatch, tmp_path):
         (tmp_path / run).mkdir(parents=True)
         arm, seed = run.rsplit("/", 1)[-1].rsplit("_", 1)
         number = [a.replace(" ", "_") for a in arms].index(arm)
-        told = {"frames": 10 * number + int(seed)}
-        (tmp_path / run / "result.json").write_text(json.dumps(told))
+        result = {"frames": 10 * number + int(seed)}
+        (tmp_path / run / "result.json").write_text(json.dumps(result))
 
     steps = (Gray(), Noise(), Shift(), Standardize())
-    config = as_config(TrainSettings(appearance=LOOKS, transforms=steps))
+    config = as_config(TrainSettings(appearance=APPEARANCE, transforms=steps))
     monkeypatch.setattr(commands, "call", call)
     monkeypatch.setattr(robust, "read_checkpoint", lambda path: {"config": config})
     return commands_
 
 
-def test_the_figures(called, monkeypatch, tmp_path):
-    def flown(runs, episodes):
+def test_gains_and_costs_by_hand(called, monkeypatch, tmp_path):
+    def success_rates(runs, episodes):
         shares = {}
         for run in runs:
             is_all = run.name[:-2] == "all"
@@ -50,16 +50,16 @@ def test_the_figures(called, monkeypatch, tmp_path):
             shares[run] |= {"camera_height": good, "camera_sideways": good, "distractors": 0.4}
         return shares
 
-    monkeypatch.setattr(robust, "fly", flown)
+    monkeypatch.setattr(robust, "success_rates", success_rates)
     found = bench_robust(tmp_path, [1, 2], quick=False)
     kinds = ["camera position", "field of view", "object size", "distractors", "dynamics"]
     assert found["robust_untouched"] == kinds
-    # of five kinds one differs: by 0.2 with seed 1, by 0.3 with seed 2
+    # one of five kinds differs: by 0.2 with seed 1, by 0.3 with seed 2
     assert found["robust_gain_by_seed"] == pytest.approx([100 * 0.2 / 5, 100 * 0.3 / 5])
     assert found["robust_gain_points"] == pytest.approx(5.0)
-    # of ten kinds one does, whether training touches them or not
+    # one of all ten kinds differs
     assert found["robust_gain_all_kinds_points"] == pytest.approx(100 * 0.25 / 10)
-    # of seven axes two do
+    # two of seven axes differ
     assert found["robust_gain_by_axis_points"] == pytest.approx(100 * 0.25 * 2 / 7)
     assert found["robust_room_points"] == pytest.approx(100 * 1.2 / 5)
     assert found["robust_cost_points"] == pytest.approx(2.0)
@@ -78,20 +78,20 @@ def test_the_figures(called, monkeypatch, tmp_path):
     assert len(by_run) == 14
 
 
-def test_a_quick_one_trains_one_seed_for_a_moment(called, monkeypatch, tmp_path):
-    told = []
+def test_a_quick_benchmark_trains_one_seed_briefly(called, monkeypatch, tmp_path):
+    calls = []
 
-    def flown(runs, episodes, strengths):
-        told.append((episodes, strengths))
+    def success_rates(runs, episodes, strengths):
+        calls.append((episodes, strengths))
         return {run: {PLAIN: 1.0, **dict.fromkeys(AXES, 1.0)} for run in runs}
 
-    monkeypatch.setattr(robust, "fly", flown)
+    monkeypatch.setattr(robust, "success_rates", success_rates)
     found = bench_robust(tmp_path, [1, 2], quick=True)
     assert len(called) == 7 and all("trainer.total_frames=1000" in c for c in called)
-    assert told == [(5, 1)] and found["robust_gain_points"] == 0.0
+    assert calls == [(5, 1)] and found["robust_gain_points"] == 0.0
 
 
-def test_policies_are_flown_in_worlds_of_minimal_look(monkeypatch, tmp_path):
+def test_policies_are_evaluated_with_minimal_appearance(monkeypatch, tmp_path):
     seen = {}
 
     def compare(evaluator, subjects, axes, **how):
@@ -101,6 +101,6 @@ def test_policies_are_flown_in_worlds_of_minimal_look(monkeypatch, tmp_path):
     monkeypatch.setattr(robust, "compare", compare)
     from drone_rl.policies.policy import load_policy
 
-    found = fly([load_policy("good").path, load_policy("poor").path], 2)
+    found = success_rates([load_policy("good").path, load_policy("poor").path], 2)
     assert [shares[PLAIN] for shares in found.values()] == [1.0, 1.0]
     assert all(subject.appearance.is_minimal for subject in seen.values())

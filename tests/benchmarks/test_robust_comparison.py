@@ -1,4 +1,4 @@
-"""What a training knows of shifts, as its settings and nobody else say."""
+"""Axes of perturbation to which a training is exposed, by its settings."""
 
 import dataclasses
 
@@ -16,13 +16,13 @@ def seeing(*steps):
     return TrainSettings(transforms=(Gray(), *steps, Standardize()))
 
 
-def test_the_default_knows_nothing():
+def test_the_default_training_is_exposed_to_no_axis():
     assert changed(TrainSettings()) == set()
     assert touched_axes(TrainSettings()) == []
     assert untouched_kinds(TrainSettings()) == [*GROUPS]
 
 
-def test_how_it_learns_makes_no_difference():
+def test_settings_of_learning_do_not_matter():
     settings = TrainSettings(seed=3, evaluate_after=10)
     assert changed(settings) == set()
 
@@ -45,17 +45,17 @@ def test_how_it_learns_makes_no_difference():
         (seeing(LateFrames(), Blur()), ["blur", "late_frames", "action_delay"]),
     ],
 )
-def test_what_settings_touch(settings, axes):
+def test_axes_of_a_training(settings, axes):
     assert touched_axes(settings) == axes
     kinds = {AXES[name].group for name in axes}
     assert untouched_kinds(settings) == [kind for kind in GROUPS if kind not in kinds]
 
 
-def test_no_look_and_no_fault_goes_unseen():
+def test_every_setting_of_appearance_and_every_fault_belongs_to_an_axis():
     named = {name for names in TOUCHED_BY.values() for name in names}
-    looks = {f"appearance.{field.name}" for field in dataclasses.fields(AppearanceSettings)}
+    appearance = {f"appearance.{field.name}" for field in dataclasses.fields(AppearanceSettings)}
     faults = {f"transforms.{snake_case(fault)}" for fault in (Blur, *Fault.variants())}
-    assert looks | faults <= named
+    assert appearance | faults <= named
 
 
 def test_settings_that_axes_name_exist():

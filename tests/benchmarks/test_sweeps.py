@@ -1,4 +1,4 @@
-"""What is counted of sweeps, on files made by hand."""
+"""Figures of sweeps, from hand-written files."""
 
 import json
 import subprocess
@@ -12,13 +12,13 @@ import torch
 from benchmarks import sweeps
 
 
-def test_times_are_compared_run_by_run(monkeypatch, tmp_path):
-    took = {"bare": 10.0, "sweep_1": 25.0, "sweep_2": 12.5}
+def test_speed_up_and_overhead(monkeypatch, tmp_path):
+    times = {"bare": 10.0, "sweep_1": 25.0, "sweep_2": 12.5}
     calls = []
 
     def seconds(program, *args):
         calls.append(args)
-        return next(t for name, t in took.items() if any(f"/{name}" in a for a in args))
+        return next(t for name, t in times.items() if any(f"/{name}" in a for a in args))
 
     monkeypatch.setattr(sweeps, "_seconds", seconds)
     found = sweeps.bench_sweeps(tmp_path, "cpu", quick=True)
@@ -28,7 +28,7 @@ def test_times_are_compared_run_by_run(monkeypatch, tmp_path):
     assert sum("-m" in args for args in calls) == 2
 
 
-def test_the_first_batch_does_not_count_as_collecting(tmp_path):
+def test_the_collection_rate_excludes_the_first_batch(tmp_path):
     rows = "frames,time/collect_s\n100,50\n300,2\n500,2\n"
     (tmp_path / "m.csv").write_text(rows)
     assert sweeps._collected_rate(tmp_path / "m.csv") == 100.0
@@ -36,7 +36,7 @@ def test_the_first_batch_does_not_count_as_collecting(tmp_path):
 
 @pytest.fixture
 def make_run(tmp_path, monkeypatch):
-    """A run that ended with a result and a weight."""
+    """Return a factory of finished runs with a result and a weight."""
     monkeypatch.setattr(sweeps, "load_checkpoint", lambda path: torch.load(path, weights_only=True))
 
     def build(name, weight=1.0, **result):
@@ -50,7 +50,7 @@ def make_run(tmp_path, monkeypatch):
     return build
 
 
-def test_two_runs_came_to_the_same_but_for_the_time_they_took(make_run):
+def test_outcomes_are_equal_except_for_the_time(make_run):
     first = sweeps._outcome(make_run("a"))
     assert sweeps._outcome(make_run("b", seconds=99.0)) == first
     assert sweeps._outcome(make_run("c", weight=1.0 + 2**-20)) != first
@@ -60,13 +60,13 @@ def test_two_runs_came_to_the_same_but_for_the_time_they_took(make_run):
 def test_only_processes_of_the_sweep_are_killed(tmp_path):
     code = "import time; time.sleep(60)"
     named, other = (
-        subprocess.Popen([sys.executable, "-c", code, words])
-        for words in (f"dir={tmp_path}/killed", f"dir={tmp_path}/spared")
+        subprocess.Popen([sys.executable, "-c", code, text])
+        for text in (f"dir={tmp_path}/killed", f"dir={tmp_path}/spared")
     )
     while not Path(f"/proc/{named.pid}/cmdline").read_bytes():
-        time.sleep(0.01)  # a program that has only just begun has no command line yet
+        time.sleep(0.01)  # a new process has no command line yet
     try:
-        sweeps._kill_all_that_name(f"{tmp_path}/killed")
+        sweeps._kill_processes(f"{tmp_path}/killed")
         assert named.wait(10) == -9
         assert other.poll() is None
     finally:
@@ -74,13 +74,13 @@ def test_only_processes_of_the_sweep_are_killed(tmp_path):
         other.wait()
 
 
-def test_without_ray_there_is_no_figure(monkeypatch, tmp_path):
+def test_without_ray_the_figures_are_none(monkeypatch, tmp_path):
     monkeypatch.setattr(sweeps.importlib.util, "find_spec", lambda name: None)
     found = sweeps.bench_ray(tmp_path, "cpu", quick=True)
     assert found == {"ray_fps": None, "ray_over_plain": None}
 
 
-def test_ray_is_compared_with_the_plain_collector_in_turn(monkeypatch, tmp_path):
+def test_ray_is_compared_with_the_default_collector_alternately(monkeypatch, tmp_path):
     monkeypatch.setattr(sweeps.importlib.util, "find_spec", lambda name: object())
     order = []
     monkeypatch.setattr(sweeps, "_seconds", lambda program, *args: order.append(args[0]))
