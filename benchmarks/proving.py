@@ -1,4 +1,4 @@
-"""Proofs of shipped and of freshly trained policies: how long, how much, and do they hold?"""
+"""Proofs of shipped and newly trained policies: time, decided fraction, and correctness."""
 
 import multiprocessing
 import statistics
@@ -20,53 +20,53 @@ from drone_rl.utils.progress import silent
 from drone_rl.verification.check import Check, check
 from drone_rl.verification.prove import Proof, prove
 
-ASKED_FOR = 148_000
-"""Pictures a second that the default's network did where the figures for proofs were asked."""
+REFERENCE_IMAGES_PER_S = 148_000
+"""Images per second of the default network on the reference machine of the proof times."""
 _BATCH, _TIMES = 1024, 15
 
 
 @torch.no_grad()
-def network_pictures_per_s(network: PolicyNetwork, shape: tuple[int, ...]) -> float:
-    """Pictures a second that a network looks at, with as many threads as torch takes.
+def network_images_per_s(network: PolicyNetwork, shape: tuple[int, ...]) -> float:
+    """Return the images per second of a network's forward pass, with torch's number of threads.
 
     Args:
-        network: Any.
-        shape: Of one picture, (C, H, W).
+        network: Any network.
+        shape: Shape of an image, (C, H, W).
     """
-    pictures, seconds = torch.rand(_BATCH, *shape), []
+    images, seconds = torch.rand(_BATCH, *shape), []
     for _ in range(_TIMES):
         begin = time.perf_counter()
-        network(pictures)
+        network(images)
         seconds.append(time.perf_counter() - begin)
     return _BATCH / statistics.median(seconds)
 
 
-FLIGHTS = 105_000
-"""Of all certificates together, at most: somewhat more than the 100,000 that are asked for."""
+EPISODES = 105_000
+"""Episodes that check all certificates together; the requirement is 100,000."""
 SMALL_PARTS = {4: 2e7, 5: 5e7}
-"""By number of cubes, combinations of pictures of a part: so few that parts are done in time."""
+"""Image combinations of a part of a proof, by number of cubes; small enough to end in time."""
 
 
 def bench_prove(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, Any]:
-    """Trains the default from each seed, proves what came of it, and checks every certificate.
+    """Train the default from each seed, prove the policies, and check every certificate.
 
     Args:
-        folder: For runs and certificates.
-        seeds: Of the trainings.
-        quick: Whether one cube and one seed will do.
+        folder: Folder of runs and certificates.
+        seeds: Seeds of the trainings.
+        quick: Whether to use one cube and one seed.
 
     Returns:
-        "proof_two_s" of policy good with two cubes; "proof_three_s", "proof_success",
-        "proof_lost" and "proof_undecided" of each seed's policy with the default's three; how many
-        certificates the second checker accepts, and how many of its flights end otherwise than
-        proved; the pictures a second that the network alone looks at, and the times as they would
-        be where those are 148,000, for which the figures were asked.
+        "proof_two_s" of the policy "good" with two cubes; "proof_three_s", "proof_success",
+        "proof_lost" and "proof_undecided" of each seed's policy with three cubes;
+        "proof_network_pictures_per_s", the speed of the network alone, and the times scaled to
+        148,000 images per second; the number of certificates that the checker accepts, and of its
+        episodes that contradict them.
     """
     two, three = (1, 1) if quick else (2, 3)
     policy = load_policy("good")
     camera = policy.description.camera
-    pace = network_pictures_per_s(policy.make_network(), (1, camera.height, camera.width))
-    slower = ASKED_FOR / pace
+    images_per_s = network_images_per_s(policy.make_network(), (1, camera.height, camera.width))
+    slower = REFERENCE_IMAGES_PER_S / images_per_s
     good, good_s = _timed("good", two, folder / "good")
     proofs, seconds = {"good": good}, []
     for seed in seeds[:1] if quick else seeds:
@@ -78,12 +78,12 @@ def bench_prove(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, An
     trained = list(proofs.values())[1:]
     for name in ("poor", "right_and_forward"):
         proofs[name], _ = _timed(name, two, folder / name)
-    flights = 100 if quick else -(-FLIGHTS // len(proofs))
-    checks = [_check(proof, policy, flights) for policy, proof in proofs.items()]
+    episodes = 100 if quick else -(-EPISODES // len(proofs))
+    checks = [_check(proof, policy, episodes) for policy, proof in proofs.items()]
     return {
         "proof_two_s": good_s,
         "proof_three_s": seconds,
-        "proof_network_pictures_per_s": pace,
+        "proof_network_pictures_per_s": images_per_s,
         "proof_two_scaled_s": good_s / slower,
         "proof_three_scaled_s": [taken / slower for taken in seconds],
         "proof_success": [proof.success for proof in trained],
@@ -98,18 +98,17 @@ def bench_prove(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, An
 
 
 def bench_many_cubes(folder: Path, hours: float, quick: bool) -> dict[str, Any]:
-    """How much is decided of policy good with four and with five cubes in a given time.
+    """Measure the decided fraction of proofs with four and five cubes in a given time.
 
-    Both at once, each in a process of its own, as a proof works on one core; one after the other if
-    quick.
+    A proof uses one core, so both run in parallel processes; sequentially if quick.
 
     Args:
-        folder: For certificates.
-        hours: For each.
-        quick: Whether a few seconds will do.
+        folder: Folder of the certificates.
+        hours: Time limit of each proof.
+        quick: Whether to stop after a second.
 
     Returns:
-        "proof_four", "proof_five": the shares decided, and the seconds that it took.
+        "proof_four" and "proof_five", the decided fractions for the policy "good", and seconds.
     """
     limit, names = 1.0 if quick else 3600 * hours, {4: "proof_four", 5: "proof_five"}
     context = multiprocessing.get_context("spawn")
@@ -138,14 +137,14 @@ def _decided(cubes: int, folder: Path, limit_s: float) -> tuple[float, float]:
 
 
 def bench_tampering(folder: Path, quick: bool) -> dict[str, Any]:
-    """Proves two small tasks, and tampers with their certificates in every way there is.
+    """Prove a policy in two small tasks and tamper with the certificates in every known way.
 
     Args:
-        folder: For certificates.
-        quick: Whether one of them will do.
+        folder: Folder of the certificates.
+        quick: Whether to use only one task.
 
     Returns:
-        How many of the tampered certificates are refused, and how many there are.
+        See `count_refused`.
     """
     paths = {}
     for cubes in (1,) if quick else (1, 2):
@@ -162,23 +161,23 @@ def _timed(policy: str | Path, num_cubes: int, folder: Path) -> tuple[Proof, flo
     return proof, time.perf_counter() - begin
 
 
-def _check(proof: Proof, policy: str, flights: int) -> Check:
+def _check(proof: Proof, policy: str, episodes: int) -> Check:
     assert proof.folder is not None
     path = proof.folder / "certificate.json"
-    return check(path, policy, flights=flights, seed=0, progress=silent)
+    return check(path, policy, flights=episodes, seed=0, progress=silent)
 
 
 def bench_provable(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, Any]:
-    """Trains from each seed until the policy is proved, as a user starts it.
+    """Train `experiment=provable` from each seed until the policy is proved.
 
     Args:
-        folder: For the runs.
-        seeds: Of the trainings.
-        quick: Whether one cube and one seed will do.
+        folder: Folder of the runs.
+        seeds: Seeds of the trainings.
+        quick: Whether to use one cube and one seed.
 
     Returns:
-        Per seed: seconds from the start of the command to its end, searches for failures, and
-        whether it is proved.
+        For each seed the seconds until the command ends, the number of rounds (searches for
+        failures), and whether the policy is proved.
     """
     results: dict[str, list] = {"provable_s": [], "provable_rounds": [], "provable_proved": []}
     easier = ["task=collect_one", "provable.flights=500"] if quick else []

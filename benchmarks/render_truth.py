@@ -59,7 +59,7 @@ class Difference:
 def compare(ours: Images, theirs: Images) -> Difference:
     """Compare the images of two renderers.
 
-    For a depth d between the near plane n and the far plane f, OpenGL stores n (f - d) / (d (f - n))
+    OpenGL stores a depth d between the near plane n and the far plane f as n (f - d) / (d (f - n))
     in float32, and MuJoCo computes d from it in float32. Each of the two roundings is at most 2^-24
     and is amplified by d^2 / n. OpenGL also moves corners by up to half of `_SNAP`, which changes
     depth by its slope. It renders round solids as facets, see `facet_errors`.

@@ -1,4 +1,4 @@
-"""Certificates that go together and are of this network and task, but false: only flights tell."""
+"""Changes that make a certificate false but keep it consistent; only episodes refute it."""
 
 import copy
 import operator
@@ -7,22 +7,22 @@ from fractions import Fraction
 
 import numpy as np
 
-from benchmarks.tampered_inconsistent import Data, Way, largest
+from benchmarks.tampered_inconsistent import Change, Data, largest
 from drone_rl.policies.policy import load_policy
 from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.checker.consistency import MOST_MISSING, volume
 
 _TAIL = 1000
-"""A box's length by that of the part that is given to another outcome."""
+"""Length of a box divided by the length of the part that moves to another outcome."""
 
 
-def _reshared(way: Callable[[Data], None]) -> Way:
-    """Makes shares and steps those of the boxes afterwards, and leaves no outcome empty."""
+def _updated(move_boxes: Callable[[Data], None]) -> Change:
+    """Update shares and steps after boxes have moved, and remove empty outcomes."""
 
-    def whole(data: Data) -> Data:
+    def change(data: Data) -> Data:
         before = copy.deepcopy(data)
-        way(data)
-        if data == before:  # nothing there to lie about
+        move_boxes(data)
+        if data == before:  # the change does not apply to this certificate
             return data
         task = data["policy"]["description"]["task"]
         placements = Fraction(2 * task["lateral_bound"]) ** task["num_cubes"]
@@ -37,28 +37,28 @@ def _reshared(way: Callable[[Data], None]) -> Way:
         data["outcomes"] = [outcome for outcome in data["outcomes"] if outcome["boxes"]]
         return data
 
-    return whole
+    return change
 
 
 def _scaled(steps: Mapping[str, float], share: float) -> dict[str, float]:
-    """Numbers of steps as frequent as before, of nearly all of a share."""
+    """Scale the fractions of numbers of steps so that their sum is almost a share."""
     factor = (1 - MOST_MISSING / 2) * share / (sum(steps.values()) or 1.0)
     return {number: factor * one for number, one in steps.items()}
 
 
 def _two(data: Data) -> list[Data]:
-    """The two largest outcomes, if there are two."""
+    """Return the two largest outcomes, or an empty list if there is only one."""
     ordered = sorted(data["outcomes"], key=lambda outcome: -outcome["share"])
     return ordered[:2] if len(ordered) > 1 else []
 
 
 def _won(data: Data) -> Data:
-    """The outcome in which all are collected, made if there is none."""
+    """Return the outcome in which all cubes are collected; add it if missing."""
     return _outcome(data, "all_cubes", True)
 
 
 def _lost(data: Data) -> Data:
-    """One in which none is collected."""
+    """Return an outcome in which no cube is collected; add it if missing."""
     return _outcome(data, "front_boundary", False)
 
 
@@ -67,13 +67,13 @@ def _outcome(data: Data, end: str, collected: bool) -> Data:
     for outcome in data["outcomes"]:
         if (outcome["end"], outcome["collected"]) == (end, cubes):
             return outcome
-    made = {"end": end, "collected": cubes, "loops": False, "share": 0.0, "steps": {}, "boxes": []}
-    data["outcomes"].append(made)
-    return made
+    new = {"end": end, "collected": cubes, "loops": False, "share": 0.0, "steps": {}, "boxes": []}
+    data["outcomes"].append(new)
+    return new
 
 
-def _take_largest(outcome: Data) -> list[list[float]]:
-    """The largest of its boxes, which it has no more."""
+def _pop_largest(outcome: Data) -> list[list[float]]:
+    """Remove and return the largest box of an outcome."""
     sizes = [float(np.prod(np.diff(box))) for box in outcome["boxes"]]
     return outcome["boxes"].pop(int(np.argmax(sizes)))
 
@@ -86,13 +86,13 @@ def _boxes_exchanged(data: Data) -> None:
 def _lost_box_won(data: Data) -> None:
     lost = [outcome for outcome in data["outcomes"] if outcome["end"] != "all_cubes"]
     if lost:
-        _won(data)["boxes"].append(_take_largest(largest(lost)))
+        _won(data)["boxes"].append(_pop_largest(largest(lost)))
 
 
 def _won_box_lost(data: Data) -> None:
     won = [outcome for outcome in data["outcomes"] if outcome["end"] == "all_cubes"]
     if won:
-        _lost(data)["boxes"].append(_take_largest(won[0]))
+        _lost(data)["boxes"].append(_pop_largest(won[0]))
 
 
 def _all_won(data: Data) -> None:
@@ -104,24 +104,24 @@ def _all_won(data: Data) -> None:
 
 
 def _border_moved(data: Data) -> None:
-    """One outcome has a slice of the largest box of another."""
+    """Move a slice of the largest box of one outcome to another."""
     for one, other in [_two(data)] if _two(data) else []:
-        (low, high), *others = _take_largest(other)
+        (low, high), *others = _pop_largest(other)
         cut = low + (high - low) / _TAIL
         one["boxes"].append([[low, cut], *others])
         other["boxes"].append([[cut, high], *others])
 
 
 def _undecided_hidden(data: Data) -> None:
-    """As lost where most is won, as won where most is lost; wrong at one side of each border."""
-    to = _lost if largest(data["outcomes"])["end"] == "all_cubes" else _won
+    """Move undecided boxes to the opposite of the most frequent outcome."""
+    target = _lost if largest(data["outcomes"])["end"] == "all_cubes" else _won
     if hidden := data["undecided"]["boxes"]:
-        to(data)["boxes"] += hidden
+        target(data)["boxes"] += hidden
         data["undecided"]["boxes"] = []
 
 
 def _another_boundary(data: Data) -> Data:
-    """Flights to the front boundary end at the side, and the other way round."""
+    """Exchange the front boundary and the side boundary."""
     ends = {"front_boundary": "side_boundary", "side_boundary": "front_boundary"}
     for outcome in data["outcomes"]:
         outcome["end"] = ends.get(outcome["end"], outcome["end"])
@@ -129,7 +129,7 @@ def _another_boundary(data: Data) -> Data:
 
 
 def _mirrored(data: Data) -> Data:
-    """The first cubes' places as if they were the last ones', and left as if it were right."""
+    """Reverse the order of the cubes and exchange left and right."""
     for part in (*data["outcomes"], data["undecided"]):
         part["boxes"] = [[[-b, -a] for a, b in reversed(box)] for box in part["boxes"]]
         part.get("collected", []).reverse()
@@ -137,35 +137,35 @@ def _mirrored(data: Data) -> Data:
 
 
 def _another_policy(data: Data) -> Data:
-    """The same of a network that is another one, with its hash."""
+    """Replace name and hash by those of another policy."""
     name = "good" if data["policy"]["name"] == "poor" else "poor"
     weights = fingerprint(load_policy(name).state["policy"])
     return {**data, "policy": {**data["policy"], "name": name, "weights": weights}}
 
 
 def _farther(data: Data) -> Data:
-    """The same of a task in which all is farther away; a lie where flights get to all cubes."""
+    """Increase the distance of the first cube; false if episodes reach all cubes."""
     if any(o["end"] == "all_cubes" and o["steps"] for o in data["outcomes"]):
         data["policy"]["description"]["task"]["first_distance"] += 5.0
     return data
 
 
-def _steps(change: Callable[[dict[str, float]], dict[str, float]]) -> Way:
-    def way(data: Data) -> Data:
+def _steps(new_steps: Callable[[dict[str, float]], dict[str, float]]) -> Change:
+    def change(data: Data) -> Data:
         outcome = largest(data["outcomes"])
-        outcome["steps"] = change(outcome["steps"])
+        outcome["steps"] = new_steps(outcome["steps"])
         return data
 
-    return way
+    return change
 
 
 def _of_one_number(steps: dict[str, float]) -> dict[str, float]:
-    """All flights as long as the fewest are."""
+    """State the rarest number of steps for all episodes."""
     return {min(steps, key=steps.__getitem__): sum(steps.values())} if steps else steps
 
 
 def _forgotten(steps: dict[str, float]) -> dict[str, float]:
-    """The most frequent number of steps as if it were the next but one."""
+    """Replace the most frequent number of steps by a number that is larger by 100."""
     if not steps:
         return steps
     most, share = max(steps.items(), key=operator.itemgetter(1))
@@ -173,13 +173,13 @@ def _forgotten(steps: dict[str, float]) -> dict[str, float]:
     return {**others, str(int(most) + 100): share}
 
 
-WHOLES: dict[str, Way] = {
-    "boxes exchanged": _reshared(_boxes_exchanged),
-    "a lost box won": _reshared(_lost_box_won),
-    "a won box lost": _reshared(_won_box_lost),
-    "all won": _reshared(_all_won),
-    "a border moved": _reshared(_border_moved),
-    "undecided hidden": _reshared(_undecided_hidden),
+CONSISTENT: dict[str, Change] = {
+    "boxes exchanged": _updated(_boxes_exchanged),
+    "a lost box won": _updated(_lost_box_won),
+    "a won box lost": _updated(_won_box_lost),
+    "all won": _updated(_all_won),
+    "a border moved": _updated(_border_moved),
+    "undecided hidden": _updated(_undecided_hidden),
     "another boundary": _another_boundary,
     "mirrored": _mirrored,
     "another policy": _another_policy,
@@ -188,4 +188,4 @@ WHOLES: dict[str, Way] = {
     "steps of one number": _steps(_of_one_number),
     "steps of another number": _steps(_forgotten),
 }
-"""By name."""
+"""Changes by name."""

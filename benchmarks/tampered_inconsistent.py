@@ -1,53 +1,54 @@
-"""Certificates with one part changed, so that it goes together no more or is of something else."""
+"""Changes that make a certificate inconsistent, or a certificate of another policy or task."""
 
 import copy
 from collections.abc import Callable
 from typing import Any
 
 Data = dict[str, Any]
-"""A certificate's content; each way takes it, may change it, and returns it."""
-Way = Callable[[Data], Data]
+"""Content of a certificate."""
+Change = Callable[[Data], Data]
+"""Return a changed certificate; the argument may be modified."""
 
 
 def largest(outcomes: list[Data]) -> Data:
-    """The outcome of the largest share."""
+    """Return the outcome with the largest share."""
     return max(outcomes, key=lambda outcome: outcome["share"])
 
 
-def _part(*keys: str, to: Any) -> Way:
-    """Replaces a value by another, or by what a function makes of it."""
+def _part(*keys: str, to: Any) -> Change:
+    """Replace a value by another, or by the result of a function."""
 
-    def way(data: Data) -> Data:
+    def change(data: Data) -> Data:
         part: Any = data
         for key in keys[:-1]:
             part = part[key]
         part[keys[-1]] = to(part[keys[-1]]) if callable(to) else to
         return data
 
-    return way
+    return change
 
 
-def _described(*keys: str, to: Any) -> Way:
+def _described(*keys: str, to: Any) -> Change:
     return _part("policy", "description", *keys, to=to)
 
 
-def _outcome(*keys: str, to: Any) -> Way:
-    """The same within the largest outcome."""
+def _outcome(*keys: str, to: Any) -> Change:
+    """Replace a value in the largest outcome."""
 
-    def way(data: Data) -> Data:
+    def change(data: Data) -> Data:
         _part(*keys, to=to)(largest(data["outcomes"]))
         return data
 
-    return way
+    return change
 
 
-def _boxes(change: Callable[[list[Any]], list[Any]]) -> Way:
-    """Puts other boxes for the largest outcome's first one."""
+def _boxes(change: Callable[[list[Any]], list[Any]]) -> Change:
+    """Replace the first box of the largest outcome by other boxes."""
     return _outcome("boxes", to=lambda boxes: [*change(boxes[0]), *boxes[1:]])
 
 
-def _first_side(change: Callable[[float, float], list[Any]]) -> Way:
-    """Puts another interval for the first one of this box."""
+def _first_side(change: Callable[[float, float], list[Any]]) -> Change:
+    """Replace the first interval of this box."""
     return _boxes(lambda box: [[change(*box[0]), *box[1:]]])
 
 
@@ -69,15 +70,15 @@ def _twice(data: Data) -> Data:
 
 
 def _split(data: Data) -> Data:
-    """One outcome told of as two, each of a half of every box."""
-    one = largest(data["outcomes"])
-    one["share"] /= 2
-    one["steps"] = {number: share / 2 for number, share in one["steps"].items()}
-    other = copy.deepcopy(one)
-    for mine, others in zip(one["boxes"], other["boxes"], strict=True):
-        middle = (mine[0][0] + mine[0][1]) / 2
-        mine[0][1] = others[0][0] = middle
-    return {**data, "outcomes": [*data["outcomes"], other]}
+    """Split an outcome into two, each with half of every box."""
+    first = largest(data["outcomes"])
+    first["share"] /= 2
+    first["steps"] = {number: share / 2 for number, share in first["steps"].items()}
+    second = copy.deepcopy(first)
+    for low, high in zip(first["boxes"], second["boxes"], strict=True):
+        middle = (low[0][0] + low[0][1]) / 2
+        low[0][1] = high[0][0] = middle
+    return {**data, "outcomes": [*data["outcomes"], second]}
 
 
 def _dropped_outcome(data: Data) -> Data:
@@ -85,11 +86,11 @@ def _dropped_outcome(data: Data) -> Data:
 
 
 def _unfinished(data: Data) -> Data:
-    """Finished though it is not can't be told from the file; the opposite can."""
+    """State "unfinished" if nothing is undecided; a false "finished" is not visible in the file."""
     return data if data["undecided"]["boxes"] else {**data, "finished": False}
 
 
-PARTS: dict[str, Way] = {
+INCONSISTENT: dict[str, Change] = {
     "share higher": _outcome("share", to=lambda share: min(1.0, share + 1e-9) - (share == 1) / 9),
     "share below zero": _outcome("share", to=-0.1),
     "share not a number": _outcome("share", to=float("nan")),
@@ -136,4 +137,4 @@ PARTS: dict[str, Way] = {
     "future version": _part("format_version", to=2),
     "another format": _part("format", to="drone_rl policy"),
 }
-"""By name."""
+"""Changes by name."""

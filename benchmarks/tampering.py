@@ -1,4 +1,4 @@
-"""Certificates that say what is not so, and how many of them the checker refuses."""
+"""Tampered certificates, and how many of them the checker refuses."""
 
 import copy
 import json
@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.tampered_consistent import WHOLES
-from benchmarks.tampered_inconsistent import PARTS
+from benchmarks.tampered_consistent import CONSISTENT
+from benchmarks.tampered_inconsistent import INCONSISTENT
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verification.check import check
@@ -27,21 +27,23 @@ TEXTS: dict[str, Callable[[bytes], bytes]] = {
         rb'"share": [^,]+', b'"share": 1' + b"0" * 999, text, count=1
     ),
 }
-"""What can be done to the file."""
+"""Changes of the file's bytes, by name."""
 
 
 def tampered(data: dict[str, Any]) -> Iterator[tuple[str, bytes]]:
-    """Files that lie, by name, no two alike; what can't be done to this certificate is left out.
+    """Yield names and contents of tampered files, without duplicates.
+
+    Changes that do not apply to this certificate are left out.
 
     Args:
-        data: Of a true certificate; left as it is.
+        data: Content of a valid certificate, which is not changed.
     """
-    true = json.dumps(data).encode()
-    ways = {**PARTS, **WHOLES}.items()
-    made = {name: json.dumps(way(copy.deepcopy(data))).encode() for name, way in ways}
-    made |= {name: change(true) for name, change in TEXTS.items()}
-    seen = {true}
-    for name, content in made.items():
+    valid = json.dumps(data).encode()
+    changes = {**INCONSISTENT, **CONSISTENT}.items()
+    files = {name: json.dumps(change(copy.deepcopy(data))).encode() for name, change in changes}
+    files |= {name: change(valid) for name, change in TEXTS.items()}
+    seen = {valid}
+    for name, content in files.items():
         if content not in seen:
             seen.add(content)
             yield name, content
@@ -50,15 +52,16 @@ def tampered(data: dict[str, Any]) -> Iterator[tuple[str, bytes]]:
 def count_refused(
     certificates: Mapping[Path, str | Path | None], few: int = 400, flights: int = 2000
 ) -> dict[str, Any]:
-    """Tampers with true certificates in all ways, and checks what comes of it.
+    """Tamper with valid certificates in all ways and check the results.
 
     Args:
-        certificates: Files, each with its policy; none takes the one that it names.
-        few: Flights after which most are refused.
-        flights: As many as `drone-rl check` flies, for those that are not.
+        certificates: Files and their policies; None means the policy that the file names.
+        few: Number of episodes of a first, short check.
+        flights: Number of episodes of a full check, if the short check accepts the file.
 
     Returns:
-        "tampered_refused", "tampered_total", and the "tampered_accepted" by name.
+        "tampered_refused" and "tampered_total", numbers of files, and "tampered_accepted", the
+        names of those that are accepted.
     """
     accepted, total = [], 0
     with tempfile.TemporaryDirectory() as folder:
@@ -77,7 +80,7 @@ def count_refused(
 
 
 def is_refused(path: Path, policy: str | Path | None = None, flights: int = 2000) -> bool:
-    """Whether the checker refuses a file, be it as none of its kind or as one that lies."""
+    """Return whether the checker refuses a file as invalid or as false."""
     try:
         return not check(path, policy, flights=flights, seed=0, progress=silent).accepted
     except InputError:

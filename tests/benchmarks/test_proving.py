@@ -1,4 +1,4 @@
-"""Benchmarks of proofs, in their short form: real proofs of one cube."""
+"""Quick benchmarks of proofs: real proofs for one cube."""
 
 import pytest
 
@@ -18,7 +18,7 @@ def test_tampered_certificates_are_refused(tmp_path):
     assert found["tampered_refused"] == found["tampered_total"] >= 20
 
 
-def test_more_cubes_than_there_is_time_for(tmp_path):
+def test_many_cubes_stops_at_the_time_limit(tmp_path):
     found = bench_many_cubes(tmp_path, 1.0, quick=True)
     assert found["proof_four"] == pytest.approx(found["proof_five"]) == pytest.approx(0.0)
     assert found["proof_four_s"] > 1.0

@@ -1,4 +1,4 @@
-"""Figures of trainings until proved: what is read of them."""
+"""Figures of trainings that stop when the policy is proved."""
 
 import json
 
@@ -6,7 +6,7 @@ from benchmarks import commands as running
 from benchmarks.proving import bench_provable
 
 
-def test_proved_runs_are_gathered(monkeypatch, tmp_path):
+def test_results_of_all_runs_are_collected(monkeypatch, tmp_path):
     commands = []
 
     def call(*command):

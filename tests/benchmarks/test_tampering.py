@@ -1,4 +1,4 @@
-"""How many lies the checker refuses: all."""
+"""The checker refuses all tampered certificates."""
 
 import json
 
@@ -9,7 +9,7 @@ from tests.verification.checker.making import of_one_cube
 
 
 def _by_hand():
-    """One cube, won up to y = 2, lost from y = 3; no flight was made for it."""
+    """Return a certificate for one cube: collected up to y = 2, lost from y = 3."""
     policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
     won = {"end": "all_cubes", "collected": [True], "loops": False, "share": 2 / 3}
     lost = {"end": "front_boundary", "collected": [False], "loops": False, "share": 0.25}
@@ -23,30 +23,30 @@ def _by_hand():
 CERTIFICATE = _by_hand()
 
 
-def test_there_are_enough_ways_and_names():
-    made = list(tampered(CERTIFICATE))
-    assert len({content for _, content in made}) == len(made) >= 60
-    assert {"cut in half", "a border moved", "hash changed"} <= {name for name, _ in made}
+def test_there_are_enough_different_files():
+    files = list(tampered(CERTIFICATE))
+    assert len({content for _, content in files}) == len(files) >= 60
+    assert {"cut in half", "a border moved", "hash changed"} <= {name for name, _ in files}
 
 
-def test_texts_by_hand():
+def test_changes_of_bytes_by_hand():
     assert TEXTS["cut in half"](b"{12345}") == b"{12"
     assert TEXTS["infinite share"](b'{"share": 0.5, "share": 1}') == b'{"share": 1e999, "share": 1}'
 
 
-def test_every_lie_about_a_true_certificate_is_refused(tmp_path):
-    true = tmp_path / "true.json"
-    true.write_text(json.dumps(of_one_cube("right_and_forward")))
-    assert not is_refused(true, flights=100)
-    found = count_refused({true: None}, few=200)
+def test_every_tampered_file_of_a_valid_certificate_is_refused(tmp_path):
+    valid = tmp_path / "valid.json"
+    valid.write_text(json.dumps(of_one_cube("right_and_forward")))
+    assert not is_refused(valid, flights=100)
+    found = count_refused({valid: None}, few=200)
     assert found["tampered_accepted"] == []
     assert found["tampered_refused"] == found["tampered_total"] >= 60
 
 
-def test_a_lie_that_passes_is_named(tmp_path, monkeypatch):
-    true = tmp_path / "true.json"
-    true.write_text(json.dumps(CERTIFICATE))
+def test_refused_files_are_counted(tmp_path, monkeypatch):
+    valid = tmp_path / "valid.json"
+    valid.write_text(json.dumps(CERTIFICATE))
     monkeypatch.setattr("benchmarks.tampering.is_refused", lambda *a: "hash" not in str(a))
     monkeypatch.setattr("benchmarks.tampering.tampered", lambda data: [("x", b"{}")])
-    found = count_refused({true: "good"})
+    found = count_refused({valid: "good"})
     assert found == {"tampered_refused": 1, "tampered_total": 1, "tampered_accepted": []}
