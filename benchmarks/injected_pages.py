@@ -1,8 +1,8 @@
-"""Pages of HTML into which one string was put wherever a string from a file can reach.
+"""HTML pages with one string at all places that a string of a file can reach.
 
-A string takes two ways to a page. Files are changed and read again, and what their readers accept
-is written into a page. And since readers refuse many strings, the templates are also called with
-values that no reader has checked, so that each string does reach the page.
+There are two kinds of pages. For one, files are changed and read again, and the page shows what
+the readers accept. Readers refuse many strings, so for the other kind the templates get values that
+no reader has checked.
 """
 
 import copy
@@ -28,16 +28,16 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.text import say
 
 Place = tuple[tuple[Any, ...], bool]
-"""Keys that lead to an entry, and whether its name is meant and not its value."""
+"""Path of keys to an entry, and whether the place is its name (else its value)."""
 PIXEL = "data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAA="
 _PROBE = "'\"<b x='>&"
-"""Stands for all payloads where places for them are looked for."""
+"""A string like the payloads, with which places are tested."""
 _LONG_PROBE = _PROBE.ljust(200, "x")
-"""Longer than any payload: some texts, such as dates, can hold the short ones alone."""
+"""A string longer than any payload; some texts, such as dates, accept short payloads only."""
 
 
 def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[Place]:
-    """Return where plain data holds a text: as the name of an entry or as a value."""
+    """Yield the places of texts in plain data: names of entries and values."""
     if isinstance(value, str):
         yield path, False
     items = value.items() if isinstance(value, Mapping) else ()
@@ -48,12 +48,12 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[Place]:
 
 
 def as_list(value: Any) -> list[Any]:
-    """Return a list as it is, and an empty one of anything else."""
+    """Return the argument if it is a list, else an empty list."""
     return value if isinstance(value, list) else []
 
 
 def put(value: Any, where: frozenset[Place], text: str, path: tuple[Any, ...] = ()) -> Any:
-    """Return a copy of plain data with a text in these places; names stay different."""
+    """Return a copy of plain data with a text at some places; names stay unique."""
     if isinstance(value, str):
         return text if (path, False) in where else value
     if isinstance(value, list):
@@ -73,21 +73,21 @@ def accepted(
     among: frozenset[Place] | None = None,
     probe: str = _PROBE,
 ) -> frozenset[Place]:
-    """Return all places, together, in which a text is no error; entries of the whole keep names.
+    """Return the places that accept a text at the same time. Top-level names are kept.
 
-    Places that differ in the number of a list's item alone are tried together.
+    Places that differ only in the index of a list's item are tested together.
 
     Args:
         value: Plain data.
-        works: Raises an error where a text is refused.
-        among: Places to try; all by default.
-        probe: The text that is tried.
+        works: Raises an error if a text is refused.
+        among: Places to test; all by default.
+        probe: Text to test.
     """
 
     def holds(where: frozenset[Place]) -> bool:
         try:
             works(put(value, where, probe))
-        except Exception:  # whatever a reader or a template makes of nonsense
+        except Exception:  # readers and templates can raise any error
             return False
         return True
 
@@ -109,18 +109,18 @@ def accepted(
     return kept
 
 
-class _Drawn(dict[str, str]):
-    """One pixel for each picture that a template asks for."""
+class _PixelImages(dict[str, str]):
+    """An image of one pixel under every name."""
 
     def __missing__(self, name: str) -> str:
         return PIXEL
 
 
 class _Forged(Explanation):
-    """An explanation whose terms and actions no reader has checked."""
+    """An explanation with unchecked terms and action names."""
 
     text: str = ""
-    made: TaskVocabulary | None = None
+    forged_terms: TaskVocabulary | None = None
 
     @property
     def name(self) -> str:
@@ -137,22 +137,22 @@ class _Forged(Explanation):
     @property
     def terms(self) -> TaskVocabulary:
         """See `Explanation`."""
-        if self.made is None:
+        if self.forged_terms is None:
             known = super().terms.as_dict()
             kept = [place for place in places(known) if not (place[1] and len(place[0]) == 1)]
-            self.made = TaskVocabulary(
+            self.forged_terms = TaskVocabulary(
                 **put(known, frozenset(kept if self.text else ()), self.text)
             )
-        return self.made
+        return self.forged_terms
 
 
 @dataclasses.dataclass(frozen=True)
 class _ForgedPolicy(Policy):
-    """Gives templates a text wherever they show one."""
+    """A policy that gives templates the payload for every text."""
 
     text: str = ""
     extras: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """What is known of a part by its title, and slow to make."""
+    """Extras of parts that are slow to compute, by title."""
 
     def show(self, part: Part) -> dict[str, Any]:
         """See `Policy`."""
@@ -167,7 +167,7 @@ class _ForgedPolicy(Policy):
             "name": explanation.name,
             "numbers": explanation.numbers,
             "actions": explanation.actions,
-            "pictures": _Drawn({} if extras.get("rows") == [] else {"shown": PIXEL}),
+            "pictures": _PixelImages({} if extras.get("rows") == [] else {"shown": PIXEL}),
             "text": sentences,
             "terms": explanation.terms,
             "extras": extras,
@@ -175,7 +175,7 @@ class _ForgedPolicy(Policy):
 
 
 def _everywhere(extras: Mapping[str, Any], text: str) -> dict[str, Any]:
-    """A text as each value that is a text, but for a picture; and as frames' steps and episodes."""
+    """Replace all texts but images by the payload, and the steps and episodes of frames."""
     where = {place for place in places(extras) if not place[1] and "sprite" not in place[0]}
     forged = put(extras, frozenset(where), text)
     if "points" in forged:
@@ -186,12 +186,12 @@ def _everywhere(extras: Mapping[str, Any], text: str) -> dict[str, Any]:
 
 
 _OPEN = {"ends", "baselines", "terms", "provenance", "versions", "settings", "seconds", "shares"}
-"""Mappings of which pages show the names of all entries."""
+"""Mappings whose keys are shown on pages."""
 
 
 @functools.cache
 def _sources() -> frozenset[str]:
-    """All words of the code that makes reports; an entry that it asks for must keep its name."""
+    """Return all words in the source of reports; entries with such a name must keep it."""
     root = resources.files("drone_rl")
     files = [
         file
@@ -213,22 +213,22 @@ def _is_tried(place: Place, names: bool) -> bool:
 
 
 _MORE = {"left_out": {"embedding": "why"}, "shifts": {"refused": "why"}, "other": {"name": "text"}}
-"""Parts of the page that not every explanation has."""
+"""Optional parts of an explanation."""
 
 
 class Pages:
-    """Makes pages out of an explanation and a summary of a sweep."""
+    """Pages of an explanation and a sweep with an inserted text."""
 
     def __init__(
         self, explanation: Path, summary: Mapping[str, Any], folder: Path, *, names: bool = True
     ) -> None:
-        """Looks for all places in which a text is accepted.
+        """Find all places that accept a text.
 
         Args:
-            explanation: Folder of one.
-            summary: As `sweeps.summary.summarise_sweep` makes it.
-            folder: For files; made if need be.
-            names: Whether names of entries are replaced, too, which takes half a minute to find.
+            explanation: Folder of an explanation.
+            summary: Result of `sweeps.summary.summarise_sweep`.
+            folder: Folder of the files; created if missing.
+            names: Whether to replace names of entries, too; finding them takes half a minute.
         """
         (folder / "figures").mkdir(parents=True, exist_ok=True)
         self._folder, self._source = folder, explanation
@@ -245,15 +245,15 @@ class Pages:
         self.of_long = accepted(numbers, self._read, self.of_files, _LONG_PROBE)
         self.of_sweeps = accepted(self._summary, lambda s: render_sweep("x", s, []))
 
-    def made(self, text: str) -> dict[str, str]:
-        """Return the pages that hold a text, by name."""
+    def inject(self, text: str) -> dict[str, str]:
+        """Return the pages with a text at all places, by name."""
         numbers = self._known.numbers
         picture = {"title": text, "text": text, "light": PIXEL, "dark": PIXEL}
         other = {text: {text: text}}
         forged = self._report({**put(numbers, self.of_templates, text), **other}, text)
         try:
             read = self._read({**put(numbers, self.of_files, text), **other})
-        except InputError:  # too long for one of the places
+        except InputError:  # too long for one place
             read = self._read({**put(numbers, self.of_long, text), **other})
         sweep = render_sweep(text, put(self._summary, self.of_sweeps, text), [picture])
         return {
@@ -270,16 +270,16 @@ class Pages:
         forged = _Forged(numbers, known.arrays, known.data, text or known.source)
         forged.text = text
         figures = self._folder / "figures"
-        made = render_page([_ForgedPolicy(forged, figures, "x", text, self._extras)])
-        if made.count("<section") < self._sections:
-            raise InputError("a part of the page is missing")
-        return made
+        html = render_page([_ForgedPolicy(forged, figures, "x", text, self._extras)])
+        if html.count("<section") < self._sections:
+            raise InputError("a section of the page is missing")
+        return html
 
     def _read(self, numbers: dict[str, Any]) -> dict[str, Any]:
-        """What the reader of files makes of the numbers.
+        """Write the numbers to a file and return what the reader accepts.
 
         Raises:
-            InputError: It refuses them.
+            InputError: The reader refuses them.
         """
         target = self._folder / "changed"
         if not target.exists():
@@ -292,11 +292,11 @@ _BARE = "<!doctype html><html><head><title>notebook</title></head><body>{}</body
 
 
 def without_policy(html: str) -> str:
-    """Return a page without its Content-Security-Policy: escaping alone has to hold."""
+    """Return a page without its content security policy, to test escaping alone."""
     start = html.index("<meta http-equiv")
     return html[:start] + html[html.index(">", start) + 1 :]
 
 
 def with_markup(html: str, text: str) -> str:
-    """Return a page that holds a text as markup: the policy alone has to hold."""
+    """Return a page with a text as markup, to test the content security policy alone."""
     return html.replace("</nav>", f"</nav>{Markup(text)}", 1)

@@ -1,9 +1,9 @@
-"""`drone-rl bench injections`: strings that would run a script are put into every page.
+"""Script injection: no string from a file may run on a page.
 
-Each string is put wherever a string of a file can reach, see `injected_pages.py`. The pages are
-opened in Chromium, and everything on them is pointed at and clicked. A string has run if it changed
-the document, opened a dialog, asked for something outside the page, or if the page's policy had to
-stop it: a string that is text needs no stopping.
+Each payload is inserted at all places of a page that a string of a file can reach, see
+`injected_pages.py`. Chromium opens the pages, and the pointer hovers over and clicks every element.
+A payload has run if it changed the document, opened a dialog, or sent a request, or if the page's
+content security policy blocked it: escaped text triggers no policy.
 """
 
 import json
@@ -17,9 +17,9 @@ from typing import Any
 from drone_rl.utils.errors import InputError, extra
 
 RAN = "document.documentElement.dataset.ran=1"
-"""What a payload runs."""
+"""Script of the payloads."""
 HOST = "ran.invalid"
-"""That no page may ask for anything."""
+"""Host of the payloads; no page may send a request to it."""
 
 _ELEMENTS = (
     f"<script>{RAN}</script>",
@@ -71,7 +71,7 @@ _ELEMENTS = (
     f"<noscript><p title='</noscript><img src=x onerror={RAN}>'>",
     f"<x onclick={RAN} onmousemove={RAN} onpointermove={RAN}>x</x>",
 )
-"""Elements, for where a string is put as markup."""
+"""Elements, for strings that are inserted as markup."""
 _BREAKS = (
     f"</script><script>{RAN}</script>",
     f"</script ><img src=x onerror={RAN}>",
@@ -96,7 +96,7 @@ _BREAKS = (
     f'\\";{RAN};//',
     f'"}});{RAN};({{"',
 )
-"""For where a string is put into an attribute, a script, a style sheet or a comment."""
+"""Payloads that end an attribute, a script, a style sheet or a comment."""
 _OTHERS = (
     f"javascript:{RAN}",
     f"JaVaScRiPt:{RAN}//",
@@ -113,14 +113,14 @@ _OTHERS = (
     f"\uff1cscript\uff1e{RAN}\uff1c/script\uff1e",
     f"__proto__<img src=x onerror={RAN}>",
 )
-"""For links, style sheets, templates, and for text that is decoded twice."""
+"""Payloads for links, style sheets, templates, and for text that is decoded twice."""
 PAYLOADS = (*_ELEMENTS, *_BREAKS, *_OTHERS)
-"""All of them; each is one line of printable characters, as readers of files demand."""
+"""All payloads; each is one line of printable characters, as readers of files require."""
 MARKUP = _ELEMENTS
-"""Those that a page would have to be protected from if they did reach it as markup."""
+"""Payloads that the page's policy must block if they are inserted as markup."""
 
 
-_TRY = """
+_INTERACT = """
 document.querySelectorAll("details").forEach(d => { d.open = true; });
 const click = (element, kinds) => {
   const box = element.getBoundingClientRect();
@@ -143,26 +143,26 @@ const bad = "[onerror], [onload], [onclick], iframe:not([srcdoc]), object, embed
   "meta[http-equiv=refresh], a[href^=javascript i], a[href^='//'], a[href^=http]";
 return document.querySelectorAll(bad).length;
 """
-"""Points at everything and clicks it; returns how many elements there are that might run."""
-_LATER = "setTimeout(() => arguments[0](document.documentElement.dataset.ran || ''), 60)"
-"""Returns whether something has run until a little later."""
+"""Hover over and click every element; return the number of elements that can run a script."""
+_HAS_RUN = "setTimeout(() => arguments[0](document.documentElement.dataset.ran || ''), 60)"
+"""Return after 60 ms whether a script has run."""
 _log = logging.getLogger(__name__)
 _NAVIGATES = ("http-equiv=refresh", "rel=preconnect", "rel=prefetch")
-"""Markup that no policy of a page can stop; only escaping can."""
+"""Markup that a content security policy can't block; only escaping prevents it."""
 
 
 def bench_injections(folder: Path, explanation: Path | None = None) -> dict[str, int]:
-    """Open every page with every string.
+    """Open every page with every payload.
 
     Args:
-        folder: For files; made if need be.
-        explanation: Folder of an explanation; one of the package's policy is made by default.
+        folder: Folder of the files; created if missing.
+        explanation: Folder of an explanation; by default a shipped policy is explained.
 
     Returns:
-        "injections_run" and "injections_total", a string on a page each.
+        "injections_run" and "injections_total", numbers of pairs of a payload and a page.
 
     Raises:
-        InputError: There is no Chromium with its driver.
+        InputError: Chromium or its driver is not installed.
     """
     outcomes = open_all(folder, explanation or explained(folder), PAYLOADS)
     for outcome in outcomes:
@@ -175,38 +175,40 @@ def bench_injections(folder: Path, explanation: Path | None = None) -> dict[str,
 
 
 def explained(folder: Path) -> Path:
-    """Explain a policy of the package on few frames. Returns the explanation's folder."""
+    """Explain a shipped policy on few frames; return the explanation's folder."""
     from drone_rl.explanations.explain import explain
     from drone_rl.explanations.settings import ExplainSettings
 
     few = ExplainSettings(frames=180, episodes=6, perplexity=5)
-    made = explain("good", few, folder=folder / "explained", num_envs=8, outputs=folder)
-    return next(made.folder.glob("*/explanation.json")).parent
+    result = explain("good", few, folder=folder / "explained", num_envs=8, outputs=folder)
+    return next(result.folder.glob("*/explanation.json")).parent
 
 
 def open_all(
     folder: Path, explanation: Path, payloads: Iterable[str], *, names: bool = True
 ) -> list[dict[str, Any]]:
-    """Open the pages of some strings.
+    """Open all pages with some payloads.
 
     Args:
-        folder: For files; made if need be.
+        folder: Folder of the files; created if missing.
         explanation: Folder of an explanation.
-        payloads: The strings.
+        payloads: Payloads to insert.
         names: See `Pages`.
 
     Returns:
-        Of each its "page", "payload" and "ran", which says what ran; empty if nothing did.
+        For each page and payload "page", "payload" and "ran" (what ran; empty if nothing did).
     """
     from benchmarks.injected_pages import Pages, with_markup
 
     pages, outcomes = Pages(explanation, summary(folder), folder, names=names), []
     with chromium(folder / "profile") as browser:
         for payload in payloads:
-            made = pages.made(payload)
+            injected = pages.inject(payload)
             if payload in MARKUP and not any(name in payload for name in _NAVIGATES):
-                made["markup_under_policy"] = with_markup(pages.made("text")["report"], payload)
-            for name, html in made.items():
+                injected["markup_under_policy"] = with_markup(
+                    pages.inject("text")["report"], payload
+                )
+            for name, html in injected.items():
                 path = folder / "page.html"
                 path.write_text(html, encoding="utf-8")
                 ran = what_ran(browser, path, is_markup=name == "markup_under_policy")
@@ -240,10 +242,10 @@ def chromium(profile: Path) -> Iterator[Any]:
     """Start a headless Chromium.
 
     Args:
-        profile: Its folder.
+        profile: Folder of the browser's profile.
 
     Raises:
-        InputError: It or its driver is not installed.
+        InputError: Chromium or its driver is not installed.
     """
     webdriver = extra("selenium.webdriver", "dev", "bench injections")
     program = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -271,13 +273,13 @@ def chromium(profile: Path) -> Iterator[Any]:
 
 
 def what_ran(browser: Any, path: Path, *, is_markup: bool = False) -> str:
-    """Open a page and try everything on it.
+    """Open a page and interact with every element.
 
     Args:
-        browser: From `chromium`.
-        path: Of the page.
-        is_markup: Whether the string is markup on this page on purpose, so that the policy may
-            stop it; else nothing may be stopped.
+        browser: Result of `chromium`.
+        path: Path of the page.
+        is_markup: Whether the payload is inserted as markup on purpose. If so, the page's policy
+            may block it; else a blocked payload counts as run.
 
     Returns:
         What ran; empty if nothing did.
@@ -293,8 +295,8 @@ def what_ran(browser: Any, path: Path, *, is_markup: bool = False) -> str:
     found: list[str] = []
     try:
         browser.get(path.absolute().as_uri())
-        elements = browser.execute_script(_TRY)
-        ran = browser.execute_async_script(_LATER)  # errors of images come late
+        elements = browser.execute_script(_INTERACT)
+        ran = browser.execute_async_script(_HAS_RUN)  # image errors are asynchronous
         found += ["a script"] if ran else []
         found += [f"{elements} elements"] if elements and not is_markup else []
     except UnexpectedAlertPresentException:
@@ -315,7 +317,7 @@ def what_ran(browser: Any, path: Path, *, is_markup: bool = False) -> str:
 
 
 def _requests(messages: Sequence[dict[str, Any]], path: Path) -> list[str]:
-    """Addresses outside the page that were asked for, and not blocked before anything was sent."""
+    """Return the URLs outside the page that were requested and not blocked before sending."""
     failed = [m["params"] for m in messages if m["method"] == "Network.loadingFailed"]
     stopped = {of["requestId"] for of in failed if of.get("blockedReason")}
     sent = [m["params"] for m in messages if m["method"] == "Network.requestWillBeSent"]

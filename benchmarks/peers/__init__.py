@@ -1,1 +1,1 @@
-"""What a user would pick instead, on the same worlds, with the same network, beside ours."""
+"""Third-party learners in the same environments with the same network, for comparison."""

@@ -1,4 +1,4 @@
-"""Our learners and what a user would pick instead, one after the other on the same machine."""
+"""Compare this project's learners with third-party learners on the same machine."""
 
 import functools
 import json
@@ -19,25 +19,26 @@ Measured = dict[str, Any]
 
 
 def bench_peers(folder: Path, seeds: Sequence[int], episodes: int, quick: bool) -> dict[str, Any]:
-    """Trains with each from each seed until it is solved, and judges by held-out episodes.
+    """Train each learner from each seed until solved, and evaluate it on held-out episodes.
 
-    Ours is the whole command, its end and its files included; of a peer, what comes after it is
-    solved does not count. Each is started once beforehand, so that none reads files from the disk
-    for the others; and all of a seed come one after the other, so that a machine that becomes
-    slower does so for all.
+    The time of this project's learners is that of the whole command with all its files. The time of
+    a third-party training ends when the task is solved. Each learner is started once beforehand, so
+    that all have their files in the disk cache. The learners alternate for each seed, so that a
+    drift of the machine's speed affects all of them.
 
     Args:
-        folder: For the runs, and above it for the picture.
-        seeds: Of worlds, weights and actions.
-        episodes: Held-out ones.
-        quick: Whether a few frames will do.
+        folder: Folder of the runs; the plot is written two levels above.
+        seeds: Seeds of environments, weights and actions.
+        episodes: Number of held-out episodes.
+        quick: Whether to train only a few frames.
 
     Returns:
         "peers": by name, lists by seed of "seconds" from the start of the process,
         "seconds_without_imports", "frames", "is_solved", "success_lower95".
-        "solve_over_best_peer": the mean of our default's "seconds" over the best other's.
+        "solve_over_best_peer": mean "seconds" of the default divided by that of the fastest
+        third-party learner.
     """
-    if not quick:  # or the first would read all files from the disk for the others
+    if not quick:  # fill the disk cache
         for start in _trainings(folder / "starts", 0, quick=True).values():
             start(seed=seeds[0])
     trainings = _trainings(folder, episodes, quick)
@@ -53,7 +54,7 @@ def bench_peers(folder: Path, seeds: Sequence[int], episodes: int, quick: bool) 
 
 
 def _trainings(folder: Path, episodes: int, quick: bool) -> dict[str, Callable[..., Measured]]:
-    """A training by each, of a seed."""
+    """Return functions that train with each learner from a seed."""
     trainings: dict[str, Callable[..., Measured]] = {}
     for name, arguments in OURS.items():
         short = ("trainer.total_frames=1",) if quick else ()
@@ -69,13 +70,13 @@ def _trainings(folder: Path, episodes: int, quick: bool) -> dict[str, Callable[.
 
 
 def train_ours(arguments: Sequence[str], *, seed: int, episodes: int, folder: Path) -> Measured:
-    """One training by `drone-rl train`.
+    """Run one training by `drone-rl train`.
 
     Args:
-        arguments: Of the command.
-        seed: Of worlds, weights and actions.
-        episodes: Held-out ones to fly afterwards; 0 for none.
-        folder: For the runs.
+        arguments: Overrides of the command.
+        seed: Seed of environments, weights and actions.
+        episodes: Number of held-out episodes; 0 for no evaluation.
+        folder: Folder of the runs.
     """
     run = folder / str(seed)
     seconds, result = train(run, *arguments, f"seed={seed}")
@@ -91,23 +92,23 @@ def train_ours(arguments: Sequence[str], *, seed: int, episodes: int, folder: Pa
 def train_theirs(
     name: str, settings: Mapping[str, Any], *, seed: int, episodes: int, max_frames: int
 ) -> Measured:
-    """One training by others.
+    """Run one third-party training.
 
     Args:
-        name: Of the peer.
-        settings: Of it.
-        seed: Of worlds, weights and actions.
-        episodes: Held-out ones to fly afterwards; 0 for none.
-        max_frames: It stops after so many in any case.
+        name: Name of the learner.
+        settings: Settings of the learner.
+        seed: Seed of environments, weights and actions.
+        episodes: Number of held-out episodes; 0 for no evaluation.
+        max_frames: Stop after this number of frames in any case.
 
     Raises:
-        RuntimeError: It failed.
+        RuntimeError: The training failed.
     """
     options = {"seed": seed, "episodes": episodes, "max-frames": max_frames}
     options |= {"settings": json.dumps(dict(settings)), "started": time.time()}
-    words = [f"--{key}={value}" for key, value in options.items()]
+    arguments = [f"--{key}={value}" for key, value in options.items()]
     program = [sys.executable, "-m", "benchmarks.peers.program", name]
-    done = subprocess.run([*program, *words], capture_output=True, text=True, check=False)
+    done = subprocess.run([*program, *arguments], capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(f"{name} failed: {done.stderr.strip()[-500:]}")
     return json.loads(done.stdout.splitlines()[-1])

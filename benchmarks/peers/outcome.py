@@ -1,20 +1,20 @@
-"""What comes of a training by anybody, and when it is called solved."""
+"""Result of a third-party training, and the criterion for solving the task."""
 
 import dataclasses
 
 from drone_rl.policies.external_policy import ForeignPolicy
 
 TARGET, DECAY = 2.97, 0.99
-"""Of the running mean of the episodes' rewards, which begins at 0; and what an episode leaves."""
+"""Target and decay of the running mean of episode rewards, which starts at 0."""
 
 
 @dataclasses.dataclass(frozen=True)
 class PeerTraining:
-    """What came of a training."""
+    """Result of a training."""
 
     is_solved: bool
     """Whether the running mean has reached the target."""
     frames: int
     running_reward: float
     policy: ForeignPolicy
-    """The policy, to be judged in worlds that it was not trained in."""
+    """The trained policy, for evaluation in held-out environments."""

@@ -1,4 +1,4 @@
-"""A picture of who takes how long."""
+"""Bar chart of the training times."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,11 +14,11 @@ COLORS = {
 
 
 def plot(found: Mapping[str, Mapping[str, list[Any]]], path: Path) -> None:
-    """Draws a bar for each, with a dot for each seed.
+    """Plot a bar for each learner and a dot for each seed.
 
     Args:
-        found: As `bench_peers` returns it.
-        path: Of the picture.
+        found: "peers" of `bench_peers`.
+        path: Path of the image.
     """
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch

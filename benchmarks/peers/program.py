@@ -1,10 +1,10 @@
-"""One training of a peer in a process of its own, so that its start counts.
+"""Run one third-party training in a separate process, so that start-up time counts.
 
     python -m benchmarks.peers.program sb3_ppo --seed 100 --started "$(date +%s.%N)"
 
-It prints a line of JSON: "seconds" from the start of the process until it is solved,
-"seconds_without_imports", "frames", "is_solved", and of as many held-out greedy episodes as were
-asked for "success_lower95".
+It prints one line of JSON: "seconds" from the start of the process until solved,
+"seconds_without_imports", "frames", "is_solved", and, if `--episodes` is given, "success_lower95"
+in held-out greedy episodes.
 """
 
 import argparse
@@ -35,60 +35,62 @@ PEERS: dict[str, Callable[[], Callable[..., Any]]] = {
     "sb3_a2c": lambda: _sb3("a2c"),
     "torchrl": _torchrl,
 }
-"""By name, what imports how it is trained."""
+"""By name, functions that import a library and return its training function."""
 
 
 def measure(arguments: Sequence[str]) -> dict[str, Any]:
-    """Trains, and looks at the clock.
+    """Train and measure the time.
 
     Args:
-        arguments: Of the program.
+        arguments: Arguments of the program.
 
     Returns:
-        What it prints.
+        The printed values.
 
     Raises:
-        InputError: Something isn't installed, or a setting can't be.
+        InputError: A library is not installed, or a setting is invalid.
     """
     began = time.time()
-    given = _parser().parse_args(arguments)
-    settings, train = json.loads(given.settings), PEERS[given.peer]()
+    options = _parser().parse_args(arguments)
+    settings, train = json.loads(options.settings), PEERS[options.peer]()
     imported = time.time()
-    done = train(given.seed, max_frames=given.max_frames, **settings)
+    done = train(options.seed, max_frames=options.max_frames, **settings)
     solved = time.time()
     found = {
-        "seconds": solved - (began if given.started is None else given.started),
+        "seconds": solved - (began if options.started is None else options.started),
         "seconds_without_imports": solved - imported,
         "frames": done.frames,
         "is_solved": done.is_solved,
     }
-    if given.episodes:
-        found["success_lower95"] = success_lower95(done.policy, given.episodes)
+    if options.episodes:
+        found["success_lower95"] = success_lower95(done.policy, options.episodes)
     return found
 
 
 def success_lower95(policy: Any, episodes: int) -> float:
-    """Lower end of the exact 95% interval of the share of held-out episodes with all cubes.
+    """Return the lower bound of the exact 95% interval of the held-out success rate.
 
     Args:
-        policy: What `drone_rl.evaluate` takes.
-        episodes: To fly, greedily.
+        policy: Policy, as for `drone_rl.evaluate`.
+        episodes: Number of greedy episodes.
     """
     from drone_rl.evaluation.evaluate import evaluate
     from drone_rl.utils.progress import silent
 
-    flown = evaluate(policy, episodes=episodes, seed=0, baselines=False, progress=silent).flown
-    return flown["greedy"]["success"]["lower95"]
+    result = evaluate(policy, episodes=episodes, seed=0, baselines=False, progress=silent)
+    return result.flown["greedy"]["success"]["lower95"]
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.peers.program")
     parser.add_argument("peer", choices=PEERS)
-    parser.add_argument("--seed", type=int, default=0, help="of worlds, weights and actions")
-    parser.add_argument("--started", type=float, help="when the process began, as time.time()")
-    parser.add_argument("--episodes", type=int, default=0, help="held-out ones to fly afterwards")
-    parser.add_argument("--max-frames", type=int, default=1_000_000, help="to stop after")
-    parser.add_argument("--settings", default="{}", help="of the peer's function: JSON")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="seed of environments, weights, actions"
+    )
+    parser.add_argument("--started", type=float, help="time.time() at process start")
+    parser.add_argument("--episodes", type=int, default=0, help="number of held-out episodes")
+    parser.add_argument("--max-frames", type=int, default=1_000_000, help="limit of frames")
+    parser.add_argument("--settings", default="{}", help="settings of the learner as JSON")
     return parser
 
 

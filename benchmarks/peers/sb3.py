@@ -1,4 +1,4 @@
-"""Stable-Baselines3's algorithms on our worlds, with the default's network, until it is solved."""
+"""Train Stable-Baselines3's algorithms with the default network until the task is solved."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -21,21 +21,21 @@ from drone_rl.training.trainer import running_mean
 from drone_rl.utils.errors import InputError
 
 ALGORITHMS: Mapping[str, type[OnPolicyAlgorithm]] = MappingProxyType({"ppo": PPO, "a2c": A2C})
-"""By name."""
+"""Algorithms by name."""
 NUM_ENVS = 64
 TRANSFORMS: tuple[Transform, ...] = (Gray(), Standardize())
-"""What the default's network sees."""
+"""Transforms of the default network's observations."""
 
 
 class Solved(BaseCallback):
-    """Stops a training once the running mean of the episodes' rewards has reached a target."""
+    """Stop a training when the running mean of episode rewards reaches a target."""
 
     def __init__(self, target: float, decay: float = DECAY) -> None:
-        """Begins at 0.
+        """Start the running mean at 0.
 
         Args:
-            target: Of the running mean.
-            decay: What an episode leaves of it.
+            target: Target of the running mean.
+            decay: Decay of the running mean for each episode.
         """
         super().__init__()
         self.target, self.decay = target, decay
@@ -48,7 +48,7 @@ class Solved(BaseCallback):
         return self.running_reward >= self.target
 
     def count(self, rewards: np.ndarray, done: np.ndarray) -> None:
-        """Adds a step. Shapes: (num_envs,)."""
+        """Add a step. Shapes: (num_envs,)."""
         self._earned = self._earned + rewards
         ended = torch.from_numpy(self._earned[done])
         self.running_reward = running_mean(self.running_reward, ended, self.decay)
@@ -70,19 +70,19 @@ def train_sb3(
     max_frames: int = 1_000_000,
     **settings: Any,
 ) -> PeerTraining:
-    """Trains until the running mean of the episodes' rewards has reached a target.
+    """Train until the running mean of episode rewards reaches a target.
 
     Args:
         algorithm: "ppo" or "a2c".
-        seed: Of worlds, weights and actions.
-        environment: Gymnasium's name of the worlds.
-        num_envs: Worlds in a batch.
-        target: Of the running mean.
-        max_frames: It stops after so many in any case.
-        settings: Of the algorithm.
+        seed: Seed of environments, weights and actions.
+        environment: Gymnasium ID of the environment.
+        num_envs: Number of environments.
+        target: Target of the running mean.
+        max_frames: Stop after this number of frames in any case.
+        settings: Settings of the algorithm.
 
     Raises:
-        InputError: There is no such algorithm.
+        InputError: The algorithm is unknown.
     """
     if algorithm not in ALGORITHMS:
         raise InputError(f"algorithm={algorithm!r} is unknown; give {', '.join(ALGORITHMS)}")
@@ -90,7 +90,7 @@ def train_sb3(
     assert isinstance(worlds, DroneWorlds)
     env, solved = Sb3Worlds(worlds, TRANSFORMS), Solved(target)
     model = ALGORITHMS[algorithm](
-        "MlpPolicy",  # of which the trunk and the heads are all that is left
+        "MlpPolicy",  # only its trunk and heads are used
         env,
         seed=seed,
         policy_kwargs={"features_extractor_class": Sb3Trunk, "net_arch": []},
@@ -98,12 +98,12 @@ def train_sb3(
         **settings,
     )
     model.learn(max_frames, callback=solved)
-    stage = worlds.batch
+    batch = worlds.batch
     env.close()
     policy = policy_from(
         Sb3Logits(model),
-        task=stage.worlds.task,
-        camera=stage.worlds.camera,
+        task=batch.worlds.task,
+        camera=batch.worlds.camera,
         transforms=TRANSFORMS,
         name=f"sb3 {algorithm}",
     )

@@ -1,4 +1,4 @@
-"""Who is measured, and with which settings; `python -m tools.tuning` is how they were found."""
+"""Settings of the compared learners, found by `python -m tools.tuning`."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -11,7 +11,7 @@ OURS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "ppo": ("objective=ppo", "objective.epochs=1", "optimiser.lr=3e-3"),
     }
 )
-"""Arguments of `drone-rl train`."""
+"""Overrides of `drone-rl train` for this project's learners."""
 THEIRS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {
         "sb3_ppo": {
@@ -26,7 +26,7 @@ THEIRS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         "torchrl": {"num_envs": 32, "steps": 150, "lr": 3e-3},
     }
 )
-"""Where they differ from their own defaults."""
+"""Settings of third-party learners that differ from their defaults."""
 LABELS: Mapping[str, str] = MappingProxyType(
     {
         "reinforce": "drone_rl, REINFORCE (default)",
@@ -37,4 +37,4 @@ LABELS: Mapping[str, str] = MappingProxyType(
         "torchrl": "TorchRL's Collector, REINFORCE",
     }
 )
-"""For people."""
+"""Labels in figures and tables."""

@@ -1,4 +1,4 @@
-"""The example that trains with nothing but TorchRL's own collector, until it is solved."""
+"""Train with TorchRL's collector, by an example of the repository, until the task is solved."""
 
 import importlib.util
 from pathlib import Path
@@ -10,22 +10,22 @@ from drone_rl.policies.external_policy import policy_from
 from drone_rl.utils.errors import InputError
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "train_with_torchrl.py"
-"""Which does not travel with the package."""
+"""The example; it is not part of the package."""
 
 
 def train_torchrl(
     seed: int, *, target: float = TARGET, max_frames: int = 1_000_000, **settings: Any
 ) -> PeerTraining:
-    """Trains until the running mean of the episodes' rewards has reached a target.
+    """Train until the running mean of episode rewards reaches a target.
 
     Args:
-        seed: Of worlds, weights and actions.
-        target: Of the running mean.
-        max_frames: It stops after so many in any case.
-        settings: Of the example.
+        seed: Seed of environments, weights and actions.
+        target: Target of the running mean.
+        max_frames: Stop after this number of frames in any case.
+        settings: Settings of the example.
 
     Raises:
-        InputError: The example is not there.
+        InputError: The example does not exist.
     """
     done = _example().train(seed=seed, target=target, max_frames=max_frames, **settings)
     reached = done.running_reward >= target
@@ -36,7 +36,9 @@ def train_torchrl(
 def _example() -> ModuleType:
     spec = importlib.util.spec_from_file_location("train_with_torchrl", EXAMPLE)
     if not EXAMPLE.is_file() or spec is None or spec.loader is None:
-        raise InputError(f"{EXAMPLE} is not there; measure in a clone of the repository")
+        raise InputError(
+            f"{EXAMPLE} does not exist; run the benchmark in a clone of the repository"
+        )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -1,4 +1,4 @@
-"""Where a text can be put, and what pages are made of it."""
+"""Places for texts, and pages with an inserted text."""
 
 from benchmarks.injected_pages import (
     _LONG_PROBE,
@@ -13,7 +13,7 @@ from benchmarks.injections import PAYLOADS
 PLAIN = {"a": "x", "b": [{"kind": "good", "free": 1}, {"kind": "poor", "free": 2}]}
 
 
-def test_places_are_names_and_values_that_are_texts():
+def test_places_are_names_and_text_values():
     found = set(places(PLAIN))
     assert ((("a",), True)) in found and ((("a",), False)) in found
     assert (("b", 0, "kind"), False) in found and (("b", 0, "free"), True) in found
@@ -21,7 +21,7 @@ def test_places_are_names_and_values_that_are_texts():
     assert len(found) == 2 + 1 + 2 * 3
 
 
-def test_a_text_is_put_where_it_is_asked_for_and_names_stay_different():
+def test_put_replaces_texts_at_places_and_keeps_names_unique():
     where = frozenset({(("a",), False), (("b", 1, "kind"), True), (("b", 1, "free"), True)})
     assert put(PLAIN, where, "T") == {
         "a": "T",
@@ -29,7 +29,7 @@ def test_a_text_is_put_where_it_is_asked_for_and_names_stay_different():
     }
 
 
-def test_places_that_work_are_kept_together():
+def test_accepted_returns_places_that_accept_a_text_together():
     def works(value):
         for item in value["b"]:
             assert item["kind"] in ("good", "poor")
@@ -38,7 +38,7 @@ def test_places_that_work_are_kept_together():
     assert kept == {(("a",), False), (("b", 0, "free"), True), (("b", 1, "free"), True)}
 
 
-def test_places_for_short_texts_alone_are_known():
+def test_places_for_short_texts_only_are_found():
     def works(value):
         assert len(value["a"]) < 40
 
@@ -47,7 +47,7 @@ def test_places_for_short_texts_alone_are_known():
     assert len(_LONG_PROBE) > max(map(len, PAYLOADS))
 
 
-def test_pages_are_robbed_of_one_defence_each():
+def test_pages_without_policy_and_without_escaping():
     page = '<head><meta http-equiv="Content-Security-Policy" content="x"></head><nav></nav>'
     assert without_policy(page) == "<head></head><nav></nav>"
     assert "<nav></nav><b>x" in with_markup(page, "<b>x")

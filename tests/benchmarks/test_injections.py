@@ -1,4 +1,4 @@
-"""What would run on a page is noticed, and on ours nothing runs."""
+"""Scripts that run on a page are detected, and none runs on the program's pages."""
 
 import shutil
 
@@ -33,14 +33,14 @@ def browser(tmp_path_factory):
         ("<base href=http://ran.invalid/>", "1 elements"),
     ],
 )
-def test_what_runs_on_a_page_is_noticed(browser, tmp_path, content, ran):
+def test_scripts_and_requests_are_detected(browser, tmp_path, content, ran):
     page = tmp_path / "page.html"
     page.write_text(f"<!doctype html><html><head></head><body>{content}</body></html>")
     found = injections.what_ran(browser, page)
     assert found.startswith(ran) if content.startswith("<p>") is False else found == ""
 
 
-def test_what_the_policy_stops_is_noticed_where_the_string_should_have_been_text(browser, tmp_path):
+def test_a_blocked_script_is_detected_unless_it_is_markup_on_purpose(browser, tmp_path):
     page = tmp_path / "page.html"
     policy = "<meta http-equiv=Content-Security-Policy content=\"default-src 'none'\">"
     page.write_text(f"<html><head>{policy}</head><body><script>{RAN}</script></body></html>")
@@ -49,7 +49,7 @@ def test_what_the_policy_stops_is_noticed_where_the_string_should_have_been_text
 
 
 @pytest.mark.slow
-def test_nothing_runs_on_our_pages(explanations, tmp_path):  # noqa: F811
+def test_nothing_runs_on_the_programs_pages(explanations, tmp_path):  # noqa: F811
     few = [PAYLOADS[7], f'"></script><script>{RAN}</script>']  # markup; attributes and scripts
     outcomes = injections.open_all(tmp_path, explanations[1], few, names=False)
     assert {outcome["page"] for outcome in outcomes} == {
@@ -60,20 +60,20 @@ def test_nothing_runs_on_our_pages(explanations, tmp_path):  # noqa: F811
 
 
 def test_the_settings_of_the_explanation_are_valid(tmp_path, monkeypatch):
-    given = []
+    calls = []
 
     def explain(policy, settings, *, folder, **_):
-        given.append((policy, settings.frames))
+        calls.append((policy, settings.frames))
         (folder / "good").mkdir(parents=True)
         (folder / "good" / "explanation.json").touch()
-        return type("Made", (), {"folder": folder})
+        return type("Result", (), {"folder": folder})
 
     monkeypatch.setattr("drone_rl.explanations.explain.explain", explain)
     assert injections.explained(tmp_path) == tmp_path / "explained" / "good"
-    assert given == [("good", 180)]
+    assert calls == [("good", 180)]
 
 
-def test_counts(tmp_path, monkeypatch):
+def test_payloads_that_run_are_counted(tmp_path, monkeypatch):
     outcomes = [{"page": "a", "payload": "b", "ran": ran} for ran in ("", "a script", "")]
     monkeypatch.setattr(injections, "open_all", lambda *_: outcomes)
     assert injections.bench_injections(tmp_path, tmp_path) == {

@@ -1,4 +1,4 @@
-"""All of them, in short form."""
+"""Comparison of learners, with short trainings."""
 
 import pytest
 
@@ -9,11 +9,11 @@ from benchmarks.peers.settings import LABELS, OURS, THEIRS
 KEYS = {"seconds", "seconds_without_imports", "frames", "is_solved", "success_lower95"}
 
 
-def test_lists_by_seed_in_the_order_of_seeds_by_turns(tmp_path, monkeypatch):
-    told = []
+def test_learners_alternate_for_each_seed(tmp_path, monkeypatch):
+    calls = []
 
     def measured(name, seed, episodes):
-        told.append((name, seed, episodes))
+        calls.append((name, seed, episodes))
         seconds = (10.0 if name in OURS else 20.0 if name == "sb3_a2c" else 12.0) + seed
         return {"seconds": seconds, "seconds_without_imports": 5.0, "is_solved": True}
 
@@ -28,17 +28,17 @@ def test_lists_by_seed_in_the_order_of_seeds_by_turns(tmp_path, monkeypatch):
 
     monkeypatch.setattr(comparison, "train_ours", ours)
     monkeypatch.setattr(comparison, "train_theirs", theirs)
-    told_all = bench_peers(tmp_path / "runs" / "peers", [5, 4], 3, quick=False)
-    found = told_all["peers"]
-    assert told_all["solve_over_best_peer"] == pytest.approx(14.5 / 16.5)
-    measured_first = [(name, seed, 3) for seed in (5, 4) for name in LABELS]
-    assert told == [*((name, 5, 0) for name in LABELS), *measured_first]
+    figures = bench_peers(tmp_path / "runs" / "peers", [5, 4], 3, quick=False)
+    found = figures["peers"]
+    assert figures["solve_over_best_peer"] == pytest.approx(14.5 / 16.5)
+    timed = [(name, seed, 3) for seed in (5, 4) for name in LABELS]
+    assert calls == [*((name, 5, 0) for name in LABELS), *timed]
     assert [*found] == [*LABELS]
     assert found["reinforce"]["seconds"] == [15.0, 14.0]
     assert (tmp_path / "peers.png").stat().st_size > 10_000
 
 
-def test_the_command_that_a_user_gives(tmp_path):
+def test_train_ours_runs_the_command(tmp_path):
     short = ["trainer.total_frames=1", "collector.num_envs=2", "task.num_cubes=1"]
     found = train_ours(short, seed=1, episodes=2, folder=tmp_path)
     assert found.keys() == KEYS and not found["is_solved"]
@@ -47,12 +47,12 @@ def test_the_command_that_a_user_gives(tmp_path):
     assert (tmp_path / "1" / "result.json").is_file()
 
 
-def test_a_peer():
-    how = {"num_envs": 2, "steps": 160}
-    found = train_theirs("torchrl", how, seed=1, episodes=2, max_frames=1)
+def test_train_theirs_runs_a_third_party_training():
+    settings = {"num_envs": 2, "steps": 160}
+    found = train_theirs("torchrl", settings, seed=1, episodes=2, max_frames=1)
     assert found.keys() == KEYS and found["frames"] == 320 and not found["is_solved"]
 
 
-def test_a_peer_that_fails_says_why():
+def test_a_failed_third_party_training_is_an_error():
     with pytest.raises(RuntimeError, match="no_such failed"):
         train_theirs("no_such", {}, seed=0, episodes=1, max_frames=1)

@@ -1,4 +1,4 @@
-"""The picture's bars are the figures."""
+"""The bars of the plot show the figures."""
 
 import matplotlib.figure
 import pytest

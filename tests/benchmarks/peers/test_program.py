@@ -1,4 +1,4 @@
-"""The program, in short form."""
+"""The program of third-party trainings, with short trainings."""
 
 import json
 import subprocess
@@ -14,7 +14,7 @@ from drone_rl.utils.errors import InputError
 PROGRAM = [sys.executable, "-m", "benchmarks.peers.program"]
 
 
-def test_a_line_of_what_was_measured():
+def test_the_program_prints_one_line_of_json():
     reason = "Stable-Baselines3 is not installed"
     pytest.importorskip("stable_baselines3", reason=reason)
     short = {"num_envs": 4, "n_steps": 8, "batch_size": 8, "n_epochs": 1}
@@ -30,7 +30,7 @@ def test_a_line_of_what_was_measured():
     assert 0 <= found["success_lower95"] <= 1
 
 
-def test_of_torchrls_collector():
+def test_a_training_with_torchrls_collector():
     settings = json.dumps({"num_envs": 4, "steps": 160})
     found = measure(["torchrl", "--max-frames", "640", "--settings", settings])
     assert found["frames"] == 640 and not found["is_solved"]
@@ -38,12 +38,12 @@ def test_of_torchrls_collector():
     assert 0 < found["seconds_without_imports"] < found["seconds"]
 
 
-def test_the_lower_end_is_of_that_many_episodes():
+def test_the_lower_bound_of_ten_successes():
     good = drone_rl.load_policy("good")
     assert success_lower95(good, 10) == pytest.approx(0.025 ** (1 / 10))  # 10 of 10
 
 
-def test_without_it_one_line_tells_what_to_install(monkeypatch):
+def test_without_the_library_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3", None)
     with pytest.raises(InputError, match=r"bench peers needs .*pip install 'drone-rl\[sb3\]'$"):
         measure(["sb3_ppo"])

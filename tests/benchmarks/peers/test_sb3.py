@@ -1,4 +1,4 @@
-"""A training with Stable-Baselines3, and the mean that stops it, by hand."""
+"""Training with Stable-Baselines3, and the running mean that stops it."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def test_the_running_mean_counts_whole_episodes_in_the_order_of_their_ends():
     assert (solved.running_reward, solved.is_reached) == (2.3125, True)
 
 
-def test_458_perfect_episodes_are_the_least_that_reaches_the_target():
+def test_459_perfect_episodes_reach_the_target():
     solved = Solved(target=2.97)
     while not solved.is_reached:
         solved.count(np.array([3.0]), np.array([True]))
@@ -33,10 +33,10 @@ def test_458_perfect_episodes_are_the_least_that_reaches_the_target():
     ("algorithm", "settings"),
     [("ppo", {"n_steps": 16, "batch_size": 32}), ("a2c", {})],
 )
-def test_it_stops_at_frames_or_target_and_leaves_a_policy_to_judge(algorithm, settings):
-    how = {"num_envs": 4, **settings}
-    done = train_sb3(algorithm, 3, max_frames=64, **how)
-    again = train_sb3(algorithm, 3, max_frames=64, **how)
+def test_training_stops_at_frames_or_target_and_returns_a_policy(algorithm, settings):
+    settings = {"num_envs": 4, **settings}
+    done = train_sb3(algorithm, 3, max_frames=64, **settings)
+    again = train_sb3(algorithm, 3, max_frames=64, **settings)
     assert (done.is_solved, done.running_reward) == (False, again.running_reward)
     assert done.frames >= 64
     ours, theirs = (t.policy.make_network() for t in (done, again))
@@ -45,10 +45,10 @@ def test_it_stops_at_frames_or_target_and_leaves_a_policy_to_judge(algorithm, se
     assert (done.policy.name, ours.in_shape) == (f"sb3 {algorithm}", (1, 25, 64))
     with done.policy.flying(2) as (env, actor):
         assert actor(env.reset())["action"].shape == (2,)
-    at_once = train_sb3(algorithm, 3, target=0.0, **how)
+    at_once = train_sb3(algorithm, 3, target=0.0, **settings)
     assert (at_once.is_solved, at_once.frames) == (True, 4)
 
 
-def test_an_algorithm_that_is_none():
+def test_an_unknown_algorithm_is_an_error():
     with pytest.raises(InputError, match=r"^algorithm='dqn' is unknown; give ppo, a2c$"):
         train_sb3("dqn", 0)

@@ -1,4 +1,4 @@
-"""TorchRL's collector, by the example that stands in the repository."""
+"""Training with TorchRL's collector by the example of the repository."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from benchmarks.peers.torchrl import train_torchrl
 from drone_rl.utils.errors import InputError
 
 
-def test_it_stops_at_frames_or_target_and_leaves_a_policy_to_judge():
+def test_training_stops_at_frames_or_target_and_returns_a_policy():
     done = train_torchrl(3, max_frames=640, num_envs=4, steps=160)
     assert (done.is_solved, done.frames) == (False, 640)
     assert done.running_reward > 0
@@ -16,7 +16,7 @@ def test_it_stops_at_frames_or_target_and_leaves_a_policy_to_judge():
     assert train_torchrl(3, target=0.0, num_envs=2, steps=160).is_solved
 
 
-def test_without_the_repository(monkeypatch, tmp_path):
+def test_a_missing_example_is_an_error(monkeypatch, tmp_path):
     monkeypatch.setattr(torchrl, "EXAMPLE", tmp_path / "none.py")
-    with pytest.raises(InputError, match=r"none\.py is not there; measure in a clone"):
+    with pytest.raises(InputError, match=r"none\.py does not exist; run the benchmark in a clone"):
         train_torchrl(0)
