@@ -1,6 +1,6 @@
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo's classes are untyped.)
-"""How far the batched flight and MuJoCo's own integration of the same forces drift apart."""
+"""Drift between the batched quadrotor dynamics and MuJoCo's integration of the same forces."""
 
 import dataclasses
 import math
@@ -20,9 +20,9 @@ from drone_rl.sim.dynamics.forces_kernel import forces
 
 SECONDS = 10.0
 HEIGHT = 1000.0
-"""Metres above the ground at which manoeuvres begin, so that none ends there."""
+"""Initial height in metres, so that no manoeuvre reaches the ground."""
 _HOLD = 1.0
-"""Seconds for which a drone is told the same."""
+"""Duration of each command in seconds."""
 _PLACES = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
 _ANGLES = (Mode.ANGLE, Mode.ANGLE, Mode.ANGLE, Mode.POSITION)
 _SPEEDS = (Mode.HEADING_VELOCITY, Mode.HEADING_VELOCITY, Mode.RATE, Mode.VELOCITY)
@@ -31,17 +31,17 @@ _RATES = (Mode.RATE, Mode.RATE, Mode.RATE, Mode.POSITION)
 
 @dataclasses.dataclass(frozen=True)
 class Manoeuvre:
-    """What drones are told, a second at a time, and the air in which they are."""
+    """Commands of several drones and the air in which they fly."""
 
     name: str
     settings: DynamicsSettings
     goals: tuple[Goals, ...]
-    """Of as many drones each."""
+    """Goals of all drones, one entry for each second."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Gap:
-    """The greatest differences at any whole second, over the drones of a manoeuvre."""
+    """Largest differences over all drones of a manoeuvre, at whole seconds."""
 
     name: str
     metres: float
@@ -49,25 +49,25 @@ class Gap:
 
 
 def measure_parity(count: int = 100, seed: int = 0, seconds: float = SECONDS) -> list[Gap]:
-    """Flies random manoeuvres both ways.
+    """Fly random manoeuvres with both simulators.
 
     Args:
-        count: How many, over all kinds.
-        seed: Of what is random about them.
-        seconds: How long each is.
+        count: Number of drones over all kinds of manoeuvres.
+        seed: Seed of the manoeuvres.
+        seconds: Duration of each manoeuvre.
     """
-    return [gap_of(one) for one in manoeuvres(count, seed, seconds)]
+    return [gap_of(manoeuvre) for manoeuvre in manoeuvres(count, seed, seconds)]
 
 
 def bench_flight_parity(quick: bool) -> dict[str, Any]:
-    """Random manoeuvres of ten seconds, flown by the batch and by MuJoCo.
+    """Compare random manoeuvres of ten seconds in the batched dynamics and in MuJoCo.
 
     Args:
-        quick: Whether a few are enough, of a second.
+        quick: Whether to fly only a few, of one second.
 
     Returns:
-        "flight_parity_m", "flight_parity_deg": the greatest differences of place and attitude over
-        all; "flight_parity": by kind of manoeuvre, metres and degrees.
+        "flight_parity_m", "flight_parity_deg": largest differences of position and attitude;
+        "flight_parity": metres and degrees by kind of manoeuvre.
     """
     gaps = measure_parity(15, seconds=1.0) if quick else measure_parity()
     return {
@@ -78,7 +78,7 @@ def bench_flight_parity(quick: bool) -> dict[str, Any]:
 
 
 def manoeuvres(count: int, seed: int, seconds: float = SECONDS) -> list[Manoeuvre]:
-    """Hovers, steps, rolls and velocities, in still air, wind and gusts, as many of each."""
+    """Return random manoeuvres of each kind, in still air, wind and gusts."""
     source = np.random.default_rng(seed)
     still = DynamicsSettings(mode="simple_flight")
     airs = {
@@ -100,7 +100,7 @@ def manoeuvres(count: int, seed: int, seconds: float = SECONDS) -> list[Manoeuvr
         Manoeuvre(
             f"{kind} in {air}",
             airs[air],
-            tuple(_told(source, kinds[kind], share) for _ in range(parts)),
+            tuple(_random_goals(source, kinds[kind], share) for _ in range(parts)),
         )
         for (kind, air), share in zip(pairs, shares, strict=True)
         if share
@@ -108,26 +108,26 @@ def manoeuvres(count: int, seed: int, seconds: float = SECONDS) -> list[Manoeuvr
 
 
 def gap_of(manoeuvre: Manoeuvre) -> Gap:
-    """Flies one manoeuvre both ways, from a hover at `HEIGHT`."""
+    """Fly one manoeuvre with both simulators, starting from a hover at `HEIGHT`."""
     quadrotor, count = Quadrotor(manoeuvre.settings), len(manoeuvre.goals[0].values)
     ticks = round(_HOLD / manoeuvre.settings.tick)
     places = torch.zeros(count, 3, dtype=torch.float64)
     places[:, 2] = HEIGHT
-    here = there = quadrotor.start(places, torch.arange(count))
-    worlds = _Worlds(manoeuvre.settings, there)
-    away, turned = torch.zeros(1), torch.zeros(1)
+    ours = theirs = quadrotor.start(places, torch.arange(count))
+    simulation = _MuJoCo(manoeuvre.settings, theirs)
+    metres, degrees = torch.zeros(1), torch.zeros(1)
     for goals in manoeuvre.goals:
         control = manoeuvre.settings.control_ticks
         for first in range(0, ticks, control):
-            here = quadrotor.fly(here, goals, min(control, ticks - first))
-        there = worlds.fly(quadrotor, there, goals, ticks)
-        away = torch.maximum(away, (here.position - there.position).norm(dim=-1).max())
-        turned = torch.maximum(turned, _between(here.attitude, there.attitude).max())
-    return Gap(manoeuvre.name, float(away), float(turned))
+            ours = quadrotor.fly(ours, goals, min(control, ticks - first))
+        theirs = simulation.fly(quadrotor, theirs, goals, ticks)
+        metres = torch.maximum(metres, (ours.position - theirs.position).norm(dim=-1).max())
+        degrees = torch.maximum(degrees, _angle(ours.attitude, theirs.attitude).max())
+    return Gap(manoeuvre.name, float(metres), float(degrees))
 
 
-class _Worlds:
-    """Drones in worlds of MuJoCo's, one each."""
+class _MuJoCo:
+    """Free rigid bodies in MuJoCo, one simulation for each drone."""
 
     def __init__(self, settings: DynamicsSettings, body: FlightState) -> None:
         inertia = " ".join(repr(moment) for moment in settings.inertia)
@@ -137,26 +137,26 @@ class _Worlds:
             <worldbody><body><freejoint/>
                 <inertial pos="0 0 0" mass="{settings.mass}" diaginertia="{inertia}"/>
             </body></worldbody></mujoco>""")
-        self._worlds = [mujoco.MjData(self._model) for _ in range(len(body))]
-        for data, row in zip(self._worlds, body.numbers.numpy(), strict=True):
+        self._data = [mujoco.MjData(self._model) for _ in range(len(body))]
+        for data, row in zip(self._data, body.numbers.numpy(), strict=True):
             data.qpos[:] = row[fs.POSITION : fs.VELOCITY]
             data.qvel[:] = row[fs.VELOCITY : fs.ROTORS]
 
     def fly(self, quadrotor: Quadrotor, body: FlightState, goals: Goals, ticks: int) -> FlightState:
-        """Applies the forces of every tick, and lets MuJoCo do the rest."""
+        """Apply the forces of every tick and integrate with MuJoCo."""
         for tick in range(ticks):
-            body, pushes = forces(quadrotor.frame, body, goals, tick)
-            rows, given = body.numbers.numpy(), pushes.numpy()
-            for data, row, push in zip(self._worlds, rows, given, strict=True):
-                data.xfrc_applied[1] = push
+            body, wrenches = forces(quadrotor.frame, body, goals, tick)
+            rows, applied = body.numbers.numpy(), wrenches.numpy()
+            for data, row, wrench in zip(self._data, rows, applied, strict=True):
+                data.xfrc_applied[1] = wrench
                 mujoco.mj_step(self._model, data)
                 row[fs.POSITION : fs.VELOCITY] = data.qpos
                 row[fs.VELOCITY : fs.ROTORS] = data.qvel
         return body
 
 
-def _told(source: np.random.Generator, modes: tuple[Mode, ...], count: int) -> Goals:
-    """Something for each drone to do."""
+def _random_goals(source: np.random.Generator, modes: tuple[Mode, ...], count: int) -> Goals:
+    """Sample a goal for each drone."""
     values = np.zeros((count, 4))
     if not modes:
         modes, values[:, 3] = _PLACES, HEIGHT
@@ -178,9 +178,9 @@ def _goals(modes: tuple[Mode, ...], values: NDArray) -> Goals:
     return Goals(modes, torch.from_numpy(values))  # pyright: ignore[reportArgumentType] (four)
 
 
-def _between(one: Tensor, other: Tensor) -> Tensor:
-    """Degrees between attitudes; by the sine, as the cosine of small angles says little."""
+def _angle(one: Tensor, other: Tensor) -> Tensor:
+    """Return the angle between attitudes in degrees, by the sine for precision at small angles."""
     w, v = one[:, :1], one[:, 1:]
-    aside = w * other[:, 1:] - other[:, :1] * v - torch.linalg.cross(v, other[:, 1:])
-    along = (one * other).sum(-1).abs()
-    return torch.rad2deg(2.0 * torch.atan2(aside.norm(dim=-1), along))
+    sine = w * other[:, 1:] - other[:, :1] * v - torch.linalg.cross(v, other[:, 1:])
+    cosine = (one * other).sum(-1).abs()
+    return torch.rad2deg(2.0 * torch.atan2(sine.norm(dim=-1), cosine))

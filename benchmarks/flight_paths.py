@@ -1,4 +1,4 @@
-"""How near a drone in flight stays to its paths, and to its place in wind."""
+"""Errors of path following, and of hovering in wind."""
 
 import dataclasses
 import math
@@ -19,77 +19,77 @@ from drone_rl.flight.commands.path_following import (
 from drone_rl.sim.dynamics import Quadrotor
 
 HEIGHT = 5.0
-"""Metres at which paths begin."""
+"""Height of the first point of paths in metres."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Course:
-    """A path, and how fast to fly it."""
+    """A path and a speed."""
 
     points: Tensor  # (P, 3) float64
-    """Metres, from where the path begins."""
+    """Points relative to the first one, metres."""
     speed: float
-    """Metres a second."""
+    """Speed in m/s."""
 
     @property
     def length(self) -> float:
-        """Metres."""
+        """Length in metres."""
         return float(self.points.diff(dim=0).norm(dim=-1).sum())
 
 
 @dataclasses.dataclass(frozen=True)
 class Following:
-    """How a course was flown."""
+    """Errors of a flight along a course."""
 
     length: float
-    """Of the path, metres."""
+    """Length of the path, metres."""
     speed: float
-    """That was asked for, metres a second."""
+    """Commanded speed, m/s."""
     mean: float
-    """Distance from the path over the time of the flight, metres."""
+    """Mean distance from the path over time, metres."""
     greatest: float
-    """Metres."""
+    """Largest distance from the path, metres."""
     seconds: float
-    """From the first command to the end of the path; infinite if it never got there."""
+    """Time from the first command to the end of the path; infinite if the end is not reached."""
 
 
 def square(side: float = 10.0) -> Tensor:
-    """Four sides, back to where it began. Shape: (5, 3)."""
+    """Return a closed square. Shape: (5, 3)."""
     return _flat([(0, 0), (side, 0), (side, side), (0, side), (0, 0)])
 
 
 def figure_eight(width: float = 20.0, points: int = 64) -> Tensor:
-    """Gerono's lemniscate, once round from its middle. Shape: (points + 1, 3)."""
+    """Return Gerono's lemniscate, starting at its center. Shape: (points + 1, 3)."""
     turn = torch.linspace(0.0, 2.0 * math.pi, points + 1, dtype=torch.float64)
     half = 0.5 * width
     return torch.stack([half * turn.sin(), half * turn.sin() * turn.cos(), 0.0 * turn], -1)
 
 
 def helix(radius: float = 5.0, climb: float = 10.0, turns: int = 2, points: int = 64) -> Tensor:
-    """Up around a cylinder. Shape: (points + 1, 3)."""
+    """Return an ascending helix. Shape: (points + 1, 3)."""
     turn = torch.linspace(0.0, 2.0 * math.pi * turns, points + 1, dtype=torch.float64)
     height = torch.linspace(0.0, climb, points + 1, dtype=torch.float64)
     return torch.stack([radius * turn.sin(), radius * (1.0 - turn.cos()), height], -1)
 
 
 def zigzag(teeth: int = 6, step: float = 5.0, width: float = 5.0) -> Tensor:
-    """Forward, to one side and the other. Shape: (teeth + 1, 3)."""
+    """Return a zigzag line. Shape: (teeth + 1, 3)."""
     return _flat([(step * i, width * (i % 2)) for i in range(teeth + 1)])
 
 
 def straight(length: float = 100.0) -> Tensor:
-    """Shape: (2, 3)."""
+    """Return a straight line. Shape: (2, 3)."""
     return _flat([(0, 0), (length, 0)])
 
 
 def staircase(steps: int = 4, step: float = 3.0) -> Tensor:
-    """Forward and up in turn. Shape: (2 * steps + 1, 3)."""
+    """Return steps that alternate between forward and up. Shape: (2 * steps + 1, 3)."""
     places = [(step * ((i + 1) // 2), 0.0, step * (i // 2)) for i in range(2 * steps + 1)]
     return torch.tensor(places, dtype=torch.float64)
 
 
 def courses() -> dict[str, Course]:
-    """Those that are published, by name."""
+    """Return the published courses by name."""
     return {
         "square": Course(square(), 2.0),
         "figure_eight": Course(figure_eight(), 2.0),
@@ -103,11 +103,11 @@ def courses() -> dict[str, Course]:
 def path_following(
     paths: Mapping[str, Course] | None = None, settings: DynamicsSettings | None = None
 ) -> dict[str, Following]:
-    """Flies courses from hovering at their first points, with automatic lookahead.
+    """Fly courses with automatic lookahead, starting from a hover at their first points.
 
     Args:
-        paths: By name; those of `courses` by default.
-        settings: Drone and air; the defaults, in still air, by default.
+        paths: Courses by name; `courses()` by default.
+        settings: Settings of drone and air; the default drone in still air by default.
     """
     chosen = paths or courses()
     quadrotor = Quadrotor(settings or DynamicsSettings(mode="simple_flight"))
@@ -120,20 +120,20 @@ def path_following(
     states, done = fly_command(quadrotor, body, command)
     positions = torch.cat([state.position for state in states])
     followed = make_paths(points.repeat(len(states), 1, 1))
-    away = distance_from(followed, positions).view(len(states), -1)
+    distances = distance_from(followed, positions).view(len(states), -1)
     step = period_ticks(quadrotor.settings) * quadrotor.settings.tick
     times = torch.arange(len(states), dtype=torch.float64) * step
     return {
-        name: _following(course, times, away[:, number], int(done[number]))
+        name: _following(course, times, distances[:, number], int(done[number]))
         for number, (name, course) in enumerate(chosen.items())
     }
 
 
-def _following(course: Course, times: Tensor, away: Tensor, done: int) -> Following:
-    """Of one course, up to the moment in which it was done; `away` is the distance at each time."""
-    flown = away[: done + 1]
+def _following(course: Course, times: Tensor, distances: Tensor, done: int) -> Following:
+    """Return the errors of one course from the distance at each time until the course is done."""
+    until = distances[: done + 1]
     seconds = float(times[done]) if done < len(times) else math.inf
-    return Following(course.length, course.speed, float(flown.mean()), float(flown.max()), seconds)
+    return Following(course.length, course.speed, float(until.mean()), float(until.max()), seconds)
 
 
 def _flat(places: list[tuple[float, float]]) -> Tensor:
@@ -141,10 +141,10 @@ def _flat(places: list[tuple[float, float]]) -> Tensor:
 
 
 def stack_paths(paths: Sequence[Tensor]) -> Tensor:
-    """Stack paths of different numbers of points; shorter ones repeat their end.
+    """Stack paths with different numbers of points; shorter ones repeat their last point.
 
     Args:
-        paths: Points of each. Shapes: (P, 3).
+        paths: Points of each path. Shapes: (P, 3).
     """
     most = max(map(len, paths))
     rows = [torch.cat([p, p[-1:].expand(most - len(p), 3)]) for p in paths]
@@ -153,54 +153,54 @@ def stack_paths(paths: Sequence[Tensor]) -> Tensor:
 
 @dataclasses.dataclass(frozen=True)
 class HoverError:
-    """Distances from where drones were told to stay, metres."""
+    """Distances from the commanded position, metres."""
 
     mean: float
-    """Once blown there: over the second half of the time."""
+    """Mean over the second half of the time."""
     greatest: float
-    """Of all the time."""
+    """Largest distance over all the time."""
 
 
 def hover_error(
     settings: DynamicsSettings, *, seconds: float = 30.0, num_drones: int = 8, seed: int = 0
 ) -> HoverError:
-    """Hovers 5 m above the ground, from a start at rest in moving air.
+    """Hover 5 m above the ground, starting at rest in moving air.
 
     Args:
-        settings: Drone and air.
-        seconds: How long.
-        num_drones: How many, each with gusts of its own.
-        seed: Of the first one's; the others' follow.
+        settings: Settings of drone and air.
+        seconds: Duration.
+        num_drones: Number of drones, each with its own gusts.
+        seed: Seed of the first drone's gusts; the others have the following seeds.
     """
     quadrotor = Quadrotor(settings)
     place = torch.tensor([[0.0, 0.0, 5.0]], dtype=torch.float64).repeat(num_drones, 1)
     body = quadrotor.start(place, torch.arange(seed, seed + num_drones))
     states, _ = fly_command(quadrotor, body, Hover(body, seconds))
-    away = (torch.stack([state.position for state in states]) - place).norm(dim=-1)
-    return HoverError(float(away[len(away) // 2 :].mean()), float(away.max()))
+    distances = (torch.stack([state.position for state in states]) - place).norm(dim=-1)
+    return HoverError(float(distances[len(distances) // 2 :].mean()), float(distances.max()))
 
 
 WIND = 5.0
-"""Metres a second in which drones hover."""
+"""Wind speed of the hover test, m/s."""
 _DIRECTIONS = 8
-"""From which it blows, one after the other."""
+"""Number of wind directions."""
 
 
 def bench_flight_paths(quick: bool) -> dict[str, Any]:
-    """The pilot's commands on the default drone.
+    """Measure path following and hovering of the default drone.
 
     Args:
-        quick: Whether the square and one direction of wind will do.
+        quick: Whether to use only the square and one wind direction.
 
     Returns:
-        "path_error_m": mean distance from a square of 10 m at 2 m/s. "path_errors": of every course
-        its length, speed, mean and greatest distance and seconds. "hover_error_m": mean distance
-        from its place of a drone that hovers in wind of 5 m/s, once it has been blown there, from
-        the worst direction; "hover_greatest_m": the greatest on the way there.
+        "path_error_m": mean distance from a square of 10 m at 2 m/s. "path_errors": length, speed,
+        mean and largest distance, and seconds of every course. "hover_error_m": steady-state mean
+        distance of a hovering drone from its position in wind of 5 m/s, for the worst direction;
+        "hover_greatest_m": the largest distance.
     """
     chosen = {"square": courses()["square"]} if quick else courses()
     followed = path_following(chosen)
-    errors = [_blown(number) for number in range(1 if quick else _DIRECTIONS)]
+    errors = [_wind_error(number) for number in range(1 if quick else _DIRECTIONS)]
     return {
         "path_error_m": followed["square"].mean,
         "path_errors": {name: vars(following) for name, following in followed.items()},
@@ -209,7 +209,7 @@ def bench_flight_paths(quick: bool) -> dict[str, Any]:
     }
 
 
-def _blown(number: int) -> HoverError:
+def _wind_error(number: int) -> HoverError:
     angle = 2.0 * math.pi * number / _DIRECTIONS
     wind = (WIND * math.cos(angle), WIND * math.sin(angle), 0.0)
     return hover_error(DynamicsSettings(mode="simple_flight", wind=wind), num_drones=1)

@@ -1,7 +1,7 @@
 # pyright: reportAttributeAccessIssue=false
 # pyright: reportCallIssue=false
 # (MuJoCo Warp's and Warp's functions are untyped.)
-"""How fast drones fly: many at once, beside MuJoCo Warp's own step, and one with its camera."""
+"""Speed of the quadrotor simulation: a batch, compared with MuJoCo Warp, and one camera drone."""
 
 from functools import partial
 from typing import Any
@@ -19,7 +19,7 @@ from drone_rl.sim.worlds import Worlds
 FLYING = DynamicsSettings(mode="simple_flight")
 _DRONES = 256
 _COLLECTED = (64, 256)
-"""Numbers of worlds that are tried."""
+"""Batch sizes at which the collector is measured."""
 _FREE_BODY = """
 <mujoco>
   <option timestep="{tick}" integrator="Euler"/>
@@ -35,21 +35,22 @@ _FREE_BODY = """
 
 
 def bench_flight_speed(quick: bool) -> dict[str, Any]:
-    """Drones in flight on all cores.
+    """Measure the quadrotor simulation on all cores.
 
     Args:
-        quick: Whether a rough look will do.
+        quick: Whether to take a short, rough measurement.
 
     Returns:
-        "flight_moves_per_s": moves of 33 ticks, the whole cascade in each, of 256 drones together.
-        "flight_over_mujoco_warp": how many times as many as MuJoCo Warp makes of the same body
-        without any controller. "flight_realtime_factor": simulated seconds a second of one drone
-        whose front camera takes 144x256 pixels at each command, about ten times a second.
-        "flight_over_cv": frames of collecting in flight over those in computer-vision mode, each
-        with the number of worlds that is best for it; "flight_collector_fps": the former.
+        "flight_moves_per_s": moves per second of 256 drones together; a move has 33 ticks with the
+        whole control cascade. "flight_over_mujoco_warp": ratio to MuJoCo Warp's moves per second
+        of the same body without controllers. "flight_realtime_factor": simulated seconds per
+        second of one drone whose front camera renders 144x256 pixels at each command, about ten
+        times per second. "flight_over_cv": frames per second of the collector with vehicle dynamics
+        divided by those in computer-vision mode, each at its best batch size;
+        "flight_collector_fps": the former.
     """
     seconds = 0.2 if quick else 3.0
-    fly, step = partial(_fly, Fleet(_DRONES)), _mujoco_warp(_DRONES)
+    fly, step = partial(_fly, Fleet(_DRONES)), _mujoco_warp_step(_DRONES)
     fly()
     step()
     moves, _, ratio = paired(fly, step, seconds=seconds, rounds=5)
@@ -64,10 +65,10 @@ def bench_flight_speed(quick: bool) -> dict[str, Any]:
 
 
 class Fleet:
-    """Drones that are told to go somewhere else with every move."""
+    """A batch of drones that take random moves."""
 
     def __init__(self, count: int) -> None:
-        """Puts them into the air."""
+        """Start the drones in the air."""
         self.quadrotor = Quadrotor(FLYING)
         self.body: FlightState = self.quadrotor.start(
             torch.tensor([[0.0, 0.0, 2.5]], dtype=torch.float64).repeat(count, 1)
@@ -76,14 +77,14 @@ class Fleet:
 
 
 def _fly(fleet: Fleet) -> int:
-    """Some moves of all of them. Returns how many."""
+    """Take 64 moves with every drone; return the number of moves."""
     for action in fleet.actions:
         fleet.body = fleet.quadrotor.step(fleet.body, action)
     return fleet.actions.numel()
 
 
-def _mujoco_warp(count: int) -> Any:
-    """What steps the same body as often as a move does, by MuJoCo Warp. Returns moves."""
+def _mujoco_warp_step(count: int) -> Any:
+    """Return a function that takes one move of each drone in MuJoCo Warp, without controllers."""
     text = _FREE_BODY.format(
         tick=FLYING.tick, mass=FLYING.mass, inertia=" ".join(map(str, FLYING.inertia))
     )
@@ -96,7 +97,7 @@ def _mujoco_warp(count: int) -> Any:
         with wp.ScopedCapture() as capture:
             mjw.step(warp_model, warp_data)
     graph = capture.graph
-    assert graph is not None  # a CPU records, too
+    assert graph is not None  # capture works on CPUs, too
 
     def step() -> int:
         for _ in range(FLYING.control_ticks):
@@ -107,7 +108,7 @@ def _mujoco_warp(count: int) -> Any:
 
 
 def _realtime(seconds: float) -> float:
-    """Simulated seconds a second of a drone with a camera."""
+    """Return the simulated seconds per second of a drone with a camera."""
     worlds = Worlds(1, camera=CameraSettings(width=256, height=144), dynamics=Quadrotor(FLYING))
     worlds.prepare()
     every, action = torch.arange(1), torch.zeros(1, dtype=torch.int64)
@@ -124,7 +125,7 @@ def _realtime(seconds: float) -> float:
 
 
 def _collecting(seconds: float) -> tuple[float, float]:
-    """Frames a second in flight, and over those in computer-vision mode; in turn."""
+    """Return frames per second with vehicle dynamics, and the ratio to computer-vision mode."""
     found = []
     for count in _COLLECTED:
         flying, still = (default_collector(count, "cpu", d) for d in (FLYING, DynamicsSettings()))

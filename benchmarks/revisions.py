@@ -1,4 +1,4 @@
-"""Compare an earlier revision with the working tree: the same benchmarks in turn on one machine."""
+"""Compare an earlier revision with the working tree by the same benchmarks on one machine."""
 
 import os
 import statistics
@@ -15,14 +15,14 @@ from drone_rl.utils.files import read_json
 BEFORE = "b3e55cd"
 """The last revision before modules moved into packages by feature."""
 NAMES = ("collector", "solve", "large", "memory", "explain", "startup")
-"""Benchmarks that are compared."""
+"""Compared benchmarks."""
 COSTS = (
     *("median_time_to_solve_s", "peak_memory_mib", "explain_s", "explain_peak_memory_mib"),
     *("import_s", "start_to_first_update_s", "verdict_s"),
 )
-"""Figures of which less is better."""
+"""Figures for which lower is better."""
 RATES = ("collector_fps", "collector_fps_16", "learning_fps", "learning_fps_large")
-"""Figures of which more is better."""
+"""Figures for which higher is better."""
 _ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -31,21 +31,20 @@ def bench_revisions(
 ) -> dict[str, Any]:
     """Run the benchmarks of both revisions alternately and compare the medians.
 
-    Each revision measures itself by its own benchmarks, in processes of its own.
+    Each revision runs its own benchmarks in separate processes.
 
     Args:
-        folder: Holds the earlier tree and all results.
-        quick: Whether to run once, in the quick mode, instead of three times.
+        folder: Folder of the earlier tree and all results.
+        quick: Whether to run once in quick mode instead of three times.
         before: The earlier revision, as git names it.
-        root: Checkout of the later one.
+        root: Checkout of the later revision.
 
     Returns:
-        "ratio_before_after": by figure, how many times as much the working tree costs: seconds and
-        memory after / before, frames per second before / after; and the two medians under
-        "revisions".
+        "ratio_before_after": cost ratio of each figure: seconds and memory after / before, frames
+        per second before / after; "revisions": the medians of both revisions.
 
     Raises:
-        InputError: There is no such revision.
+        InputError: The earlier revision does not exist.
         RuntimeError: A benchmark failed.
     """
     trees = {"before": extract(before, folder / "before", root), "after": root}
@@ -62,10 +61,10 @@ def bench_revisions(
 
 
 def extract(revision: str, target: Path, root: Path = _ROOT) -> Path:
-    """Write the files of a revision into a new folder, unless it is there already.
+    """Write the files of a revision into a folder, unless the folder exists.
 
     Raises:
-        InputError: There is no such revision.
+        InputError: The revision does not exist.
     """
     if target.is_dir():
         return target
@@ -82,7 +81,7 @@ def extract(revision: str, target: Path, root: Path = _ROOT) -> Path:
 
 
 def measure(tree: Path, names: Sequence[str], folder: Path, quick: bool) -> dict[str, float]:
-    """Run benchmarks of a tree in a process of its own; return those figures that are compared."""
+    """Run benchmarks of a tree in a separate process; return the compared figures."""
     only = f"only=[{','.join(names)}]"
     program = [sys.executable, "-m", "drone_rl.cli.main", "bench", only, f"quick={quick}".lower()]
     done = subprocess.run(
@@ -100,7 +99,7 @@ def measure(tree: Path, names: Sequence[str], folder: Path, quick: bool) -> dict
 
 
 def compare(before: Mapping[str, float], after: Mapping[str, float]) -> dict[str, float]:
-    """How many times as much each figure costs after as before; 1.1 is ten percent worse."""
+    """Return the cost ratio of each figure, after over before; 1.1 is ten percent worse."""
     both = before.keys() & after.keys()
     return {
         **{key: after[key] / before[key] for key in COSTS if key in both},

@@ -3,7 +3,7 @@ import math
 from benchmarks.flight_paths import bench_flight_paths
 
 
-def test_it_meets_what_is_asked_for():
+def test_errors_are_within_their_limits():
     figures = bench_flight_paths(quick=True)
     assert figures["path_error_m"] <= 0.5
     assert figures["hover_error_m"] <= figures["hover_greatest_m"] <= 0.3

@@ -3,11 +3,11 @@ import math
 import pytest
 import torch
 
-from benchmarks import flight_paths as of
+from benchmarks import flight_paths
 
 
-def test_the_courses_are_what_they_are_called():
-    courses = of.courses()
+def test_courses_have_the_shapes_of_their_names():
+    courses = flight_paths.courses()
     assert len(courses) >= 5
     assert courses["square"].length == 40.0
     assert courses["straight"].length == 100.0
@@ -20,47 +20,68 @@ def test_the_courses_are_what_they_are_called():
     assert eight[16].tolist() == pytest.approx([10, 0, 0])
 
 
-def test_a_short_way_is_followed():
-    course = of.Course(torch.tensor([[0.0, 0, 0], [3, 0, 0], [3, 3, 0]]).double(), 1.0)
-    followed = of.path_following({"corner": course})["corner"]
+def test_a_short_path_is_followed():
+    course = flight_paths.Course(torch.tensor([[0.0, 0, 0], [3, 0, 0], [3, 3, 0]]).double(), 1.0)
+    followed = flight_paths.path_following({"corner": course})["corner"]
     assert (followed.length, followed.speed) == (6.0, 1.0)
     assert 0.0 < followed.mean < followed.greatest < 0.6
     assert 6.0 < followed.seconds < 12.0
 
 
 def test_the_square_meets_its_target():
-    square = of.path_following({"square": of.courses()["square"]})["square"]
+    square = flight_paths.path_following({"square": flight_paths.courses()["square"]})["square"]
     assert square.mean <= 0.5
     assert math.isfinite(square.seconds)
 
 
-def test_courses_point_by_point():
-    assert of.square(2.0).tolist() == [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [0, 0, 0]]
-    assert of.zigzag(3, 5.0, 4.0).tolist() == [[0, 0, 0], [5, 4, 0], [10, 0, 0], [15, 4, 0]]
-    assert of.staircase(2, 3.0).tolist() == [[0, 0, 0], [3, 0, 0], [3, 0, 3], [6, 0, 3], [6, 0, 6]]
-    turns = of.helix(2.0, 8.0, turns=1, points=4)
+def test_points_of_courses_by_hand():
+    assert flight_paths.square(2.0).tolist() == [
+        [0, 0, 0],
+        [2, 0, 0],
+        [2, 2, 0],
+        [0, 2, 0],
+        [0, 0, 0],
+    ]
+    assert flight_paths.zigzag(3, 5.0, 4.0).tolist() == [
+        [0, 0, 0],
+        [5, 4, 0],
+        [10, 0, 0],
+        [15, 4, 0],
+    ]
+    assert flight_paths.staircase(2, 3.0).tolist() == [
+        [0, 0, 0],
+        [3, 0, 0],
+        [3, 0, 3],
+        [6, 0, 3],
+        [6, 0, 6],
+    ]
+    turns = flight_paths.helix(2.0, 8.0, turns=1, points=4)
     expected = [[0, 0, 0], [2, 2, 2], [0, 4, 4], [-2, 2, 6], [0, 0, 8]]
     torch.testing.assert_close(turns, torch.tensor(expected).double(), atol=1e-6, rtol=0)
-    eight = of.figure_eight(4.0, points=8)
+    eight = flight_paths.figure_eight(4.0, points=8)
     half = math.sqrt(0.5)
     expected = [[0, 0, 0], [2 * half, 1, 0], [2, 0, 0], [2 * half, -1, 0], [0, 0, 0]]
     torch.testing.assert_close(eight[:5], torch.tensor(expected).double(), atol=1e-6, rtol=0)
-    speeds = {name: course.speed for name, course in of.courses().items()}
+    speeds = {name: course.speed for name, course in flight_paths.courses().items()}
     assert speeds == {"square": 2, "figure_eight": 2, "helix": 2, "zigzag": 2, "straight": 5,
                       "staircase": 1}  # fmt: skip
 
 
-def test_a_course_may_take_three_times_as_long_as_it_should_and_20_s(monkeypatch):
-    class EnoughError(Exception):
+def test_the_time_limit_of_a_course(monkeypatch):
+    """Three times the time at the commanded speed, and 20 s."""
+
+    class StopError(Exception):
         pass
 
     def fly(quadrotor, body, command):
-        raise EnoughError(command.limit)
+        raise StopError(command.limit)
 
-    monkeypatch.setattr(of, "fly_command", fly)
-    way = torch.tensor([[0.0, 0, 0], [6, 0, 0]]).double()
-    with pytest.raises(EnoughError) as found:
-        of.path_following({"fast": of.Course(way, 4.0), "slow": of.Course(way, 0.8)})
+    monkeypatch.setattr(flight_paths, "fly_command", fly)
+    path = torch.tensor([[0.0, 0, 0], [6, 0, 0]]).double()
+    with pytest.raises(StopError) as found:
+        flight_paths.path_following(
+            {"fast": flight_paths.Course(path, 4.0), "slow": flight_paths.Course(path, 0.8)}
+        )
     assert found.value.args == (3 * 6 / 0.8 + 20,)
 
 
@@ -69,5 +90,5 @@ CORNER = torch.tensor(
 )
 
 
-def test_shorter_paths_repeat_their_ends():
-    assert torch.equal(of.stack_paths([CORNER[0], CORNER[1][:2]]), CORNER)
+def test_shorter_paths_repeat_their_last_point():
+    assert torch.equal(flight_paths.stack_paths([CORNER[0], CORNER[1][:2]]), CORNER)

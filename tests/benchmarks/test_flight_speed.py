@@ -1,4 +1,4 @@
-"""What is timed of flight: that it is done, how much of it, and what it is called."""
+"""Speed of the quadrotor simulation: measured work and keys of figures."""
 
 import pytest
 import torch
@@ -7,7 +7,7 @@ from benchmarks import flight_speed
 from benchmarks.flight_speed import FLYING, Fleet, bench_flight_speed
 
 
-def test_a_fleet_is_told_somewhere_else_with_every_move():
+def test_a_fleet_takes_random_moves():
     fleet = Fleet(4)
     assert fleet.actions.shape == (64, 4) and set(fleet.actions.unique().tolist()) == {0, 1, 2}
     assert flight_speed._fly(fleet) == 64 * 4
@@ -17,9 +17,9 @@ def test_a_fleet_is_told_somewhere_else_with_every_move():
     assert torch.isfinite(fleet.body.numbers).all()
 
 
-def test_mujoco_warp_takes_as_many_ticks_for_a_move():
+def test_mujoco_warp_takes_one_move_of_each_drone():
     assert FLYING.control_ticks == 33
-    assert flight_speed._mujoco_warp(3)() == 3
+    assert flight_speed._mujoco_warp_step(3)() == 3
 
 
 def test_figures_by_name(monkeypatch):

@@ -1,4 +1,4 @@
-"""An earlier revision is measured by its own files, and ratios point the right way."""
+"""An earlier revision runs its own files, and ratios above 1 mean a higher cost."""
 
 import json
 import subprocess
@@ -11,7 +11,7 @@ from drone_rl.utils.errors import InputError
 
 @pytest.fixture
 def checkout(tmp_path):
-    """A repository whose program writes how fast its own revision is."""
+    """Return a repository whose program writes figures of its own revision."""
     root = tmp_path / "root"
     (root / "drone_rl" / "cli").mkdir(parents=True)
     (root / "drone_rl" / "__init__.py").touch()
@@ -42,12 +42,12 @@ def test_both_revisions_are_measured(checkout, tmp_path, quick):
     json.dumps(found)
 
 
-def test_an_unknown_revision(checkout, tmp_path):
+def test_an_unknown_revision_is_an_error(checkout, tmp_path):
     with pytest.raises(InputError, match="no revision deadbeef"):
         revisions.extract("deadbeef", tmp_path / "tree", checkout)
 
 
-def test_a_benchmark_that_fails(checkout, tmp_path):
+def test_a_failed_benchmark_is_an_error(checkout, tmp_path):
     (checkout / "drone_rl" / "cli" / "main.py").write_text("raise SystemExit('out of memory')")
     with pytest.raises(RuntimeError, match="out of memory"):
         revisions.measure(checkout, ["solve"], tmp_path / "out", quick=False)
