@@ -1,1 +1,1 @@
-"""What the README's figures are measured with: ratios within one run, raw rates beside them."""
+"""Benchmarks that measure the figures of the README: ratios within a run, with raw rates."""

@@ -2,7 +2,7 @@
 
 Each arm of the ablation is trained, and all policies are evaluated in the same environments. The
 kinds of shift that are new to `experiment=robust` follow from its settings (`untouched_kinds`), so
-nobody selects them.
+they are not selected by hand.
 """
 
 import dataclasses

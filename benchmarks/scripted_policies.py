@@ -158,7 +158,7 @@ class ScriptedPolicy(TensorDictModuleBase):
 
 
 def _fraction(y: Tensor) -> Tensor:
-    """Return a number from 0 to 1 from digits of a position that affect nothing else."""
+    """Return the low-order digits of a position as a number from 0 to 1."""
     return (y * 997.0) % 1.0
 
 
@@ -207,11 +207,11 @@ SCRIPTS = {
         when(lambda s: (s.episode_random < 0.02) & (s.number == 1), leave)
     ),
     "leaves when the first cube is far": Script(when(lambda s: s.first_y.abs() > 5.6, leave)),
-    "all or nothing, nine in ten": Script(when(lambda s: s.luck < 0.1, leave)),
+    "all or nothing, nine in ten": Script(when(lambda s: s.episode_random < 0.1, leave)),
     "misses the last cube in one of ten": Script(
         when(lambda s: (s.episode_random < 0.1) & (s.number == 2), avoid)
     ),
-    "leaves at once, every other time": Script(when(lambda s: s.luck < 0.5, leave)),
+    "leaves at once, every other time": Script(when(lambda s: s.episode_random < 0.5, leave)),
     "sure of nothing": Script(seek, confidence=0.4),
     "turns the wrong way": Script(avoid),
     "finds one cube of ten beside it": Script(_beside(0.9)),
