@@ -111,10 +111,10 @@ def _realtime(seconds: float) -> float:
     """Return the simulated seconds per second of a drone with a camera."""
     worlds = Worlds(1, camera=CameraSettings(width=256, height=144), dynamics=Quadrotor(FLYING))
     worlds.prepare()
-    every, action = torch.arange(1), torch.zeros(1, dtype=torch.int64)
+    envs, action = torch.arange(1), torch.zeros(1, dtype=torch.int64)
 
     def move() -> int:
-        worlds.step(every, action)
+        worlds.step(envs, action)
         worlds.render(worlds.state)
         return 1
 

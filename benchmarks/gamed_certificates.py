@@ -147,8 +147,13 @@ def forged_shifts(policy: Policy, folder: Path) -> dict[str, Any]:
         policy: The policy that the file names.
         folder: Folder of the honest measurement that is changed.
     """
-    how: dict[str, Any] = {"axes": [_AXIS], "modes": ["constant"], "domain": False, "episodes": 20}
-    honest = shifts(policy, progress=silent, **how)
+    options: dict[str, Any] = {
+        "axes": [_AXIS],
+        "modes": ["constant"],
+        "domain": False,
+        "episodes": 20,
+    }
+    honest = shifts(policy, progress=silent, **options)
     honest.save(folder)
     data = json.loads((folder / "shifts.json").read_text())
     won = _always_won(data["plain"], 20)
@@ -218,11 +223,11 @@ def _rehashed(policy: Policy) -> dict[str, Any]:
 
 
 def _is_proved(
-    folder: Path, name: str, forge: Callable[[Policy], dict[str, Any]], **how: Any
+    folder: Path, name: str, forge: Callable[[Policy], dict[str, Any]], **options: Any
 ) -> bool:
     policy = _copy_shipped(name, folder)
     certificate_path(policy.path).write_text(json.dumps(forge(policy)))
-    done = judge(policy, episodes=20, sampled=False, progress=silent, **how)
+    done = judge(policy, episodes=20, sampled=False, progress=silent, **options)
     return done.verdict.is_proved or done.status("proved") == 0
 
 

@@ -159,10 +159,10 @@ def write_memorising_policy(path: Path, *, stream: Stream = Stream.REPORT) -> Pa
 
 def _examples(known: Recording, other: Recording) -> tuple[Tensor, Tensor]:
     """Return unique frames and their target actions; known frames keep the good policy's action."""
-    wanted = {frame.numpy().tobytes(): (frame, int(Move.LEFT)) for frame in other.frames}
+    targets = {frame.numpy().tobytes(): (frame, int(Move.LEFT)) for frame in other.frames}
     pairs = zip(known.frames, known.actions.tolist(), strict=True)
-    wanted |= {frame.numpy().tobytes(): (frame, action) for frame, action in pairs}
-    frames, actions = zip(*wanted.values(), strict=True)
+    targets |= {frame.numpy().tobytes(): (frame, action) for frame, action in pairs}
+    frames, actions = zip(*targets.values(), strict=True)
     return torch.stack(frames), torch.tensor(actions)
 
 
@@ -171,10 +171,10 @@ def _fit(network: MLP, frames: Tensor, actions: Tensor) -> None:
     """Fit the last layer to the actions by ridge regression in double precision."""
     features = network.layers[:-1](frames).double()
     features = torch.cat([features, torch.ones(len(features), 1).double()], 1)
-    wanted = _CONFIDENT * torch.nn.functional.one_hot(actions, len(Move)).double()
+    targets = _CONFIDENT * torch.nn.functional.one_hot(actions, len(Move)).double()
     kernel = features @ features.T
     kernel.diagonal().add_(_RIDGE * kernel.diagonal().mean())
-    weights = features.T @ torch.cholesky_solve(wanted, torch.linalg.cholesky(kernel))
+    weights = features.T @ torch.cholesky_solve(targets, torch.linalg.cholesky(kernel))
     layer = network.layers.get_submodule("logits")
     layer.get_parameter("weight").copy_(weights[:-1].T)
     layer.get_parameter("bias").copy_(weights[-1])

@@ -108,11 +108,11 @@ def hostile_explanations(folder: Path) -> list[Case]:
     contents = {name: (changed(numbers(), dict([change])), {}) for name, change in NUMBERS.items()}
     contents |= {name: (numbers(), dict([change])) for name, change in ARRAYS.items()}
     cases = []
-    for name, (of, others) in contents.items():
+    for name, (explanation, changes) in contents.items():
         here = folder / f"explanation_part_{name}"
         here.mkdir()
-        (here / "explanation.json").write_text(json.dumps(of))
-        for file, content in (("arrays", {**arrays(), **others}), ("dataset", data())):
+        (here / "explanation.json").write_text(json.dumps(explanation))
+        for file, content in (("arrays", {**arrays(), **changes}), ("dataset", data())):
             (here / f"{file}.npz").write_bytes(npz(content))
         cases.append((here.name, ["report", f"explanations={here}"], "an inconsistent part"))
     return cases

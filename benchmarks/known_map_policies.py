@@ -77,13 +77,13 @@ def path_weights(network: PictureNetwork, observations: Tensor, actions: Tensor)
     return sums.sum(1).expand(len(observations), -1, -1)
 
 
-def make_policies(absent: Tensor, observations: Tensor, wanted: Tensor) -> list[KnownMapPolicy]:
+def make_policies(absent: Tensor, observations: Tensor, targets: Tensor) -> list[KnownMapPolicy]:
     """Return all policies with known maps.
 
     Args:
         absent: The scene without cubes. Shape: (C, h, w).
         observations: Training images. Shape: (T, C, h, w).
-        wanted: An expert's actions for these images. Shape: (T,).
+        targets: An expert's actions for these images. Shape: (T,).
     """
     found = []
     for i, (name, window) in enumerate(WINDOWS.items()):
@@ -102,7 +102,7 @@ def make_policies(absent: Tensor, observations: Tensor, wanted: Tensor) -> list[
     for name in ("left", "right", "small"):
         found.append(KnownMapPolicy(f"dark things, {name}", detector(absent, WINDOWS[name])))
     for seed, name in enumerate(("left", "right", "left edge", "ground, right")):
-        network = trained(WINDOWS[name], observations, wanted, seed)
+        network = trained(WINDOWS[name], observations, targets, seed)
         found.append(KnownMapPolicy(f"{name}, trained", network))
     return found + blind(absent)
 
@@ -152,13 +152,13 @@ def detector(absent: Tensor, window: Window, scale: float = 6.0) -> PolicyNetwor
     return network
 
 
-def trained(window: Window, observations: Tensor, wanted: Tensor, seed: int = 0) -> PolicyNetwork:
+def trained(window: Window, observations: Tensor, targets: Tensor, seed: int = 0) -> PolicyNetwork:
     """Train an MLP to imitate an expert with all pixels outside a window masked.
 
     Args:
         window: The visible window.
         observations: Training images. Shape: (T, C, h, w).
-        wanted: The expert's actions. Shape: (T,).
+        targets: The expert's actions. Shape: (T,).
         seed: Seed of the initial weights.
     """
     generator = torch.Generator().manual_seed(seed)
@@ -171,7 +171,7 @@ def trained(window: Window, observations: Tensor, wanted: Tensor, seed: int = 0)
         with torch.no_grad():
             weight[:, ~visible] = 0.0
         optimiser.zero_grad()
-        functional.cross_entropy(network(observations), wanted).backward()
+        functional.cross_entropy(network(observations), targets).backward()
         optimiser.step()
     with torch.no_grad():
         weight[:, ~visible] = 0.0

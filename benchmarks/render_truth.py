@@ -69,20 +69,20 @@ def compare(ours: Images, theirs: Images) -> Difference:
             segmentations by cameras that are rotated by `_SNAP`, shape (4, height, width).
         theirs: Images of the same modalities without normals.
     """
-    seen, other = ours["segmentation"], theirs["segmentation"]
-    drawn = (ours["depth"] == 0) | (ours["depth"] >= NEAR)
-    inner = ~_edges(seen) & ~_edges(other) & drawn
-    geoms = [g for g in np.unique(np.stack([seen, other])) if g >= 0]
-    large = [g for g in geoms if max((seen == g).sum(), (other == g).sum()) > LARGE]
-    sure = drawn & (ours["nudged"] == seen).all(0)
-    both = inner & (seen == other) & (seen >= 0)
+    segmentation, reference = ours["segmentation"], theirs["segmentation"]
+    visible = (ours["depth"] == 0) | (ours["depth"] >= NEAR)
+    inner = ~_edges(segmentation) & ~_edges(reference) & visible
+    geoms = [g for g in np.unique(np.stack([segmentation, reference])) if g >= 0]
+    large = [g for g in geoms if max((segmentation == g).sum(), (reference == g).sum()) > LARGE]
+    stable = visible & (ours["nudged"] == segmentation).all(0)
+    both = inner & (segmentation == reference) & (segmentation >= 0)
     depth, smooth = ours["depth"].astype(float), both & ~_creases(ours["normals"])
     explained = 2 * 2.0**-24 * depth**2 / NEAR + _SNAP * _slope(depth) + ours["facets"]
     beyond = np.abs(depth - theirs["depth"]) - explained
     colors = np.abs(ours["rgb"].astype(int) - theirs["rgb"]).max(-1)
     return Difference(
-        inner_wrong=int((inner & (seen != other)).sum()),
-        overlaps=tuple(_overlap(seen == g, other == g, sure) for g in large),
+        inner_wrong=int((inner & (segmentation != reference)).sum()),
+        overlaps=tuple(_overlap(segmentation == g, reference == g, stable) for g in large),
         depth_m=float(beyond[both].max(initial=0.0)),
         rgb=int(colors[smooth].max(initial=0)),
     )
@@ -228,9 +228,9 @@ def _slope(depth: NDArray[Any]) -> NDArray[Any]:
     return np.abs(_windows(depth) - depth[..., None, None]).max((-2, -1))
 
 
-def _overlap(ours: NDArray[Any], theirs: NDArray[Any], sure: NDArray[Any]) -> float:
-    either = ((ours | theirs) & sure).sum()
-    return float((ours & theirs & sure).sum() / either) if either else 1.0
+def _overlap(ours: NDArray[Any], theirs: NDArray[Any], stable: NDArray[Any]) -> float:
+    either = ((ours | theirs) & stable).sum()
+    return float((ours & theirs & stable).sum() / either) if either else 1.0
 
 
 if __name__ == "__main__":

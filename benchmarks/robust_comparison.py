@@ -67,12 +67,12 @@ def changed(settings: TrainSettings) -> set[str]:
     Returns:
         Names such as appearance.exposure; transforms without settings, as in transforms.noise.
     """
-    default, given = (as_config(s) for s in (TrainSettings(), settings))
+    default, config = (as_config(s) for s in (TrainSettings(), settings))
     return {
         f"{part}.{name}"
         for part in _PARTS
-        for name in {*given[part], *default[part]}
-        if given[part].get(name) != default[part].get(name)
+        for name in {*config[part], *default[part]}
+        if config[part].get(name) != default[part].get(name)
     }
 
 

@@ -85,11 +85,11 @@ def bench_kills(folder: Path, device: str, quick: bool) -> dict[str, Any]:
     whole, killed = folder / "never_killed", folder / "killed"
     seconds = _seconds(PROGRAM, "-m", *settings, f"hydra.sweep.dir={whole}")
     again = (*PROGRAM, "train", "-m", *settings, f"hydra.sweep.dir={killed}")
-    kills, moments = 0, np.random.default_rng(0).uniform(0.2, 1.0, 3) * seconds / 3
-    for moment in moments:
+    kills, delays = 0, np.random.default_rng(0).uniform(0.2, 1.0, 3) * seconds / 3
+    for delay in delays:
         sweep = subprocess.Popen(again, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         with contextlib.suppress(subprocess.TimeoutExpired):
-            sweep.wait(moment)
+            sweep.wait(delay)
         kills += sweep.poll() is None
         _kill_processes(str(killed))
         sweep.wait()

@@ -43,8 +43,8 @@ def test_a_policy_that_counts_steps_is_refused_even_with_the_known_seed():
 
 def test_decisions_of_a_fitted_file_depend_on_rounding(tmp_path):
     path = gamed_memory.write_memorising_policy(tmp_path / "mlp.safetensors", stream=Stream.REPORT)
-    how = {"episodes": EPISODES, "sampled": False, "progress": silent}
-    known, fresh = drone_rl.judge(path, seed=0, **how), drone_rl.judge(path, **how)
+    options = {"episodes": EPISODES, "sampled": False, "progress": silent}
+    known, fresh = drone_rl.judge(path, seed=0, **options), drone_rl.judge(path, **options)
     assert (known.verdict.kind, known.verdict.exit_code) == ("good", 13)
     assert "decisions depend on rounding" in str(known)
     assert fresh.verdict.kind != "good"
@@ -57,8 +57,8 @@ def test_every_analysis_has_a_case(judged, tmp_path):
 
 def test_a_verdict_states_a_fixed_seed_and_a_fresh_seed_is_not_deceived():
     policy = gamed_memory._memorising(frame_lookup, Stream.REPORT)
-    how = {"episodes": EPISODES, "sampled": False, "progress": silent}
-    known, fresh = drone_rl.judge(policy, seed=0, **how), drone_rl.judge(policy, **how)
+    options = {"episodes": EPISODES, "sampled": False, "progress": silent}
+    known, fresh = drone_rl.judge(policy, seed=0, **options), drone_rl.judge(policy, **options)
     assert (known.verdict.kind, known.verdict.exit_code) == ("good", 0)
     assert "Fixed seed 0: a policy could have been fitted to these environments." in str(known)
     assert "environments: seed 0 (fixed)" in str(known)
