@@ -105,7 +105,12 @@ BENCHMARKS: dict[str, Benchmark] = {
     "sentences": Benchmark(
         lambda s: bench_sentences(),
         "truth",
-        (*_CLAIMS, "benchmarks/sentences", "benchmarks/evidence"),
+        (
+            *_CLAIMS,
+            "benchmarks/sentences",
+            "benchmarks/evidence",
+            "benchmarks/evidence_changes",
+        ),
     ),
     "hostile": Benchmark(
         lambda s: bench_hostile(s.runs / "hostile"),
@@ -130,6 +135,7 @@ BENCHMARKS: dict[str, Benchmark] = {
                     "_arrays",
                     "_policies",
                     "_claims",
+                    "_explanations",
                     "_runs",
                 )
             ),
@@ -160,7 +166,12 @@ BENCHMARKS: dict[str, Benchmark] = {
     "maps": Benchmark(
         lambda s: bench_maps(s.runs, s.quick),
         "truth",
-        (*_EXPLAINING, "benchmarks/maps", "benchmarks/adversarial_maps"),
+        (
+            *_EXPLAINING,
+            "benchmarks/maps",
+            "benchmarks/adversarial_maps",
+            "benchmarks/known_map_policies",
+        ),
     ),
     "explain": Benchmark(
         lambda s: bench_explain(s.runs, s.quick),
@@ -190,7 +201,14 @@ BENCHMARKS: dict[str, Benchmark] = {
     "robust": Benchmark(
         lambda s: bench_robust(s.runs / "robust", s.seeds[:3], s.quick),
         "truth",
-        (*_TRAINING, "evaluation", "robustness", "conf", "benchmarks/robust"),
+        (
+            *_TRAINING,
+            "evaluation",
+            "robustness",
+            "conf",
+            "benchmarks/robust",
+            "benchmarks/robust_comparison",
+        ),
     ),
     "render_truth": Benchmark(
         lambda s: bench_render_truth(s.quick),
