@@ -17,7 +17,12 @@ from drone_rl.utils.settings import kinds_of, types_of
 from tests.docs.commands import check_commands
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = [DOCS / "flight.md", DOCS / "howto.md", DOCS / "pilot.md", *sorted((DOCS / "tutorials").glob("*.md"))]
+PAGES = [
+    DOCS / "flight.md",
+    DOCS / "howto.md",
+    DOCS / "pilot.md",
+    *sorted((DOCS / "tutorials").glob("*.md")),
+]
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 SHORT = (
     "trainer=drone_rl.TrainerSettings(total_frames=1500, checkpoint_interval_s=0.0), "
