@@ -4,16 +4,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PURE_DATA = {
-    **{
-        f"config/{name}": "values with bounds; cli/hydra/test_schemas reads and builds each"
-        for name in ("networks", "transforms")
-    },
+    f"config/{name}": "values with bounds; cli/hydra/test_composition_schemas builds each"
+    for name in ("networks", "transforms")
 }
-"""Modules that need no test of their own, and which tests cover them."""
+"""Modules that need no test of their own name, and the tests that cover them."""
 
 
 def modules_without_test(root: Path = ROOT) -> list[str]:
-    """Return modules of drone_rl, such as "sim/rules", without a tests/sim/test_rules.py."""
+    """Return the modules of drone_rl, such as "sim/rules", that lack a tests/sim/test_rules.py."""
     package = root / "drone_rl"
     names = [p.relative_to(package).with_suffix("") for p in sorted(package.rglob("*.py"))]
     return [

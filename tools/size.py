@@ -1,6 +1,6 @@
-"""`make count`: size and shape of the package as JSON, and phrases to rewrite in plain English.
+"""`make count`: print the size of the package as JSON, including phrases to rewrite.
 
-`python -m tools.size PATH...` prints each such phrase below the paths, and what to write instead.
+`python -m tools.size PATH...` prints each phrase to rewrite below the paths, and the replacement.
 """
 
 import ast
@@ -19,7 +19,7 @@ from tools.mirror import ROOT, modules_without_test
 SMALL = 60
 """Modules with fewer lines and a single importer count as `single_use_modules`."""
 PROSE = ("drone_rl", "docs", "conf", "README.md", "AGENTS.md", "tools", "examples")
-"""Where phrases are counted, as far as it exists."""
+"""Paths whose phrases are counted; those that do not exist are ignored."""
 _SUFFIXES = (".py", ".md", ".yaml", ".html", ".j2")
 _SUPPRESSION = re.compile(r"^# pyright: (?!reportUnnec)", re.M)
 _ASIDE = "(?:draws|flies|makes|asks|learns|knows|has|does|wants|waits|keeps|can)"
@@ -48,7 +48,7 @@ PHRASES = {
     r"\bwork(?:s|ed)?\sout\b": "compute",
     r"\bpictures?\b": "image, frame, observation",
 }
-"""Phrases to avoid, as regular expressions, and what to write instead."""
+"""Phrases to avoid, as regular expressions, and their replacements."""
 _PHRASES = [(re.compile(pattern, re.I | re.M), advice) for pattern, advice in PHRASES.items()]
 
 
@@ -62,13 +62,13 @@ class Phrase(NamedTuple):
 
 
 def measure(root: Path = ROOT) -> dict[str, Any]:
-    """Count the size and shape of a checkout.
+    """Measure the size and structure of a checkout.
 
     Args:
         root: Folder with `drone_rl`, `benchmarks` and `tests`.
 
     Returns:
-        The counts; "longest_module" is a number of lines and a path.
+        The counts. "longest_module" is a number of lines and a path.
     """
     package = _read(root, "drone_rl")
     lines = {path: text.count("\n") for path, text in package.items()}
@@ -80,7 +80,7 @@ def measure(root: Path = ROOT) -> dict[str, Any]:
         and len(importers[_module(root, path)]) == 1
         and lines[path] < SMALL
     ]
-    suppressions = [  # Warp types the code of kernels itself
+    suppressions = [  # Warp checks the types in kernels
         len(_SUPPRESSION.findall(text)) for p, text in package.items() if "kernel" not in p.stem
     ]
     tests = sum(text.count("\n") for text in _read(root, "tests").values())
@@ -100,7 +100,7 @@ def measure(root: Path = ROOT) -> dict[str, Any]:
 
 
 def find_importers(root: Path) -> defaultdict[str, set[str]]:
-    """Return which modules of package and benchmarks import each module of the package."""
+    """Return the importers, in package and benchmarks, of each module of the package."""
     known = {_module(root, path) for path in _read(root, "drone_rl")}
     importers = defaultdict(set)
     for path, text in (_read(root, "drone_rl") | _read(root, "benchmarks")).items():
@@ -124,7 +124,7 @@ def find_phrases(paths: Iterable[Path]) -> Iterator[Phrase]:
 
 
 def _prose(path: Path) -> Iterator[tuple[int, str]]:
-    """Yield numbered lines: of Python only comments, and strings that contain a space."""
+    """Yield numbered lines; of Python only comments and strings with a space."""
     text = path.read_text(errors="replace")
     if path.suffix != ".py":
         yield from enumerate(text.splitlines(), 1)
@@ -137,7 +137,7 @@ def _prose(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _imported(tree: ast.Module, importer: str, *, is_package: bool) -> Iterator[str]:
-    """Yield the names of imported modules, and of what is imported from them."""
+    """Yield the names of imported modules and of the names imported from them."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)

@@ -1,4 +1,4 @@
-"""What `make clean` deletes, in a copy."""
+"""The files that `make clean` deletes, in a copy."""
 
 import shutil
 import subprocess
@@ -37,8 +37,8 @@ def test_clean_keeps_results(make):
     ("typed", "is_deleted"),
     [("y\n", True), ("Y\n", True), ("n\n", False), ("\n", False), ("", False), ("why\n", False)],
 )
-def test_results_are_deleted_only_after_a_yes(make, typed, is_deleted):
-    left, said = make("clean-outputs", typed)
+def test_results_are_deleted_only_after_confirmation(make, typed, is_deleted):
+    left, output = make("clean-outputs", typed)
     assert ("outputs/train/last.pt" not in left) == is_deleted
     assert {"a/kept.py", ".venv/x", "site/x"} <= left
-    assert "[y/N]" in said and ("deleted" in said) == is_deleted
+    assert "[y/N]" in output and ("deleted" in output) == is_deleted

@@ -1,7 +1,7 @@
 from tools.mirror import PURE_DATA, ROOT, count_lines, modules_without_test
 
 
-def test_modules_and_their_tests_are_paired_by_name_and_folder(tmp_path):
+def test_modules_and_tests_match_by_name_and_folder(tmp_path):
     for name in ("a", "b", "deep/a", "deep/c", "__init__", "config/networks"):
         path = tmp_path / "drone_rl" / f"{name}.py"
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -15,7 +15,7 @@ def test_modules_and_their_tests_are_paired_by_name_and_folder(tmp_path):
     assert count_lines(tmp_path / "tests") == 9
 
 
-def test_what_is_excepted_is_there_and_has_a_reason():
+def test_exempt_modules_exist_and_have_a_reason():
     assert all(
-        (ROOT / "drone_rl" / f"{name}.py").exists() and why for name, why in PURE_DATA.items()
+        (ROOT / "drone_rl" / f"{name}.py").exists() and reason for name, reason in PURE_DATA.items()
     )

@@ -1,4 +1,4 @@
-"""The machinery of `make mutants` that needs no Cosmic Ray."""
+"""The parts of `make mutants` that do not need Cosmic Ray."""
 
 import json
 from pathlib import Path
@@ -33,24 +33,24 @@ def column(text, line):
     ("text", "line", "silent"),
     [
         ("|", 4, True),  # an annotation
-        ("*", 4, True),  # the sign between parameters
-        ("3", 4, False),  # ... but not its default
+        ("*", 4, True),  # the marker between parameters
+        ("3", 4, False),  # a default
         ("1.5", 4, False),
         ("| str", 4, True),
-        ("<", 5, False),  # whether it raises is behaviour
-        ("+ 1", 6, True),  # what it says is not
+        ("<", 5, False),  # the condition of a raise is behaviour
+        ("+ 1", 6, True),  # its message is not
         ("+ 2", 7, True),
         ("*", 8, False),
         ("*", 13, True),  # __repr__
     ],
 )
-def test_only_behaviour_is_mutated(text, line, silent):
+def test_spans_without_behaviour_are_silent(text, line, silent):
     spans = filters.silent_spans(SOURCE)
     assert filters.is_within((line, column(text, line)), spans) is silent
 
 
 @pytest.mark.parametrize(
-    ("operator", "kept"),
+    ("operator", "is_kept"),
     [
         ("core/ReplaceBinaryOperator_Add_Sub", True),
         ("core/ReplaceBinaryOperator_Add_LShift", False),
@@ -64,11 +64,11 @@ def test_only_behaviour_is_mutated(text, line, silent):
         ("drone_rl/SwapName", True),
     ],
 )
-def test_like_is_replaced_by_like(operator, kept):
-    assert filters.is_of_one_kind(operator) is kept
+def test_an_operator_must_keep_the_kind_of_a_token(operator, is_kept):
+    assert filters.is_of_one_kind(operator) is is_kept
 
 
-def test_a_mutant_is_another_program():
+def test_a_mutant_must_compile_and_differ():
     assert filters.changes_program("a = 1", "a = 2")
     assert not filters.changes_program("a = 1", "a  =  1")
     assert not filters.changes_program("a = 1", "a = = 1")
@@ -83,27 +83,27 @@ def test_the_whole_package_is_mutated():
     assert {name.split("/")[1] for name in found if name.count("/") > 1} == packages
 
 
-def test_tests_of_pages_and_tools_are_not_run():
+def test_tests_of_pages_and_tools_are_excluded():
     found = targets.test_files(ROOT)
     assert "tests/evaluation/test_metrics.py" in found
     assert "tests/benchmarks/test_sentences.py" in found  # changes every sentence
     assert not any("/tools/" in name or "/docs/" in name for name in found)
 
 
-def test_where_the_tests_of_a_module_are():
+def test_mirror_returns_the_test_file_of_a_module():
     assert targets.mirror("drone_rl/sim/tasks/task.py") == "tests/sim/tasks/test_task.py"
     assert targets.mirror("drone_rl/sim/__init__.py") == "tests/sim/test_sim.py"
     assert targets.mirror("drone_rl/__init__.py") == "tests/test_drone_rl.py"
 
 
-def test_a_tree_without_the_program_is_an_error(tmp_path):
+def test_a_tree_without_modules_raises(tmp_path):
     with pytest.raises(ValueError, match="has no modules"):
         targets.modules(tmp_path)
 
 
-def test_each_survivor_that_is_kept_has_the_harm_that_it_would_do():
-    kept = json.loads((ROOT / "docs" / "mutants.json").read_text())
-    survivors = [row for row in kept["mutants"] if row["outcome"] == "survived"]
+def test_each_listed_survivor_has_a_harm():
+    content = json.loads((ROOT / "docs" / "mutants.json").read_text())
+    survivors = [row for row in content["mutants"] if row["outcome"] == "survived"]
     if not any("harm" in row for row in survivors):
-        pytest.skip("a list from before harms were kept")
+        pytest.skip("the list predates harms")
     assert [row["id"] for row in survivors if not row["harm"]] == []

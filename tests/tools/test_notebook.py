@@ -1,11 +1,11 @@
-"""A page becomes a notebook of text and code, in order."""
+"""Conversion of a Markdown page to a notebook."""
 
 import json
 
 from tools.readme.notebook import make_notebook
 
 
-def test_python_is_code_and_all_else_is_text():
+def test_python_blocks_become_code_cells_and_the_rest_text():
     first, last = "```python\nx = 1\n\ny = 2\n```\n", "```python\nx\n```\n"
     page = f"# Title\n\nWords.\n\n{first}\n```sh\nls\n```\n\n{last}"
     made = json.loads(make_notebook(page))
@@ -19,6 +19,6 @@ def test_python_is_code_and_all_else_is_text():
     assert all(cell["outputs"] == [] for cell in made["cells"] if cell["cell_type"] == "code")
 
 
-def test_a_file_in_a_block_with_a_title_is_text():
+def test_a_titled_block_is_text():
     (cell,) = json.loads(make_notebook('```python title="a.py"\nx = 1\n```\n'))["cells"]
     assert cell["cell_type"] == "markdown"

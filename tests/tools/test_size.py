@@ -1,4 +1,4 @@
-"""Counts of a small package, by hand."""
+"""Hand-counted values of a small package."""
 
 import json
 
@@ -9,7 +9,7 @@ from tools.size import ROOT, find_importers, find_phrases, main, measure
 
 @pytest.fixture
 def checkout(tmp_path):
-    """Two packages, a benchmark and a test."""
+    """Return a checkout with two packages, a benchmark and a test."""
     files = {
         "drone_rl/__init__.py": "",
         "drone_rl/a/__init__.py": "",
@@ -29,7 +29,7 @@ def checkout(tmp_path):
     return tmp_path
 
 
-def test_counts_by_hand(checkout):
+def test_measure_returns_the_hand_counted_values(checkout):
     found = measure(checkout)
     assert found == {
         "package_lines": 66,
@@ -45,20 +45,20 @@ def test_counts_by_hand(checkout):
     }
 
 
-def test_importers_by_absolute_and_relative_imports(checkout):
+def test_find_importers_resolves_absolute_and_relative_imports(checkout):
     found = find_importers(checkout)
     assert found["drone_rl.a.once"] == {"drone_rl.a.twice"}
     assert found["drone_rl.a.twice"] == {"drone_rl.b.user", "benchmarks.b"}
     assert found["drone_rl.a.long"] == {"drone_rl.b.user"}
 
 
-def test_a_relative_import_in_a_package_is_of_that_package(checkout):
+def test_a_relative_import_in_init_resolves_to_its_package(checkout):
     (checkout / "drone_rl/a/__init__.py").write_text("from .long import x\nfrom . import once\n")
     found = find_importers(checkout)
     assert "drone_rl.a" in found["drone_rl.a.long"] and "drone_rl.a" in found["drone_rl.a.once"]
 
 
-def test_only_comments_and_texts_of_python_are_prose(tmp_path):
+def test_prose_of_python_is_comments_and_strings_with_spaces(tmp_path):
     path = tmp_path / "a.py"
     path.write_text('picture = "picture"\nother = "a picture"\n# pictures are drawn anew\n')
     found = list(find_phrases([path]))
@@ -78,13 +78,13 @@ def test_only_comments_and_texts_of_python_are_prose(tmp_path):
         ("nothing to rewrite here", 0),
     ],
 )
-def test_phrases(tmp_path, text, count):
+def test_find_phrases_counts_phrases(tmp_path, text, count):
     path = tmp_path / "a.md"
     path.write_text(text)
     assert len(list(find_phrases([tmp_path]))) == count
 
 
-def test_it_prints_counts_of_this_checkout_or_phrases(capsys, checkout):
+def test_main_prints_counts_or_phrases(capsys, checkout):
     main([])
     printed = json.loads(capsys.readouterr().out)
     assert printed["package_modules"] == len([*(ROOT / "drone_rl").rglob("*.py")])

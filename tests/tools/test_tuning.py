@@ -1,24 +1,24 @@
-"""Everybody is tuned with the same care, and what was found is what is used."""
+"""All learners are tuned with equal effort, and the benchmark uses the tuned settings."""
 
 from benchmarks.peers import settings as peers
 from tools import tuning
 
 
-def test_all_have_as_many_settings_and_none_twice():
+def test_every_learner_has_six_distinct_settings():
     tried = [*tuning.OURS.values(), *tuning.THEIRS.values()]
     assert {len(settings) for settings in tried} == {6}
     assert all(len({str(one) for one in settings}) == 6 for settings in tried)
     assert [*tuning.OURS, *tuning.THEIRS] == [*peers.LABELS]
 
 
-def test_the_settings_that_are_measured_are_of_those_that_were_tried():
+def test_the_measured_settings_are_among_those_tried():
     for name in ("a2c", "ppo"):
         assert " ".join(peers.OURS[name]) in tuning.OURS[name]
     for name, settings in peers.THEIRS.items():
         assert dict(settings) in tuning.THEIRS[name]
 
 
-def test_a_line_is_told_of_each(monkeypatch, capsys):
+def test_main_prints_a_line_per_setting(monkeypatch, capsys):
     times = iter([10.0, 12.0, 20.0, 21.0])
 
     def trained(name, settings, *, seed, episodes, max_frames):

@@ -1,4 +1,4 @@
-"""Listing and drawing, where Cosmic Ray is installed (`make mutants` installs it)."""
+"""Listing and sampling of mutants; needs Cosmic Ray, which `make mutants` installs."""
 
 import json
 import tomllib
@@ -11,7 +11,7 @@ import cosmic_ray.plugins
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.work_db import WorkDB, use_db
 
-from tools.mutants import kept, worklist
+from tools.mutants import results, worklist
 from tools.mutants.operators import HalveNumber, SwapName
 
 SOURCE = """\
@@ -35,11 +35,11 @@ def database(tree):
         yield found
 
 
-def test_the_list_has_behaviour_only(tree, database):
+def test_only_mutations_of_behaviour_are_listed(tree, database):
     worklist.fill(database, tree, ["module.py"], lambda mutants: mutants)
     sample, done, listed = worklist.sample_of(database, tree)
     assert listed == len(sample) and not done
-    rows = [kept.row(mutant, tree, {"outcome": "killed"}, {}, {}) for mutant in sample]
+    rows = [results.row(mutant, tree, {"outcome": "killed"}, {}, {}) for mutant in sample]
     changed = {(row["before"], " ".join(row["after"].split())) for row in rows}
     first, last = SOURCE.splitlines()[0], "return max(values) + bonus"
     assert (last, "return min(values) + bonus") in changed
@@ -50,7 +50,7 @@ def test_the_list_has_behaviour_only(tree, database):
     assert not any("list" in after and "| None" not in after for _, after in changed)
 
 
-def test_a_sample_is_part_of_the_list_and_the_same_for_the_same_seed(tree, database):
+def test_a_sample_is_a_subset_determined_by_the_seed(tree, database):
     def ids(seed, size):
         choose = lambda mutants: worklist.draw(mutants, tree, size, seed)  # noqa: E731
         worklist.fill(database, tree, ["module.py"], choose)
@@ -61,7 +61,7 @@ def test_a_sample_is_part_of_the_list_and_the_same_for_the_same_seed(tree, datab
     assert first < ids(0, 8) < ids(0, 1000)
     assert ids(1, 5) != first
     (tree / "module.py").write_text("import math\n\n\n" + SOURCE)
-    assert ids(0, 5) == first  # lines that moved are the same lines
+    assert ids(0, 5) == first  # moved lines keep their ids
 
 
 @pytest.mark.parametrize(
@@ -70,63 +70,63 @@ def test_a_sample_is_part_of_the_list_and_the_same_for_the_same_seed(tree, datab
         (SwapName(), 'x["lower95"]', 'x["upper95"]'),
         (SwapName(), "x.all(-1)", "x.any(-1)"),
         (HalveNumber(), "x = 0.9", "x = 0.45"),
-        (SwapName(), "min = 3", None),  # a name of one's own
+        (SwapName(), "min = 3", None),  # a local variable
         (HalveNumber(), "x = 1e-8", None),  # a tolerance
         (HalveNumber(), "x = 3", None),
     ],
 )
-def test_operators_of_our_own(operator, before, after):
+def test_own_operators(operator, before, after):
     assert mutate_code(before, operator, 0) == after
 
 
-def test_the_kept_list_counts_equivalent_mutants_neither_way(tree, database):
+def test_equivalent_mutants_do_not_count_in_the_score(tree, database):
     worklist.fill(database, tree, ["module.py"], lambda mutants: mutants[:4])
     sample, _, _ = worklist.sample_of(database, tree)
     reasons = {sample[0].id: "because", sample[1].id: "wrongly so"}
     outcomes = ("survived", "killed", "survived", "timeout")
-    results = [{"outcome": outcome, "by": None} for outcome in outcomes]
+    outputs = [{"outcome": outcome, "by": None} for outcome in outcomes]
     harms = {sample[0].id: "none", sample[2].id: "wrong figures"}
-    rows = [kept.row(m, tree, r, reasons, harms) for m, r in zip(sample, results, strict=True)]
+    rows = [results.row(m, tree, r, reasons, harms) for m, r in zip(sample, outputs, strict=True)]
     assert [row["outcome"] for row in rows] == ["equivalent", "killed", "survived", "timeout"]
     assert rows[0]["reason"] == "because" and "reason" not in rows[1]
     assert rows[2]["harm"] == "wrong figures" and "harm" not in rows[0]
-    assert kept.score(rows) == pytest.approx(2 / 3)
-    kept.write(tree / "kept.json", {"seed": 0}, rows)
+    assert results.score(rows) == pytest.approx(2 / 3)
+    results.write(tree / "kept.json", {"seed": 0}, rows)
     read = json.loads((tree / "kept.json").read_text())
     assert read["seed"] == 0 and read["score"] == pytest.approx(2 / 3)
     assert sorted(row["id"] for row in read["mutants"]) == sorted(row["id"] for row in rows)
 
 
-def test_hashes_are_those_of_files_and_of_folders(tree):
+def test_hashes_cover_files_and_folders(tree):
     (tree / "tests").mkdir()
     (tree / "tests" / "test_a.py").write_text("")
-    found = kept.hashes(tree, ["module.py", "tests"])
+    found = results.hashes(tree, ["module.py", "tests"])
     assert list(found) == ["module.py", "tests/test_a.py"]
     assert found["tests/test_a.py"].startswith("e3b0c44298fc")  # SHA-256 of nothing
 
 
-def test_a_list_whose_survivors_were_run_again(tree):
+def test_merging_a_second_run_keeps_the_first_score(tree):
     outcomes = {"a": "killed", "b": "survived", "c": "survived"}
     first = [{"id": i, "module": "m", "line": 1, "outcome": o} for i, o in outcomes.items()]
-    kept.write(tree / "first.json", {"modules": {"m": "1"}}, first)
+    results.write(tree / "first.json", {"modules": {"m": "1"}}, first)
     again = [{**first[1], "outcome": "killed"}, first[2]]
-    rows, score = kept.merge(tree / "first.json", {"m": "1"}, again)
+    rows, score = results.merge(tree / "first.json", {"m": "1"}, again)
     assert [row["outcome"] for row in rows] == ["killed", "killed", "survived"]
-    assert score == pytest.approx(1 / 3)  # at first sight
-    kept.write(tree / "second.json", {"modules": {"m": "1"}, "first_score": score}, rows)
-    assert kept.merge(tree / "second.json", {"m": "1"}, [])[1] == pytest.approx(1 / 3)
+    assert score == pytest.approx(1 / 3)  # the score of the first run
+    results.write(tree / "second.json", {"modules": {"m": "1"}, "first_score": score}, rows)
+    assert results.merge(tree / "second.json", {"m": "1"}, [])[1] == pytest.approx(1 / 3)
     with pytest.raises(ValueError, match="modules have changed"):
-        kept.merge(tree / "first.json", {"m": "2"}, again)
+        results.merge(tree / "first.json", {"m": "2"}, again)
 
 
-def test_each_reason_and_each_harm_is_of_one_mutant():
+def test_each_id_is_listed_once():
     for name in ("equivalents", "harms"):
-        text = (kept.HERE / f"{name}.toml").read_text()
+        text = (results.HERE / f"{name}.toml").read_text()
         ids = [id_ for entry in tomllib.loads(text).get("mutants", []) for id_ in entry["ids"]]
-        assert len(ids) == len(set(ids)) == len(kept.listed(name))
+        assert len(ids) == len(set(ids)) == len(results.read_reasons(name))
 
 
-def test_only_operators_that_replace_like_by_like_are_tried():
+def test_only_operators_that_keep_the_kind_are_used():
     names = cosmic_ray.plugins.operator_names()
     assert {"drone_rl/SwapName", "core/NumberReplacer", "core/AddNot"} <= set(names)
     assert "core/ReplaceBinaryOperator_Add_Sub" in names

@@ -1,4 +1,4 @@
-"""`python -m tools.mutants`: draws the sample, runs what has no result yet, keeps the list."""
+"""`python -m tools.mutants`: sample mutants, run those without a result, write the list."""
 
 import argparse
 import json
@@ -13,7 +13,7 @@ from typing import Any
 from cosmic_ray.work_db import WorkDB, use_db
 from cosmic_ray.work_item import TestOutcome, WorkerOutcome, WorkResult
 
-from tools.mutants import forks, kept, reach, targets, worklist
+from tools.mutants import coverage, forks, results, targets, worklist
 
 ROOT = Path(__file__).resolve().parents[2]
 COPIED = ("drone_rl", "conf", "tests", "tools", "pyproject.toml", "README.md", "docs")
@@ -21,7 +21,7 @@ OUTCOMES = {"passed": "survived", "failed": "killed", "timeout": "timeout"}
 
 
 def main() -> int:
-    """Runs it; see `--help`."""
+    """Run the command; see `--help`."""
     options = _options()
     work = options.work.resolve()
     work.mkdir(parents=True, exist_ok=True)
@@ -34,7 +34,7 @@ def main() -> int:
     with use_db(str(work / "session.sqlite"), WorkDB.Mode.create) as database:
         _prepare(database, work, tree, modules, head, options.again)
         sample, done, listed = worklist.sample_of(database, tree)
-        _say(f"{len(sample)} mutants of {listed} in {len(modules)} modules, {len(done)} done")
+        _print(f"{len(sample)} mutants of {listed} in {len(modules)} modules, {len(done)} done")
         todo = [mutant for mutant in sample if mutant.job not in done]
         tests = targets.test_files(tree)
         if options.only:
@@ -46,28 +46,28 @@ def main() -> int:
             for job, result in database.results
             if job in {mutant.job for mutant in sample}
         }
-    reasons, harms = kept.listed("equivalents"), kept.listed("harms")
-    rows = [kept.row(m, tree, done[m.job], reasons, harms) for m in sample]
+    reasons, harms = results.read_reasons("equivalents"), results.read_reasons("harms")
+    rows = [results.row(m, tree, done[m.job], reasons, harms) for m in sample]
     if options.again:
-        rows, first = kept.merge(options.again, head["modules"], rows)
+        rows, first = results.merge(options.again, head["modules"], rows)
         head["first_score"] = first
-    kept.write(options.out, {**head, "listed": listed}, rows)
+    results.write(options.out, {**head, "listed": listed}, rows)
     _report(rows, reasons)
     return 0
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tools.mutants", description=__doc__)
-    parser.add_argument("--seed", type=int, default=0, help="of the sample")
-    parser.add_argument("--sample", type=int, default=1000, help="how many mutants")
-    parser.add_argument("--jobs", type=int, default=2, help="processes at once")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the sample")
+    parser.add_argument("--sample", type=int, default=1000, help="number of mutants")
+    parser.add_argument("--jobs", type=int, default=2, help="number of parallel processes")
     parser.add_argument(
         "--only",
         nargs="*",
         default=[],
-        help="modules, by a part of their path, with their own tests alone",
+        help="parts of module paths: mutate these and run only the tests of their own name",
     )
-    parser.add_argument("--again", type=Path, help="a kept list: its survivors only, now")
+    parser.add_argument("--again", type=Path, help="an earlier list, to run its survivors only")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "mutants.json")
     parser.add_argument("--work", type=Path, default=ROOT / "outputs" / "mutants")
     options = parser.parse_args()
@@ -80,20 +80,20 @@ def _head(options: argparse.Namespace, modules: list[str]) -> dict[str, Any]:
         "seed": options.seed,
         "sample": options.sample,
         "revision": _revision(),
-        "modules": kept.hashes(ROOT, modules),
-        "tests": kept.digest(ROOT, ["tests"]),
+        "modules": results.hashes(ROOT, modules),
+        "tests": results.digest(ROOT, ["tests"]),
     }
 
 
 def _revision() -> str | None:
-    """Commit of the tree, with "-dirty" if it was changed since; None without git."""
-    asked = (["rev-parse", "HEAD"], ["status", "--porcelain", "-uno"])
+    """Return the commit of the tree, with "-dirty" if it has changes; None without git."""
+    commands = (["rev-parse", "HEAD"], ["status", "--porcelain", "-uno"])
     try:
         commit, changes = (
             subprocess.run(
                 ["git", "-C", str(ROOT), *args], check=True, capture_output=True, text=True
             ).stdout.strip()
-            for args in asked
+            for args in commands
         )
     except (OSError, subprocess.CalledProcessError):
         return None
@@ -108,13 +108,13 @@ def _prepare(
     head: dict[str, Any],
     again: Path | None,
 ) -> None:
-    """Draws a new sample, unless the session is one of this very tree, which then goes on."""
+    """Draw a new sample, unless a session of this tree exists, which is then resumed."""
     ids: list[str] = []
     if again is not None:
         rows = json.loads(again.read_text())["mutants"]
         ids = [row["id"] for row in rows if row["outcome"] == "survived"]
-    plain = {name: value for name, value in head.items() if name != "revision"}
-    key = {**plain, "again": ids, "tree": kept.hashes(tree, ["drone_rl", "tools"])}
+    settings = {name: value for name, value in head.items() if name != "revision"}
+    key = {**settings, "again": ids, "tree": results.hashes(tree, ["drone_rl", "tools"])}
     state = work / "session.json"
     if state.exists() and json.loads(state.read_text()) == key:
         return
@@ -137,31 +137,31 @@ def _run(
     tests: list[str],
     jobs: int,
 ) -> None:
-    """Records what tests run, then runs those that can notice each mutant."""
+    """Record the coverage of each test, then run the tests that cover each mutant."""
     forks.import_libraries(work / "kernels")
     shutil.rmtree(work / "scratch", ignore_errors=True)
     (work / "scratch").mkdir()
-    for line in reach.record(tree, work, tests, jobs):
-        _say(line)
-    reached = reach.read(tree, work, tests)
-    if reached.failed:
-        _say(f"left out, as they fail without a mutation: {', '.join(reached.failed)}")
+    for line in coverage.record(tree, work, tests, jobs):
+        _print(line)
+    covered = coverage.read(tree, work, tests)
+    if covered.failed:
+        _print(f"skipped, because they fail without a mutation: {', '.join(covered.failed)}")
     by_id = {mutant.id: mutant for mutant in todo}
-    runs = (run for mutant in todo if (run := _as_run(mutant, tree, reached)))
+    runs = (run for mutant in todo if (run := _make_run(mutant, tree, covered)))
     for count, outcome in enumerate(forks.run_all(runs, tree, work / "scratch", jobs), 1):
         mutant = by_id.pop(outcome.run.name)
         result = {"outcome": OUTCOMES[outcome.status], "by": outcome.failing}
         database.set_result(mutant.job, _result(result))
         if outcome.status == "passed" or count % 20 == 0:
-            _say(f"{count}/{len(todo)} {_line(mutant, tree, result)}")
+            _print(f"{count}/{len(todo)} {_line(mutant, tree, result)}")
     for mutant in by_id.values():
         result = {"outcome": "survived", "by": None}
         database.set_result(mutant.job, _result(result))
-        _say(f"no test runs it: {_line(mutant, tree, result)}")
+        _print(f"no test covers it: {_line(mutant, tree, result)}")
 
 
-def _as_run(mutant: worklist.Mutant, tree: Path, reached: reach.Reach) -> forks.Run | None:
-    tests = reached.tests_for(mutant)
+def _make_run(mutant: worklist.Mutant, tree: Path, covered: coverage.Coverage) -> forks.Run | None:
+    tests = covered.tests_for(mutant)
     source = mutant.source(tree)
     if source is None or not (tests.own or tests.others):
         return None
@@ -172,12 +172,12 @@ def _as_run(mutant: worklist.Mutant, tree: Path, reached: reach.Reach) -> forks.
         mutant.module,
         source,
         then=tests.others,
-        leave_out=reached.failed,
+        skip=covered.failed,
     )
 
 
 def _line(mutant: worklist.Mutant, tree: Path, result: dict[str, Any]) -> str:
-    row = kept.row(mutant, tree, result, {}, {})
+    row = results.row(mutant, tree, result, {}, {})
     return f"{row['outcome']} {row['id']} {row['module']}:{row['line']} {row['after']}"
 
 
@@ -191,7 +191,7 @@ def _result(result: dict[str, Any]) -> WorkResult:
 
 
 def _copy(work: Path) -> Path:
-    """A copy of what the tests need, so that edits and mutations keep out of each other's way."""
+    """Copy the files that the tests need, so that edits of the tree do not affect the run."""
     tree = work / "tree"
     ignore = shutil.ignore_patterns("__pycache__", ".*")
     for name in COPIED:
@@ -210,15 +210,15 @@ def _report(rows: list[dict[str, Any]], reasons: dict[str, str]) -> None:
         if row["outcome"] == "survived":
             print(f"survived {row['id']} {row['module']}:{row['line']} {row['operator']}")
             print(f"    - {row['before']}\n    + {row['after']}")
-            print(f"    {row['harm'] or 'the harm is not yet in tools/mutants/harms.toml'}")
+            print(f"    {row['harm'] or 'no harm is listed in tools/mutants/harms.toml'}")
         if row["id"] in reasons and row["outcome"] in ("killed", "timeout"):
             print(f"listed as equivalent, but killed: {row['id']}", file=sys.stderr)
     counts = Counter(row["outcome"] for row in rows)
-    told = ", ".join(f"{count} {outcome}" for outcome, count in sorted(counts.items()))
-    print(f"mutation score {kept.score(rows):.3f}: {told}")
+    summary = ", ".join(f"{count} {outcome}" for outcome, count in sorted(counts.items()))
+    print(f"mutation score {results.score(rows):.3f}: {summary}")
 
 
-def _say(text: str) -> None:
+def _print(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 

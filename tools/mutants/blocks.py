@@ -1,8 +1,8 @@
-"""Blocks of a module: its functions, and the branches within them, each with a name.
+"""Named code blocks of a module: its functions and the branches within them.
 
-A block runs as a whole or not at all, but for errors: the body of a function, or of a branch,
-a loop or a handler in it. `counted` makes every block report when it runs, which says which
-tests can notice a mutation of it.
+A block is the body of a function, branch, loop or exception handler. Unless an error occurs, it
+runs as a whole or not at all. `instrument` adds to each block a call that reports its execution,
+which shows the tests that can detect a mutation of the block.
 """
 
 import ast
@@ -11,8 +11,8 @@ from collections.abc import Iterator
 
 from tools.mutants.filters import Position
 
-CALLED = "__reached__"
-"""A built-in function that takes the name of a block; whoever runs counted code provides it."""
+CALLBACK = "__reached__"
+"""Name of the built-in function that instrumented code calls with the name of a block."""
 WARP = ("wp.kernel", "wp.func", "wp.func_native", "warp.kernel", "warp.func", "warp.func_native")
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -27,51 +27,51 @@ class Block:
     end: Position
     statements: list[ast.stmt]
     is_kernel: bool
-    """Whether Warp compiles it, so that it has no branches of its own and reports nothing."""
+    """Whether Warp compiles the function. Such a block has no inner blocks and no report."""
 
 
 def module_name(path: str) -> str:
-    """The name of a module, from its path below the tree."""
+    """Return the name of a module, given its path relative to the tree."""
     return path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
 
 
 def blocks(tree: ast.Module, module: str) -> list[Block]:
-    """All blocks of a module, outer ones before those in them."""
-    return list(_inside(tree, f"{module}:"))
+    """Return all blocks of a module, outer blocks before inner ones."""
+    return list(_blocks_below(tree, f"{module}:"))
 
 
 def block_at(tree: ast.Module, module: str, position: Position) -> Block | None:
-    """The innermost block at a position; None for what runs when the module is imported."""
+    """Return the innermost block at a position; None for code that runs at import."""
     found = [b for b in blocks(tree, module) if b.start <= position < b.end]
     return max(found, key=lambda block: block.start, default=None)
 
 
-def counted(source: str, module: str) -> ast.Module:
-    """The syntax tree of a module whose blocks report that they run."""
+def instrument(source: str, module: str) -> ast.Module:
+    """Return the syntax tree of a module in which each block reports its execution."""
     tree = ast.parse(source)
     for block in blocks(tree, module):
         if block.is_kernel:
             continue
-        name = ast.Call(ast.Name(CALLED, ast.Load()), [ast.Constant(block.name)], [])
+        name = ast.Call(ast.Name(CALLBACK, ast.Load()), [ast.Constant(block.name)], [])
         first = block.statements[0]
-        place = int(block.name.endswith("#0") and _is_text(first))
-        report = ast.copy_location(ast.Expr(name), block.statements[-1 if place else 0])
-        block.statements.insert(place, ast.fix_missing_locations(report))
+        index = int(block.name.endswith("#0") and _is_docstring(first))
+        report = ast.copy_location(ast.Expr(name), block.statements[-1 if index else 0])
+        block.statements.insert(index, ast.fix_missing_locations(report))
     return tree
 
 
-def _inside(node: ast.AST, prefix: str) -> Iterator[Block]:
-    """Blocks of the functions below a node that is in no function."""
+def _blocks_below(node: ast.AST, prefix: str) -> Iterator[Block]:
+    """Yield the blocks of all functions below a node that is outside any function."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, Function):
-            yield from _of(child, prefix)
+            yield from _blocks_of(child, prefix)
         elif isinstance(child, ast.ClassDef):
-            yield from _inside(child, f"{prefix}{child.name}.")
+            yield from _blocks_below(child, f"{prefix}{child.name}.")
         else:
-            yield from _inside(child, prefix)
+            yield from _blocks_below(child, prefix)
 
 
-def _of(function: Function, prefix: str) -> Iterator[Block]:
+def _blocks_of(function: Function, prefix: str) -> Iterator[Block]:
     name = f"{prefix}{function.name}"
     is_kernel = any(_decorator(d) in WARP for d in function.decorator_list)
     yield _block(f"{name}#0", function.body, is_kernel)
@@ -89,7 +89,7 @@ def _of(function: Function, prefix: str) -> Iterator[Block]:
     for count, body in enumerate(branches, 1):
         yield _block(f"{name}#{count}", body, False)
     for node in inner:
-        yield from _of(node, f"{name}.")
+        yield from _blocks_of(node, f"{name}.")
 
 
 def _branches(node: ast.AST) -> Iterator[list[ast.stmt]]:
@@ -111,5 +111,5 @@ def _decorator(node: ast.expr) -> str:
     return ast.unparse(node.func if isinstance(node, ast.Call) else node)
 
 
-def _is_text(node: ast.stmt) -> bool:
+def _is_docstring(node: ast.stmt) -> bool:
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)

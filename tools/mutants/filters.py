@@ -1,14 +1,13 @@
-"""Which mutations are none: those that change no behaviour by design, and those that only crash.
+"""Filters for mutations that change no behaviour by design or that only crash.
 
-Left out are
-1. type annotations, and the signs `*` and `/` that part the parameters of a function;
-2. `raise` statements and what is written to a log: their texts (whether the branch is taken at
-   all is decided outside and stays in);
+Excluded are
+1. type annotations, and the markers `*` and `/` between parameters of a function;
+2. the contents of `raise` statements and log messages (conditions around them are mutated);
 3. bodies of `__repr__` and `__str__`;
-4. an operator replaced by one of another kind: `a + b` by `a << b` or `-x` by `~x` is a TypeError
-   of tensors and floats, which any test notices, so that it would only flatter the figure; and
-   `==` by `is`. Kinds: arithmetic, bits, order and equality, identity;
-5. what does not compile, or compiles to the same syntax tree.
+4. replacements of an operator by one of another kind. `a << b` for `a + b` or `~x` for `-x` raises
+   a TypeError for tensors and floats in any test, which would inflate the score. `is` for `==` is
+   excluded too. Kinds: arithmetic, bitwise, order and equality, identity;
+5. mutants that do not compile or that have the same syntax tree as the original.
 """
 
 import ast
@@ -17,7 +16,7 @@ import re
 from collections.abc import Iterator
 
 Position = tuple[int, int]
-"""Line, counted from 1, and column, counted from 0."""
+"""Line (from 1) and column (from 0)."""
 
 KINDS = (
     {"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"},
@@ -28,15 +27,15 @@ KINDS = (
     {"Invert"},
     {"Not"},
 )
-SIGN = re.compile(r"(?:^|[(,])\s*([*/])(?=\s*[,)])")
+MARKER = re.compile(r"(?:^|[(,])\s*([*/])(?=\s*[,)])")
 LOGS = re.compile(r"^(_log|log|logger|logging|warnings)\b")
 
 
 def is_of_one_kind(operator: str) -> bool:
-    """Whether an operator of Cosmic Ray replaces like by like, or deletes.
+    """Return whether a Cosmic Ray operator keeps the kind of the token, or deletes it.
 
     Args:
-        operator: Its name, such as "core/ReplaceBinaryOperator_Add_Sub".
+        operator: Name of the operator, such as "core/ReplaceBinaryOperator_Add_Sub".
     """
     found = re.fullmatch(r"core/Replace\w+Operator_([A-Z]\w*?)_([A-Z]\w*)", operator)
     if found is None or found[1] == "Delete":
@@ -45,22 +44,22 @@ def is_of_one_kind(operator: str) -> bool:
 
 
 def silent_spans(source: str) -> list[tuple[Position, Position]]:
-    """Parts of a module in which no behaviour is written (rules 1 to 3), from start to end."""
-    signs = (
+    """Return start and end of the parts of a module without behaviour (rules 1 to 3)."""
+    markers = (
         ((number, found.start(1)), (number, found.end(1)))
         for number, line in enumerate(source.splitlines(), 1)
-        for found in SIGN.finditer(line)
+        for found in MARKER.finditer(line)
     )
-    return [*signs, *(_span(node) for node in _silent(ast.parse(source)))]
+    return [*markers, *(_span(node) for node in _silent(ast.parse(source)))]
 
 
 def is_within(position: Position, spans: list[tuple[Position, Position]]) -> bool:
-    """Whether a position lies in one of the spans."""
+    """Return whether a position lies in one of the spans."""
     return any(start <= position < end for start, end in spans)
 
 
 def changes_program(source: str, mutated: str | None) -> bool:
-    """Whether mutated source is a program, and another one (rule 5)."""
+    """Return whether mutated source compiles and differs from the original (rule 5)."""
     if mutated is None:
         return False
     try:

@@ -1,4 +1,4 @@
-"""Test runs in forks of this process, which has imported the libraries but not the program."""
+"""Run tests in forks of this process, which has imported the libraries but not the package."""
 
 import contextlib
 import dataclasses
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.mutants.recording import CountedFinder, Recorder, record_launches
+from tools.mutants.recording import InstrumentingFinder, Recorder, record_launches
 
 LIBRARIES = (
     "torch",
@@ -43,17 +43,17 @@ LIBRARIES = (
     "_hypothesis_pytestplugin",
 )
 PACKAGE = "drone_rl"
-"""Of which it is recorded which blocks run."""
-WAIT = 10.0
-"""Seconds that may pass for each of processor time; more is a deadlock."""
+"""Package whose executed blocks are recorded."""
+MAX_WALL_RATIO = 10.0
+"""Greatest ratio of wall-clock to processor time; a run that exceeds it has a deadlock."""
 MEMORY_BYTES = 6 << 30
-"""A mutant that wants more is killed: a size that became a power, say."""
+"""Memory limit of a run; a mutant can turn a product of sizes into a power."""
 OPTIONS = (
     "-q",
     "--no-header",
     "--tb=line",
     *("-p", "no:cacheprovider"),
-    *("-p", "no:unraisableexception"),  # collects garbage of all libraries twice, for 1 s
+    *("-p", "no:unraisableexception"),  # its garbage collections take 1 s
     *("-W", "ignore"),
     *("-m", "not render"),
 )
@@ -61,49 +61,49 @@ OPTIONS = (
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """Tests to run on a copy of the tree, with one module's source replaced in memory."""
+    """A run of tests on a copy of the tree, with the source of one module replaced in memory."""
 
     name: str
     tests: Sequence[str]
     limit_s: float
-    """Of processor time, which a busy machine does not use up; of patience WAIT times that."""
+    """Limit of processor time; the limit of wall-clock time is MAX_WALL_RATIO times that."""
     module: str | None = None
-    """Path of the mutated module below the tree; None for the tree as it is."""
+    """Path of the mutated module relative to the tree; None for the original program."""
     source: str = ""
     then: Sequence[str] = ()
-    """Tests to run if the others have passed, in the same process."""
-    leave_out: Sequence[str] = ()
-    """Tests that fail without a mutation too."""
+    """Tests to run in the same process if `tests` have passed."""
+    skip: Sequence[str] = ()
+    """Tests to deselect because they fail without a mutation."""
     record: Path | None = None
-    """Where to write which blocks of which tests run; all tests run then, whatever fails."""
+    """File for the blocks that each test executes; if set, all tests run even after a failure."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """How a run ended."""
+    """The outcome of a run."""
 
     run: Run
     status: str
     """"passed", "failed" (also a crash), or "timeout"."""
     seconds: float
-    """Of processor time."""
+    """Processor time."""
     output: str
 
     @property
     def failing(self) -> str | None:
-        """The test that failed; None without one, as after a crash."""
+        """The test that failed; None if no test did or after a crash."""
         found = re.search(r"^(?:FAILED|ERROR) (\S+\.py(?:::.*?)?)(?: - .*)?$", self.output, re.M)
         return found and found[1]
 
 
 def import_libraries(kernels: Path) -> None:
-    """Imports what takes most of a test run's start; nothing of the program.
+    """Import the libraries, which take most of the start of a test run, but not the package.
 
     Args:
-        kernels: Folder for compiled kernels, those of mutants too.
+        kernels: Folder for compiled kernels, including those of mutants.
 
     Raises:
-        RuntimeError: The program was imported, so that a fork would not see a mutation.
+        RuntimeError: The package was imported, so a fork would not run the mutated source.
     """
     os.environ["OMP_NUM_THREADS"] = "1"
     os.environ["WARP_CACHE_PATH"] = str(kernels)
@@ -114,21 +114,21 @@ def import_libraries(kernels: Path) -> None:
 
     hypothesis.settings.register_profile("mutants", derandomize=True, deadline=None, database=None)
     hypothesis.settings.load_profile("mutants")
-    if "warp" in sys.modules:  # at level 0 results differ by rounding, at 1 they don't
+    if "warp" in sys.modules:  # level 0 rounds differently, level 1 does not
         sys.modules["warp"].config.optimization_level = 1
     if any(name.partition(".")[0] == "drone_rl" for name in sys.modules):
         raise RuntimeError("drone_rl was imported before the fork")
-    gc.freeze()  # what is imported stays for good: no child looks through it
+    gc.freeze()  # exempt imported objects from collection in the children
 
 
 def run_all(runs: Iterator[Run], tree: Path, scratch: Path, jobs: int) -> Iterator[Outcome]:
-    """Runs tests, `jobs` at a time, and yields each outcome as it comes.
+    """Execute runs in parallel and yield each outcome as it completes.
 
     Args:
-        runs: In this order.
+        runs: The runs, started in this order.
         tree: The copy of the project.
         scratch: Folder for outputs and temporary files.
-        jobs: Processes at once.
+        jobs: Number of parallel processes.
     """
     running: dict[int, tuple[Run, float]] = {}
     while True:
@@ -143,12 +143,12 @@ def run_all(runs: Iterator[Run], tree: Path, scratch: Path, jobs: int) -> Iterat
 def _finished(running: dict[int, tuple[Run, float]], scratch: Path) -> Iterator[Outcome]:
     for pid, (run, begin) in list(running.items()):
         ended, code, used = os.wait4(pid, os.WNOHANG)
-        late = not ended and time.monotonic() - begin > WAIT * run.limit_s
+        late = not ended and time.monotonic() - begin > MAX_WALL_RATIO * run.limit_s
         if late:
             os.killpg(pid, signal.SIGKILL)
             _, code, used = os.wait4(pid, 0)
         elif ended:
-            with contextlib.suppress(ProcessLookupError):  # what a test left behind
+            with contextlib.suppress(ProcessLookupError):  # processes that a test left running
                 os.killpg(pid, signal.SIGKILL)
         else:
             continue
@@ -172,7 +172,7 @@ def _start(run: Run, tree: Path, scratch: Path) -> int:
         with (scratch / f"{run.name}.txt").open("wb") as file:
             os.dup2(file.fileno(), 1)
             os.dup2(file.fileno(), 2)
-        sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__  # not a parent's captured ones
+        sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__  # the parent's may be captured
         code = _test(run, tree, scratch / run.name)
         sys.stdout.flush()
     finally:
@@ -180,9 +180,9 @@ def _start(run: Run, tree: Path, scratch: Path) -> int:
 
 
 def _test(run: Run, tree: Path, temporary: Path) -> int:
-    """Runs pytest in the child. Returns its exit status; 0 is that all tests passed."""
-    # At the first limit comes SIGXCPU, which nothing else sends. How much time was used doesn't
-    # tell: the limit counts ticks, which a busy machine gives for less time than `wait4` says.
+    """Run pytest in the child and return its exit status, which is 0 if all tests passed."""
+    # The soft limit sends SIGXCPU, which nothing else does. The time that `wait4` reports does not
+    # show a timeout: the limit counts scheduler ticks, which can exceed the time used.
     limit_s = math.ceil(run.limit_s)
     resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s + 60))
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
@@ -190,19 +190,19 @@ def _test(run: Run, tree: Path, temporary: Path) -> int:
     os.environ["PYTHONPATH"] = str(tree)  # for the processes that tests start
     sys.path.insert(0, str(tree))
     if run.module is not None:
-        sys.meta_path.insert(0, _Replaced(run.module, run.source))
-    options = [*OPTIONS, f"--basetemp={temporary}", *(f"--deselect={t}" for t in run.leave_out)]
+        sys.meta_path.insert(0, _MutantFinder(run.module, run.source))
+    options = [*OPTIONS, f"--basetemp={temporary}", *(f"--deselect={t}" for t in run.skip)]
     if run.record is None:
         stages = [tests for tests in (run.tests, run.then) if tests]
         return next(filter(None, (int(pytest.main(["-x", *options, *t])) for t in stages)), 0)
     recorder = Recorder(run.record)
     record_launches(recorder)
-    sys.meta_path.insert(0, CountedFinder(PACKAGE))
+    sys.meta_path.insert(0, InstrumentingFinder(PACKAGE))
     return int(pytest.main([*options, *run.tests], plugins=[recorder]))
 
 
-class _Replaced(importlib.abc.MetaPathFinder):
-    """Finds one module, and gives it other source than its file has."""
+class _MutantFinder(importlib.abc.MetaPathFinder):
+    """Finds one module and loads it from mutated source."""
 
     def __init__(self, path: str, source: str) -> None:
         self.name = path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
@@ -212,17 +212,17 @@ class _Replaced(importlib.abc.MetaPathFinder):
         if fullname != self.name:
             return None
         found = importlib.machinery.PathFinder.find_spec(fullname, path)
-        found.loader = _Loader(fullname, found.origin, self.source)
+        found.loader = _MutantLoader(fullname, found.origin, self.source)
         return found
 
 
-class _Loader(importlib.machinery.SourceFileLoader):
+class _MutantLoader(importlib.machinery.SourceFileLoader):
     def __init__(self, name: str, path: str, source: str) -> None:
         super().__init__(name, path)
         self._source = source
 
     def get_code(self, fullname: str) -> object:
-        # Warp compiles what `inspect` finds in this cache; without a time it's never read again.
+        # Warp compiles the source that `inspect` finds in this cache. Entries without a time stay.
         lines = self._source.splitlines(keepends=True)
         linecache.cache[self.path] = (len(self._source), None, lines, self.path)
         return compile(self._source, self.path, "exec", dont_inherit=True)

@@ -1,4 +1,4 @@
-"""Mutations that Cosmic Ray has not: a name for its counterpart, half of a number."""
+"""Mutations that Cosmic Ray lacks: swap a name with its counterpart, halve a number."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -26,76 +26,76 @@ PAIRS = (
 )
 COUNTERPART = {a: b for pair in PAIRS for a, b in (pair, pair[::-1])}
 SMALLEST = 1e-3
-"""Smaller numbers are tolerances against rounding; half of one is as good."""
+"""Smaller numbers are tolerances for rounding, and half of a tolerance works as well."""
 
 
 class SwapName(Operator):
-    """Calls, reads or names the counterpart: `min` for `max`, "lower95" for "upper95"."""
+    """Replace a name or key by its counterpart: `min` for `max`, "lower95" for "upper95"."""
 
     def mutation_positions(self, node: Any) -> Iterator[tuple]:
-        """Names that are called or are an attribute, and strings that are such a word."""
+        """Yield names that are called or are attributes, and strings equal to such a name."""
         if _counterpart(node):
             yield node.start_pos, node.end_pos
 
     def mutate(self, node: Any, index: int) -> Any:
-        """Puts the counterpart in its place."""
+        """Replace the name by its counterpart."""
         node.value = _counterpart(node)
         return node
 
     @classmethod
     def examples(cls) -> tuple[Example, ...]:
-        """For Cosmic Ray's own tests."""
+        """Return examples for Cosmic Ray's own tests."""
         return (Example("min(x)", "max(x)"),)
 
 
 class HalveNumber(Operator):
-    """Halves a number with a point, which Cosmic Ray moves by a whole 1 only."""
+    """Halve a number with a decimal point, which Cosmic Ray only changes by 1."""
 
     def mutation_positions(self, node: Any) -> Iterator[tuple]:
-        """Numbers with a point, tolerances left out."""
+        """Yield numbers with a decimal point, except tolerances."""
         if isinstance(node, Number) and "." in node.value and abs(float(node.value)) >= SMALLEST:
             yield node.start_pos, node.end_pos
 
     def mutate(self, node: Any, index: int) -> Any:
-        """Puts half of it in its place."""
+        """Replace the number by half of it."""
         return parso.python.tree.Number(str(float(node.value) / 2), node.start_pos, node.prefix)
 
     @classmethod
     def examples(cls) -> tuple[Example, ...]:
-        """For Cosmic Ray's own tests."""
+        """Return examples for Cosmic Ray's own tests."""
         return (Example("x = 0.5", "x = 0.25"),)
 
 
 class Provider:
-    """What Cosmic Ray asks for operators."""
+    """Cosmic Ray's provider interface to our operators."""
 
     _operators = {"SwapName": SwapName, "HalveNumber": HalveNumber}  # noqa: RUF012
 
     def __iter__(self) -> Iterator[str]:
-        """Their names."""
+        """Iterate over the names of the operators."""
         return iter(self._operators)
 
     def __getitem__(self, name: str) -> type[Operator]:
-        """One of them."""
+        """Return an operator by name."""
         return self._operators[name]
 
 
-class OfOneKind:
-    """Those operators of another provider that replace like by like; the rest take a minute to try.
+class SameKindProvider:
+    """The operators of a provider that keep the kind of a token; trying the rest takes a minute.
 
     Args:
-        provider: What Cosmic Ray asks for its own operators.
+        provider: Cosmic Ray's provider of its own operators.
     """
 
     def __init__(self, provider: Any) -> None:
         self._provider = provider
 
     def __iter__(self) -> Iterator[str]:
-        """Their names."""
+        """Iterate over the names of the operators."""
         return (name for name in self._provider if is_of_one_kind(f"core/{name}"))
 
     def __getitem__(self, name: str) -> type[Operator]:
-        """One of them."""
+        """Return an operator by name."""
         return self._provider[name]
 
 

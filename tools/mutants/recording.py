@@ -1,4 +1,4 @@
-"""Which blocks of the program each test runs, and for how long: recorded in a fork, by pytest."""
+"""Record the blocks that each test executes, and its processor time, with a pytest plug-in."""
 
 import builtins
 import importlib.machinery
@@ -10,66 +10,66 @@ from typing import Any
 
 import pytest
 
-from tools.mutants.blocks import CALLED, counted
+from tools.mutants.blocks import CALLBACK, instrument
 
 
-class CountedLoader(importlib.machinery.SourceFileLoader):
-    """Loads a module of the program so that its blocks report."""
+class InstrumentingLoader(importlib.machinery.SourceFileLoader):
+    """Load a module in instrumented form."""
 
     def get_code(self, fullname: str) -> Any:
-        """Compiles the counted syntax tree, under the file's own name and lines."""
+        """Compile the instrumented syntax tree with the file's name and line numbers."""
         source = Path(self.path).read_text()
-        return compile(counted(source, fullname), self.path, "exec", dont_inherit=True)
+        return compile(instrument(source, fullname), self.path, "exec", dont_inherit=True)
 
 
-class CountedFinder:
-    """Finds the modules of one package, to be counted."""
+class InstrumentingFinder:
+    """Find the modules of one package and instrument them."""
 
     def __init__(self, package: str) -> None:
         self.package = package
 
     def find_spec(self, fullname: str, path: Any, target: Any = None) -> Any:
-        """Gives a module of the package the other loader."""
+        """Return the spec of a module of the package, with the instrumenting loader."""
         if fullname.partition(".")[0] != self.package:
             return None
         found = importlib.machinery.PathFinder.find_spec(fullname, path)
         if found is not None and isinstance(found.loader, importlib.machinery.SourceFileLoader):
-            found.loader = CountedLoader(fullname, str(found.origin))
+            found.loader = InstrumentingLoader(fullname, str(found.origin))
         return found
 
 
 class Recorder:
-    """A plug-in of pytest that writes down every test of a run."""
+    """A pytest plug-in that records every test of a run."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.hits: set[str] = set()
-        self.wide: dict[Any, set[str]] = {}
-        """What fixtures run that serve more than one test."""
-        self.wide_s = 0.0
+        self.shared: dict[Any, set[str]] = {}
+        """Blocks that fixtures of several tests execute, by fixture."""
+        self.shared_s = 0.0
         self.tests: list[dict[str, Any]] = []
         self.failed: set[str] = set()
         self.skipped: set[str] = set()
-        setattr(builtins, CALLED, self.reached)
+        setattr(builtins, CALLBACK, self.reached)
 
     def reached(self, name: str) -> None:
-        """What counted code calls."""
+        """Record a block; instrumented code calls this."""
         self.hits.add(name)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: Any) -> Iterator[None]:
-        """Records one test."""
+        """Record one test."""
         self.hits = set()
         begin = time.process_time()
         result = yield
-        hits = self.hits.union(*(self.wide.get(f, set()) for f in _fixtures(item)))
+        hits = self.hits.union(*(self.shared.get(f, set()) for f in _fixtures(item)))
         seconds = time.process_time() - begin
         self.tests.append({"id": item.nodeid, "seconds": seconds, "hits": hits})
         return result
 
     @pytest.hookimpl(wrapper=True)
     def pytest_fixture_setup(self, fixturedef: Any) -> Iterator[None]:
-        """Keeps apart what a fixture runs that serves more than one test."""
+        """Record separately the blocks of a fixture that several tests use."""
         if fixturedef.scope == "function":
             return (yield)
         before, self.hits = self.hits, set()
@@ -77,46 +77,46 @@ class Recorder:
         try:
             return (yield)
         finally:
-            self.wide[fixturedef] = self.wide.get(fixturedef, set()) | self.hits
-            self.wide_s += time.process_time() - begin
+            self.shared[fixturedef] = self.shared.get(fixturedef, set()) | self.hits
+            self.shared_s += time.process_time() - begin
             self.hits = self.hits | before
 
     def pytest_runtest_logreport(self, report: Any) -> None:
-        """Notes failures, those of fixtures too, and what is skipped, which notices nothing."""
+        """Record failures, including those of fixtures, and skipped tests."""
         if not report.passed:
             (self.failed if report.failed else self.skipped).add(report.nodeid)
 
     def pytest_sessionfinish(self) -> None:
-        """Writes the record."""
+        """Write the record."""
         tests = [t for t in self.tests if t["id"] not in self.failed | self.skipped]
         names = sorted(set().union(*(t["hits"] for t in tests)))
-        place = {name: index for index, name in enumerate(names)}
+        indices = {name: index for index, name in enumerate(names)}
         rows = [
-            [t["id"], round(t["seconds"], 3), sorted(place[name] for name in t["hits"])]
+            [t["id"], round(t["seconds"], 3), sorted(indices[name] for name in t["hits"])]
             for t in tests
         ]
-        kept = {
-            "wide_s": self.wide_s,
+        content = {
+            "wide_s": self.shared_s,
             "failed": sorted(self.failed),
             "blocks": names,
             "tests": rows,
         }
-        self.path.write_text(json.dumps(kept))
+        self.path.write_text(json.dumps(content))
 
 
 def record_launches(recorder: Recorder) -> None:
-    """Reports the functions of a Warp kernel, and those that they call, when it is launched."""
+    """Record the function of each launched Warp kernel and the functions that it calls."""
     import warp
 
     launch, known = warp.launch, {}
 
-    def launched(kernel: Any, *args: Any, **options: Any) -> Any:
+    def record_and_launch(kernel: Any, *args: Any, **options: Any) -> Any:
         if kernel not in known:
             known[kernel] = set(_functions(kernel))
         recorder.hits |= known[kernel]
         return launch(kernel, *args, **options)
 
-    warp.launch = launched
+    warp.launch = record_and_launch
 
 
 def _functions(kernel: Any) -> Iterator[str]:

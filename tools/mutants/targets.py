@@ -1,23 +1,23 @@
-"""Which modules are mutated, and which files of tests may notice."""
+"""Modules to mutate, and test files that can detect the mutations."""
 
 from pathlib import Path
 
-NOT_RUN = ("docs", "examples", "tools", "test_wheel.py", "test_architecture.py")
-"""Tests of other things; those of pages and examples start processes, which see no mutation."""
+EXCLUDED = ("docs", "examples", "tools", "test_wheel.py", "test_architecture.py")
+"""Tests of other code; those of pages and examples start processes without the mutation."""
 
-ALSO = {
+PACKAGE_TESTS = {
     "drone_rl/config/": "tests/cli/hydra/test_composition_schemas.py",
 }
-"""Tests of whole packages: those that hold settings in code and in files together."""
-OF_ALL = "tests/test_data.py"
-"""Looks at what all modules define when they are imported."""
+"""Tests of whole packages: this one compares settings in code with those in files."""
+ALL_MODULES_TEST = "tests/test_data.py"
+"""Checks what all modules define at import."""
 
 
 def modules(root: Path) -> list[str]:
-    """Paths of the modules of drone_rl that are mutated, below the tree.
+    """Return the paths of the modules to mutate, relative to the tree.
 
     Raises:
-        ValueError: There are none.
+        ValueError: The tree has no modules.
     """
     package = root / "drone_rl"
     found = [path.relative_to(root).as_posix() for path in sorted(package.rglob("*.py"))]
@@ -27,22 +27,22 @@ def modules(root: Path) -> list[str]:
 
 
 def test_files(root: Path) -> list[str]:
-    """Paths of the files of tests that are run, below the tree."""
+    """Return the paths of the test files to run, relative to the tree."""
     return [
         path.relative_to(root).as_posix()
         for path in sorted((root / "tests").rglob("test_*.py"))
-        if path.relative_to(root / "tests").parts[0] not in NOT_RUN
+        if path.relative_to(root / "tests").parts[0] not in EXCLUDED
     ]
 
 
 def own_tests(module: str) -> list[str]:
-    """Files of the tests of a module: its mirror, and what its package is tested by."""
-    also = [file for package, file in ALSO.items() if module.startswith(package)]
-    return [mirror(module), *also]
+    """Return the test files of a module: its mirror, and the tests of its package."""
+    shared = [file for package, file in PACKAGE_TESTS.items() if module.startswith(package)]
+    return [mirror(module), *shared]
 
 
 def mirror(module: str) -> str:
-    """Where the tests of a module are: tests/x/test_y.py for drone_rl/x/y.py."""
+    """Return the test file of a module: tests/x/test_y.py for drone_rl/x/y.py."""
     path = Path(module)
     folder = Path("tests", *path.parts[1:-1])
     name = path.parent.name if path.stem == "__init__" else path.stem

@@ -1,4 +1,4 @@
-"""The list of mutants and a sample of it, kept in a session of Cosmic Ray."""
+"""The list of mutants and a sample of it, stored in a Cosmic Ray session."""
 
 import dataclasses
 import functools
@@ -14,31 +14,31 @@ from cosmic_ray.work_db import WorkDB
 from cosmic_ray.work_item import MutationSpec, WorkerOutcome, WorkResult
 
 from tools.mutants.filters import changes_program, is_of_one_kind, is_within, silent_spans
-from tools.mutants.operators import OfOneKind, Provider
+from tools.mutants.operators import Provider, SameKindProvider
 
 _PROVIDERS = cosmic_ray.plugins.OPERATOR_PROVIDERS
-_PROVIDERS |= {"drone_rl": Provider(), "core": OfOneKind(_PROVIDERS["core"])}
+_PROVIDERS |= {"drone_rl": Provider(), "core": SameKindProvider(_PROVIDERS["core"])}
 FILTERED = "changes no behaviour, or only crashes"
-"""Output of what the filters left out."""
+"""Output of mutants that the filters exclude."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Mutant:
-    """One change to one module."""
+    """One mutation of one module."""
 
     id: str
-    """Stays the same as long as the changed line does, wherever it stands."""
+    """Unchanged while the text of the mutated line is, even if the line moves."""
     job: str
-    """Its name in the session."""
+    """Id of the job in the session."""
     spec: MutationSpec
 
     @property
     def module(self) -> str:
-        """Path of the module below the tree."""
+        """Path of the module relative to the tree."""
         return self.spec.module_path.as_posix()
 
     def source(self, root: Path) -> str | None:
-        """The mutated module; None if there is nothing to mutate."""
+        """Return the source of the mutated module; None if there is nothing to mutate."""
         source = (root / self.module).read_text()
         return _mutated(source, self.spec.operator_name, self.spec.occurrence)
 
@@ -54,47 +54,47 @@ def fill(
     modules: list[str],
     choose: Callable[[list[Mutant]], list[Mutant]],
 ) -> None:
-    """Lists all mutations of some modules; marks as skipped what is none, and what is not chosen.
+    """List all mutations of modules and mark those as skipped that are filtered or not chosen.
 
     Args:
-        database: Is emptied first.
-        root: The tree, which is the working directory too.
-        modules: Paths below it.
-        choose: Gives those of all mutants that are to be run.
+        database: The session, which is emptied first.
+        root: The tree, which must be the working directory.
+        modules: Paths relative to the tree.
+        choose: Selects the mutants to run from all mutants.
     """
     init([Path(module) for module in modules], database, {})
     spans = {module: silent_spans((root / module).read_text()) for module in modules}
-    mutants, none = [], []
-    for mutant in _everything(database, root):
-        kept = is_of_one_kind(mutant.spec.operator_name) and not is_within(
+    mutants, filtered = [], []
+    for mutant in _read_mutants(database, root):
+        is_kept = is_of_one_kind(mutant.spec.operator_name) and not is_within(
             mutant.spec.start_pos, spans[mutant.module]
         )
-        (mutants if kept else none).append(mutant)
+        (mutants if is_kept else filtered).append(mutant)
     chosen = {mutant.job for mutant in choose(mutants)}
-    _skip(database, none, FILTERED)
+    _skip(database, filtered, FILTERED)
     _skip(database, [m for m in mutants if m.job not in chosen], "not in the sample")
 
 
 def sample_of(database: WorkDB, root: Path) -> tuple[list[Mutant], dict[str, WorkResult], int]:
-    """The mutants of a session to run, those results that are there by job, and how many it lists.
+    """Return the mutants to run, the available results by job, and the number of listed mutants.
 
-    Mutants come in the order of module and place, so that an early look is no random one.
+    The mutants are sorted by module and position, so partial results are not a random sample.
     """
     results = dict(database.results)
     skipped = {j: r for j, r in results.items() if r.worker_outcome is WorkerOutcome.SKIPPED}
-    sample = [m for m in _everything(database, root) if m.job not in skipped]
+    sample = [m for m in _read_mutants(database, root) if m.job not in skipped]
     filtered = sum(result.output == FILTERED for result in skipped.values())
     done = {job: result for job, result in results.items() if job not in skipped}
     return sample, done, database.num_work_items - filtered
 
 
-def _skip(database: WorkDB, mutants: list[Mutant], why: str) -> None:
-    """Marks mutants as not to be run, as Cosmic Ray's own filters do."""
-    result = WorkResult(worker_outcome=WorkerOutcome.SKIPPED, output=why)
+def _skip(database: WorkDB, mutants: list[Mutant], reason: str) -> None:
+    """Mark mutants as skipped, as Cosmic Ray's own filters do."""
+    result = WorkResult(worker_outcome=WorkerOutcome.SKIPPED, output=reason)
     database.set_multiple_results([mutant.job for mutant in mutants], result)
 
 
-def _everything(database: WorkDB, root: Path) -> list[Mutant]:
+def _read_mutants(database: WorkDB, root: Path) -> list[Mutant]:
     items = [(item.mutations[0], item.job_id) for item in database.work_items]
     items.sort(key=lambda i: (i[0].module_path, i[0].operator_name, i[0].occurrence))
     lines = {
@@ -112,9 +112,9 @@ def _everything(database: WorkDB, root: Path) -> list[Mutant]:
 
 
 def draw(mutants: list[Mutant], root: Path, size: int, seed: int) -> list[Mutant]:
-    """A uniform sample of the mutants that change the program.
+    """Return a uniform sample of the mutants that change the program.
 
-    It takes the smallest hashes of seed and id, so that it changes only where the source does.
+    It selects the smallest hashes of seed and id, so it changes only where the source changes.
     """
     sample = []
     for mutant in sorted(mutants, key=lambda m: _digest(f"{seed}|{m.id}")):

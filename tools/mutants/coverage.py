@@ -1,7 +1,7 @@
-"""Which tests can notice a mutation: those that run the mutated block, as a recorded run has shown.
+"""Tests that can detect a mutation: those that execute the mutated block in a recorded run.
 
-Every file of tests is run once, without any mutation, on a program that reports which of its
-blocks run (`recording`). A record is kept until the program or the tests change.
+Every test file runs once on the instrumented program without a mutation (`recording`). Its record
+is valid until the program or the tests change.
 """
 
 import ast
@@ -13,40 +13,40 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tools.mutants import forks, kept, targets
+from tools.mutants import forks, results, targets
 from tools.mutants.blocks import block_at, blocks, module_name
 from tools.mutants.worklist import Mutant
 
 BUDGET_S = 20.0
-"""Processor time that the tests of one stage may take without a mutation; quick ones come first."""
+"""Greatest processor time of the tests of one stage without a mutation; fast tests come first."""
 WHOLE_FILE_S = 3.0
-"""A file of tests that takes less is run as a whole in the second stage."""
-PATIENCE = 3.0
-"""A mutant may take so many times the processor time of the tests without it, and START_S."""
+"""A test file that takes less is run as a whole in the second stage."""
+TIME_FACTOR = 3.0
+"""Limit of a mutant's processor time, relative to the tests without a mutation, plus START_S."""
 START_S = 8.0
 COMPILING_S = 120.0
-"""More for a mutant of what Warp compiles."""
+"""Additional limit for a mutant of a Warp kernel."""
 RECORD_S = 900.0
 
 
 @dataclasses.dataclass(frozen=True)
 class Chosen:
-    """Tests to run on a mutant: files, or single tests of them; quick ones first."""
+    """Test files or single tests to run on a mutant, fast ones first."""
 
     own: tuple[str, ...]
-    """Of the tests of the mutated module."""
+    """Tests of the mutated module."""
     others: tuple[str, ...]
-    """To run if those of its own have passed."""
+    """Tests to run if `own` have passed."""
     limit_s: float
-    """Processor time for all of them."""
+    """Limit of the processor time of all tests."""
 
 
-class Reach:
-    """What a recorded run has shown of every test.
+class Coverage:
+    """The blocks that every test executes, according to records.
 
     Args:
         root: The tree.
-        records: What `recording` has written, by file of tests.
+        records: The records by test file, as `recording` writes them.
     """
 
     def __init__(self, root: Path, records: dict[str, dict[str, Any]]) -> None:
@@ -65,15 +65,15 @@ class Reach:
         self.failed += record["failed"]
         self._of_file[file] = [test for test, _, _ in record["tests"]]
         self._seconds[file] = sum(seconds for _, seconds, _ in record["tests"])
-        for test, seconds, places in record["tests"]:
+        for test, seconds, indices in record["tests"]:
             self._seconds[test] = seconds
-            for place in places:
-                self._of_block[record["blocks"][place]].append(test)
+            for index in indices:
+                self._of_block[record["blocks"][index]].append(test)
         for name in record["blocks"]:
             self._of_module[name.partition(":")[0]].add(file)
 
     def tests_for(self, mutant: Mutant) -> Chosen:
-        """Chooses the tests of its module, and others that run its block; none if none does."""
+        """Choose the tests of the mutant's module and others that execute its block, if any."""
         module = module_name(mutant.module)
         tree = ast.parse((self._root / mutant.module).read_text())
         block = block_at(tree, module, mutant.spec.start_pos)
@@ -87,18 +87,20 @@ class Reach:
         others = sorted(files - set(own), key=self._nearest_to(own[0]))
         second = self._chosen(others, tests, WHOLE_FILE_S)
         total = sum(self._seconds[test] for test in (*first, *second))
-        limit = START_S + PATIENCE * total + (COMPILING_S if is_compiled else 0.0)
+        limit = START_S + TIME_FACTOR * total + (COMPILING_S if is_compiled else 0.0)
         return Chosen(first, second, limit)
 
     def _of_import(self, module: str) -> list[str]:
-        """Tests that may notice what runs at import: those of the module and of its importers."""
+        """Return the tests of a module and its importers, which cover code that runs at import."""
         name = module_name(module)
         files = set(self._of_module.get(name, ())) | set(targets.own_tests(module))
-        files |= {targets.mirror(other) for other in self._importers[name]} | {targets.OF_ALL}
+        files |= {targets.mirror(other) for other in self._importers[name]} | {
+            targets.ALL_MODULES_TEST
+        }
         return [test for file in sorted(files) for test in self._of_file.get(file, [])]
 
     def _chosen(self, files: list[str], tests: list[str], whole_s: float) -> tuple[str, ...]:
-        """Whole files, of long ones only the given tests, up to the budget; one test at least."""
+        """Choose files, or the given tests of slow files, up to the budget; at least one test."""
         chosen, total = [], 0.0
         for file in files:
             of_file = [test for test in tests if _file(test) == file]
@@ -110,23 +112,23 @@ class Reach:
         return tuple(chosen)
 
     def _nearest_to(self, own: str) -> Any:
-        """Order of files of tests: of all modules, of the same package, then quick ones."""
+        """Return a sort key for test files: of all modules, of the same package, then by time."""
         folder = Path(own).parts[1]
         return lambda file: (
-            file != targets.OF_ALL,
+            file != targets.ALL_MODULES_TEST,
             Path(file).parts[1] != folder,
             self._seconds[file],
         )
 
 
 def record(tree: Path, work: Path, files: list[str], jobs: int) -> Iterator[str]:
-    """Records the files of tests that have changed since they were recorded.
+    """Record the test files that have no valid record.
 
     Args:
         tree: The copy of the project.
-        work: Folder of records and of temporary files.
-        files: Which tests.
-        jobs: Processes at once.
+        work: Folder for records and temporary files.
+        files: The test files.
+        jobs: Number of parallel processes.
 
     Yields:
         A line about each file that was run.
@@ -143,26 +145,26 @@ def record(tree: Path, work: Path, files: list[str], jobs: int) -> Iterator[str]
         yield f"{count}/{len(missing)} {outcome.status} {outcome.seconds:5.1f} s {file}"
 
 
-def read(tree: Path, work: Path, files: list[str]) -> Reach:
-    """Reads records; a file whose run left none (it was too long, or crashed) is left out."""
+def read(tree: Path, work: Path, files: list[str]) -> Coverage:
+    """Read the records; a file without one, after a timeout or crash, is omitted."""
     paths = _records(tree, work, files)
-    return Reach(tree, {f: json.loads(p.read_text()) for f, p in paths.items() if p.exists()})
+    return Coverage(tree, {f: json.loads(p.read_text()) for f, p in paths.items() if p.exists()})
 
 
 def _records(tree: Path, work: Path, files: list[str]) -> dict[str, Path]:
-    """Where the record of each file of tests is, by what it depends on."""
+    """Return the path of each test file's record, which depends on program, helpers and file."""
     helpers = [p for p in (tree / "tests").rglob("*.py") if not p.name.startswith("test_")]
-    shared = kept.digest(tree, ["drone_rl", *(p.relative_to(tree).as_posix() for p in helpers)])
+    shared = results.digest(tree, ["drone_rl", *(p.relative_to(tree).as_posix() for p in helpers)])
     return {
-        file: work / "records" / f"{_short(shared + kept.digest(tree, [file]) + file)}.json"
+        file: work / "records" / f"{_short(shared + results.digest(tree, [file]) + file)}.json"
         for file in files
     }
 
 
 def _importers(root: Path) -> dict[str, set[str]]:
-    """Paths of the modules that import each module, by its name, be it by way of its package."""
+    """Return the paths of the importers of each module, direct or through its package."""
     found: dict[str, set[str]] = defaultdict(set)
-    passed_on: dict[str, set[str]] = defaultdict(set)
+    reexported: dict[str, set[str]] = defaultdict(set)
     for path in targets.modules(root):
         for node in ast.walk(ast.parse((root / path).read_text())):
             if not isinstance(node, ast.ImportFrom) or not node.module:
@@ -172,8 +174,8 @@ def _importers(root: Path) -> dict[str, set[str]]:
                 found[name].add(path)
             if path.endswith("__init__.py"):
                 package = module_name(path)
-                passed_on[node.module] |= {f"{package}.{alias.name}" for alias in node.names}
-    for module, names in passed_on.items():
+                reexported[node.module] |= {f"{package}.{alias.name}" for alias in node.names}
+    for module, names in reexported.items():
         found[module] = found[module].union(*(found[name] for name in names if name in found))
     return found
 

@@ -1,4 +1,4 @@
-"""What is kept of a run: every mutant of the sample, and what became of it."""
+"""Results of a run: every mutant of the sample with its outcome."""
 
 import hashlib
 import json
@@ -20,14 +20,14 @@ def row(
     reasons: dict[str, str],
     harms: dict[str, str],
 ) -> dict[str, Any]:
-    """One line of the list.
+    """Return the entry of one mutant in the list.
 
     Args:
-        mutant: Which one.
-        root: The tree it was made of.
-        result: Its "outcome" ("killed", "timeout" or "survived"), and "by" which test.
-        reasons: Why some mutants change nothing, by id; a survivor among them is "equivalent".
-        harms: What the others would do if they were in the program, by id.
+        mutant: The mutant.
+        root: The tree that contains the original module.
+        result: "outcome" ("killed", "timeout" or "survived") and "by", the test that failed.
+        reasons: Reasons why mutants are equivalent, by id; such a survivor is "equivalent".
+        harms: The harm that other survivors would do in the program, by id.
     """
     before, after = _change((root / mutant.module).read_text(), mutant.source(root) or "")
     found = {
@@ -46,18 +46,18 @@ def row(
     return found
 
 
-def listed(name: str) -> dict[str, str]:
-    """What is listed of mutants by id, from equivalents.toml or harms.toml.
+def read_reasons(name: str) -> dict[str, str]:
+    """Return the reasons in equivalents.toml or harms.toml by mutant id.
 
     Args:
-        name: "equivalents", why they change nothing, or "harms", what they would do.
+        name: "equivalents" (why the mutants change nothing) or "harms" (what they would break).
     """
     found = tomllib.loads((HERE / f"{name}.toml").read_text())
     return {id_: entry["reason"] for entry in found.get("mutants", []) for id_ in entry["ids"]}
 
 
 def score(rows: list[dict[str, Any]]) -> float:
-    """Killed, timeouts included, out of those that change anything."""
+    """Return the fraction of non-equivalent mutants that were killed, timeouts included."""
     counts = Counter(row["outcome"] for row in rows)
     killed = counts["killed"] + counts["timeout"]
     return killed / max(1, killed + counts["survived"])
@@ -66,21 +66,21 @@ def score(rows: list[dict[str, Any]]) -> float:
 def merge(
     path: Path, modules: dict[str, str], rows: list[dict[str, Any]]
 ) -> tuple[list[dict[str, Any]], float]:
-    """A kept list after its survivors were run again, with tests that were added since.
+    """Merge a list with the results of a second run of its survivors against newer tests.
 
-    What was killed stays so: it is for the reviewer of the tests to see that none was taken away.
+    Killed mutants are not run again; reviewers must check that no test was removed.
 
     Args:
-        path: The kept list.
-        modules: Hashes of the modules as they are.
-        rows: Of the survivors' second run.
+        path: The list.
+        modules: Current hashes of the modules.
+        rows: Entries of the survivors after the second run.
 
     Returns:
-        All rows, and the score at first sight of the sample, before a test was written for it:
-        what a sample drawn anew would get, about.
+        All entries, and the score of the first run, before tests for this sample were written. That
+        score estimates the one of a new sample.
 
     Raises:
-        ValueError: A module has changed since, so that its mutants are others.
+        ValueError: A module has changed since, so its mutants are different.
     """
     old = json.loads(path.read_text())
     if old["modules"] != modules:
@@ -91,7 +91,7 @@ def merge(
 
 
 def hashes(root: Path, paths: list[str]) -> dict[str, str]:
-    """SHA-256 of files; a folder counts by its Python files."""
+    """Return the SHA-256 of files and of all Python files in folders, by path."""
     files = {
         file.relative_to(root).as_posix(): file
         for path in paths
@@ -101,12 +101,12 @@ def hashes(root: Path, paths: list[str]) -> dict[str, str]:
 
 
 def digest(root: Path, paths: list[str]) -> str:
-    """One hash of files and folders together."""
+    """Return one hash of files and folders together."""
     return hashlib.sha256(json.dumps(hashes(root, paths)).encode()).hexdigest()
 
 
 def write(path: Path, head: dict[str, Any], rows: list[dict[str, Any]]) -> None:
-    """Writes the list as JSON, a mutant a line."""
+    """Write the list as JSON, with one mutant per line."""
     head = {"tool": f"cosmic-ray {metadata.version('cosmic-ray')}", **head}
     head |= {"score": score(rows), "counts": dict(Counter(row["outcome"] for row in rows))}
     text = json.dumps({**head, "mutants": []}, indent=1)
@@ -116,7 +116,7 @@ def write(path: Path, head: dict[str, Any], rows: list[dict[str, Any]]) -> None:
 
 
 def _change(source: str, mutated: str) -> tuple[str, str]:
-    """The lines that differ, before and after."""
+    """Return the lines that differ, before and after the mutation."""
     old, new = source.splitlines(), mutated.splitlines()
     same = [a == b for a, b in zip(old, new, strict=False)]
     first = same.index(False) if False in same else len(same)

@@ -1,10 +1,10 @@
-"""Which tests are chosen for a mutant, from records made by hand."""
+"""Choice of the tests for a mutant, from hand-made records."""
 
 import types
 
 import pytest
 
-from tools.mutants import reach
+from tools.mutants import coverage
 
 MODULE = """\
 LIMIT = 3
@@ -41,15 +41,15 @@ def record(*tests, failed=()):
 
 
 LOW, BRANCH, HIGH = (f"drone_rl.sim.small:{name}" for name in ("low#0", "low#1", "high#0"))
-OWN, OTHERS, SLOW, WORLDS = (
+OWN, OTHER, NEAR, FAR = (
     f"tests/{name}.py"
     for name in ("sim/test_small", "envs/test_other", "sim/test_a", "envs/test_b")
 )
 RECORDS = {
     OWN: record((f"{OWN}::low", 0.5, [LOW]), (f"{OWN}::high", 1.0, [HIGH])),
-    SLOW: record((f"{SLOW}::quick", 2.0, [LOW]), (f"{SLOW}::none", 50.0, [])),
-    OTHERS: record((f"{OTHERS}::low", 0.25, [LOW, BRANCH]), failed=[f"{OTHERS}::wrong"]),
-    WORLDS: record((f"{WORLDS}::long", 19.0, [LOW]), (f"{WORLDS}::longer", 40.0, [LOW])),
+    NEAR: record((f"{NEAR}::quick", 2.0, [LOW]), (f"{NEAR}::none", 50.0, [])),
+    OTHER: record((f"{OTHER}::low", 0.25, [LOW, BRANCH]), failed=[f"{OTHER}::wrong"]),
+    FAR: record((f"{FAR}::long", 19.0, [LOW]), (f"{FAR}::longer", 40.0, [LOW])),
 }
 
 
@@ -59,46 +59,46 @@ def mutant(line, column=4, module="drone_rl/sim/small.py"):
     )
 
 
-def test_own_tests_come_first_then_others_that_run_the_block(root):
-    found = reach.Reach(root, RECORDS)
-    chosen = found.tests_for(mutant(5))
-    assert chosen.own == (OWN,)  # all of its tests, though one alone runs the block
-    # of the same package first; of a long file what runs the block; within the budget
-    assert chosen.others == (f"{SLOW}::quick", OTHERS)
-    assert chosen.limit_s == reach.START_S + reach.PATIENCE * (1.5 + 2.0 + 0.25)
-    assert found.failed == [f"{OTHERS}::wrong"]
+def test_tests_of_the_module_precede_others_that_run_the_block(root):
+    covered = coverage.Coverage(root, RECORDS)
+    chosen = covered.tests_for(mutant(5))
+    assert chosen.own == (OWN,)  # the whole file, although only one of its tests runs the block
+    # same package first; of a slow file only tests that run the block; within the budget
+    assert chosen.others == (f"{NEAR}::quick", OTHER)
+    assert chosen.limit_s == coverage.START_S + coverage.TIME_FACTOR * (1.5 + 2.0 + 0.25)
+    assert covered.failed == [f"{OTHER}::wrong"]
 
 
-def test_a_branch_is_run_by_those_that_take_it(root):
-    chosen = reach.Reach(root, RECORDS).tests_for(mutant(6, 8))
-    assert chosen.own == () and chosen.others == (OTHERS,)
+def test_a_branch_is_covered_by_tests_that_take_it(root):
+    chosen = coverage.Coverage(root, RECORDS).tests_for(mutant(6, 8))
+    assert chosen.own == () and chosen.others == (OTHER,)
 
 
-def test_what_no_test_runs_has_none(root):
-    chosen = reach.Reach(root, RECORDS).tests_for(mutant(15))
+def test_an_uncovered_block_has_no_tests(root):
+    chosen = coverage.Coverage(root, RECORDS).tests_for(mutant(15))
     assert chosen.own == chosen.others == ()
 
 
-def test_what_runs_at_import_has_tests_of_the_module_and_of_its_importers(root):
-    records = {OWN: RECORDS[OWN], OTHERS: record((f"{OTHERS}::both", 1.0, []))}
-    chosen = reach.Reach(root, records).tests_for(mutant(1, 8))
-    assert chosen.own == (OWN,) and chosen.others == (OTHERS,)
+def test_code_run_at_import_is_covered_by_tests_of_module_and_importers(root):
+    records = {OWN: RECORDS[OWN], OTHER: record((f"{OTHER}::both", 1.0, []))}
+    chosen = coverage.Coverage(root, records).tests_for(mutant(1, 8))
+    assert chosen.own == (OWN,) and chosen.others == (OTHER,)
 
 
-def test_a_module_that_warp_compiles_has_more_time(root):
+def test_a_warp_module_gets_more_time(root):
     kernel = "import warp as wp\n\n\n@wp.func\ndef twice(x: float):\n    return 2.0 * x\n"
     (root / "drone_rl" / "sim" / "kernel.py").write_text(kernel)
     own = "tests/sim/test_kernel.py"
     records = {own: record((f"{own}::twice", 1.0, ["drone_rl.sim.kernel:twice#0"]))}
-    chosen = reach.Reach(root, records).tests_for(mutant(6, 11, "drone_rl/sim/kernel.py"))
+    chosen = coverage.Coverage(root, records).tests_for(mutant(6, 11, "drone_rl/sim/kernel.py"))
     assert chosen.own == (own,)
-    assert chosen.limit_s == reach.START_S + reach.PATIENCE + reach.COMPILING_S
+    assert chosen.limit_s == coverage.START_S + coverage.TIME_FACTOR + coverage.COMPILING_S
 
 
-def test_importers_by_way_of_a_package_count_too(root):
+def test_importers_through_a_package_count(root):
     (root / "drone_rl" / "sim" / "__init__.py").write_text("from drone_rl.sim.small import LIMIT\n")
     (root / "drone_rl" / "envs" / "far.py").write_text("from drone_rl.sim import LIMIT\n")
     far = "tests/envs/test_far.py"
     records = {far: record((f"{far}::far", 1.0, []))}
-    chosen = reach.Reach(root, records).tests_for(mutant(1, 8))
+    chosen = coverage.Coverage(root, records).tests_for(mutant(1, 8))
     assert chosen.own == () and chosen.others == (far,)
