@@ -32,11 +32,11 @@ format: $(STAMP)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-# Goes on where it stopped; `drone-rl bench NAME` measures one again.
+# Resumes where it stopped; `drone-rl bench NAME` repeats one benchmark.
 bench: $(STAMP)
 	$(BIN)/drone-rl bench
 
-# What README.md and docs/ have that is made; with the newest figures; which figures are old.
+# Generate tables of README.md and docs/; with the newest figures; list outdated figures.
 readme: $(STAMP)
 	@$(BIN)/python -m tools.readme
 keep: $(STAMP)
@@ -44,28 +44,28 @@ keep: $(STAMP)
 stale: $(STAMP)
 	@$(BIN)/python -m tools.readme stale
 
-# The site, in site/: open site/index.html. No network is needed, to make it or to read it.
+# Build the site; open site/index.html. Neither the build nor the site needs a network.
 docs: $(STAMP)
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "site/index.html"
 
-# Size and shape of the package, phrases to rewrite, modules without a test of their own name, as JSON.
+# Print size of the package, phrases to rewrite and modules without a test file of the same name as JSON.
 count: $(STAMP)
 	@$(BIN)/python -m tools.size
 
-# Mutation testing of the whole package but benchmarks/: a sample of 1,000 mutants, about 45 minutes on two
-# idle cores, 15 of them for a run of all tests that records what each one runs. It goes on where it was
-# stopped. With the survivors alone, after tests for them: MUTANTS="--again docs/mutants.json".
+# Mutation testing of the package: a sample of 1,000 mutants takes about 45 minutes on two idle cores,
+# including 15 minutes to record the coverage of all tests. It resumes where it stopped. To run only the
+# survivors after adding tests for them: MUTANTS="--again docs/mutants.json".
 mutants: $(STAMP)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(EXTRAS),mutants]'
 	@$(BIN)/python -m tools.mutants $(MUTANTS)
 
-# What is made again by itself: the environment, the site, caches, packages. Results are kept.
+# Delete files that are created automatically: environment, site, caches, packages. Results are kept.
 clean:
 	rm -rf $(VENV) site dist build .pytest_cache .ruff_cache .import_linter_cache *.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# Deletes trainings, reports and figures that may have taken hours, after asking.
+# Delete training runs, reports and figures, which may have taken hours, after confirmation.
 clean-outputs:
 	@printf 'Delete everything in outputs/ (%s)? [y/N] ' "$$(du -sh outputs 2>/dev/null | cut -f1)"; \
 	read -r answer || answer=; \

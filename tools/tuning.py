@@ -18,7 +18,7 @@ from typing import Any
 from benchmarks.peers.comparison import train_ours, train_theirs
 
 SEEDS = (100, 101)
-MOST_FRAMES = 200_000
+MAX_FRAMES = 200_000
 _PPO = "objective=ppo"
 _SB3 = {"num_envs": 64, "n_steps": 64, "n_epochs": 4, "batch_size": 512, "ent_coef": 0.01}
 OURS: Mapping[str, Sequence[str]] = {
@@ -47,7 +47,7 @@ OURS: Mapping[str, Sequence[str]] = {
         f"{_PPO} objective.num_steps=16 optimiser.lr=2e-3",
     ],
 }
-"""Arguments of `drone-rl train`."""
+"""Arguments of `drone-rl train` for each of our learners."""
 THEIRS: Mapping[str, Sequence[Mapping[str, Any]]] = {
     "sb3_ppo": [
         _SB3 | {"learning_rate": 1e-3},
@@ -74,32 +74,32 @@ THEIRS: Mapping[str, Sequence[Mapping[str, Any]]] = {
         {"num_envs": 32, "steps": 150, "lr": 3e-3},
     ],
 }
-"""Of the peers."""
+"""Settings of the learners of other libraries."""
 
 
 def main(names: Sequence[str]) -> None:
-    """Tries all settings of those who are named, or of everybody, and prints a line for each."""
+    """Train with all settings of the named learners (default: all) and print a line for each."""
     with tempfile.TemporaryDirectory() as folder:
         for name in names or [*OURS, *THEIRS]:
             for settings in [*OURS.get(name, ()), *THEIRS.get(name, ())]:
-                done = [_try(name, settings, seed, Path(folder)) for seed in SEEDS]
-                print(name, json.dumps(settings), *_told(done), flush=True)
+                results = [_train(name, settings, seed, Path(folder)) for seed in SEEDS]
+                print(name, json.dumps(settings), *_summary(results), flush=True)
 
 
-def _try(name: str, settings: Any, seed: int, folder: Path) -> dict[str, Any]:
+def _train(name: str, settings: Any, seed: int, folder: Path) -> dict[str, Any]:
     if name in THEIRS:
-        return train_theirs(name, settings, seed=seed, episodes=0, max_frames=MOST_FRAMES)
-    words = [*settings.split(), f"trainer.total_frames={MOST_FRAMES}"]
-    place = folder / str(len(list(folder.iterdir())))
-    return train_ours(words, seed=seed, episodes=0, folder=place)
+        return train_theirs(name, settings, seed=seed, episodes=0, max_frames=MAX_FRAMES)
+    arguments = [*settings.split(), f"trainer.total_frames={MAX_FRAMES}"]
+    run_folder = folder / str(len(list(folder.iterdir())))
+    return train_ours(arguments, seed=seed, episodes=0, folder=run_folder)
 
 
-def _told(done: Sequence[Mapping[str, Any]]) -> list[str]:
-    mark = "" if all(one["is_solved"] for one in done) else " (not all solved)"
-    seconds = [f"{one['seconds']:.1f}" for one in done]
-    frames = [f"{one['frames']:,}" for one in done]
-    least = mean(one["seconds"] for one in done)
-    return [f"{least:.1f} s{mark}:", ", ".join(seconds), "s;", ", ".join(frames), "frames"]
+def _summary(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    mark = "" if all(one["is_solved"] for one in results) else " (not all solved)"
+    seconds = [f"{one['seconds']:.1f}" for one in results]
+    frames = [f"{one['frames']:,}" for one in results]
+    average = mean(one["seconds"] for one in results)
+    return [f"{average:.1f} s{mark}:", ", ".join(seconds), "s;", ", ".join(frames), "frames"]
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The files of conf/ that hold defaults are generated from the settings."""
+"""The files of conf/ with defaults are generated from the settings classes."""
 
 from typing import Annotated
 
@@ -22,7 +22,7 @@ class Some(Settings):
     """Switch."""
 
 
-def test_a_file_keeps_its_head_and_gets_comments_and_values(tmp_path):
+def test_a_generated_file_keeps_its_head(tmp_path):
     path = tmp_path / "some.yaml"
     path.write_text("# Some settings.\ndefaults: [base_some, _self_]\n\nold: 3\n")
     text = make_text(path, Some)
@@ -33,9 +33,9 @@ def test_a_file_keeps_its_head_and_gets_comments_and_values(tmp_path):
     assert "name: null\n# Switch.\nis_on: true\n" in text
 
 
-def test_descriptions_are_written_above_settings():
+def test_describe_writes_descriptions_above_settings():
     head = "# drone-rl some: an example.\ndefaults:\n  - base_some\n\n"
-    words = {
+    descriptions = {
         "rate": "Learning rate; none for no learning.",
         "blur": "Blur.",
         "blur.width": "Width.",
@@ -45,11 +45,11 @@ def test_descriptions_are_written_above_settings():
         "# Learning rate; null for no learning.\nrate: 7\nwidth: 8\n"
         "# Blur.\nblur:\n  # Width.\n  width: 9\n"
     )
-    assert describe(head + old, words) == head + new
-    assert describe("# Nothing below.\nrate: 7\n", words) == "# Nothing below.\nrate: 7\n"
+    assert describe(head + old, descriptions) == head + new
+    assert describe("# Nothing below.\nrate: 7\n", descriptions) == "# Nothing below.\nrate: 7\n"
 
 
-def test_a_stale_file_is_reported_and_written_again(tmp_path, monkeypatch):
+def test_a_stale_file_is_reported_and_rewritten(tmp_path, monkeypatch):
     path = tmp_path / "some.yaml"
     path.write_text("# Some settings.\n\nold: 3\n")
     monkeypatch.setattr("tools.conf.generated_files", lambda _: [(path, Some)])

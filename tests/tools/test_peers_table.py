@@ -1,10 +1,10 @@
-"""The table of learners and peers."""
+"""The table of learners of this and other libraries."""
 
 from tools.readme.peers import make_peers
 from tools.readme.tables import UNKNOWN
 
 
-def test_a_line_for_each():
+def test_every_learner_has_a_row():
     ours = {
         "seconds": [9.04, 10.0],
         "seconds_without_imports": [5.0, 6.0],

@@ -1,4 +1,4 @@
-"""What is made from files in README.md and docs/ is that of today's files."""
+"""Generated blocks of README.md and docs/ are current."""
 
 import dataclasses
 import json
@@ -16,34 +16,34 @@ from tools.readme.guest_rows import GUESTS
 from tools.readme.headlines import HEADLINES, make_headlines
 from tools.readme.layers import draw_layers, list_packages
 from tools.readme.rows import MAIN, PROOF, TRUTH
-from tools.readme.stale import tell_ages
+from tools.readme.stale import report_ages
 from tools.readme.tables import UNKNOWN, Row, list_figures, list_origins, make_table
 
 
 @pytest.fixture(scope="module")
-def made():
+def generated():
     return make_files(ROOT)
 
 
-def test_it_is_made_of_todays_files(made):
-    for path, content in made.items():
+def test_generated_files_are_current(generated):
+    for path, content in generated.items():
         assert content == (ROOT / path).read_text(), f"{path}: run make readme"
 
 
-def test_every_block_that_is_made_stands_somewhere():
+def test_every_generated_block_is_on_a_page():
     marked = set().union(*(marked_blocks((ROOT / path).read_text()) for path in PAGES))
     assert marked == set(make_blocks(ROOT))
 
 
 @pytest.mark.parametrize("path", PAGES)
-def test_files_and_folders_that_it_names_are_there(path):
+def test_named_files_and_folders_exist(path):
     text = (ROOT / path).read_text()
     named = set(re.findall(r"`((?:[a-z_]+/)+(?:[a-z_]+\.py)?)`", text))
     missing = {n for n in named if not any((ROOT / top / n).exists() for top in ("drone_rl", ""))}
     assert {n for n in missing if not n.startswith(("outputs/", "site/"))} == set()
 
 
-def test_a_changed_figure_changes_it(tmp_path):
+def test_a_changed_figure_changes_the_pages(tmp_path):
     for name in (*PAGES, "pyproject.toml", "docs/results.json", "docs/tutorials/notebook.md"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text((ROOT / name).read_text())
@@ -52,27 +52,27 @@ def test_a_changed_figure_changes_it(tmp_path):
     path = tmp_path / "docs" / "results.json"
     changed = {"sweep_speedup": 1.234, "seeds_solved": 4, "success_lower95": [0.999, 0.876]}
     path.write_text(json.dumps(json.loads(path.read_text()) | changed))
-    made = make_files(tmp_path)
-    assert "| 1.23 times | 1.6 times | `sweeps` |" in made["docs/results.md"]
-    assert "| `sweep_speedup` | 1.234 | `sweeps` |" in made["docs/results.md"]
-    assert "| 87.6% | `drone-rl bench solve` |" in made["README.md"]
-    assert "| 0.876 | 0.95 | `solve` |" in made["docs/results.md"]
+    pages = make_files(tmp_path)
+    assert "| 1.23 times | 1.6 times | `sweeps` |" in pages["docs/results.md"]
+    assert "| `sweep_speedup` | 1.234 | `sweeps` |" in pages["docs/results.md"]
+    assert "| 87.6% | `drone-rl bench solve` |" in pages["README.md"]
+    assert "| 0.876 | 0.95 | `solve` |" in pages["docs/results.md"]
 
 
-def test_blocks_are_replaced_and_nothing_else():
+def test_only_blocks_are_replaced():
     text = "a\n<!-- made: x -->\nold\n<!-- /made -->\nb\n<!-- made: y -->\n<!-- /made -->\n"
-    made = "a\n<!-- made: x -->\n1\n2\n<!-- /made -->\nb\n<!-- made: y -->\n3\n<!-- /made -->\n"
-    assert replace_blocks(text, {"x": "1\n2\n", "y": "3"}) == made
-    assert replace_blocks(made, {"x": "1\n2", "y": "3"}) == made
+    new = "a\n<!-- made: x -->\n1\n2\n<!-- /made -->\nb\n<!-- made: y -->\n3\n<!-- /made -->\n"
+    assert replace_blocks(text, {"x": "1\n2\n", "y": "3"}) == new
+    assert replace_blocks(new, {"x": "1\n2", "y": "3"}) == new
 
 
 @pytest.mark.parametrize("blocks", [{}, {"z": ""}])
-def test_a_block_that_nobody_makes_is_an_error(blocks):
-    with pytest.raises(ValueError, match=r"nobody makes the blocks \['x'\]"):
+def test_an_unknown_block_raises(blocks):
+    with pytest.raises(ValueError, match=r"blocks \['x'\] are unknown"):
         replace_blocks("<!-- made: x -->\n<!-- /made -->", blocks)
 
 
-def test_a_figure_that_is_missing_leaves_its_cell_unmeasured():
+def test_a_missing_figure_is_marked_as_unmeasured():
     rows = (Row("moon", "tide", lambda f: f"{f['tide_m']:.1f} m", "3 m"),)
     assert make_table(rows, {"tide_m": 2.96}).splitlines()[2:] == [
         "| tide | 3.0 m | 3 m | `moon` |"
@@ -80,7 +80,7 @@ def test_a_figure_that_is_missing_leaves_its_cell_unmeasured():
     assert f"| tide | {UNKNOWN} | 3 m | `moon` |" in make_table(rows, {})
 
 
-def test_every_row_names_a_benchmark_and_every_benchmark_with_figures_has_a_row():
+def test_every_benchmark_with_figures_has_a_row():
     rows = (*MAIN, *FLIGHT, *TRUTH, *PROOF, *GUESTS)
     named = {row.bench for row in rows}
     assert named <= set(BENCHMARKS)
@@ -91,7 +91,7 @@ def test_every_row_names_a_benchmark_and_every_benchmark_with_figures_has_a_row(
     assert {row.bench for row in HEADLINES} <= named and len(HEADLINES) <= 8
 
 
-def test_headlines_are_readable_without_a_legend():
+def test_headline_cells():
     figures = {
         "time_to_solve_s": [4.0, 5.25, 6.0],
         "success_lower95": [0.996, 0.991],
@@ -112,7 +112,7 @@ def test_headlines_are_readable_without_a_legend():
     ]
 
 
-def test_rows_say_what_the_figures_are():
+def test_table_cells():
     figures = {
         "time_to_solve_s": [30.0, 20.4, 25.0, 21.0, 40.6],
         "success_lower95": [0.996, 0.991],
@@ -140,8 +140,14 @@ def test_rows_say_what_the_figures_are():
         "hostile_max_s": 1.94,
     }
     text = "".join(make_table(rows, figures) for rows in (MAIN, FLIGHT, TRUTH, PROOF, GUESTS))
-    assert "| 2.6e-06 on 40,000 pictures |" in text and "| 3 of 40,000 |" in text
-    for cell in ("20 to 41, median 25", "0.991", "1024 MiB", "44 of 45 certain, of 55", "7.9%"):
+    assert "| 2.6e-06 on 40,000 images |" in text and "| 3 of 40,000 |" in text
+    for cell in (
+        "20 to 41, median 25",
+        "0.991",
+        "1024 MiB",
+        "44 of 45 certain, 55 in total",
+        "7.9%",
+    ):
         assert f"| {cell} |" in text
     assert "| 4.2, on a machine 1.4 times slower |" in text
     assert "| 26 of 27 |" in text
@@ -149,7 +155,7 @@ def test_rows_say_what_the_figures_are():
         assert f"| {cell} |" in text
 
 
-def test_layers_side_by_side_are_one_box_and_what_is_forbidden_is_told():
+def test_layers_are_boxes_followed_by_forbidden_imports():
     drawn = draw_layers(
         [
             {"type": "layers", "name": "order", "layers": ["top", "left | right", "base"]},
@@ -166,7 +172,7 @@ def test_layers_side_by_side_are_one_box_and_what_is_forbidden_is_told():
     assert drawn.endswith("- No water inside: in top, left, no sea, rain.")
 
 
-def test_packages_are_listed_from_the_top_each_with_those_within_it(tmp_path):
+def test_packages_are_listed_from_the_top_with_their_subpackages(tmp_path):
     texts = {"base/__init__": "Low.", "top/__init__": "High.\n\nMore", "top/a/__init__": "In"}
     for name, text in texts.items():
         path = tmp_path / f"{name}.py"
@@ -184,7 +190,7 @@ def test_packages_are_listed_from_the_top_each_with_those_within_it(tmp_path):
 
 @pytest.fixture
 def measured(tmp_path):
-    """A ledger of three benchmarks, one of them of today's code."""
+    """Return a ledger of three benchmarks and its folder; only "new" is current."""
     (tmp_path / "drone_rl").mkdir()
     (tmp_path / "drone_rl" / "sim.py").write_text("1")
     code = digest_code(["sim"], tmp_path)
@@ -198,20 +204,20 @@ def measured(tmp_path):
     return ledger, tmp_path
 
 
-def test_figures_older_than_their_code_are_named(measured):
+def test_outdated_figures_are_reported(measured):
     ledger, root = measured
     names = ("new", "old", "unknown", "never")
     benchmarks = {name: Benchmark(lambda _: {}, "tests", ("sim",)) for name in names}
     since = "measured 2026-11-21 at 0123456789ab, "
-    assert list(tell_ages(benchmarks, ledger, root)) == [
-        f"new: {since}of today's code",
-        f"old: {since}OLDER than what it measures (sim)",
-        f"unknown: {since}of code that was not noted",
+    assert list(report_ages(benchmarks, ledger, root)) == [
+        f"new: {since}current",
+        f"old: {since}OUTDATED: sim changed since",
+        f"unknown: {since}of unknown code",
         "never: never measured",
     ]
 
 
-def test_every_figure_is_listed_with_the_benchmark_and_where_it_was_run(tmp_path):
+def test_every_figure_is_listed_with_its_origin(tmp_path):
     ledger = Ledger(tmp_path / "r.json")
     figures = {
         "tide_m": 2.0 / 3.0, "days": 3, "moons": [1.0, 0.5], "phases": {"new": 1, "full": 2},
@@ -236,7 +242,7 @@ def test_every_figure_is_listed_with_the_benchmark_and_where_it_was_run(tmp_path
     assert "| 2026-11-22 | `0123456789ab-dirty` |" in list_origins(ledger)
 
 
-def test_newer_figures_replace_those_of_their_benchmarks_alone(measured, tmp_path):
+def test_newer_figures_replace_only_those_of_their_benchmarks(measured, tmp_path):
     kept, _ = measured
     newest = Ledger(tmp_path / "newest.json")
     newest.add("old", {"old_s": 2.0}, make_origin("def", {}))
@@ -245,6 +251,6 @@ def test_newer_figures_replace_those_of_their_benchmarks_alone(measured, tmp_pat
     assert Ledger(kept.path).origins["old"].code == "def"
 
 
-def test_an_unknown_word_is_an_error(capsys):
+def test_an_unknown_argument_is_an_error(capsys):
     assert main(["fresh"]) == 2
     assert "'fresh' is unknown" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""The page of settings says of each what its class says."""
+"""The page of settings shows the docstrings of the settings classes."""
 
 import importlib
 from typing import Annotated, ClassVar
@@ -49,7 +49,7 @@ class Pond(Sea):
     """How shallow."""
 
 
-def test_each_setting_with_what_it_may_be_its_unit_default_and_meaning():
+def test_a_row_has_allowed_values_unit_default_and_meaning():
     assert make_table(Sea, "sea.").splitlines()[2:] == [
         "| `sea.depth` | a number above 0 up to 11000 | m | `100.0` | "
         "How deep, &#124;z&#124; below the surface. |",
@@ -60,7 +60,7 @@ def test_each_setting_with_what_it_may_be_its_unit_default_and_meaning():
     ]
 
 
-def test_what_is_said_again_replaces_what_was_said_before():
+def test_a_subclass_overrides_meanings():
     first, second, *_ = make_table(Pond).splitlines()[2:]
     assert first == "| `depth` | a number from 0 to 3 | m | `1.0` | How shallow. |"
     assert second.startswith("| `tides` |")
@@ -81,7 +81,7 @@ def commands():
     ],
     ids=lambda cls: f"{cls.__module__}.{cls.__name__}",
 )
-def test_every_setting_has_a_meaning_and_seconds_are_seconds(cls):
+def test_every_setting_has_a_meaning_and_seconds_a_suffix(cls):
     assert all(meanings(cls).get(name) for name in kinds_of(cls))
     for line in make_table(cls).splitlines()[2:]:
         name, may_be, unit = [cell.strip("| `") for cell in line.split(" | ")][:3]
@@ -95,10 +95,10 @@ def test_variants_are_listed_below_their_parts():
     network = text.partition("### network")[2].partition("### ")[0]
     assert "**`small_cnn`** Network for small images" in network
     assert make_table(SmallCnn, "network.") in network
-    assert make_table(Crop, "transforms.crop.") in text  # of which there may be several
+    assert make_table(Crop, "transforms.crop.") in text  # transforms can be repeated
 
 
-def test_commands_point_at_the_groups_that_they_take():
+def test_commands_link_to_their_groups():
     train = list_commands().partition("### drone-rl train")[2].partition("### ")[0]
     assert "| `camera` | [camera](#camera) |  |  |" in train
     assert (
@@ -107,7 +107,7 @@ def test_commands_point_at_the_groups_that_they_take():
     assert "changes to the policy's [task](#task)" in list_commands()
 
 
-def test_presets_are_told_by_their_first_comment(tmp_path):
+def test_presets_are_described_by_their_first_comment(tmp_path):
     for group in ("experiment", "sweep"):
         (tmp_path / group).mkdir()
     file = tmp_path / "experiment" / "deep.yaml"

@@ -1,6 +1,6 @@
-"""`make readme`: what README.md and docs/ have that is made from files, and whether it is of today.
+"""`make readme`: generate the tables of README.md and docs/.
 
-python -m tools.readme           writes it
-python -m tools.readme keep      takes the figures of outputs/bench over first
-python -m tools.readme stale     tells which figures are older than the code that they measure
+python -m tools.readme           write the generated blocks
+python -m tools.readme keep      copy the figures of outputs/bench to docs/results.json first
+python -m tools.readme stale     list the figures that are older than the code that they measure
 """

@@ -15,7 +15,7 @@ from tools.readme.peers import make_peers
 from tools.readme.robust import make_robust
 from tools.readme.rows import MAIN, PROOF, TRUTH
 from tools.readme.settings import list_commands, list_groups, list_parts, list_presets
-from tools.readme.stale import tell_ages
+from tools.readme.stale import report_ages
 from tools.readme.tables import list_figures, list_origins, make_table
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -29,13 +29,13 @@ PAGES = (
     "docs/robustness.md",
     "docs/settings.md",
 )
-"""Which have blocks that are made."""
+"""Pages with generated blocks."""
 NOTEBOOK = "docs/tutorials/notebook"
-"""The page that is a notebook, too."""
+"""The page that is also available as a notebook."""
 
 
 def make_blocks(root: Path) -> dict[str, str]:
-    """Every block as it should be, by name."""
+    """Return the current content of every block by name."""
     ledger = Ledger(root / "docs" / "results.json")
     contracts = read_contracts(root)
     tables = {
@@ -63,7 +63,7 @@ def make_blocks(root: Path) -> dict[str, str]:
 
 
 def make_files(root: Path) -> dict[str, str]:
-    """All that is made from files, as it should be, by path."""
+    """Return the current content of every file with generated content by path."""
     blocks = make_blocks(root)
     files = {path: replace_blocks((root / path).read_text(), blocks) for path in PAGES}
     page = (root / f"{NOTEBOOK}.md").read_text()
@@ -71,23 +71,24 @@ def make_files(root: Path) -> dict[str, str]:
 
 
 def keep(source: Path, target: Path) -> list[str]:
-    """Takes figures over, each benchmark's in place of its older ones; returns their names."""
+    """Replace the figures of each measured benchmark; return the names of the benchmarks."""
     measured, kept = Ledger(source), Ledger(target)
     for name, origin in measured.origins.items():
         kept.add(name, measured.of(name), origin)
     return list(measured.origins)
 
 
-def main(words: list[str]) -> int:
-    """Returns the exit status."""
-    if words == ["stale"]:
+def main(arguments: list[str]) -> int:
+    """Run the command and return the exit status."""
+    if arguments == ["stale"]:
         ledger = Ledger(ROOT / "docs" / "results.json")
-        print(*tell_ages(BENCHMARKS, ledger, ROOT), sep="\n")
+        print(*report_ages(BENCHMARKS, ledger, ROOT), sep="\n")
         return 0
-    if words not in ([], ["keep"]):
-        print(f"error: {' '.join(words)!r} is unknown; use keep, stale or nothing", file=sys.stderr)
+    if arguments not in ([], ["keep"]):
+        given = " ".join(arguments)
+        print(f"error: {given!r} is unknown; use keep, stale or no argument", file=sys.stderr)
         return 2
-    if words:
+    if arguments:
         print("kept:", ", ".join(keep(MEASURED, ROOT / "docs" / "results.json")))
     for path, content in make_files(ROOT).items():
         (ROOT / path).write_text(content)

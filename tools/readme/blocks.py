@@ -1,4 +1,4 @@
-"""Blocks of a Markdown file that are made by a program, each between two marks."""
+"""Generated blocks of a Markdown file, each between two markers."""
 
 import re
 from collections.abc import Mapping
@@ -7,21 +7,21 @@ _BLOCK = re.compile(r"(<!-- made: (\w+) -->\n).*?(<!-- /made -->)", re.DOTALL)
 
 
 def replace_blocks(text: str, blocks: Mapping[str, str]) -> str:
-    """A text with its blocks made anew.
+    """Return a text with its generated blocks replaced.
 
     Args:
-        text: With `<!-- made: NAME -->` before and `<!-- /made -->` after each block.
-        blocks: What stands between, by name.
+        text: Markdown with `<!-- made: NAME -->` before and `<!-- /made -->` after each block.
+        blocks: Contents of the blocks by name.
 
     Raises:
-        ValueError: The text marks a block that is none of these.
+        ValueError: The text marks a block that is not in `blocks`.
     """
     unknown = marked_blocks(text) - set(blocks)
     if unknown:
-        raise ValueError(f"nobody makes the blocks {sorted(unknown)}; there are {sorted(blocks)}")
+        raise ValueError(f"blocks {sorted(unknown)} are unknown; use one of {sorted(blocks)}")
     return _BLOCK.sub(lambda match: f"{match[1]}{blocks[match[2]].strip()}\n{match[3]}", text)
 
 
 def marked_blocks(text: str) -> set[str]:
-    """Names of a text's blocks."""
+    """Return the names of the blocks in a text."""
     return {match.group(2) for match in _BLOCK.finditer(text)}

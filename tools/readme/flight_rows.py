@@ -1,4 +1,4 @@
-"""What the table of figures in flight says, row by row, of which keys of docs/results.json."""
+"""Rows of the table of figures for vehicle dynamics."""
 
 from collections.abc import Sequence
 
@@ -24,55 +24,54 @@ def _trained(f: Figures, name: str) -> str:
 FLIGHT = (
     Row(
         "flight_speed",
-        "moves a second of 256 drones, 33 ticks of physics and the whole cascade in each; times as "
-        "many as MuJoCo Warp makes of the same body without a controller",
+        "environment steps per second of 256 drones (33 physics steps with all controllers each); "
+        "ratio to MuJoCo Warp with the same body and no controller",
         _speed,
         "300,000; 50",
     ),
     Row(
         "flight_speed",
-        "one drone with a picture of 144x256 at each command: times real time",
+        "real-time factor of one drone with an image of 144x256 per command",
         lambda f: f"{f['flight_realtime_factor']:.0f}",
         "30",
     ),
     Row(
         "flight_speed",
-        "frames/s of collecting in flight; over computer-vision mode",
+        "frames/s of the collector with vehicle dynamics; ratio to computer-vision mode",
         lambda f: f"{f['flight_collector_fps']:,.0f}; {f['flight_over_cv']:.2f}",
         "0.8",
     ),
     Row(
         "flight_parity",
-        "greatest difference to MuJoCo after 10 s of free flight, 100 random manoeuvres: metres; "
-        "degrees",
+        "greatest difference to MuJoCo after 10 s of free flight, 100 random maneuvers: m; degrees",
         lambda f: f"{f['flight_parity_m']:.4f}; {f['flight_parity_deg']:.4f}",
         "0.01; 0.5",
     ),
     Row(
         "flight_paths",
-        "mean distance, metres, from a square of 10 m at 2 m/s; from its place of a drone that "
-        "hovers in wind of 5 m/s",
+        "mean distance, m, to a square path of 10 m at 2 m/s; to the hover position in wind of "
+        "5 m/s",
         lambda f: f"{f['path_error_m']:.2f}; {f['hover_error_m']:.2f}",
         "0.5; 0.3",
     ),
     Row(
         "flight_moves",
-        "`experiment=flight`: seconds from the start of the command until solved, five seeds; "
-        "lower end of the share of 1,000 flights with all cubes",
+        "`experiment=flight`: seconds from the start of the command until solved, 5 seeds; success "
+        "rate in 1,000 episodes, lower end of the exact 95% CI",
         lambda f: _trained(f, "flight"),
         "median 60; 0.95",
     ),
     Row(
         "flight_velocity",
-        "`experiment=flight_velocity`, the same, three seeds",
+        "the same for `experiment=flight_velocity`, 3 seeds",
         lambda f: _trained(f, "flight_velocity"),
         "300; 0.95",
     ),
     Row(
         "flight_pillars",
-        "`experiment=flight_pillars`, the same of flights that touch no pillar, three seeds",
+        "the same for `experiment=flight_pillars`, 3 seeds",
         lambda f: _trained(f, "flight_pillars"),
         "0.9",
     ),
 )
-"""Drones with a body."""
+"""Vehicle dynamics."""

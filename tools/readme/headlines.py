@@ -1,4 +1,4 @@
-"""The headline figures of README.md: at most eight, each readable without a legend."""
+"""The headline figures of README.md: at most eight that need no legend."""
 
 import statistics
 from collections.abc import Iterable
@@ -51,6 +51,6 @@ HEADLINES = (
 
 
 def make_headlines(rows: Iterable[Row], figures: Figures) -> str:
-    """Return a table in Markdown, each row with the command that measures it."""
-    lines = [f"| {r.what} | {make_cell(r, figures)} | `drone-rl bench {r.bench}` |" for r in rows]
+    """Return a Markdown table of figures with the commands that measure them."""
+    lines = [f"| {r.label} | {make_cell(r, figures)} | `drone-rl bench {r.bench}` |" for r in rows]
     return "\n".join(["| measured | result | command |", "| --- | --- | --- |", *lines])

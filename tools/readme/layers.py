@@ -1,4 +1,4 @@
-"""The house: what each package holds, and which may import which, from the import contracts."""
+"""Package list and layer diagram, from docstrings and import contracts."""
 
 import ast
 import tomllib
@@ -8,16 +8,16 @@ from typing import Any
 
 
 def read_contracts(root: Path) -> list[dict[str, Any]]:
-    """The import contracts of a checkout."""
+    """Return the import contracts of a checkout."""
     with open(root / "pyproject.toml", "rb") as file:
         return tomllib.load(file)["tool"]["importlinter"]["contracts"]
 
 
 def list_packages(contracts: Iterable[dict[str, Any]], package: Path) -> str:
-    """A table in Markdown: each package and those within it, by their docstrings' first lines.
+    """Return a Markdown table of packages and subpackages with their docstrings' first lines.
 
     Args:
-        contracts: The import contracts, whose layers give the order.
+        contracts: The import contracts, whose layers define the order.
         package: The folder drone_rl.
     """
     paths = []
@@ -29,10 +29,9 @@ def list_packages(contracts: Iterable[dict[str, Any]], package: Path) -> str:
 
 
 def draw_layers(contracts: Iterable[dict[str, Any]]) -> str:
-    """The contract of layers as a list from the top, and under it what the others forbid.
+    """Return the layers as an HTML list from the top, and below it the forbidden imports.
 
-    A list needs no program that draws it, on the site or on any page that shows Markdown; the site
-    makes boxes of its items.
+    Any Markdown viewer shows the list without a diagram renderer; the site styles items as boxes.
     """
     boxes = [" ".join(f"<code>{name}</code>" for name in names) for names in _layers(contracts)]
     lines = ['<ol class="layers">', *(f"<li>{box}</li>" for box in boxes), "</ol>", ""]
@@ -41,7 +40,7 @@ def draw_layers(contracts: Iterable[dict[str, Any]]) -> str:
 
 
 def _layers(contracts: Iterable[dict[str, Any]]) -> list[list[str]]:
-    """Names of packages, from the top; those of one row side by side."""
+    """Return the names of packages by layer, from the top."""
     layers = next(c["layers"] for c in contracts if c["type"] == "layers")
     return [[name.strip() for name in layer.split("|")] for layer in layers]
 
@@ -51,14 +50,14 @@ def _name(path: Path, package: Path) -> str:
 
 
 def _first_line(path: Path) -> str:
-    """What a package, or a module in place of one, says of itself."""
+    """Return the first line of the docstring of a package or module."""
     file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
     text = ast.get_docstring(ast.parse(file.read_text())) or ""
     return text.partition("\n")[0].rstrip(".")
 
 
 def _sentence(contract: dict[str, Any]) -> str:
-    who = ", ".join(name.removeprefix("drone_rl.") for name in contract["source_modules"])
+    sources = ", ".join(name.removeprefix("drone_rl.") for name in contract["source_modules"])
     name = contract["name"][0].upper() + contract["name"][1:]
-    what = ", ".join(contract["forbidden_modules"])
-    return f"- {name}: in {who}, no {what}."
+    forbidden = ", ".join(contract["forbidden_modules"])
+    return f"- {name}: in {sources}, no {forbidden}."

@@ -1,4 +1,4 @@
-"""A page of Markdown as a notebook: its Python is code to run, all else is text."""
+"""Conversion of a Markdown page to a notebook: Python blocks become code cells."""
 
 import json
 import re
@@ -7,12 +7,12 @@ _CODE = re.compile(r"^```python\n(.*?)^```\n", re.DOTALL | re.MULTILINE)
 
 
 def make_notebook(page: str) -> str:
-    """The notebook (nbformat 4.5), as JSON.
+    """Return the notebook (nbformat 4.5) as JSON.
 
     Args:
-        page: Markdown with blocks of Python.
+        page: Markdown with Python code blocks.
     """
-    parts = _CODE.split(page)  # text and code in turn
+    parts = _CODE.split(page)  # alternates between text and code
     cells = [_cell("code" if i % 2 else "markdown", part.strip()) for i, part in enumerate(parts)]
     numbered = [{"id": f"cell-{i}", **cell} for i, cell in enumerate(cells) if cell["source"]]
     kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}

@@ -1,4 +1,4 @@
-"""The table of our learners beside what a user would pick instead."""
+"""The table that compares our learners with those of other libraries."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -15,10 +15,10 @@ _SHOWN = {
 
 
 def make_peers(figures: Mapping[str, Any]) -> str:
-    """A table in Markdown, a line for each; lists are by seed."""
+    """Return a Markdown table with one row for each learner and one value for each seed."""
     lines = [
-        "| who | settings | seconds from the start of the process | without imports | frames | "
-        "success, lower end |",
+        "| learner | settings | seconds from process start | without imports | frames | "
+        "success rate, lower end of 95% CI |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for name, label in LABELS.items():
@@ -29,7 +29,7 @@ def make_peers(figures: Mapping[str, Any]) -> str:
 
 
 def _cells(measured: Mapping[str, Any]) -> list[str]:
-    cells = ["; ".join(f"{v:{how}}" for v in measured[key]) for key, how in _SHOWN.items()]
+    cells = ["; ".join(f"{v:{spec}}" for v in measured[key]) for key, spec in _SHOWN.items()]
     unsolved = measured["is_solved"].count(False)
     return [*cells[:2], cells[2] + (f" ({unsolved} not solved)" if unsolved else ""), cells[3]]
 

@@ -1,4 +1,4 @@
-"""The table of what trainings in other worlds gain, and what each part of them does."""
+"""The table of the ablation of randomized training: success rate by group of perturbations."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,10 +12,10 @@ _UNTOUCHED = "untouched"
 
 
 def make_robust(figures: Mapping[str, Any]) -> str:
-    """A table in Markdown, a line for each kind of shift; a column for each arm of the ablation."""
+    """Return a Markdown table with a row for each group and a column for each arm."""
     measured, untouched = figures.get("robust_arms", {}), figures.get("robust_untouched", ())
     names = [PLAIN, *GROUPS, _UNTOUCHED, ALL_KINDS]
-    lines = [_line(["successful flights, %", *ARMS]), _line(["---"] * (1 + len(ARMS)))]
+    lines = [_line(["success rate, %", *ARMS]), _line(["---"] * (1 + len(ARMS)))]
     for name in names:
         cells = [_cell(measured.get(arm, {}).get(name)) for arm in ARMS]
         lines.append(_line([_title(name, untouched), *cells]))
@@ -24,19 +24,19 @@ def make_robust(figures: Mapping[str, Any]) -> str:
 
 def _title(name: str, untouched: Sequence[str]) -> str:
     if name == PLAIN:
-        return "the world as it is"
+        return "training conditions"
     if name == _UNTOUCHED:
-        return "**mean of the kinds that are not touched**"
+        return "**mean of the groups without randomization**"
     if name == ALL_KINDS:
-        return "mean of all kinds"
+        return "mean of all groups"
     return f"**{name}**" if name in untouched else name
 
 
-def _cell(shares: Sequence[float] | None) -> str:
-    """The mean over seeds, and the least and the greatest."""
-    if not shares:
+def _cell(rates: Sequence[float] | None) -> str:
+    """Format the mean, minimum and maximum over seeds."""
+    if not rates:
         return UNKNOWN
-    low, middle, high = (100 * share for share in (min(shares), mean(shares), max(shares)))
+    low, middle, high = (100 * rate for rate in (min(rates), mean(rates), max(rates)))
     return f"{middle:.0f} ({low:.0f} to {high:.0f})"
 
 

@@ -1,4 +1,4 @@
-"""What the tables of figures say, row by row, of which keys of docs/results.json."""
+"""Rows of the tables of figures for training, adversarial tests and verification."""
 
 import statistics
 from collections.abc import Sequence
@@ -12,11 +12,11 @@ def _times(f: Figures) -> str:
 
 
 def _rates(f: Figures) -> str:
-    collected, drawn = f["collector_fps"], f["raw_render_beside_collector_fps"]
-    return f"{f['collector_over_raw']:.2f} ({collected:,.0f} over {drawn:,.0f})"
+    collected, rendered = f["collector_fps"], f["raw_render_beside_collector_fps"]
+    return f"{f['collector_over_raw']:.2f} ({collected:,.0f} over {rendered:,.0f})"
 
 
-def _drawing(f: Figures) -> str:
+def _rendering(f: Figures) -> str:
     ratios = "; ".join(f"{ratio:.1f}" for ratio in f["render_over_warp"].values())
     return f"{f['raw_render_fps']:,.0f}; {ratios} times"
 
@@ -27,15 +27,15 @@ def _class_models(f: Figures) -> str:
 
 def _verdicts(f: Figures) -> str:
     right, certain, total = (f[f"verdicts_{name}"] for name in ("right", "certain", "total"))
-    return f"{right} of {certain} certain, of {total}"
+    return f"{right} of {certain} certain, {total} in total"
 
 
-def _planted(f: Figures) -> str:
-    share, total = f["planted_maps_found"], f["planted_maps_total"]
-    return f"{share * total:.0f} of {total}"
+def _known_maps(f: Figures) -> str:
+    rate, total = f["planted_maps_found"], f["planted_maps_total"]
+    return f"{rate * total:.0f} of {total}"
 
 
-def _shares(values: Sequence[float]) -> str:
+def _rates_failed(values: Sequence[float]) -> str:
     return ", ".join(f"{value:.2g}" if value else "0" for value in values)
 
 
@@ -44,69 +44,69 @@ def _seconds(values: Sequence[float]) -> str:
 
 
 def _slower(f: Figures) -> str:
-    """Than the one for which the figures were asked, by how the bench scaled its seconds."""
+    """Describe the machine relative to the one of the targets, by how the seconds were scaled."""
     return f"on a machine {f['proof_two_s'] / f['proof_two_scaled_s']:.1f} times slower"
 
 
 TRUTH = (
     Row(
         "coverage",
-        "smallest coverage of a 95% interval that is shown, by enumeration and simulation",
+        "smallest coverage of all displayed 95% intervals, by enumeration and simulation",
         lambda f: f"{f['interval_coverage_min']:.3f}",
         "0.945",
     ),
     Row(
         "coverage",
-        "certain and wrong, the worst of 42 simulated policies at and around the thresholds",
+        "rate of certain but wrong verdicts, greatest of 42 simulated policies near the thresholds",
         lambda f: f"{f['false_certain_rate']:.3f}",
         "at most 0.05",
     ),
     Row(
         "maps",
-        "maps that say nothing of the policy and are trusted",
+        "saliency maps independent of the policy that are trusted",
         lambda f: f"{f['placebo_maps_trusted']} of {f['placebo_maps_total']}",
         "0",
     ),
-    Row("maps", "planted networks whose true map is trusted", _planted, "0.9"),
+    Row("maps", "networks with a known map whose true map is trusted", _known_maps, "0.9"),
     Row(
         "sentences",
-        "planted changes of evidence that change or take the sentence",
+        "injected changes of evidence that change or remove the sentence",
         lambda f: f"{f['sentences_flipped']} of {f['sentences_total']}",
         "all",
     ),
     Row(
         "verdicts",
-        "verdicts called certain that agree with 5,000 other episodes",
+        "certain verdicts that agree with 5,000 other episodes",
         _verdicts,
         "all",
     ),
     Row(
         "hostile",
-        "hostile files refused in one line, with nothing run, read or written",
+        "malicious files refused in one line, with nothing executed, read or written",
         lambda f: f"{f['hostile_refused']} of {f['hostile_total']}",
         "all",
     ),
     Row(
         "hostile",
-        "the greatest memory, and processor time, of any of them after imports",
+        "greatest memory and processor time of a refusal after imports",
         lambda f: f"{f['hostile_peak_mib']:,.0f} MiB; {f['hostile_max_s']:.1f} s",
         "1,024 MiB; 2 s",
     ),
     Row(
         "gamed",
-        "adversarial policies called good and certain, or proved",
+        "adversarial policies judged good and certain, or proved",
         lambda f: f"{f['gamed_verdicts']} of {f['gamed_total']}",
         "0",
     ),
     Row(
         "fragile_honest",
-        'honest policies, shipped or trained by default, that rounding makes "not certain"',
+        'honest policies, bundled or trained by default, "not certain" because of rounding',
         lambda f: f"{f['fragile_honest']} of {f['fragile_honest_total']}",
         "0",
     ),
     Row(
         "injections",
-        "injection payloads that run in Chromium, of one on a page each",
+        "injection payloads, one per page, that run in Chromium",
         lambda f: f"{f['injections_run']} of {f['injections_total']:,}",
         "0",
     ),
@@ -118,8 +118,9 @@ TRUTH = (
     ),
     Row(
         "render_truth",
-        "pictures against OpenGL's, random scenes: pixels on no edge that show another geom; geoms "
-        "of more than 30 pixels that overlap by 0.98, the least; depth, mm; colour, levels of 255",
+        "images compared with OpenGL, random scenes: pixels off edges with another geom; geoms "
+        "of more than 30 pixels with IoU of at least 0.98, smallest IoU; greatest difference of "
+        "depth, mm; of color, levels of 255",
         lambda f: (
             f"{f['render_truth_inner_wrong']}; {f['render_truth_overlapping']} of "
             f"{f['render_truth_geoms']}, {f['render_truth_least_overlap']:.3f}; "
@@ -130,8 +131,8 @@ TRUTH = (
     ),
     Row(
         "shifts",
-        "seconds of a policy's flights under ten kinds of other conditions, five strengths each, "
-        "200 episodes; mean area under success over strength, policy good",
+        "seconds to evaluate a policy under ten groups of perturbations, five strengths each, 200 "
+        "episodes; mean area under the curve of success rate over strength, policy good",
         lambda f: (
             f"{f['shift_suite_s']:.0f} with {f['shift_suite_axes']} axes; {f['shift_area']:.2f}"
         ),
@@ -139,41 +140,46 @@ TRUTH = (
     ),
     Row(
         "robust",
-        "`experiment=robust` over the default, points of successful flights under the kinds of "
-        "shift that training does not touch, three seeds; under all kinds; cost where nothing is "
-        "different",
+        "gain of `experiment=robust` over the default in success rate, percentage points, 3 seeds: "
+        "under groups of perturbations without randomization in training; under all groups; loss "
+        "under training conditions",
         lambda f: (
-            f"{f['robust_gain_points']:+.1f} of {f['robust_room_points']:.1f} that there are to "
-            f"gain; {f['robust_gain_all_kinds_points']:+.1f}; "
+            f"{f['robust_gain_points']:+.1f} of at most "
+            f"{f['robust_room_points']:.1f}; {f['robust_gain_all_kinds_points']:+.1f}; "
             f"{round(f['robust_cost_points'], 1) + 0.0:.1f}"
         ),
         "+15; -; at most 1",
     ),
     Row(
         "mutants",
-        "mutants killed, of those sampled that change anything (`make mutants` before it)",
+        "fraction of sampled, non-equivalent mutants that are killed (run `make mutants` before)",
         lambda f: (
-            f"{f['mutation_score_at_first_sight']:.2f} at first sight of the sample of "
-            f"{f['mutants_sampled']}; {f['mutation_score']:.2f} once its survivors had tests"
+            f"{f['mutation_score_at_first_sight']:.2f} for a new sample of "
+            f"{f['mutants_sampled']}; {f['mutation_score']:.2f} with tests for its survivors"
         ),
         "0.9",
     ),
     Row(
         "explain",
-        "`drone-rl explain policy=good`, 600 frames, report included",
+        "time and memory of `drone-rl explain policy=good`, 600 frames, with the report",
         lambda f: f"{f['explain_s']:.0f} s, {f['explain_peak_memory_mib'] / 1024:.1f} GiB",
         "120 s, 2 GiB",
     ),
 )
-"""Whether what the program says holds against an adversary."""
+"""Adversarial tests."""
 PROOF = (
     Row(
         "prove",
-        "share of all placements that the default's 5 seeds fail at, exactly",
-        lambda f: _shares(f["proof_lost"]),
+        "fraction of all placements from which the default policy fails, exact, 5 seeds",
+        lambda f: _rates_failed(f["proof_lost"]),
         "",
     ),
-    Row("prove", "the same, undecided at most", lambda f: f"{f['proof_undecided']:.1e}", "1e-6"),
+    Row(
+        "prove",
+        "greatest undecided fraction of these proofs",
+        lambda f: f"{f['proof_undecided']:.1e}",
+        "1e-6",
+    ),
     Row(
         "prove",
         "seconds of these proofs",
@@ -188,54 +194,54 @@ PROOF = (
     ),
     Row(
         "prove",
-        "flights of the simulator that end otherwise than proved",
+        "simulated episodes that end differently than proved",
         lambda f: f"{f['proof_contradicted']} of {f['proof_flights']:,}",
         "0",
     ),
     Row(
         "prove",
-        "certificates that the second checker accepts",
+        "certificates that the independent checker accepts",
         lambda f: f"{f['proof_checked']} of {f['proof_checked_total']}",
         "all",
     ),
     Row(
         "tampering",
-        "tampered certificates that it refuses",
+        "tampered certificates that the checker rejects",
         lambda f: f"{f['tampered_refused']} of {f['tampered_total']}",
         "all",
     ),
     Row(
         "places",
-        "random pictures that are not the closed form's",
+        "random images that differ from the closed form",
         lambda f: f"{f['places_wrong']} of {f['places_compared']:,}",
         "0",
     ),
     Row(
         "places",
-        "seconds of an exact map",
+        "seconds to compute an exact response map",
         lambda f: f"{f['places_s']:.1f}, {f['places_cells']:,} cells",
         "15",
     ),
     Row(
         "provable",
-        "minutes until `experiment=provable` is proved, three seeds",
+        "minutes until `experiment=provable` is proved, 3 seeds",
         lambda f: ", ".join(f"{seconds / 60:.1f}" for seconds in f["provable_s"]),
         "30",
     ),
     Row(
         "exact_coverage",
-        "intervals of verdicts that hold the exact share",
+        "fraction of verdict intervals that contain the exact success rate",
         lambda f: f"{f['verdict_coverage_exact']:.3f}",
         "0.945",
     ),
     Row(
         "many_cubes",
-        "four and five cubes, policy good: share decided within an hour",
+        "fraction decided within an hour, policy good: four cubes; five cubes",
         lambda f: f"{f['proof_four']:.2g}; {f['proof_five']:.2g}",
         "",
     ),
 )
-"""What is proved."""
+"""Verification."""
 MAIN = (
     Row(
         "solve",
@@ -243,41 +249,40 @@ MAIN = (
         _times,
         "60",
     ),
-    Row("solve", "seeds of 5 that reach it", lambda f: str(f["seeds_solved"]), "5"),
+    Row("solve", "seeds of 5 that reach this mean", lambda f: str(f["seeds_solved"]), "5"),
     Row(
         "solve",
-        "share of 1,000 episodes in worlds to report on with all cubes, lower end of the exact 95% "
-        "interval, the least of 5 seeds",
+        "success rate in 1,000 held-out episodes, lower end of the exact 95% CI, worst of 5 seeds",
         lambda f: f"{min(f['success_lower95']):.3f}",
         "0.95",
     ),
     Row(
         "seeds",
-        "seeds of 20 others that reach it, and the least of their lower ends",
+        "20 other seeds: number that reach this mean; worst lower end of the 95% CI",
         lambda f: f"{f['seeds_solved_of_20']}; {min(f['seeds_lower95']):.3f}",
         "20",
     ),
     Row(
         "solve",
-        "collecting and learning together, frames/s",
+        "training frames/s, collection and learning together",
         lambda f: f"{f['learning_fps']:,.0f}",
         "16,000",
     ),
     Row(
         "large",
-        "the same with pictures of 100x256 (`experiment=large`)",
+        "the same with images of 100x256 (`experiment=large`)",
         lambda f: f"{f['learning_fps_large']:,.0f}",
         "2,440",
     ),
     Row(
         "render",
-        "drawing at 25x64, frames/s, and over MuJoCo Warp's renderer at 25x64; 64x64; 100x256",
-        _drawing,
+        "rendering at 25x64, frames/s; ratio to MuJoCo Warp's renderer at 25x64; 64x64; 100x256",
+        _rendering,
         "-",
     ),
     Row(
         "render",
-        "drawing at 64x64, frames/s",
+        "rendering at 64x64, frames/s",
         lambda f: f"{f['raw_render_fps_64']:,.0f}",
         "70,000",
     ),
@@ -289,34 +294,34 @@ MAIN = (
     ),
     Row(
         "render",
-        "time of RGB, gray, depth, distance, segmentation and normals in one pass over that of RGB",
+        "time of RGB, gray, depth, distance, segmentation and normals in one pass, relative to RGB",
         lambda f: f"{f['render_all_over_rgb']:.2f}",
         "at most 1.6",
     ),
     Row(
         "collector",
-        "collector, policy in the loop, over what MuJoCo Warp draws alone, 25x64, frames/s",
+        "frames/s of the collector with a policy, relative to rendering only by MuJoCo Warp, 25x64",
         _rates,
         "0.7",
     ),
     Row(
         "collector",
-        "collector, policy in the loop, frames/s, with as many worlds as are best; with 16",
+        "frames/s of the collector with a policy, best number of environments; 16 environments",
         lambda f: (
-            f"{f['collector_fps']:,.0f} ({f['collector_worlds']} worlds); "
+            f"{f['collector_fps']:,.0f} ({f['collector_worlds']} environments); "
             f"{f['collector_fps_16']:,.0f}"
         ),
         "40,000; 15,000",
     ),
     Row(
         "dm_control",
-        "batched environment over dm_control's pixel path, EGL, default quality",
+        "frames/s of the batched environment relative to dm_control with EGL, default quality",
         lambda f: f"{f['batched_over_dm_control']:.0f} times ({f['dm_control_fps']:.0f} frames/s)",
         "100 times",
     ),
     Row(
         "dm_control",
-        "the same, dm_control's quality tuned by hand",
+        "the same with dm_control's quality tuned manually",
         lambda f: (
             f"{f['batched_over_dm_control_tuned']:.1f} times "
             f"({f['dm_control_tuned_fps']:.0f} frames/s)"
@@ -331,75 +336,74 @@ MAIN = (
     ),
     Row(
         "memory",
-        "growth of memory over 1,000,000 frames after the first 100,000",
+        "memory growth over 1,000,000 frames after the first 100,000",
         lambda f: f"{round(f['memory_growth_mib_per_million_frames'], 1) + 0.0:.1f} MiB",
         "5 MiB",
     ),
     Row(
         "startup",
-        "start of `drone-rl train` to its first update, kernels cached",
+        "time from the start of `drone-rl train` to its first update, kernels cached",
         lambda f: (
-            f"{f['start_to_first_update_s']:.1f} s where `import torch` takes "
-            f"{f['import_torch_s']:.1f} s: {f['start_to_first_update_scaled_s']:.1f} s where it "
-            "takes 1 s"
+            f"{f['start_to_first_update_s']:.1f} s with {f['import_torch_s']:.1f} s for `import "
+            f"torch`; {f['start_to_first_update_scaled_s']:.1f} s scaled to 1 s for it"
         ),
         "4 s",
     ),
     Row(
         "startup",
-        "`drone-rl verdict policy=good`, 400 episodes",
+        "time of `drone-rl verdict policy=good`, 400 episodes; scaled likewise",
         lambda f: f"{f['verdict_s']:.1f} s; {f['verdict_scaled_s']:.1f} s",
         "6 s",
     ),
     Row(
         "startup",
-        "the same without a cache of kernels, which are compiled then: seconds more",
+        "additional time if kernels must be compiled; scaled likewise",
         lambda f: f"{f['first_compile_s']:.0f} s; {f['first_compile_scaled_s']:.0f} s",
         "15 s",
     ),
-    Row("startup", "`import drone_rl`", lambda f: f"{f['import_s']:.2f} s", "0.3 s"),
+    Row("startup", "time of `import drone_rl`", lambda f: f"{f['import_s']:.2f} s", "0.3 s"),
     Row(
         "explain",
-        "t-SNE of 600 frames; of 10,000",
+        "time of t-SNE with 600 frames; 10,000 frames",
         lambda f: f"{f['tsne_600_s']:.1f} s; {f['tsne_10000_s']:.0f} s",
         "5 s; 60 s",
     ),
     Row(
         "explain",
-        "response map, 41 x 31 places",
+        "time of a response map, 41 x 31 positions",
         lambda f: f"{f['response_map_s']:.1f} s",
         "3 s",
     ),
     Row(
         "explain",
-        "probability that the good policy's class models reach (forward, left, right)",
+        "action probability of class models, policy good (forward, left, right)",
         _class_models,
         "0.99",
     ),
     Row("explain", "size of report.html", lambda f: f"{f['report_mib']:.1f} MiB", "10 MB"),
     Row(
         "sweeps",
-        "trainings an hour of a sweep, two at once over one at a time",
+        "training runs per hour in a sweep, two parallel runs relative to one",
         lambda f: f"{f['sweep_speedup']:.2f} times",
         "1.6 times",
     ),
     Row(
         "sweeps",
-        "what launcher and logging add to the time of bare trainings",
+        "overhead of launcher and logging relative to training runs without them",
         lambda f: f"{100 * f['launcher_overhead']:.1f}%",
         "10%",
     ),
     Row(
         "kills",
-        "runs that end the same, to the last bit, in a sweep killed three times",
+        "runs with bit-identical results in a sweep that was killed three times",
         lambda f: f"{f['sweep_runs_same_after_kills']} of {f['sweep_runs']}",
         "all",
     ),
     Row(
         "ray",
-        "frames/s of collecting with `collector=ray` over the plain collector",
+        "frames/s with `collector=ray` relative to the default collector",
         lambda f: f"{f['ray_over_plain']:.2f}",
         "0.8",
     ),
 )
-"""The main job and sweeps."""
+"""Training and sweeps."""

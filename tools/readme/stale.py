@@ -1,4 +1,4 @@
-"""Which figures are older than the code that they measure."""
+"""Report the figures that are older than the code that they measure."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -7,13 +7,13 @@ from benchmarks.benchmark import Benchmark
 from benchmarks.ledger import Ledger, digest_code
 
 
-def tell_ages(benchmarks: Mapping[str, Benchmark], ledger: Ledger, root: Path) -> Iterable[str]:
-    """A line for each benchmark: of today's code, older, never run, or of code that nobody noted.
+def report_ages(benchmarks: Mapping[str, Benchmark], ledger: Ledger, root: Path) -> Iterable[str]:
+    """Return a line for each benchmark: current, outdated, never run, or of unknown code.
 
     Args:
-        benchmarks: All that there are.
-        ledger: What was measured.
-        root: Of the checkout.
+        benchmarks: All benchmarks by name.
+        ledger: The measurements.
+        root: Root of the checkout.
     """
     for name, benchmark in benchmarks.items():
         origin = ledger.origins.get(name)
@@ -22,8 +22,8 @@ def tell_ages(benchmarks: Mapping[str, Benchmark], ledger: Ledger, root: Path) -
             continue
         since = f"measured {origin.date} at {(origin.revision or 'an unknown revision')[:12]}"
         if origin.code is None:
-            yield f"{name}: {since}, of code that was not noted"
+            yield f"{name}: {since}, of unknown code"
         elif origin.code == digest_code(benchmark.measures, root):
-            yield f"{name}: {since}, of today's code"
+            yield f"{name}: {since}, current"
         else:
-            yield f"{name}: {since}, OLDER than what it measures ({', '.join(benchmark.measures)})"
+            yield f"{name}: {since}, OUTDATED: {', '.join(benchmark.measures)} changed since"

@@ -1,4 +1,4 @@
-"""Tables of figures out of docs/results.json: what was measured, what was asked for, by what."""
+"""Tables of the figures in docs/results.json: quantity, measured value, target, benchmark."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
@@ -10,63 +10,62 @@ UNKNOWN = "not measured yet"
 
 
 class Row(NamedTuple):
-    """A line of a table."""
+    """A row of a table."""
 
     bench: str
-    """The benchmark that measures it."""
-    what: str
-    measured: Callable[[Figures], str]
-    """Takes what it needs by key; a key that is missing leaves the cell unmeasured."""
-    asked: str = ""
+    """Name of the benchmark that measures the quantity."""
+    label: str
+    format: Callable[[Figures], str]
+    """Formats the figures; if it raises a KeyError, the cell says that they are not measured."""
+    target: str = ""
 
 
 def make_table(rows: Iterable[Row], figures: Figures) -> str:
-    """A table in Markdown."""
-    lines = [f"| {r.what} | {make_cell(r, figures)} | {r.asked} | `{r.bench}` |" for r in rows]
-    head = ["| what | measured | asked for | `drone-rl bench` |", "| --- | --- | --- | --- |"]
+    """Return a Markdown table."""
+    lines = [f"| {r.label} | {make_cell(r, figures)} | {r.target} | `{r.bench}` |" for r in rows]
+    head = ["| quantity | measured | target | `drone-rl bench` |", "| --- | --- | --- | --- |"]
     return "\n".join([*head, *lines])
 
 
 def list_figures(ledger: Ledger) -> str:
-    """A table in Markdown: every figure by its key, its benchmark, and when that was run."""
+    """Return a Markdown table of every figure with its key, benchmark, revision and date."""
     lines = [
-        "| figure | value | `drone-rl bench` | revision | day |",
+        "| figure | value | `drone-rl bench` | revision | date |",
         "| --- | --- | --- | --- | --- |",
     ]
     for name, origin in sorted(ledger.origins.items()):
-        of = f"`{name}` | {_revision(origin)} | {origin.date}"
-        lines += [f"| `{k}` | {_short(ledger.figures[k])} | {of} |" for k in origin.keys]
+        source = f"`{name}` | {_revision(origin)} | {origin.date}"
+        lines += [f"| `{k}` | {_short(ledger.figures[k])} | {source} |" for k in origin.keys]
     return "\n".join(lines)
 
 
 def list_origins(ledger: Ledger, names: Iterable[str] = ()) -> str:
-    """A table in Markdown: when, where and at which revision each benchmark was run.
+    """Return a Markdown table of date, revision and machine of each benchmark run.
 
     Args:
-        ledger: What was measured.
-        names: Of all benchmarks; one that was never run is listed as such.
+        ledger: The measurements.
+        names: Names of all benchmarks; those that were never run are marked.
     """
-    lines = ["| `drone-rl bench` | run | revision | on |", "| --- | --- | --- | --- |"]
+    lines = ["| `drone-rl bench` | date | revision | machine |", "| --- | --- | --- | --- |"]
     for name in sorted({*ledger.origins, *names}):
         origin = ledger.origins.get(name)
         if origin is None:
             lines.append(f"| `{name}` | {UNKNOWN} |  |  |")
         else:
-            line = f"| `{name}` | {origin.date} | {_revision(origin)} | {origin.machine} |"
-            lines.append(line)
+            lines.append(f"| `{name}` | {origin.date} | {_revision(origin)} | {origin.machine} |")
     return "\n".join(lines)
 
 
 def _revision(origin: Origin) -> str:
-    """Of the measured checkout, abbreviated; with "-dirty" if it had changes."""
+    """Return the abbreviated revision of the measured checkout, with "-dirty" if it had changes."""
     if not origin.revision:
         return "unknown"
-    commit, *changed = origin.revision.split("-")
-    return f"`{'-'.join([commit[:12], *changed])}`"
+    commit, *suffix = origin.revision.split("-")
+    return f"`{'-'.join([commit[:12], *suffix])}`"
 
 
 def _short(value: Any) -> str:
-    """A number, a text, or a list of them; of what is longer only its size."""
+    """Format a number, a string or a short list of them, or the size of a longer container."""
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, list) and len(value) <= 8 and not any(isinstance(v, dict) for v in value):
@@ -77,8 +76,8 @@ def _short(value: Any) -> str:
 
 
 def make_cell(row: Row, figures: Figures) -> str:
-    """Return a row's figure, or that it was not measured."""
+    """Return a row's figure, or UNKNOWN."""
     try:
-        return row.measured(figures)
+        return row.format(figures)
     except KeyError:
         return UNKNOWN
