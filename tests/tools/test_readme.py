@@ -12,9 +12,9 @@ from benchmarks.registry import BENCHMARKS
 from tools.readme.__main__ import PAGES, ROOT, keep, main, make_blocks, make_files
 from tools.readme.blocks import marked_blocks, replace_blocks
 from tools.readme.flight_rows import FLIGHT
-from tools.readme.guest_rows import GUESTS
 from tools.readme.headlines import HEADLINES, make_headlines
 from tools.readme.layers import draw_layers, list_packages
+from tools.readme.library_rows import LIBRARIES
 from tools.readme.rows import MAIN, PROOF, TRUTH
 from tools.readme.stale import report_ages
 from tools.readme.tables import UNKNOWN, Row, list_figures, list_origins, make_table
@@ -81,7 +81,7 @@ def test_a_missing_figure_is_marked_as_unmeasured():
 
 
 def test_every_benchmark_with_figures_has_a_row():
-    rows = (*MAIN, *FLIGHT, *TRUTH, *PROOF, *GUESTS)
+    rows = (*MAIN, *FLIGHT, *TRUTH, *PROOF, *LIBRARIES)
     named = {row.bench for row in rows}
     assert named <= set(BENCHMARKS)
     assert set(BENCHMARKS) - named == {
@@ -139,7 +139,7 @@ def test_table_cells():
         "hostile_peak_mib": 1000.4,
         "hostile_max_s": 1.94,
     }
-    text = "".join(make_table(rows, figures) for rows in (MAIN, FLIGHT, TRUTH, PROOF, GUESTS))
+    text = "".join(make_table(rows, figures) for rows in (MAIN, FLIGHT, TRUTH, PROOF, LIBRARIES))
     assert "| 2.6e-06 on 40,000 images |" in text and "| 3 of 40,000 |" in text
     for cell in (
         "20 to 41, median 25",

@@ -7,9 +7,9 @@ from benchmarks.ledger import Ledger
 from benchmarks.registry import BENCHMARKS
 from tools.readme.blocks import replace_blocks
 from tools.readme.flight_rows import FLIGHT
-from tools.readme.guest_rows import GUESTS
 from tools.readme.headlines import HEADLINES, make_headlines
 from tools.readme.layers import draw_layers, list_packages, read_contracts
+from tools.readme.library_rows import LIBRARIES
 from tools.readme.notebook import make_notebook
 from tools.readme.peers import make_peers
 from tools.readme.robust import make_robust
@@ -43,7 +43,7 @@ def make_blocks(root: Path) -> dict[str, str]:
         "flight": FLIGHT,
         "truth": TRUTH,
         "proof": PROOF,
-        "guests": GUESTS,
+        "guests": LIBRARIES,
     }
     return {
         **{name: make_table(rows, ledger.figures) for name, rows in tables.items()},

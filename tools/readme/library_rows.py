@@ -11,7 +11,7 @@ def _peer_seconds(figures: Figures) -> str:
     return "; ".join(f"{statistics.mean(peers[name]['seconds']):.1f}" for name in names)
 
 
-GUESTS = (
+LIBRARIES = (
     Row(
         "peers",
         "seconds from process start until solved, mean of 3 seeds: our default; our PPO; "
