@@ -23,12 +23,12 @@ def high(x):
 def unused(x):
     return x + 1
 """
-OTHER = "from drone_rl.sim.small import low\n\n\ndef both(x):\n    return low(x)\n"
+OTHER_MODULE = "from drone_rl.sim.small import low\n\n\ndef both(x):\n    return low(x)\n"
 
 
 @pytest.fixture
 def root(tmp_path):
-    for path, text in {"sim/small.py": MODULE, "envs/other.py": OTHER}.items():
+    for path, text in {"sim/small.py": MODULE, "envs/other.py": OTHER_MODULE}.items():
         (tmp_path / "drone_rl" / path).parent.mkdir(parents=True)
         (tmp_path / "drone_rl" / path).write_text(text)
     return tmp_path
