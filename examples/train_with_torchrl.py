@@ -60,7 +60,7 @@ def train(
         postproc=LeaveOneOut(0.95, scale=True),
         auto_register_policy_transforms=False,
     )
-    loss = ReinforceLoss(actor)
+    loss = ReinforceLoss(actor, entropy_coeff=0.0)
     optimiser = torch.optim.Adam(loss.parameters(), lr=lr)
     for batch in collector:
         done.frames += batch.numel()
