@@ -22,18 +22,10 @@ def real(
     is_above: bool = False,
     unit: str = "",
 ) -> float:
-    """Return a finite number within bounds.
-
-    Args:
-        value: The value to check.
-        name: Parameter name for the message.
-        low: Lower bound.
-        high: Upper bound.
-        is_above: Whether the lower bound is exclusive.
-        unit: Unit for the message.
+    """Return a finite number from `low` (above it if `is_above`) to `high`.
 
     Raises:
-        InputError: The value is not such a number.
+        InputError: The value is not such a number; the message has its name and unit.
     """
     try:
         number = float(value)
@@ -77,15 +69,9 @@ def radians(value: Any, name: str, limit: float = 3600.0) -> float:
 
 
 def time_limit(timeout: float | None, length: float, speed: float) -> float:
-    """Return the time limit of a movement, seconds.
+    """Return the time limit of a movement of this length (metres) and speed, seconds.
 
-    Args:
-        timeout: The requested limit; three times the expected time plus 10 s by default.
-        length: Length of the path, metres.
-        speed: Metres per second.
-
-    Raises:
-        InputError: The timeout is negative.
+    By default it is three times the expected time plus 10 s; a negative one is an `InputError`.
     """
     if timeout is None:
         return 10.0 + 3.0 * length / speed
@@ -93,11 +79,7 @@ def time_limit(timeout: float | None, length: float, speed: float) -> float:
 
 
 def height(value: Any, name: str = "z") -> float:
-    """Return a height above the ground, metres.
-
-    Raises:
-        InputError: It is negative.
-    """
+    """Return a height above the ground, metres; a negative one is an `InputError`."""
     number = real(value, name, unit="m")
     if number < 0.0:
         raise InputError(f"{name}={number:g} is below the ground; z points up here, give 0 or more")
@@ -105,13 +87,7 @@ def height(value: Any, name: str = "z") -> float:
 
 
 def path(points: Any) -> Tensor:
-    """Return the points of a path.
-
-    Args:
-        points: Positions (x, y, z) in metres, world frame: an array, a tensor or a list.
-
-    Returns:
-        Shape: (1, P, 3), float64.
+    """Return the points (x, y, z) of a path, metres, world frame. Shape: (1, P, 3), float64.
 
     Raises:
         InputError: The path is empty or a point is invalid.

@@ -66,10 +66,8 @@ def goals_of(
     z: float | Tensor,
 ) -> Goals:
     """Build goals from scalars (for all drones) or tensors of shape (num_worlds,)."""
-    columns = [
-        torch.as_tensor(v, dtype=torch.float64).expand(len(body)) for v in (x, y, heading, z)
-    ]
-    return Goals(modes, torch.stack(columns, -1))
+    values = (torch.as_tensor(v, dtype=torch.float64) for v in (x, y, heading, z))
+    return Goals(modes, torch.stack([value.expand(len(body)) for value in values], -1))
 
 
 def hold(reference: Tensor) -> Goals:
@@ -117,13 +115,10 @@ class RotateToCommand(Hover):
     succeeds_at_limit = False
 
     def __init__(self, body: FlightState, heading: float, margin: float, limit: float) -> None:
-        """Create the command.
+        """Take the state at the start, heading and margin in radians, and time limit in seconds.
 
-        Args:
-            body: State at the start.
-            heading: Radians to the left of the world's x axis.
-            margin: Heading error in radians at which the command is complete, at rest.
-            limit: Seconds after which it fails.
+        The heading is to the left of the world's x axis. The command is complete at rest with a
+        heading error of at most the margin.
         """
         super().__init__(body, limit)
         self.heading, self.margin = heading, margin
@@ -183,13 +178,7 @@ class FlightFuture:
     """A running or finished command. It advances only while simulated time passes."""
 
     def __init__(self, name: str, command: Command, wait: Callable[["FlightFuture"], None]) -> None:
-        """Create a future.
-
-        Args:
-            name: Name for messages.
-            command: The command.
-            wait: Advances simulated time until this future is done.
-        """
+        """Take the name for messages; `wait` advances simulated time until the command is done."""
         self.name, self.command = name, command
         self.elapsed = 0.0
         """Simulated seconds since the command started."""
@@ -241,12 +230,7 @@ def fly_command(
 ) -> tuple[list[FlightState], Tensor]:
     """Run one command until all drones are complete; drones that are complete continue.
 
-    Args:
-        quadrotor: Vehicle dynamics.
-        body: Initial state.
-        command: The command.
-        seconds: Maximum duration, in addition to the command's limit.
-        obstacles: Obstacles to collide with.
+    It ends after `seconds`, or the command's own limit, at the latest.
 
     Returns:
         The state at the start and after each of T - 1 control periods, and the index of the first

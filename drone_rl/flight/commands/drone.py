@@ -75,9 +75,6 @@ class Drone:
             worlds: A single world that the cameras render.
             sensors: Sensor settings; the sensors then run from the start.
             changes: Dynamics settings to change, such as wind=[5, 0, 0].
-
-        Raises:
-            InputError: A setting is invalid.
         """
         if worlds is not None:
             if worlds.num_worlds != 1:
@@ -153,11 +150,7 @@ class Drone:
         return self._sensors
 
     def advance(self, seconds: float) -> PilotState:
-        """Advance simulated time and return the state.
-
-        Raises:
-            InputError: The duration is negative.
-        """
+        """Advance simulated time and return the state; a negative duration is an `InputError`."""
         self._advance(self._ticks_of(checks.duration(seconds)))
         return self.state
 
@@ -168,24 +161,13 @@ class Drone:
             self._end(None)
 
     def arm(self) -> None:
-        """Start the rotors.
-
-        Raises:
-            PilotError: The drone is in the air.
-        """
+        """Start the rotors; a `PilotError` in the air."""
         if self._is_flying and not self._is_armed:
             raise PilotError("can't arm in the air; wait until the drone lies on the ground")
         self._is_armed = True
 
     def disarm(self, *, force: bool = False) -> None:
-        """Stop the rotors.
-
-        Args:
-            force: Also in the air; the drone then falls.
-
-        Raises:
-            PilotError: The drone is in the air and `force` is False.
-        """
+        """Stop the rotors; a `PilotError` in the air, unless `force` lets the drone fall."""
         if self._is_flying and not force:
             raise PilotError("can't disarm in the air; land first, or let it fall by force=True")
         self._is_armed = False
@@ -199,16 +181,10 @@ class Drone:
         height: int | None = None,
         width: int | None = None,
     ) -> Tensor:
-        """Render one of the drone's cameras; level if the cameras hang in a gimbal.
+        """Render one of AirSim's five cameras; level if the cameras hang in a gimbal.
 
-        Args:
-            camera: Name of one of AirSim's five cameras.
-            modality: See `Renderer.render`.
-            height: Pixels; the worlds' setting by default.
-            width: Pixels; the worlds' setting by default.
-
-        Raises:
-            PilotError: The pilot has no worlds.
+        See `Renderer.render` for `modality`. The size, in pixels, is the worlds' by default. A
+        drone without worlds raises `PilotError`.
         """
         worlds, state = self._scene("picture")
         return worlds.render(state, worlds.view(camera, modality, height, width))[0]
@@ -220,25 +196,17 @@ class Drone:
         height: int | None = None,
         width: int | None = None,
     ) -> list[Tensor]:
-        """Render AirSim's images: any of five cameras and seven types, all of one size.
+        """Render AirSim's images, any of five cameras and seven types, all of one size.
 
-        Args:
-            requests: Camera and type of each image.
-            height: Pixels; the worlds' setting by default.
-            width: Pixels; the worlds' setting by default.
+        The size, in pixels, is the worlds' by default. A drone without worlds raises `PilotError`.
 
         Returns:
             One tensor a request. Shapes: (H, W, 3), uint8; or (H, W), float32, for `as_float`.
-
-        Raises:
-            PilotError: The pilot has no worlds.
-            InputError: There are no requests, or a size is out of range.
         """
         worlds, state = self._scene("images")
         return [found[0] for found in images(worlds, state, requests, height=height, width=width)]
 
     def _scene(self, name: str) -> tuple[Worlds, State]:
-        """Return the worlds and their state with this drone in it."""
         if self.worlds is None:
             raise PilotError(f"{name}: there is nothing to render; give worlds=Worlds(1, ...)")
         state, body = copy.copy(self.worlds.state), self.body
@@ -252,7 +220,6 @@ class Drone:
 
     @property
     def _is_lost(self) -> bool:
-        """Whether the simulation has diverged."""
         return bool(self.body.is_lost[0])
 
     @property
@@ -266,11 +233,7 @@ class Drone:
             raise PilotError(f"{name}: the drone isn't armed; call arm() first")
 
     def _run(self, name: str, command: Command, wait: bool) -> bool | FlightFuture:
-        """Start a command that only a flying drone can run.
-
-        Raises:
-            PilotError: The drone is not armed, or on the ground.
-        """
+        """Start a command that only a flying drone can run."""
         self._require_armed(name)
         if not self._is_flying:
             raise PilotError(f"{name}: the drone is on the ground; call take_off() first")
@@ -290,7 +253,6 @@ class Drone:
             self._advance(self._left or self._period)
 
     def _ticks_of(self, seconds: float) -> int:
-        """Return the fewest ticks that last so long."""
         return math.ceil(seconds / self.settings.tick - 1e-9)
 
     def _advance(self, ticks: int) -> None:
@@ -341,10 +303,9 @@ class Drone:
             if pushes and abs(float(body.velocity[0, 2])) > _CLIMBS:
                 self._landed = LandedState.FLYING
             return
-        contact = body.contact
-        touches = int(contact.thing[0]) != NOTHING
-        touches = touches and float(contact.time[0]) > self.time - 2.5 * self.settings.tick
-        turns = float(body.angular_velocity.norm())
+        contact, turns = body.contact, float(body.angular_velocity.norm())
+        is_recent = float(contact.time[0]) > self.time - 2.5 * self.settings.tick
+        touches = int(contact.thing[0]) != NOTHING and is_recent
         if touches and not pushes and max(self._speed, turns) < _AT_REST:
             self._settle()
 
@@ -367,8 +328,7 @@ class Drone:
         """End the running command (None: cancelled) and choose the pose to hold afterwards."""
         future, self.running = self.running, None
         assert future is not None
-        command, self._left = future.command, 0
-        self._place = None
+        command, self._place, self._left = future.command, None, 0
         self._coasting = self._ticks_of(COASTING)
         if success is None:
             return

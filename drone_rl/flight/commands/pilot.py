@@ -77,6 +77,11 @@ class Pilot(Drone):
     returns a `FlightFuture` at once. A new command cancels the running one. After a command the
     drone holds the position that the command reached, or else the one it has 0.06 s later.
 
+    `duration` and `timeout` are in seconds. A command fails after its timeout, by default three
+    times its expected duration plus 10 s. `drivetrain` and `yaw_mode` are a `Drivetrain` and a
+    `YawMode`. Every command raises `InputError` if a number is invalid or two alternatives are
+    given, and `PilotError` if the drone isn't flying (`take_off`: isn't armed, or is moving).
+
     >>> with Pilot(wind=[5, 0, 0]) as pilot:
     ...     pilot.arm()
     ...     pilot.take_off()
@@ -88,11 +93,7 @@ class Pilot(Drone):
     """Stick positions for `move_by_manual`; may be replaced at any time."""
 
     def take_off(self, timeout: float | None = None, *, wait: bool = True) -> bool | FlightFuture:
-        """Climb 2 m at 0.5 m/s.
-
-        Raises:
-            PilotError: The drone isn't armed, or is moving.
-        """
+        """Climb 2 m at 0.5 m/s."""
         self._require_armed("take_off")
         if self._speed > MOVING:
             raise PilotError(
@@ -137,28 +138,19 @@ class Pilot(Drone):
         yaw_rate: float | None = None,
         wait: bool = True,
     ) -> bool | FlightFuture:
-        """Hold roll and pitch.
+        """Hold roll (right side down) and pitch (nose down: forward), degrees.
 
-        Args:
-            roll: Degrees, right side down.
-            pitch: Degrees, nose down: forward.
-            duration: Seconds.
-            z: Height to hold, metres; the present one by default.
-            throttle: In place of `z`, fraction of the maximum thrust from 0 to 1.
-            yaw: Heading, degrees to the left of the world's x axis; unchanged by default.
-            yaw_rate: In place of `yaw`, degrees per second to the left.
-            wait: Whether to wait for the end.
-
-        Raises:
-            InputError: Two alternatives are given, or a number is invalid.
-            PilotError: The drone isn't flying.
+        `z` is the height to hold, metres, the present one by default; in its place `throttle` is a
+        fraction of the maximum thrust, 0 to 1. `yaw` is the heading, degrees to the left of the
+        world's x axis, unchanged by default; in its place `yaw_rate` is in degrees per second.
         """
         if yaw is not None and yaw_rate is not None:
             raise InputError(f"yaw={yaw} and yaw_rate={yaw_rate} are both given; give one of them")
         x, y = checks.radians(roll, "roll", 90.0), checks.radians(pitch, "pitch", 90.0)
-        heading = self.body.heading if yaw is None else checks.radians(yaw, "yaw")
-        turn, turn_mode = heading, Mode.ANGLE
-        if yaw_rate is not None:
+        turn, turn_mode = self.body.heading, Mode.ANGLE
+        if yaw is not None:
+            turn = checks.radians(yaw, "yaw")
+        elif yaw_rate is not None:
             turn, turn_mode = checks.radians(yaw_rate, "yaw_rate"), Mode.RATE
         lift_mode, lift = self._lift(z, throttle)
         modes: Modes = (Mode.ANGLE, Mode.ANGLE, turn_mode, lift_mode)
@@ -180,8 +172,7 @@ class Pilot(Drone):
         named = ((roll, "roll"), (pitch, "pitch"), (yaw, "yaw"))
         x, y, turn = (checks.radians(value, name) for value, name in named)
         lift_mode, lift = self._lift(z, throttle)
-        modes: Modes = (Mode.RATE, Mode.RATE, Mode.RATE, lift_mode)
-        goals = goals_of(self.body, modes, x, y, turn, lift)
+        goals = goals_of(self.body, (Mode.RATE, Mode.RATE, Mode.RATE, lift_mode), x, y, turn, lift)
         return self._hold("move_by_rates", goals, duration, wait)
 
     def move_by_rotors(
@@ -205,22 +196,10 @@ class Pilot(Drone):
         yaw_mode: YawMode | None = None,
         wait: bool = True,
     ) -> bool | FlightFuture:
-        """Hold a velocity.
+        """Hold a velocity: forward, to the left and up, metres per second.
 
-        Args:
-            vx: Forward, metres per second.
-            vy: To the left.
-            vz: Up.
-            duration: Seconds.
-            z: Height to hold in place of `vz`, metres.
-            frame: "world", or "body" for vx ahead of the drone and vy to its left.
-            drivetrain: See `Drivetrain`.
-            yaw_mode: See `YawMode`.
-            wait: Whether to wait for the end.
-
-        Raises:
-            InputError: A number is invalid, or drivetrain, yaw mode and frame are incompatible.
-            PilotError: The drone isn't flying.
+        `z` is the height to hold in place of `vz`, metres. `frame` is "world", or "body" for `vx`
+        ahead of the drone and `vy` to its left, not with `Drivetrain.FORWARD_ONLY`.
         """
         x, y, up = (
             checks.real(v, n, -100.0, 100.0, unit="m/s")
@@ -261,21 +240,10 @@ class Pilot(Drone):
     ) -> bool | FlightFuture:
         """Follow a path from the present position by pure pursuit.
 
-        Args:
-            path: Points (x, y, z), metres. The last one is reached within 0.5 m, and held.
-            speed: Metres per second; less near the end.
-            timeout: Seconds after which the command fails; three times the expected duration plus
-                10 s by default.
-            drivetrain: See `Drivetrain`.
-            yaw_mode: See `YawMode`.
-            lookahead: Lookahead distance, metres; computed from the speed if negative.
-            adaptive_lookahead: Lookahead added per metre of distance from the path.
-            wait: Whether to wait for the end.
-
-        Raises:
-            InputError: The path is empty, a number is invalid, the lookahead is too short, or
-                drivetrain and yaw mode are incompatible.
-            PilotError: The drone isn't flying.
+        `path` has points (x, y, z), metres; the last one is reached within 0.5 m, and held. `speed`
+        is in metres per second, less near the end. `lookahead` is a distance in metres, computed
+        from the speed if negative; `adaptive_lookahead` is added per metre of distance from the
+        path. A lookahead that is too short is an `InputError`.
         """
         points, pace = checks.path(path), checks.speed(speed)
         whole = torch.cat([self.body.position[:, None], points], 1)
@@ -309,13 +277,10 @@ class Pilot(Drone):
     def rotate_to(
         self, yaw: float, timeout: float | None = None, *, margin: float = 5.0, wait: bool = True
     ) -> bool | FlightFuture:
-        """Turn to a heading the shorter way round.
+        """Turn to a heading the shorter way round, degrees to the left of the world's x axis.
 
-        Args:
-            yaw: Degrees to the left of the world's x axis.
-            timeout: Seconds after which the command fails; 20 by default.
-            margin: Heading error in degrees at which it succeeds, once the drone no longer turns.
-            wait: Whether to wait for the end.
+        It fails after 20 s by default. `margin` is the heading error in degrees at which it
+        succeeds, once the drone no longer turns.
         """
         limit = 20.0 if timeout is None else checks.duration(timeout)
         near = math.radians(checks.real(margin, "margin", 0.0, 180.0, is_above=True))
@@ -341,14 +306,9 @@ class Pilot(Drone):
     ) -> bool | FlightFuture:
         """Follow `sticks`, which may change meanwhile.
 
-        Args:
-            vx_max: Forward speed at full stick, in the heading at the start; metres per second.
-            vy_max: Sideways speed at full stick.
-            z_max: Height of the goal above the drone at full throttle, metres.
-            duration: Seconds.
-            drivetrain: See `Drivetrain`.
-            yaw_mode: See `YawMode`.
-            wait: Whether to wait for the end.
+        `vx_max` and `vy_max` are the speeds at full stick, forward in the heading at the start and
+        sideways, metres per second; `z_max` is the height of the goal above the drone at full
+        throttle, metres.
         """
         fastest = checks.speed(vx_max, "vx_max"), checks.speed(vy_max, "vy_max")
         climb = checks.height(z_max, "z_max")

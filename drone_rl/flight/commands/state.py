@@ -159,13 +159,7 @@ class Sensors:
     """
 
     def __init__(self, body: FlightState, settings: SensorSettings, seed: int = 0) -> None:
-        """Turn the sensors on.
-
-        Args:
-            body: State of one drone now.
-            settings: Rates, latencies and noise.
-            seed: Seed of the noise.
-        """
+        """Turn the sensors of one drone on; `seed` is that of the noise."""
         self.settings = settings
         """Rates, latencies and noise."""
         self._suite = SensorSuite(settings, seed=seed)
