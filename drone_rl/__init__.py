@@ -42,13 +42,13 @@ if TYPE_CHECKING:
     from drone_rl.explanations.settings import ExplainSettings as ExplainSettings
     from drone_rl.flight.commands.command import FlightFuture as FlightFuture
     from drone_rl.flight.commands.command import PilotError as PilotError
+    from drone_rl.flight.commands.path_following import Drivetrain as Drivetrain
+    from drone_rl.flight.commands.path_following import YawMode as YawMode
     from drone_rl.flight.commands.pilot import Pilot as Pilot
     from drone_rl.flight.commands.pilot import Sticks as Sticks
     from drone_rl.flight.commands.state import PilotState as PilotState
     from drone_rl.flight.commands.state import Sensors as Sensors
     from drone_rl.flight.commands.state import Trajectory as Trajectory
-    from drone_rl.flight.commands.yaw import Drivetrain as Drivetrain
-    from drone_rl.flight.commands.yaw import YawMode as YawMode
     from drone_rl.policies.environment import make_env as make_env
     from drone_rl.policies.external_policy import ForeignPolicy as ForeignPolicy
     from drone_rl.policies.external_policy import policy_from as policy_from
@@ -108,7 +108,7 @@ _PLACES = {
     "flight.commands.command": ("FlightFuture", "PilotError"),
     "flight.commands.pilot": ("Pilot", "Sticks"),
     "flight.commands.state": ("PilotState", "Sensors", "Trajectory"),
-    "flight.commands.yaw": ("Drivetrain", "YawMode"),
+    "flight.commands.path_following": ("Drivetrain", "YawMode"),
     "policies.sb3": ("Sb3Logits", "Sb3Trunk"),
     "config.commands": ("BodiesSettings", "EvaluateSettings", "JudgeSettings", "ShiftSettings"),
     "config.verification": (

@@ -24,12 +24,14 @@ from drone_rl.flight.commands.path_following import (
     AUTOMATIC,
     TAKEOFF_HEIGHT,
     TAKEOFF_SPEED,
+    Drivetrain,
     GoHomeCommand,
     PathCommand,
     TakeoffCommand,
+    YawControl,
+    YawMode,
     braking_time,
 )
-from drone_rl.flight.commands.yaw import Drivetrain, YawControl, YawMode
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
 from drone_rl.sim.dynamics.control import Modes, rotor_goals
 from drone_rl.utils.errors import InputError

@@ -5,8 +5,14 @@ import torch
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.flight.commands.command import fly_command
-from drone_rl.flight.commands.path_following import PathCommand, braking_time, lookahead_of
-from drone_rl.flight.commands.yaw import Drivetrain, YawControl, YawMode
+from drone_rl.flight.commands.path_following import (
+    Drivetrain,
+    PathCommand,
+    YawControl,
+    YawMode,
+    braking_time,
+    lookahead_of,
+)
 from drone_rl.sim.dynamics import Mode
 from drone_rl.utils.errors import InputError
 

@@ -3,8 +3,8 @@ import math
 import pytest
 
 from drone_rl.flight.commands.command import PilotError
+from drone_rl.flight.commands.path_following import YawMode
 from drone_rl.flight.commands.pilot import Pilot, Sticks
-from drone_rl.flight.commands.yaw import YawMode
 from drone_rl.utils.errors import InputError
 
 

@@ -2,8 +2,8 @@ import math
 
 import pytest
 
+from drone_rl.flight.commands.path_following import YawMode
 from drone_rl.flight.commands.pilot import Sticks
-from drone_rl.flight.commands.yaw import YawMode
 from drone_rl.sim.dynamics import Mode
 from drone_rl.utils.errors import InputError
 

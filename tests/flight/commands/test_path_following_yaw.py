@@ -3,7 +3,7 @@ import math
 import pytest
 import torch
 
-from drone_rl.flight.commands.yaw import Drivetrain, YawControl, YawMode
+from drone_rl.flight.commands.path_following import Drivetrain, YawControl, YawMode
 from drone_rl.sim.dynamics import Mode
 from drone_rl.utils.errors import InputError
 
