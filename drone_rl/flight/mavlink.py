@@ -47,12 +47,9 @@ class Link:
     """A bidirectional byte stream. Methods raise FlightControllerError once the peer is gone."""
 
     def __init__(self, name: str, patience: float, file: int | None = None) -> None:
-        """Create a link.
+        """Take the peer's name for messages, and a descriptor in non-blocking mode once connected.
 
-        Args:
-            name: Name of the peer for messages.
-            patience: Seconds after which a peer that accepts no bytes counts as gone.
-            file: Descriptor in non-blocking mode; None before the peer has connected.
+        A peer that accepts no bytes for `patience` seconds counts as gone.
         """
         self.name, self.patience, self._file = name, patience, file
 
@@ -103,12 +100,7 @@ class SerialLink(Link):
     """A serial port, such as that of a flight controller, or a pseudo-terminal."""
 
     def __init__(self, device: str, baud: int = 921_600, patience: float = 1.0) -> None:
-        """Open the port in raw mode.
-
-        Args:
-            device: Such as /dev/ttyACM0.
-            baud: Bits per second.
-            patience: See `Link`.
+        """Open a device such as /dev/ttyACM0 in raw mode, with so many bits per second.
 
         Raises:
             InputError: The device can't be opened, is no serial port, or the speed is invalid.
@@ -137,11 +129,7 @@ class TcpLink(Link):
     """A TCP port to which one autopilot connects, as PX4's simulation does."""
 
     def __init__(self, port: int = TCP_PORT, host: str = "127.0.0.1") -> None:
-        """Listen.
-
-        Args:
-            port: 0 for any free port.
-            host: Address; by default only this machine can connect.
+        """Listen at a port (0 for any free one); by default only this machine can connect.
 
         Raises:
             InputError: The port is in use.
@@ -246,14 +234,9 @@ class MavlinkBridge:
         self.link.close()
 
     def step(self, readings: Readings, sticks: RcSticks | None = None) -> Vector:
-        """Send measurements and return the rotor commands.
+        """Send measurements and return the rotor commands as `rotor_outputs` does.
 
-        Args:
-            readings: Measurements.
-            sticks: Ignored: pilots of an autopilot have their own link to it.
-
-        Returns:
-            Front right, rear left, front left, rear right, 0 to 1. Shape: (4,).
+        The sticks are ignored: pilots of an autopilot have their own link to it.
 
         Raises:
             FlightControllerError: The autopilot is gone, or has been silent for too long.
@@ -353,13 +336,9 @@ def gps_fields(readings: Readings) -> dict[str, Any]:
 def rotor_outputs(controls: list[float], mode: int) -> Vector:
     """Return the rotor commands in HIL_ACTUATOR_CONTROLS for an X frame.
 
-    Args:
-        controls: Its sixteen outputs; the first four are rotors in PX4's order, which is ours.
-        mode: Its mode flags.
-
-    Returns:
-        Front right, rear left, front left, rear right, 0 to 1; all 0 if disarmed, and 0 for an
-        output that is not finite. Shape: (4,).
+    The first four of its sixteen outputs are rotors in PX4's order, which is ours: front right,
+    rear left, front left, rear right, 0 to 1. All are 0 if the mode is disarmed, and an output that
+    is not finite is 0. Shape: (4,).
     """
     if not mode & ARMED:
         return np.zeros(ROTORS)

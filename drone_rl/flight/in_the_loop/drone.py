@@ -54,13 +54,10 @@ class DroneInTheLoop:
         controller: Controller,
         settings: DynamicsSettings,
     ) -> None:
-        """Create the drone.
+        """Take the dynamics, the state of one drone at rest, its controller, and its settings.
 
-        Args:
-            physics: Vehicle dynamics with a time step of `settings.tick` seconds.
-            body: State of one drone, at rest.
-            controller: The flight controller.
-            settings: Vehicle, and gains of the outer loops. Betaflight needs `tick=TICK`.
+        The settings are the vehicle's, whose tick is the time step, and the gains of the outer
+        loops. Betaflight needs `tick=TICK`.
         """
         self.physics = physics
         self.obstacles: Obstacles | None = None
@@ -103,13 +100,8 @@ class DroneInTheLoop:
     def arm(self, tries: int = 3, settle: float = 3.5, within: float = 1.0) -> None:
         """Arm the firmware: throttle low, the switch first off, then on, until the rotors turn.
 
-        Args:
-            tries: Number of attempts.
-            settle: Seconds before the first, in which the firmware calibrates its sensors.
-            within: Seconds in which the rotors must turn.
-
-        Raises:
-            FlightControllerError: They don't.
+        The firmware calibrates its sensors for `settle` seconds. In each attempt the rotors must
+        turn within some seconds, else a `FlightControllerError` is raised.
         """
         self._integral = 0.0
         self.hold(AT_REST, settle)
@@ -147,7 +139,7 @@ class DroneInTheLoop:
             Whether `until` ended the flight.
 
         Raises:
-            FlightControllerError: See `tick`; or `guidance` took longer than the firmware's
+            FlightControllerError: See `tick`; or the guidance took longer than the firmware's
                 failsafe allows.
         """
         tick, between = self.settings.tick, max(1, round(every / self.settings.tick))

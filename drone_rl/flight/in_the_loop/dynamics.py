@@ -40,12 +40,10 @@ class InTheLoopDynamics:
         settings: DynamicsSettings,
         actions: ActionSettings | None = None,
     ) -> None:
-        """Take a drone.
+        """Take a disarmed drone on the ground, the three moves as its actions by default.
 
-        Args:
-            drone: A disarmed drone on the ground.
-            settings: Duration of an action and camera mount; the drone has its own vehicle.
-            actions: Action space; the three moves by default.
+        The settings are the duration of an action and the camera mount; the drone has its own
+        vehicle.
         """
         self.drone = drone
         self.settings = settings
@@ -62,10 +60,7 @@ class InTheLoopDynamics:
         return self._quadrotor.start(position, seeds)
 
     def begin(self, body: BodyState) -> None:
-        """Arm the drone, take off and hover where the episode begins.
-
-        Args:
-            body: State from `start`.
+        """Arm the drone, take off and hover where the episode begins, at the state from `start`.
 
         Raises:
             NotReadyError: The drone doesn't arm, or doesn't hover there.
@@ -90,12 +85,7 @@ class InTheLoopDynamics:
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> FlightState:
-        """Fly for one action; see `Dynamics`.
-
-        Args:
-            body: State from `start` or the last step; only its reference pose is used.
-            action: Action of one world. Shape: (1, *).
-            obstacles: Obstacles to collide with.
+        """Fly for one action, shape (1, *); see `Dynamics`. Only the reference of `body` counts.
 
         Raises:
             FlightControllerError: See `DroneInTheLoop.tick`; or the policy took too long.
@@ -110,8 +100,7 @@ class InTheLoopDynamics:
         drone, goals = self.drone, self._quadrotor.steering.goals(body, action)
         begin = drone.time
 
-        def track(body: BodyState, readings: Readings) -> Setpoint:
-            del body
+        def track(_: BodyState, readings: Readings) -> Setpoint:
             return setpoint_of(goals, readings.time - begin, readings, drone.settings)
 
         drone.obstacles = obstacles

@@ -62,16 +62,10 @@ class Readings:
 
 
 def measure(before: BodyState, after: BodyState, seconds: float, time: float) -> Readings:
-    """Measure the motion between two states, at its end.
+    """Measure the motion of the first drone between two states, at its end.
 
-    Rates and forces are averages over the interval, from attitudes and velocities, so that they
-    include collisions.
-
-    Args:
-        before: State at the start; the first drone counts.
-        after: State at the end.
-        seconds: Length of the interval.
-        time: Time of its end, seconds.
+    Rates and forces are averages over the interval of so many seconds, from attitudes and
+    velocities, so that they include collisions. `time` is that of the end.
     """
     position, velocity, attitude = map(first_row, (after.position, after.velocity, after.attitude))
     acceleration = (velocity - first_row(before.velocity)) / seconds
@@ -93,9 +87,7 @@ def pressure_at(altitude: float) -> float:
 def rotation_between(before: Vector, after: Vector) -> Vector:
     """Return the rotation vector between two attitudes, radians about the body axes.
 
-    Args:
-        before: Quaternion (w, x, y, z).
-        after: Another, less than half a turn away.
+    The attitudes are quaternions (w, x, y, z), less than half a turn apart.
     """
     w, axis = before[0] * after[0] + before[1:] @ after[1:], before[0] * after[1:]
     axis = axis - after[0] * before[1:] - np.cross(before[1:], after[1:])

@@ -66,12 +66,9 @@ def hold_position(place: Vector, settings: DynamicsSettings) -> Guidance:
 
 
 def follow_path(path: Paths, speed: float, settings: DynamicsSettings) -> Guidance:
-    """Return guidance to a point that moves along a path at constant speed from the first call.
+    """Return guidance to a point that moves along a path from the first call.
 
-    Args:
-        path: A single path.
-        speed: Metres per second.
-        settings: Gains and limits.
+    It is a single path, and the speed in metres per second is constant.
     """
     begin: float | None = None
 
@@ -89,11 +86,7 @@ def follow_path(path: Paths, speed: float, settings: DynamicsSettings) -> Guidan
 
 
 def fly_course(drone: DroneInTheLoop, course: Course | None = None) -> CourseReport:
-    """Arm, take off, hover, fly a square and land.
-
-    Args:
-        drone: A drone on the ground.
-        course: Settings.
+    """Arm a drone on the ground, take off, hover, fly a square and land.
 
     Raises:
         FlightControllerError: It doesn't arm, reach its height or land; or the firmware failed.
@@ -138,15 +131,10 @@ def take_off(drone: DroneInTheLoop, above: Vector, within: float = 10.0) -> None
 
 
 def land(drone: DroneInTheLoop, ground: Vector, within: float = 20.0) -> None:
-    """Descend over a position, stop the rotors and disarm.
-
-    Args:
-        drone: A flying drone.
-        ground: Position on the ground. Shape: (3,).
-        within: Greatest duration, seconds.
+    """Descend over a position on the ground, shape (3,), stop the rotors and disarm.
 
     Raises:
-        FlightControllerError: The drone isn't on the ground in time.
+        FlightControllerError: The drone isn't on the ground within so many seconds.
     """
     hold = hold_position(ground, drone.settings)
 
