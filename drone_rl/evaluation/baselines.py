@@ -27,9 +27,7 @@ def oracle_policy(
 ) -> TensorDictModule:
     """Return a policy that acts by the true state: an upper bound for one that sees images.
 
-    Args:
-        task: The task or its settings.
-        actions: Available actions; those of the task's default dynamics by default.
+    By default its actions are those of the task's default dynamics.
 
     Raises:
         InputError: The task has no oracle, or none for these actions.
@@ -79,24 +77,16 @@ def make_baseline(
 ) -> TensorDictModule:
     """Build a baseline of a task: "oracle" or one of its random and constant baselines.
 
-    Args:
-        name: Of the baseline.
-        task: The task or its settings.
-        generator: Source of random actions.
-        actions: Available actions; those of the task's default dynamics by default.
-
-    Raises:
-        InputError: The task has no oracle.
+    By default its actions are those of the task's default dynamics; `generator` samples random
+    ones. A task without an oracle raises `InputError`.
     """
     task = as_task(task)
     actions = actions or task.make_dynamics().actions
     if name == "oracle":
         return oracle_policy(task, actions)
-    return (
-        random_policy(actions, generator)
-        if name == "random"
-        else constant_policy(actions.always(name))
-    )
+    if name == "random":
+        return random_policy(actions, generator)
+    return constant_policy(actions.always(name))
 
 
 def run_baselines(
@@ -113,8 +103,8 @@ def run_baselines(
         num_worlds: Environments in a batch, as for the policy.
         task: The task or its settings.
         worlds: `DroneEnv.state_dict` from before the policy's first episode.
-        episodes: How many.
-        device: Where to run.
+        episodes: Number of episodes.
+        device: Device of the environments.
         dynamics: Vehicle dynamics; the task's default by default.
 
     Raises:

@@ -136,12 +136,8 @@ def held_out_environments(
     policy: Pilot, settings: FlightSettings, seed: RootSeed
 ) -> AbstractContextManager[tuple[Any, TensorDictModuleBase]]:
     """Open environments that no training uses, and the policy as their actor."""
-    return policy.flying(
-        settings.num_worlds,
-        seed=seed.value,
-        device=settings.device,
-        renderer=settings.renderer,
-    )
+    where = {"device": settings.device, "renderer": settings.renderer}
+    return policy.flying(settings.num_worlds, seed=seed.value, **where)
 
 
 def _same(evidence: Evidence) -> str:

@@ -73,14 +73,10 @@ def judge_policy(
     sampled: bool = True,
     **known: Any,
 ) -> Verdict:
-    """Run a policy and the baselines on the same initial states, and apply the rule.
+    """Run so many episodes of a policy and of each baseline, and apply the rule.
 
-    Args:
-        env: A batch of environments.
-        actor: The policy.
-        episodes: How many of each.
-        sampled: Whether to run the policy with sampled actions, too.
-        known: "rule", "claim", "unlike" and "seed", see `judge`.
+    Initial states are the same. `sampled` also runs the policy with sampled actions; `known` are
+    the arguments "rule", "claim", "unlike" and "seed" of `judge`.
     """
     base, worlds = base_env(env), worlds_of(env)
     state = base.state_dict()
@@ -109,8 +105,8 @@ def judge_for_selection(
 
     Args:
         path: The checkpoint.
-        episodes: How many.
-        device: Where to run.
+        episodes: Number of episodes.
+        device: Device of the environments.
         renderer: Name of the renderer.
         seed: Root of the random streams; a fresh one by default.
 
@@ -120,12 +116,9 @@ def judge_for_selection(
     Raises:
         InputError: The checkpoint is unusable.
     """
-    policy = load_policy(path)
-    count, seed = min(episodes, 250), seed or root_seed(None)
-    worlds = policy.flying(
-        count, seed=seed.value, stream=Stream.CHOICE, device=device, renderer=renderer
-    )
-    with worlds as (env, actor):
+    policy, seed = load_policy(path), seed or root_seed(None)
+    how = {"stream": Stream.CHOICE, "device": device, "renderer": renderer}
+    with policy.flying(min(episodes, 250), seed=seed.value, **how) as (env, actor):
         verdict = judge_policy(env, actor, episodes, seed=seed)
         return verdict.as_dict(), policy.state["progress"]
 
@@ -149,8 +142,7 @@ def judge(
         rule: Thresholds.
         sampled: The policy's episodes with sampled actions, from the same states.
         claim: A certificate of the policy in this task, if there is one.
-        unlike: How the dynamics differ from those that the policy was trained with: setting to
-            "own" and "flown", plain values.
+        unlike: How the dynamics differ from those of the training: setting to "own" and "flown".
         seed: Root of the environments' random streams; without it the verdict says that a policy
             could have been fitted to these environments.
         rounding: How rounding can change `greedy`; None if that was not checked.
@@ -226,9 +218,8 @@ def widen(
     upper bounds even if each has the best one.
     """
     observed = _observe_each(greedy, baselines, rule)
-    if outcomes.episodes is None:
-        others = [values[:0] for values in observed]
-    else:
+    others = [values[:0] for values in observed]
+    if outcomes.episodes is not None:
         beside = {name: flown[outcomes.owner] for name, flown in baselines.items()}
         others = _observe_each(outcomes.episodes, beside, rule)
     widened = []
@@ -247,11 +238,9 @@ def widen(
 
 
 def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
-    """Return each episode's value of each of the rule's quantities.
+    """Return each episode's value of each of the rule's quantities, float64.
 
-    Returns:
-        An array for each quantity, shape (at most n,), float64; those of "collected" have values
-        only for episodes that offered such a cube.
+    Shapes: (at most n,); those of "collected" are only of episodes that offered such a goal.
     """
     each = _observe_each(greedy, baselines, rule)
     return [values[~np.isnan(values)] for values in each]

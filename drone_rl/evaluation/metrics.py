@@ -29,10 +29,8 @@ class Episodes:
     def ended(cls, task: Task[Any], info: Mapping[str, Tensor], length: Tensor) -> "Episodes":
         """Build episodes from the last step's info, on the CPU.
 
-        Args:
-            task: Their task.
-            info: The task's `scored` and "end_reason", as in `Worlds.info`. Shapes: (n, *).
-            length: Steps of each episode. Shape: (n,).
+        `info` has the task's `scored` and "end_reason", as in `Worlds.info`, shapes (n, *), and
+        `length` the steps of each episode, shape (n,).
         """
         goals = task.score({name: info[name].cpu() for name in task.scored})
         return cls(task, goals, info["end_reason"][:, 0].cpu(), length.cpu())
@@ -72,8 +70,7 @@ class Episodes:
     def stratum_share(self, stratum: int) -> Tensor:
         """Return the fraction of a stratum's goals that was reached, by episode that offered one.
 
-        Returns:
-            Shape: (number of such episodes,), float64.
+        Shape: (number of such episodes,), float64.
         """
         offered = self.offered(stratum)
         there = (self.goals.stratum == stratum)[offered]
@@ -113,11 +110,7 @@ def failure_table(episodes: Episodes, confidence: float = 0.95) -> dict[str, Any
     """Count first failures by class of goal and by how the episode ended.
 
     An episode fails once, at the first goal that it misses. So each row is a binomial count, and
-    its interval is exact.
-
-    Args:
-        episodes: Finished episodes.
-        confidence: With which the intervals of all rows hold at once (Bonferroni).
+    its interval is exact. With this confidence the intervals of all rows hold at once (Bonferroni).
 
     Returns:
         "rows": each with "by", "value", "episodes" (that offered such a goal at or before their

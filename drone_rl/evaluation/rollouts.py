@@ -120,15 +120,10 @@ def final_episodes(env: EnvBase, batch: TensorDictBase) -> Episodes:
 
 
 def rollout(start: State, step: Callable[[int, State, Tensor], tuple[State, Tensor]]) -> State:
-    """Step a batch of simulated scenes until each is over.
+    """Step a batch of n scenes from initial states until each is over; return the final states.
 
-    Args:
-        start: Initial states. Length: n.
-        step: Called with the number of the step, the states of the active scenes and their indices;
-            returns the next states and which of them remain active, shape (number active,), bool.
-
-    Returns:
-        The final states. Length: n.
+    `step` is called with the number of the step, the states of the active scenes and their indices.
+    It returns the next states and which of them remain active, shape (number active,), bool.
     """
     active = torch.arange(len(start), device=start.end_reason.device)
     final, state = start[active], start
@@ -147,11 +142,7 @@ def find_failures(
 ) -> tuple[NDArray[np.float64], int]:
     """Search for cube placements from which a greedy policy misses a cube.
 
-    Args:
-        env: A batch of environments.
-        actor: The policy.
-        num_episodes: Minimum number of episodes; batches are never cut.
-        enough: Number of failures after which the search stops.
+    It runs at least `num_episodes`, in whole batches, unless `enough` failures were found before.
 
     Returns:
         The placements, metres to the left of the start, shape (failures, num_cubes), and the
