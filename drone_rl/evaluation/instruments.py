@@ -52,15 +52,10 @@ def read(body: FlightState) -> Reading:
 
 
 def panel(reading: Reading, most: float, hover: float) -> Image.Image:
-    """Draw the instruments.
+    """Draw the instruments. Size: (WIDTH, HEIGHT).
 
-    Args:
-        reading: Of the drone.
-        most: Speed at which bars are full, m/s.
-        hover: Fraction of the maximum thrust in hover: a mark on each motor's bar.
-
-    Returns:
-        Size: (WIDTH, HEIGHT).
+    Bars of speeds are full at `most`, m/s. A mark on each motor's bar shows the thrust in hover, as
+    a fraction of the maximum thrust.
     """
     image = Image.new("RGB", (WIDTH, HEIGHT), _BACKGROUND)
     draw = ImageDraw.Draw(image)
@@ -87,13 +82,9 @@ def horizon(attitude: Attitude) -> Image.Image:
     return Image.fromarray(colors).resize((2 * _RADIUS, 2 * _RADIUS), Image.Resampling.BOX)
 
 
-def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    return ImageFont.load_default(size)
-
-
 def _draw_horizon(image: Image.Image, draw: ImageDraw.ImageDraw, attitude: Attitude) -> None:
     x, y = _DIAL
-    draw.text((x - _RADIUS, 8), "horizon", _FAINT, _font(13))
+    draw.text((x - _RADIUS, 8), "horizon", _FAINT, ImageFont.load_default(13))
     image.paste(horizon(attitude), (x - _RADIUS, y - _RADIUS))
     for side in (-1, 1):
         ends = sorted((x + side * 12, x + side * 40))
@@ -101,7 +92,7 @@ def _draw_horizon(image: Image.Image, draw: ImageDraw.ImageDraw, attitude: Attit
     draw.rectangle((x - 2, y - 2, x + 1, y + 1), _NEEDLE)
     side, nose = "right" if attitude.roll > 0 else "left", "down" if attitude.pitch > 0 else "up"
     text = f"{abs(attitude.roll):.0f}° {side}, {abs(attitude.pitch):.0f}° {nose}"
-    draw.text((x, HEIGHT - 12), text, _TEXT, _font(13), anchor="mm")
+    draw.text((x, HEIGHT - 12), text, _TEXT, ImageFont.load_default(13), anchor="mm")
 
 
 def _draw_speeds(
@@ -109,13 +100,13 @@ def _draw_speeds(
 ) -> None:
     left, top = _SPEEDS
     middle = left + _BARS // 2
-    draw.text((left, 8), "speed", _FAINT, _font(13))
+    draw.text((left, 8), "speed", _FAINT, ImageFont.load_default(13))
     for row, (speed, words) in enumerate(zip(speeds, _WORDS, strict=True)):
         y = top + 53 * row
         word = words[speed < -_STILL]
-        draw.text((left, y), word, _TEXT, _font(15))
+        draw.text((left, y), word, _TEXT, ImageFont.load_default(15))
         text = f"{abs(speed):.1f} m/s"
-        draw.text((left + _BARS, y), text, _TEXT, _font(15), anchor="ra")
+        draw.text((left + _BARS, y), text, _TEXT, ImageFont.load_default(15), anchor="ra")
         draw.rectangle((left, y + 24, left + _BARS, y + 36), (50, 54, 63))
         share = max(-1.0, min(1.0, speed / most))
         is_mirrored = row == 1  # to the left is on the left
@@ -126,7 +117,7 @@ def _draw_speeds(
 
 def _draw_motors(draw: ImageDraw.ImageDraw, rotors: tuple[float, ...], hover: float) -> None:
     left, top = _MOTORS
-    draw.text((left, 8), "motors (line: hovering)", _FAINT, _font(13))
+    draw.text((left, 8), "motors (line: hovering)", _FAINT, ImageFont.load_default(13))
     tall, wide = 54, 34
     for i, (name, rotor) in enumerate(_PLACES.items()):
         x, y = left + 12 + 72 * (i % 2), top + 78 * (i // 2)
@@ -136,4 +127,6 @@ def _draw_motors(draw: ImageDraw.ImageDraw, rotors: tuple[float, ...], hover: fl
         draw.rectangle((x, full, x + wide, y + tall), _BAR)
         mark = y + tall - round(tall * hover)
         draw.line((x - 4, mark, x + wide + 4, mark), _TEXT, 2)
-        draw.text((x + wide / 2, y + tall + 9), name, _TEXT, _font(12), anchor="mm")
+        draw.text(
+            (x + wide / 2, y + tall + 9), name, _TEXT, ImageFont.load_default(12), anchor="mm"
+        )

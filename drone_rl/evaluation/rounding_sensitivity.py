@@ -62,13 +62,7 @@ def run_compared(
 ) -> tuple[Episodes, Rounding | None]:
     """Run greedy episodes in PyTorch, and the first ones again by another implementation.
 
-    Args:
-        env: A batch of environments.
-        actor: The policy.
-        num_episodes: How many.
-
-    Returns:
-        The episodes, and what `compare_implementations` returns.
+    Return the episodes and what `compare_implementations` returns.
 
     Raises:
         InputError: See `check_rounding`.
@@ -82,9 +76,8 @@ def run_compared(
 def require_function(policy: Pilot, **how: Any) -> None:
     """Check that a third-party policy acts by the current frame only.
 
-    Args:
-        policy: Any; policies of this package act so by construction.
-        how: Seed, device and renderer of the environments, see `Pilot.flying`.
+    Policies of this package act so by construction. `how` are the seed, device and renderer of the
+    environments, see `Pilot.flying`.
 
     Raises:
         InputError: Its actions depend on the batch, on a frame's row, or on earlier calls.
@@ -107,7 +100,7 @@ def check_rounding(
     Args:
         env: In the state from which `flown` started.
         actor: The policy.
-        episodes: How many; all of `flown` at most.
+        episodes: Number of episodes; all of `flown` at most.
         flown: Greedy episodes to compare with.
         log: Their actions.
 
@@ -158,17 +151,7 @@ def compare_implementations(
 ) -> Rounding | None:
     """Run the first episodes again by another implementation: the fused kernel if there is one.
 
-    Args:
-        env: In the state from which `flown` started.
-        actor: The policy.
-        flown: Greedy episodes, run in PyTorch.
-        log: Their actions.
-
-    Returns:
-        None for an actor without a network.
-
-    Raises:
-        InputError: See `check_rounding`.
+    Arguments, result and errors are those of `check_rounding`; `flown` was run in PyTorch.
     """
     state, count = base_env(env).state_dict(), min(COMPARED, len(flown))
     found = check_rounding(env, actor, count, flown=flown, log=log)
@@ -180,13 +163,9 @@ def compare_implementations(
     finals = [final_episodes(env, batch) for batch in batches]
     if again.implementation == log.implementation:
         return found
+    is_counted, ends = isinstance(worlds_of(env).dynamics, ComputerVision), Episodes.joined(finals)
     first = _first_differences(
-        flown,
-        Episodes.joined(finals),
-        log.actions,
-        again.actions,
-        count,
-        is_counted=isinstance(worlds_of(env).dynamics, ComputerVision),
+        flown, ends, log.actions, again.actions, count, is_counted=is_counted
     )
     differing = [i for i, at in enumerate(first) if at is not None]
     return dataclasses.replace(
@@ -286,9 +265,8 @@ def _run_checked(
         fragile += cast(Tensor, batch["fragile"]).cpu().split(lengths)
         finals.append(final_episodes(env, batch))
         worlds = torch.tensor([bool(f.any()) for f in fragile[first:]]).nonzero()[:, 0]
-        is_few = len(worlds) <= MOST_FRAGILE_EPISODES * len(lengths)
         if is_counted and len(worlds):
-            if not is_few:
+            if len(worlds) > MOST_FRAGILE_EPISODES * len(lengths):
                 found = Outcomes(None, worlds[:0], torch.ones_like(worlds, dtype=torch.bool))
             elif not isinstance(renderer, Reasons):
                 found = enumerate_outcomes(renderer, decide, worlds.to(env.device))

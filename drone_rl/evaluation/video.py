@@ -55,25 +55,12 @@ _BACKGROUND, _TEXT, _CHOSEN, _BAR = (24, 26, 31), (235, 235, 240), (226, 74, 51)
 
 
 def film(
-    policy: Policy,
-    folder: Path,
-    episodes: int,
-    *,
-    greedy: bool = True,
-    **how: Any,
+    policy: Policy, folder: Path, episodes: int, *, greedy: bool = True, **how: Any
 ) -> list[Path]:
-    """Write videos of a policy in held-out environments, one MP4 and one GIF per episode.
+    """Film episodes in held-out environments as MP4 and GIF files, and return the files.
 
-    Args:
-        policy: The policy.
-        folder: Where the files go.
-        episodes: How many.
-        greedy: Whether to take the most probable action instead of sampling one.
-        how: "seed", "device", "renderer" and "appearance" of the environments, see
-            `Policy.make_env`.
-
-    Returns:
-        The files.
+    The policy takes the most probable action, or samples it. `how` are the seed, device, renderer
+    and appearance of the environments, see `Policy.make_env`.
     """
     files: list[Path] = []
     with policy.flying(1, **how) as (env, actor):
@@ -85,13 +72,7 @@ def film(
     return files
 
 
-def view(
-    policy: Policy,
-    *,
-    greedy: bool = True,
-    seed: int = 0,
-    **how: Any,
-) -> None:
+def view(policy: Policy, *, greedy: bool = True, seed: int = 0, **how: Any) -> None:
     """Open dm_control's viewer on the composer task, controlled by a policy; see `film`.
 
     The viewer shows the dm_control simulation; observations are rendered as in training.
@@ -143,12 +124,10 @@ class _Seen(NamedTuple):
 def film_episode(
     env: TransformedEnv, actor: TensorDictModuleBase, *, greedy: bool = True
 ) -> Iterator[np.ndarray]:
-    """Run one episode and yield its video frames.
+    """Run one episode in a single environment and yield its video frames.
 
-    Args:
-        env: A single environment.
-        actor: The policy; its "logits", if it has any, are shown as probabilities.
-        greedy: Whether to take the most probable action instead of sampling one.
+    The policy takes the most probable action, or samples it; its "logits", if it has any, are shown
+    as probabilities.
 
     Yields:
         RGB frames, uint8. Shape: (720, 1280, 3).
@@ -170,17 +149,14 @@ def film_episode(
 
 
 def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
-    """Write an MP4 and, at half the size, a GIF.
+    """Write RGB frames of one size as MP4 and, at half the size, as GIF; return the two files.
 
     Args:
-        frames: RGB frames of one size.
-        path: Where to, without suffix.
-
-    Returns:
-        The two files.
+        frames: RGB frames.
+        path: Without suffix.
 
     Raises:
-        InputError: They can't be written.
+        InputError: The files can't be written.
     """
     files = [path.with_suffix(".mp4"), path.with_suffix(".gif")]
     try:
@@ -225,10 +201,7 @@ def _panel(worlds: Worlds) -> Image.Image | None:
 
 
 def _compose(
-    seen: _Seen,
-    caption: str,
-    acted: TensorDictBase | None = None,
-    actions: Actions = MOVES,
+    seen: _Seen, caption: str, acted: TensorDictBase | None = None, actions: Actions = MOVES
 ) -> np.ndarray:
     """Chase view with the observation as inset; below all five cameras, a caption and bars."""
     canvas = Image.new("RGB", (WIDTH, HEIGHT), _BACKGROUND)
@@ -273,16 +246,10 @@ def _draw_bars(
 
 
 def render_chase(worlds: Worlds, look: Appearance | None, height: int, width: int) -> Tensor:
-    """Render the drones from behind.
+    """Render the drones from behind, in an appearance that all environments share.
 
     With flight dynamics the chase camera follows the heading only, so that the tilt of the body is
     visible.
-
-    Args:
-        worlds: Environments to render.
-        look: Changes to the appearance that all of them share.
-        height: Pixels.
-        width: Pixels.
 
     Returns:
         Colours. Shape: (num_worlds, height, width, 3), uint8.
@@ -301,9 +268,8 @@ def render_chase(worlds: Worlds, look: Appearance | None, height: int, width: in
 def level(attitude: Tensor, camera: str) -> Mounting:
     """Return the mounting that keeps the chase camera level on tilted bodies.
 
-    Args:
-        attitude: Of the bodies, quaternions (w, x, y, z). Shape: (num_worlds, 4).
-        camera: Its full name in the model.
+    The attitudes are quaternions (w, x, y, z), shape (num_worlds, 4); the camera is given by its
+    full name in the model.
     """
     back = product(attitude * attitude.new_tensor(_BACK), heading_only(attitude))
     place = torch.tensor(CHASE.pos, dtype=attitude.dtype, device=attitude.device)

@@ -44,12 +44,9 @@ def heated(frame: NDArray, heat: NDArray) -> NDArray:
 
 
 def thumbnails(frames: NDArray, colors: Sequence[Color], cells: NDArray) -> Image.Image:
-    """Place tinted frames on the cells of a grid.
+    """Place frames, each tinted with its action's colour, on the cells of a grid.
 
-    Args:
-        frames: Shape (N, H, W, 3).
-        colors: Of each frame's action.
-        cells: Column and row of each. Shape: (N, 2).
+    Shapes: (N, H, W, 3) of the frames; (N, 2), column and row, of the cells.
     """
     height, width = frames.shape[1:3]
     columns, rows = cells.max(0) + 1
@@ -79,11 +76,7 @@ def probed_frame(
 ) -> Image.Image:
     """Stack a frame of the data set under a caption, and its action probabilities.
 
-    Args:
-        data: With "frames" (T, H, W, 3), "actions" (T,) and "probabilities" (T, num_actions).
-        frame: Index of the frame.
-        caption: Above the frame.
-        actions: Names and arrows of the actions.
+    `data` has "frames" (T, H, W, 3), "actions" (T,) and "probabilities" (T, num_actions).
     """
     plain = titled(enlarge(data["frames"][frame]), caption)
     chosen = int(data["actions"][frame])
@@ -128,16 +121,13 @@ def gridded(pictures: Sequence[Image.Image], columns: int, gap: int = 12) -> Ima
 
 
 def shown_picture(observation: NDArray, low: float, high: float, channels: str) -> NDArray:
-    """Convert the newest frame of an observation to an RGB image.
+    """Convert the newest frame of an observation to an RGB image, uint8. Shape: (H, W, 3).
 
     Args:
         observation: Shape (C, H, W), of one frame or several.
         low: Value shown as black.
         high: Value shown as white.
         channels: "gray", "rgb", or "chromaticity" of red and blue, with the remainder as green.
-
-    Returns:
-        Shape: (H, W, 3), uint8.
     """
     newest = observation[-_CHANNELS.get(channels, 1) :].astype(np.float64)
     share = ((newest - low) / max(high - low, 1e-12)).clip(0, 1)
@@ -152,14 +142,7 @@ def shown_picture(observation: NDArray, low: float, high: float, channels: str) 
 def indicator(
     probabilities: Sequence[float], chosen: int, width: int, actions: ShownActions = SHOWN_MOVES
 ) -> Image.Image:
-    """Draw one bar per action, as long as it is probable.
-
-    Args:
-        probabilities: By action.
-        chosen: Action whose bar is red.
-        width: Of the image, pixels.
-        actions: Names and arrows of the actions.
-    """
+    """Draw one bar per action, as long as it is probable; that of the chosen action is red."""
     if sorted(actions.arrows) == sorted((LEFT, UP, RIGHT)):
         return _arrows(probabilities, chosen, width, actions)
     return _rows(probabilities, chosen, width, actions)

@@ -24,14 +24,9 @@ FRAMES_PER_SECOND = 8
 
 
 def save_drawn(drawn: Image.Image | Figure | NDArray, path: Path) -> str:
-    """Save an image or chart as PNG, a video as MP4.
+    """Save an image or chart as PNG, a video as MP4; return it as a data URI.
 
-    Args:
-        drawn: See `report.part.Drawn`.
-        path: Without suffix.
-
-    Returns:
-        The same as a data URI.
+    The path is without suffix. See `report.part.Drawn`.
     """
     if isinstance(drawn, (Image.Image, Figure)):
         content = to_png(drawn)
