@@ -41,25 +41,15 @@ def run_episodes(
     env: EnvBase,
     actor: TensorDictModuleBase,
     num_episodes: int,
-    *,
-    greedy: bool = True,
-    is_compiled: bool = False,
-    log: StepLog | None = None,
+    **how: Any,
 ) -> Episodes:
-    """Run complete episodes, `env.batch_size[0]` at a time.
+    """Run complete episodes, `env.batch_size[0]` at a time; return them, on the CPU.
 
     Environment i samples its episodes from its own random stream, so that the k-th episode has the
-    same initial state for every policy.
-
-    Arguments are those of `episode_batches`. Surplus episodes of the last batch are dropped; `log`
-    receives their actions, too.
-
-    Returns:
-        The episodes, on the CPU.
+    same initial state for every policy. Arguments are those of `episode_batches`; by default the
+    last batch is whole, and its surplus episodes, whose actions `log` receives, too, are dropped.
     """
-    batches = episode_batches(
-        env, actor, num_episodes, greedy=greedy, is_compiled=is_compiled, log=log, is_exact=False
-    )
+    batches = episode_batches(env, actor, num_episodes, **{"is_exact": False, **how})
     return Episodes.joined([final_episodes(env, batch) for batch in batches])[:num_episodes]
 
 

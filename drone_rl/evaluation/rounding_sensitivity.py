@@ -158,12 +158,10 @@ def compare_implementations(
     if found is None:
         return None
     base_env(env).load_state_dict(state)
-    again = StepLog()
-    batches = episode_batches(env, actor, count, is_compiled=True, log=again)
-    finals = [final_episodes(env, batch) for batch in batches]
+    again, is_counted = StepLog(), isinstance(worlds_of(env).dynamics, ComputerVision)
+    ends = run_episodes(env, actor, count, is_compiled=True, is_exact=True, log=again)
     if again.implementation == log.implementation:
         return found
-    is_counted, ends = isinstance(worlds_of(env).dynamics, ComputerVision), Episodes.joined(finals)
     first = _first_differences(
         flown, ends, log.actions, again.actions, count, is_counted=is_counted
     )
@@ -308,9 +306,8 @@ def _run_regrouped(
 ) -> tuple[list[Tensor], Episodes]:
     """Run with the network evaluated in other batches. Returns actions and episodes."""
     log, actor = StepLog(), make_actor(Regrouped(network, "mixed"), env.action_spec)
-    batches = episode_batches(env, actor, episodes, log=log)
-    finals = [final_episodes(env, batch) for batch in batches]
-    return log.actions, Episodes.joined(finals)
+    ends = run_episodes(env, actor, episodes, is_exact=True, log=log)
+    return log.actions, ends
 
 
 def _require_function_of_frames(
