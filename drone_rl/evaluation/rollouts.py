@@ -38,10 +38,7 @@ class StepLog:
 
 
 def run_episodes(
-    env: EnvBase,
-    actor: TensorDictModuleBase,
-    num_episodes: int,
-    **how: Any,
+    env: EnvBase, actor: TensorDictModuleBase, num_episodes: int, **how: Any
 ) -> Episodes:
     """Run complete episodes, `env.batch_size[0]` at a time; return them, on the CPU.
 
