@@ -4,11 +4,11 @@ These checks do not prove that a file is genuine; `drone_rl.verdicts.coverage` r
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from drone_rl.robustness.axes import Axis
-from drone_rl.robustness.domain import walk
+from drone_rl.robustness.domain import range_of, walk
 from drone_rl.robustness.perturbations import Mode
 from drone_rl.robustness.suite import finite, mcnemar_p, success_area
 from drone_rl.sim.tasks import Task
@@ -158,46 +158,37 @@ def _is_surely_bad(level: Mapping[str, Any], numbers: Mapping[str, Any]) -> bool
 
 
 def _is_sound(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[str, Any]) -> bool:
-    is_good = numbers["domain"]["plain"]["good"]
-    if found["positions"] is None or not is_good:
-        return found["positions"] is None and not is_good and not found["flown"]
-    values = all(_is_at(axis, at["position"], at["value"], of) for at in found["flown"])
-    limits: dict[int, float] = dict(zip((-1, 1), found["positions"], strict=True))
-    ends = [
-        _is_end(axis, found, end, sign, of, numbers["settings"]["seed"])
-        and _is_at(axis, limits[sign], found[end], of)
-        for end, sign in axis.signs.items()
-    ]
-    return values and all(ends)
-
-
-def _is_end(axis: Axis, found: Mapping[str, Any], end: str, sign: int, of: Any, seed: int) -> bool:
-    """Whether the search, given these answers, tries these strengths and ends at this limit."""
-    left = {at["position"]: at["good"] for at in found["flown"] if sign * at["position"] > 0}
+    """Whether the search, given these answers, tries these strengths and finds this range."""
+    is_plain_good = numbers["domain"]["plain"]["good"]
+    if found["positions"] is None or not is_plain_good:
+        return found["positions"] is None and not is_plain_good and not found["flown"]
+    left = {at["position"]: at["good"] for at in found["flown"]}
 
     def is_good(strength: float, _: float) -> bool:
         return left.pop(next(at for at in left if _is_same(at, axis.position(strength))))
 
+    seed = numbers["settings"]["seed"]
     try:
-        walked = walk(axis, sign, seed, is_good)
+        ends = {name: walk(axis, sign, seed, is_good) for name, sign in axis.signs.items()}
     except StopIteration:  # a strength is missing
         return False
-    limits: dict[int, float] = dict(zip((-1, 1), found["positions"], strict=True))
-    failed = [at["value"] for at in found["failed"] if at["end"] == end]
-    values = [] if walked.failed is None else [finite(axis.value(walked.failed, of))]
-    is_open = walked.failed is None if walked.flown else None
-    return (
-        not left
-        and _is_same(limits[sign], axis.position(walked.limit))
-        and found[f"{end}_open"] == is_open
-        and len(failed) == len(values)
-        and all(_is_same(one, other) for one, other in zip(failed, values, strict=True))
-    )
+    failed = [
+        {"end": name, "value": finite(axis.value(end.failed, of))}
+        for name, end in ends.items()
+        if end.failed is not None
+    ]
+    return not left and _agrees(range_of(axis, ends, failed, of), found)
 
 
-def _is_at(axis: Axis, position: float, value: float | None, of: Any) -> bool:
-    """Whether a value is what lies at a position."""
-    return _is_same(finite(axis.value(axis.at(position), of)), value)
+def _agrees(expected: Any, given: Any) -> bool:
+    """Whether all entries of the expected plain data are given, up to rounding."""
+    if isinstance(expected, Mapping):
+        return all(_agrees(value, given[name]) for name, value in expected.items())
+    if isinstance(expected, Sequence) and not isinstance(expected, str):
+        return len(expected) == len(given) and all(map(_agrees, expected, given))
+    if isinstance(expected, str):
+        return expected == given
+    return _is_same(expected, given)
 
 
 def _is_same(one: float | None, other: float | None) -> bool:

@@ -13,7 +13,7 @@ episodes at different strengths, nor that a stronger perturbation is worse.
 """
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import torch
@@ -57,9 +57,9 @@ def walk(axis: Axis, sign: int, seed: int, is_good: Callable[[float, float], boo
     """Find one end of a range; the same answers give the same strengths.
 
     Args:
-        axis: Which.
+        axis: The axis.
         sign: Side of no perturbation on the axis's scale: -1 or 1.
-        seed: Of the random strengths.
+        seed: Seed of the random strengths.
         is_good: Takes a strength and the part of the axis's error that its answer may use; returns
             whether the policy is certainly good there.
     """
@@ -85,6 +85,24 @@ def walk(axis: Axis, sign: int, seed: int, is_good: Callable[[float, float], boo
     return end
 
 
+def range_of(
+    axis: Axis, ends: Mapping[str, End], failed: Sequence[Mapping[str, Any]], of: Any
+) -> dict[str, Any]:
+    """Return the range of a policy between two ends, by name, as in `Prober.search`."""
+
+    def value(strength: float) -> float | None:
+        return finite(axis.value(strength, of))
+
+    flown = [(axis.position(s), value(s), good) for end in ends.values() for s, good in end.flown]
+    return {
+        **{name: value(end.limit) for name, end in ends.items()},
+        **{f"{n}_open": e.failed is None if e.flown else None for n, e in ends.items()},
+        "positions": sorted(axis.position(end.limit) for end in ends.values()),
+        "failed": failed,
+        "flown": [{"position": p, "value": v, "good": good} for p, v, good in sorted(flown)],
+    }
+
+
 class Prober:
     """Tests at which strengths a policy is certainly good."""
 
@@ -96,14 +114,14 @@ class Prober:
         possible_share: float = 0.9,
         plain_part: float = WALKING,
     ) -> None:
-        """Test the policy without perturbation.
+        """Test the policy without perturbation, with this part of the axis's error.
 
         Args:
             evaluator: Runs the episodes.
             oracle: Episodes of the task's oracle without perturbation.
             good_share: See `Rule`.
             possible_share: See `Suite`.
-            plain_part: Part of the axis's error that this test may use.
+            plain_part: The part.
         """
         task = oracle.task
         self._evaluator, self._oracle, self._possible = evaluator, oracle, possible_share
@@ -122,11 +140,8 @@ class Prober:
 
         That is, the verdict is certainly good, and the policy is certainly better than the random
         and constant baselines, however easy the condition makes the task. Episodes that depend on
-        rounding count as failures for "good", and as successes for "bad".
-
-        Args:
-            condition: Which.
-            part: Part of the axis's error that the test may use.
+        rounding count as failures for "good", and as successes for "bad". The test may use this
+        part of the axis's error.
 
         Returns:
             "good" and "bad" (certainly; neither if there are too few episodes), "success", and
@@ -180,36 +195,20 @@ class Prober:
         signs = axis.signs.items()
         ends = {name: walk(axis, sign, self._evaluator.seed, is_good) for name, sign in signs}
         failed = [
-            {"end": name, "value": self._value(axis, end.failed)}
+            {"end": name, "value": finite(axis.value(end.failed, self._evaluator.subject))}
             | self._explain(axis, end.failed, probed[end.failed])
             for name, end in ends.items()
             if end.failed is not None
         ]
-        flown = sorted(
-            (axis.position(strength), self._value(axis, strength), good)
-            for end in ends.values()
-            for strength, good in end.flown
-        )
-        opens = {f"{n}_open": e.failed is None if e.flown else None for n, e in ends.items()}
-        return {
-            **{name: self._value(axis, end.limit) for name, end in ends.items()},
-            **opens,
-            "positions": sorted(axis.position(end.limit) for end in ends.values()),
-            "failed": failed,
-            "flown": [{"position": p, "value": v, "good": good} for p, v, good in flown],
-        }
+        return range_of(axis, ends, failed, self._evaluator.subject)
 
     def _explain(self, axis: Axis, strength: float, found: dict[str, Any]) -> dict[str, Any]:
-        """Add whether the oracle fails, too."""
         if found["refused"] is not None or not has_oracle(self._oracle.task):
             return {**found, "oracle": None, "impossible": False}
         condition = axis.make(strength, self._evaluator.subject)
         success = self._evaluator.run(condition, agent=OracleAgent()).episodes.success
         seen = proportion(int(success.sum()), len(success))
         return {**found, "oracle": seen, "impossible": seen["upper95"] < self._possible}
-
-    def _value(self, axis: Axis, strength: float) -> float | None:
-        return finite(axis.value(strength, self._evaluator.subject))
 
 
 def is_surely_good(found: Mapping[str, Quantity], rule: Rule) -> bool:
