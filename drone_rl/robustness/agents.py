@@ -50,11 +50,7 @@ class Agent(Protocol):
         ...
 
     def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
-        """Choose the actions of one step.
-
-        Returns:
-            Actions, shape (n, *), and the images that the agent used, if any, shape (n, *).
-        """
+        """Return actions and the images that the agent used, if any. Shapes: (n, *)."""
         ...
 
 

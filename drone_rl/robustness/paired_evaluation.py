@@ -88,11 +88,7 @@ class PairedEvaluator:
         self._built: dict[tuple[Any, ...], Worlds] = {}
 
     def settings(self, condition: Condition) -> tuple[BaseTaskSettings, CameraSettings]:
-        """Return task and camera under a condition.
-
-        Raises:
-            InputError: A setting is out of range.
-        """
+        """Return task and camera under a condition; a setting out of range is an `InputError`."""
         with below("task"):
             task = self.subject.task.replace(**condition.task)
         with below("camera"):
@@ -100,11 +96,7 @@ class PairedEvaluator:
         return task, camera
 
     def worlds(self, condition: Condition) -> Worlds:
-        """Return the simulated environments of a condition, cached by task and camera.
-
-        Raises:
-            InputError: See `settings`.
-        """
+        """Return the simulated environments of a condition, cached by task and camera."""
         task, camera = self.settings(condition)
         key = (task, camera, condition.clutter)
         if key not in self._built:
@@ -124,12 +116,9 @@ class PairedEvaluator:
     def run(
         self, condition: Condition, mode: Mode = Mode.CONSTANT, agent: Agent | None = None
     ) -> ConditionResult:
-        """Run one episode in every environment.
+        """Run one episode of an agent, by default the policy, in every environment.
 
-        Args:
-            condition: The perturbations.
-            mode: When they are active.
-            agent: Who acts; the policy by default.
+        The perturbations of the condition are active as the mode says.
         """
         if agent is None:
             agent = PolicyAgent(self.subject.network, self.subject.transforms, self.episodes)

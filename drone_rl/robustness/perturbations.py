@@ -99,21 +99,19 @@ def variations(
         mode: When the condition is active.
         dimensions: Of each part of the condition.
         num_worlds: Number of environments, active or not.
-        generator: Samples them.
+        generator: Source of the variations.
 
     Yields:
         One tensor per part. Shapes: (num_worlds, dimensions), float64.
     """
-    shape = (num_worlds, sum(dimensions))
+    shape, is_drifting = (num_worlds, sum(dimensions)), mode is Mode.DRIFTING
     variation = torch.rand(shape, generator=generator, dtype=torch.float64).round() * 2 - 1
-    if mode is not Mode.DRIFTING:
-        while True:
-            yield [*variation.split(list(dimensions), -1)]
-    variation = torch.zeros_like(variation)
+    variation = torch.zeros_like(variation) if is_drifting else variation
     while True:
         yield [*variation.split(list(dimensions), -1)]
-        step = DRIFT * torch.randn(shape, generator=generator, dtype=torch.float64)
-        variation = reflect(variation + step)
+        if is_drifting:
+            step = DRIFT * torch.randn(shape, generator=generator, dtype=torch.float64)
+            variation = reflect(variation + step)
 
 
 def reflect(variation: Tensor) -> Tensor:
@@ -138,13 +136,9 @@ def scene_appearance(scene: Scene) -> Appearance:
 
 def tint(classes: Sequence[SemanticClass], by: float) -> AppearanceChange:
     """Shift red, green and blue of some classes by up to `by`, differently in each environment."""
-
-    def change(appearance: Appearance, variation: Tensor) -> Appearance:
-        return _repaint(
-            appearance, classes, lambda own: (own.to(variation) + by * variation).clamp(0, 1)
-        )
-
-    return AppearanceChange(change, 3)
+    return AppearanceChange(
+        lambda look, v: _repaint(look, classes, lambda own: (own.to(v) + by * v).clamp(0, 1)), 3
+    )
 
 
 def whiten(classes: Sequence[SemanticClass], fraction: float) -> AppearanceChange:
@@ -189,10 +183,8 @@ def mount(
 ) -> AppearanceChange:
     """Move the camera and turn it about itself, in either direction.
 
-    Args:
-        offset: Metres, drone frame: forward, to the left, up.
-        turn: Axis of the drone, see `drone_rl.sim.rendering.appearance.AXES`.
-        degrees: Angle.
+    The offset is in metres in the drone frame: forward, to the left, up. See
+    `drone_rl.sim.rendering.appearance.AXES` for the axes to turn about.
     """
 
     def change(appearance: Appearance, variation: Tensor) -> Appearance:
@@ -210,11 +202,7 @@ def elevation(direction: Colors) -> float:
 
 
 def task_things(settings: BaseTaskSettings) -> Things:
-    """Return where a task's objects are, how large and of which colour.
-
-    Raises:
-        InputError: The task does not say.
-    """
+    """Return where a task's objects are, their size and colour; an `InputError` without any."""
     if settings.things is None:
         raise InputError(f"axes=distractors is not for task={settings.name}; leave it out of axes")
     return settings.things
@@ -227,10 +215,9 @@ def as_bright(color: Sequence[float]) -> tuple[float, ...]:
 
 
 def sample_distractors(things: Things, num_worlds: int, generator: torch.Generator) -> Tensor:
-    """Sample positions of distractors next to the area of the task.
+    """Sample positions of distractors next to the area of the task, metres, world frame.
 
-    Returns:
-        Metres, world frame. Shape: (num_worlds, MOST, 3), float64.
+    Shape: (num_worlds, MOST, 3), float64.
     """
     near, far = _AWAY
     sampled = torch.rand(num_worlds, MOST, 3, generator=generator, dtype=torch.float64)
@@ -290,10 +277,8 @@ class FaultPipeline:
     def __call__(self, images: Tensor, active: Tensor, nothing: float = 0.0) -> Tensor:
         """Return the faulty images of one step.
 
-        Args:
-            images: Of the active environments, from 0 to 1. Shape: (n, C, H, W).
-            active: Indices of these. Shape: (n,).
-            nothing: Value of a pixel that shows nothing.
+        `images` are those of the `active` environments, from 0 to 1, shape (n, C, H, W); `nothing`
+        is the value of a pixel that shows nothing.
         """
         for i, (fault, generator) in enumerate(self._faults):
             sample = self._sampler(generator, active)

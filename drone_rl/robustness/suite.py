@@ -1,6 +1,7 @@
 """Measure success rates along every axis, paired with those without perturbation."""
 
 import base64
+import contextlib
 import dataclasses
 import functools
 import math
@@ -145,20 +146,16 @@ class FrameRecorder:
 def make_strip(evaluator: PairedEvaluator, axis: Axis) -> list[NDArray | None]:
     """Record the camera of one environment without perturbation and at each strength of an axis.
 
-    Returns:
-        Shapes: (H, W, 3), uint8; None where task or camera do not allow a strength.
+    Shapes: (H, W, 3), uint8; None where task or camera do not allow a strength.
     """
     conditions = (axis.make(strength, evaluator.subject) for strength in axis.strengths)
-    return [_record(evaluator, condition) for condition in (Condition(), *conditions)]
-
-
-def _record(evaluator: PairedEvaluator, condition: Condition) -> NDArray | None:
-    agent = FrameRecorder()
-    try:
-        evaluator.run(condition, agent=agent)
-    except InputError:
-        return None
-    return None if agent.image is None else agent.image.cpu().numpy()
+    strip: list[NDArray | None] = []
+    for condition in (Condition(), *conditions):
+        agent = FrameRecorder()
+        with contextlib.suppress(InputError):
+            evaluator.run(condition, agent=agent)
+        strip.append(None if agent.image is None else agent.image.cpu().numpy())
+    return strip
 
 
 def finite(value: float) -> float | None:
@@ -216,11 +213,7 @@ def packed(image: NDArray) -> str:
 
 
 def unpacked(text: str, shape: tuple[int, ...], where: str) -> NDArray:
-    """Decode an image of `packed`, uint8.
-
-    Raises:
-        InputError: It is none, or of another shape; the message says `where`.
-    """
+    """Decode an image of `packed`, uint8; any other text is an `InputError` about `where`."""
     size = math.prod(shape)
     try:
         unpacking = zlib.decompressobj()
@@ -228,5 +221,5 @@ def unpacked(text: str, shape: tuple[int, ...], where: str) -> NDArray:
     except (ValueError, zlib.error):
         content = b""
     if len(content) != size:
-        raise InputError(f"{where} is no picture of {shape[0]} rows and {shape[1]} columns")
+        raise InputError(f"{where} is no image of {shape[0]} rows and {shape[1]} columns")
     return np.frombuffer(content, np.uint8).reshape(shape)

@@ -122,7 +122,7 @@ _ALL_GOOD = {f"{_BLUR}.flown.3.good": True, **_WIDE}
         ({"seed": -1}, "seed=-1 is out of range"),
         ({"seed_is_fixed": "no"}, "seed_is_fixed='no' is neither true nor false"),
         ({"pictures.blur.0": None}, "does not show the world as it is"),
-        ({"pictures.blur.1": "AAAA"}, "is no picture of 25 rows"),
+        ({"pictures.blur.1": "AAAA"}, "is no image of 25 rows"),
     ],
 )
 def test_what_does_not_go_together_is_refused(read, lie, message):
