@@ -103,7 +103,7 @@ def find_claim(
     """Find and check the certificate of a policy, see `checker.read_validated`.
 
     Args:
-        policy: Which, in its task.
+        policy: The policy, in its task.
         given: The certificate's file, or a folder with a certificate.json; by default the file next
             to the policy, see `drone_rl.policies.zoo.certificate_path`.
         flights: Rollouts that re-check it from other placements; 0 for none.
@@ -124,16 +124,15 @@ def find_claim(
                 "proved of it; leave the certificate out"
             )
         return None
-    path = certificate_path(policy.path) if given is None else Path(given)
-    if given is not None and path.is_dir():
-        path = path / "certificate.json"
-    if given is None and not path.is_file():
-        return None
+    seed = seed or root_seed(None)
+    if given is not None:
+        path = Path(given)
+        path = path / "certificate.json" if path.is_dir() else path
+        return _try(policy, path, flights, seed, **flying)
+    path = certificate_path(policy.path)
     try:
-        return _try(policy, path, flights, seed or root_seed(None), **flying)
+        return _try(policy, path, flights, seed, **flying) if path.is_file() else None
     except InputError as error:
-        if given is not None:
-            raise
         return Claim(path, None, refused=str(error))
 
 
@@ -148,9 +147,9 @@ def _can_end_otherwise(stated: Certificate, greedy: Episodes, rounding: Rounding
 
 def _outcomes_of(stated: Certificate, episodes: Episodes) -> NDArray[np.int64]:
     """Index of each episode's outcome; the number of outcomes where none is stated."""
-    groups = stated.groups
+    groups, places = stated.groups, episodes.goals.world.reshape(len(episodes), -1, 3)  # x, y, z
     owner = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])
-    return owner[find(np.concatenate(groups), _placements(episodes))]
+    return owner[find(np.concatenate(groups), places[..., 1].double().numpy())]
 
 
 def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:
@@ -162,12 +161,6 @@ def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:
         for i, end, reached in flown
         if i < len(stated.outcomes)
     ]
-
-
-def _placements(episodes: Episodes) -> NDArray[np.float64]:
-    """Positions of the cubes, metres to the left. Shape: (n, cubes)."""
-    places = episodes.goals.world.reshape(len(episodes), -1, 3)  # x, y, z of each cube
-    return places[..., 1].double().numpy()
 
 
 def _try(policy: Policy, path: Path, flights: int, seed: RootSeed, **flying: Any) -> Claim:

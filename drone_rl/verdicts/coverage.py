@@ -116,7 +116,7 @@ def find_domain(
     """Find the robustness evaluation of a policy in its task.
 
     Args:
-        policy: Which, in its task.
+        policy: The policy, in its task.
         given: The file, or a folder with a shifts.json; by default the file next to the policy
             (`drone_rl.policies.zoo.shifts_path`), otherwise the newest that `drone-rl shifts`
             wrote for it, preferably one with ranges.
@@ -205,12 +205,9 @@ def _read_need(name: str, value: Any) -> Need:
 
 
 def require(policy: Pilot, needed: str | Path, measured: SavedShifts | None) -> Coverage:
-    """Compare requirements with a policy's operating domain.
+    """Compare the requirements in a file with a policy's operating domain.
 
-    Args:
-        policy: Which.
-        needed: A file, see `read_requirements`.
-        measured: From `find_domain`.
+    See `read_requirements` and `find_domain`.
 
     Raises:
         InputError: The file is unusable, or no operating domain was measured, or it is refused.
@@ -240,7 +237,7 @@ def recheck_domain(
     """Run new episodes at the ends of the required ranges and at random strengths within them.
 
     Args:
-        policy: Which, in its task.
+        policy: The policy, in its task.
         needs: By axis, see `read_requirements`.
         numbers: As in `shifts.json`, with the axes.
         settings: `domain_flights`, `good_share`, device and renderer count.

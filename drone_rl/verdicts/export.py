@@ -9,6 +9,7 @@ from typing import Any
 from safetensors import SafetensorError
 
 from drone_rl.config.commands import FlightSettings
+from drone_rl.evaluation.evaluate import held_out_environments
 from drone_rl.evaluation.judge import judge_policy
 from drone_rl.evaluation.verdict_text import best_baseline, is_quoted
 from drone_rl.policies.policy import Policy
@@ -42,10 +43,10 @@ def export(
     """Judge a policy and write it as safetensors with a model card.
 
     Args:
-        policy: Which.
+        policy: The policy.
         target: The file, ending in .safetensors.
-        settings: Of the card's verdict.
-        command: That trained it; None takes it from its file or folder.
+        settings: Settings of the card's verdict.
+        command: The training command; None takes it from the policy's file or folder.
         certificate: Certificate to quote and to copy; by default the one next to the policy.
         shifts: The same of a robustness evaluation, see `find_domain`.
         outputs: See `find_domain`.
@@ -57,13 +58,10 @@ def export(
         InputError: It can't be written, or a given file is unusable.
     """
     settings, seed = with_seed(settings)
-    device = settings.device
     claim = find_claim(policy, certificate, seed=seed)
     claim = None if claim is None or claim.refused else claim  # cards quote no refused certificate
     measured = find_domain(policy, shifts, outputs)
-    with policy.flying(
-        settings.num_worlds, seed=seed.value, device=device, renderer=settings.renderer
-    ) as (env, actor):
+    with held_out_environments(policy, settings, seed) as (env, actor):
         verdict = judge_policy(env, actor, settings.episodes, claim=claim, seed=seed).as_dict()
     noted, chosen = origin_of(policy.path, policy.state)
     carried, numbers = {}, measured and measured.numbers
@@ -73,16 +71,9 @@ def export(
         carried[shifts_path(target)] = read_bytes(measured.path, SHIFTS_BYTES)
     if claim is not None and is_quoted(verdict):
         carried[certificate_path(target)] = read_bytes(claim.path, CERTIFICATE_BYTES)
-    export_policy(
-        target,
-        policy.state,
-        command=command or noted,
-        verdict=verdict,
-        seed=seed.value,
-        chosen=chosen,
-        shifts=numbers,
-        carried=carried,
-    )
+    about: dict[str, Any] = {"verdict": verdict, "seed": seed.value, "chosen": chosen}
+    about |= {"command": command or noted, "shifts": numbers, "carried": carried}
+    export_policy(target, policy.state, **about)
     return seed
 
 

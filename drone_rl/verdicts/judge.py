@@ -112,11 +112,9 @@ class Judgements(tuple[Judgement, ...]):
     def rows(self) -> list[list[str]]:
         """Return a table of texts: a heading, then a row for each policy."""
         rows = [["policy", "verdict", "certain", "success rate (95% interval)"]]
-        for one in self:
-            verdict = one.verdict
+        for name, verdict in ((one.name, one.verdict) for one in self):
             success = interval(verdict.evidence["greedy"]["success"], "share")
-            certain = "yes" if verdict.certain else "no"
-            rows.append([one.name, verdict.kind.value, certain, success])
+            rows.append([name, verdict.kind.value, "yes" if verdict.certain else "no", success])
         return rows
 
     def __str__(self) -> str:
@@ -149,16 +147,7 @@ def judge(
 ) -> Judgement | Judgements:
     """Judge one policy, or a list or tuple of policies in the same environments.
 
-    Args:
-        policy: One or several, each as `judge_one` takes it.
-        settings: See `judge_one`.
-        how: The other arguments of `judge_one`.
-
-    Returns:
-        The judgement, or one for each policy of the list.
-
-    Raises:
-        InputError: See `judge_one`, or the list is empty.
+    Arguments and errors are those of `judge_one`; an empty list is an `InputError`, too.
     """
     if not isinstance(policy, list | tuple):
         return judge_one(cast("Any", policy), settings, **how)
@@ -217,7 +206,6 @@ def judge_one(
     claim = measured = coverage = None
     if pilot is None:
         _refuse_files(name, certificate=certificate, shifts=shifts, require_domain=require_domain)
-    if pilot is None:
         changed = Changes(TaskSettings).read(task or {}, "task")
         moved = DynamicsSettings(**Changes(DynamicsSettings).read(dynamics or {}, "dynamics"))
         moved.check_air()
@@ -228,27 +216,14 @@ def judge_one(
         measured = find_domain(pilot, shifts, outputs)
         coverage = require(pilot, require_domain, measured) if require_domain is not None else None
         coverage = _reflown(pilot, coverage, measured, settings, seed)
-        claim = find_claim(
-            pilot,
-            certificate,
-            flights=settings.certificate_flights,
-            seed=seed,
-            device=settings.device,
-            renderer=settings.renderer,
-        )
+        how = {"device": settings.device, "renderer": settings.renderer}
+        flights = settings.certificate_flights
+        claim = find_claim(pilot, certificate, flights=flights, seed=seed, **how)
         worlds = held_out_environments(pilot, settings, seed)
     draws, rule = settings.sampled and pilot is not None, Rule(good_share=settings.good_share)
+    known = {"claim": claim, "unlike": pilot and pilot.unlike, "rule": rule, "seed": seed}
     with worlds as (env, actor):
-        verdict = judge_policy(
-            env,
-            actor,
-            settings.episodes,
-            rule=rule,
-            sampled=draws,
-            claim=claim,
-            unlike=None if pilot is None else pilot.unlike,
-            seed=seed,
-        )
+        verdict = judge_policy(env, actor, settings.episodes, sampled=draws, **known)
     progress("judged", 1, 1)
     done = Judgement(name, settings, verdict, claim and claim.path, measured)
     if coverage is None or measured is None:

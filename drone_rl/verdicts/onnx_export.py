@@ -82,7 +82,8 @@ def export_onnx(
     Args:
         policy: The policy, or what `load_policy` takes.
         target: The file, ending in .onnx, see `drone_rl.policies.zoo.make_onnx`.
-        command: That trained it, for the metadata; None takes it from its file or folder.
+        command: The training command, for the metadata; None takes it from the policy's file or
+            folder.
         seed: Root of the random streams of the comparison; a fresh one by default.
 
     Returns:
