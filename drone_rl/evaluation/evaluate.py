@@ -136,7 +136,7 @@ def held_out_environments(
     policy: Pilot, settings: FlightSettings, seed: RootSeed
 ) -> AbstractContextManager[tuple[Any, TensorDictModuleBase]]:
     """Open environments that no training uses, and the policy as their actor."""
-    where = {"device": settings.device, "renderer": settings.renderer}
+    where: dict[str, Any] = {"device": settings.device, "renderer": settings.renderer}
     return policy.flying(settings.num_worlds, seed=seed.value, **where)
 
 

@@ -117,7 +117,7 @@ def judge_for_selection(
         InputError: The checkpoint is unusable.
     """
     policy, seed = load_policy(path), seed or root_seed(None)
-    how = {"stream": Stream.CHOICE, "device": device, "renderer": renderer}
+    how: dict[str, Any] = {"stream": Stream.CHOICE, "device": device, "renderer": renderer}
     with policy.flying(min(episodes, 250), seed=seed.value, **how) as (env, actor):
         verdict = judge_policy(env, actor, episodes, seed=seed)
         return verdict.as_dict(), policy.state["progress"]

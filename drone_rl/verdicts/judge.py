@@ -216,9 +216,9 @@ def judge_one(
         measured = find_domain(pilot, shifts, outputs)
         coverage = require(pilot, require_domain, measured) if require_domain is not None else None
         coverage = _reflown(pilot, coverage, measured, settings, seed)
-        how = {"device": settings.device, "renderer": settings.renderer}
+        where = {"device": settings.device, "renderer": settings.renderer}
         flights = settings.certificate_flights
-        claim = find_claim(pilot, certificate, flights=flights, seed=seed, **how)
+        claim = find_claim(pilot, certificate, flights=flights, seed=seed, **where)
         worlds = held_out_environments(pilot, settings, seed)
     draws, rule = settings.sampled and pilot is not None, Rule(good_share=settings.good_share)
     known = {"claim": claim, "unlike": pilot and pilot.unlike, "rule": rule, "seed": seed}
