@@ -114,11 +114,7 @@ class LocalExecutor:
     """Executes runs in parallel on this machine."""
 
     def __init__(self, num_jobs: int | None = None) -> None:
-        """Take the number of parallel runs; None for one a core.
-
-        Raises:
-            InputError: The number is less than one.
-        """
+        """Take the number of parallel runs, at least 1; None for one a core."""
         if num_jobs is not None and num_jobs < 1:
             raise InputError(f"hydra.launcher.num_jobs={num_jobs} must be at least 1, or null")
         self.num_jobs = num_jobs or num_cores()
@@ -186,12 +182,9 @@ class RayExecutor:
     """Executes runs as Ray tasks; Ray restarts the tasks of a lost node."""
 
     def __init__(self, *, address: str | None, num_cpus: float, num_gpus: float) -> None:
-        """Connect to the cluster.
+        """Connect to the cluster at an address; None starts one on this machine.
 
-        Args:
-            address: Address of the cluster; None starts one on this machine.
-            num_cpus: Cores per run.
-            num_gpus: GPUs per run, possibly a fraction.
+        A run takes so many cores and GPUs, possibly a fraction.
 
         Raises:
             InputError: Ray isn't installed or the cluster can't be reached.
@@ -199,12 +192,8 @@ class RayExecutor:
         self._ray = extra("ray", "ray", "hydra/launcher=ray")
         self._started = not self._ray.is_initialized()
         try:
-            self._ray.init(
-                address=address,
-                ignore_reinit_error=True,
-                include_dashboard=False,
-                log_to_driver=False,
-            )
+            options = {"include_dashboard": False, "log_to_driver": False}
+            self._ray.init(address=address, ignore_reinit_error=True, **options)
         except (ConnectionError, ValueError) as error:
             raise InputError(
                 f"hydra.launcher.address={address} can't be reached; start a cluster with "

@@ -127,13 +127,8 @@ class Sweep:
             {"number": r.number, "overrides": list(r.overrides), "folder": r.folder.name}
             for r in self.runs
         ]
-        content = {
-            "format": FORMAT,
-            "command": self.command,
-            "settings": self.settings,
-            "runs": runs,
-            **provenance(),
-        }
+        own = {"format": FORMAT, "command": self.command, "settings": self.settings, "runs": runs}
+        content = {**own, **provenance()}
         write_atomically(self.folder / "sweep.json", json.dumps(content, indent=2))
 
 
@@ -182,10 +177,10 @@ def _name(folder: str) -> str:
 def open_sweep(
     folder: Path, command: Sequence[str], settings: Mapping[str, Any], runs: Sequence[Run]
 ) -> Sweep:
-    """Begin a sweep in a new folder, or resume it in its folder.
+    """Begin a sweep in a new folder, created if missing, or resume it in its folder.
 
     Args:
-        folder: Folder of the sweep, created if missing.
+        folder: Folder of the sweep.
         command: The command line.
         settings: The common settings of all runs.
         runs: Known runs must be unchanged; new ones, such as those of more seeds, are added.

@@ -31,11 +31,7 @@ _log = logging.getLogger(__name__)
 
 
 def find_sweep(which: str | Path, outputs: str | Path = "outputs") -> Sweep:
-    """Return a sweep.
-
-    Args:
-        which: Its folder, or "latest" for the newest one.
-        outputs: Folder below which sweeps are stored.
+    """Return the sweep in a folder, or with "latest" the newest one below `outputs`.
 
     Raises:
         InputError: There is none.
@@ -54,8 +50,7 @@ def find_sweep(which: str | Path, outputs: str | Path = "outputs") -> Sweep:
 def write_sweep_report(sweep: Sweep) -> tuple[Path, dict[str, Any]]:
     """Write `summary.csv`, `summary.json` and `report.html` to the sweep's folder.
 
-    Returns:
-        The path of the page, and the summary.
+    Return the path of the page, and the summary.
     """
     rows = read_rows(sweep)
     summary = summarise_sweep(sweep, rows)
@@ -68,11 +63,7 @@ def write_sweep_report(sweep: Sweep) -> tuple[Path, dict[str, Any]]:
 
 
 def write_picture(sweep: Sweep, path: Path) -> None:
-    """Write a plot of verdicts, sides and entropies.
-
-    Args:
-        sweep: A sweep with judged runs.
-        path: Path of the PNG.
+    """Write a plot of verdicts, sides and entropies as PNG.
 
     Raises:
         InputError: No run of the sweep is finished and judged.
@@ -105,10 +96,7 @@ def terminal_lines(summary: dict[str, Any]) -> str:
 def judge_sweep(sweep: Sweep, episodes: int, device: str) -> None:
     """Judge the last policies of all finished runs again; log those that can't be judged.
 
-    Args:
-        sweep: The sweep.
-        episodes: Episodes per verdict, in selection environments.
-        device: Device of the rollouts.
+    Each verdict takes so many episodes, in selection environments.
     """
     from drone_rl.utils.seeding import root_seed  # imports torch
 
@@ -135,9 +123,6 @@ def judge_run(
         seed: Root of the environments' random streams, the same for all runs that are compared; a
             fresh one by default.
 
-    Returns:
-        The verdict.
-
     Raises:
         InputError: The run has no result, or its last checkpoint is unusable or does not belong to
             the result.
@@ -161,23 +146,19 @@ def judge_run(
 
 
 def render_page(name: str, summary: dict[str, Any], pictures: list[dict[str, str]]) -> str:
-    """Return the HTML page of a sweep.
+    """Return the HTML page of a sweep with this name and summary, from `summarise_sweep`.
 
-    Args:
-        name: Name of the sweep.
-        summary: From `summarise_sweep`.
-        pictures: Each with "title", "text", and data URIs for a "light" and a "dark" page.
+    Each of the plots has "title", "text", and data URIs for a "light" and a "dark" page.
     """
     environment = page_environment("drone_rl.sweeps", "drone_rl.explanations.report")  # for styles
     environment.filters |= {"figure": _figure, "code": _code}
     style = static_text(environment, STYLES)
     parts = ("runs", "verdicts", "best", "settings")
-    texts = {part: _paragraph(summary["sentences"], f"{part}.") for part in parts}
     return environment.get_template("report.html").render(
         name=name,
         figures=summary,
         pictures=pictures,
-        texts=texts,
+        texts={part: _paragraph(summary["sentences"], f"{part}.") for part in parts},
         policy=content_security_policy(style),
         style=style,
     )

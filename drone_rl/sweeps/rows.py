@@ -124,11 +124,7 @@ class Row:
 
 
 def read_rows(sweep: Sweep) -> list[Row]:
-    """Read one row for each run.
-
-    Raises:
-        InputError: The result files are too large in total.
-    """
+    """Read one row for each run; too large result files in total are an `InputError`."""
     _check_results_size(sweep)
     metrics = TablesAllowance()
     choices = [_choice(run) for run in sweep.runs]

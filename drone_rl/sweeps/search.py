@@ -21,23 +21,14 @@ _DAMAGE = (LookupError, TypeError, ValueError, AttributeError, AssertionError)
 
 
 def import_optuna() -> Any:
-    """Return the module.
-
-    Raises:
-        InputError: It isn't installed.
-    """
+    """Return the module; raise an `InputError` if it isn't installed."""
     return extra("optuna", "optuna", "hydra/sweeper=optuna")
 
 
 def open_study(folder: Path, **settings: Any) -> Any:
-    """Open the study in a sweep's folder; create it if `direction` is given.
+    """Return the `optuna.Study` in a sweep's folder; create it if `direction` is given.
 
-    Args:
-        folder: Folder of the sweep.
-        settings: Further arguments of `optuna.create_study`.
-
-    Returns:
-        An `optuna.Study`.
+    The settings are further arguments of `optuna.create_study`.
 
     Raises:
         InputError: Optuna isn't installed, or the study's file is damaged or too large.
@@ -61,11 +52,7 @@ def open_study(folder: Path, **settings: Any) -> Any:
 
 
 def _check_journal(path: Path) -> None:
-    """Check the journal's size and operation codes.
-
-    Raises:
-        InputError: The journal is too large or damaged.
-    """
+    """Check the journal's size and operation codes."""
     if not path.exists() or (path.is_file() and path.stat().st_size == 0):
         return
     content = read_bytes(path, JOURNAL_BYTES)
@@ -81,7 +68,7 @@ def _check_journal(path: Path) -> None:
 
 
 def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> list[Any]:
-    """Return the unfinished trials of an interrupted search, or else new ones.
+    """Return the unfinished trials of an interrupted search, or else `count` new ones.
 
     Args:
         study: From `open_study`.
@@ -106,12 +93,12 @@ def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> 
 
 def note_outcome(study: Any, number: int, result: Mapping[str, Any] | None) -> None:
     """Report the outcome of a trial: its running mean of rewards, pruned or failed."""
-    optuna = import_optuna()
-    if study.trials[number].state != optuna.trial.TrialState.RUNNING:
+    states = import_optuna().trial.TrialState
+    if study.trials[number].state != states.RUNNING:
         return
     if result is None:
-        study.tell(number, state=optuna.trial.TrialState.FAIL)
+        study.tell(number, state=states.FAIL)
     elif result["reason"] == "pruned":
-        study.tell(number, state=optuna.trial.TrialState.PRUNED)
+        study.tell(number, state=states.PRUNED)
     else:
         study.tell(number, float(result["running_reward"]))

@@ -181,15 +181,10 @@ def _to_solve(rows: Sequence[Row], had: Sequence[float]) -> dict[str, Any]:
 
 
 def share_of_runs(successes: int, unknown: int, trials: int) -> dict[str, Any]:
-    """Return a fraction of runs with an interval that holds whatever the unknown runs are.
+    """Return a fraction of all runs with an interval that holds whatever the unknown runs are.
 
-    Args:
-        successes: Runs known to be successes.
-        unknown: Runs that may all be successes, or none.
-        trials: All runs, including the unknown ones.
-
-    Returns:
-        As `proportion`, with "unknown".
+    The unknown runs may all be successes, or none. The result is that of `proportion`, with
+    "unknown".
     """
     upper = proportion(successes + unknown, trials)["upper95"]
     return {**proportion(successes, trials), "upper95": upper, "unknown": unknown}
@@ -220,13 +215,9 @@ def median_of_runs(values: Sequence[float], had: Sequence[float] | None = None) 
 
 
 def median_band(values: Array) -> tuple[Array, Array] | None:
-    """Return the pointwise exact interval of the median.
+    """Return the pointwise exact interval of the median of values, a row per run.
 
-    Args:
-        values: One row per run. Shape: (num_runs, num_points).
-
-    Returns:
-        Lower and upper bounds, of shape (num_points,) each; None of fewer than six runs.
+    Lower and upper bounds have shape (num_points,) each; None of fewer than six runs.
     """
     bounds = [median_bounds(column) for column in np.asarray(values, float).T]
     known = [pair for pair in bounds if pair is not None]
@@ -237,13 +228,8 @@ def median_band(values: Array) -> tuple[Array, Array] | None:
 
 
 def on_grid(x: Array, y: Array, grid: Array) -> Array:
-    """Interpolate a curve; it is 0 before its first point and constant after its last.
+    """Interpolate a curve on a grid; it is 0 before its first point and constant after its last.
 
-    Args:
-        x: Increasing positions; empty for a run without progress. Shape: (n,).
-        y: Values there. Shape: (n,).
-        grid: Positions of the result.
+    The positions rise; they are empty for a run without progress. Shapes: (n,) of both.
     """
-    if len(x) == 0:
-        return np.zeros_like(grid)
-    return np.interp(grid, x, y, left=0.0)
+    return np.interp(grid, x, y, left=0.0) if len(x) else np.zeros_like(grid)
