@@ -15,70 +15,55 @@ def from_to(values: list) -> str:
     return f"{values[0]}" if len(values) == 1 else f"{values[0]} to {values[-1]}"
 
 
-def count(summary: Evidence) -> int:
-    """Count all runs."""
-    return len(summary["runs"])
-
-
 def readable(group: Evidence) -> int:
     """Count the ended runs of a setting with readable files."""
     return group["ended"] - group["damaged"]
 
 
-def few(summary: Evidence) -> int:
-    """Count the settings with readable runs, but too few for an interval of the median."""
-    return sum(0 < readable(group) < FEWEST for group in summary["groups"])
+def counts(summary: Evidence) -> dict[str, int]:
+    """Return numbers of runs and settings.
+
+    "few": settings with readable runs, but too few for an interval of the median; "censored":
+    settings of which at least half of the runs never reached the target; "left", "right": runs
+    whose policy collects on this side only; "still": finished runs with a practically deterministic
+    policy; "entropies": judged runs with a known final entropy.
+    """
+    runs, groups = summary["runs"], summary["groups"]
+    kinds = [run["verdict"] for run in runs]
+    known = [run for run in runs if run["entropy"] is not None]
+    solved = sum(group["solved"]["successes"] for group in groups)
+    return {
+        "ended": len(runs) - summary["unfinished"],
+        "solved": solved,
+        "unsolved": summary["finished"] + summary["failed"] - solved,
+        "few": sum(0 < readable(group) < FEWEST for group in groups),
+        "censored": sum(group["frames_to_solve"]["more_than"] is not None for group in groups),
+        "left": kinds.count("one-sided (left)"),
+        "right": kinds.count("one-sided (right)"),
+        "still": sum(run["state"] == "finished" and run["entropy"] < STILL for run in known),
+        "entropies": sum(run["certain"] is not None for run in known),
+    }
 
 
-def censored(summary: Evidence) -> int:
-    """Count the settings of which at least half of the runs never reached the target."""
-    return sum(group["frames_to_solve"]["more_than"] is not None for group in summary["groups"])
-
-
-def solved(summary: Evidence) -> int:
-    """Count the runs that reached their target."""
-    return sum(group["solved"]["successes"] for group in summary["groups"])
-
-
-def ended(summary: Evidence) -> int:
-    """Count the runs that are finished, failed or damaged."""
-    return count(summary) - summary["unfinished"]
-
-
-def unsolved(summary: Evidence) -> int:
-    """Count the runs that ended without reaching their target."""
-    return summary["finished"] + summary["failed"] - solved(summary)
-
-
-def one_sided(summary: Evidence, kept: str) -> int:
-    """Count the runs with a policy that collects on one side only, "left" or "right"."""
-    return sum(run["verdict"] == f"one-sided ({kept})" for run in summary["runs"])
-
-
-def still(summary: Evidence) -> int:
-    """Count the finished runs with a practically deterministic policy."""
-    runs = [run for run in summary["runs"] if run["state"] == "finished"]
-    return sum(run["entropy"] is not None and run["entropy"] < STILL for run in runs)
-
-
-def entropies(summary: Evidence) -> int:
-    """Count the judged runs with a known final entropy."""
-    judged = [run for run in summary["runs"] if run["certain"] is not None]
-    return sum(run["entropy"] is not None for run in judged)
-
-
-def _if_any(name: str, condition: str, number: Callable[[Evidence], int], text: str) -> Sentence:
+def _if_any(
+    name: str, condition: str, number: str | Callable[[Evidence], int], text: str
+) -> Sentence:
     """Return a sentence that is included if a number is positive.
 
-    Its text formats {e}, the evidence; {n}, the number; {runs}, such as "3 runs"; and {settings},
-    the number of settings.
+    The number is an entry of the evidence or one of `counts`. The text formats {e}, the evidence;
+    {n}, the number; {runs}, such as "3 runs"; and {settings}, the number of settings.
     """
 
+    def count(e: Evidence) -> int:
+        if not isinstance(number, str):
+            return number(e)
+        return e[number] if number in e else counts(e)[number]
+
     def fill(e: Evidence) -> str:
-        n, settings = number(e), len(e.get("groups", ()))
+        n, settings = count(e), len(e.get("groups", ()))
         return text.format(e=e, n=n, runs=plural(n, "run"), settings=settings)
 
-    return Sentence(name, condition, lambda e: number(e) > 0, fill)
+    return Sentence(name, condition, lambda e: count(e) > 0, fill)
 
 
 SENTENCES = (
@@ -87,60 +72,60 @@ SENTENCES = (
         "always",
         lambda e: True,
         lambda e: (
-            f"{plural(count(e), 'run')}: {e['finished']} finished, {e['failed']} failed, "
+            f"{plural(len(e['runs']), 'run')}: {e['finished']} finished, {e['failed']} failed, "
             f"{e['damaged']} damaged, {e['unfinished']} unfinished."
         ),
     ),
     _if_any(
         "runs.read",
         "a run has ended",
-        ended,
+        "ended",
         "All figures of {runs} were read from files in their folders and not measured again.",
     ),
     _if_any(
         "runs.failed",
         "a run failed",
-        lambda e: e["failed"],
+        "failed",
         "Fractions are of all runs that ended: {runs} that failed count as not solved, as having "
         "learned nothing, and among the verdicts as failed.",
     ),
     _if_any(
         "runs.damaged",
         "a run's files can't be read",
-        lambda e: e["damaged"],
+        "damaged",
         "The files of {runs} can't be read: intervals of fractions allow for any outcome of these; "
         "medians and curves leave them out.",
     ),
     _if_any(
         "runs.copies",
         "runs have the same figures, measured seconds included",
-        lambda e: e["copies"],
+        "copies",
         "{runs} with exactly the figures of another run, seconds included: probably copies of one "
         "training, which count more than once.",
     ),
     _if_any(
         "runs.unfinished",
         "a run has not ended",
-        lambda e: e["unfinished"],
+        "unfinished",
         "{runs} not ended yet: left out of every fraction and median.",
     ),
     _if_any(
         "runs.solved_none",
         "runs ended and none was solved",
-        lambda e: ended(e) > 0 and solved(e) == 0,
+        lambda e: counts(e)["ended"] > 0 and counts(e)["solved"] == 0,
         "No run was stopped by reaching its target.",
     ),
     _if_any(
         "runs.few",
         f"a setting has some ended runs, but fewer than {FEWEST}",
-        few,
+        "few",
         f"{{n}} of {{settings}} settings with fewer than {FEWEST} ended runs: their medians have "
         "no valid interval, so that none is shown.",
     ),
     _if_any(
         "runs.censored",
         "a setting of whose runs at least half never reached the target",
-        censored,
+        "censored",
         "At {n} of {settings} settings at least half of the runs ended without reaching the "
         "target: the median cost to solve is greater (>) than the value shown.",
     ),
@@ -172,14 +157,14 @@ SENTENCES = (
     _if_any(
         "verdicts.older_rule",
         "a run has an evaluation, but no verdict by the present rule",
-        lambda e: e["judged_by_older_rule"],
+        "judged_by_older_rule",
         "{runs} judged by an older rule: not counted; the intervals of kinds allow for any. Judge "
         "again: `{e[judge_command]}`",
     ),
     _if_any(
         "verdicts.missing",
         "a finished run was never judged",
-        lambda e: e["never_judged"],
+        "never_judged",
         "{runs} finished and not judged; the intervals of kinds allow for any. Judge: "
         "`{e[judge_command]}`",
     ),
@@ -228,19 +213,19 @@ SENTENCES = (
     _if_any(
         "curves.runs",
         f"a setting with fewer than {FEWEST} ended runs",
-        few,
+        "few",
         f"Thin lines: single runs, where fewer than {FEWEST} have ended.",
     ),
     _if_any(
         "curves.ends",
         "a run has finished",
-        lambda e: e["finished"],
+        "finished",
         "The curve of a finished run is extended by its last value.",
     ),
     _if_any(
         "curves.failed",
         "a run failed",
-        lambda e: e["failed"],
+        "failed",
         "A failed run counts as having learned nothing.",
     ),
     Sentence(
@@ -248,8 +233,8 @@ SENTENCES = (
         "a policy was judged",
         lambda e: e["judged"] > 0,
         lambda e: (
-            f"Fraction of all {ended(e)} runs that ended; bars: exact 95% (Clopper-Pearson) "
-            "intervals over runs."
+            f"Fraction of all {counts(e)['ended']} runs that ended; bars: exact 95% "
+            "(Clopper-Pearson) intervals over runs."
         ),
     ),
     _if_any(
@@ -262,50 +247,50 @@ SENTENCES = (
     _if_any(
         "sides.lost_left",
         "a policy is one-sided to the right",
-        lambda e: one_sided(e, "right"),
+        "right",
         "{runs} one-sided to the right.",
     ),
     _if_any(
         "sides.lost_right",
         "a policy is one-sided to the left",
-        lambda e: one_sided(e, "left"),
+        "left",
         "{runs} one-sided to the left.",
     ),
     _if_any(
         "sides.not_offered",
         "a policy was offered no cube on a side",
-        lambda e: e["sides_not_offered"],
+        "sides_not_offered",
         "{runs} without a dot: one side had no cubes.",
     ),
     _if_any(
         "entropies.dots",
         "a judged run has an entropy",
-        entropies,
+        "entropies",
         "Each dot is a judged run: the mean entropy of its policy over the last updates; the line "
         "is that of three actions of the same probability.",
     ),
     _if_any(
         "entropies.still",
         f"a finished run ended below {STILL} nats",
-        still,
+        "still",
         f"{{runs}} ended below {STILL} nats: these policies are practically deterministic.",
     ),
     _if_any(
         "costs.dots",
         "a run was solved",
-        solved,
+        "solved",
         "Each dot is a run that reached its target; above: their number, of the runs that ended.",
     ),
     _if_any(
         "costs.open",
         "a run ended without reaching its target",
-        unsolved,
+        "unsolved",
         "Each open triangle is a run that ended without (red: failed): it needs more than that.",
     ),
     _if_any(
         "settings.intervals",
         "a run has ended",
-        ended,
+        "ended",
         "Fractions are of all runs that ended, with exact (Clopper-Pearson) 95% intervals; "
         f"medians of at least {FEWEST} runs have intervals by order statistics.",
     ),
@@ -331,7 +316,7 @@ GROUP_SENTENCES = (
     _if_any(
         "group.solved",
         "a run of the setting has ended",
-        lambda g: g["ended"],
+        "ended",
         "solved {e[solved][successes]} of {n}",
     ),
     Sentence(

@@ -29,7 +29,6 @@ SUMMARY = {
 @pytest.mark.parametrize(
     ("name", "number"),
     [
-        ("count", 7),
         ("ended", 5),  # 7 runs, 2 of them unfinished
         ("solved", 3),
         ("unsolved", 2),  # 4 + 1 that ended, 3 solved
@@ -37,16 +36,16 @@ SUMMARY = {
         ("censored", 1),
         ("still", 1),  # 0.0099 nats; the failed run does not count
         ("entropies", 2),  # of the judged ones
+        ("left", 2),
+        ("right", 1),
     ],
 )
 def test_counts(name, number):
-    assert getattr(sweep_counts, name)(SUMMARY) == number
+    assert sweep_counts.counts(SUMMARY)[name] == number
 
 
-def test_counts_of_one_setting_and_one_side():
+def test_readable_runs_of_a_setting():
     assert [sweep_counts.readable(group) for group in SUMMARY["groups"]] == [6, 5, 0]
-    assert sweep_counts.one_sided(SUMMARY, "left") == 2
-    assert sweep_counts.one_sided(SUMMARY, "right") == 1
 
 
 def test_numbers_in_words():
