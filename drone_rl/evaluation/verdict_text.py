@@ -59,7 +59,6 @@ def _basis(evidence: Evidence) -> str:
 
 
 def _checked(proof: Evidence) -> str:
-    """The number of rollouts that re-checked it, and what they rule out."""
     bound = proof.get("wrong_at_most")
     if bound is None:
         return "It was read from its file and not re-checked, so it proves nothing here."
@@ -114,14 +113,11 @@ def _every(evidence: Evidence) -> str:
     return f"{terms.reaches} every {terms.goal}"
 
 
-def best_baseline(evidence: Evidence) -> str:
-    """Return the random or constant baseline that collects most."""
-    return _best(evidence, lambda flown: flown["shares"]["all"]["mean"])
-
-
-def _best(evidence: Evidence, figure: Callable[[Evidence], float]) -> str:
-    blind = {name: f for name, f in evidence["baselines"].items() if name != "oracle"}
-    return max(blind, key=lambda name: figure(blind[name]))
+def best_baseline(evidence: Evidence, figure: Callable[[Evidence], float] | None = None) -> str:
+    """Return the random or constant baseline that collects most, or with the greatest figure."""
+    figure = figure or (lambda flown: flown["shares"]["all"]["mean"])
+    blind = {name: figure(f) for name, f in evidence["baselines"].items() if name != "oracle"}
+    return max(blind, key=lambda name: blind[name])
 
 
 def _acting(baseline: str) -> str:
@@ -172,7 +168,7 @@ def _trivial(evidence: Evidence) -> str:
 
 
 def _most_successful(evidence: Evidence) -> str:
-    return _best(evidence, lambda flown: flown["success"]["share"])
+    return best_baseline(evidence, lambda flown: flown["success"]["share"])
 
 
 def _no_better(evidence: Evidence) -> str:

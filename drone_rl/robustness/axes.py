@@ -29,8 +29,6 @@ from drone_rl.robustness.shifts_text import TABLE
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.utils.errors import InputError
 
-NUMBERS = (1, 2, 3, 4, 5)
-"""Numbers of the strengths, weakest first."""
 TOGETHER = 3
 """Number of the strength at which all axes are combined."""
 
@@ -178,7 +176,7 @@ _MAKE: dict[str, Callable[[float, PolicySpec], Condition]] = {
     "action_delay": lambda s, _: Condition(delay=round(s)),
 }
 _VALUE: dict[str, Callable[[float, PolicySpec], float]] = {
-    "field_of_view": lambda s, of: _field_of_view(s, of),
+    "field_of_view": _field_of_view,
     "object_size": lambda s, of: _times(_size(of), s, of),
     "step_length": lambda s, of: _times("step_length", s, of),
 }
@@ -208,11 +206,7 @@ GROUPS = tuple(dict.fromkeys(axis.group for axis in AXES.values()))
 
 
 def check_axes(names: Iterable[str]) -> None:
-    """Refuse unknown names.
-
-    Raises:
-        InputError: One of the names is neither an axis nor a group.
-    """
+    """Raise an `InputError` if one of the names is neither an axis nor a group."""
     for name in names:
         if name not in (*GROUPS, *AXES):
             known = ", ".join(dict.fromkeys((*GROUPS, *AXES)))
@@ -220,11 +214,7 @@ def check_axes(names: Iterable[str]) -> None:
 
 
 def find_axes(names: Iterable[str] | None, subject: PolicySpec) -> list[Axis]:
-    """Return axes by name or by group, in the order of `AXES`.
-
-    Args:
-        names: Which; all that the task has by default.
-        subject: The policy to evaluate.
+    """Return axes by name or by group, by default all that the task has, in the order of `AXES`.
 
     Raises:
         InputError: A name is unknown, or the axis is not for this task.

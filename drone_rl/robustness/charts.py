@@ -31,8 +31,7 @@ _LABEL = 190
 def chart(numbers: Mapping[str, Any]) -> Figure:
     """Plot success rate over strength by axis, with 95% intervals, the oracle and the range.
 
-    Args:
-        numbers: As in `shifts.json`.
+    `numbers` are those of `shifts.json`.
     """
     axes = numbers["axes"]
     rows = -(-(len(axes) + 1) // _COLUMNS)
@@ -109,9 +108,8 @@ def strips(
 ) -> Image.Image:
     """Arrange camera images at each strength, one row per axis, with success rates.
 
-    Args:
-        numbers: As in `shifts.json`.
-        pictures: By axis, without perturbation and at each strength. Shapes: (H, W, 3).
+    `numbers` are those of `shifts.json`; `pictures` are by axis, without perturbation and at each
+    strength. Shapes: (H, W, 3).
     """
     rows = [_strip(name, numbers["axes"][name], shown) for name, shown in pictures.items()]
     return stacked(rows, gap=0)
@@ -124,7 +122,10 @@ def _strip(name: str, along: Mapping[str, Any], pictures: Sequence[NDArray | Non
     cells = [titled(enlarge(first, _SCALE), "as it was trained")]
     for number, picture in enumerate(pictures[1:], 1):
         if picture is not None and number in by_number:
-            cells.append(titled(enlarge(picture, _SCALE), _caption(by_number[number], along)))
+            level = by_number[number]
+            success = percent(level["modes"]["constant"]["success"]["share"])
+            caption = f"{level['value']:.3g}: success rate {success}"
+            cells.append(titled(enlarge(picture, _SCALE), caption))
     strip = gridded(cells, len(cells), gap=8)
     height = strip.height
     canvas = Image.new("RGB", (_LABEL + 6 * (cells[0].width + 8), height + 6), BACKGROUND)
@@ -133,8 +134,3 @@ def _strip(name: str, along: Mapping[str, Any], pictures: Sequence[NDArray | Non
     pen.multiline_text((4, height // 2 - 16), NAMES[name], INK, ImageFont.load_default(15))
     pen.text((4, height // 2 + 6), along["unit"], MUTED, ImageFont.load_default(13))
     return canvas
-
-
-def _caption(level: Mapping[str, Any], along: Mapping[str, Any]) -> str:
-    success = level["modes"]["constant"]["success"]["share"]
-    return f"{level['value']:.3g}: success rate {percent(success)}"

@@ -142,11 +142,15 @@ def shifts(
     with closing(PairedEvaluator(subject, 1, seed.value)) as filmed:
         pictures = {axis.name: make_strip(filmed, axis) for axis in axes}
     progress("flown", total, total)
+    identity = None  # of a third-party policy
+    if isinstance(pilot, Policy):
+        described = pilot.description.as_dict()
+        identity = {"weights": fingerprint(pilot.state["policy"]), "description": described}
     numbers = {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
         "policy": pilot.name,
-        "network": _identity(pilot),
+        "network": identity,
         "settings": settings.values(),
         **seed.as_dict(),
         "terms": as_task(subject.task).vocabulary.as_dict(),
@@ -186,14 +190,6 @@ def _domain(
             tell(f"range of {axis.name}")
             ranges[axis.name] = prober.search(axis)
     return {"plain": prober.plain, "ranges": ranges}
-
-
-def _identity(pilot: Pilot) -> dict[str, Any] | None:
-    """Hash and description of the policy; None for a third-party one."""
-    if not isinstance(pilot, Policy):
-        return None
-    described = pilot.description.as_dict()
-    return {"weights": fingerprint(pilot.state["policy"]), "description": described}
 
 
 def make_policy_spec(pilot: Pilot, settings: ShiftSettings) -> PolicySpec:

@@ -74,12 +74,7 @@ class SavedShifts:
 def read_shifts(
     path: Path, described: PolicyDescription, weights: Mapping[str, torch.Tensor]
 ) -> SavedShifts:
-    """Read a robustness evaluation from a file.
-
-    Args:
-        path: The JSON file.
-        described: Description of the policy, in its task.
-        weights: Of its network.
+    """Read the robustness evaluation of a policy in its task from a JSON file.
 
     Raises:
         InputError: It is missing, damaged, of another network, camera or task, or contradicts

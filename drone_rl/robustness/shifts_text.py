@@ -2,7 +2,7 @@
 
 import math
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -53,12 +53,10 @@ def is_tested(e: Evidence, name: str) -> bool:
     return bool(flown) and not flown[-1]["unchanged"]
 
 
-def _wide(e: Evidence) -> Iterator[str]:
+def _wide(e: Evidence) -> list[str]:
     """Axes with a range in which the policy is good."""
-    for name, found in _ranges(e).items():
-        has_width = found["positions"] is not None and found["positions"][0] < found["positions"][1]
-        if has_width and is_tested(e, name):
-            yield name
+    limits = {name: found["positions"] or (0.0, 0.0) for name, found in _ranges(e).items()}
+    return [name for name, (low, high) in limits.items() if low < high and is_tested(e, name)]
 
 
 def _shut(e: Evidence, is_sure: bool) -> list[str]:
@@ -130,7 +128,6 @@ def _at(e: Evidence, name: str, value: float) -> str:
 
 
 def _why(e: Evidence, found: Mapping[str, Any]) -> str:
-    """How it fails."""
     if found["refused"] is not None:
         return ", which the task does not allow"
     worst = found["worst"]
@@ -173,7 +170,7 @@ SHIFTS = (
     Sentence(
         "shifts.good",
         "certainly good without perturbation and up to both ends of a range with an effect",
-        lambda e: any(True for _ in _wide(e)),
+        lambda e: bool(_wide(e)),
         _good,
     ),
     Sentence(
@@ -218,7 +215,7 @@ SHIFTS = (
     Sentence(
         "shifts.scope",
         "a range was found",
-        lambda e: any(True for _ in _wide(e)),
+        lambda e: bool(_wide(e)),
         lambda e: (
             "Tested within each range, with constant perturbations: its limits, the strengths of "
             "the table and a random one between each two; not tested: other strengths, and "
@@ -312,11 +309,8 @@ def needed_range(along: Evidence, need: Mapping[str, float | None]) -> tuple[flo
 def contradicted(name: str | None, value: float, unit: str, probed: Evidence) -> str | None:
     """Return how new episodes contradict a file, or None if they do not.
 
-    Args:
-        name: Of the axis; None without perturbation.
-        value: Of the axis.
-        unit: Of the axis.
-        probed: See `drone_rl.robustness.domain.Prober.probe`.
+    They are at a value of an axis (None without perturbation); see
+    `drone_rl.robustness.domain.Prober.probe` for their result.
     """
     if not probed["bad"]:
         return None
@@ -330,12 +324,10 @@ def contradicted(name: str | None, value: float, unit: str, probed: Evidence) ->
 
 
 def lacking(shifts: Evidence, name: str, need: Mapping[str, float | None]) -> str | None:
-    """Return what an operating domain lacks of a required range, or None.
+    """Return what an operating domain lacks of a required range of an axis, or None.
 
-    Args:
-        shifts: As in `shifts.json`, with ranges.
-        name: Of the axis.
-        need: Its "low" and "high"; None for the value without perturbation, or the other end.
+    In the range None is the value without perturbation, or the other end. `shifts` are those of
+    `shifts.json`, with ranges.
     """
     found, along = shifts["domain"]["ranges"].get(name), shifts["axes"].get(name)
     if found is None or along is None:

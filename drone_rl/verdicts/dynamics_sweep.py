@@ -97,7 +97,11 @@ def bodies(
     given = list(settings.policies) if policies is None else policies
     whom = given if isinstance(given, list | tuple) else [given]
     pilots = [as_pilot(one, outputs) for one in whom]
-    _check_names([pilot.name for pilot in pilots])
+    names = [pilot.name for pilot in pilots]
+    if not names:
+        raise InputError("policies=[] names nobody; give a policy or more")
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise InputError(f"two policies are called {twice}; give each once, or rename a file")
     asked = settings.narrowed(JudgeSettings)
     found: dict[str, dict[str, Any]] = {}
     steps = len(pilots) * (len(settings.bodies) + bool(settings.loop_flights))
@@ -129,14 +133,6 @@ def _looped(pilot: Pilot, settings: BodiesSettings, seed: RootSeed) -> dict[str,
         return evaluate_in_the_loop(still, count, drawn_seed=seed, progress=silent).as_dict()
     except (InputError, FlightControllerError) as error:
         return {"left_out": str(error)}
-
-
-def _check_names(names: list[str]) -> None:
-    if not names:
-        raise InputError("policies=[] names nobody; give a policy or more")
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"two policies are called {name}; give each once, or rename a file")
 
 
 def changes_of(body: str, own: DynamicsSettings) -> Mapping[str, Any]:
@@ -202,8 +198,7 @@ def _interval(success: Evidence) -> str:
 def chart(numbers: Mapping[str, Any]) -> Figure:
     """Draw a coloured table: verdict, success rate with 95% interval, and largest failure.
 
-    Args:
-        numbers: As in `bodies.json`.
+    `numbers` are those of `bodies.json`.
     """
     policies, looped = numbers["policies"], numbers.get(LOOPED, {})
     bodies = [*numbers["bodies"], *([LOOPED] if looped else [])]

@@ -188,11 +188,9 @@ def _flights(verdict: Evidence) -> str:
         "oracle": verdict["baselines"]["oracle"],
     }
     flown = {name: flights for name, flights in flown.items() if flights is not None}
-    rows = [["", *flown], ["---"] * (1 + len(flown))]
     terms = terms_of(verdict)
-    rows.append(
-        [f"episodes with all {terms.goals}", *(_share(f["success"]) for f in flown.values())]
-    )
+    successes = (_share(flights["success"]) for flights in flown.values())
+    rows = [["", *flown], [f"episodes with all {terms.goals}", *successes]]
     for side in verdict["greedy"]["shares"]:
         label = f"{terms.goals} {terms.reached}" if side == "all" else f"of those {side}"
         rows.append([label, *(_share(f["shares"][side]) for f in flown.values())])
@@ -204,17 +202,19 @@ def _failures(failures: Evidence) -> str:
     largest = failures["largest"]
     if largest is None:
         upper = f"{100 * failures['bound']['upper95']:.1f}% of episodes"
-        return _table([["fails", "never"], ["---"] * 2, ["upper bound", upper]])
+        return _table([["fails", "never"], ["upper bound", upper]])
     failed = [row for row in failures["rows"] if row["failed"] and row != largest]
     rows = [
         [f"{row['by']}: {row['value']}", str(row["failed"]), str(row["episodes"]), _share(row)]
         for row in (largest, *failed)
     ]
-    return _table([["fails first at", "episodes", "of", "share"], ["---"] * 4, *rows])
+    return _table([["fails first at", "episodes", "of", "share"], *rows])
 
 
 def _table(rows: list[list[str]]) -> str:
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    head, *rest = rows
+    lines = [head, ["---"] * len(head), *rest]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def _share(value: Evidence) -> str:

@@ -121,7 +121,6 @@ class PathCommand(Command):
         yaw_control: YawControl | None = None,
         lookahead: float = AUTOMATIC,
         adaptive: float = 1.0,
-        accuracy: float = ACCURACY,
         braking: float = 1.8,
     ) -> None:
         """Create the command.
@@ -134,10 +133,9 @@ class PathCommand(Command):
             yaw_control: Heading control.
             lookahead: See `lookahead_of`.
             adaptive: See `lookahead_of`.
-            accuracy: Distance from the last point, metres, at which the command is complete.
             braking: See `braking_time`.
         """
-        self.limit, self.accuracy, self.adaptive = limit, accuracy, adaptive
+        self.limit, self.adaptive = limit, adaptive
         self.paths = make_paths(torch.cat([body.position[:, None], points], 1))
         """The paths, from the position at the start through all waypoints."""
         self.speed = torch.as_tensor(speed, dtype=torch.float64).expand(len(points))
@@ -169,7 +167,7 @@ class PathCommand(Command):
     def is_complete(self, body: FlightState) -> Tensor:
         """Return which drones are near the last point, with no other waypoint before it."""
         is_last = self.along + self._ahead >= self.paths.lengths
-        return is_last & ((self.paths.ends - body.position).norm(dim=-1) <= self.accuracy)
+        return is_last & ((self.paths.ends - body.position).norm(dim=-1) <= ACCURACY)
 
     def rest(self, body: FlightState) -> Tensor:
         """Return the last points, with the commanded heading if there is one."""
