@@ -46,7 +46,7 @@ class Episodes:
     @classmethod
     def joined(cls, parts: Sequence["Episodes"]) -> "Episodes":
         """Concatenate episodes of one task."""
-        goals = Goals.joined([part.goals for part in parts])
+        goals = type(parts[0].goals).joined([part.goals for part in parts])
         ends, lengths = ([getattr(p, name) for p in parts] for name in ("end_reason", "length"))
         return cls(parts[0].task, goals, torch.cat(ends), torch.cat(lengths))
 

@@ -151,12 +151,7 @@ def film_episode(
 def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
     """Write RGB frames of one size as MP4 and, at half the size, as GIF; return the two files.
 
-    Args:
-        frames: RGB frames.
-        path: Without suffix.
-
-    Raises:
-        InputError: The files can't be written.
+    The path is without suffix. Files that can't be written are an `InputError`.
     """
     files = [path.with_suffix(".mp4"), path.with_suffix(".gif")]
     try:
@@ -188,16 +183,11 @@ def _look(base: DroneEnv) -> _Seen:
     five = worlds.view(_FIVE, height=STRIP_HEIGHT, width=(WIDTH + GAP) // len(_FIVE) - GAP)
     outside = render_chase(worlds, look, CHASE_HEIGHT, WIDTH)[0]
     strip = worlds.render_all(worlds.state, five, look)["rgb"][0]
-    return _Seen(base.last_pixels[0], outside, strip, _panel(worlds))
-
-
-def _panel(worlds: Worlds) -> Image.Image | None:
-    """Instruments of the first environment's drone, if it has flight dynamics."""
-    body, dynamics = worlds.state.body, worlds.dynamics
-    if not (isinstance(body, FlightState) and isinstance(dynamics, Quadrotor)):
-        return None
-    reading, settings = instruments.read(body), dynamics.settings
-    return instruments.panel(reading, settings.velocity_limit, settings.hover_throttle)
+    body, dynamics, panel = worlds.state.body, worlds.dynamics, None
+    if isinstance(body, FlightState) and isinstance(dynamics, Quadrotor):
+        reading, of = instruments.read(body), dynamics.settings
+        panel = instruments.panel(reading, of.velocity_limit, of.hover_throttle)
+    return _Seen(base.last_pixels[0], outside, strip, panel)
 
 
 def _compose(

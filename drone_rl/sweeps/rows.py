@@ -125,8 +125,10 @@ class Row:
 
 def read_rows(sweep: Sweep) -> list[Row]:
     """Read one row for each run; too large result files in total are an `InputError`."""
-    _check_results_size(sweep)
-    metrics = TablesAllowance()
+    results, metrics = Allowance(SWEEP_RESULTS_BYTES), TablesAllowance()
+    for path in (path for run in sweep.runs for path in (run.folder / "result.json", run.failure)):
+        with contextlib.suppress(OSError):  # bound the total size; each reader bounds its file
+            results.take(path.stat().st_size, f"the results of {sweep.folder}: {path.name}")
     choices = [_choice(run) for run in sweep.runs]
     keys = list(dict.fromkeys(key for choice in choices for key in choice))
     swept = [key for key in keys if len({choice.get(key) for choice in choices}) > 1]
@@ -139,15 +141,6 @@ def read_rows(sweep: Sweep) -> list[Row]:
 def _choice(run: Run) -> dict[str, str]:
     parts = (override.partition("=") for override in run.overrides)
     return {key.lstrip("+"): value for key, _, value in parts if key != "trial"}
-
-
-def _check_results_size(sweep: Sweep) -> None:
-    """Bound the total size; each reader bounds its file."""
-    allowance = Allowance(SWEEP_RESULTS_BYTES)
-    for run in sweep.runs:
-        for path in (run.folder / "result.json", run.failure):
-            with contextlib.suppress(OSError):
-                allowance.take(path.stat().st_size, f"the results of {sweep.folder}: {path.name}")
 
 
 def _read_row(run: Run, choice: dict[str, str], metrics: TablesAllowance) -> Row:

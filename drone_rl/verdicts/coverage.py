@@ -1,5 +1,6 @@
 """Find a policy's operating domain, compare it with a required one, and re-run a sample of it."""
 
+import bisect
 import dataclasses
 from collections.abc import Iterator, Mapping
 from contextlib import closing, suppress
@@ -113,17 +114,12 @@ class Coverage:
 def find_domain(
     policy: Pilot, given: str | Path | None = None, outputs: str | Path = "outputs"
 ) -> SavedShifts | None:
-    """Find the robustness evaluation of a policy in its task.
+    """Find the robustness evaluation of a policy in its task; return None if there is none.
 
-    Args:
-        policy: The policy, in its task.
-        given: The file, or a folder with a shifts.json; by default the file next to the policy
-            (`drone_rl.policies.zoo.shifts_path`), otherwise the newest that `drone-rl shifts`
-            wrote for it, preferably one with ranges.
-        outputs: Folder of all runs.
-
-    Returns:
-        None if there is none. An invalid file next to the policy is returned as refused.
+    It is the given file or the shifts.json of the given folder, by default the file next to the
+    policy (`drone_rl.policies.zoo.shifts_path`), otherwise the newest one below `outputs` that
+    `drone-rl shifts` wrote for it, preferably one with ranges. An invalid file next to the policy
+    is returned as refused.
 
     Raises:
         InputError: The given file is unreadable, of another network or task, or contradicts itself.
@@ -236,12 +232,9 @@ def recheck_domain(
 ) -> DomainRecheck:
     """Run new episodes at the ends of the required ranges and at random strengths within them.
 
-    Args:
-        policy: The policy, in its task.
-        needs: By axis, see `read_requirements`.
-        numbers: As in `shifts.json`, with the axes.
-        settings: `domain_flights`, `good_share`, device and renderer count.
-        seed: Root of the random streams of the sample and of its environments.
+    `needs` are from `read_requirements`, `numbers` as in `shifts.json`; the settings have
+    `domain_flights` and `good_share`. `seed` is the root of the random streams of the sample and of
+    its environments.
     """
     from drone_rl.robustness.shifts import make_policy_spec  # slow to import: it draws charts
 
@@ -296,10 +289,9 @@ def _strengths(
 
 def _fewest(episodes: int, rule: Rule) -> int:
     """Fewest successes that do not contradict, with an oracle that always succeeds."""
-    least, most = 0, episodes
-    while least < most:
-        middle = (least + most) // 2
-        values = np.repeat([1.0, 0.0], [middle, episodes - middle]) - rule.good_share
-        upper = mean_bounds(values, -rule.good_share, 1.0, rule.confidence)["upper95"]
-        least, most = (least, middle) if upper > 0 else (middle + 1, most)
-    return least
+
+    def is_consistent(successes: int) -> bool:
+        values = np.repeat([1.0, 0.0], [successes, episodes - successes]) - rule.good_share
+        return mean_bounds(values, -rule.good_share, 1.0, rule.confidence)["upper95"] > 0
+
+    return bisect.bisect_left(range(episodes), True, key=is_consistent)
