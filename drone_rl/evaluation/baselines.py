@@ -97,15 +97,10 @@ def run_baselines(
     device: str = "cpu",
     dynamics: Dynamics | None = None,
 ) -> dict[str, Episodes]:
-    """Run the episodes of every baseline, the k-th of each from the same initial state.
+    """Run so many episodes of every baseline, the k-th of each from the same initial state.
 
-    Args:
-        num_worlds: Environments in a batch, as for the policy.
-        task: The task or its settings.
-        worlds: `DroneEnv.state_dict` from before the policy's first episode.
-        episodes: Number of episodes.
-        device: Device of the environments.
-        dynamics: Vehicle dynamics; the task's default by default.
+    `worlds` is `DroneEnv.state_dict` from before the policy's first episode, and `num_worlds` the
+    policy's batch size. The task's default dynamics are used by default.
 
     Raises:
         InputError: The task has no oracle.

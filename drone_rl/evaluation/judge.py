@@ -103,15 +103,8 @@ def judge_for_selection(
 ) -> tuple[dict[str, Any], dict]:
     """Judge a checkpoint in environments reserved for selection, of which no report shows figures.
 
-    Args:
-        path: The checkpoint.
-        episodes: Number of episodes.
-        device: Device of the environments.
-        renderer: Name of the renderer.
-        seed: Root of the random streams; a fresh one by default.
-
-    Returns:
-        The verdict, as in verdict.json, and the checkpoint's progress.
+    The root of the random streams is fresh by default. Return the verdict, as in verdict.json, and
+    the checkpoint's progress.
 
     Raises:
         InputError: The checkpoint is unusable.

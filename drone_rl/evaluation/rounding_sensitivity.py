@@ -97,15 +97,8 @@ def check_rounding(
 ) -> Rounding | None:
     """Run the first episodes again in PyTorch, with a bound on the rounding error at every frame.
 
-    Args:
-        env: In the state from which `flown` started.
-        actor: The policy.
-        episodes: Number of episodes; all of `flown` at most.
-        flown: Greedy episodes to compare with.
-        log: Their actions.
-
-    Returns:
-        None for an actor without a network.
+    They are compared with greedy episodes and their actions, `flown` and `log`, which started from
+    the present state of the environments. Return None for an actor without a network.
 
     Raises:
         InputError: An output is not finite, or a third-party network is no function of the frame.

@@ -179,14 +179,11 @@ class MavlinkBridge:
     ) -> None:
         """Create a bridge that owns and closes the link.
 
-        Args:
-            link: Connection to the autopilot.
-            lockstep: Wait in each step for controls with its time stamp or a later one; else use
-                the newest controls, as hardware with its own clock needs.
-            patience: Seconds without any message after which the autopilot counts as gone.
-            answer_within: Seconds to wait for controls in lockstep, once there were any (a starting
-                autopilot sends none). Then the step uses the old ones.
-            connect_within: Seconds to wait for the first heartbeat.
+        With `lockstep` each step waits for controls with its time stamp or a later one, for
+        `answer_within` seconds once there were any (a starting autopilot sends none), and then uses
+        the old ones. Without it, as hardware with its own clock needs, it uses the newest controls.
+        An autopilot counts as gone `patience` seconds after its last message, or if its first
+        heartbeat does not come within `connect_within` seconds.
 
         Raises:
             InputError: pymavlink isn't installed.
@@ -212,11 +209,7 @@ class MavlinkBridge:
         self._next_gps = -np.inf
 
     def __enter__(self) -> Self:
-        """Wait for the autopilot and its first heartbeat.
-
-        Raises:
-            FlightControllerError: There was none in time.
-        """
+        """Wait for the autopilot and its first heartbeat, which must come in time."""
         with contextlib.ExitStack() as stack:
             stack.callback(self.link.close)
             self.link.accept(self.connect_within)

@@ -47,11 +47,7 @@ def check_counts(numbers: Mapping[str, Any], task: Task[Any]) -> None:
 def check_range(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[str, Any]) -> None:
     """Check that a range of `domain.ranges` follows from the strengths that the search tries.
 
-    Args:
-        axis: With the policy's own neutral strength.
-        found: The range.
-        of: The policy's description.
-        numbers: As in `shifts.json`.
+    The axis has the policy's own neutral strength; `of` is the policy's description.
 
     Raises:
         InputError: The search gives another limit or other strengths.

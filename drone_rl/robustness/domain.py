@@ -116,12 +116,8 @@ class Prober:
     ) -> None:
         """Test the policy without perturbation, with this part of the axis's error.
 
-        Args:
-            evaluator: Runs the episodes.
-            oracle: Episodes of the task's oracle without perturbation.
-            good_share: See `Rule`.
-            possible_share: See `Suite`.
-            plain_part: The part.
+        `oracle` are episodes of the task's oracle without perturbation; see `Rule` for `good_share`
+        and `Suite` for `possible_share`.
         """
         task = oracle.task
         self._evaluator, self._oracle, self._possible = evaluator, oracle, possible_share

@@ -93,16 +93,10 @@ class Condition:
 def variations(
     mode: Mode, dimensions: Sequence[int], num_worlds: int, generator: torch.Generator
 ) -> Iterator[list[Tensor]]:
-    """Yield the variations of each step, without end.
+    """Yield the variations of each step, without end, of all environments, active or not.
 
-    Args:
-        mode: When the condition is active.
-        dimensions: Of each part of the condition.
-        num_worlds: Number of environments, active or not.
-        generator: Source of the variations.
-
-    Yields:
-        One tensor per part. Shapes: (num_worlds, dimensions), float64.
+    `dimensions` are those of each part of the condition; one tensor per part is yielded. Shapes:
+    (num_worlds, dimensions), float64.
     """
     shape, is_drifting = (num_worlds, sum(dimensions)), mode is Mode.DRIFTING
     variation = torch.rand(shape, generator=generator, dtype=torch.float64).round() * 2 - 1

@@ -142,13 +142,10 @@ class SlurmExecutor:
     """Executes runs on a Slurm cluster through submitit, as one job array."""
 
     def __init__(self, folder: Path, *, cluster: str, num_jobs: int, **resources: Any) -> None:
-        """Configure the jobs.
+        """Take the folder of submitit's scripts and logs, on a disk that all nodes share.
 
-        Args:
-            folder: Folder of submitit's scripts and logs, on a disk that all nodes share.
-            cluster: "slurm", or "local" for processes on this machine.
-            num_jobs: Number of parallel jobs.
-            resources: Arguments of submitit's `update_parameters`.
+        The cluster is "slurm", or "local" for processes on this machine. The resources are
+        arguments of submitit's `update_parameters`.
 
         Raises:
             InputError: submitit isn't installed, or this machine has no Slurm.

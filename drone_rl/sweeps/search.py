@@ -70,14 +70,9 @@ def _check_journal(path: Path) -> None:
 def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> list[Any]:
     """Return the unfinished trials of an interrupted search, or else `count` new ones.
 
-    Args:
-        study: From `open_study`.
-        space: Optuna's distributions by name.
-        count: Number of new trials.
-        seed: Root seed; each batch has its own seed, so that a resumed search samples the same.
-
-    Returns:
-        `optuna.trial.FrozenTrial`s with consecutive numbers.
+    They are `optuna.trial.FrozenTrial`s with consecutive numbers, in a space of Optuna's
+    distributions by name. Each batch has its own seed, derived from the root seed, so that a
+    resumed search samples the same.
     """
     optuna = import_optuna()
     running = optuna.trial.TrialState.RUNNING

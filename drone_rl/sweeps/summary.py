@@ -193,9 +193,8 @@ def share_of_runs(successes: int, unknown: int, trials: int) -> dict[str, Any]:
 def median_of_runs(values: Sequence[float], had: Sequence[float] | None = None) -> dict[str, Any]:
     """Return the median over runs with its exact interval, allowing for censored values.
 
-    Args:
-        values: One per run; infinite for a censored run, which ended without reaching its target.
-        had: What each run had at its end; a lower bound for a censored run.
+    There is one value per run, infinite for a censored one, which ended without reaching its
+    target; what it had at its end (`had`) is a lower bound.
 
     Returns:
         "median" (None of no runs, or if at least half are censored), "more_than" (then a lower

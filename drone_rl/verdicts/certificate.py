@@ -52,10 +52,8 @@ class Claim:
     def as_evidence(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
         """Return what a verdict may quote: nothing if an episode contradicts the certificate.
 
-        Args:
-            greedy: The verdict's greedy episodes, in the same task.
-            rounding: How rounding can change these. A proof holds for any order of sums, so nothing
-                is quoted if rounding can lead to an end that is not stated.
+        A proof holds for any order of sums, so nothing is quoted either if rounding can lead to an
+        end that is not stated.
 
         Returns:
             Plain values: "refused" (the reason or None) and, unless refused, "every" (whether all
@@ -100,18 +98,12 @@ def find_claim(
     seed: RootSeed | None = None,
     **flying: Any,
 ) -> Claim | None:
-    """Find and check the certificate of a policy, see `checker.read_validated`.
+    """Find and check the certificate of a policy in its task, see `checker.read_validated`.
 
-    Args:
-        policy: The policy, in its task.
-        given: The certificate's file, or a folder with a certificate.json; by default the file next
-            to the policy, see `drone_rl.policies.zoo.certificate_path`.
-        flights: Rollouts that re-check it from other placements; 0 for none.
-        seed: Root of the random stream of these placements; a fresh one by default.
-        flying: "device" and "renderer", see `drone_rl.verification.checker.check_certificate`.
-
-    Returns:
-        None if there is none. An invalid one next to the policy is returned as refused.
+    It is the given file or the certificate.json of the given folder, by default the file next to
+    the policy, see `drone_rl.policies.zoo.certificate_path`. Rollouts from so many other
+    placements, by default of a fresh seed, re-check it; `flying` is "device" and "renderer". Return
+    None if there is none; an invalid one next to the policy is returned as refused.
 
     Raises:
         InputError: The given one is unreadable, of another network or task, contradicts itself, or

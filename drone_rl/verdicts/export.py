@@ -47,8 +47,8 @@ def export(
         target: The file, ending in .safetensors.
         settings: Settings of the card's verdict.
         command: The training command; None takes it from the policy's file or folder.
-        certificate: Certificate to quote and to copy; by default the one next to the policy.
-        shifts: The same of a robustness evaluation, see `find_domain`.
+        certificate: See `find_claim`; it is quoted and copied, like the robustness evaluation.
+        shifts: See `find_domain`.
         outputs: See `find_domain`.
 
     Returns:
@@ -101,18 +101,12 @@ def export_policy(
     shifts: Mapping[str, Any] | None = None,
     carried: Mapping[Path, bytes] | None = None,
 ) -> None:
-    """Write a checkpoint's policy and its model card, both or neither.
+    """Write a checkpoint's policy and its model card, .safetensors and .md, both or neither.
 
-    Args:
-        path: The file, ending in .safetensors; the card ends in .md.
-        checkpoint: From `read_policy`.
-        command: The training command.
-        verdict: As in verdict.json, from environments reserved for reports.
-        seed: Root of their random streams.
-        chosen: "runs" of the sweep that it is of, and "episodes" by which it was judged there;
-            None outside a sweep.
-        shifts: As in shifts.json, for the card.
-        carried: Further files that the card quotes, by their paths.
+    `checkpoint` is from `read_policy`, `verdict` and `shifts` are as in verdict.json and
+    shifts.json, `seed` is the root of the verdict's random streams. `chosen` has "runs" of the
+    policy's sweep, and "episodes" by which it was judged there; None outside a sweep. `carried` are
+    further files that the card quotes, by their paths.
 
     Raises:
         InputError: It can't be written.

@@ -46,12 +46,8 @@ def agreement(
 ) -> Agreement:
     """Run a policy with sampled actions and compare another implementation at every step.
 
-    Args:
-        env: Environments with transforms.
-        actor: The policy; it writes "logits".
-        other: Takes RGB images (N, H, W, 3), uint8, and returns probabilities (N, A), see
-            `Actions.wish`; on the CPU.
-        steps: Of each environment; environments whose episode ends are reset.
+    The actor writes "logits"; `other` takes RGB images (N, H, W, 3), uint8, and returns
+    probabilities (N, A), see `Actions.wish`, on the CPU. Environments whose episode ends are reset.
     """
     base: Any = env.base_env
     actions = worlds_of(env).dynamics.actions

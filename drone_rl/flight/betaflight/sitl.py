@@ -100,17 +100,12 @@ class Betaflight:
         patience: float = 10.0,
         answer_within: float = 0.02,
     ) -> None:
-        """Configure the firmware; it starts in `__enter__`.
+        """Take the firmware with its arguments; it starts in `__enter__`.
 
-        Args:
-            program: The firmware and its arguments.
-            folder: Folder of its settings and log; created if missing. Settings in it are used,
-                else the firmware is set up.
-            isolated: See `FirmwareProcess`.
-            patience: Seconds of silence after which the firmware counts as dead; half of them while
-                it starts.
-            answer_within: Seconds to wait for the answer to one state; then the rotors keep their
-                commands.
+        The folder of its settings and log is created if missing; a firmware without settings is set
+        up. After `patience` seconds of silence, half of them while it starts, the firmware counts
+        as dead. After `answer_within` seconds without an answer to one state the rotors keep their
+        commands. See `FirmwareProcess` for `isolated`.
         """
         self.program = list(program)
         self.folder = folder
@@ -129,12 +124,7 @@ class Betaflight:
         self._open = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
-        """Start the firmware; set it up first if the folder has no settings.
-
-        Raises:
-            InputError: See `FirmwareProcess`.
-            FlightControllerError: It can't be started or set up.
-        """
+        """Start the firmware; set it up first if the folder has no settings."""
         self.folder.mkdir(parents=True, exist_ok=True)
         with contextlib.ExitStack() as stack:
             self._process = stack.enter_context(FirmwareProcess(isolated=self.isolated))

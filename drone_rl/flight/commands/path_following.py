@@ -123,17 +123,11 @@ class PathCommand(Command):
         adaptive: float = 1.0,
         braking: float = 1.8,
     ) -> None:
-        """Create the command.
+        """Take the state at the start and the waypoints, metres. Shape: (num_worlds, P, 3).
 
-        Args:
-            body: State at the start.
-            points: Waypoints, metres. Shape: (num_worlds, P, 3).
-            speed: Metres per second, for all drones or for each. Shape: (num_worlds,).
-            limit: Seconds after which the command fails.
-            yaw_control: Heading control.
-            lookahead: See `lookahead_of`.
-            adaptive: See `lookahead_of`.
-            braking: See `braking_time`.
+        The speed is in metres per second, for all drones or for each, shape (num_worlds,); the
+        command fails after `limit` seconds. See `lookahead_of` for `lookahead` and `adaptive`, and
+        `braking_time`. A lookahead that is too short is an `InputError`.
         """
         self.limit, self.adaptive = limit, adaptive
         self.paths = make_paths(torch.cat([body.position[:, None], points], 1))

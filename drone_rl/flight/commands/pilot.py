@@ -46,11 +46,7 @@ _FREE = Drivetrain.MAX_DEGREE_OF_FREEDOM
 
 @dataclasses.dataclass(frozen=True)
 class Sticks:
-    """Positions of a remote control's sticks, each from -1 to 1.
-
-    Raises:
-        InputError: A position is out of range.
-    """
+    """Positions of a remote control's sticks, each from -1 to 1."""
 
     pitch: float = 0.0
     """Forward."""
