@@ -98,10 +98,8 @@ class Rounding:
 def enumerate_outcomes(renderer: DirectRenderer, decide: Decide, worlds: Tensor) -> Outcomes:
     """Run episodes from their starts, with every possible action wherever there are several.
 
-    Args:
-        renderer: Renders an environment in the state at the start of the episodes.
-        decide: The policy, of discrete actions and without memory.
-        worlds: Indices of the episodes. Shape: (k,).
+    The renderer is in the state at the start of the episodes. The policy has discrete actions and
+    no memory. `worlds` are the indices of the episodes, shape (k,).
     """
     simulated, count = renderer.worlds, len(worlds)
     state: Any = simulated.state[worlds]

@@ -56,12 +56,9 @@ class End:
 def walk(axis: Axis, sign: int, seed: int, is_good: Callable[[float, float], bool]) -> End:
     """Find one end of a range; the same answers give the same strengths.
 
-    Args:
-        axis: The axis.
-        sign: Side of no perturbation on the axis's scale: -1 or 1.
-        seed: Seed of the random strengths.
-        is_good: Takes a strength and the part of the axis's error that its answer may use; returns
-            whether the policy is certainly good there.
+    `sign` is the side of no perturbation on the axis's scale, -1 or 1. `is_good` takes a strength
+    and the part of the axis's error that its answer may use; it returns whether the policy is
+    certainly good there. The seed is that of the random strengths.
     """
     end = End(axis.neutral, [])
 

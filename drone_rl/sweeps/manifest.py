@@ -179,14 +179,8 @@ def open_sweep(
 ) -> Sweep:
     """Begin a sweep in a new folder, created if missing, or resume it in its folder.
 
-    Args:
-        folder: Folder of the sweep.
-        command: The command line.
-        settings: The common settings of all runs.
-        runs: Known runs must be unchanged; new ones, such as those of more seeds, are added.
-
-    Raises:
-        InputError: The folder holds another sweep.
+    The settings are common to all runs. Known runs must be unchanged; new ones, such as those of
+    more seeds, are added. A folder with another sweep is an `InputError`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     refuse_links(folder)

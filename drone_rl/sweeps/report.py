@@ -116,12 +116,8 @@ def judge_run(
 ) -> dict[str, Any]:
     """Judge the last policy of a finished run and store the verdict in its result.json.
 
-    Args:
-        folder: Folder of the run.
-        episodes: Number of episodes.
-        device: Device of the rollouts.
-        seed: Root of the environments' random streams, the same for all runs that are compared; a
-            fresh one by default.
+    The root of the environments' random streams, by default a fresh one, is the same for all runs
+    that are compared.
 
     Raises:
         InputError: The run has no result, or its last checkpoint is unusable or does not belong to

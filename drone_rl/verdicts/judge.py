@@ -184,10 +184,9 @@ def judge_one(
         settings: Number of episodes, seed, device and so on.
         task: Settings to change of the policy's task or, for a baseline, of the default one.
         dynamics: Settings to change of the dynamics, likewise.
-        certificate: Certificate to quote; by default the one next to the policy, if it is of this
-            task, see `drone_rl.policies.zoo.certificate_path`.
+        certificate: Certificate to quote, see `drone_rl.verdicts.certificate.find_claim`.
         shifts: Robustness evaluation to quote, see `drone_rl.verdicts.coverage.find_domain`.
-        require_domain: File of the required operating domain, see
+        require_domain: File of the required domain, see
             `drone_rl.verdicts.coverage.read_requirements`.
         outputs: Folder of all runs.
         progress: Called with what is running; a progress bar by default.

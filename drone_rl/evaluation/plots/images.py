@@ -121,13 +121,10 @@ def gridded(pictures: Sequence[Image.Image], columns: int, gap: int = 12) -> Ima
 
 
 def shown_picture(observation: NDArray, low: float, high: float, channels: str) -> NDArray:
-    """Convert the newest frame of an observation to an RGB image, uint8. Shape: (H, W, 3).
+    """Convert the newest frame of an observation, shape (C, H, W), to an RGB image, uint8.
 
-    Args:
-        observation: Shape (C, H, W), of one frame or several.
-        low: Value shown as black.
-        high: Value shown as white.
-        channels: "gray", "rgb", or "chromaticity" of red and blue, with the remainder as green.
+    `low` is shown as black, `high` as white. The channels are "gray", "rgb", or "chromaticity" of
+    red and blue, with the remainder as green. Shape: (H, W, 3).
     """
     newest = observation[-_CHANNELS.get(channels, 1) :].astype(np.float64)
     share = ((newest - low) / max(high - low, 1e-12)).clip(0, 1)

@@ -19,10 +19,8 @@ _LINE = 'fill="none" class="line"'
 def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: ShownActions) -> Figure:
     """Draw the map as a chart.
 
-    Args:
-        numbers: "places" of an explanation.
-        arrays: "points", "ends" and "labels" of its outlines.
-        names: The actions.
+    `numbers` are "places" of an explanation; `arrays` are "points", "ends" and "labels" of its
+    outlines.
     """
     window = numbers["window"]
     side, near, far = window["sideways"], window["nearest"], window["farthest"]

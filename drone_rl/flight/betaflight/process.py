@@ -24,12 +24,10 @@ class FirmwareProcess:
     """Runs at most one firmware, which ends with this object however this ends."""
 
     def __init__(self, *, isolated: bool = True, patience: float = 10.0) -> None:
-        """Start the supervisor.
+        """Start the supervisor, each of whose answers must come within `patience` seconds.
 
-        Args:
-            isolated: Give the firmware its own network namespace if the system allows it; else it
-                uses this machine's network, with a warning.
-            patience: Seconds to wait for each answer of the supervisor.
+        With `isolated` the firmware has its own network namespace if the system allows it; else it
+        uses this machine's network, with a warning.
 
         Raises:
             InputError: Without a namespace, a port that the firmware needs is in use.

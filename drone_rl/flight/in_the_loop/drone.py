@@ -127,16 +127,9 @@ class DroneInTheLoop:
         every: float = SETPOINT_PERIOD,
         until: Callable[[Readings], bool] = lambda readings: False,
     ) -> bool:
-        """Fly by setpoints.
+        """Fly by setpoints for so many seconds at most; return whether `until` ended the flight.
 
-        Args:
-            guidance: Returns the setpoint; called at once and then periodically.
-            seconds: Greatest duration.
-            every: Setpoint period, seconds.
-            until: Ends the flight if it returns True; called before each setpoint.
-
-        Returns:
-            Whether `until` ended the flight.
+        The guidance is called at once and then every `every` seconds, and `until` before each call.
 
         Raises:
             FlightControllerError: See `tick`; or the guidance took longer than the firmware's
