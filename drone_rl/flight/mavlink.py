@@ -196,8 +196,6 @@ class MavlinkBridge:
         self.patience = patience
         self.answer_within = answer_within
         self.connect_within = connect_within
-        self.steps = 0
-        """States sent."""
         self.missed = 0
         """States without controls in time, in lockstep and after the first controls."""
         self.is_armed = False
@@ -240,7 +238,6 @@ class MavlinkBridge:
         if readings.time >= self._next_gps:
             self._next_gps = readings.time + GPS_EVERY
             self._send("hil_gps", gps_fields(readings))
-        self.steps += 1
         self._receive(0.0)
         if self.lockstep:
             self._wait_for_controls(round(readings.time * 1e6))

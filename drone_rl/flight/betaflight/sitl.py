@@ -114,8 +114,6 @@ class Betaflight:
         self.isolated = isolated
         self.patience = patience
         self.answer_within = answer_within
-        self.steps = 0
-        """States sent."""
         self.missed = 0
         """States that were not answered in time."""
         self._rotors = np.zeros(4)
@@ -151,8 +149,7 @@ class Betaflight:
             self._next_sticks = readings.time + STICKS_EVERY
             self._send(self._sticks, pack_sticks(readings.time, sticks.channels))
         self._drop_late_answers()
-        self._send(self._state, pack_state(readings, 0.0))
-        self.steps += 1
+        self._send(self._state, pack_state(readings))
         try:
             self._rotors = unpack_rotors(self._hear.recv(64))
             self._heard = time.monotonic()
@@ -196,7 +193,7 @@ class Betaflight:
     def _answers(self) -> bool:
         for _ in range(_AWAKE):
             self._drop_late_answers()
-            self._send(self._state, pack_state(_STANDING, 0.0))
+            self._send(self._state, pack_state(_STANDING))
             self._hear.settimeout(_WAKES_WITHIN)  # packets before it listens are lost
             try:
                 self._hear.recv(64)
@@ -228,19 +225,18 @@ class Betaflight:
             time.sleep(0.02)
 
 
-def pack_state(readings: Readings, time: float) -> bytes:
+def pack_state(readings: Readings) -> bytes:
     """Pack `fdm_packet`: time, gyroscope, accelerometer, attitude, velocity, place, pressure.
 
     The gyroscope is in forward-right-down, the attitude relates that frame to north-east-down, the
     accelerometer is our body frame with all signs inverted, the velocity is east-north-up, and the
     place is longitude, latitude, altitude, as the firmware's virtual GPS expects.
 
-    The firmware scales its clock by the progress of these times, in seconds; if they are constant,
-    its clock is the wall clock.
+    The time is constant, so that the firmware's clock is the wall clock, not scaled by its progress.
     """
     latitude, longitude, altitude = readings.place
     return _STATE.pack(
-        time,
+        0.0,
         *frd_from_body(readings.rates),
         *-readings.force,
         *ned_attitude_from_world(readings.attitude),

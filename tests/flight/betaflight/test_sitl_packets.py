@@ -19,9 +19,9 @@ READINGS = Readings(
 
 
 def test_a_state_byte_for_byte():
-    packet = pack_state(READINGS, 1.5)
+    packet = pack_state(READINGS)
     values = (
-        *(1.5,),
+        *(0.0,),
         *(0.1, -0.2, -0.3),
         *(-1.0, -2.0, -9.0),
         *(0.5, 0.5, -0.5, -0.5),
@@ -31,7 +31,7 @@ def test_a_state_byte_for_byte():
     )
     assert len(packet) == 144
     assert packet == b"".join(struct.pack("<d", value) for value in values)
-    assert packet[:8] == bytes.fromhex("000000000000f83f")
+    assert packet[-8:] == bytes.fromhex("00000000d0bcf840")
 
 
 def test_sticks_byte_for_byte():
