@@ -232,7 +232,7 @@ def pack_state(readings: Readings) -> bytes:
     accelerometer is our body frame with all signs inverted, the velocity is east-north-up, and the
     place is longitude, latitude, altitude, as the firmware's virtual GPS expects.
 
-    The time is constant, so that the firmware's clock is the wall clock, not scaled by its progress.
+    The time is constant, so that the firmware's clock is the wall clock.
     """
     latitude, longitude, altitude = readings.place
     return _STATE.pack(
