@@ -3,11 +3,10 @@
 import dataclasses
 import json
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
@@ -211,37 +210,26 @@ def chart(numbers: Mapping[str, Any]) -> Figure:
         axes.text(x + 0.5, -0.25, body, ha="center", va="center", fontsize=10, color=_INK)
     for y, (name, flown) in enumerate(policies.items()):
         axes.text(-0.05, y + 0.5, name, ha="right", va="center", fontsize=11, color=_INK)
-        for x, body in enumerate(numbers["bodies"]):
-            _draw_verdict(axes, x, y, flown[body])
+        cells = [_verdict_cell(flown[body]) for body in numbers["bodies"]]
         if looped:
             text = textwrap.fill(sitl_cell(looped[name]), 22)
-            lines = ((0.5, text, 8.0, _INK),)
-            _draw_cell(axes, len(bodies) - 1, y, _COLORS["none"], lines, hatch="..")
+            cells.append((_COLORS["none"], "..", [(0.5, text, 8.0, _INK)]))
+        for x, (color, hatch, lines) in enumerate(cells):
+            axes.add_patch(Rectangle((x, y), 1, 1, fc=color, ec="white", lw=2, hatch=hatch))
+            for height, text, points, ink in lines:
+                axes.text(
+                    x + 0.5, y + height, text, ha="center", va="center", fontsize=points, color=ink
+                )
     return figure
 
 
-def _draw_verdict(axes: Axes, x: int, y: int, verdict: Mapping[str, Any]) -> None:
-    kind = verdict["kind"]
+def _verdict_cell(verdict: Evidence) -> tuple[str, str | None, list[tuple[float, str, float, str]]]:
+    """Colour, hatch, and lines of a cell: height, text, points and colour of each."""
+    kind, success = verdict["kind"], verdict["greedy"]["success"]
     color = _COLORS.get(kind) or _COLORS.get(kind.split()[0], _COLORS["none"])
-    success, unsure = verdict["greedy"]["success"], "" if verdict["certain"] else " ?"
-    lines = (
-        (0.2, f"{kind}{unsure}", 9.0, _INK),
+    lines = [
+        (0.2, f"{kind}{'' if verdict['certain'] else ' ?'}", 9.0, _INK),
         (0.45, f"{100 * success['share']:.1f}%  ({_interval(success)})", 9.5, _INK),
         (0.77, textwrap.fill(failure(verdict), 26), 7.0, _FAINT),
-    )
-    _draw_cell(axes, x, y, color, lines)
-
-
-def _draw_cell(
-    axes: Axes,
-    x: int,
-    y: int,
-    color: str,
-    lines: Sequence[tuple[float, str, float, str]],
-    hatch: str | None = None,
-) -> None:
-    """A rectangle with lines of text: height, text, points and colour of each."""
-    box = Rectangle((x, y), 1, 1, facecolor=color, edgecolor="white", linewidth=2, hatch=hatch)
-    axes.add_patch(box)
-    for height, text, points, ink in lines:
-        axes.text(x + 0.5, y + height, text, ha="center", va="center", fontsize=points, color=ink)
+    ]
+    return color, None, lines
