@@ -46,7 +46,8 @@ def run_episodes(
     same initial state for every policy. Arguments are those of `episode_batches`; by default the
     last batch is whole, and its surplus episodes, whose actions `log` receives, too, are dropped.
     """
-    batches = episode_batches(env, actor, num_episodes, **{"is_exact": False, **how})
+    how.setdefault("is_exact", False)
+    batches = episode_batches(env, actor, num_episodes, **how)
     return Episodes.joined([final_episodes(env, batch) for batch in batches])[:num_episodes]
 
 

@@ -126,9 +126,10 @@ class Row:
 def read_rows(sweep: Sweep) -> list[Row]:
     """Read one row for each run; too large result files in total are an `InputError`."""
     results, metrics = Allowance(SWEEP_RESULTS_BYTES), TablesAllowance()
-    for path in (path for run in sweep.runs for path in (run.folder / "result.json", run.failure)):
-        with contextlib.suppress(OSError):  # bound the total size; each reader bounds its file
-            results.take(path.stat().st_size, f"the results of {sweep.folder}: {path.name}")
+    for run in sweep.runs:
+        for path in (run.folder / "result.json", run.failure):
+            with contextlib.suppress(OSError):  # bound the total size; each reader bounds its file
+                results.take(path.stat().st_size, f"the results of {sweep.folder}: {path.name}")
     choices = [_choice(run) for run in sweep.runs]
     keys = list(dict.fromkeys(key for choice in choices for key in choice))
     swept = [key for key in keys if len({choice.get(key) for choice in choices}) > 1]
