@@ -19,7 +19,6 @@ from drone_rl.flight.in_the_loop.dynamics import InTheLoopDynamics
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
-from drone_rl.sim.dynamics import BodyState
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.seeding import RootSeed, root_seed
@@ -48,7 +47,7 @@ class SitlEpisode:
     """Wall-clock seconds, arming and take-off included."""
     missed: int
     """Ticks that the firmware did not answer in time."""
-    path: tuple[tuple[float, float, float], ...]
+    path: tuple[tuple[float, ...], ...]
     """Positions before the first action and after each, metres, world frame."""
 
 
@@ -155,10 +154,10 @@ def _fly(
         seen, worlds = env.reset(), worlds_of(env)
         actor(seen.clone())  # once before the firmware waits for it
         dynamics.begin(worlds.state.body)
-        left, path = drone.time, [_place(drone.body)]
+        left, path = drone.time, [drone.body.position[0].tolist()]
         while True:
             after = env.step(actor(seen))
-            path.append(_place(drone.body))
+            path.append(drone.body.position[0].tolist())
             if bool(after["next", "done"]):
                 break
             seen = step_mdp(after)
@@ -175,10 +174,5 @@ def _fly(
             simulated_s=drone.time - left,
             wall_s=time.monotonic() - began,
             missed=drone.controller.missed if isinstance(drone.controller, Betaflight) else 0,
-            path=tuple(path),
+            path=tuple(map(tuple, path)),
         )
-
-
-def _place(body: BodyState) -> tuple[float, float, float]:
-    x, y, z = body.position[0].tolist()
-    return x, y, z
