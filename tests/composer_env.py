@@ -1,4 +1,4 @@
-"""The dm_control task as a TorchRL environment: one world, drawn by OpenGL."""
+"""The dm_control task as a TorchRL environment: one scene, rendered by OpenGL."""
 
 import torch
 from dm_control import composer
@@ -8,9 +8,9 @@ from torchrl.envs import DMControlWrapper
 
 
 class ComposerEnv(DMControlWrapper):
-    """Wraps a `composer.Environment`, whose discrete actions TorchRL's own wrapper refuses.
+    """Wrapper of a `composer.Environment` with discrete actions, which TorchRL's wrapper rejects.
 
-    Those are indices, as in `DroneEnv`.
+    Actions are indices, as in `DroneEnv`.
     """
 
     def _check_kwargs(self, kwargs: dict) -> None:
@@ -21,8 +21,7 @@ class ComposerEnv(DMControlWrapper):
         super()._make_specs(env)
         spec = env.action_spec()
         if isinstance(spec, DiscreteArray):
-            number = spec.num_values
-            self.action_spec = Categorical(number, dtype=torch.int64, device=self.device)
+            self.action_spec = Categorical(spec.num_values, dtype=torch.int64, device=self.device)
 
     def _set_seed(self, _seed: int | None) -> None:
         self._env.random_state.seed(_seed)

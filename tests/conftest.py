@@ -1,10 +1,10 @@
-"""Shared fixtures: small worlds, and whether OpenGL is there."""
+"""Shared fixtures."""
 
 import os
 import subprocess
 import sys
 
-# Tests run side by side, one a core: threads of theirs would only wait for each other's.
+# Tests run in parallel, one per core, so more threads would only compete.
 os.environ.update(OMP_NUM_THREADS="1", OMP_WAIT_POLICY="PASSIVE")
 
 import pytest
@@ -16,25 +16,25 @@ from drone_rl.policies import SmallCNN, make_actor
 
 @pytest.fixture(autouse=True)
 def one_thread():
-    """Whatever the test before has left."""
+    """Limit torch to one thread, whatever the previous test has set."""
     torch.set_num_threads(1)
 
 
 @pytest.fixture(scope="session")
 def egl():
-    """Skips where OpenGL can't draw without a display."""
+    """Skip the test if OpenGL cannot render without a display."""
     code = "from dm_control import _render; _render.Renderer(8, 8).make_current()"
     environment = {**os.environ, "MUJOCO_GL": "egl"}
     command = [sys.executable, "-c", code]
     if subprocess.run(command, env=environment, capture_output=True, check=False).returncode:
         pytest.skip("no OpenGL renderer (EGL) on this machine")
     if os.environ.get("MUJOCO_GL") != "egl":
-        pytest.skip("EGL is there but not chosen; set MUJOCO_GL=egl")
+        pytest.skip("EGL is available but not selected; set MUJOCO_GL=egl")
 
 
 @pytest.fixture
 def make_pipeline():
-    """Builds an environment with the default pipeline and an actor with a fresh small network."""
+    """Return a factory of environments with default transforms and actors with a small network."""
     envs = []
 
     def build(num_envs=4, seed=0, **kwargs):
@@ -55,7 +55,7 @@ def make_pipeline():
 
 @pytest.fixture
 def registered():
-    """Remembers registered parts and removes them after the test."""
+    """Return a decorator that registers variants for the duration of the test."""
     parts = []
     yield lambda part: parts.append(part) or part
     for part in parts:

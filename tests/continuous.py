@@ -1,4 +1,4 @@
-"""One cube near by, flown to at speeds that are drawn: what continuous actions are tried on."""
+"""A small environment with one close cube and continuous actions."""
 
 import torch
 
@@ -19,15 +19,15 @@ TASK = TaskSettings(
 CAMERA = CameraSettings(width=32, height=8)
 
 
-def make_worlds(num_envs=8, seed=0, **actions):
-    """Environment of few pixels; a step takes a quarter of a second."""
+def make_env(num_envs=8, seed=0, **actions):
+    """Return an environment with small images and a control step of 0.25 s."""
     dynamics = Kinematic(SETTINGS.replace(**actions), 0.25)
     env = DroneEnv(num_envs, TASK, CAMERA, dynamics=dynamics, seed=seed, num_shards=1)
     return with_transforms(env, [GrayPixels(), StandardizePixels()])
 
 
 def make_policy(env, seed=0):
-    """A small network and an actor of it."""
+    """Return a small network and its actor."""
     generator = torch.Generator().manual_seed(seed)
     network = SmallCNN((1, 8, 32), 6, channels=(8,), hidden=(32,), generator=generator)
     network.actions = env.base_env.worlds.dynamics.actions

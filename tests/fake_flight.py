@@ -1,4 +1,4 @@
-"""A stand-in for drones in flight: random air, obstacles, tilt, and a motion that diverges."""
+"""Fake vehicle dynamics with wind, seeds, obstacles, tilt and divergence."""
 
 import dataclasses
 
@@ -9,12 +9,12 @@ from drone_rl.sim.actions import MOVES
 from drone_rl.sim.dynamics import BodyState
 
 FLIGHT = DynamicsSettings(mode="simple_flight")
-"""What makes one of it, where `floating` is in force."""
+"""Settings that create `Floating` once `floating` has patched `Quadrotor`."""
 
 
 @dataclasses.dataclass
 class FloatingState(BodyState):
-    """A body, its episode's seed, whether it is lost, and what it was told of obstacles."""
+    """A body, its episode's seed, whether it is lost, and how often it was near an obstacle."""
 
     seed: torch.Tensor
     lost: torch.Tensor
@@ -27,30 +27,30 @@ class FloatingState(BodyState):
 
 
 class Floating:
-    """Moves as told and is blown along by the wind; lost where it comes beyond 5 m to the left."""
+    """Dynamics that execute moves, add the wind, and lose a drone beyond y = 5 m."""
 
     actions = MOVES
 
     def __init__(self, settings, actions, *, needs_obstacles=True):
-        """Takes what `Quadrotor` takes."""
-        self.settings, self.asked = settings, actions
+        """Accept the arguments of `Quadrotor`."""
+        self.settings, self.action_settings = settings, actions
         self.mount = settings.camera_mount
         self.is_random = settings.gusts > 0
         self.needs_obstacles = needs_obstacles
 
     def start(self, position, seeds=None):
-        """Tilted by 0.2 radians to the right, heading 90 degrees to the left."""
+        """Start with a roll of 0.2 radians and a heading of 90 degrees."""
         body = BodyState.at_rest(position)
         count = len(position)
         roll, half = torch.tensor([0.1]).double(), torch.tensor([0.5]).double().sqrt()
         c, s = roll.cos() * half, roll.sin() * half
         body.attitude = torch.cat([c, s, s, c]).expand(count, 4).clone()
         seeds = torch.zeros(count, dtype=torch.int64) if seeds is None else seeds
-        nothing = torch.zeros(count, dtype=torch.bool)
-        return FloatingState(**vars(body), seed=seeds, lost=nothing, near=nothing.long())
+        none = torch.zeros(count, dtype=torch.bool)
+        return FloatingState(**vars(body), seed=seeds, lost=none, near=none.long())
 
     def step(self, body, action, obstacles=None):
-        """A metre, and what the wind adds."""
+        """Move by 1 m and by the wind."""
         moves = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]).double()
         wind = torch.tensor(self.settings.wind).double() * self.settings.control_timestep
         position = body.position + moves[action] + wind
@@ -63,5 +63,5 @@ class Floating:
 
 
 def floating(monkeypatch):
-    """Lets all that is told to fly fly so."""
+    """Replace `Quadrotor` by `Floating`."""
     monkeypatch.setattr("drone_rl.sim.dynamics.dynamics.Quadrotor", Floating)

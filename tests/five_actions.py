@@ -1,4 +1,4 @@
-"""A set of another size, with two pairs that undo each other and one pair of mirror images."""
+"""A set of five actions with two pairs of opposites and one mirrored pair."""
 
 from drone_rl.sim.actions import DiscreteActions
 

@@ -1,4 +1,4 @@
-"""Drones in flight for tests, and a slow one in double precision to measure them by."""
+"""Simulated drones for tests, and a reference implementation in double precision."""
 
 import math
 
@@ -10,14 +10,14 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.sim.dynamics import FlightState, Goals, Mode, Quadrotor
 from drone_rl.sim.dynamics.rigid_body_kernel import make_airframe
 
-PLACES = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
-SPEEDS = (Mode.VELOCITY, Mode.VELOCITY, Mode.RATE, Mode.VELOCITY)
+POSITIONS = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
+VELOCITIES = (Mode.VELOCITY, Mode.VELOCITY, Mode.RATE, Mode.VELOCITY)
 ANGLES = (Mode.ANGLE, Mode.ANGLE, Mode.ANGLE, Mode.POSITION)
 GRAVITY = 9.81
 
 
 def settings(**changes):
-    """SimpleFlight's own drone."""
+    """Return the settings of SimpleFlight's drone."""
     return DynamicsSettings(mode="simple_flight", **changes)
 
 
@@ -30,31 +30,31 @@ def frame(**changes):
     return make_airframe(settings(**changes))
 
 
-def numbers(*rows):
+def doubles(*rows):
     return torch.tensor(rows, dtype=torch.float64)
 
 
-def still(drone, *, height=100.0, count=1, seeds=None):
-    """Drones that hover side by side, far from each other and from the ground."""
-    places = torch.zeros(count, 3, dtype=torch.float64)
-    places[:, 2] = height
-    return drone.start(places, seeds)
+def hovering(drone, *, height=100.0, count=1, seeds=None):
+    """Return drones that hover at a height at which they touch nothing."""
+    positions = torch.zeros(count, 3, dtype=torch.float64)
+    positions[:, 2] = height
+    return drone.start(positions, seeds)
 
 
-def told(modes, *values, count=1, drift=None):
-    goals = numbers(values).repeat(count, 1)
-    return Goals(modes, goals, None if drift is None else numbers(drift).repeat(count, 1))
+def make_goals(modes, *values, count=1, drift=None):
+    goals = doubles(values).repeat(count, 1)
+    return Goals(modes, goals, None if drift is None else doubles(drift).repeat(count, 1))
 
 
 def falling(height=100.0, velocity=(0.0, 0.0, 0.0), rates=(0.0, 0.0, 0.0)):
-    """One drone whose rotors stand still."""
-    state = FlightState.at_rest(numbers((0.0, 0.0, height)))
-    state.velocity[:], state.angular_velocity[:] = numbers(velocity), numbers(rates)
+    """Return the state of one drone whose rotors do not turn."""
+    state = FlightState.at_rest(doubles((0.0, 0.0, height)))
+    state.velocity[:], state.angular_velocity[:] = doubles(velocity), doubles(rates)
     return state
 
 
-def history(drone, state, goals, ticks, every=1):
-    """All states, one after every so many ticks."""
+def trajectory(drone, state, goals, ticks, every=1):
+    """Return the initial state and the states after every `every` ticks."""
     states = [state]
     for _ in range(ticks // every):
         states.append(drone.fly(states[-1], goals, every))
@@ -62,32 +62,32 @@ def history(drone, state, goals, ticks, every=1):
 
 
 def angles(state):
-    """Roll, pitch and heading, radians. Shape: (num_worlds, 3)."""
+    """Return roll, pitch and heading in radians. Shape: (num_envs, 3)."""
     w, x, y, z = state.attitude.unbind(-1)
     roll = torch.atan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
     pitch = torch.asin((2 * (w * y - x * z)).clamp(-1, 1))
     return torch.stack([roll, pitch, state.heading], -1)
 
 
-class Answer:
-    """How something went from 0 to what was wanted, tick by tick."""
+class StepResponse:
+    """The step response of a quantity from 0 to a setpoint, tick by tick."""
 
-    def __init__(self, values, wanted, tick=0.003):
-        self.share, self.tick = np.asarray(values) / wanted, tick
+    def __init__(self, values, setpoint, tick=0.003):
+        self.fraction, self.tick = np.asarray(values) / setpoint, tick
 
     @property
     def rise(self):
-        """Seconds until 0.9 of it."""
-        return int(np.argmax(self.share >= 0.9)) * self.tick
+        """Seconds until 0.9 of the setpoint."""
+        return int(np.argmax(self.fraction >= 0.9)) * self.tick
 
     @property
     def overshoot(self):
-        """Share beyond it."""
-        return float(self.share.max()) - 1.0
+        """Greatest excess as a fraction of the setpoint."""
+        return float(self.fraction.max()) - 1.0
 
-    def settled(self, within):
-        """Seconds after which it stays so near."""
-        away = np.flatnonzero(np.abs(self.share - 1.0) > within)
+    def settling_time(self, within):
+        """Return the seconds after which the error stays below a fraction of the setpoint."""
+        away = np.flatnonzero(np.abs(self.fraction - 1.0) > within)
         return (int(away[-1]) + 1) * self.tick if len(away) else 0.0
 
 
@@ -95,33 +95,34 @@ def limit(value, most=1.0):
     return max(-most, min(most, value))
 
 
-def turned(angle):
+def wrap_angle(angle):
     return angle - 2 * math.pi * round(angle / (2 * math.pi))
 
 
-class Slow:
-    """One drone in NumPy and double precision, written down from the formulas anew.
+class ReferenceDrone:
+    """An independent implementation of one drone in NumPy and double precision, without gusts.
 
-    Rotation matrices and Rodrigues' formula instead of quaternions; gusts are left out.
+    It uses rotation matrices and Rodrigues' formula instead of quaternions.
     """
 
-    def __init__(self, what, place, heading=0.0):
-        self.s = what
+    def __init__(self, settings, position, heading=0.0):
+        self.s = settings
         c, s = math.cos(heading), math.sin(heading)
-        self.place, self.velocity, self.rates = np.array(place, float), np.zeros(3), np.zeros(3)
-        self.turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
-        self.rotors = np.full(4, what.hover_throttle)
-        self.climb = 2 * what.hover_throttle - 1
-        side = what.arm_length / math.sqrt(2)
+        self.position = np.array(position, float)
+        self.velocity, self.rates = np.zeros(3), np.zeros(3)
+        self.rotation = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+        self.rotors = np.full(4, settings.hover_throttle)
+        self.climb = 2 * settings.hover_throttle - 1
+        side = settings.arm_length / math.sqrt(2)
         at = np.array([[side, -side], [-side, side], [side, side], [-side, -side]])
         spins = np.array([-1.0, -1.0, 1.0, 1.0])
-        push, twist = what.rotor_thrust, what.rotor_torque
-        self.to_torque = np.stack([at[:, 1] * push, -at[:, 0] * push, spins * twist])
+        thrust, torque = settings.rotor_thrust, settings.rotor_torque
+        self.to_torque = np.stack([at[:, 1] * thrust, -at[:, 0] * thrust, spins * torque])
         self.mixer = np.stack([np.sign(at[:, 1]), -np.sign(at[:, 0]), spins], -1)
 
-    def wanted(self, modes, goal, drift, seconds):
-        """Rotors that the cascade asks for."""
-        s, r = self.s, self.turn
+    def control(self, modes, goal, drift, seconds):
+        """Return the rotor setpoints of the cascaded controller."""
+        s, r = self.s, self.rotation
         heading = math.atan2(r[1, 0], r[0, 0])
         c, si = math.cos(heading), math.sin(heading)
         if modes[0] == Mode.ANGLE:
@@ -130,7 +131,7 @@ class Slow:
             speed = list(goal[:2])
             for i in range(2):
                 if modes[0] == Mode.POSITION:
-                    away = goal[i] + drift[i] * seconds - self.place[i]
+                    away = goal[i] + drift[i] * seconds - self.position[i]
                     back = s.velocity_limit * limit(s.position_gain * away)
                     speed[i] = limit(drift[i] + back, s.velocity_limit)
             x, y = speed[0] - self.velocity[0], speed[1] - self.velocity[1]
@@ -141,23 +142,23 @@ class Slow:
             roll = -s.angle_limit * limit(s.velocity_gain * (c * y - si * x))
         now = (math.atan2(r[2, 1], r[2, 2]), math.asin(-r[2, 0]))
         rates = [0.0, 0.0, goal[2]]
-        for i, (want, have) in enumerate(zip((roll, pitch), now, strict=True)):
-            rates[i] = s.rate_limit[i] * limit(s.angle_gain[i] * turned(want - have))
+        for i, (target, current) in enumerate(zip((roll, pitch), now, strict=True)):
+            rates[i] = s.rate_limit[i] * limit(s.angle_gain[i] * wrap_angle(target - current))
         if modes[2] == Mode.ANGLE:
-            away = turned(goal[2] + drift[2] * seconds - heading)
+            away = wrap_angle(goal[2] + drift[2] * seconds - heading)
             rates[2] = s.rate_limit[2] * limit(s.angle_gain[2] * away) + drift[2]
         rates[2] = limit(rates[2], s.rate_limit[2])
         climb = goal[3]
         if modes[3] == Mode.POSITION:
-            away = goal[3] + drift[3] * seconds - self.place[2]
+            away = goal[3] + drift[3] * seconds - self.position[2]
             climb = drift[3] + s.climb_limit * limit(s.position_gain * away)
             climb = limit(climb, s.climb_limit)
         miss = climb - self.velocity[2]
         throttle = 0.5 + 0.5 * limit(s.climb_gain * miss + self.climb)
         self.climb = limit(self.climb + s.climb_integral * miss * s.tick)
-        return self.mixed(throttle, np.clip(s.rate_gain * (rates - self.rates), -1, 1))
+        return self.mix(throttle, np.clip(s.rate_gain * (rates - self.rates), -1, 1))
 
-    def mixed(self, throttle, control):
+    def mix(self, throttle, control):
         out = throttle + self.mixer @ control
         out += max(0.0, -out.min())
         return out / max(1.0, out.max())
@@ -167,22 +168,22 @@ class Slow:
         inertia, area = np.array(s.inertia), np.array(s.drag_area)
         pace = 1 - math.exp(-dt / s.rotor_time_constant) if s.rotor_time_constant else 1.0
         for tick in range(ticks):
-            asked = self.wanted(modes, goal, drift, tick * dt)
-            self.rotors = self.rotors + pace * (asked - self.rotors)
-            air = self.turn.T @ (self.velocity - s.wind)
+            setpoint = self.control(modes, goal, drift, tick * dt)
+            self.rotors = self.rotors + pace * (setpoint - self.rotors)
+            air = self.rotation.T @ (self.velocity - s.wind)
             force = -s.air_density * area * np.abs(air) * air
             force[2] += s.rotor_thrust * self.rotors.sum()
             torque = self.to_torque @ self.rotors
-            gained = (torque - np.cross(self.rates, inertia * self.rates)) / inertia
-            self.velocity = self.velocity + dt * (self.turn @ force / s.mass - [0, 0, GRAVITY])
-            self.rates = self.rates + dt * gained
-            self.place = self.place + dt * self.velocity
-            self.turn = self.turn @ rotation(dt * self.rates)
+            acceleration = (torque - np.cross(self.rates, inertia * self.rates)) / inertia
+            self.velocity = self.velocity + dt * (self.rotation @ force / s.mass - [0, 0, GRAVITY])
+            self.rates = self.rates + dt * acceleration
+            self.position = self.position + dt * self.velocity
+            self.rotation = self.rotation @ rotation(dt * self.rates)
         return self
 
 
 def rotation(angle):
-    """Rodrigues' formula. Shape: (3, 3)."""
+    """Return the matrix of a rotation vector by Rodrigues' formula. Shape: (3, 3)."""
     x, y, z = angle
     size = math.sqrt(x * x + y * y + z * z)
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -194,7 +195,7 @@ def rotation(angle):
 
 
 def matrix(attitude):
-    """Of one quaternion. Shape: (3, 3)."""
+    """Return the rotation matrix of one quaternion. Shape: (3, 3)."""
     w, x, y, z = (float(v) for v in attitude)
     return np.array(
         [
@@ -206,7 +207,7 @@ def matrix(attitude):
 
 
 def degrees_between(one, other):
-    """Of the turn from one rotation matrix to another."""
+    """Return the angle in degrees between two rotation matrices."""
     difference = one.T @ other
     sine = np.array([difference[2, 1] - difference[1, 2], difference[0, 2] - difference[2, 0],
                      difference[1, 0] - difference[0, 1]])  # fmt: skip

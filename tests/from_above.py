@@ -1,4 +1,4 @@
-"""A box of 1 m on the ground, seen from 10 m above: a pixel shows 0.25 m of the ground."""
+"""A box of 1 m on the ground, viewed from 10 m above; a pixel covers 0.25 m of the ground."""
 
 import mujoco
 import torch
@@ -23,14 +23,14 @@ LAUNCHERS = ("cores", "pixels")
 def tracer(launcher="cores", kind="box", size=".5 .5 .5"):
     model = mujoco.MjModel.from_xml_string(XML.format(kind=kind, size=size))
     scene = Scene(model, (SemanticClass.GROUND, SemanticClass.TARGET), (-1, -1), (0.2, 0.4, 0.6))
-    made = Raytracer(scene, num_worlds=2, num_shards=2)
+    renderer = Raytracer(scene, num_worlds=2, num_shards=2)
     if launcher == "pixels":
-        made._launcher = GpuLauncher("cpu")  # the kernels for GPUs run on a CPU, too
-    return made
+        renderer._launcher = GpuLauncher("cpu")  # the GPU kernels run on a CPU as well
+    return renderer
 
 
-def seen(renderer, appearance=None, *, camera="down", modality="rgb", worlds=1):
-    """Images. Shape: (worlds, SIZE, SIZE, *)."""
+def render(renderer, appearance=None, *, camera="down", modality="rgb", worlds=1):
+    """Return images. Shape: (worlds, SIZE, SIZE, *)."""
     view = View(cameras=(camera,), height=SIZE, width=SIZE, modalities=(modality,))
     attitude = torch.tensor([[1.0, 0.0, 0.0, 0.0]]).repeat(worlds, 1)
     poses = Poses(torch.zeros(worlds, 3), attitude, torch.zeros(worlds, 0, 3))

@@ -1,4 +1,4 @@
-"""A small second motion with five actions, which shows that nothing else knows of the chapter's."""
+"""Small user-defined dynamics with five actions: no code may depend on the built-in ones."""
 
 import dataclasses
 import math
@@ -10,11 +10,11 @@ from drone_rl.sim.dynamics import BodyState, Dynamics
 
 TURN = math.pi / 2
 SPEED = 2.0
-"""Metres a second; a step takes 0.1 s."""
+"""Metres per second; a step takes 0.1 s."""
 
 
 class Turning(Dynamics):
-    """Flies where its nose points, and turns it: attitude and speeds mean something here."""
+    """Dynamics that turn the drone and fly in its heading, so attitude and velocities matter."""
 
     actions = DiscreteActions(
         names=("fly", "turn left", "turn right", "turn round", "hover"),
@@ -27,13 +27,13 @@ class Turning(Dynamics):
     )
 
     def start(self, position, seeds=None):
-        """Already on its way."""
+        """Start with velocity SPEED."""
         body = BodyState.at_rest(position)
         body.velocity[:, 0] = SPEED
         return body
 
     def step(self, body, action, obstacles=None):
-        """Turns by a quarter or by half, then flies a tenth of a second."""
+        """Turn by 0, 90 or 180 degrees, then fly for 0.1 s."""
         yaw = 2 * torch.atan2(body.attitude[:, 3], body.attitude[:, 0])
         rate = torch.tensor([0.0, TURN, -TURN, 2 * TURN, 0.0], dtype=torch.float64)[action]
         yaw = yaw + rate

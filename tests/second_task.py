@@ -1,7 +1,7 @@
-"""A small second task, which shows that whatever knows a task knows none in particular.
+"""A small user-defined task, to test that no code depends on a particular task.
 
-Fly past posts that stand beside the way and touch none: a post that is passed earns 1, a touched
-one ends the episode. Nothing is collected and nothing vanishes.
+The drone flies past posts beside its path without touching them. The reward is 1 for each passed
+post; touching one ends the episode. Nothing is collected or removed.
 """
 
 import dataclasses
@@ -19,11 +19,11 @@ from drone_rl.sim.vocabulary import TaskVocabulary
 
 NUM_POSTS = 2
 REACH = 1.0
-"""Metres along an axis up to which drone and post touch."""
+"""Greatest distance along each axis, in metres, at which drone and post touch."""
 
 
 class End(enum.IntEnum):
-    """Why an episode ended."""
+    """The reason why an episode ended."""
 
     RUNNING = 0
     THROUGH = 1
@@ -33,20 +33,20 @@ class End(enum.IntEnum):
 
 @dataclasses.dataclass
 class PostsState(State):
-    """Worlds with posts."""
+    """The state of environments with posts."""
 
     posts: Tensor  # (num_worlds, NUM_POSTS, 3) float64
     passed: Tensor  # (num_worlds, NUM_POSTS) bool
 
 
 class Post(Cube):
-    """A box that must not be touched."""
+    """A box that the drone must not touch."""
 
     semantic_class = SemanticClass.OBSTACLE
 
 
 class Posts(Task[PostsState]):
-    """The task."""
+    """Fly past all posts without touching one."""
 
     name = "posts"
     ends = End
@@ -76,7 +76,7 @@ class Posts(Task[PostsState]):
 
     @property
     def entries(self):
-        """Which posts are passed, on which side they stand, and the end."""
+        """The passed posts, the sides of the posts, the end reason and the positions."""
         return {
             "passed": Entry((NUM_POSTS,), torch.bool),
             "sides": Entry((NUM_POSTS,), torch.int64, 0, 1),
@@ -85,15 +85,15 @@ class Posts(Task[PostsState]):
         }
 
     def make_props(self):
-        """The posts."""
+        """Return the posts."""
         return [Post(1.0, (0.1, 0.1, 0.6), name=f"post_{i}") for i in range(NUM_POSTS)]
 
     def draw(self, random_state):
-        """A side for each post: 1 to the left, -1 to the right."""
+        """Sample a side for each post: 1 for left, -1 for right."""
         return torch.from_numpy(random_state.choice([-1.0, 1.0], size=NUM_POSTS))
 
     def start(self, drawn, body):
-        """Posts stand 3 m and 6 m ahead, 1.5 m aside."""
+        """Place posts 3 m and 6 m ahead and 1.5 m to the side."""
         ahead = 3.0 * torch.arange(1, NUM_POSTS + 1, dtype=torch.float64)
         posts = torch.stack([ahead.expand_as(drawn), 1.5 * drawn, torch.ones_like(drawn)], -1)
         return PostsState(
@@ -105,7 +105,7 @@ class Posts(Task[PostsState]):
         )
 
     def judge(self, state, body):
-        """A reward for each post that is now behind the drone."""
+        """Reward each post that the drone has passed in this step."""
         away = (body.position[:, None] - state.posts).abs().amax(-1)
         passed = state.passed | (body.position[:, None, 0] > state.posts[..., 0])
         steps = state.steps + 1
@@ -117,11 +117,11 @@ class Posts(Task[PostsState]):
         return new, reward
 
     def places(self, state):
-        """Where the posts are."""
+        """Return the positions of the posts."""
         return state.posts
 
     def info(self, state):
-        """See `entries`."""
+        """Return the values of `entries`."""
         return {
             "passed": state.passed.clone(),
             "sides": (state.posts[..., 1] < 0).long(),
@@ -130,12 +130,12 @@ class Posts(Task[PostsState]):
         }
 
     def score(self, info):
-        """Each post is a goal; all come up at once."""
+        """Return each post as a goal; all are available from the start."""
         sides = info["sides"]
         return Goals(reached=info["passed"], stratum=sides, world=sides.double())
 
     def remember(self, info):
-        """Where the posts are, and how many lie behind."""
+        """Return the positions of the posts and the number of passed ones."""
         return {"posts": info["posts"], "next_target": info["passed"].sum(-1)}
 
     def tally(self, info):
@@ -143,7 +143,7 @@ class Posts(Task[PostsState]):
         return passed, torch.zeros_like(passed)
 
     def recall(self, kept, body):
-        """The posts as they stood."""
+        """Restore a state from recorded positions."""
         index = torch.arange(NUM_POSTS)
         return PostsState(
             body=body,
@@ -154,25 +154,25 @@ class Posts(Task[PostsState]):
         )
 
     def next_target(self, state):
-        """The nearest post ahead."""
+        """Return the index of the nearest post ahead."""
         return state.passed.sum(-1)
 
     def is_reached(self, state, target):
-        """Whether it was passed."""
+        """Return whether the target was passed."""
         return state.passed[torch.arange(len(state)), target]
 
     def needed(self, offset):
-        """Away from a post in the way."""
+        """Return the action that moves away from a post in the path."""
         lateral = offset[..., 1]
         away = torch.where(lateral > 0, MOVES.right, MOVES.left)
         return away.masked_fill(lateral.abs() > REACH, 0)
 
     def stratum_at(self, offset):
-        """Left or right."""
+        """Return the side of an offset: 0 for left, 1 for right."""
         return (offset[..., 1] < 0).long()
 
     def grid(self, num_forward, num_lateral):
-        """Up to six metres ahead and three aside."""
+        """Return a grid up to 6 m ahead and 3 m to each side."""
         return Grid(
             torch.zeros(1).double(),
             torch.linspace(2.0, 6.0, num_forward).double(),
@@ -180,7 +180,7 @@ class Posts(Task[PostsState]):
         )
 
     def one_target(self, body, offset):
-        """The last post there, the others behind."""
+        """Place the last post at an offset and the others behind the drone."""
         state = self.start(torch.ones(len(offset), NUM_POSTS).double(), body)
         state.posts[:, :-1] -= 100.0
         state.posts[:, -1] = body.position + offset
@@ -188,27 +188,27 @@ class Posts(Task[PostsState]):
         return state
 
     def without_targets(self, state):
-        """All posts far behind."""
+        """Place all posts far behind the drone."""
         gone = torch.ones_like(state.passed)
         return dataclasses.replace(state, posts=state.posts - 100.0, passed=gone)
 
     def without_next(self, state):
-        """The next one far behind."""
+        """Place the next post far behind the drone."""
         following = self._is_next(state)
         posts = state.posts - 100.0 * following[..., None]
         return dataclasses.replace(state, posts=posts, passed=state.passed | following)
 
     def next_moved(self, state, metres):
-        """The next one to the left."""
+        """Move the next post to the left."""
         posts = state.posts.clone()
         move = torch.as_tensor(metres).expand(len(state))[:, None]
         posts[..., 1] += move * self._is_next(state)
         return dataclasses.replace(state, posts=posts)
 
     def elsewhere(self, state, camera, generator):
-        """All posts ahead, somewhere to either side."""
-        draw = torch.rand(*state.posts.shape, generator=generator, dtype=torch.float64)
-        away = torch.stack([3.0 + 3.0 * draw[..., 0], 4.0 * draw[..., 1] - 2.0], -1)
+        """Place all posts at random positions ahead."""
+        sample = torch.rand(*state.posts.shape, generator=generator, dtype=torch.float64)
+        away = torch.stack([3.0 + 3.0 * sample[..., 0], 4.0 * sample[..., 1] - 2.0], -1)
         posts = state.posts.clone()
         posts[..., :2] = state.body.position[:, None, :2] + away
         return dataclasses.replace(state, posts=posts, passed=torch.zeros_like(state.passed))

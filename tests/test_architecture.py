@@ -1,4 +1,4 @@
-"""The order of imports is a contract, not a wish."""
+"""Import contracts and structural rules of the package."""
 
 import importlib
 import pkgutil
@@ -32,7 +32,7 @@ def test_every_public_name_is_exported_and_documented():
 
 
 def test_imports_do_no_work():
-    """No world is compiled, no kernel loaded, no generator seeded by importing everything."""
+    """Importing all modules compiles no scene, loads no kernel and seeds no generator."""
     code = (
         "import os, torch; before = dict(os.environ); state = torch.get_rng_state()\n"
         f"import {', '.join(m for m in modules())}\n"
@@ -49,9 +49,9 @@ def test_no_module_is_too_long():
     assert max(lengths.values()) <= 400, max(lengths, key=lengths.get)
 
 
-def test_every_module_has_a_test_of_its_own_name():
+def test_every_module_has_a_test_file_of_its_name():
     assert modules_without_test(ROOT) == []
 
 
-def test_there_are_enough_lines_of_test():
+def test_tests_have_enough_lines():
     assert count_lines(ROOT / "tests") >= 0.6 * count_lines(ROOT / "drone_rl")

@@ -1,4 +1,4 @@
-"""Data classes of the whole package: frozen, so that what was checked stays as it was."""
+"""Data classes of the package are frozen, so validated values stay valid."""
 
 import dataclasses
 import importlib
@@ -31,9 +31,9 @@ MUTABLE = {
     "verification.prover.lattice:Graph",
     "verification.prover.prover:Findings",
 }
-"""Those that are not frozen, or not yet, below drone_rl; batches of tensors are none of them."""
-BY_NAME_ALONE = ("drone_rl.config.", "drone_rl.config.", "drone_rl.cli.")
-"""Where fields have no order, so that adding one changes no call."""
+"""Data classes below drone_rl that are not frozen; batches of tensors are exempt."""
+KEYWORD_ONLY = ("drone_rl.config.", "drone_rl.cli.")
+"""Packages whose fields are keyword-only, so a new field changes no call."""
 
 
 def data_classes():
@@ -42,7 +42,7 @@ def data_classes():
             continue
         try:
             module = importlib.import_module(found.name)
-        except ImportError:  # an optional part is not installed
+        except ImportError:  # an optional dependency is not installed
             continue
         for name, kind in inspect.getmembers(module, inspect.isclass):
             is_ours = kind.__module__ == found.name and "__dataclass_params__" in vars(kind)
@@ -51,22 +51,22 @@ def data_classes():
 
 
 @pytest.fixture(scope="module")
-def all_of_them():
+def classes():
     return dict(data_classes())
 
 
-def test_what_is_described_cannot_be_changed(all_of_them):
-    assert len(all_of_them) > 100
-    changeable = {n for n, k in all_of_them.items() if not k.__dataclass_params__.frozen}
-    assert {name.removeprefix("drone_rl.") for name in changeable} == MUTABLE
+def test_data_classes_are_frozen(classes):
+    assert len(classes) > 100
+    mutable = {n for n, k in classes.items() if not k.__dataclass_params__.frozen}
+    assert {name.removeprefix("drone_rl.") for name in mutable} == MUTABLE
 
 
-def test_settings_are_given_by_name(all_of_them):
-    by_place = {
+def test_settings_are_keyword_only(classes):
+    positional = {
         f"{name}.{field.name}"
-        for name, kind in all_of_them.items()
+        for name, kind in classes.items()
         for field in dataclasses.fields(kind)
-        if name.startswith(BY_NAME_ALONE) and field.init and not field.kw_only
-        if name != "drone_rl.config.configuration:Changes"  # a type, and nothing else
+        if name.startswith(KEYWORD_ONLY) and field.init and not field.kw_only
+        if name != "drone_rl.config.configuration:Changes"  # a type only
     }
-    assert by_place == set()
+    assert positional == set()

@@ -1,4 +1,4 @@
-"""`import drone_rl` is quick and offers all that it lists."""
+"""`import drone_rl` is fast and provides all public names."""
 
 import re
 import subprocess
@@ -10,7 +10,7 @@ import pytest
 import drone_rl
 
 
-def test_everything_that_is_listed_is_there():
+def test_every_public_name_is_available():
     for name in drone_rl.__all__:
         assert getattr(drone_rl, name).__name__ == name
         assert name in dir(drone_rl)
@@ -19,19 +19,19 @@ def test_everything_that_is_listed_is_there():
     assert {name: home for home, name in typed} == drone_rl._HOMES
 
 
-def test_what_is_not_there():
+def test_an_unknown_name_raises():
     with pytest.raises(AttributeError, match="no attribute 'fly'"):
         drone_rl.fly  # noqa: B018
 
 
-def test_nothing_heavy_is_imported():
+def test_import_loads_no_heavy_library():
     code = "import sys, drone_rl; assert not {'torch', 'numpy', 'hydra'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
 @pytest.mark.parametrize("flags", [["default"], ["error::DeprecationWarning:abc"]])
-def test_no_import_prints_a_warning(flags):
-    """Not even of modules that nobody imports through `drone_rl` itself."""
+def test_imports_print_no_warning(flags):
+    """This includes modules that `drone_rl` itself does not import."""
     code = (
         "import warnings, drone_rl.training, drone_rl.envs, drone_rl.sim.composer_task\n"
         "drone_rl.make_env().close()\n"
@@ -44,7 +44,7 @@ def test_no_import_prints_a_warning(flags):
     assert (done.stdout, len(done.stderr.splitlines())) == ("", 1)
 
 
-def test_importing_the_api_says_nothing():
+def test_importing_the_api_prints_nothing():
     code = "import warnings; warnings.simplefilter('default'); import drone_rl; drone_rl.judge"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("", "")

@@ -17,7 +17,7 @@ def test_action_zero_stays_and_is_truncated():
     assert rollout["next", "reward"].sum() == 0
 
 
-def test_action_one_succeeds_three_times_in_four():
+def test_action_one_succeeds_with_probability_0_75():
     env = ThreeStateEnv(20_000)
     state = env.reset().set("action", torch.ones(20_000).long())
     after = env.step(state)["next"]
@@ -26,17 +26,17 @@ def test_action_one_succeeds_three_times_in_four():
     assert torch.equal(after["reward"][:, 0], after["observation"][:, 2])
 
 
-def test_seed_repeats():
-    def draw(seed):
+def test_same_seed_gives_same_transitions():
+    def sample(seed):
         env = ThreeStateEnv(50, seed=seed)
         return env.step(env.reset().set("action", torch.ones(50).long()))["next", "reward"]
 
-    assert torch.equal(draw(1), draw(1))
-    assert not torch.equal(draw(1), draw(2))
+    assert torch.equal(sample(1), sample(1))
+    assert not torch.equal(sample(1), sample(2))
 
 
 def test_outcomes_of_two_steps_by_hand():
-    """Leave at once (1/5), later (4/5 * 1/2), or stay (4/5 * 1/2); 3 of 4 who leave succeed."""
+    """Leave at once (1/5), later (4/5 * 1/2), or stay (4/5 * 1/2); 3/4 of departures succeed."""
     found = {(o.actions, o.rewards): o.probability for o in outcomes([0.2, 0.5])}
     assert found == pytest.approx(
         {
@@ -49,8 +49,8 @@ def test_outcomes_of_two_steps_by_hand():
     )
 
 
-def test_outcomes_are_those_of_the_environment():
-    """4,000 worlds under a policy that leaves with probability 0.3 and 0.6."""
+def test_outcomes_match_the_environment():
+    """4,000 environments under a policy that takes action 1 with probability 0.3 and 0.6."""
     leaving, n = [0.3, 0.6], 4000
     env, generator = ThreeStateEnv(n, horizon=2, seed=3), torch.Generator().manual_seed(0)
     state, seen = env.reset(), [((), ())] * n
@@ -72,7 +72,7 @@ def test_outcomes_are_those_of_the_environment():
 
 @pytest.mark.parametrize("gamma", [1.0, 0.9])
 def test_exact_gradient_is_the_sum_over_outcomes(gamma):
-    """Of sum_t score_t g_t with g_t the discounted return; d log pi / d logit = action - p."""
+    """The sum is over score_t g_t, with g_t the discounted return; score = action - p."""
     leaving = [0.3, 0.6, 0.2]
     total = torch.zeros(3, dtype=torch.float64)
     for p, actions, rewards in outcomes(leaving):
@@ -90,8 +90,8 @@ def test_exact_gradient_is_the_derivative_of_the_expected_reward():
         return total
 
     logits = torch.tensor([0.4, -1.0, 0.3], dtype=torch.float64, requires_grad=True)
-    (slope,) = torch.autograd.grad(reward(logits), logits)
-    torch.testing.assert_close(exact_gradient(logits.sigmoid().tolist()), slope)
+    (gradient,) = torch.autograd.grad(reward(logits), logits)
+    torch.testing.assert_close(exact_gradient(logits.sigmoid().tolist()), gradient)
     assert exact_gradient([0.5]).tolist() == [0.75 / 4]
 
 
@@ -105,10 +105,10 @@ def test_truncated_exactly_at_the_horizon_and_terminated_before():
     assert state["terminated"][:, 0].tolist() == [False, True, True]
     assert state["truncated"][:, 0].tolist() == [True, False, False]
     assert state["done"].all()
-    assert state["reward"][1] == 0.0  # nothing more happens to a world that has ended
+    assert state["reward"][1] == 0.0  # a terminated environment gives no more reward
 
 
-def test_reset_of_some_worlds_leaves_the_others():
+def test_partial_reset_keeps_the_other_environments():
     env = ThreeStateEnv(2, horizon=5)
     state = env.step(env.reset().set("action", torch.tensor([1, 0])))["next"]
     state["_reset"] = torch.tensor([[True], [False]])

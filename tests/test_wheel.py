@@ -1,4 +1,4 @@
-"""An installed wheel works outside the checkout: its configuration travels with it."""
+"""An installed wheel works outside the checkout and contains its configuration."""
 
 import subprocess
 import sys
@@ -8,15 +8,15 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 
 
-def test_wheel_carries_the_configuration_and_runs_without_the_checkout(tmp_path):
+def test_wheel_contains_the_configuration_and_runs_without_the_checkout(tmp_path):
     build = ["-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
     subprocess.run([sys.executable, *build], cwd=ROOT, check=True, capture_output=True)
     (wheel,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
         archive.extractall(tmp_path / "site")
-    carried = {p.relative_to(ROOT / "conf") for p in (ROOT / "conf").rglob("*.yaml")}
-    assert {f"drone_rl/conf/{path.as_posix()}" for path in carried} <= names
+    configs = {p.relative_to(ROOT / "conf") for p in (ROOT / "conf").rglob("*.yaml")}
+    assert {f"drone_rl/conf/{path.as_posix()}" for path in configs} <= names
     assert "drone_rl/py.typed" in names
     assert "drone_rl/explanations/report/templates/report.html" in names
     policies = ("good", "poor", "right_and_forward", "proved")

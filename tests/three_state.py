@@ -1,4 +1,4 @@
-"""The three-state Markov decision process of Fig. 3, small enough to know its exact gradient."""
+"""The three-state Markov decision process of Fig. 3, whose exact gradient is known."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -9,11 +9,11 @@ from torchrl.data import Binary, Categorical, Composite, OneHot, Unbounded
 from torchrl.envs import EnvBase
 
 SUCCESS_PROBABILITY = 0.75
-"""Of action 1 in state 0: to state 2, with reward 1; otherwise to state 1, with none."""
+"""Probability that action 1 in state 0 leads to state 2 and reward 1, else to state 1 and 0."""
 
 
 class Outcome(NamedTuple):
-    """One way in which an episode can go."""
+    """One possible episode."""
 
     probability: float
     actions: tuple[int, ...]
@@ -21,7 +21,7 @@ class Outcome(NamedTuple):
 
 
 def outcomes(leaving: Sequence[float]) -> list[Outcome]:
-    """Every way in which an episode can go, so that expectations become sums.
+    """Return every possible episode, so expectations become sums.
 
     Args:
         leaving: The policy's probability of action 1 in state 0 at each step; as many as `horizon`.
@@ -38,12 +38,12 @@ def outcomes(leaving: Sequence[float]) -> list[Outcome]:
 
 
 def exact_gradient(leaving: Sequence[float], gamma: float = 1.0) -> torch.Tensor:
-    """The policy gradient with respect to the logit of action 1 at each step, without sampling.
+    """Return the exact policy gradient with respect to the logit of action 1 at each step.
 
-    It is P(still in state 0) p (1 - p) (Q(action 1) - Q(action 0)), with p of the step.
-    Undiscounted this is the gradient of the expected reward. With gamma below 1 it is what Eq. 15
-    estimates with discounted returns, each discounted from its own step: the gradient of nothing,
-    but what REINFORCE climbs.
+    It is P(still in state 0) p (1 - p) (Q(action 1) - Q(action 0)), with p of the step. With gamma
+    = 1 it is the gradient of the expected reward. With gamma < 1 it is the expectation of Eq. 15
+    with returns discounted from their own step: REINFORCE follows it, although it is not the
+    gradient of any objective.
 
     Args:
         leaving: As in `outcomes`.
@@ -65,17 +65,17 @@ def exact_gradient(leaving: Sequence[float], gamma: float = 1.0) -> torch.Tensor
 class ThreeStateEnv(EnvBase):
     """Action 0 stays in state 0; action 1 goes to state 1 (25%) or, for reward 1, to state 2.
 
-    States 1 and 2 have no way out and no reward, so they end the episode; staying in state 0 is
-    truncated after `horizon` steps. Observation: the state, one-hot, shape (num_envs, 3).
+    States 1 and 2 terminate the episode. In state 0 the episode is truncated after `horizon` steps.
+    The observation is the one-hot state, shape (num_envs, 3).
     """
 
     def __init__(self, num_envs: int, *, horizon: int = 3, seed: int = 0) -> None:
-        """Makes the worlds.
+        """Create the environments.
 
         Args:
-            num_envs: How many.
-            horizon: Steps after which an episode is truncated.
-            seed: Of the transitions.
+            num_envs: Number of environments.
+            horizon: Number of steps after which an episode is truncated.
+            seed: Seed of the transitions.
         """
         super().__init__(batch_size=torch.Size([num_envs]))
         self.horizon = horizon

@@ -21,7 +21,8 @@ from drone_rl.envs import (
 from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
 from drone_rl.evaluation.baselines import make_baseline
 from drone_rl.policies import SmallCNN, make_actor
-from tests.continuous import make_policy, make_worlds
+from tests.continuous import make_env as make_continuous_env
+from tests.continuous import make_policy
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
 KEPT = [("next", name) for name in ("reward", "done", "terminated", "truncated")]
@@ -66,7 +67,7 @@ def test_direct_and_stepping_batches_are_identical(task, worlds, look):
 def test_continuous_actions_of_direct_and_stepping_batches_are_identical():
     collectors = []
     for acceleration in ("fused", "none"):
-        env = make_worlds(5)
+        env = make_continuous_env(5)
         actor = make_policy(env)[1]
         made = EpisodeCollector(env, actor, keep=(REASON,), acceleration=acceleration)
         is_direct = isinstance(made.source, DirectCollector)

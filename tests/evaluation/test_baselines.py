@@ -17,7 +17,7 @@ from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import side_stream, world_random_state
-from tests.continuous import make_worlds
+from tests.continuous import make_env
 from tests.second_task import Posts
 
 TASK = TaskSettings(num_cubes=1)
@@ -70,7 +70,7 @@ def test_another_task_has_luck_of_its_own():
 
 
 def test_luck_flies_at_full_speed_where_speeds_are_asked_for():
-    env = make_worlds(6)
+    env = make_env(6)
     flown = run_baselines(
         6,
         env.base_env.worlds.task,

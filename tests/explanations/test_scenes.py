@@ -11,7 +11,7 @@ from drone_rl.envs import (
     with_transforms,
 )
 from drone_rl.explanations.scenes import Region, Scenes, empty_scene, place_target
-from tests.continuous import make_worlds
+from tests.continuous import make_env
 from tests.second_dynamics import Turning
 
 
@@ -79,6 +79,6 @@ def test_what_is_needed_is_known_of_the_tasks_own_actions_alone(scenes):
 
 
 def test_what_is_needed_is_the_part_of_the_same_name():
-    env, places = make_worlds(1), torch.tensor([[6.0, y, 0.0] for y in (4.0, 0.0, -4.0)])
+    env, places = make_env(1), torch.tensor([[6.0, y, 0.0] for y in (4.0, 0.0, -4.0)])
     assert Scenes(env).needed(places).tolist() == [1, 0, 2]
     env.close()

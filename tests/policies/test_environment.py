@@ -139,7 +139,7 @@ def test_settings_of_dynamics_and_actions(monkeypatch):
     windy = drone_rl.DynamicsSettings(mode="simple_flight", wind=(1.0, 0.0, 0.0))
     env = drone_rl.make_env(2, dynamics=windy, actions=slow)
     made = env.base_env.worlds.dynamics
-    assert (made.settings, made.asked) == (windy, slow)
+    assert (made.settings, made.action_settings) == (windy, slow)
     env.close()
     with pytest.raises(InputError, match=r"^actions=moves, but dynamics=Turning brings its own"):
         drone_rl.make_env(1, dynamics=Turning(), actions=slow)

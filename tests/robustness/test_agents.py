@@ -29,12 +29,12 @@ def sight(worlds, flying, spoil=lambda pictures, flying, nothing=0.0: pictures):
     return StepContext(worlds, state, flying, worlds.poses(state), None, spoil, [])
 
 
-def make_worlds():
+def make_env():
     return Worlds(3, TASK, CameraSettings(width=16, height=5), num_shards=1)
 
 
 def test_a_policy_sees_what_its_transforms_make_of_spoilt_pictures():
-    worlds, network = make_worlds(), Looking()
+    worlds, network = make_env(), Looking()
     flying = torch.tensor([0, 2])
     agent = PolicyAgent(network, [GrayPixels()], 3)
     action, seen = agent.act(sight(worlds, flying, lambda p, f, nothing=0.0: p / 2))
@@ -46,14 +46,14 @@ def test_a_policy_sees_what_its_transforms_make_of_spoilt_pictures():
 
 
 def test_colours_are_drawn_for_who_sees_colours():
-    worlds, network = make_worlds(), Looking()
+    worlds, network = make_env(), Looking()
     PolicyAgent(network, [RgbPixels()], 3).act(sight(worlds, torch.arange(3)))
     worlds.close()
     assert network.shown[0].shape == (3, 3, 5, 16)
 
 
 def test_a_stack_of_frames_holds_those_of_the_worlds_that_still_fly():
-    worlds, network = make_worlds(), Looking()
+    worlds, network = make_env(), Looking()
     agent = PolicyAgent(network, [GrayPixels(), CatFrames(N=2, dim=-3, in_keys=["pixels"])], 3)
     step = iter((0.25, 0.5))
 
@@ -78,7 +78,7 @@ class Tied(PictureNetwork):
 
 
 def test_episodes_with_a_frame_on_which_rounding_decides_are_noted():
-    worlds = make_worlds()
+    worlds = make_env()
     bright = torch.tensor([1.0, 0.0, 0.0])
     for examines in (True, False):
         agent = PolicyAgent(Tied(), [GrayPixels()], 3, examines_rounding=examines)
@@ -89,7 +89,7 @@ def test_episodes_with_a_frame_on_which_rounding_decides_are_noted():
 
 
 def test_who_looks_at_nothing_does_the_same_always_or_anything_alike():
-    worlds = make_worlds()
+    worlds = make_env()
     where = sight(worlds, torch.arange(3))
     generator = torch.Generator().manual_seed(0)
     action, seen = BaselineAgent("right", MOVES, generator).act(where)
@@ -101,7 +101,7 @@ def test_who_looks_at_nothing_does_the_same_always_or_anything_alike():
 
 
 def test_who_looks_at_nothing_may_have_speeds_to_choose():
-    worlds, actions = make_worlds(), ContinuousActions.of(SETTINGS)
+    worlds, actions = make_env(), ContinuousActions.of(SETTINGS)
     where, generator = sight(worlds, torch.arange(2)), torch.Generator().manual_seed(0)
     action, _ = BaselineAgent("forward", actions, generator).act(where)
     assert action.tolist() == [[1, 0, 0]] * 2

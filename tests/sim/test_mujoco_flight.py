@@ -13,19 +13,19 @@ from drone_rl.sim.dynamics import FlightState, Mode, Obstacles, Quadrotor
 from drone_rl.sim.dynamics.state import GROUND, NOTHING
 from drone_rl.utils.seeding import world_random_state
 from tests.flying import (
-    PLACES,
-    SPEEDS,
+    POSITIONS,
+    VELOCITIES,
     angles,
     degrees_between,
+    doubles,
+    make_goals,
     matrix,
-    numbers,
     quadrotor,
     settings,
-    told,
 )
 
 DROP = (Mode.ROTOR,) * 4
-FAR = numbers((50.0, 50.0, 3.0))
+FAR = doubles((50.0, 50.0, 3.0))
 
 
 class Both:
@@ -39,7 +39,7 @@ class Both:
         )
         self.env.reset()
         self.flight, self.physics = self.env.task._flight, self.env.physics
-        self.here = self.drone.start(numbers(place))
+        self.here = self.drone.start(doubles(place))
         self.flight.begin(self.physics, self.here)
         self.there = self.here
         frames = self.env.task._frames
@@ -51,7 +51,7 @@ class Both:
         """Puts the pillars elsewhere."""
         for frame, place in zip(self.env.task._frames, places, strict=True):
             self.physics.bind(frame).mocap_pos = place
-        self.obstacles = Obstacles(numbers(*places)[None], self.half)
+        self.obstacles = Obstacles(doubles(*places)[None], self.half)
         self.physics.forward()
 
     def fly(self, goals, ticks):
@@ -72,12 +72,12 @@ class Both:
 
 
 FLIGHTS = {
-    "step": ((PLACES, (3.0, -2.0, 1.0, 21.0)), (PLACES, (0.0, 0.0, -2.0, 20.0))),
+    "step": ((POSITIONS, (3.0, -2.0, 1.0, 21.0)), (POSITIONS, (0.0, 0.0, -2.0, 20.0))),
     "roll": (
         ((Mode.ANGLE, Mode.ANGLE, Mode.ANGLE, Mode.POSITION), (0.7, -0.4, 0.5, 20.0)),
         ((Mode.ANGLE, Mode.ANGLE, Mode.ANGLE, Mode.POSITION), (-0.7, 0.4, 0.0, 20.0)),
     ),
-    "speed": ((SPEEDS, (3.0, 1.0, 0.5, 0.5)), (SPEEDS, (-1.0, 2.0, -0.5, 0.0))),
+    "speed": ((VELOCITIES, (3.0, 1.0, 0.5, 0.5)), (VELOCITIES, (-1.0, 2.0, -0.5, 0.0))),
 }
 
 
@@ -87,7 +87,7 @@ def test_in_the_air_they_stay_together(name, air):
     """Four seconds, within a millimetre and a hundredth of a degree, and a bit of rounding."""
     both = Both((0.0, 0.0, 20.0), **air)
     for modes, goal in FLIGHTS[name]:
-        both.fly(told(modes, *goal), 660)
+        both.fly(make_goals(modes, *goal), 660)
     metres, degrees = both.apart()
     assert metres < 0.001 and degrees < 0.01
     torch.testing.assert_close(both.there.velocity, both.here.velocity, atol=1e-3, rtol=0)
@@ -99,7 +99,9 @@ def test_in_the_air_they_stay_together(name, air):
 def test_both_land_and_rest_level():
     """Down at half a metre a second, then rotors stop."""
     both = Both((0.0, 0.0, 1.5))
-    both.fly(told(SPEEDS, 0.3, 0.0, 0.0, -0.5), 990).fly(told(DROP, 0, 0, 0, 0), 990)
+    both.fly(make_goals(VELOCITIES, 0.3, 0.0, 0.0, -0.5), 990).fly(
+        make_goals(DROP, 0, 0, 0, 0), 990
+    )
     for state in (both.here, both.there):
         assert float(state.position[0, 2]) == pytest.approx(0.3, abs=0.005)
         assert float(state.velocity.norm()) < 0.01 and float(angles(state)[0, :2].norm()) < 0.01
@@ -112,7 +114,7 @@ def test_both_bounce_off_a_pillar_and_end_before_it():
     """It is wanted on the other side of a pillar that stands in the way."""
     both = Both((0.0, 0.0, 2.0))
     both.move([(4.0, 0.0, both.half[2])] + [(50.0, 50.0 + i, 3.0) for i in range(both.count - 1)])
-    both.fly(told(PLACES, 8.0, 0.0, 0.0, 2.0), 700)
+    both.fly(make_goals(POSITIONS, 8.0, 0.0, 0.0, 2.0), 700)
     for state in (both.here, both.there):
         contact = state.contact
         assert contact.thing.tolist() == [0]
@@ -120,7 +122,7 @@ def test_both_bounce_off_a_pillar_and_end_before_it():
         face = 4.0 - both.half[0]
         np.testing.assert_allclose(contact.point[0], (face, 0.0, 2.0), atol=0.1)
         assert float(state.position[0, 0]) < face - 0.29
-    both.fly(told(PLACES, 0.0, 0.0, 0.0, 2.0), 2000)
+    both.fly(make_goals(POSITIONS, 0.0, 0.0, 0.0, 2.0), 2000)
     assert both.apart()[0] < 0.1
     np.testing.assert_allclose(both.there.position, both.here.position, atol=0.1)
 
@@ -130,7 +132,7 @@ def test_a_bounce_gives_back_about_its_share():
     both = Both((0.0, 0.0, 1.3), air_density=0.0)
     heights = {"here": [], "there": []}
     for _ in range(40):
-        both.fly(told(DROP, 0, 0, 0, 0), 10)
+        both.fly(make_goals(DROP, 0, 0, 0, 0), 10)
         heights["here"].append(float(both.here.position[0, 2]))
         heights["there"].append(float(both.there.position[0, 2]))
     tops = [max(list_[15:30]) - 0.3 for list_ in heights.values()]
@@ -178,7 +180,7 @@ def test_a_drone_moved_by_hand_is_told_to_stay_there():
 def test_cameras_on_a_gimbal_stay_level(mount, is_level):
     both = Both((0.0, 0.0, 20.0), camera_mount=mount)
     modes = (Mode.ANGLE, Mode.ANGLE, Mode.ANGLE, Mode.POSITION)
-    both.fly(told(modes, 0.3, 0.2, 0.8, 20.0), 660)
+    both.fly(make_goals(modes, 0.3, 0.2, 0.8, 20.0), 660)
     both.physics.forward()
     camera = both.physics.named.data.cam_xmat["drone/front_center"].reshape(3, 3)
     ahead, tilt = -camera[:, 2], angles(both.there)[0]

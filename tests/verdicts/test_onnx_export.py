@@ -12,7 +12,7 @@ from drone_rl.policies.zoo import open_onnx, parse
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts import onnx_export as exporting
 from drone_rl.verdicts.onnx_export import agreement
-from tests.continuous import make_policy, make_worlds
+from tests.continuous import make_env, make_policy
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def test_a_program_agrees_with_itself(flown):
 
 
 def test_programs_agree_on_what_speeds_are_for_the_most_part():
-    env = make_worlds(4)
+    env = make_env(4)
     network, actor = make_policy(env)
     transform, actions = on_pixels(env.transform), network.actions
     found = agreement(env, actor, lambda frames: actions.wish(network(transform(frames))), 5)

@@ -131,7 +131,7 @@ def test_settings_of_dynamics_and_actions(monkeypatch):
     floating(monkeypatch)
     given = {"dynamics": {"mode": "simple_flight"}, "actions": {"move_speed": 1.0}}
     made = WorldBatch(1, TASK, given).worlds.dynamics
-    assert (made.settings, made.asked.move_speed) == (FLIGHT, 1.0)
+    assert (made.settings, made.action_settings.move_speed) == (FLIGHT, 1.0)
     for wrong, message in (
         ({"dynamics": {"mas": 1.0}}, r"dynamics\.mas is unknown"),
         ({"dynamics": {"gusts": 1.0}}, r"dynamics\.gusts=1\.0 moves nothing"),

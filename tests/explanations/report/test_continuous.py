@@ -9,7 +9,7 @@ import torch
 from drone_rl.explanations.explain import explain_policy
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.settings import ExplainSettings
-from tests.continuous import make_policy, make_worlds
+from tests.continuous import make_env, make_policy
 from tests.explanations.quick import quick
 
 NAMES = ["forward", "left", "right", "turn left", "turn right"]
@@ -19,7 +19,7 @@ NAMES = ["forward", "left", "right", "turn left", "turn right"]
 def folder(tmp_path_factory):
     """All sections, the verdict among them."""
     folder = tmp_path_factory.mktemp("continuous")
-    env = make_worlds(6)
+    env = make_env(6)
     network, _ = make_policy(env)
     with torch.no_grad():  # mostly onwards, a little to the left
         network.layers.logits.weight.mul_(20)

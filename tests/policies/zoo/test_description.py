@@ -286,9 +286,9 @@ def test_worlds_move_as_described_or_as_told(monkeypatch):
         return env.base_env.worlds.dynamics
 
     own = flown()
-    assert (own.settings, own.asked) == (FLIGHT, fast)
+    assert (own.settings, own.action_settings) == (FLIGHT, fast)
     windy = FLIGHT.replace(wind=(1.0, 0.0, 0.0))
-    assert (flown(dynamics=windy).settings, flown(dynamics=windy).asked) == (windy, fast)
+    assert (flown(dynamics=windy).settings, flown(dynamics=windy).action_settings) == (windy, fast)
     turning = Turning()
     assert flown(dynamics=turning) is turning
     assert type(flown(dynamics=COMPUTER_VISION)) is ComputerVision

@@ -4,14 +4,14 @@ import torch
 from drone_rl.sim.dynamics import Goals, Mode
 from drone_rl.sim.dynamics.control import rotor_goals
 from drone_rl.utils.errors import InputError
-from tests.flying import PLACES, numbers
+from tests.flying import POSITIONS, doubles
 
-FOUR = numbers((1.0, 2.0, 3.0, 4.0))
+FOUR = doubles((1.0, 2.0, 3.0, 4.0))
 
 
 def test_nothing_drifts_by_default():
-    assert Goals(PLACES, FOUR).drifts.tolist() == [[0, 0, 0, 0]]
-    assert Goals(PLACES, FOUR, FOUR).drifts is FOUR
+    assert Goals(POSITIONS, FOUR).drifts.tolist() == [[0, 0, 0, 0]]
+    assert Goals(POSITIONS, FOUR, FOUR).drifts is FOUR
 
 
 def test_rotors_are_told_all_together():
@@ -56,8 +56,8 @@ def test_what_goes_together_is_taken(modes):
 
 def test_a_number_for_each_axis_is_asked_for():
     with pytest.raises(InputError, match=r"goals of shape \(4,\) are not \(num_worlds, 4\)"):
-        Goals(PLACES, FOUR[0])
+        Goals(POSITIONS, FOUR[0])
     with pytest.raises(InputError, match=r"goals of shape \(1, 3\)"):
-        Goals(PLACES, FOUR[:, :3])
+        Goals(POSITIONS, FOUR[:, :3])
     with pytest.raises(InputError, match=r"drift of shape \(4,\) is not that of the goals"):
-        Goals(PLACES, FOUR, torch.zeros(4))
+        Goals(POSITIONS, FOUR, torch.zeros(4))

@@ -9,15 +9,15 @@ import torch
 from drone_rl.sim.dynamics import Mode
 from tests.flying import (
     ANGLES,
-    PLACES,
-    SPEEDS,
-    Answer,
+    POSITIONS,
+    VELOCITIES,
+    StepResponse,
     angles,
-    history,
-    numbers,
+    doubles,
+    hovering,
+    make_goals,
     quadrotor,
-    still,
-    told,
+    trajectory,
 )
 
 RATES = (Mode.RATE, Mode.RATE, Mode.RATE, Mode.POSITION)
@@ -28,11 +28,11 @@ HEADS = (Mode.HEADING_VELOCITY, Mode.HEADING_VELOCITY, Mode.RATE, Mode.VELOCITY)
 def asked(modes, *values, yaw=0.0, drift=None, change=None):
     """What a drone that hovers at (0, 0, 100) asks of each rotor in the first tick."""
     drone = quadrotor(rotor_time_constant=0.0)
-    state = still(drone)
-    state.attitude[:] = numbers((math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)))
+    state = hovering(drone)
+    state.attitude[:] = doubles((math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)))
     for name, value in (change or {}).items():
-        getattr(state, name)[:] = numbers(value)
-    return drone.fly(state, told(modes, *values, drift=drift), 1).rotors[0].numpy()
+        getattr(state, name)[:] = doubles(value)
+    return drone.fly(state, make_goals(modes, *values, drift=drift), 1).rotors[0].numpy()
 
 
 def control(rotors):
@@ -83,32 +83,32 @@ SHARE = 0.2 * math.pi / 5.5 * 2.5 * 2.5 * 0.25
 @pytest.mark.parametrize("yaw", [0.0, 1.0, -2.5, math.pi])
 def test_velocities_are_of_the_world_or_of_the_heading(yaw):
     x, y, c, s = 0.3, -0.2, math.cos(yaw), math.sin(yaw)
-    world = control(asked(SPEEDS, x, y, 0.0, 0.0, yaw=yaw))
+    world = control(asked(VELOCITIES, x, y, 0.0, 0.0, yaw=yaw))
     forward, left = c * x + s * y, c * y - s * x
     np.testing.assert_allclose(world, (HOVER, -SHARE * left, SHARE * forward, 0), atol=1e-6)
     same = control(asked(HEADS, forward, left, 0.0, 0.0, yaw=yaw))
     np.testing.assert_allclose(same, world, atol=1e-6)
     moving = {"velocity": (x, y, 0.0)}
-    for modes, goal in ((SPEEDS, (x, y)), (HEADS, (forward, left))):
+    for modes, goal in ((VELOCITIES, (x, y)), (HEADS, (forward, left))):
         at_it = control(asked(modes, *goal, 0.0, 0.0, yaw=yaw, change=moving))
         np.testing.assert_allclose(at_it, (HOVER, 0, 0, 0), atol=1e-6)
 
 
 def test_places_are_led_to_by_velocities():
     """Half a metre ahead asks for 0.75 m/s; a metre up for 1 m/s, which is all thrust there is."""
-    found = control(asked(PLACES, 0.5, -0.5, 0.0, 100.0))
+    found = control(asked(POSITIONS, 0.5, -0.5, 0.0, 100.0))
     np.testing.assert_allclose(found, (HOVER, 0.75 * SHARE, 0.75 * SHARE, 0), atol=1e-6)
-    found = control(asked(PLACES, 0.0, 0.0, 0.0, 100.1))
+    found = control(asked(POSITIONS, 0.0, 0.0, 0.0, 100.1))
     np.testing.assert_allclose(found[0], HOVER + 0.5 * 2.0 * 0.1, atol=1e-6)
-    assert control(asked(PLACES, 0.0, 0.0, 0.0, 101.0))[0] == pytest.approx(1.0)
+    assert control(asked(POSITIONS, 0.0, 0.0, 0.0, 101.0))[0] == pytest.approx(1.0)
 
 
 def test_a_place_that_drifts_is_followed_at_its_speed():
-    found = control(asked(PLACES, 0.0, 0.0, 0.0, 100.0, drift=(0.3, -0.2, 0.0, 0.05)))
+    found = control(asked(POSITIONS, 0.0, 0.0, 0.0, 100.0, drift=(0.3, -0.2, 0.0, 0.05)))
     np.testing.assert_allclose(found, (HOVER + 0.05, 0.2 * SHARE, 0.3 * SHARE, 0), atol=1e-6)
-    far = control(asked(PLACES, 50.0, 0.0, 0.0, 100.0, drift=(50.0, 0.0, 0.0, 0.0)))
+    far = control(asked(POSITIONS, 50.0, 0.0, 0.0, 100.0, drift=(50.0, 0.0, 0.0, 0.0)))
     moving = {"velocity": (6.0, 0.0, 0.0)}
-    fast = control(asked(PLACES, 50.0, 0, 0, 100.0, drift=(50.0, 0, 0, 0), change=moving))
+    fast = control(asked(POSITIONS, 50.0, 0, 0, 100.0, drift=(50.0, 0, 0, 0), change=moving))
     assert far[2] > 0.1 and fast[2] == pytest.approx(0.0, abs=1e-6)  # 6 m/s is the most
 
 
@@ -120,10 +120,10 @@ def test_rotors_are_told_without_a_controller():
 STEPS = {  # modes, goal, axis, what, rise, overshoot, settled
     "rate": (RATES, (0, 0, 1.0, 100.0), 2, "rates", 0.6, 0.01),
     "angle": (ANGLES, (0.3, 0, 0, 100.0), 0, "angles", 0.6, 0.02),
-    "velocity": (SPEEDS, (2.0, 0, 0, 0), 0, "speed", 3.0, 0.05),
-    "climb": (SPEEDS, (0, 0, 0, 1.0), 2, "speed", 1.0, 0.2),
-    "position": (PLACES, (2.0, 0, 0, 100.0), 0, "place", 3.5, 0.33),
-    "height": (PLACES, (0, 0, 0, 101.0), 2, "place", 3.5, 0.1),
+    "velocity": (VELOCITIES, (2.0, 0, 0, 0), 0, "speed", 3.0, 0.05),
+    "climb": (VELOCITIES, (0, 0, 0, 1.0), 2, "speed", 1.0, 0.2),
+    "position": (POSITIONS, (2.0, 0, 0, 100.0), 0, "place", 3.5, 0.33),
+    "height": (POSITIONS, (0, 0, 0, 101.0), 2, "place", 3.5, 0.1),
 }
 
 
@@ -131,7 +131,7 @@ STEPS = {  # modes, goal, axis, what, rise, overshoot, settled
 def test_a_step_is_answered(name):
     modes, goal, axis, what, rise, overshoot = STEPS[name]
     drone = quadrotor()
-    states = history(drone, still(drone), told(modes, *goal), 3300, 3)
+    states = trajectory(drone, hovering(drone), make_goals(modes, *goal), 3300, 3)
     read = {
         "rates": lambda s: s.angular_velocity,
         "angles": angles,
@@ -141,22 +141,22 @@ def test_a_step_is_answered(name):
     values = torch.cat([read(s) for s in states]).numpy()[:, axis]
     start = 100.0 if name == "height" else 0.0
     wanted = 1.0 if name in ("rate", "climb", "height") else max(goal[:3])
-    answer = Answer(values - start, wanted, tick=0.009)
-    assert 0.0 < answer.rise < rise
-    assert answer.overshoot < overshoot
-    assert answer.settled(0.05) < 2.0 * rise
+    response = StepResponse(values - start, wanted, tick=0.009)
+    assert 0.0 < response.rise < rise
+    assert response.overshoot < overshoot
+    assert response.settling_time(0.05) < 2.0 * rise
 
 
 def test_no_limit_is_exceeded_whatever_is_wanted():
     """Sixty drones between random places: what they do stays near what controllers may ask for."""
     drone, source = quadrotor(), np.random.default_rng(0)
-    state = still(drone, count=60)
+    state = hovering(drone, count=60)
     most = np.zeros(4)
     for _ in range(10):
         values = torch.tensor(source.uniform(-20, 20, (60, 4)))
         values[:, 2] /= 7
         values[:, 3] += 100
-        goals = told(PLACES, 0, 0, 0, 0, count=60)
+        goals = make_goals(POSITIONS, 0, 0, 0, 0, count=60)
         goals.values[:] = values
         for _ in range(10):
             state = drone.fly(state, goals, 33)

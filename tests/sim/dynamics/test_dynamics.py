@@ -141,7 +141,7 @@ def test_settings_of_dynamics_do_wherever_dynamics_do(monkeypatch):
         make_environment(dynamics=windy, pixels=False).task.dynamics,
     ):
         assert isinstance(made, Floating) and made.settings == windy
-        assert made.asked == MOVES_SETTINGS
+        assert made.action_settings == MOVES_SETTINGS
 
 
 def test_a_lost_drone_ends_its_own_episode_alone():

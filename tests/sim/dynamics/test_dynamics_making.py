@@ -34,8 +34,8 @@ def test_what_flies_is_made_of_both(monkeypatch):
     floating(monkeypatch)
     slow = ActionSettings(move_speed=1.0)
     made = make_dynamics(TASK, FLIGHT, slow)
-    assert isinstance(made, Floating) and (made.settings, made.asked) == (FLIGHT, slow)
-    assert make_dynamics(TASK, FLIGHT).asked == MOVES_SETTINGS
+    assert isinstance(made, Floating) and (made.settings, made.action_settings) == (FLIGHT, slow)
+    assert make_dynamics(TASK, FLIGHT).action_settings == MOVES_SETTINGS
 
 
 def test_speeds_in_computer_vision_mode_last_a_control_step():

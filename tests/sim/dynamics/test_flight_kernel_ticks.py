@@ -7,29 +7,29 @@ from drone_rl.sim.dynamics import Mode, Obstacles
 from drone_rl.sim.dynamics.control import rotor_goals
 from tests.flying import (
     ANGLES,
-    PLACES,
-    SPEEDS,
-    Slow,
+    POSITIONS,
+    VELOCITIES,
+    ReferenceDrone,
     degrees_between,
+    doubles,
     falling,
-    history,
+    hovering,
+    make_goals,
     matrix,
-    numbers,
     quadrotor,
-    still,
-    told,
+    trajectory,
 )
 
 HEADS = (Mode.HEADING_VELOCITY, Mode.HEADING_VELOCITY, Mode.RATE, Mode.POSITION)
 TICKS = 3333
 FLIGHTS = {
-    "hover": (PLACES, (0.0, 0.0, 0.0, 100.0), {}),
-    "hover in wind": (PLACES, (0.0, 0.0, 0.0, 100.0), {"wind": (5.0, 2.0, -1.0)}),
-    "step": (PLACES, (3.0, -2.0, 1.0, 102.0), {}),
+    "hover": (POSITIONS, (0.0, 0.0, 0.0, 100.0), {}),
+    "hover in wind": (POSITIONS, (0.0, 0.0, 0.0, 100.0), {"wind": (5.0, 2.0, -1.0)}),
+    "step": (POSITIONS, (3.0, -2.0, 1.0, 102.0), {}),
     "roll": (ANGLES, (0.7, -0.4, 2.0, 101.0), {}),
-    "speeds": (SPEEDS, (4.0, -2.0, 0.7, 1.0), {"wind": (4.0, -3.0, 1.0)}),
+    "speeds": (VELOCITIES, (4.0, -2.0, 0.7, 1.0), {"wind": (4.0, -3.0, 1.0)}),
     "circle": (HEADS, (3.0, 1.0, 0.5, 101.0), {}),
-    "slow rotors": (PLACES, (1.0, 1.0, -2.0, 99.0), {"rotor_time_constant": 0.03}),
+    "slow rotors": (POSITIONS, (1.0, 1.0, -2.0, 99.0), {"rotor_time_constant": 0.03}),
 }
 
 
@@ -38,51 +38,51 @@ def test_single_precision_drifts_by_less_than_a_millimetre_in_ten_seconds(name):
     """And by less than 0.01 degrees, where nothing is touched; commands are of 33 ticks."""
     modes, goal, changes = FLIGHTS[name]
     drone = quadrotor(**changes)
-    after = history(drone, still(drone), told(modes, *goal), TICKS, 33)[-1]
-    slow = Slow(drone.settings, (0.0, 0.0, 100.0)).fly(modes, goal, TICKS)
-    assert np.abs(after.position[0].numpy() - slow.place).max() < 0.001
-    assert np.abs(after.velocity[0].numpy() - slow.velocity).max() < 0.001
-    assert degrees_between(slow.turn, matrix(after.attitude[0])) < 0.01
-    np.testing.assert_allclose(after.rotors[0], slow.rotors, atol=1e-3)
+    after = trajectory(drone, hovering(drone), make_goals(modes, *goal), TICKS, 33)[-1]
+    reference = ReferenceDrone(drone.settings, (0.0, 0.0, 100.0)).fly(modes, goal, TICKS)
+    assert np.abs(after.position[0].numpy() - reference.position).max() < 0.001
+    assert np.abs(after.velocity[0].numpy() - reference.velocity).max() < 0.001
+    assert degrees_between(reference.rotation, matrix(after.attitude[0])) < 0.01
+    np.testing.assert_allclose(after.rotors[0], reference.rotors, atol=1e-3)
 
 
 def test_a_place_that_drifts_is_where_the_drift_has_brought_it():
     drone, drift = quadrotor(), (0.5, -0.3, 0.1, 0.2)
-    goals = told(PLACES, 0.0, 0.0, 0.0, 100.0, drift=drift)
-    after = drone.fly(still(drone), goals, 1000)
-    slow = Slow(drone.settings, (0.0, 0.0, 100.0)).fly(
-        PLACES, goals.values[0].tolist(), 1000, drift
+    goals = make_goals(POSITIONS, 0.0, 0.0, 0.0, 100.0, drift=drift)
+    after = drone.fly(hovering(drone), goals, 1000)
+    reference = ReferenceDrone(drone.settings, (0.0, 0.0, 100.0)).fly(
+        POSITIONS, goals.values[0].tolist(), 1000, drift
     )
-    np.testing.assert_allclose(after.position[0], slow.place, atol=1e-4)
+    np.testing.assert_allclose(after.position[0], reference.position, atol=1e-4)
     np.testing.assert_allclose(after.reference[0], (1.5, -0.9, 0.3, 100.6), atol=1e-6)
 
 
 def test_the_climbs_memory_counts_only_where_height_is_sought():
     drone = quadrotor()
     thrown = (Mode.ANGLE, Mode.ANGLE, Mode.ANGLE, Mode.THROTTLE)
-    state = still(drone)
-    kept = drone.fly(state, told(thrown, 0.0, 0.0, 0.0, 0.9), 10).numbers[0, 21]
+    state = hovering(drone)
+    kept = drone.fly(state, make_goals(thrown, 0.0, 0.0, 0.0, 0.9), 10).numbers[0, 21]
     assert float(kept) == pytest.approx(2 * drone.settings.hover_throttle - 1)
-    gained = drone.fly(state, told(SPEEDS, 0.0, 0.0, 0.0, 0.5), 1).numbers[0, 21] - kept
+    gained = drone.fly(state, make_goals(VELOCITIES, 0.0, 0.0, 0.0, 0.5), 1).numbers[0, 21] - kept
     assert float(gained) == pytest.approx(2.0 * 0.5 * 0.003, rel=1e-4)
 
 
 def test_a_drone_on_the_ground_keeps_its_tilt_while_rotors_carry_it():
     drone = quadrotor(rotor_time_constant=0.0)
     state = falling(0.3)
-    state.attitude[:] = numbers((0.9950042, 0.0998334, 0.0, 0.0))  # 0.2 rad
-    strong, weak = (drone.push(state, numbers((share,) * 4)) for share in (0.62, 0.5))
+    state.attitude[:] = doubles((0.9950042, 0.0998334, 0.0, 0.0))  # 0.2 rad
+    strong, weak = (drone.push(state, doubles((share,) * 4)) for share in (0.62, 0.5))
     assert float(strong.attitude[0, 1]) > 0.09
     assert weak.attitude.tolist() == [[1, 0, 0, 0]]
 
 
 def test_a_fast_drone_misses_no_obstacle():
     """At 60 m/s, 6 m in a command; and with rotors of 100 m/s2."""
-    box = Obstacles(numbers((7.0, 0.0, 100.0))[None], (0.5, 0.5, 5.0))
-    none = numbers((0.0, 0.0, 0.0, 0.0))
+    box = Obstacles(doubles((7.0, 0.0, 100.0))[None], (0.5, 0.5, 5.0))
+    none = doubles((0.0, 0.0, 0.0, 0.0))
     hit = quadrotor().fly(falling(100.0, (66.0, 0.0, 0.0)), rotor_goals(none), 34, box)
     assert hit.contact.thing.tolist() == [0] and float(hit.velocity[0, 0]) < 0
     strong = quadrotor(rotor_thrust=50.0, rotor_time_constant=0.0, air_density=0.0)
-    above = Obstacles(numbers((0.0, 0.0, 103.0))[None], (0.5, 0.5, 0.5))
-    risen = strong.fly(falling(100.0), rotor_goals(numbers((1.0,) * 4)), 60, above)
+    above = Obstacles(doubles((0.0, 0.0, 103.0))[None], (0.5, 0.5, 0.5))
+    risen = strong.fly(falling(100.0), rotor_goals(doubles((1.0,) * 4)), 60, above)
     assert risen.contact.thing.tolist() == [0]

@@ -8,15 +8,24 @@ import yaml
 from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import Quadrotor
-from tests.flying import PLACES, angles, history, numbers, quadrotor, settings, still, told
+from tests.flying import (
+    POSITIONS,
+    angles,
+    doubles,
+    hovering,
+    make_goals,
+    quadrotor,
+    settings,
+    trajectory,
+)
 
 CONF = Path(__file__).parents[3] / "conf" / "dynamics"
 
 
 def test_it_starts_in_a_hover():
     drone = quadrotor(mass=1.2)
-    state = drone.start(numbers((1.0, 2.0, 3.0)), torch.tensor([9]))
-    after = drone.fly(state, told(PLACES, 1.0, 2.0, 0.0, 3.0), 333)
+    state = drone.start(doubles((1.0, 2.0, 3.0)), torch.tensor([9]))
+    after = drone.fly(state, make_goals(POSITIONS, 1.0, 2.0, 0.0, 3.0), 333)
     torch.testing.assert_close(after.position, state.position, atol=1e-6, rtol=0)
     torch.testing.assert_close(after.rotors, state.rotors, atol=1e-5, rtol=0)
     assert state.rotors[0, 0].item() == pytest.approx(1.2 * 9.81 / (4 * 4.179446268))
@@ -25,24 +34,24 @@ def test_it_starts_in_a_hover():
 def test_moves_shift_where_it_is_wanted():
     """By 0.4 m in 0.1 s, at 4 m/s."""
     drone = quadrotor()
-    state = still(drone, count=3)
+    state = hovering(drone, count=3)
     moved = drone.step(state, torch.tensor([Move.FORWARD, Move.LEFT, Move.RIGHT]))
     expected = [[0.396, 0, 0, 100], [0, 0.396, 0, 100], [0, -0.396, 0, 100]]
-    torch.testing.assert_close(moved.reference, numbers(*expected))
+    torch.testing.assert_close(moved.reference, doubles(*expected))
     assert moved.position[0, 0] > 0 and moved.position[1, 1] > 0 > moved.position[2, 1]
     assert not state.position[:, :2].any() and moved.ticks.tolist() == [33] * 3
 
 
 def test_the_place_where_it_is_wanted_runs_ahead_only_so_far():
     drone = Quadrotor(settings(), ActionSettings(move_lead=0.25))
-    state = still(drone)
+    state = hovering(drone)
     state.reference[0, 0] = 10.0
     assert drone.steering.goals(state, torch.tensor([0])).values[0].tolist() == [0.25, 0, 0, 100]
 
 
 def test_ten_moves_forward_become_a_flight():
     drone = quadrotor()
-    state = still(drone)
+    state = hovering(drone)
     for _ in range(30):
         state = drone.step(state, torch.tensor([Move.FORWARD]))
     assert state.velocity[0, 0].item() == pytest.approx(4.0, rel=0.15)
@@ -67,9 +76,11 @@ def test_a_drone_out_of_a_file_hovers_steps_and_flies_moves(name):
     values = yaml.safe_load((CONF / f"{name}.yaml").read_text())
     del values["defaults"]
     drone = Quadrotor(DynamicsSettings(**values))
-    hover = drone.fly(still(drone), told(PLACES, 0.0, 0.0, 0.0, 100.0), 3300)
-    assert float((hover.position - still(drone).position).norm()) < 1e-3
-    states = history(drone, still(drone), told(PLACES, 2.0, -1.0, 1.0, 101.0), 3630, 33)
+    hover = drone.fly(hovering(drone), make_goals(POSITIONS, 0.0, 0.0, 0.0, 100.0), 3300)
+    assert float((hover.position - hovering(drone).position).norm()) < 1e-3
+    states = trajectory(
+        drone, hovering(drone), make_goals(POSITIONS, 2.0, -1.0, 1.0, 101.0), 3630, 33
+    )
     path = torch.cat([state.position for state in states])
     assert path[:, 0].max() < 2.0 * 1.35 and path[:, 1].min() > -1.0 * 1.35
     assert path[:, 2].max() < 101.1
@@ -77,7 +88,7 @@ def test_a_drone_out_of_a_file_hovers_steps_and_flies_moves(name):
     np.testing.assert_allclose(last.position[0], (2.0, -1.0, 101.0), atol=0.02)
     assert last.heading.item() == pytest.approx(1.0, abs=0.01)
     assert float(last.velocity.norm()) < 0.02 and float(last.angular_velocity.norm()) < 0.02
-    state = still(drone)
+    state = hovering(drone)
     for action in [Move.FORWARD] * 20 + [Move.LEFT] * 10 + [Move.RIGHT] * 10:
         state = drone.step(state, torch.tensor([action]))
         assert not state.is_lost.item() and float(angles(state)[0, :2].abs().max()) < 0.7
@@ -88,9 +99,9 @@ def test_a_drone_out_of_a_file_hovers_steps_and_flies_moves(name):
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA GPU")
 def test_a_gpu_flies_the_same():
     drone = quadrotor(gusts=1.0)
-    state, goals = still(drone, count=8), told(PLACES, 3.0, 1.0, 1.0, 101.0, count=8)
+    state, goals = hovering(drone, count=8), make_goals(POSITIONS, 3.0, 1.0, 1.0, 101.0, count=8)
     here = drone.fly(state, goals, 330)
-    moved = told(PLACES, 3.0, 1.0, 1.0, 101.0, count=8)
+    moved = make_goals(POSITIONS, 3.0, 1.0, 1.0, 101.0, count=8)
     there = type(goals)(moved.modes, moved.values.cuda())
     away = drone.fly(type(state)(state.numbers.cuda()), there, 330)
     torch.testing.assert_close(away.numbers.cpu(), here.numbers, atol=1e-3, rtol=0)

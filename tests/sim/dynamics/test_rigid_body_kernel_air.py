@@ -4,17 +4,19 @@ import numpy as np
 import pytest
 import torch
 
-from tests.flying import PLACES, falling, history, numbers, quadrotor, still, told
+from tests.flying import POSITIONS, doubles, falling, hovering, make_goals, quadrotor, trajectory
 
-NONE = numbers((0.0, 0.0, 0.0, 0.0))
+NONE = doubles((0.0, 0.0, 0.0, 0.0))
 
 
 def gusts(count=1000, ticks=4000, every=20, *, seeds=None, **changes):
     """Velocities of the air around drones that hover. Shape: (times, drones, axes)."""
     drone = quadrotor(gusts=2.0, **changes)
     seeds = torch.arange(count) if seeds is None else seeds
-    state = still(drone, count=count, seeds=seeds, height=1000.0)
-    states = history(drone, state, told(PLACES, 0, 0, 0, 1000.0, count=count), ticks, every)
+    state = hovering(drone, count=count, seeds=seeds, height=1000.0)
+    states = trajectory(
+        drone, state, make_goals(POSITIONS, 0, 0, 0, 1000.0, count=count), ticks, every
+    )
     return torch.stack([s.gust for s in states]).numpy()
 
 
@@ -30,7 +32,7 @@ def test_what_floats_goes_with_the_wind():
 def test_a_drone_hovers_in_wind_a_little_beside_its_place():
     """The push of the wind, 1.225 * 0.00538 * 25 N, is met by a tilt, and that by a distance."""
     drone = quadrotor(wind=(5.0, 0.0, 0.0))
-    after = drone.fly(still(drone), told(PLACES, 0, 0, 0, 100.0), 6000)
+    after = drone.fly(hovering(drone), make_goals(POSITIONS, 0, 0, 0, 100.0), 6000)
     away = float(after.position[0, 0])
     tilt = 1.225 * 0.00538 * 25 / 9.81
     expected = tilt / (np.pi / 5.5 * 0.2 * 6.0 * 0.25)

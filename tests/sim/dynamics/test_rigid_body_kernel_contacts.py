@@ -9,9 +9,9 @@ import torch
 from drone_rl.sim.dynamics import Obstacles
 from drone_rl.sim.dynamics.control import rotor_goals
 from drone_rl.sim.dynamics.state import GROUND, NOTHING
-from tests.flying import falling, numbers, quadrotor
+from tests.flying import doubles, falling, quadrotor
 
-NONE = numbers((0.0, 0.0, 0.0, 0.0))
+NONE = doubles((0.0, 0.0, 0.0, 0.0))
 VACUUM = {"air_density": 0.0}
 
 
@@ -20,7 +20,7 @@ def flown(drone, state, ticks, obstacles=None, rotors=NONE):
 
 
 def pillar(*centers, half=(0.5, 0.5, 5.0)):
-    return Obstacles(numbers(*centers)[None], half)
+    return Obstacles(doubles(*centers)[None], half)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.55, 1.0])
@@ -69,7 +69,7 @@ def test_it_rests_level_at_its_radius():
 def test_rotors_lift_it_off_the_ground_again():
     drone = quadrotor()
     rested = flown(drone, falling(0.3), 100)
-    risen = flown(drone, rested, 333, rotors=numbers((0.7,) * 4))
+    risen = flown(drone, rested, 333, rotors=doubles((0.7,) * 4))
     assert float(risen.position[0, 2]) > 0.6
 
 
@@ -95,7 +95,7 @@ def test_edges_are_round_for_a_ball():
     drone = quadrotor(restitution=1.0, friction=0.0, **VACUUM)
     state = falling(100.0, (2.0, 0.0, 0.0))
     reach = 0.3 * math.sqrt(0.5)
-    state.position[:] = numbers((0.5 - reach - 0.006, -0.5 - reach, 100.0))
+    state.position[:] = doubles((0.5 - reach - 0.006, -0.5 - reach, 100.0))
     after = flown(drone, state, 6, pillar((1.0, 0.0, 100.0)))
     np.testing.assert_allclose(after.velocity[0, :2], (0.0, -2.0), atol=0.1)
     np.testing.assert_allclose(
@@ -116,9 +116,9 @@ def test_edges_are_round_for_a_ball():
 )
 def test_what_is_inside_leaves_by_the_nearest_side(inside, out):
     state = falling(100.0)
-    state.position[:] += numbers(inside)
+    state.position[:] += doubles(inside)
     after = flown(quadrotor(**VACUUM), state, 1, pillar((0.0, 0.0, 100.0)))
-    np.testing.assert_allclose(after.position[0] - numbers((0, 0, 100))[0], out, atol=1e-3)
+    np.testing.assert_allclose(after.position[0] - doubles((0, 0, 100))[0], out, atol=1e-3)
 
 
 def test_it_lands_on_a_box():
@@ -140,7 +140,7 @@ def test_obstacles_count_more_than_the_ground():
 def test_each_world_has_obstacles_of_its_own():
     state = falling(100.0, (2.0, 0.0, 0.0))
     both = type(state)(state.numbers.repeat(2, 1))
-    boxes = Obstacles(numbers((1.0, 0, 100.0), (1.0, 0, -900.0)).reshape(2, 1, 3), (0.5, 0.5, 5.0))
+    boxes = Obstacles(doubles((1.0, 0, 100.0), (1.0, 0, -900.0)).reshape(2, 1, 3), (0.5, 0.5, 5.0))
     rotors = torch.zeros(2, 4).double()
     after = flown(quadrotor(**VACUUM), both, 100, boxes, rotors)
     assert after.contact.thing.tolist() == [0, NOTHING]

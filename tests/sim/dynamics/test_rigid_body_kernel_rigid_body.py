@@ -7,12 +7,21 @@ import pytest
 import torch
 
 from drone_rl.sim.dynamics.control import rotor_goals
-from tests.flying import GRAVITY, falling, history, matrix, numbers, quadrotor, rotation, still
+from tests.flying import (
+    GRAVITY,
+    doubles,
+    falling,
+    hovering,
+    matrix,
+    quadrotor,
+    rotation,
+    trajectory,
+)
 
 VACUUM = {"air_density": 0.0}
 AT_ONCE = {"rotor_time_constant": 0.0}
 THRUST, LEVER, TWIST = 4.179446268, 4.179446268 * 0.2275 / math.sqrt(2), 0.055562
-NONE = numbers((0.0, 0.0, 0.0, 0.0))
+NONE = doubles((0.0, 0.0, 0.0, 0.0))
 
 
 def test_what_falls_without_air_gains_speed_by_gravity_alone():
@@ -27,7 +36,7 @@ def test_what_falls_without_air_gains_speed_by_gravity_alone():
 
 def test_energy_is_kept_in_free_fall_but_for_the_length_of_a_tick():
     drone = quadrotor(**VACUUM)
-    states = history(drone, falling(velocity=(2.0, 0.0, 10.0)), rotor_goals(NONE), 1000, 100)
+    states = trajectory(drone, falling(velocity=(2.0, 0.0, 10.0)), rotor_goals(NONE), 1000, 100)
     energy = [0.5 * s.velocity.square().sum() + GRAVITY * s.position[0, 2] for s in states]
     most_speed = max(float(s.velocity.norm()) for s in states)
     assert max(abs(float(e - energy[0])) for e in energy) < 0.5 * GRAVITY * 0.003 * 2 * most_speed
@@ -62,7 +71,7 @@ def test_drag_turns_with_the_body():
         ((root, 0, root, 0), 0, 0.02989),
     ):
         state = falling()
-        state.attitude[:], state.velocity[0, axis] = numbers(attitude), -5.0
+        state.attitude[:], state.velocity[0, axis] = doubles(attitude), -5.0
         after = quadrotor().push(state, NONE)
         gained = float(after.velocity[0, axis]) + 5.0
         assert gained == pytest.approx(0.003 * 1.225 * area * 25.0, abs=1e-6)
@@ -70,7 +79,7 @@ def test_drag_turns_with_the_body():
 
 def test_rotors_spin_up_and_down_like_a_filter_of_first_order():
     drone = quadrotor(rotor_time_constant=0.05)
-    up = drone.push(falling(), numbers((1.0, 0.5, 0.0, 0.2)), 20)
+    up = drone.push(falling(), doubles((1.0, 0.5, 0.0, 0.2)), 20)
     gained = 1 - math.exp(-20 * 0.003 / 0.05)
     np.testing.assert_allclose(up.rotors[0], np.array([1, 0.5, 0, 0.2]) * gained, rtol=1e-6)
     down = drone.push(up, NONE, 20)
@@ -85,8 +94,8 @@ def test_thrust_is_along_the_bodys_z():
         ((math.cos(angle), math.sin(angle), 0, 0), 1, -1),
     ):
         state = falling()
-        state.attitude[:] = numbers(attitude)
-        gained = quadrotor(**AT_ONCE, **VACUUM).push(state, numbers((1.0,) * 4)).velocity[0]
+        state.attitude[:] = doubles(attitude)
+        gained = quadrotor(**AT_ONCE, **VACUUM).push(state, doubles((1.0,) * 4)).velocity[0]
         expected = np.array([0, 0, whole * math.cos(2 * angle) - GRAVITY])
         expected[axis] = sign * whole * 0.5
         np.testing.assert_allclose(gained, 0.003 * expected, atol=2e-6)
@@ -105,7 +114,7 @@ def test_thrust_is_along_the_bodys_z():
     ],
 )
 def test_each_rotor_turns_the_body_by_its_place_and_its_spin(shares, torque):
-    after = quadrotor(**AT_ONCE).push(falling(), numbers(shares))
+    after = quadrotor(**AT_ONCE).push(falling(), doubles(shares))
     gained = 0.003 * np.array(torque) / (0.00672, 0.00804, 0.01428)
     np.testing.assert_allclose(after.angular_velocity[0], gained, rtol=1e-5, atol=1e-8)
 
@@ -113,7 +122,7 @@ def test_each_rotor_turns_the_body_by_its_place_and_its_spin(shares, torque):
 def test_a_constant_torque_turns_faster_and_faster():
     """The rate grows with time, the angle with its square."""
     drone = quadrotor(**AT_ONCE, **VACUUM)
-    after = drone.push(falling(), numbers((0.0, 0.005, 0.005, 0.0)), 100)
+    after = drone.push(falling(), doubles((0.0, 0.005, 0.005, 0.0)), 100)
     rate = 0.3 * 0.01 * LEVER / 0.00672
     assert float(after.angular_velocity[0, 0]) == pytest.approx(rate, rel=1e-5)
     w, x = after.attitude[0, :2].tolist()
@@ -155,7 +164,7 @@ def test_attitudes_stay_of_length_one():
     state = falling()
     state = type(state)(state.numbers.repeat(20, 1))
     state.angular_velocity[:] = rates
-    states = history(quadrotor(), state, rotor_goals(torch.full((20, 4), 0.2).double()), 990, 33)
+    states = trajectory(quadrotor(), state, rotor_goals(torch.full((20, 4), 0.2).double()), 990, 33)
     lengths = torch.stack([s.attitude.norm(dim=-1) for s in states])
     assert float((lengths - 1).abs().max()) < 1e-6
 
@@ -206,12 +215,12 @@ def test_rotors_accelerate_a_crazyflie_as_they_do_there():
         rotor_time_constant=0.0,
         air_density=0.0,
     )
-    state = still(drone, count=count)
+    state = hovering(drone, count=count)
     attitude, speeds = source.normal(size=(count, 4)), source.uniform(5000, 23000, (count, 4))
     attitude /= np.linalg.norm(attitude, axis=1, keepdims=True)
     velocity, rates = source.normal(size=(2, count, 3))
-    state.attitude[:], state.velocity[:] = numbers(*attitude), numbers(*velocity)
-    state.angular_velocity[:] = numbers(*rates)
+    state.attitude[:], state.velocity[:] = doubles(*attitude), doubles(*velocity)
+    state.angular_velocity[:] = doubles(*rates)
     shares = (CURVE[1] * speeds + CURVE[2] * speeds**2) / MOST
     ours = [0, 2, 3, 1]  # theirs: front right, rear right, rear left, front left
     after = drone.push(state, torch.tensor(shares[:, ours]))

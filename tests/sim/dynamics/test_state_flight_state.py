@@ -6,7 +6,7 @@ import torch
 
 from drone_rl.sim.dynamics import FlightState
 from drone_rl.sim.dynamics import state as fs
-from tests.flying import numbers
+from tests.flying import doubles
 
 
 def test_parts_follow_each_other_without_a_gap():
@@ -19,31 +19,31 @@ def test_parts_follow_each_other_without_a_gap():
 
 
 def test_at_rest_is_told_to_stay_where_it_is():
-    turned = numbers((math.cos(0.35), 0.0, 0.0, math.sin(0.35)))
-    state = FlightState.at_rest(numbers((1.0, 2.0, 3.0)), turned, torch.tensor([5]))
+    turned = doubles((math.cos(0.35), 0.0, 0.0, math.sin(0.35)))
+    state = FlightState.at_rest(doubles((1.0, 2.0, 3.0)), turned, torch.tensor([5]))
     assert state.position.tolist() == [[1, 2, 3]] and not state.velocity.any()
     assert state.heading.item() == pytest.approx(0.7)
     assert state.reference[0].tolist() == pytest.approx([1.0, 2.0, 0.7, 3.0])
     assert state.numbers[0, fs.SEED] == 5 and not state.is_lost.any()
     assert state.contact.thing.tolist() == [fs.NOTHING] and state.ticks.tolist() == [0]
-    assert FlightState.at_rest(numbers((0.0, 0.0, 0.0))).attitude.tolist() == [[1, 0, 0, 0]]
+    assert FlightState.at_rest(doubles((0.0, 0.0, 0.0))).attitude.tolist() == [[1, 0, 0, 0]]
 
 
 def test_parts_are_views():
-    state = FlightState.at_rest(numbers((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)))
-    state.velocity[1] = numbers((7.0, 8.0, 9.0))
+    state = FlightState.at_rest(doubles((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)))
+    state.velocity[1] = doubles((7.0, 8.0, 9.0))
     state.rotors[:] = 0.5
     assert state.numbers[1, 7:10].tolist() == [7, 8, 9]
     assert state.numbers[0, 13:17].tolist() == [0.5] * 4
 
 
 def test_moved_is_elsewhere_and_told_to_stay_there():
-    state = FlightState.at_rest(numbers((1.0, 2.0, 3.0)))
+    state = FlightState.at_rest(doubles((1.0, 2.0, 3.0)))
     state.velocity[:] = 1.0
-    moved = state.moved(numbers((4.0, 5.0, 6.0)))
+    moved = state.moved(doubles((4.0, 5.0, 6.0)))
     assert moved.position.tolist() == [[4, 5, 6]] and state.position.tolist() == [[1, 2, 3]]
     assert moved.reference.tolist() == [[4, 5, 0, 6]] and moved.velocity.tolist() == [[1, 1, 1]]
     root = math.sqrt(0.5)
-    turned = state.moved(state.position, numbers((root, 0.0, 0.0, root)))
+    turned = state.moved(state.position, doubles((root, 0.0, 0.0, root)))
     assert turned.heading.item() == pytest.approx(math.pi / 2)
     assert turned.reference[0, 2].item() == pytest.approx(math.pi / 2)

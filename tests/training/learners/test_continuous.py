@@ -15,7 +15,7 @@ from drone_rl.policies import MLP, ActorCritic, make_actor
 from drone_rl.policies.distributions import SquashedNormal
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.training import ActorCriticLearner, ReinforceLearner
-from tests.continuous import SETTINGS, make_policy, make_worlds
+from tests.continuous import SETTINGS, make_env, make_policy
 
 ACTIONS = ContinuousActions.of(SETTINGS)
 SHAPE = (1, 1, 2)
@@ -33,7 +33,7 @@ def policy():
     network = MLP(SHAPE, 6, hidden=(), generator=generator())
     network.actions = ACTIONS
     torch.nn.init.zeros_(network.layers[-1].weight)
-    env = make_worlds(1)
+    env = make_env(1)
     actor = make_actor(network, env.action_spec, generator(1))
     env.close()
     return network, actor
@@ -158,7 +158,7 @@ def test_a_step_that_earns_most_at_one_action_leads_there(policy, kind):
 
 @pytest.mark.parametrize("kind", ["reinforce", "ppo"])
 def test_a_policy_learns_to_fly_to_a_cube(kind):
-    env, unseen = make_worlds(32), make_worlds(50, seed=9)
+    env, unseen = make_env(32), make_env(50, seed=9)
     network, actor = make_policy(env)
 
     def success():

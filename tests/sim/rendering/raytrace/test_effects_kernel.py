@@ -9,7 +9,7 @@ import torch
 from drone_rl.sim.rendering import Appearance, Texture
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.view import to_gray
-from tests.from_above import LAUNCHERS, SIZE, seen, tracer
+from tests.from_above import LAUNCHERS, SIZE, render, tracer
 
 EVEN = {"ambient": (1.0, 1.0, 1.0), "sun": (0.0, 0.0, 0.0)}
 WHITE = {SemanticClass.GROUND: (1.0, 1.0, 1.0)}
@@ -26,12 +26,12 @@ def made(request):
 @pytest.mark.parametrize("camera", ["down", "ahead"])
 def test_what_is_switched_on_but_does_nothing_changes_nothing(made, camera, modality):
     nothing = Appearance(zenith=(0.2, 0.4, 0.6), fog=math.inf)
-    plain, drawn = (seen(made, a, camera=camera, modality=modality) for a in (None, nothing))
+    plain, drawn = (render(made, a, camera=camera, modality=modality) for a in (None, nothing))
     assert (plain.double() - drawn.double()).abs().max() <= (1 if modality == "rgb" else 0)
 
 
 def test_the_sky_goes_from_the_horizons_colour_to_the_zeniths(made):
-    picture = seen(made, Appearance(zenith=(1.0, 0.4, 0.0)), camera="ahead")[0].double()
+    picture = render(made, Appearance(zenith=(1.0, 0.4, 0.0)), camera="ahead")[0].double()
     slopes = 1 - (torch.arange(SIZE // 2) + 0.5) / (SIZE // 2)  # of the upper half's rows
     column = -1 + 0.5 / 20  # of the first column
     heights = slopes / (1 + column**2 + slopes**2).sqrt()
@@ -43,19 +43,19 @@ def test_the_sky_goes_from_the_horizons_colour_to_the_zeniths(made):
 @pytest.mark.parametrize("visibility", [10.0, 20.0])
 def test_fog_leaves_a_twentieth_of_the_contrast_at_its_visibility(made, visibility):
     colors = {**WHITE, SemanticClass.SKY: (0.0, 0.2, 0.4)}
-    picture = seen(made, Appearance(colors=colors, fog=visibility, **EVEN))[0].double()
+    picture = render(made, Appearance(colors=colors, fog=visibility, **EVEN))[0].double()
     aside = (2.5 + 0.125) / 10  # of the pixel whose colour is looked at, over its depth
     clear = 0.05 ** (10 * math.sqrt(1 + aside**2 + 0.0125**2) / visibility)
     wanted = [clear * 255 + (1 - clear) * sky for sky in (0, 51, 102)]
     assert picture[20, 30].tolist() == pytest.approx(wanted, abs=1)
-    plain = seen(made, None, modality="depth")
-    foggy = seen(made, Appearance(fog=visibility), modality="depth")
+    plain = render(made, None, modality="depth")
+    foggy = render(made, Appearance(fog=visibility), modality="depth")
     assert torch.equal(plain, foggy)
 
 
 def test_a_box_keeps_the_sun_from_what_is_beyond_it(made):
     """The sun stands at 45 degrees, so the shadow of 1 m is 1 m long: four by four pixels."""
-    plain, shaded = (seen(made, Appearance(shadows=on))[0] for on in (0, 1))
+    plain, shaded = (render(made, Appearance(shadows=on))[0] for on in (0, 1))
     rows, columns = np.nonzero((plain != shaded).any(-1).numpy())
     assert (rows.min(), rows.max(), columns.min(), columns.max()) == (18, 21, 22, 25)
     assert len(rows) == 16
@@ -71,7 +71,7 @@ def test_round_things_cast_shadows_too(kind, size):
     images = []
     for launcher in LAUNCHERS:
         renderer = tracer(launcher, kind, size)
-        plain, shaded = (seen(renderer, Appearance(shadows=on))[0] for on in (0, 1))
+        plain, shaded = (render(renderer, Appearance(shadows=on))[0] for on in (0, 1))
         dark = (plain != shaded).any(-1)
         assert 8 <= dark.sum() <= 16 and dark[19:21, 23:25].all()
         images.append(shaded)
@@ -82,7 +82,7 @@ def test_round_things_cast_shadows_too(kind, size):
 def test_a_texture_repeats_at_its_size(made):
     """Tiles of 2.5 m, ten pixels, from the origin on: five light ones, five dark ones."""
     tiled = {SemanticClass.GROUND: Texture(images=("checker",), size=2.5)}
-    picture = seen(made, Appearance(colors=WHITE, textures=tiled, **EVEN))[0, ..., 0]
+    picture = render(made, Appearance(colors=WHITE, textures=tiled, **EVEN))[0, ..., 0]
     row = picture[2, 20:].tolist()
     inner = [row[i] for i in (1, 2, 3, 6, 7, 8)]
     assert inner in ([255] * 3 + [140] * 3, [140] * 3 + [255] * 3)
@@ -94,7 +94,7 @@ def test_a_texture_repeats_at_its_size(made):
 def test_from_afar_a_texture_is_its_mean(made):
     tiled = {SemanticClass.GROUND: Texture(images=("checker",), size=0.02)}
     colors = {SemanticClass.GROUND: (1.0, 0.5, 0.0)}
-    picture = seen(made, Appearance(colors=colors, textures=tiled, **EVEN))[0].double()
+    picture = render(made, Appearance(colors=colors, textures=tiled, **EVEN))[0].double()
     mean = (255 + 140) / 2
     assert (picture[:10] - torch.tensor([mean, mean / 2, 0.0])).abs().max() <= 1
 
@@ -111,25 +111,25 @@ def test_each_world_has_its_own(made):
             )
         },
     )
-    together = seen(made, appearance, worlds=3)
+    together = render(made, appearance, worlds=3)
     for world in range(3):
-        alone = seen(made, appearance[world : world + 1])
+        alone = render(made, appearance[world : world + 1])
         assert torch.equal(together[world], alone[0])
-    assert torch.equal(together[0], seen(made, Appearance(zenith=(0.2, 0.4, 0.6)))[0])
+    assert torch.equal(together[0], render(made, Appearance(zenith=(0.2, 0.4, 0.6)))[0])
 
 
 def test_gray_is_that_of_the_colours(made):
     appearance = Appearance(
         fog=30.0, shadows=1, textures={SemanticClass.TARGET: Texture(images=("noise",), size=1.0)}
     )
-    rgb, gray = (seen(made, appearance, modality=of) for of in ("rgb", "gray"))
+    rgb, gray = (render(made, appearance, modality=of) for of in ("rgb", "gray"))
     assert torch.equal(gray, to_gray(rgb))
 
 
 def test_exposure_is_a_factor_until_white(made):
-    plain = seen(made, Appearance(**EVEN))[0, 0, 0].tolist()
+    plain = render(made, Appearance(**EVEN))[0, 0, 0].tolist()
     assert plain == [255, 127, 0]
-    assert seen(made, Appearance(exposure=0.5, **EVEN))[0, 0, 0].tolist() == [127, 63, 0]
-    assert seen(made, Appearance(exposure=1.5, **EVEN))[0, 0, 0].tolist() == [255, 191, 0]
-    sky = seen(made, Appearance(exposure=2.0), camera="ahead")[0, 0, 0].tolist()
+    assert render(made, Appearance(exposure=0.5, **EVEN))[0, 0, 0].tolist() == [127, 63, 0]
+    assert render(made, Appearance(exposure=1.5, **EVEN))[0, 0, 0].tolist() == [255, 191, 0]
+    sky = render(made, Appearance(exposure=2.0), camera="ahead")[0, 0, 0].tolist()
     assert sky == [102, 204, 255]
