@@ -1,4 +1,4 @@
-"""The direct collector equals TorchRL's collector bit for bit, where it is supported."""
+"""The direct collector equals TorchRL's collector bit for bit."""
 
 import pytest
 import torch
@@ -54,14 +54,14 @@ def test_direct_and_stepping_batches_are_identical(task, worlds, look):
     keep = (REASON, ("next", "info", "drone"))
     collectors = [collector(how, task, keep, look) for how in ("direct", "none")]
     lengths = set()
-    for _ in range(3):  # the streams of worlds and actions go on alike
+    for _ in range(3):  # random streams continue identically
         one, other = (each.collect(worlds) for each in collectors)
         assert set(one.keys(True, True)) == set(other.keys(True, True))
         for key in one.keys(True, True):
             assert torch.equal(one[key], other[key]), key
         first = one["collector", "traj_ids"].min()
         lengths |= {*torch.bincount(one["collector", "traj_ids"] - first).tolist()}
-    assert len(lengths) > 1 or task is not SHORT  # some went on alone
+    assert len(lengths) > 1 or task is not SHORT  # some environments finish first
 
 
 def test_continuous_actions_of_direct_and_stepping_batches_are_identical():
@@ -102,13 +102,15 @@ def reasons(env, observed, kept):
         (None, {"pixels": False}, ["pixels"], [], "the environment renders no pixels"),
     ],
 )
-def test_what_needs_steps_of_torchrl(transforms, options, observed, kept, reason):
+def test_unsupported_environments_are_stepped_by_torchrl(
+    transforms, options, observed, kept, reason
+):
     first = [] if transforms is None or "gray" in observed else [GrayPixels()]
     env = make_env(*first, *(transforms or []), **options)
     assert reason in reasons(env, observed, [*KEPT, *kept])
 
 
-def test_maps_of_pixels_need_no_steps_of_torchrl():
+def test_per_pixel_transforms_are_supported():
     transforms = (GrayPixels(), CropRows(5, 25), Blur(), StandardizePixels())
     assert not reasons(make_env(*transforms), ["pixels"], [*KEPT, REASON])
 
@@ -122,7 +124,7 @@ def test_a_subclass_of_the_environment_is_stepped_by_torchrl():
 
 
 @pytest.mark.parametrize("name", ["oracle", "random", "left"])
-def test_a_policy_that_reads_the_true_state_needs_no_steps_of_torchrl(name):
+def test_policies_that_read_the_true_state_are_supported(name):
     batches = []
     for acceleration in ("direct", "none"):
         env = DroneEnv(3, SHORT, seed=5, pixels=False)

@@ -51,7 +51,7 @@ def test_direct_and_torchrl_streams_are_identical(task):
 @pytest.mark.parametrize("saved", [True, False])
 @pytest.mark.parametrize("loaded", [True, False])
 @pytest.mark.parametrize("look", [None, AppearanceSettings(fog_visibility=(5.0, 50.0))])
-def test_either_resumes_from_the_state_of_the_other(saved, loaded, look):
+def test_direct_and_torchrl_streams_exchange_states(saved, loaded, look):
     first, drawn = collector(saved, SHORT, look=look)
     first.collect()
     state, stream = copy.deepcopy(first.state_dict()), drawn.get_state()

@@ -1,4 +1,4 @@
-"""Episodes flown by the kernel are episodes: replayed step by step they are the same."""
+"""Episodes of the fused kernel equal their replay step by step."""
 
 import threading
 
@@ -60,7 +60,7 @@ GIMBAL = FLYING.replace(camera_mount="gimbal")
 
 
 @pytest.mark.parametrize("dynamics", [None, Quadrotor(FLYING), Quadrotor(GIMBAL)])
-def test_replayed_by_torchrls_steps_they_are_the_same_bit_for_bit(dynamics):
+def test_fused_episodes_equal_their_replay_by_torchrl_bit_for_bit(dynamics):
     kept = [REASON, ("next", "info", "collected"), ("next", "info", "drone")]
     collector = make(keep=kept, dynamics=dynamics)
     assert isinstance(collector.source, FusedCollector)
@@ -90,14 +90,14 @@ def test_replayed_by_torchrls_steps_they_are_the_same_bit_for_bit(dynamics):
     assert collector.episodes == 15 and collector.frames > 15
 
 
-def test_a_resize_to_the_same_size_changes_nothing():
+def test_resize_to_the_same_size_changes_nothing():
     resized = make(transforms=(GrayPixels, lambda: Resize(height=25, width=64), StandardizePixels))
     assert isinstance(resized.source, FusedCollector)
     one, other = make().collect(), resized.collect()
     assert all(torch.equal(one[key], other[key]) for key in one.keys(True, True))
 
 
-def test_what_is_told_by_the_kernel_is_what_a_replay_tells():
+def test_kernel_reports_the_same_info_as_a_replay():
     brief, replayed = make(), make(keep=[REASON, ("next", "info", "drone")])
     for _ in range(2):
         one, other = brief.collect(), replayed.collect()
@@ -106,7 +106,7 @@ def test_what_is_told_by_the_kernel_is_what_a_replay_tells():
         assert {*other.keys(True, True)} == {*one.keys(True, True), ("next", "info", "drone")}
 
 
-def test_the_step_by_step_way_gives_entries_of_the_same_kinds():
+def test_stepping_collector_returns_entries_of_the_same_types():
     one, other = make().collect(), make(acceleration="direct").collect()
     assert {*one.keys(True, True)} == {*other.keys(True, True)}
     for key in one.keys(True, True):
@@ -114,14 +114,14 @@ def test_the_step_by_step_way_gives_entries_of_the_same_kinds():
 
 
 @pytest.mark.parametrize("how", [{"num_threads": 2}, {"num_threads": 3}])
-def test_nothing_depends_on_how_many_cores_fly(how):
+def test_batches_do_not_depend_on_the_number_of_cores(how):
     one, other = make(num_envs=35), make(num_envs=35, **how)
     for _ in range(2):
         first, second = one.collect(), other.collect()
         assert all(torch.equal(first[key], second[key]) for key in first.keys(True, True))
 
 
-def test_in_parts_greedy_flights_are_the_same(monkeypatch):
+def test_greedy_episodes_do_not_depend_on_the_split_into_launches(monkeypatch):
     with set_exploration_type(DETERMINISTIC):
         whole = make()
         monkeypatch.setattr(fused_collector, "_MAX_STEPS", 2)
@@ -134,7 +134,7 @@ def test_in_parts_greedy_flights_are_the_same(monkeypatch):
                 assert torch.equal(expected[key], found[key])
 
 
-def test_the_most_probable_actions_are_taken_when_asked_for():
+def test_deterministic_exploration_takes_the_most_probable_actions():
     with set_exploration_type(DETERMINISTIC):
         batch = make().collect()
     assert torch.equal(batch["logits"].argmax(-1), batch["action"])
@@ -142,7 +142,7 @@ def test_the_most_probable_actions_are_taken_when_asked_for():
     assert not torch.equal(drawn["logits"].argmax(-1), drawn["action"])
 
 
-def test_actions_are_drawn_by_their_probabilities():
+def test_actions_are_sampled_by_their_probabilities():
     task = TaskSettings(num_cubes=1, step_limit=20)
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=())
     with torch.no_grad():
@@ -150,11 +150,11 @@ def test_actions_are_drawn_by_their_probabilities():
         network.layers.logits.bias.copy_(torch.tensor([0.5, 0.3, 0.2]).log())
     actions = make(task, num_envs=500, network=network).collect()["action"]
     shares = actions.bincount(minlength=3) / len(actions)
-    # of about 10,000: four standard errors are 0.02
+    # four standard errors are 0.02 for about 10,000 actions
     assert shares.tolist() == pytest.approx([0.5, 0.3, 0.2], abs=0.02)
 
 
-def test_what_has_been_learned_is_flown():
+def test_collector_uses_updated_weights():
     collector = make()
     collector.collect()
     with torch.no_grad():
@@ -162,18 +162,18 @@ def test_what_has_been_learned_is_flown():
     assert (collector.collect()["action"] == 1).all()
 
 
-def test_fewer_worlds_than_there_are():
+def test_collecting_from_fewer_environments():
     batch = make().collect(3)
     assert batch["collector", "traj_ids"].unique().tolist() == [0, 1, 2]
 
 
-def test_observations_may_be_left_out():
+def test_observations_are_optional():
     batch = make(keep_observations=False).collect()
     assert "pixels" not in batch and "logits" not in batch and "action" in batch
 
 
 def learned(network, by, batch, *handles):
-    """Logits of a batch, and the gradients of a sum of them."""
+    """Return the logits of a batch and the gradients of their weighted sum."""
     network.zero_grad()
     logits = by(batch["pixels"], *handles)
     (logits * torch.linspace(-1, 1, logits.numel()).view(logits.shape)).sum().backward()
@@ -181,7 +181,7 @@ def learned(network, by, batch, *handles):
 
 
 def cached(collector, num_threads=1):
-    """The collector's network, fused, and with the activations that the collector keeps."""
+    """Return the collector's network, fused, and a version that uses cached activations."""
     cache = collector.source.cache_activations()
     return FusedNetwork(collector.actor.module[0].module, num_threads, cache=cache)
 
@@ -205,11 +205,11 @@ def test_cached_activations_equal_computed_ones(max_steps, is_greedy, monkeypatc
             expected = learned(network, plain, part)
             assert all(torch.equal(*pair) for pair in zip(found, expected, strict=True))
             assert torch.equal(found[0], part["logits"])
-            reusing(torch.zeros_like(batch["pixels"]))  # computed in memory of its own
+            reusing(torch.zeros_like(batch["pixels"]))  # computed, not cached
         darker = batch["pixels"] * 0.5
         assert torch.equal(reusing(darker, batch["activations"]), plain(darker))
         with torch.no_grad():
-            network.layers.fc1.weight.add_(0.1)  # other weights than the cached activations'
+            network.layers.fc1.weight.add_(0.1)  # the cached activations are stale
         logits = plain(batch["pixels"])
         assert torch.equal(reusing(batch["pixels"], batch["activations"]), logits)
         assert not torch.equal(logits, batch["logits"])
@@ -223,7 +223,9 @@ def test_the_next_batch_overwrites_cached_activations():
     other = collector.collect()
     with pytest.raises(RuntimeError, match="collected between the forward and the backward pass"):
         logits.sum().backward()
-    again = network(batch["pixels"], batch["activations"])  # stale handles: computed
+    again = network(
+        batch["pixels"], batch["activations"]
+    )  # stale handles, so activations are computed
     assert torch.allclose(again, batch["logits"], atol=1e-5)
     again.sum().backward()
     assert torch.equal(network(other["pixels"], other["activations"]), other["logits"])
@@ -265,7 +267,7 @@ def test_no_activations_without_a_request_or_without_observations():
         ({"network": MLP((1, 25, 64), 3)}, "network MLP is not fused"),
     ],
 )
-def test_the_log_says_why_a_collector_is_not_fused(how, reason):
+def test_log_states_why_a_collector_is_not_fused(how, reason):
     collector = make(**how) if "network" in how or "task" in how else None
     if collector is None:
         channels = 3 if how["transforms"] == (RgbPixels,) else 1
@@ -276,7 +278,7 @@ def test_the_log_says_why_a_collector_is_not_fused(how, reason):
     assert make().source.name == "fused collector"
 
 
-def test_goes_on_from_a_state_as_if_it_had_never_stopped():
+def test_resuming_from_a_state_gives_the_same_batches():
     collector, other = make(), make()
     collector.collect()
     state = collector.state_dict()
@@ -300,13 +302,13 @@ def test_goes_on_from_a_state_as_if_it_had_never_stopped():
         {"network": MLP((1, 25, 64), 3)},
     ],
 )
-def test_whatever_it_does_not_know_is_flown_step_by_step(what):
+def test_unsupported_configurations_fall_back(what):
     collector = make(**what)
     assert isinstance(collector.source, DirectCollector | SteppingCollector)
     assert len(collector.collect())
 
 
-def test_another_renderer_draws_step_by_step():
+def test_other_renderers_fall_back():
     env = with_transforms(DroneEnv(2, SHORT, renderer="mujoco_warp"), [GrayPixels()])
     actor = make_actor(SmallCNN((1, 25, 64), 3), env.action_spec)
     source = EpisodeCollector(env, actor, acceleration="fused").source
@@ -314,24 +316,24 @@ def test_another_renderer_draws_step_by_step():
     env.close()
 
 
-def test_a_way_of_exploring_that_it_does_not_know_is_taken_step_by_step():
+def test_unsupported_exploration_types_fall_back():
     collector = make()
     with set_exploration_type(ExplorationType.MODE):
         assert len(collector.collect())
 
 
-def test_its_threads_end_with_the_collector():
+def test_shutdown_ends_the_threads():
     before = {*threading.enumerate()}
     collector = make(num_threads=3)
     collector.collect()
     begun = {*threading.enumerate()} - before
-    assert begun  # no more than it needs: one that is idle again takes the next part
+    assert begun  # idle threads are reused
     collector.shutdown()
     assert not any(thread.is_alive() for thread in begun)
 
 
 @pytest.mark.parametrize("visibility", [30.0, (10.0, 30.0)])
-def test_worlds_of_another_look_are_flown_step_by_step(visibility):
+def test_environments_with_fog_fall_back(visibility):
     look = AppearanceSettings(fog_visibility=visibility)
     env = with_transforms(DroneEnv(3, SHORT, appearance=look), [GrayPixels(), StandardizePixels()])
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,))
@@ -340,11 +342,11 @@ def test_worlds_of_another_look_are_flown_step_by_step(visibility):
     assert isinstance(collector.source, DirectCollector | SteppingCollector)
     batch, plain = collector.collect(), make(num_envs=3).collect()
     assert batch["next", "done"].sum() == 3
-    assert batch["pixels"][0].mean() > plain["pixels"][0].mean()  # the fog is bright
+    assert batch["pixels"][0].mean() > plain["pixels"][0].mean()  # fog is bright
 
 
-def test_a_lost_drone_ends_its_episode_in_the_kernel_too():
-    """Of five drones one is lost from the start."""
+def test_kernel_ends_the_episode_of_a_lost_drone():
+    """One of five drones is lost from the start."""
     collector = make(dynamics=Quadrotor(FLYING))
     begin = collector.source._worlds.begin
 
@@ -359,7 +361,7 @@ def test_a_lost_drone_ends_its_episode_in_the_kernel_too():
     assert batch[REASON].flatten().tolist().count(EndReason.LOST_CONTROL) == 1
 
 
-def test_pictures_that_are_not_standardised_are_as_they_are_drawn():
+def test_images_without_standardization_equal_rendered_ones():
     collector = make(transforms=(GrayPixels,))
     assert isinstance(collector.source, FusedCollector)
     batch = collector.collect()

@@ -1,4 +1,4 @@
-"""What it takes and refuses, and that there is no second way back."""
+"""Supported networks, and the backward pass of the fused network."""
 
 import copy
 
@@ -9,50 +9,50 @@ from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
 from drone_rl.envs.direct_renderer import Reasons
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
 from drone_rl.utils.errors import InputError
-from tests.policies.halves import draw_weights, halves, made, taught
+from tests.policies.halves import draw_weights, forward_backward, halves, make_network
 
 
-def test_patches_of_an_odd_size_have_no_way_back_to_pictures():
-    found = FusedNetwork.try_create(made((1, 26, 41), patch=5), of="pixels")
+def test_odd_patch_sizes_have_no_gradient_of_images():
+    found = FusedNetwork.try_create(make_network((1, 26, 41), patch=5), of="pixels")
     assert found == ("the first layer's inputs are not a multiple of 16",)
-    assert isinstance(FusedNetwork.try_create(made((1, 26, 41), patch=5)), FusedNetwork)
+    assert isinstance(FusedNetwork.try_create(make_network((1, 26, 41), patch=5)), FusedNetwork)
 
 
-def test_more_dimensions_and_no_gradient():
-    network = made()
-    learning = FusedNetwork.try_create(network, 2)
-    pictures = halves(2, 3, 1, 12, 20)
+def test_batch_dimensions_and_no_grad():
+    network = make_network()
+    fused = FusedNetwork.try_create(network, 2)
+    images = halves(2, 3, 1, 12, 20)
     with torch.no_grad():
-        assert torch.allclose(learning(pictures), network(pictures), atol=1e-5)
-        assert learning(pictures).shape == (2, 3, 3)
+        assert torch.allclose(fused(images), network(images), atol=1e-5)
+        assert fused(images).shape == (2, 3, 3)
 
 
-def test_the_same_every_time():
-    network, pictures, weights = made(), torch.randn(90, 1, 12, 20), torch.randn(90, 3)
-    learning = FusedNetwork.try_create(network, 2)
-    _, first = taught(network, learning, pictures, weights)
-    taught(network, learning, torch.randn(200, 1, 12, 20), torch.randn(200, 3))
-    _, again = taught(network, learning, pictures, weights)
+def test_gradients_are_deterministic():
+    network, images, weights = make_network(), torch.randn(90, 1, 12, 20), torch.randn(90, 3)
+    fused = FusedNetwork.try_create(network, 2)
+    _, first = forward_backward(network, fused, images, weights)
+    forward_backward(network, fused, torch.randn(200, 1, 12, 20), torch.randn(200, 3))
+    _, again = forward_backward(network, fused, images, weights)
     assert all(torch.equal(one, other) for one, other in zip(first, again, strict=True))
 
 
-def test_there_is_no_second_way_back():
-    network, pictures = made(), torch.randn(5, 1, 12, 20)
-    learning = FusedNetwork.try_create(network, 1)
-    total = learning(pictures).sum()
+def test_second_backward_pass_raises():
+    network, images = make_network(), torch.randn(5, 1, 12, 20)
+    fused = FusedNetwork.try_create(network, 1)
+    total = fused(images).sum()
     total.backward(retain_graph=True)
-    learning(pictures)  # works where the first numbers were
+    fused(images)  # overwrites the activations of the first call
     with pytest.raises(RuntimeError, match="second backward pass"):
         total.backward()
 
 
-def test_two_ways_at_a_time_do_not_meet():
-    network = made()
-    learning = FusedNetwork.try_create(network, 2)
+def test_two_forward_passes_before_backward_are_independent():
+    network = make_network()
+    fused = FusedNetwork.try_create(network, 2)
     batches = [halves(n, 1, 12, 20) for n in (40, 70)]
-    expected = [taught(network, network, b, torch.ones(len(b), 3))[1] for b in batches]
-    learning(halves(90, 1, 12, 20)).sum().backward()  # leaves numbers that only one may have
-    sums = [learning(batch).sum() for batch in batches]
+    expected = [forward_backward(network, network, b, torch.ones(len(b), 3))[1] for b in batches]
+    fused(halves(90, 1, 12, 20)).sum().backward()  # leaves a buffer that only one call may reuse
+    sums = [fused(batch).sum() for batch in batches]
     for total, other in zip(sums, expected, strict=True):
         network.zero_grad()
         total.backward()
@@ -60,33 +60,33 @@ def test_two_ways_at_a_time_do_not_meet():
             assert torch.allclose(p.grad, gradient, rtol=1e-3, atol=1e-3)
 
 
-def test_a_copy_learns_by_itself():
-    network = made()
-    learning = FusedNetwork.try_create(network, 1)
-    other = copy.deepcopy(learning)
+def test_copies_are_independent():
+    network = make_network()
+    fused = FusedNetwork.try_create(network, 1)
+    other = copy.deepcopy(fused)
     with torch.no_grad():
         network.layers.logits.bias += 1.0
-    pictures = torch.randn(3, 1, 12, 20)
-    assert torch.allclose(learning(pictures) - other(pictures), torch.ones(3, 3), atol=1e-5)
+    images = torch.randn(3, 1, 12, 20)
+    assert torch.allclose(fused(images) - other(images), torch.ones(3, 3), atol=1e-5)
 
 
-def test_pictures_of_another_shape_are_refused():
-    learning = FusedNetwork.try_create(made())
-    assert learning.in_shape == (1, 12, 20) and learning.num_actions == 3
+def test_images_of_another_shape_raise():
+    fused = FusedNetwork.try_create(make_network())
+    assert fused.in_shape == (1, 12, 20) and fused.num_actions == 3
     with pytest.raises(InputError, match="built for pictures"):
-        learning(halves(5, 1, 12, 21))
+        fused(halves(5, 1, 12, 21))
 
 
-def test_pictures_meet_the_weights_that_were_there_at_first():
-    network, pictures = made(), halves(5, 1, 12, 20)
-    learning = FusedNetwork.try_create(network, of="pixels")
-    first = learning(pictures)
+def test_network_for_images_keeps_its_initial_weights():
+    network, images = make_network(), halves(5, 1, 12, 20)
+    fused = FusedNetwork.try_create(network, of="pixels")
+    first = fused(images)
     draw_weights(network)
-    assert torch.equal(learning(pictures), first)
-    assert not torch.equal(network(pictures), first)
+    assert torch.equal(fused(images), first)
+    assert not torch.equal(network(images), first)
 
 
-def test_reasons_against_networks_that_the_kernel_does_not_support():
+def test_unsupported_networks_return_a_reason():
     for network, reason in (
         (MLP((1, 25, 64), 3), "network MLP is not fused"),
         (OriginalCNN((1, 25, 64), 3), "network OriginalCNN is not fused"),
@@ -104,7 +104,7 @@ WEIGHTS = torch.tensor([1.0, -2.0])
 
 
 def seen(rows=(6, 0, 1, 7)):
-    """Observations of these rows, each with values of its own."""
+    """Return observations of these rows with distinct values."""
     return torch.arange(8.0)[list(rows), None].expand(-1, 40) + torch.arange(40.0) / 64
 
 
@@ -122,14 +122,14 @@ def test_handles_find_the_rows_of_activations():
     assert cache.find(handles, WEIGHTS, seen()).dtype == torch.int32
 
 
-def test_handles_are_not_valid_for_changed_observations():
+def test_handles_are_invalid_for_changed_observations():
     cache, handles = filled()
     assert cache.find(handles, WEIGHTS, seen() + 2.0**-10) is None
     assert cache.find(handles, WEIGHTS, seen().flip(0)) is None
     assert cache.find(handles, WEIGHTS, seen().roll(1, 1)) is None
 
 
-def test_handles_are_not_valid_for_other_weights():
+def test_handles_are_invalid_for_other_weights():
     cache, handles = filled()
     assert cache.find(handles, torch.tensor([1.0, -2.0000002]), seen()) is None
 
@@ -146,7 +146,7 @@ def test_handles_are_valid_until_the_cache_is_cleared():
     assert ActivationCache(8, 3).find(handles, WEIGHTS, seen()) is None
 
 
-def test_no_handle_is_valid_if_the_activations_do_not_all_fit():
+def test_handles_are_invalid_if_not_all_activations_fit():
     for last, fits in ((7, True), (8, False)):
         cache, handles = filled((0, min(last, 7)))
         handles = cache.add(torch.tensor((0, last)), WEIGHTS, seen((0, 7)))

@@ -1,4 +1,4 @@
-"""A network asked by kernels answers as it does by torch, whoever asks at the same time."""
+"""Batched inference equals torch, also with concurrent calls."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -18,26 +18,26 @@ def network():
 
 
 @pytest.mark.parametrize("count", [0, 1, 15, 16, 17, 50])
-def test_logits_are_the_networks(network, count):
-    pictures = torch.randn(count, 1, 25, 64)
-    found, expected = BatchedInference(network)(pictures), network(pictures)
+def test_logits_equal_the_network(network, count):
+    images = torch.randn(count, 1, 25, 64)
+    found, expected = BatchedInference(network)(images), network(images)
     assert found.shape == (count, 3) and not found.requires_grad
     assert torch.allclose(found, expected, atol=1e-4)
     assert count == 0 or expected.abs().max() > 1
 
 
-def test_an_answer_does_not_depend_on_the_pictures_beside_it(network):
-    answers, pictures = BatchedInference(network), torch.randn(40, 1, 25, 64)
-    whole = answers(pictures)
-    assert torch.equal(torch.cat([answers(picture[None]) for picture in pictures]), whole)
-    assert torch.equal(answers(pictures.flip(0)).flip(0), whole)
+def test_logits_do_not_depend_on_other_images_of_the_batch(network):
+    logits_of, images = BatchedInference(network), torch.randn(40, 1, 25, 64)
+    whole = logits_of(images)
+    assert torch.equal(torch.cat([logits_of(image[None]) for image in images]), whole)
+    assert torch.equal(logits_of(images.flip(0)).flip(0), whole)
 
 
-def test_threads_have_buffers_of_their_own(network):
-    answers, parts = BatchedInference(network), torch.randn(8, 200, 1, 25, 64)
-    expected = [answers(part) for part in parts]
+def test_threads_use_separate_buffers(network):
+    logits_of, parts = BatchedInference(network), torch.randn(8, 200, 1, 25, 64)
+    expected = [logits_of(part) for part in parts]
     with ThreadPoolExecutor(4) as pool:
-        found = list(pool.map(answers, parts))
+        found = list(pool.map(logits_of, parts))
     assert all(torch.equal(one, other) for one, other in zip(expected, found, strict=True))
 
 

@@ -1,4 +1,4 @@
-"""The pieces of the way back give what torch's give, whatever their sizes."""
+"""The functions of the backward pass equal torch for all sizes."""
 
 import pytest
 import torch
@@ -12,11 +12,11 @@ from drone_rl.sim.rendering.devices import start_warp
 
 start_warp("cpu")
 OFFSET = 3
-"""Where everything begins in its array, so that a function that forgets it is found out."""
+"""Offset of all values in their arrays, to detect functions that ignore it."""
 
 
 @wp.kernel(enable_backward=False)
-def add_up(
+def accumulate_once(
     given: wp.array(dtype=float),
     deltas: wp.array(dtype=float),
     gradients: wp.array(dtype=float),
@@ -26,7 +26,7 @@ def add_up(
 
 
 @wp.kernel(enable_backward=False)
-def fold_up(
+def fold_once(
     patches: wp.array(dtype=float),
     made: wp.array(dtype=float),
     size: int,
@@ -36,35 +36,35 @@ def fold_up(
 
 
 @wp.kernel(enable_backward=False)
-def cut_off(deltas: wp.array(dtype=float), made: wp.array(dtype=float), size: int) -> None:
+def rectify_once(deltas: wp.array(dtype=float), made: wp.array(dtype=float), size: int) -> None:
     rectify(deltas, OFFSET, made, OFFSET - 1, size)
 
 
-def beside(values, fill=torch.inf):
-    """An array in which they begin later, with one more at the end."""
+def padded(values, fill=torch.inf):
+    """Return the values with padding in front and one value behind."""
     return functional.pad(values.flatten(), (OFFSET, 1), value=fill)
 
 
-def inside(values):
-    assert values[:OFFSET].isinf().all() and values[-1].isinf()  # nothing is written beside it
+def unpadded(values):
+    assert values[:OFFSET].isinf().all() and values[-1].isinf()  # the padding is unchanged
     return values[OFFSET:-1]
 
 
 def accumulated(given, deltas, before, *sizes):
-    gradients = beside(in_panels(before))
-    arrays = [wp.from_torch(v) for v in (beside(given), beside(deltas), gradients)]
+    gradients = padded(in_panels(before))
+    arrays = [wp.from_torch(v) for v in (padded(given), padded(deltas), gradients)]
     product = as_products([[OFFSET, OFFSET, OFFSET, *sizes, 0]])
-    wp.launch(add_up, 1, inputs=[*arrays, product], device="cpu")
-    panels = inside(gradients).view(-1, len(before), 16)
+    wp.launch(accumulate_once, 1, inputs=[*arrays, product], device="cpu")
+    panels = unpadded(gradients).view(-1, len(before), 16)
     return panels.transpose(0, 1).reshape(before.shape)
 
 
-def test_by_hand():
+def test_weight_gradients_match_hand_computed_values():
     given = torch.tensor([[1.0, 2.0], [3.0, 5.0]])
     deltas = torch.zeros(2, 16)
     deltas[:, 0] = torch.tensor([10.0, 100.0])
     before = torch.ones(3, 16)
-    # rows beside each other, two numbers apart
+    # contiguous rows of two numbers
     found = accumulated(given, deltas, before, 2, 2, 0, 2, 1, 2, 0, 16, 16)
     assert found[:, 0].tolist() == [111.0, 311.0, 521.0]  # bias, first and second input
     assert torch.equal(found[:, 1:], torch.ones(3, 15))
@@ -73,7 +73,7 @@ def test_by_hand():
 @pytest.mark.parametrize("rows", [1, 5, 17])
 @pytest.mark.parametrize("num_outs", [16, 48])
 @pytest.mark.parametrize("length", [3, 8, 70, 131])
-def test_linear_layers(rows, num_outs, length):
+def test_gradients_of_linear_layers_equal_torch(rows, num_outs, length):
     given, deltas = torch.randn(rows, length), torch.randn(rows, num_outs)
     before = torch.randn(1 + length, num_outs)
     apart = functional.pad(deltas, (0, 7))
@@ -84,12 +84,12 @@ def test_linear_layers(rows, num_outs, length):
 
 
 @pytest.mark.parametrize(("kernel", "stride"), [((3, 3), 1), ((4, 4), 4), ((2, 5), 3)])
-def test_convolutions(kernel, stride):
+def test_gradients_of_convolutions_equal_torch(kernel, stride):
     channels, height, width, outs = 16, 11, 13, 32
-    picture = torch.randn(1, channels, height, width, requires_grad=True)
+    image = torch.randn(1, channels, height, width, requires_grad=True)
     weight = torch.randn(outs, channels, *kernel, requires_grad=True)
     bias = torch.randn(outs, requires_grad=True)
-    made = functional.conv2d(picture, weight, bias, stride)
+    made = functional.conv2d(image, weight, bias, stride)
     deltas = torch.randn_like(made)
     made.backward(deltas)
     rows, columns = made.shape[2:]
@@ -98,7 +98,7 @@ def test_convolutions(kernel, stride):
     patch = (kernel[0], kernel[1] * channels, line)
     by_place = deltas[0].permute(1, 2, 0).reshape(-1, outs)
     before = torch.zeros(1 + channels * kernel[0] * kernel[1], outs)
-    given = picture.detach()[0].permute(1, 2, 0)
+    given = image.detach()[0].permute(1, 2, 0)
     found = accumulated(given, by_place, before, *places, *patch, outs, outs)
     expected = torch.cat([bias.grad[None], weight.grad.permute(2, 3, 1, 0).reshape(-1, outs)])
     assert torch.allclose(found, expected, atol=1e-3)
@@ -108,13 +108,13 @@ def test_convolutions(kernel, stride):
     product = as_products([[OFFSET, 0, 0, *places, *patch, 0, 0, 0]])
     arrays = [wp.from_torch(patches.flatten()), wp.from_torch(folded)]
     inputs = [*arrays, given.numel(), product]
-    wp.launch(fold_up, 1, inputs=inputs, device="cpu")
-    expected = picture.grad[0].permute(1, 2, 0).flatten()
-    assert torch.allclose(inside(folded), expected, atol=1e-3)
+    wp.launch(fold_once, 1, inputs=inputs, device="cpu")
+    expected = image.grad[0].permute(1, 2, 0).flatten()
+    assert torch.allclose(unpadded(folded), expected, atol=1e-3)
 
 
-def test_nothing_goes_back_to_where_nothing_came_from():
-    deltas = beside(torch.tensor([1.0, 2.0, 3.0, 4.0]))
-    made = torch.tensor([0.0, 0.0, 0.5, 0.0, -1.0, 2.0])  # from the third on
-    wp.launch(cut_off, 1, inputs=[wp.from_torch(deltas), wp.from_torch(made), 4], device="cpu")
-    assert inside(deltas).tolist() == [1.0, 0.0, 0.0, 4.0]
+def test_relu_blocks_gradients_of_zero_outputs():
+    deltas = padded(torch.tensor([1.0, 2.0, 3.0, 4.0]))
+    made = torch.tensor([0.0, 0.0, 0.5, 0.0, -1.0, 2.0])  # used from the third value on
+    wp.launch(rectify_once, 1, inputs=[wp.from_torch(deltas), wp.from_torch(made), 4], device="cpu")
+    assert unpadded(deltas).tolist() == [1.0, 0.0, 0.0, 4.0]

@@ -1,4 +1,4 @@
-"""Layers on one core give what torch's do, whatever their sizes."""
+"""Layers on one core equal torch for all sizes."""
 
 import pytest
 import torch
@@ -11,7 +11,7 @@ from drone_rl.sim.rendering.devices import start_warp
 
 start_warp("cpu")
 OFFSET = 3
-"""Where everything begins in its array, so that a function that forgets it is found out."""
+"""Offset of all values in their arrays, to detect functions that ignore it."""
 
 
 @wp.kernel(enable_backward=False)
@@ -25,19 +25,19 @@ def run(
 
 
 def multiplied(given, weights, num_made, *sizes, made_down=None):
-    """What is made; weights by input, as `multiply` wants them in panels."""
+    """Return the outputs of `multiply`; weights are sorted by input."""
     *sizes, is_rectified = sizes
     product = as_products([[OFFSET, OFFSET, OFFSET, *sizes, made_down or sizes[-1], is_rectified]])
     weights = in_panels(weights)
     made = torch.full((OFFSET + num_made + 1,), torch.inf)
     arrays = [wp.from_torch(functional.pad(v.flatten(), (OFFSET, 0))) for v in (given, weights)]
     wp.launch(run, 1, inputs=[*arrays, wp.from_torch(made), product], device="cpu")
-    assert made[:OFFSET].isinf().all() and made[-1].isinf()  # nothing is written beside it
+    assert made[:OFFSET].isinf().all() and made[-1].isinf()  # the padding is unchanged
     return made[OFFSET:-1]
 
 
-def test_by_hand():
-    # two rows of two numbers; outputs: their sum and their difference, and 14 that are 0
+def test_outputs_match_hand_computed_values():
+    # two rows of two numbers; outputs: sum, difference and 14 zeros
     weights = torch.zeros(3, 16)
     weights[0, :2] = torch.tensor([10.0, -10.0])
     weights[1:, :2] = torch.tensor([[1.0, 1.0], [1.0, -1.0]])
@@ -50,14 +50,14 @@ def test_by_hand():
 
 @pytest.mark.parametrize("rows", [1, 3, 4, 7, 8, 9, 17])
 @pytest.mark.parametrize("num_outs", [16, 32, 48, 80])
-def test_linear_layers(rows, num_outs):
+def test_linear_layers_equal_torch(rows, num_outs):
     given, weight, bias = torch.randn(rows, 37), torch.randn(37, num_outs), torch.randn(num_outs)
     weights = torch.cat([bias[None], weight])
     made = multiplied(given, weights, rows * num_outs, rows, 1, 37, 0, 1, 37, 0, num_outs, 0)
     assert torch.allclose(made.view(rows, -1), given @ weight + bias, atol=1e-4)
 
 
-def test_rows_may_lie_apart():
+def test_outputs_can_have_a_row_stride():
     given, weights = torch.randn(9, 37), torch.randn(38, 32)
     sizes = (9, 1, 37, 0, 1, 37, 0, 32, 0)
     made = multiplied(given, weights, 9 * 48, *sizes, made_down=48).view(9, 48)
@@ -65,7 +65,7 @@ def test_rows_may_lie_apart():
     assert made[:, 32:].isinf().all()
 
 
-def test_a_row_does_not_depend_on_those_beside_it():
+def test_rows_are_independent():
     given, weights = torch.randn(9, 37), torch.randn(38, 48)
     whole = multiplied(given, weights, 9 * 48, 9, 1, 37, 0, 1, 37, 0, 48, 0).view(9, 48)
     for i, row in enumerate(given):
@@ -74,16 +74,16 @@ def test_a_row_does_not_depend_on_those_beside_it():
 
 
 @pytest.mark.parametrize(("kernel", "stride"), [((3, 3), 1), ((4, 4), 4), ((2, 5), 3)])
-def test_convolutions(kernel, stride):
+def test_convolutions_equal_torch(kernel, stride):
     channels, height, width, outs = 16, 11, 13, 32
-    picture, weight = torch.randn(1, channels, height, width), torch.randn(outs, channels, *kernel)
+    image, weight = torch.randn(1, channels, height, width), torch.randn(outs, channels, *kernel)
     bias = torch.randn(outs)
-    expected = functional.conv2d(picture, weight, bias, stride).relu()[0].permute(1, 2, 0)
+    expected = functional.conv2d(image, weight, bias, stride).relu()[0].permute(1, 2, 0)
     rows, columns, _ = expected.shape
     weights = torch.cat([bias[None], weight.permute(2, 3, 1, 0).reshape(-1, outs)])
     line = width * channels
     patch = (kernel[0], kernel[1] * channels, line)
     steps = (rows * columns, columns, stride * line, stride * channels)
-    given = picture[0].permute(1, 2, 0)
+    given = image[0].permute(1, 2, 0)
     made = multiplied(given, weights, expected.numel(), *steps, *patch, outs, 1)
     assert torch.allclose(made.view(expected.shape), expected, atol=1e-4)

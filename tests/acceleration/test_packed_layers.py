@@ -1,4 +1,4 @@
-"""A packed network gives the logits of the network, after it has learned, too."""
+"""A packed network gives the same logits as the network, also after updates."""
 
 from collections import OrderedDict
 
@@ -17,20 +17,20 @@ start_warp("cpu")
 
 
 @wp.kernel(enable_backward=False)
-def ask(
-    layers: Layers, pictures: wp.array2d(dtype=float), workspace: wp.array(dtype=float), count: int
+def infer_kernel(
+    layers: Layers, images: wp.array2d(dtype=float), workspace: wp.array(dtype=float), count: int
 ) -> None:
     for row in range(count):
-        run_convolutions(layers, pictures[row], workspace, row)
+        run_convolutions(layers, images[row], workspace, row)
     run_linear(layers, workspace, count)
 
 
-def asked(packed, pictures, num_actions):
+def infer(packed, images, num_actions):
     workspace = torch.full((packed.workspace_size,), torch.nan)
-    count = len(pictures)
-    given = wp.from_torch(pictures.flatten(1).contiguous())
+    count = len(images)
+    given = wp.from_torch(images.flatten(1).contiguous())
     inputs = [packed.layers, given, wp.from_torch(workspace), count]
-    wp.launch(ask, 1, inputs=inputs, device="cpu")
+    wp.launch(infer_kernel, 1, inputs=inputs, device="cpu")
     outs = packed.layers.num_outs
     logits = workspace[packed.layers.logits_at :][: count * outs].view(count, outs)
     assert not logits[:, num_actions:].any()
@@ -43,27 +43,27 @@ def asked(packed, pictures, num_actions):
         ((1, 25, 64), {}),
         ((1, 25, 64), {"channels": (8,), "hidden": ()}),
         ((1, 26, 41), {"patch": 5, "channels": (3, 17, 40), "hidden": (33, 20)}),
-        ((1, 4, 4), {"channels": (5,), "hidden": (7,)}),  # one place is left
-        ((1, 12, 40), {"channels": (6, 9), "hidden": (16,)}),  # one row is left
+        ((1, 4, 4), {"channels": (5,), "hidden": (7,)}),  # output of 1x1
+        ((1, 12, 40), {"channels": (6, 9), "hidden": (16,)}),  # output with one row
     ],
 )
-def test_logits_are_the_networks(shape, options):
+def test_logits_equal_the_network_after_updates(shape, options):
     network = SmallCNN(shape, 3, generator=torch.Generator().manual_seed(0), **options)
     packed = PackedNetwork(network, 6)
     optimiser = torch.optim.Adam(network.parameters(), lr=0.1)
     for count in (6, 1, 5):
-        pictures = torch.randn(count, *shape)
+        images = torch.randn(count, *shape)
         packed.update()
-        logits = network(pictures)
-        given = asked(packed, pictures, 3)
+        logits = network(images)
+        given = infer(packed, images, 3)
         assert logits.abs().max() > 1e-3 and torch.allclose(given, logits, rtol=1e-4, atol=1e-5)
         logits.square().sum().backward()
         optimiser.step()
-        assert not torch.allclose(given, network(pictures), rtol=1e-3)
+        assert not torch.allclose(given, network(images), rtol=1e-3)
 
 
-class Other(PolicyNetwork):
-    """A network of given layers."""
+class CustomNetwork(PolicyNetwork):
+    """A network with the given layers."""
 
     def __init__(self, *layers):
         named = OrderedDict((f"layer{i}", layer) for i, layer in enumerate(layers))
@@ -71,7 +71,7 @@ class Other(PolicyNetwork):
 
 
 @pytest.mark.parametrize(
-    ("layers", "is_known"),
+    ("layers", "is_supported"),
     [
         ([nn.Conv2d(1, 2, 3), nn.ReLU(), nn.Flatten(), nn.Linear(72, 3)], True),
         ([nn.Conv2d(1, 2, 3), nn.ReLU(), nn.Flatten(1), nn.Linear(72, 3)], True),
@@ -88,14 +88,14 @@ class Other(PolicyNetwork):
         ([nn.Conv2d(1, 2, 3), nn.ReLU(), nn.Flatten(), nn.Linear(72, 3, bias=False)], False),
     ],
 )
-def test_only_layers_that_it_knows_are_packed(layers, is_known):
-    network = Other(*layers)
-    assert (not unsupported(network)) is is_known
-    if is_known:
+def test_only_supported_layers_are_packed(layers, is_supported):
+    network = CustomNetwork(*layers)
+    assert (not unsupported(network)) is is_supported
+    if is_supported:
         packed = PackedNetwork(network, 2)
         packed.update()
-        pictures = torch.randn(2, 1, 8, 8)
-        assert torch.allclose(asked(packed, pictures, 3), network(pictures), atol=1e-5)
+        images = torch.randn(2, 1, 8, 8)
+        assert torch.allclose(infer(packed, images, 3), network(images), atol=1e-5)
 
 
 def test_other_networks_are_not_packed():

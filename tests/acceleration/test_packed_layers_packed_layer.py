@@ -1,4 +1,4 @@
-"""Weights go where kernels read them, and gradients come back to where they belong."""
+"""Packing of weights for kernels, and unpacking of gradients."""
 
 import torch
 
@@ -19,29 +19,29 @@ def small():
     return network, packed_layers(network)
 
 
-def test_geometry_by_hand():
+def test_geometry_matches_hand_computed_values():
     _, (conv, hidden, logits) = small()
-    # 4 places in lines of 2; a line of places begins 4 lines of 8 pixels farther, a place 4 pixels
+    # 2x2 positions; the row stride is 4 rows of 8 pixels, the column stride 4 pixels
     assert conv.geometry == [4, 2, 32, 4, 4, 4, 8, 16, 16]
-    # all of 2x2 places of 16 channels
+    # 2x2 positions of 16 channels
     assert hidden.geometry == [1, 1, 64, 16, 1, 64, 0, 16, 16]
     assert logits.geometry == [1, 1, 16, 16, 1, 16, 0, 16, 16]
     assert [layer.num_made for layer in (conv, hidden, logits)] == [64, 16, 16]
     assert [layer.is_convolution for layer in (conv, hidden, logits)] == [True, False, False]
 
 
-def test_outputs_of_a_picture_and_of_a_layer_take_an_odd_number_of_cache_lines():
+def test_outputs_take_an_odd_number_of_cache_lines():
     assert [odd_lines(n) for n in (1, 16, 17, 32, 33, 1792)] == [16, 16, 48, 48, 48, 1808]
     _, layers = small()
-    assert outputs_at(layers) == [0, 80, 96, 112]  # five lines, one and one
-    assert outputs_at(layers[:2]) == [0, 80, 112]  # five and one, and one that is empty
+    assert outputs_at(layers) == [0, 80, 96, 112]  # five cache lines, one and one
+    assert outputs_at(layers[:2]) == [0, 80, 112]  # five and one, and an empty one
 
 
-def test_order_by_hand():
+def test_order_matches_hand_computed_indices():
     layer = PackedLayer(torch.nn.Conv2d(2, 3, (1, 2)), 2, (1, 2, 2), (1, 2), 1)
     order = layer.order(10)
     assert order.shape == (1 + 4, WIDTH)
-    # 12 weights from 10 on, of output o, channel c and column w at 10 + 4 o + 2 c + w; 3 biases
+    # 12 weights from index 10, at 10 + 4 o + 2 c + w for output o, channel c, column w; 3 biases
     assert order[0].tolist() == [22, 23, 24] + [0] * 13
     assert order[1:, 0].tolist() == [10, 12, 11, 13] and order[1:, 2].tolist() == [18, 20, 19, 21]
     assert not order[:, 3:].any()
@@ -53,7 +53,7 @@ def test_panels_hold_sixteen_columns_each():
     assert torch.equal(panels[0], by_row[:, :WIDTH]) and torch.equal(panels[1], by_row[:, WIDTH:])
 
 
-def test_what_is_packed_comes_back_to_its_place():
+def test_unpacking_inverts_packing():
     network, layers = small()
     order = Order(layers)
     weights, back = torch.full((order.weights_at[-1],), 7.0), torch.full((order.back_at[-1],), 7.0)
@@ -66,7 +66,7 @@ def test_what_is_packed_comes_back_to_its_place():
     assert (weights != 0).sum() == sum(int((p != 0).sum()) for p in parameters) <= count
 
 
-def test_the_way_back_has_the_same_weights_turned():
+def test_backward_weights_are_transposed():
     _, layers = small()
     order = Order(layers)
     weights, back = torch.zeros(order.weights_at[-1]), torch.zeros(order.back_at[-1])

@@ -1,4 +1,4 @@
-"""What was written down is read as it was written, however many parts there are."""
+"""The rollout buffer returns recorded rows for any number of parts."""
 
 import warnings
 
@@ -19,61 +19,63 @@ def make(num_rows=4):
     )
 
 
-def write(room, *numbers):
-    room["action"][:] = torch.tensor(numbers)
-    room["pixels"][:] = torch.tensor(numbers)[:, None] * torch.tensor([1.0, 0.5])
+def write(part_rows, *numbers):
+    part_rows["action"][:] = torch.tensor(numbers)
+    part_rows["pixels"][:] = torch.tensor(numbers)[:, None] * torch.tensor([1.0, 0.5])
 
 
-def test_rows_of_all_parts_in_any_order():
-    book = make()
+def test_rows_are_read_in_any_order():
+    buffer = make()
     for part in range(3):
-        write(book.open(part, ("action", "pixels")), *(10 * part + row for row in range(4)))
-    read = book.read(torch.tensor([9, 0, 3, 4]), ("action", "pixels"))
+        write(buffer.open(part, ("action", "pixels")), *(10 * part + row for row in range(4)))
+    read = buffer.read(torch.tensor([9, 0, 3, 4]), ("action", "pixels"))
     assert read["action"].tolist() == [21, 0, 3, 10]
     assert read["pixels"].tolist() == [[n, n / 2] for n in (21, 0, 3, 10)]
-    assert [*book.read(torch.tensor([11]), ["action"]).items()] == [("action", torch.tensor([23]))]
+    assert [*buffer.read(torch.tensor([11]), ["action"]).items()] == [
+        ("action", torch.tensor([23]))
+    ]
 
 
 @pytest.mark.parametrize("num_parts", [1, 2, 3, 9])
-def test_there_is_room_for_any_number_of_parts(num_parts):
-    book = make(3)
+def test_buffer_grows_with_the_number_of_parts(num_parts):
+    buffer = make(3)
     where = []
-    for _ in range(2):  # and again in what has grown
+    for _ in range(2):  # the second time without growing
         for part in range(num_parts):
-            room = book.open(part, ("action", "pixels"))
-            write(room, part, part + 100, part + 200)
-        where.append(room["pixels"].data_ptr())
+            part_rows = buffer.open(part, ("action", "pixels"))
+            write(part_rows, part, part + 100, part + 200)
+        where.append(part_rows["pixels"].data_ptr())
         rows = torch.arange(3 * num_parts)
         expected = [part + hundreds for part in range(num_parts) for hundreds in (0, 100, 200)]
-        assert book.read(rows, ["action"])["action"].tolist() == expected
+        assert buffer.read(rows, ["action"])["action"].tolist() == expected
     assert where[0] == where[1]
 
 
-def test_what_is_not_kept_takes_no_more_room():
-    book = make()
+def test_unrecorded_entries_take_no_more_memory():
+    buffer = make()
     for part in range(50):
-        room = book.open(part, ("action",))
-        write(room, *[part] * 4)
-        assert room["pixels"].data_ptr() == book.open(0, ())["pixels"].data_ptr()
-    assert book.read(torch.arange(0, 200, 4), ["action"])["action"].tolist() == [*range(50)]
-    assert book.open(0, ())["pixels"].untyped_storage().nbytes() == 4 * 2 * 4
+        part_rows = buffer.open(part, ("action",))
+        write(part_rows, *[part] * 4)
+        assert part_rows["pixels"].data_ptr() == buffer.open(0, ())["pixels"].data_ptr()
+    assert buffer.read(torch.arange(0, 200, 4), ["action"])["action"].tolist() == [*range(50)]
+    assert buffer.open(0, ())["pixels"].untyped_storage().nbytes() == 4 * 2 * 4
 
 
-def given(book, *numbers):
-    write(book.open(0, ()), *numbers[:4])
-    return book.read(torch.arange(len(numbers)) % 4, ["pixels"])["pixels"]
+def given(buffer, *numbers):
+    write(buffer.open(0, ()), *numbers[:4])
+    return buffer.read(torch.arange(len(numbers)) % 4, ["pixels"])["pixels"]
 
 
-def test_memory_is_given_again_once_nobody_holds_it():
-    book = make()
-    first = given(book, 1, 2, 3, 4)
+def test_memory_is_reused_once_released():
+    buffer = make()
+    first = given(buffer, 1, 2, 3, 4)
     where = first.data_ptr()
     del first
-    again = given(book, 5, 6, 7, 8, 5)  # a quarter more fits
+    again = given(buffer, 5, 6, 7, 8, 5)  # up to a quarter more fits
     assert again.data_ptr() == where and again[:, 0].tolist() == [5, 6, 7, 8, 5]
     del again
-    with warnings.catch_warnings(action="error"):  # torch would widen it, and says so
-        assert given(book, 5, 6, 7, 8, 5, 6).shape == (6, 2)
+    with warnings.catch_warnings(action="error"):  # resizing by torch would warn
+        assert given(buffer, 5, 6, 7, 8, 5, 6).shape == (6, 2)
 
 
 @pytest.mark.parametrize(
@@ -91,17 +93,17 @@ def test_memory_is_given_again_once_nobody_holds_it():
         lambda v: v.untyped_storage(),
     ],
 )
-def test_what_anybody_holds_stays_as_it_was(hold):
-    book = make()
-    first = given(book, 1, 2, 3, 4)
+def test_referenced_memory_is_not_overwritten(hold):
+    buffer = make()
+    first = given(buffer, 1, 2, 3, 4)
     where, held = first.data_ptr(), hold(first)
     del first
-    second = given(book, 5, 6, 7, 8)
+    second = given(buffer, 5, 6, 7, 8)
     assert second.data_ptr() != where and second[:, 0].tolist() == [5, 6, 7, 8]
     del held
 
 
-def test_free_is_what_one_alone_holds():
+def test_is_free_detects_other_references():
     tensor = torch.zeros(4)
     assert is_free(tensor) and is_free(tensor)
     view = tensor[1:]

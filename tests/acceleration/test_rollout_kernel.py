@@ -1,4 +1,4 @@
-"""What the kernel decides by, with hand-computed numbers."""
+"""Functions of the rollout kernel, with hand-computed numbers."""
 
 import math
 
@@ -41,20 +41,20 @@ def actions(logits, draws):
 
 
 @pytest.mark.parametrize("offset", [0.0, 500.0, -500.0])
-def test_an_action_is_drawn_where_its_share_of_probability_lies(offset):
-    # probabilities 0.2, 0.5, 0.3: the borders are at 0.2 and 0.7
+def test_sampled_action_follows_from_cumulative_probabilities(offset):
+    # probabilities 0.2, 0.5, 0.3; the thresholds are 0.2 and 0.7
     logits = [math.log(p) + offset for p in (0.2, 0.5, 0.3)]
     draws = [0.0, 0.19, 0.21, 0.5, 0.69, 0.71, 0.9999]
     assert actions(logits, draws) == [0, 0, 1, 1, 1, 2, 2]
 
 
-def test_the_most_probable_action_is_taken_and_the_first_of_equals():
+def test_greedy_action_is_the_first_most_probable():
     assert actions([1.0, 3.0, 2.0], [-1.0]) == [1]
     assert actions([1.0, 2.0, 3.0], [-1.0]) == [2]
     assert actions([3.0, 2.0, 3.0], [-1.0]) == [0]
 
 
-def test_standardised_as_the_transform_does_bit_for_bit():
+def test_standardization_equals_the_transform_bit_for_bit():
     values = torch.rand(1000)
     expected = StandardizePixels()._apply_transform(values)
     inputs = [wp.from_torch(values), 0.53, 0.21]
@@ -81,7 +81,7 @@ class Half(CollectCubes):
 
 
 @pytest.mark.parametrize("task", [CollectCubes, Half])
-def test_the_kernel_runs_the_rules_that_a_task_supplies(task):
+def test_kernel_runs_the_rules_of_the_task(task):
     env = with_transforms(DroneEnv(4, task()), [GrayPixels(), StandardizePixels()])
     shape = tuple(env.observation_spec["pixels"].shape[1:])
     generator = torch.Generator().manual_seed(0)

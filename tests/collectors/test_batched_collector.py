@@ -1,4 +1,4 @@
-"""What both kinds of collectors do alike: TorchRL's contract, and rows of a batch."""
+"""Behavior common to both collectors: TorchRL's interface and rows of a batch."""
 
 import copy
 import itertools
@@ -25,7 +25,7 @@ KINDS = {
 
 @pytest.fixture(params=KINDS.values(), ids=KINDS)
 def make(request):
-    """Collectors of either kind, whose worlds are not drawn."""
+    """Return a factory of collectors of each kind, without rendering."""
 
     def build(actor=None, **kwargs):
         return request.param(
@@ -35,7 +35,7 @@ def make(request):
     return build
 
 
-def test_it_is_one_of_torchrls_collectors(make):
+def test_implements_the_torchrl_collector_interface(make):
     collector = make()
     assert isinstance(collector, BaseCollector)
     assert torch.equal(collector.next()["action"], make().collect()["action"])
@@ -44,7 +44,7 @@ def test_it_is_one_of_torchrls_collectors(make):
         len(collector)
 
 
-def test_batches_until_there_are_enough_frames(make):
+def test_stops_at_total_frames(make):
     frames = [batch.numel() for batch in itertools.islice(make(), 3)]
     assert [batch.numel() for batch in make(total_frames=0)] == []
     assert [batch.numel() for batch in make(total_frames=frames[0])] == frames[:1]
@@ -58,28 +58,28 @@ def test_frames_and_episodes_are_counted(make):
     assert collector.episodes == sum(int(batch["next", "done"].sum()) for batch in batches)
 
 
-def test_postproc_is_given_each_batch(make):
+def test_postproc_receives_each_batch(make):
     for batch in make(postproc=lambda batch: batch.set("seen", batch["action"]), total_frames=20):
         assert torch.equal(batch["seen"], batch["action"])
 
 
-def test_what_is_kept_is_what_the_environment_has(make):
+def test_only_existing_entries_are_kept(make):
     keep = (("next", "info", "cubes"), ("next", "wind"))
     batch = make(keep=keep).collect()
     assert ("next", "info", "cubes") in batch.keys(True)
     assert ("next", "wind") not in batch.keys(True)
 
 
-def test_seed_is_that_of_the_worlds(make):
+def test_set_seed_seeds_the_environments(make):
     collector = make()
     first = collector.collect()["info", "cube_positions"]
     assert collector.set_seed(0, static_seed=True) == 0
     assert torch.equal(collector.collect()["info", "cube_positions"], first)
-    assert collector.set_seed(7) != 7  # a seed for the next collector
+    assert collector.set_seed(7) != 7  # the seed for the next collector
     assert not torch.equal(collector.collect()["info", "cube_positions"][0], first[0])
 
 
-def test_weights_of_another_actor_its_state_or_a_tensordict(make):
+def test_update_weights_accepts_actor_state_dict_or_tensordict(make):
     layer = torch.nn.Linear(1, 1)
     actor = TensorDictModule(layer, in_keys=["frame"], out_keys=["action"])
     collector = make(actor)
@@ -91,10 +91,10 @@ def test_weights_of_another_actor_its_state_or_a_tensordict(make):
         torch.nn.init.constant_(other.module.weight, value)
         collector.update_policy_weights_(kind(other))
         assert float(layer.weight.detach()) == value
-        assert layer.weight is collector.actor.module.weight  # in place, nothing is rebound
+        assert layer.weight is collector.actor.module.weight  # updated in place
 
 
-def test_shutdown_may_leave_the_worlds_open(make):
+def test_shutdown_can_leave_the_environment_open(make):
     collector = make()
     collector.collect()
     collector.shutdown(close_env=False)
@@ -103,13 +103,13 @@ def test_shutdown_may_leave_the_worlds_open(make):
     assert collector.env.is_closed
 
 
-def test_the_worlds_are_those_behind_transforms():
+def test_base_env_is_behind_transforms():
     env = DroneEnv(2, TASK, pixels=False)
     assert EpisodeCollector(TransformedEnv(env, RewardSum()), oracle_policy(TASK)).base_env is env
     assert EpisodeCollector(env, oracle_policy(TASK)).base_env is env
 
 
-def test_one_world_without_a_batch(make):
+def test_unbatched_environment_raises(make):
     env = DroneEnv(1, TASK, pixels=False)
     env.batch_size = torch.Size([])
     for kind in KINDS.values():
@@ -117,7 +117,7 @@ def test_one_world_without_a_batch(make):
             kind(env, oracle_policy(TASK))
 
 
-def test_rows_are_what_indexing_gives():
+def test_take_rows_equals_indexing():
     part = TensorDict({"a": torch.arange(4.0), "b": {"c": torch.arange(8).view(4, 2)}}, [4])
     rows = torch.tensor([3, 0, 3])
     taken = take_rows(part, rows)

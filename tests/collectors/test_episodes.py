@@ -1,4 +1,4 @@
-"""Whole episodes in order, and the contract of TorchRL's collectors."""
+"""Complete episodes in order, and the interface of TorchRL's collectors."""
 
 import itertools
 
@@ -24,7 +24,7 @@ TRUTH = (("next", "info", "cubes"), ("next", "info", "end_reason"))
 
 
 class Scripted(EnvBase):
-    """World w has episodes of known lengths; each frame is numbered 100 w + 10 episode + step."""
+    """Episodes of known lengths; the frame of environment w is 100 w + 10 episode + step."""
 
     LENGTHS = ((3, 1, 2), (1, 1, 4), (2, 5, 1))
 
@@ -44,7 +44,9 @@ class Scripted(EnvBase):
         return TensorDict({"frame": self._frame(), "done": torch.zeros(3, 1).bool()}, [3])
 
     def _step(self, tensordict):
-        reward = -tensordict["action"].float()[:, None]  # of the frame that was acted on
+        reward = -tensordict["action"].float()[
+            :, None
+        ]  # reward of the frame to which the action belongs
         self.step_of = self.step_of + 1
         lengths = torch.tensor([self.LENGTHS[w][int(self.episode[w])] for w in range(3)])
         done = (self.step_of >= lengths)[:, None]
@@ -55,12 +57,12 @@ class Scripted(EnvBase):
 
 
 def scripted(**kwargs):
-    """A collector whose actor answers each frame with its number."""
+    """Return a collector whose actor returns the frame number as action."""
     actor = TensorDictModule(lambda f: f[:, 0].long(), in_keys=["frame"], out_keys=["action"])
     return EpisodeCollector(Scripted(), actor, **{"keep": (("next", "frame"),), **kwargs})
 
 
-def test_every_frame_of_every_episode_is_there_once_in_order_and_beside_its_action():
+def test_every_frame_appears_once_in_order_with_its_action():
     collector = scripted()
     for episode, first in ((0, 0), (1, 3), (2, 6)):
         batch = collector.collect()
@@ -76,7 +78,7 @@ def test_every_frame_of_every_episode_is_there_once_in_order_and_beside_its_acti
     assert (collector.frames, collector.episodes) == (20, 9)
 
 
-def test_the_first_worlds_alone():
+def test_collecting_from_the_first_environments():
     collector = scripted()
     batch = collector.collect(2)
     assert batch["frame"][:, 0].tolist() == [0, 1, 2, 100]
@@ -86,18 +88,18 @@ def test_the_first_worlds_alone():
     assert following["collector", "traj_ids"].tolist() == [2]
 
 
-def test_total_frames_stops_before_the_batch_that_is_not_needed():
+def test_total_frames_stops_before_an_unneeded_batch():
     assert [len(batch) for batch in scripted(total_frames=6)] == [6]
     assert [len(batch) for batch in scripted(total_frames=7)] == [6, 7]
     assert [len(batch) for batch in scripted(total_frames=0)] == []
 
 
-def test_goes_on_for_ever_by_default():
+def test_collects_without_limit_by_default():
     assert [len(batch) for batch in itertools.islice(scripted(), 3)] == [6, 7, 7]
 
 
 def test_nested_entries_are_read_and_kept_as_leaves():
-    """An actor that reads the truth, and one that writes a note beside its action."""
+    """One actor reads the true state; the other writes an entry in addition to its action."""
     env = DroneEnv(2, SHORT, pixels=False)
     assert EpisodeCollector(env, oracle_policy(SHORT)).collect()["next", "reward"].sum() > 0
     actor = TensorDictModule(
@@ -108,14 +110,14 @@ def test_nested_entries_are_read_and_kept_as_leaves():
     assert batch["frame"][:, 0].tolist() == [0, 1, 2, 100, 200, 201]
 
 
-def test_what_is_kept_and_what_is_not():
+def test_kept_entries():
     batch = scripted(keep_observations=False).collect()
     assert set(batch.keys()) == {"action", "next", "collector"}
     assert set(batch["next"].keys()) == {"reward", "done", "terminated", "frame"}
     assert set(scripted().collect().keys()) == {"frame", "action", "next", "collector"}
 
 
-def test_state_goes_on_where_it_was():
+def test_state_resumes_collection():
     first = scripted()
     first.env.state_dict, first.env.load_state_dict = dict, lambda state: None
     first.collect()
@@ -127,7 +129,7 @@ def test_state_goes_on_where_it_was():
     assert second.collect()["collector", "traj_ids"].unique().tolist() == [3, 4, 5]
 
 
-def test_shutdown_closes_once():
+def test_second_shutdown_has_no_effect():
     collector = scripted()
     collector.shutdown()
     assert collector.env.is_closed
@@ -139,16 +141,16 @@ def collector(make_pipeline):
     return EpisodeCollector(*make_pipeline(5, task=SHORT), keep=TRUTH)
 
 
-def test_batch_is_complete_episodes_one_after_the_other(collector):
+def test_batch_contains_complete_episodes(collector):
     batch = collector.collect()
     ids, done = batch["collector", "traj_ids"], batch["next", "done"][:, 0]
     assert ids.unique().tolist() == [0, 1, 2, 3, 4]
     assert torch.equal(ids, ids.sort().values)
     last = torch.cat([ids[1:] != ids[:-1], torch.tensor([True])])
-    assert torch.equal(done, last)  # each episode ends in done, and nowhere else
+    assert torch.equal(done, last)  # done is exactly the last step of each episode
 
 
-def test_frames_are_in_order_and_follow_from_the_actions(collector):
+def test_frames_are_ordered_and_follow_from_the_actions(collector):
     batch = collector.collect()
     for i in range(5):
         episode = batch[batch["collector", "traj_ids"] == i]
@@ -158,13 +160,13 @@ def test_frames_are_in_order_and_follow_from_the_actions(collector):
         assert episode["next", "info", "end_reason"][-1] > 0
 
 
-def test_collecting_keeps_no_graph(collector):
+def test_batches_require_no_grad(collector):
     batch = collector.collect()
     assert batch["logits"].numel() > 0
     assert not any(value.requires_grad for value in batch.values(True, True))
 
 
-def test_each_action_was_taken_on_the_frame_beside_it(make_pipeline):
+def test_each_action_belongs_to_its_frame(make_pipeline):
     env, actor = make_pipeline(3, task=SHORT)
     batch = EpisodeCollector(env, actor).collect()
     logits = actor.get_dist(batch.select("pixels")).logits
@@ -184,16 +186,18 @@ def test_no_frame_is_dropped_or_used_twice(make_pipeline):
     assert collector.episodes == 12
 
 
-def test_finished_worlds_are_not_drawn(make_pipeline):
+def test_finished_environments_are_not_rendered(make_pipeline):
     env, actor = make_pipeline(4, task=SHORT)
-    drawn = []
+    num_rendered = []
     render = env.base_env.worlds.render
-    env.base_env.worlds.render = lambda s, *view, **look: drawn.append(len(s)) or render(s, *view)
+    env.base_env.worlds.render = lambda s, *view, **look: (
+        num_rendered.append(len(s)) or render(s, *view)
+    )
     batch = EpisodeCollector(env, actor).collect()
-    assert sum(drawn) == len(batch)  # what was acted upon, and nothing else
+    assert sum(num_rendered) == len(batch)  # exactly the frames with an action
 
 
-def test_without_observations(make_pipeline):
+def test_observations_are_optional(make_pipeline):
     env, actor = make_pipeline(2, task=SHORT)
     batch = EpisodeCollector(env, actor, keep_observations=False).collect()
     assert "pixels" not in batch
@@ -209,38 +213,38 @@ def test_stops_at_total_frames(make_pipeline):
 
 @pytest.fixture
 def seeing(make_pipeline):
-    """A collector whose policy reads the nested truth; three worlds, nothing is drawn."""
+    """Return a collector whose policy reads the true state; three environments, no rendering."""
     return EpisodeCollector(DroneEnv(3, SHORT, pixels=False), oracle_policy(SHORT), keep=TRUTH)
 
 
-def test_what_a_policy_reads_is_there_at_every_step_and_kept(seeing):
+def test_policy_inputs_are_available_and_kept(seeing):
     batch = seeing.collect()
-    assert len(batch) > 3  # a second step needs the truth after the first
+    assert len(batch) > 3  # the second step needs the state after the first
     read = set(batch.keys(True, True)) - {"action", ("collector", "traj_ids")}
     assert {key for key in read if key[0] != "next"} == set(oracle_policy(SHORT).in_keys)
     first = batch["collector", "traj_ids"].diff(prepend=torch.tensor([-1])) > 0
     drone, after = batch["info", "drone"], batch["next", "info", "cubes"][:, 0]
     assert drone[first].tolist() == [[0.0, 0.0, SHORT.altitude]] * 3
     steps = drone.diff(dim=0).abs().sum(-1)[~first[1:]]
-    torch.testing.assert_close(steps, torch.ones_like(steps))  # one metre a step
+    torch.testing.assert_close(steps, torch.ones_like(steps))  # one meter per step
     assert after[~first.roll(-1)].max() < 2  # all cubes end an episode
 
 
-def test_stops_before_a_batch_once_there_are_enough_frames(seeing):
+def test_no_batch_follows_enough_frames(seeing):
     def batches(total_frames):
         seeing.env.set_seed(0)
         collector = EpisodeCollector(seeing.env, seeing.actor, total_frames=total_frames)
         return [len(batch) for batch in itertools.islice(collector, 3)]
 
     first, *_ = without_number = [len(batch) for batch in itertools.islice(seeing, 3)]
-    assert len(without_number) == 3  # on and on
+    assert len(without_number) == 3  # without limit
     assert batches(-1) == without_number
     assert batches(0) == []
     assert batches(1) == batches(first) == [first]
     assert batches(first + 1) == without_number[:2]
 
 
-def test_episodes_are_numbered_on_from_batch_to_batch(seeing):
+def test_episode_ids_continue_across_batches(seeing):
     ids = [set(seeing.collect()["collector", "traj_ids"].tolist()) for _ in range(3)]
     assert ids == [{0, 1, 2}, {3, 4, 5}, {6, 7, 8}]
     assert seeing.episodes == 9
@@ -258,12 +262,12 @@ def test_steps_are_masked_once_an_episode_has_ended(seeing):
     seeing.env._step = lambda state: masked.append("_step" in state) or step(state)
     batch = EpisodeCollector(seeing.env, seeing.actor, acceleration="none").collect()
     lengths = batch["collector", "traj_ids"].bincount()
-    assert len(masked) == int(lengths.max())  # nothing is stepped after the last episode
+    assert len(masked) == int(lengths.max())  # no step after the last episode
     assert masked.index(True) == int(lengths.min())
     assert all(masked[int(lengths.min()) :])
 
 
-def test_shutdown_closes_the_worlds_and_may_come_twice(seeing):
+def test_shutdown_closes_the_environment(seeing):
     seeing.collect()
     assert not seeing.env.is_closed
     seeing.shutdown()
@@ -271,7 +275,7 @@ def test_shutdown_closes_the_worlds_and_may_come_twice(seeing):
     seeing.shutdown()
 
 
-def test_unbatched_environment_is_refused(make_pipeline):
+def test_unbatched_environment_raises(make_pipeline):
     _, actor = make_pipeline(1)
 
     class Unbatched:
@@ -281,13 +285,13 @@ def test_unbatched_environment_is_refused(make_pipeline):
         EpisodeCollector(Unbatched(), actor)
 
 
-def test_what_the_environment_lacks_is_not_kept():
+def test_missing_entries_are_not_kept():
     keep = (("next", "info", "end_reason"), ("next", "frame"))
     batch = scripted(keep=keep).collect()
     assert set(batch["next"].keys()) == {"reward", "done", "terminated", "frame"}
 
 
-def test_it_is_one_of_torchrls_collectors(seeing):
+def test_implements_the_torchrl_collector_interface(seeing):
     assert isinstance(seeing, BaseCollector)
     alone = DroneEnv(3, SHORT, pixels=False)
     other = EpisodeCollector(alone, oracle_policy(SHORT), keep=TRUTH)
@@ -296,11 +300,11 @@ def test_it_is_one_of_torchrls_collectors(seeing):
         len(seeing)
 
 
-def test_a_list_of_batches():
+def test_list_returns_all_batches():
     assert [len(batch) for batch in list(scripted(total_frames=7))] == [6, 7]
 
 
-def test_postproc_is_given_each_batch():
+def test_postproc_receives_each_batch():
     collector = scripted(postproc=RewardToGo(0.5), total_frames=7)
     for batch in collector:
         expected = RewardToGo(0.5)(batch.exclude("return_to_go"))["return_to_go"]

@@ -1,4 +1,4 @@
-"""Workers on a local Ray cluster: the same episodes as on threads, whatever happens to a worker."""
+"""Ray workers collect the same episodes as threads, also after a worker fails."""
 
 import logging
 
@@ -69,6 +69,6 @@ def test_same_complete_episodes_as_on_threads_and_a_killed_worker_changes_nothin
         on_ray.collect()
 
 
-def test_more_workers_than_cores():
+def test_more_workers_than_cores_raise():
     with pytest.raises(InputError, match=r"num_threads=4.*more than the cluster's 2 cores"):
         build(Ray(num_envs=6, num_threads=4))

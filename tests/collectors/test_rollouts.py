@@ -1,4 +1,4 @@
-"""Rows that go on from batch to batch, by hand and beside TorchRL's own way of stepping."""
+"""Rollouts that continue across batches, compared with hand-computed ones and with TorchRL."""
 
 import copy
 import itertools
@@ -22,7 +22,7 @@ SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=10
 
 
 class Endless(Scripted):
-    """Begins only the episodes that it is told to, and has lengths for ever."""
+    """A `Scripted` environment that resets only masked episodes and repeats its lengths."""
 
     LENGTHS = tuple(lengths * 9 for lengths in Scripted.LENGTHS)
 
@@ -35,13 +35,13 @@ class Endless(Scripted):
 
 
 def scripted(num_steps=4, **kwargs):
-    """Its actor answers each frame with its number; the reward is minus that."""
+    """Return a collector whose actor returns the frame number; the reward is minus that."""
     actor = TensorDictModule(lambda f: f[:, 0].long(), in_keys=["frame"], out_keys=["action"])
     return RolloutCollector(Endless(), actor, num_steps, **kwargs)
 
 
-def test_rows_by_hand():
-    """World 2 has episodes of 2 and 5 steps: the second is cut by the end of the batch."""
+def test_rows_match_hand_computed_frames():
+    """Environment 2 has episodes of 2 and 5 steps; the batch ends within the second."""
     collector = scripted()
     first, second = collector.collect(), collector.collect()
     assert first.shape == second.shape == (3, 4)
@@ -49,7 +49,7 @@ def test_rows_by_hand():
     assert frames == [[200, 201, 210, 211], [212, 213, 214, 220]]
     assert first["action"][2].tolist() == frames[0]
     seen = [batch["next", "frame"][2, :, 0].tolist() for batch in (first, second)]
-    assert seen == [[201, 202, 211, 212], [213, 214, 215, 221]]  # 202: not yet the new episode
+    assert seen == [[201, 202, 211, 212], [213, 214, 215, 221]]  # 202: not the new episode yet
     assert first["next", "done"][2, :, 0].tolist() == [False, True, False, False]
     assert second["next", "done"][2, :, 0].tolist() == [False, False, True, True]
     totals = [batch["next", "episode_reward"][2, :, 0].tolist() for batch in (first, second)]
@@ -61,14 +61,14 @@ def test_rows_by_hand():
 
 
 @pytest.mark.parametrize("num_steps", [1, 2, 5, 8])
-def test_what_is_flown_does_not_depend_on_where_batches_are_cut(num_steps):
+def test_rollouts_do_not_depend_on_batch_boundaries(num_steps):
     whole, parts = scripted(40).collect(), scripted(num_steps)
     joined = torch.cat([parts.collect() for _ in range(40 // num_steps)], 1)
     for key in whole.keys(True, True):
         assert torch.equal(whole[key], joined[key]), key
 
 
-def test_what_follows_a_step_is_the_next_one_unless_the_episode_ended():
+def test_next_observation_is_the_following_one_within_an_episode():
     batch = scripted(30).collect()
     goes_on = ~batch["next", "done"][:, :-1]
     following, after = batch["next", "frame"][:, :-1], batch["frame"][:, 1:]
@@ -76,13 +76,13 @@ def test_what_follows_a_step_is_the_next_one_unless_the_episode_ended():
     assert not (following == after)[~goes_on].any()
 
 
-def test_it_ends_once_there_are_enough_frames():
+def test_stops_at_total_frames():
     assert [len(batch) for batch in scripted(total_frames=13)] == [3, 3]
     assert len(list(itertools.islice(scripted(), 3))) == 3
 
 
 def pipeline(seed=0, num_envs=5):
-    """Two frames at once, and transforms that count by themselves: all that has a memory."""
+    """Return an environment with stateful transforms: frame stack, reward sum and step counter."""
     steps = [GrayPixels(), CatFrames(2, -3, in_keys=["pixels"]), RewardSum(), StepCounter()]
     env = with_transforms(DroneEnv(num_envs, SHORT, seed=seed, num_shards=1), steps)
     network = MLP((2, 25, 64), 3, hidden=(4,), generator=torch.Generator().manual_seed(seed))
@@ -91,7 +91,7 @@ def pipeline(seed=0, num_envs=5):
     return env, make_actor(network, env.action_spec, actions), actions
 
 
-def test_same_worlds_and_actions_stepped_by_torchrl():
+def test_rollouts_equal_stepping_by_torchrl():
     env, actor, _ = pipeline()
     collector = RolloutCollector(env, actor, 6)
     other, *_ = pipeline()
@@ -103,14 +103,14 @@ def test_same_worlds_and_actions_stepped_by_torchrl():
             after, state = other.step_and_maybe_reset(state)
             for key in ("pixels", "reward", "done", "terminated", "truncated"):
                 assert torch.equal(batch["next", key][:, t], after["next", key]), key
-            for key in ("episode_reward", "step_count"):  # what the transforms make of them
+            for key in ("episode_reward", "step_count"):  # entries of the transforms
                 assert torch.equal(batch["next", key][:, t], after["next", key]), key
     assert int(collector.episodes) > 10
     env.close()
     other.close()
 
 
-def test_both_kinds_of_end_are_there():
+def test_rollouts_contain_terminations_and_truncations():
     env, actor, _ = pipeline()
     batch = RolloutCollector(env, actor, 40).collect()
     assert batch["next", "terminated"].any() and batch["next", "truncated"].any()
@@ -119,12 +119,12 @@ def test_both_kinds_of_end_are_there():
     env.close()
 
 
-def test_going_on_from_a_state_is_having_gone_on():
+def test_resuming_from_a_state_gives_the_same_rollouts():
     env, actor, actions = pipeline()
     first = RolloutCollector(env, actor, 6)
     first.collect()
     state, drawn = copy.deepcopy(first.state_dict()), actions.get_state()
-    assert state["step_count"].any()  # episodes are under way
+    assert state["step_count"].any()  # episodes are running
     wanted = [first.collect() for _ in range(3)]
     env2, actor2, actions2 = pipeline(seed=7)
     actor2.load_state_dict(actor.state_dict())
@@ -141,7 +141,7 @@ def test_going_on_from_a_state_is_having_gone_on():
     env2.close()
 
 
-def test_a_state_taken_before_the_first_batch():
+def test_state_before_the_first_batch_resumes():
     (env, actor, _), (env2, actor2, _) = pipeline(), pipeline()
     first, second = RolloutCollector(env, actor, 6), RolloutCollector(env2, actor2, 6)
     second.load_state_dict(copy.deepcopy(first.state_dict()))
@@ -150,7 +150,7 @@ def test_a_state_taken_before_the_first_batch():
     env2.close()
 
 
-def test_what_a_state_holds_is_its_own():
+def test_state_is_a_copy():
     env, actor, _ = pipeline()
     collector = RolloutCollector(env, actor, 6)
     collector.collect()
@@ -165,7 +165,7 @@ def test_what_a_state_holds_is_its_own():
     env.close()
 
 
-def test_a_seed_begins_all_episodes_anew():
+def test_set_seed_restarts_all_episodes():
     env, actor, _ = pipeline()
     collector = RolloutCollector(env, actor, 6)
     first = collector.collect()["pixels"][:, 0]
@@ -176,7 +176,7 @@ def test_a_seed_begins_all_episodes_anew():
     env.close()
 
 
-def test_threads_join_rows():
+def test_threaded_collector_concatenates_rows():
     joined = ThreadedCollector([scripted(), scripted()])
     assert isinstance(joined.collectors[0], BaseCollector)
     batch = joined.collect()
@@ -186,6 +186,6 @@ def test_threads_join_rows():
 
 
 @pytest.mark.parametrize("num_steps", [0, -1])
-def test_no_steps(num_steps):
+def test_nonpositive_num_steps_raises(num_steps):
     with pytest.raises(InputError, match=f"num_steps={num_steps} is out of range; give 1 or more"):
         scripted(num_steps)

@@ -1,4 +1,4 @@
-"""Without the package `drone_rl.acceleration` everything falls back to TorchRL and torch."""
+"""Without the package `drone_rl.acceleration`, collectors and networks use TorchRL and torch."""
 
 import sys
 
@@ -42,7 +42,7 @@ def test_collectors_step_by_torchrl_if_the_package_is_missing(missing):
     env.close()
 
 
-def test_a_collector_that_may_not_be_accelerated_says_so():
+def test_disabled_acceleration_is_the_reason():
     env = with_transforms(DroneEnv(2, TASK), [GrayPixels()])
     actor = make_actor(SmallCNN((1, 25, 64), 3), env.action_spec)
     found = speedups.accelerated_collector(env, actor, "none", kept=KEPT)
@@ -50,7 +50,7 @@ def test_a_collector_that_may_not_be_accelerated_says_so():
     env.close()
 
 
-def test_a_collector_is_fused_or_direct_or_impossible_for_reasons():
+def test_collector_is_fused_direct_or_rejected_with_reasons():
     env = with_transforms(DroneEnv(2, TASK), [GrayPixels()])
     actor = make_actor(SmallCNN((1, 25, 64), 3), env.action_spec)
     find = speedups.accelerated_collector
@@ -78,7 +78,7 @@ def test_supported_networks_are_accelerated():
     assert speedups.accelerated_gradients(network).in_keys == ("pixels",)
 
 
-def test_networks_stay_as_they_are_if_the_package_is_missing(missing):
+def test_networks_are_unchanged_if_the_package_is_missing(missing):
     network = SmallCNN((1, 25, 64), 3)
     assert speedups.accelerated_gradients(network) is network
     pixels = torch.randn(2, 1, 25, 64)
@@ -86,7 +86,7 @@ def test_networks_stay_as_they_are_if_the_package_is_missing(missing):
     assert torch.equal(logits, network(pixels)) and not logits.requires_grad
 
 
-def test_networks_stay_as_they_are_if_they_are_not_supported():
+def test_unsupported_networks_are_unchanged():
     network = MLP((1, 25, 64), 3)
     assert speedups.accelerated_gradients(network) is network
     pixels = torch.randn(2, 1, 25, 64)
@@ -94,7 +94,7 @@ def test_networks_stay_as_they_are_if_they_are_not_supported():
     assert torch.equal(logits, network(pixels)) and not logits.requires_grad
 
 
-def test_an_error_within_the_package_is_no_missing_package(monkeypatch):
+def test_import_errors_within_the_package_propagate(monkeypatch):
     monkeypatch.delitem(sys.modules, "drone_rl.acceleration", raising=False)
     monkeypatch.setitem(sys.modules, "drone_rl.acceleration.fused_collector", None)
     with pytest.raises(ModuleNotFoundError, match="fused_collector"):

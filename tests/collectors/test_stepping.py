@@ -25,7 +25,7 @@ def make(num_envs=5, **settings):
     return SteppingCollector(env, actor, Reasons(["a reason"]), kept=KEPT, **settings), env
 
 
-def test_it_is_torchrls_collector_and_says_why():
+def test_source_names_the_reason():
     collector, _ = make()
     assert type(collector._collector) is Collector
     assert collector.name == "stepping collector: a reason"
@@ -33,12 +33,12 @@ def test_it_is_torchrls_collector_and_says_why():
     collector.close()
 
 
-def test_making_it_starts_no_episode():
+def test_construction_starts_no_episode():
     env = DroneEnv(5, TASK)
     assert torch.equal(make()[0].collect(5)["pixels"][0], GrayPixels()(env.reset())["pixels"][0])
 
 
-def test_the_environment_stays_open_when_the_collector_is_deleted():
+def test_deleting_the_collector_keeps_the_environment_open():
     collector, env = make()
     collector.collect(5)
     del collector
@@ -49,7 +49,7 @@ def test_the_environment_stays_open_when_the_collector_is_deleted():
 
 
 @pytest.mark.parametrize("num_envs", [5, 2])
-def test_every_episode_is_complete_and_none_is_started_twice(num_envs):
+def test_every_episode_is_complete_and_starts_once(num_envs):
     collector, env = make()
     started, start = [], env.base_env.start
     env.base_env.start = lambda rows=None: started.append(len(rows)) or start(rows)
@@ -61,7 +61,7 @@ def test_every_episode_is_complete_and_none_is_started_twice(num_envs):
     assert started == [5, 5]
 
 
-def test_actions_are_those_of_the_exploration_type_outside():
+def test_outer_exploration_type_is_respected():
     collector, _ = make()
     with set_exploration_type(ExplorationType.DETERMINISTIC):
         batch = collector.collect(5)
@@ -70,7 +70,7 @@ def test_actions_are_those_of_the_exploration_type_outside():
     assert not torch.equal(batch["action"], batch["logits"].argmax(-1))
 
 
-def test_observations_are_left_out_and_extra_entries_kept():
+def test_observations_are_omitted_and_extra_entries_kept():
     collector, _ = make(keep_observations=False, extra=("logits",))
     batch = collector.collect(5)
     assert set(batch.keys()) == {"action", "logits", "next", "collector"}

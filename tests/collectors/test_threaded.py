@@ -1,4 +1,4 @@
-"""Collectors side by side give the batch of one, whichever is faster."""
+"""Parallel collectors give deterministic batches."""
 
 import copy
 
@@ -16,7 +16,7 @@ def threaded(make_pipeline):
     return ThreadedCollector([EpisodeCollector(*share) for share in shares])
 
 
-def test_threads_give_the_same_batch_every_time(make_pipeline):
+def test_threaded_batches_are_deterministic(make_pipeline):
     first, second = threaded(make_pipeline), threaded(make_pipeline)
     for _ in range(3):
         one, two = first.collect(), second.collect()
@@ -26,7 +26,7 @@ def test_threads_give_the_same_batch_every_time(make_pipeline):
     second.shutdown()
 
 
-def test_threads_join_in_order(make_pipeline):
+def test_batches_are_concatenated_in_order(make_pipeline):
     joined = threaded(make_pipeline)
     batch = joined.collect()
     assert int(batch["next", "done"].sum()) == 4
@@ -35,7 +35,7 @@ def test_threads_join_in_order(make_pipeline):
     joined.shutdown()
 
 
-def test_threads_carry_every_episode_of_every_collector_on():
+def test_rollouts_continue_in_every_collector():
     joined = ThreadedCollector([scripted(), scripted()])
     assert joined.actor is joined.collectors[0].actor
     for episode in range(3):
@@ -64,14 +64,14 @@ def test_threaded_state_round_trip(make_pipeline):
     second.shutdown()
 
 
-def test_it_is_one_of_torchrls_collectors():
+def test_implements_the_torchrl_collector_interface():
     joined = ThreadedCollector([scripted(), scripted()], postproc=RewardToGo(0.5))
     assert isinstance(joined, BaseCollector)
     assert len(joined.next()["return_to_go"]) == 12
     with pytest.raises(TypeError, match="without end"):
         len(joined)
     for collector in joined.collectors:
-        collector.env.is_closed = False  # TorchRL takes every environment for closed until told
+        collector.env.is_closed = False  # TorchRL's default is closed
     joined.shutdown(close_env=False)
     assert not any(c.env.is_closed for c in joined.collectors)
 
@@ -81,7 +81,7 @@ def test_seed_and_weights_reach_every_collector(make_pipeline):
     first = joined.collect()
     assert joined.set_seed(0, static_seed=True) == 0
     cubes = [c.env.reset()["info", "cube_positions"] for c in joined.collectors]
-    assert not torch.equal(*cubes)  # one seed, other worlds
+    assert not torch.equal(*cubes)  # same seed, different environments
     other = copy.deepcopy(joined.actor)
     for parameter in other.parameters():
         torch.nn.init.zeros_(parameter)

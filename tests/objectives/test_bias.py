@@ -1,7 +1,7 @@
-"""What estimators and loss expect to do, by adding up all outcomes of small batches (Fig. 3).
+"""Bias of estimators and loss, exact by enumeration of all outcomes of small batches (Fig. 3).
 
-The policy has a logit of its own for each step, so that a gradient has a direction that can be
-wrong: it sees the step, one-hot, and leaves state 0 with a probability of that step.
+The policy observes the one-hot step and has a separate logit for each, the probability of leaving
+state 0. So the gradient is a vector whose direction can be wrong.
 """
 
 import itertools
@@ -36,9 +36,9 @@ SKEWED = (0.7, 0.2, 0.4)
 
 
 def expected_update(leaving, estimator, episodes, reduction="sum"):
-    """Expected ascent on the logits of action 1, of the shipped classes; over episodes if summed.
+    """Return the expected gradient ascent step on the logits of action 1, per episode if summed.
 
-    Exact: over every tuple of outcomes, weighted by its probability.
+    It is exact: the sum over all tuples of outcomes, weighted by their probabilities.
     """
     network = nn.Linear(len(leaving), 2, bias=False)
     with torch.no_grad():
@@ -75,10 +75,10 @@ def joined(batch, horizon):
 
 
 def default_of_any_size(leaving, episodes, gamma=0.95, *, scale=True, mean=True):
-    """The same for `leave_one_out` on two steps, written out, for large batches.
+    """Return the same for `leave_one_out` on two steps, by an explicit formula for large batches.
 
-    Of an episode only its length and reward matter to the returns: long or short, rewarded or not,
-    so a batch is four counts. The score of a kind is its mean over the actions behind it.
+    The returns of an episode depend only on its length and reward, so a batch is described by the
+    counts of four kinds. The score of a kind is its mean over the actions that lead to it.
     """
     first, second = leaving
     success = SUCCESS_PROBABILITY
@@ -89,7 +89,7 @@ def default_of_any_size(leaving, episodes, gamma=0.95, *, scale=True, mean=True)
         for b in range(n + 1 - a)
         for c in range(n + 1 - a - b)
     ]
-    count = np.array(kinds, float)  # short and rewarded, short, long and rewarded, long
+    count = np.array(kinds, float)  # short with reward, short, long with reward, long
     share = np.array([first * success, first * (1 - success), (1 - first) * second * success, 0])
     share[3] = 1 - share.sum()
     probability = np.exp(gammaln(n + 1) - gammaln(count + 1).sum(1) + count @ np.log(share))
@@ -104,19 +104,19 @@ def default_of_any_size(leaving, episodes, gamma=0.95, *, scale=True, mean=True)
     weight = np.where(rms > 1e-6, probability / np.maximum(rms, 1e-6), 0) / (steps if mean else n)
     stayed = (
         -second * (1 - second) * success / (1 - second * success)
-    )  # of a long one without reward
+    )  # score of a long one without reward
     score = np.array([1 - first, 1 - first, -first, -first]), np.array([0, 0, 1 - second, stayed])
     return weight @ np.stack([count * credit @ score[0], count * later * is_long @ score[1]], 1)
 
 
 def angle(one, other):
-    """Degrees."""
+    """Return the angle in degrees."""
     cosine = one @ other / np.linalg.norm(one) / np.linalg.norm(other)
     return math.degrees(math.acos(min(1.0, cosine)))
 
 
 def known_baseline():
-    """The running means of earlier batches, whatever they were."""
+    """Return an estimator with given running means."""
     estimator = TimeBaseline(1.0, max_steps=3, scale=False)
     estimator.baseline += torch.tensor([0.7, -0.3, 0.2])
     estimator.estimate = lambda r, d: returns.time_baseline(r, d, 1.0, estimator.baseline)
@@ -128,13 +128,13 @@ def known_baseline():
     "make",
     [TotalReward, lambda: RewardToGo(1.0), lambda: LeaveOneOut(1.0, scale=False), known_baseline],
 )
-def test_unscaled_and_summed_these_are_exactly_unbiased(make, leaving, episodes):
+def test_unscaled_summed_estimators_are_unbiased(make, leaving, episodes):
     found = expected_update(leaving, make(), episodes)
     np.testing.assert_allclose(found, exact_gradient(leaving), atol=1e-6)
 
 
 @pytest.mark.parametrize("leaving", [EVEN, SKEWED])
-def test_discounted_returns_climb_the_discounted_gradient(leaving):
+def test_discounted_returns_follow_the_discounted_gradient(leaving):
     exact = exact_gradient(leaving, 0.95).numpy()
     np.testing.assert_allclose(
         expected_update(leaving, LeaveOneOut(0.95, scale=False), 2), exact, atol=1e-6
@@ -142,7 +142,7 @@ def test_discounted_returns_climb_the_discounted_gradient(leaving):
     np.testing.assert_allclose(expected_update(leaving, RewardToGo(0.95), 1), exact, atol=1e-6)
 
 
-def test_discounting_alone_turns_the_gradient():
+def test_discounting_rotates_the_gradient():
     discounted, plain = exact_gradient(EVEN, 0.95).numpy(), exact_gradient(EVEN).numpy()
     assert angle(discounted, plain) == pytest.approx(1.397, abs=1e-3)
 
@@ -158,7 +158,7 @@ def test_bias_of_the_shipped_default(episodes, degrees, length):
 
 
 @pytest.mark.parametrize("kind", [{"scale": False}, {"mean": False}])
-def test_written_out_default_is_that_of_the_classes(kind):
+def test_explicit_default_equals_the_classes(kind):
     settings = {"scale": True, "mean": True} | kind
     estimator = LeaveOneOut(0.95, scale=settings["scale"])
     reduction = "mean" if settings["mean"] else "sum"
@@ -175,14 +175,14 @@ def test_written_out_default_is_that_of_the_classes(kind):
         ({"scale": False}, {2: 3.80, 8: 1.14, 64: 0.15}),  # mean only
     ],
 )
-def test_bias_of_scale_and_mean_goes_as_the_batch_grows(settings, degrees):
+def test_bias_of_scale_and_mean_vanishes_with_batch_size(settings, degrees):
     exact = exact_gradient(EVEN, 0.95).numpy()
     found = {n: angle(default_of_any_size(EVEN, n, **settings), exact) for n in degrees}
     assert found == pytest.approx(degrees, abs=0.01)
 
 
-def test_in_large_batches_the_default_is_a_positive_multiple_of_the_gradient():
-    """1 / (RMS of the returns less their means, times the mean length), which a rate takes in."""
+def test_default_approaches_a_multiple_of_the_gradient():
+    """The factor 1 / (RMS of centered returns * mean length) is part of the learning rate."""
     found = default_of_any_size(EVEN, 64) / exact_gradient(EVEN, 0.95).numpy()
     # time 0: returns 1, 0, .95, 0 with probability 3/8, 1/8, 3/16, 5/16; time 1: 1, 0 with 3/8, 5/8
     first = 3 / 8 + 0.95**2 * 3 / 16 - (3 / 8 + 0.95 * 3 / 16) ** 2
@@ -190,8 +190,8 @@ def test_in_large_batches_the_default_is_a_positive_multiple_of_the_gradient():
     np.testing.assert_allclose(found, 1 / (1.5 * rms), rtol=0.02)
 
 
-def test_standardised_is_biased_in_any_batch():
-    assert np.abs(expected_update(EVEN, Standardised(1.0), 1)).max() < 1e-6  # learns nothing
+def test_standardised_is_biased_for_any_batch_size():
+    assert np.abs(expected_update(EVEN, Standardised(1.0), 1)).max() < 1e-6  # no gradient
     skewed = (0.9, 0.1)
     exact = exact_gradient(skewed, 0.95).numpy()
     for episodes in (1, 2):
@@ -199,20 +199,20 @@ def test_standardised_is_biased_in_any_batch():
         assert angle(found, exact) == pytest.approx(38.69, abs=0.01)
 
 
-def test_linear_ramp_is_biased_in_any_batch():
+def test_linear_ramp_is_biased_for_any_batch_size():
     for episodes in (1, 2):
         found = expected_update(EVEN, LinearRamp(), episodes)
         np.testing.assert_allclose(found, [0.140625, 0.09375], atol=1e-6)
         assert angle(found, exact_gradient(EVEN).numpy()) == pytest.approx(11.31, abs=0.01)
 
 
-def test_success_scaled_is_a_factor_where_there_is_one_reward():
+def test_success_scaled_is_a_factor_for_a_single_reward():
     found = expected_update(SKEWED, SuccessScaled(1.0, max_reward=3.0), 1)
     np.testing.assert_allclose(found, exact_gradient(SKEWED) * math.exp(-2), atol=1e-6)
 
 
-def test_success_scaled_prefers_an_even_chance_of_two_to_more_for_sure():
-    """One step: 2 or nothing is 1 on average, less than 1.1; times exp(r) it is 7.4 against 3.3."""
+def test_success_scaled_is_risk_seeking():
+    """One step: 2 or 0 has mean 1 < 1.1, but times exp(r) it is 7.4 > 3.3."""
     done = torch.ones(3, 1, dtype=torch.bool)
     credit = returns.success_scaled(torch.tensor([[2.0], [0.0], [1.1]]), done, 0.95, max_reward=2.0)
     two, nothing, sure = credit[:, 0].tolist()
@@ -220,7 +220,7 @@ def test_success_scaled_prefers_an_even_chance_of_two_to_more_for_sure():
     assert (two + nothing) / 2 > sure
 
 
-def test_batch_normalised_is_biased_less_the_larger_the_batch():
+def test_bias_of_batch_normalised_decreases_with_batch_size():
     exact = exact_gradient(EVEN, 0.95).numpy()
     alone = expected_update((0.9, 0.1), BatchNormalised(0.95), 1)
     np.testing.assert_allclose(alone, expected_update((0.9, 0.1), Standardised(0.95), 1), atol=1e-6)

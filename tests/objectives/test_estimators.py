@@ -18,28 +18,28 @@ NAMES = [n for n in objectives.__all__ if n not in OTHERS]
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_writes_returns_of_the_rewards_shape(name):
+def test_returns_have_the_shape_of_rewards(name):
     data = getattr(objectives, name)()(batch([0.0, 1.0, 1.0], [0, 1, 1]))
     assert data["return_to_go"].shape == (3, 1)
     assert data["return_to_go"].isfinite().all()
 
 
-def test_keys_can_be_chosen():
+def test_keys_are_configurable():
     estimator = RewardToGo(0.5, reward_key="r", done_key="d", out_key=("a", "b"))
     data = TensorDict({"r": torch.ones(2, 1), "d": torch.tensor([[False], [True]])}, [2])
     assert estimator(data)["a", "b"].flatten().tolist() == [1.5, 1.0]
 
 
-def test_scale():
+def test_scaled_returns_have_unit_mean_square():
     data = LeaveOneOut(0.9, scale=True)(batch([0.0, 1.0, 1.0, 1.0], [0, 1, 0, 1]))
     assert float(data["return_to_go"].square().mean()) == pytest.approx(1.0)
 
 
-def test_time_baseline_never_contains_the_episode_it_is_subtracted_from():
+def test_time_baseline_excludes_the_current_batch():
     estimator = TimeBaseline(0.5, decay=0.9, max_steps=4, scale=False)
     data = batch([0.0, 2.0], [0, 1])
     assert estimator(data)["return_to_go"].flatten().tolist() == [1.0, 2.0]  # baseline was 0
-    assert estimator.baseline.tolist() == [1.0, 2.0, 0.0, 0.0]  # first sight: the mean itself
+    assert estimator.baseline.tolist() == [1.0, 2.0, 0.0, 0.0]  # the first batch sets the mean
     other = batch([0.0, 0.0, 4.0], [0, 0, 1])  # returns 1, 2, 4
     assert estimator(other)["return_to_go"].flatten().tolist() == [0.0, 0.0, 4.0]
     assert estimator.baseline.tolist() == [1.0, 2.0, 4.0, 0.0]
@@ -56,7 +56,7 @@ def test_time_baseline_resumes_from_its_state():
     assert torch.equal(first(data.clone())["return_to_go"], second(data.clone())["return_to_go"])
 
 
-def test_time_baseline_of_episodes_longer_than_its_memory():
+def test_time_baseline_ignores_steps_beyond_max_steps():
     estimator = TimeBaseline(0.5, decay=0.5, max_steps=2, scale=False)
     long = batch([0.0, 0.0, 4.0], [0, 0, 1])  # returns 1, 2, 4
     assert estimator(long)["return_to_go"].flatten().tolist() == [1.0, 2.0, 4.0]
@@ -64,7 +64,7 @@ def test_time_baseline_of_episodes_longer_than_its_memory():
     assert estimator(long)["return_to_go"].flatten().tolist() == [0.0, 0.0, 4.0]
 
 
-def test_time_baseline_remembers_the_mean_over_episodes():
+def test_time_baseline_stores_the_mean_over_episodes():
     estimator = TimeBaseline(0.5, max_steps=3, scale=False)
     estimator(batch([0.0, 2.0, 3.0], [0, 1, 1]))  # returns 1, 2 and 3: means 2 and 2
     assert estimator.baseline.tolist() == [2.0, 2.0, 0.0]
@@ -85,7 +85,7 @@ PURE = {
 
 @pytest.mark.parametrize("scale", [False, True])
 @pytest.mark.parametrize("name", NAMES)
-def test_estimator_is_the_pure_function(name, scale):
+def test_estimator_equals_the_pure_function(name, scale):
     arguments = {} if name in ("TotalReward", "LinearRamp") else {"gamma": 0.7}
     if name == "SuccessScaled":
         arguments["max_reward"] = 2.0
@@ -104,25 +104,25 @@ def test_defaults():
     assert TimeBaseline(decay=0.0).decay == 0.0
 
 
-def test_returns_carry_no_gradient():
+def test_returns_require_no_grad():
     data = batch([0.0, 1.0], [0, 1])
     data["next", "reward"].requires_grad_()
     assert not RewardToGo(0.5)(data)["return_to_go"].requires_grad
 
 
 @pytest.mark.parametrize("gamma", [-0.1, 1.0001])
-def test_bad_discount_is_refused(gamma):
+def test_invalid_discount_raises(gamma):
     with pytest.raises(InputError, match="rate from 0 to 1"):
         RewardToGo(gamma)
 
 
 @pytest.mark.parametrize("decay", [1.0, -0.1])
-def test_bad_decay_is_refused(decay):
+def test_invalid_decay_raises(decay):
     with pytest.raises(InputError, match=f"decay={decay}"):
         TimeBaseline(decay=decay)
 
 
-def test_little_memory_by_hand():
+def test_small_decay_weights_recent_batches():
     estimator = TimeBaseline(0.5, decay=0.25, max_steps=1, scale=False)
     for reward in (4.0, 8.0):
         estimator(batch([reward], [1]))

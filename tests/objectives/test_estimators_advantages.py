@@ -1,4 +1,4 @@
-"""Generalised advantages by hand: where an episode goes on, is cut, and ends."""
+"""Hand-computed generalized advantages of running, truncated and terminated episodes."""
 
 import pytest
 import torch
@@ -18,14 +18,14 @@ def row(value, after, reward, done, terminated):
     return TensorDict({"state_value": column(value), "next": following}, [1, len(value)])
 
 
-def test_where_a_row_goes_on_ends_and_is_cut():
-    """Steps 0 and 1 of an episode that ends, one of another that is cut, two of a third.
+def test_advantages_match_hand_computed_values():
+    """Steps 0 and 1 terminate an episode, step 2 truncates another, 3 and 4 belong to a third.
 
     With d = r + 0.5 V(next) - V and weight 0.2 of the next advantage within an episode:
     step 4, the end of the batch: 0 + 0.5 * 8 - 3 = 1
     step 3: 1 + 0.5 * 3 - 2 = 0.5, and 0.2 * 1 = 0.7
-    step 2, cut by the time limit: 0 + 0.5 * 6 - 1 = 2; nothing of step 3
-    step 1, the end: 2 - 4 = -2; what follows is worth nothing, whatever the critic says
+    step 2, truncated: 0 + 0.5 * 6 - 1 = 2; independent of step 3
+    step 1, terminated: 2 - 4 = -2; the next value is 0, regardless of the critic
     step 0: 0 + 0.5 * 4 - 1 = 1, and 0.2 * -2 = 0.6
     """
     batch = row(
@@ -41,7 +41,7 @@ def test_where_a_row_goes_on_ends_and_is_cut():
     assert found["value_target"].flatten().tolist() == pytest.approx(wanted)
 
 
-def test_rows_are_apart():
+def test_rows_are_independent():
     one = row([1.0, 2.0], [2.0, 3.0], [0.0, 1.0], [0, 0], [0, 0])
     two = row([5.0, 4.0], [4.0, 0.0], [1.0, 0.0], [0, 1], [0, 1])
     both = Advantages(GAMMA, LMBDA, scale=False)(torch.cat([one, two]))["advantage"]
@@ -49,8 +49,8 @@ def test_rows_are_apart():
     torch.testing.assert_close(both, torch.cat(alone))
 
 
-def test_scaled_advantages_are_standardised_over_the_batch():
+def test_scaled_advantages_are_standardized():
     batch = row([0.0, 0.0], [0.0, 0.0], [1.0, 3.0], [1, 1], [1, 1])
     found = Advantages(GAMMA, LMBDA, scale=True)(batch)
     assert found["advantage"].flatten().tolist() == pytest.approx([-(0.5**0.5), 0.5**0.5])
-    assert found["value_target"].flatten().tolist() == [1.0, 3.0]  # as they are
+    assert found["value_target"].flatten().tolist() == [1.0, 3.0]  # not scaled

@@ -57,7 +57,7 @@ def gradient(loss, network, batch):
     return network.theta.grad.clone()
 
 
-def test_gradient_is_the_analytic_one_of_a_linear_policy():
+def test_gradient_equals_the_analytic_one_of_a_linear_policy():
     """d/dtheta[:, b] of log pi(a|s) is s (1[a = b] - pi(b|s))."""
     network, actor = make()
     with torch.no_grad():
@@ -73,7 +73,7 @@ def test_gradient_is_the_analytic_one_of_a_linear_policy():
 
 
 @pytest.mark.parametrize("reduction", ["mean", "sum"])
-def test_gradient_is_autograds_of_the_written_out_formula(reduction):
+def test_gradient_equals_autograd_of_the_formula(reduction):
     network, actor = make()
     batch = make_batch()
     loss = ReinforceLoss(actor, reduction=reduction, entropy_coeff=0.1)
@@ -85,7 +85,7 @@ def test_gradient_is_autograds_of_the_written_out_formula(reduction):
     torch.testing.assert_close(gradient(loss, network, batch), expected)
 
 
-def test_algorithm_4_by_hand():
+def test_algorithm_4_matches_a_hand_computed_step():
     """Rewards 0, 0, 1, discount 1/2: g = 1/4, 1/2, 1; mean 7/12, deviation sqrt(14)/12.
 
     With theta = 0 both actions have probability 1/2, so the gradient of log pi(a) with respect to
@@ -113,7 +113,7 @@ def test_algorithm_4_by_hand():
 
 
 @pytest.mark.parametrize("kind", ["total_reward", "reward_to_go"])
-def test_mean_gradient_is_the_exact_one_on_the_process_of_fig_3(kind):
+def test_mean_gradient_is_exact_for_the_process_of_fig_3(kind):
     """Eq. 12 and, undiscounted, Eq. 15 are unbiased estimates of the gradient of J.
 
     With p the probability of action 1 in state 0, J = 3/4 (1 - (1 - p)^H), so with respect to the
@@ -124,7 +124,7 @@ def test_mean_gradient_is_the_exact_one_on_the_process_of_fig_3(kind):
     with torch.no_grad():
         network.theta[0] = torch.tensor([0.4, -0.3])
     p = float(network.theta[0].detach().softmax(-1)[1])
-    slope = SUCCESS_PROBABILITY * horizon * (1 - p) ** (horizon - 1) * p * (1 - p)
+    derivative = SUCCESS_PROBABILITY * horizon * (1 - p) ** (horizon - 1) * p * (1 - p)
     collector = EpisodeCollector(ThreeStateEnv(episodes, horizon=horizon), actor, keep=())
     loss = ReinforceLoss(actor, reduction="sum", entropy_coeff=0.0)
     estimates = []
@@ -136,12 +136,12 @@ def test_mean_gradient_is_the_exact_one_on_the_process_of_fig_3(kind):
         estimates.append(-gradient(loss, network, batch)[0, 1] / episodes)
     estimates = torch.stack(estimates)
     error = float(estimates.std() / repeats**0.5)
-    assert error < 0.02 * slope  # narrow enough that a wrong formula would show
-    assert abs(float(estimates.mean()) - slope) < 4 * error
+    assert error < 0.02 * derivative  # small enough to detect a wrong formula
+    assert abs(float(estimates.mean()) - derivative) < 4 * error
 
 
-def test_constant_added_to_returns_leaves_the_expected_gradient_alone():
-    """Enumerated over both actions, weighted by their probabilities."""
+def test_constant_added_to_returns_keeps_the_expected_gradient():
+    """The expectation is enumerated over both actions."""
     network, actor = make()
     with torch.no_grad():
         network.theta.copy_(torch.tensor([[0.3, -0.2], [0.1, 0.4]]))
@@ -163,8 +163,8 @@ def test_constant_added_to_returns_leaves_the_expected_gradient_alone():
     torch.testing.assert_close(expected(0.0), expected(17.0), atol=1e-5, rtol=1e-5)
 
 
-def test_values_by_hand():
-    """Even odds: -log pi is log 2 at every step; returns 1, 2, 3, so 6 log 2 in all."""
+def test_values_match_hand_computed_ones():
+    """-log pi is log 2 at every step; returns are 1, 2, 3, so the sum is 6 log 2."""
     _, actor = make()
     batch = make_batch(3)
     batch["return_to_go"] = torch.tensor([[1.0], [2.0], [3.0]])
@@ -182,7 +182,7 @@ def test_values_by_hand():
     assert float(loss()["entropy"]) == pytest.approx(log2)
 
 
-def test_returns_are_constants_to_the_gradient():
+def test_returns_are_detached():
     network, actor = make()
     batch = make_batch()
     plain = gradient(ReinforceLoss(actor, entropy_coeff=0.0), network, batch)
@@ -191,7 +191,7 @@ def test_returns_are_constants_to_the_gradient():
     assert batch["return_to_go"].grad is None
 
 
-def test_stored_action_is_scored():
+def test_stored_action_is_used():
     _, actor = make()
     batch = make_batch()
     first = ReinforceLoss(actor, entropy_coeff=0.0)(batch)["loss_actor"]
@@ -205,7 +205,7 @@ def test_stored_action_is_scored():
     )
 
 
-def test_masked_equals_sliced():
+def test_masked_loss_equals_sliced_loss():
     network, actor = make()
     batch = make_batch()
     mask = torch.tensor([True, True, False, True, False, True])
@@ -229,7 +229,7 @@ def test_dispatch_equals_tensordict():
         torch.testing.assert_close(value, loss(batch)[key])
 
 
-def test_input_is_left_alone():
+def test_input_is_not_modified():
     _, actor = make()
     batch = make_batch()
     before = batch.clone()
@@ -258,19 +258,19 @@ def test_keys_can_be_set_and_nested():
     assert ("agent", "move") in loss.in_keys
 
 
-def test_unknown_key_is_refused():
+def test_unknown_key_raises():
     _, actor = make()
     with pytest.raises(ValueError, match="advantage"):
         ReinforceLoss(actor, entropy_coeff=0.0).set_keys(advantage="a")
 
 
-def test_missing_returns_name_the_remedy():
+def test_missing_returns_raise_with_the_remedy():
     _, actor = make()
     with pytest.raises(InputError, match="return estimator first"):
         ReinforceLoss(actor, entropy_coeff=0.0)(make_batch().exclude("return_to_go"))
 
 
-def test_bad_arguments_are_refused():
+def test_invalid_arguments_raise():
     _, actor = make()
     with pytest.raises(InputError, match="mean, sum or none"):
         ReinforceLoss(actor, reduction="median")

@@ -1,4 +1,4 @@
-"""An estimator where TorchRL has transforms: after a collector, in a replay buffer, in no env."""
+"""Estimators as TorchRL transforms: in collectors and replay buffers, not in environments."""
 
 import pytest
 import torch
@@ -18,7 +18,7 @@ NAMES = [n for n in objectives.__all__ if n not in OTHERS]
 
 
 def rows(rewards, ends):
-    """A batch of shape (N, T)."""
+    """Return a batch of shape (N, T)."""
     reward = torch.tensor(rewards, dtype=torch.float32)[..., None]
     done = torch.tensor(ends, dtype=torch.bool)[..., None]
     return TensorDict({"next": {"reward": reward, "done": done}}, reward.shape[:-1])
@@ -47,7 +47,7 @@ POSTPROC = {
 
 
 @pytest.mark.parametrize("how", POSTPROC)
-def test_postproc_of_a_collector_equals_torchrls_transform_where_it_is_known(how):
+def test_postproc_equals_torchrls_transform(how):
     torch.manual_seed(1)
     theirs, cut = Reward2GoTransform(0.5, out_keys=["theirs"]), 0
     for batch in collector(POSTPROC[how](RewardToGo(0.5))):
@@ -59,26 +59,26 @@ def test_postproc_of_a_collector_equals_torchrls_transform_where_it_is_known(how
     assert cut > 0
 
 
-def test_a_chain_hands_on_what_it_is_given():
+def test_compose_forwards_batches():
     batch = rows(*WHOLE)
     assert "return_to_go" not in Compose(RewardToGo())(batch)
     assert "return_to_go" in Compose(RewardToGo()).inv(batch)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_estimator_after_a_collector(name):
+def test_every_estimator_works_as_postproc(name):
     for batch in collector(getattr(objectives, name)()):
         assert batch["return_to_go"].shape == (4, 5, 1)
         assert batch["return_to_go"].isfinite().all()
 
 
-def test_rows_of_whole_episodes_by_hand():
+def test_rows_of_complete_episodes_match_hand_computed_returns():
     batch = RewardToGo(0.5)(rows(*WHOLE))
     assert batch["return_to_go"][..., 0].tolist() == [[1.5, 1.0, 2.0], [2.25, 4.5, 1.0]]
     assert ("collector", "mask") not in batch.keys(True)
 
 
-def test_an_unfinished_tail_is_masked_and_counts_for_nothing():
+def test_unfinished_tail_is_masked_and_ignored():
     batch = RewardToGo(0.5)(rows(*CUT))
     assert batch["return_to_go"][..., 0].tolist() == [[1.5, 1.0, 0.0], [2.25, 4.5, 1.0]]
     assert batch["collector", "mask"].tolist() == [[True, True, False], [True, True, True]]
@@ -87,11 +87,11 @@ def test_an_unfinished_tail_is_masked_and_counts_for_nothing():
     scaled = BatchNormalised(0.5)(rows(*CUT))["return_to_go"][..., 0]
     assert float(scaled[0, 2]) == 0.0
     assert float(scaled.sum()) == pytest.approx(0.0, abs=1e-6)
-    assert float(scaled.square().sum()) == pytest.approx(5.0)  # five steps are known
+    assert float(scaled.square().sum()) == pytest.approx(5.0)  # five steps are valid
 
 
-def test_padding_is_masked_and_an_older_mask_is_not_believed():
-    """Padding never ends; TorchRL's collectors hand out their last batch's entries again."""
+def test_padding_is_masked_and_a_stale_mask_ignored():
+    """Padding has no end; TorchRL's collectors return entries of their previous batch again."""
     batch = rows(*CUT)
     batch["collector", "mask"] = torch.tensor([[True, False, True], [True, True, True]])
     mask = RewardToGo(0.5)(batch)["collector", "mask"]
@@ -100,12 +100,12 @@ def test_padding_is_masked_and_an_older_mask_is_not_believed():
     assert RewardToGo(0.5)(batch)["collector", "mask"].all()
 
 
-def test_no_episode_ends():
+def test_batch_without_episode_end_raises():
     with pytest.raises(InputError, match=r"no episode ends in a batch of shape \(1, 2\)"):
         RewardToGo()(rows([[1.0, 1.0]], [[0, 0]]))
 
 
-def test_replay_buffer_estimates_what_comes_in_and_hands_out_samples_as_they_are():
+def test_replay_buffer_estimates_on_extend_only():
     buffer = ReplayBuffer(storage=LazyTensorStorage(20), transform=RewardToGo(0.5), batch_size=64)
     for batch in (WHOLE, CUT):
         buffer.extend(rows(*batch).flatten())
@@ -125,8 +125,8 @@ def test_replay_buffer_masks_tails():
     assert buffer[:]["collector", "mask"].tolist() == [True, True, True, False]
 
 
-def test_a_memory_is_told_of_a_batch_once():
-    """A sample handed out again must not enter into the running mean."""
+def test_running_mean_includes_a_batch_once():
+    """Sampling again must not change the running mean."""
     estimator = TimeBaseline(0.5, decay=0.5, max_steps=2, scale=False)
     buffer = ReplayBuffer(storage=LazyTensorStorage(8), transform=estimator, batch_size=8)
     buffer.extend(rows([[1.0, 1.0]], [[0, 1]])[0])
@@ -136,6 +136,6 @@ def test_a_memory_is_told_of_a_batch_once():
 
 
 @pytest.mark.parametrize("wrap", [lambda t: t, Compose, lambda t: Compose(Compose(t))])
-def test_no_transform_of_an_environment(wrap):
+def test_estimator_cannot_transform_an_environment(wrap):
     with pytest.raises(InputError, match=r"RewardToGo needs whole episodes.*postproc"):
         TransformedEnv(ThreeStateEnv(2), wrap(RewardToGo()))

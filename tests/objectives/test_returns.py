@@ -1,4 +1,4 @@
-"""Two episodes of rewards 0, 1, 0, 1 and 1, 0, discount 1/2, worked out by hand."""
+"""Hand-computed returns of two episodes with rewards 0, 1, 0, 1 and 1, 0 and discount 1/2."""
 
 import pytest
 import torch
@@ -38,7 +38,7 @@ def test_standardised():
     check(returns.standardised(REWARD, DONE, 0.5), [*first, 1.0, -1.0])
 
 
-def test_standardised_of_a_constant_is_zero_and_never_nan():
+def test_standardised_of_a_constant_is_zero():
     reward = torch.zeros(3, 1)
     done = torch.tensor([[False], [True], [True]])
     assert returns.standardised(reward, done, 0.9).tolist() == [[0.0], [0.0], [0.0]]
@@ -54,18 +54,18 @@ def test_success_scaled():
     check(returns.success_scaled(REWARD, DONE, 0.5, max_reward=3.0), expected)
 
 
-def test_time_baseline_covers_only_the_times_it_knows():
+def test_time_baseline_applies_to_known_steps_only():
     values = returns.time_baseline(REWARD, DONE, 0.5, torch.tensor([0.5, 0.25]))
     check(values, [0.125, 1.0, 0.5, 1.0, 0.5, -0.25])
 
 
 def test_leave_one_out():
-    # times 0 and 1: minus the other episode's return; then the first goes on alone
+    # steps 0 and 1: minus the other episode's return; then only the first continues
     check(returns.leave_one_out(REWARD, DONE, 0.5), [-0.375, 1.25, 0.5, 1.0, 0.375, -1.25])
 
 
 def test_batch_normalised():
-    # mean 4.375 / 6, mean square 4.203125 / 6: each return less the one, over the deviation
+    # mean 4.375 / 6, mean square 4.203125 / 6: (return - mean) / deviation
     mean = 4.375 / 6
     std = (4.203125 / 6 - mean**2) ** 0.5
     values = returns.batch_normalised(REWARD, DONE, 0.5)
@@ -76,8 +76,8 @@ def test_batch_normalised():
 
 
 @pytest.mark.parametrize(("gap", "counts"), [(1e-7, False), (1e-5, True)])
-def test_differences_of_rounding_are_nothing_and_larger_ones_count(gap, counts):
-    """Returns 1 and 1 + gap: half of the gap is their deviation."""
+def test_rounding_errors_are_not_scaled_up(gap, counts):
+    """The deviation of returns 1 and 1 + gap is half the gap."""
     reward = 1 + torch.tensor([[0.0], [gap]], dtype=torch.float64)
     done = torch.ones(2, 1, dtype=torch.bool)
     expected = torch.tensor([[-1.0], [1.0]]) * counts
@@ -89,8 +89,8 @@ def test_differences_of_rounding_are_nothing_and_larger_ones_count(gap, counts):
     torch.testing.assert_close(scaled, expected)
 
 
-def test_equal_episodes_are_credited_with_nothing_at_any_scale():
-    """Three of 0.95: float32 makes 6e-8 of what is 0, which must not be scaled up to 1."""
+def test_equal_episodes_have_zero_credit():
+    """With three returns of 0.95, float32 gives 6e-8 instead of 0, which must not become 1."""
     reward = torch.tensor([0.0, 1.0] * 3)[:, None]
     done = torch.tensor([False, True] * 3)[:, None]
     credit = returns.leave_one_out(reward, done, 0.95)
@@ -124,14 +124,14 @@ ESTIMATORS = {
 
 
 ALONE = ["total_reward", "reward_to_go", "standardised", "linear_ramp", "success_scaled"]
-"""Those that look at one episode at a time; `time_baseline` does so too."""
+"""Estimators that treat each episode separately; `time_baseline` is another."""
 HOMOGENEOUS = ["total_reward", "reward_to_go", "linear_ramp", "leave_one_out"]
 EPISODES = st.lists(
     st.lists(st.integers(0, 12).map(lambda n: n / 4), min_size=1, max_size=5),
     min_size=1,
     max_size=4,
 )
-"""Rewards of up to four episodes; quarters, so that sums are exact."""
+"""Rewards of up to four episodes, multiples of 1/4, so sums are exact."""
 QUICK = settings(max_examples=25, deadline=None)
 
 
@@ -148,8 +148,8 @@ def split(values, episodes):
 
 @given(EPISODES)
 @QUICK
-def test_flat_and_batched_are_the_same(episodes):
-    """Rows of one length, each of whole episodes: here every row is all of them once more."""
+def test_flat_and_batched_returns_are_equal(episodes):
+    """Every row contains all episodes, so rows have the same length."""
     reward, done = flat(episodes)
     rows, ends = torch.stack([reward, 2 * reward]), torch.stack([done, done])
     for name, estimate in ESTIMATORS.items():
@@ -159,7 +159,7 @@ def test_flat_and_batched_are_the_same(episodes):
 
 @given(EPISODES)
 @QUICK
-def test_episodes_are_credited_as_if_they_were_alone(episodes):
+def test_episodes_are_independent(episodes):
     whole = flat(episodes)
     for name in (*ALONE, "time_baseline"):
         alone = torch.cat([ESTIMATORS[name](*flat([episode])) for episode in episodes])
@@ -168,7 +168,7 @@ def test_episodes_are_credited_as_if_they_were_alone(episodes):
 
 @given(EPISODES.flatmap(lambda e: st.tuples(st.just(e), st.permutations(range(len(e))))))
 @QUICK
-def test_order_of_the_episodes_changes_nothing(drawn):
+def test_order_of_episodes_is_irrelevant(drawn):
     episodes, order = drawn
     for estimate in ESTIMATORS.values():
         before = split(estimate(*flat(episodes)), episodes)
@@ -180,7 +180,7 @@ def test_order_of_the_episodes_changes_nothing(drawn):
 
 @given(EPISODES, st.sampled_from([0.25, 2.0, 8.0]))
 @QUICK
-def test_scaled_rewards_scale_returns_or_change_nothing(episodes, factor):
+def test_scaling_rewards_scales_returns_or_changes_nothing(episodes, factor):
     reward, done = flat(episodes)
     for name in HOMOGENEOUS:
         found, plain = ESTIMATORS[name](factor * reward, done), ESTIMATORS[name](reward, done)
@@ -192,7 +192,7 @@ def test_scaled_rewards_scale_returns_or_change_nothing(episodes, factor):
 
 @given(EPISODES, st.sampled_from([0.0, 0.5, 0.9, 1.0]))
 @QUICK
-def test_reward_to_go_is_its_recursion(episodes, gamma):
+def test_reward_to_go_satisfies_its_recursion(episodes, gamma):
     for values, rewards in zip(
         split(returns.reward_to_go(*flat(episodes), gamma), episodes), episodes, strict=True
     ):
@@ -204,8 +204,8 @@ def test_reward_to_go_is_its_recursion(episodes, gamma):
 
 @given(EPISODES)
 @QUICK
-def test_leave_one_out_is_the_deviation_from_the_mean_of_all_stretched(episodes):
-    """g - (sum - g) / (n - 1) = (g - mean) n / (n - 1), so at each time the sum is 0."""
+def test_leave_one_out_is_the_scaled_deviation_from_the_mean(episodes):
+    """g - (sum - g) / (n - 1) = (g - mean) n / (n - 1), so the sum at each step is 0."""
     to_go = split(returns.reward_to_go(*flat(episodes), 0.9), episodes)
     found = split(returns.leave_one_out(*flat(episodes), 0.9), episodes)
     for t in range(max(len(e) for e in episodes)):
@@ -218,7 +218,7 @@ def test_leave_one_out_is_the_deviation_from_the_mean_of_all_stretched(episodes)
 
 @given(EPISODES)
 @QUICK
-def test_standardised_has_mean_0_and_deviation_1_or_is_nothing(episodes):
+def test_standardised_has_mean_0_and_deviation_1_or_is_zero(episodes):
     for values in split(returns.standardised(*flat(episodes), 0.9), episodes):
         square = sum(v * v for v in values) / len(values)
         assert sum(values) == pytest.approx(0, abs=1e-3)
@@ -229,17 +229,17 @@ def test_episode_lengths():
     done = torch.tensor([[0, 1, 1], [0, 0, 1]]).bool()[..., None]
     assert returns.episode_lengths(done) == [2, 1, 3]
     assert returns.episode_lengths(done[1]) == [3]
-    with pytest.raises(InputError):  # every row must end, not the last alone
+    with pytest.raises(InputError):  # every row must end with an episode
         returns.episode_lengths(done.flip(0, 1))
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
-def test_unfinished_tail_is_refused(name):
+def test_unfinished_tail_raises(name):
     with pytest.raises(InputError, match="complete episodes"):
         ESTIMATORS[name](torch.zeros(3, 1), torch.tensor([[False], [True], [False]]))
 
 
-def test_shapes_are_checked():
+def test_invalid_shapes_raise():
     for shape in ((3,), (3, 2), (3, 0)):
         with pytest.raises(ValueError, match="must both be"):
             returns.total_reward(torch.zeros(shape), torch.ones(shape, dtype=torch.bool))
@@ -248,8 +248,8 @@ def test_shapes_are_checked():
             returns.total_reward(torch.zeros(count, 1), torch.ones(3, 1, dtype=torch.bool))
 
 
-def test_long_batches_do_not_take_a_python_step_a_frame():
-    """64 episodes of 130 steps: loops over 130 times, not over 8,320 frames."""
+def test_long_batches_loop_over_steps_not_frames():
+    """64 episodes of 130 steps take 130 iterations, not 8,320."""
     done = torch.zeros(64, 130, 1, dtype=torch.bool)
     done[:, -1] = True
     calls = []
@@ -262,7 +262,7 @@ def test_long_batches_do_not_take_a_python_step_a_frame():
     assert calls == [130]
 
 
-def test_what_is_just_a_rounding_error_is_nothing():
+def test_rounding_threshold_is_zero():
     just = torch.tensor([[-returns.ROUNDING], [returns.ROUNDING]])
     assert just.square().mean().sqrt() == torch.tensor(returns.ROUNDING)  # exact in float32
     ends, one = torch.tensor([[True], [True]]), torch.tensor([[False], [True]])

@@ -1,7 +1,7 @@
-"""Networks and pictures to try gradients by.
+"""Networks and images for tests of gradients.
 
-Numbers are halves of -1, 0 and 1, so that sums are the same in any order: nothing but a mistake can
-put an output on the other side of 0.
+Values are multiples of 1/2 from -1/2 to 1/2, so sums are exact in any order and rounding cannot
+change the sign of an output.
 """
 
 import torch
@@ -9,7 +9,7 @@ import torch
 from drone_rl.policies import SmallCNN
 
 
-def made(shape=(1, 12, 20), **options):
+def make_network(shape=(1, 12, 20), **options):
     network = SmallCNN(shape, 3, **options)
     draw_weights(network)
     return network
@@ -25,9 +25,9 @@ def halves(*shape):
     return torch.randint(-1, 2, shape) / 2
 
 
-def taught(network, by, pictures, weights):
-    """Logits by a network, and the gradients that this leaves."""
+def forward_backward(network, by, images, weights):
+    """Return logits of `by`, and the gradients of the network after a backward pass."""
     network.zero_grad()
-    logits = by(pictures)
+    logits = by(images)
     (logits * weights).sum().backward()
     return logits.detach(), [p.grad.clone() for p in network.parameters()]
