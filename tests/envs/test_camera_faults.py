@@ -1,4 +1,4 @@
-"""Seeds, batches, resets, partial steps and saved states of faults, each as its world's own."""
+"""Seeds, batches, resets, partial steps and saved states of camera faults."""
 
 import copy
 
@@ -49,8 +49,8 @@ def make_env(kind="all", num_envs=4, **options):
 
 
 def fly(env, steps=6, worlds=4):
-    """Pictures of every step of all worlds, begun anew where they end. Shape: (N, T, C, H, W)."""
-    moves = torch.arange(steps)[None] + torch.arange(worlds)[:, None]  # each world on its own way
+    """Return the images of all steps; ended episodes restart. Shape: (N, T, C, H, W)."""
+    moves = torch.arange(steps)[None] + torch.arange(worlds)[:, None]  # distinct actions
     state, seen = env.reset(), []
     for t in range(steps):
         seen.append(state["pixels"])
@@ -66,18 +66,18 @@ def test_specs_agree_with_data(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_seed_repeats_all_and_another_differs(kind):
+def test_seed_determines_faults(kind):
     first, second = fly(make_env(kind, seed=3), 20), fly(make_env(kind, seed=3), 20)
     assert torch.equal(first, second)
     env = make_env(kind, seed=5)
     assert not torch.equal(first, fly(env, 20))
     env.set_seed(3)
     assert torch.equal(first, fly(env, 20))
-    assert not torch.equal(first, fly(env, 20))  # the streams have gone on
+    assert not torch.equal(first, fly(env, 20))  # the random streams have advanced
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_first_worlds_are_the_same_in_a_batch_of_any_size(kind):
+def test_first_environments_do_not_depend_on_batch_size(kind):
     whole = fly(make_env(kind, 4, seed=1), 20)
     assert torch.equal(fly(make_env(kind, 2, seed=1), 20, 2), whole[:2])
     env = make_env(kind, 2, seed=1, first_world=2)
@@ -90,10 +90,10 @@ def test_the_first_worlds_are_the_same_in_a_batch_of_any_size(kind):
 
 
 class OtherNoise(Noise):
-    """The same, but another kind."""
+    """A second fault class with the same behavior."""
 
 
-def test_faults_worlds_and_episodes_differ_and_so_do_kinds():
+def test_noise_is_independent_across_environments_episodes_and_faults():
     pipeline = [GrayPixels(), Noise(1.0), Noise(1.0), OtherNoise(1.0)]
     env, memories = with_transforms(DroneEnv(2, SHORT, SMALL), pipeline), []
     for _ in range(2):
@@ -102,10 +102,10 @@ def test_faults_worlds_and_episodes_differ_and_so_do_kinds():
     for i in range(len(memories)):
         for j in range(i):
             both = torch.stack([memories[i].flatten(), memories[j].flatten()])
-            assert both.corrcoef()[0, 1].abs() < 0.4  # of 128 pixels
+            assert both.corrcoef()[0, 1].abs() < 0.4  # images have 128 pixels
 
 
-def test_the_same_episodes_are_flown_with_a_fault_and_without():
+def test_faults_do_not_change_episodes():
     clean = with_transforms(DroneEnv(4, SHORT, SMALL, seed=2), [GrayPixels()])
     faulty = make_env(seed=2)
     for _ in range(3):
@@ -113,7 +113,7 @@ def test_the_same_episodes_are_flown_with_a_fault_and_without():
         assert torch.equal(*cubes)
 
 
-def test_the_same_numbers_are_drawn_at_any_strength():
+def test_samples_do_not_depend_on_strength():
     shown = []
     for strength in (0.01, 0.02):
         env = with_transforms(DroneEnv(2, SHORT, SMALL), [GrayPixels(), Noise(strength)])
@@ -127,12 +127,12 @@ def test_the_same_numbers_are_drawn_at_any_strength():
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_world_begins_anew_alone(kind):
+def test_partial_reset_keeps_the_other_environments(kind):
     env, moves = make_env(kind, seed=1), torch.tensor([0, 1, 2, 0])
     state = env.reset()
     for _ in range(3):
         state = env.step(state.set("action", moves))["next"]
-    other = make_env(kind, seed=1)  # in which nobody begins anew
+    other = make_env(kind, seed=1)  # without a partial reset
     goes_on = other.reset()
     for _ in range(3):
         goes_on = other.step(goes_on.set("action", moves))["next"]
@@ -149,7 +149,7 @@ def test_a_world_begins_anew_alone(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_worlds_outside_a_step_stand_still_and_meet_later_what_they_would_have_met(kind):
+def test_masked_environments_keep_their_faults(kind):
     env, moves = make_env(kind, seed=1), torch.zeros(4, dtype=torch.int64)
     state = env.step(env.reset().set("action", moves))["next"]
     shown = state["pixels"]
@@ -165,15 +165,15 @@ def test_worlds_outside_a_step_stand_still_and_meet_later_what_they_would_have_m
 
 
 @pytest.mark.parametrize("fault", [Noise(), DeadRows(), FrozenFrames(0.5), LateFrames(2), Shift()])
-def test_pictures_once_shown_stay_as_they_were(fault):
+def test_returned_images_are_not_modified(fault):
     env = with_transforms(DroneEnv(3, SHORT, SMALL), [GrayPixels(), fault])
     state, shown = env.reset(), []
     for t in range(6):
         shown.append((state["pixels"], state["pixels"].clone()))
         going = torch.arange(3) != t % 3
         state = env.step(state.set("action", torch.zeros(3).long()).set("_step", going))["next"]
-    for pictures, before in shown:
-        assert torch.equal(pictures, before)
+    for images, before in shown:
+        assert torch.equal(images, before)
 
 
 def collector(kind, how, seed=0):
@@ -188,7 +188,7 @@ def collector(kind, how, seed=0):
 
 @pytest.mark.parametrize("how", [EpisodeCollector, RolloutCollector])
 @pytest.mark.parametrize("kind", ["correlated", "all"])
-def test_collecting_goes_on_bit_for_bit(how, kind, tmp_path):
+def test_collectors_resume_bit_for_bit(how, kind, tmp_path):
     first, drawn = collector(kind, how)
     for _ in range(2):
         first.collect()
@@ -205,13 +205,13 @@ def test_collecting_goes_on_bit_for_bit(how, kind, tmp_path):
 
 
 @pytest.mark.parametrize("kind", sorted(set(KINDS) - {"all"}))
-def test_no_fault_is_taken_for_a_map_from_picture_to_picture(kind):
+def test_faults_are_not_treated_as_per_image_transforms(kind):
     episodes, rollouts = (collector(kind, how)[0] for how in (EpisodeCollector, RolloutCollector))
     assert isinstance(episodes.source, SteppingCollector)
     assert isinstance(rollouts._stream, TorchrlStream)
 
 
-def test_a_saved_state_goes_on_within_an_episode():
+def test_saved_state_resumes_within_an_episode():
     env, moves = make_env(), torch.zeros(4, dtype=torch.int64)
     state = env.step(env.reset().set("action", moves))["next"]
     saved = copy.deepcopy({"env": env.state_dict(), "worlds": env.base_env.running_state()})
@@ -222,7 +222,7 @@ def test_a_saved_state_goes_on_within_an_episode():
     assert torch.equal(other.step(state.set("action", moves))["next"]["pixels"], expected)
 
 
-def test_a_state_of_another_number_of_worlds_is_refused():
+def test_state_of_another_batch_size_raises():
     one, other = make_env("noise", 2), make_env("noise", 4)
     one.reset()
     other.reset()
@@ -230,7 +230,7 @@ def test_a_state_of_another_number_of_worlds_is_refused():
         other.load_state_dict(one.state_dict())
 
 
-def test_pictures_that_are_none_from_0_to_1_are_refused():
+def test_images_outside_0_to_1_raise():
     base = DroneEnv(1, SHORT, SMALL)
     for kind in (Noise, DeadRows, FrozenFrames, LateFrames, Shift):
         with pytest.raises(
@@ -242,7 +242,7 @@ def test_pictures_that_are_none_from_0_to_1_are_refused():
                 with_transforms(base, [GrayPixels(), standard, kind()]).reset()
 
 
-def test_it_may_go_to_other_worlds_and_copies_of_it_share_nothing():
+def test_faults_can_be_moved_and_copies_are_independent():
     fault = Noise(0.1, 5.0)
     with_transforms(DroneEnv(4, SHORT, SMALL), [GrayPixels(), fault]).reset()
     fault.reset_parent()
@@ -256,13 +256,13 @@ def test_it_may_go_to_other_worlds_and_copies_of_it_share_nothing():
     assert torch.equal(steps[0]["next", "pixels"], steps[1]["next", "pixels"])
 
 
-def test_a_step_before_any_reset_is_refused():
+def test_step_before_reset_raises():
     env = with_transforms(DroneEnv(1, SHORT, SMALL), [GrayPixels(), Noise()])
     with pytest.raises(InputError, match=r"a step before any reset; call reset\(\)"):
         env.step(TensorDict({"action": torch.zeros(1, dtype=torch.int64)}, [1]))
 
 
-def test_worlds_without_streams_are_refused_and_batches_of_batches_have_them_within():
+def test_environments_without_streams_raise():
     serial = SerialEnv(1, lambda: with_transforms(DroneEnv(1, SHORT, SMALL), [GrayPixels()]))
     with pytest.raises(InputError, match=r"wraps SerialEnv, which has no random streams"):
         TransformedEnv(serial, Noise()).reset()
@@ -271,17 +271,17 @@ def test_worlds_without_streams_are_refused_and_batches_of_batches_have_them_wit
     env.close()
 
 
-def test_alone_it_is_a_pipeline_and_with_no_environment_nothing_goes_wrong():
+def test_without_environment_a_fault_changes_nothing():
     env = TransformedEnv(DroneEnv(2, SHORT, SMALL), GrayPixels())
     env.append_transform(LateFrames())
     env.append_transform(RewardSum())
     env.append_transform(StepCounter())
     check_env_specs(env, break_when_any_done="both")
-    pictures = torch.rand(2, 1, 4, 4)
-    assert Noise(1.0)._apply_transform(pictures) is pictures
+    images = torch.rand(2, 1, 4, 4)
+    assert Noise(1.0)._apply_transform(images) is images
 
 
-def test_numbers_are_drawn_of_each_stream_alone():
+def test_samples_of_streams_are_independent():
     env = DroneEnv(3, SHORT, pixels=False)
     every = torch.arange(3)
 
@@ -297,13 +297,13 @@ def test_numbers_are_drawn_of_each_stream_alone():
 
 
 class Inverted(CameraFault):
-    """A user's fault without memory."""
+    """A user-defined fault without memory."""
 
     def __init__(self):
         super().__init__(FaultModel(lambda images, memory, blank: 1 - images))
 
 
-def test_a_fault_of_ones_own():
+def test_user_defined_faults_work():
     env = with_transforms(DroneEnv(2, SHORT, SMALL), [GrayPixels(), Inverted()])
     pixels = env.reset()["pixels"]
     gray = GrayPixels()._apply_transform(env.base_env.last_pixels)
@@ -312,7 +312,7 @@ def test_a_fault_of_ones_own():
 
 @pytest.mark.gpu
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA GPU")
-def test_on_a_gpu_the_same_numbers_are_drawn_and_what_a_cpu_left_goes_on():
+def test_gpu_samples_equal_cpu_and_states_are_interchangeable():
     one, other = make_env(num_envs=2), make_env(num_envs=2, device="cuda")
     for env in (one, other):
         env.reset()

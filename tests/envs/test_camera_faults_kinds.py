@@ -1,4 +1,4 @@
-"""Each fault does what it says, frame by frame."""
+"""The effect of each camera fault on frames."""
 
 import pytest
 import torch
@@ -24,12 +24,12 @@ N = 3
 
 
 def delayed(frames, count):
-    """A film that is shown late; until then it shows its first image."""
+    """Return delayed frames; the first frame is repeated until the delay is over."""
     return frames[(torch.arange(len(frames)) - count).clamp(min=0)]
 
 
 def film(*transforms, steps=10, episodes=1):
-    """What cameras show, and what they would without faults. Shapes: (T, N, 1, H, W)."""
+    """Return frames with and without faults. Shapes: (T, N, 1, H, W)."""
     env = with_transforms(DroneEnv(N, LONG, SMALL), [GrayPixels(), *transforms])
     gray, shown, clean = GrayPixels(), [], []
     for _ in range(episodes):
@@ -44,18 +44,18 @@ def film(*transforms, steps=10, episodes=1):
 
 
 @pytest.mark.parametrize("frames", [0, 1, 3])
-def test_late_frames_are_late_by_so_many(frames):
+def test_late_frames_are_delayed_by_the_number_of_frames(frames):
     shown, clean = film(LateFrames(frames))
     assert torch.equal(shown, delayed(clean, frames))
-    assert all(not torch.equal(clean[t], clean[t + 1]) for t in range(9))  # or it would say nothing
+    assert all(not torch.equal(clean[t], clean[t + 1]) for t in range(9))  # frames do change
 
 
-def test_late_frames_of_an_episode_are_none_of_the_one_before():
+def test_late_frames_do_not_cross_episodes():
     shown, clean = film(LateFrames(2), steps=5, episodes=2)
     assert torch.equal(shown[5:], delayed(clean[5:], 2))
 
 
-def test_a_share_of_frames_is_frozen_as_they_were_shown():
+def test_fraction_of_frames_is_frozen():
     shown, clean = film(FrozenFrames(0.25), steps=80, episodes=5)
     first = torch.arange(len(shown)) % 80 == 0
     assert torch.equal(shown[first], clean[first])
@@ -65,16 +65,16 @@ def test_a_share_of_frames_is_frozen_as_they_were_shown():
             if t % 80 and not torch.equal(shown[t, world], clean[t, world]):
                 assert torch.equal(shown[t, world], shown[t - 1, world])
                 frozen += 1
-    assert frozen / (5 * 79 * N) == pytest.approx(0.25, abs=0.04)  # three deviations of 1,185
+    assert frozen / (5 * 79 * N) == pytest.approx(0.25, abs=0.04)  # three standard deviations
 
 
 @pytest.mark.parametrize(("share", "same_as"), [(0.0, slice(None)), (1.0, slice(0, 1))])
-def test_none_or_all_of_the_frames_are_frozen(share, same_as):
+def test_extreme_fractions_freeze_no_or_all_frames(share, same_as):
     shown, clean = film(FrozenFrames(share))
     assert torch.equal(shown, clean[same_as].expand_as(shown))
 
 
-def test_rows_are_dead_for_an_episode_and_others_in_the_next():
+def test_dead_rows_last_for_one_episode():
     shown, clean = film(DeadRows(2, level=0.125), steps=4, episodes=6)
     drawn = set()
     for t in range(0, len(shown), 4):
@@ -85,10 +85,10 @@ def test_rows_are_dead_for_an_episode_and_others_in_the_next():
                 expected = torch.where(dead[..., None], 0.125, clean[later, world])
                 assert torch.equal(shown[later, world], expected)
             drawn.add(tuple(dead.nonzero().flatten().tolist()))
-    assert len(drawn) > 8  # of 18, out of 28 pairs
+    assert len(drawn) > 8  # of 18 samples of 28 possible pairs
 
 
-def test_rows_that_are_always_dead_come_besides_those_drawn():
+def test_fixed_dead_rows_are_added_to_random_ones():
     rows = film(DeadRows(1, rows=(2, 5), level=1.0), steps=1, episodes=20)[0][:, :, 0, :, 0] == 1.0
     assert rows[..., [2, 5]].all()
     assert (rows.sum(-1) == 3).all()
@@ -97,9 +97,9 @@ def test_rows_that_are_always_dead_come_besides_those_drawn():
     assert always.sum(-1).tolist() == [[1, 1, 1]]
 
 
-def test_noise_is_of_the_stated_strength_and_correlation():
+def test_noise_has_the_configured_strength_and_correlation():
     shown, clean = film(Noise(0.05, correlation_time=2.0), steps=80)
-    noise, inside = shown - clean, (clean > 0.25) & (clean < 0.75)  # where nothing is cut off
+    noise, inside = shown - clean, (clean > 0.25) & (clean < 0.75)  # where no value is clipped
     assert inside.sum() > 5000
     assert noise[inside].std() == pytest.approx(0.05, rel=0.05)
     both = inside[1:] & inside[:-1]
@@ -107,12 +107,12 @@ def test_noise_is_of_the_stated_strength_and_correlation():
     assert product / 0.05**2 == pytest.approx(0.6065, abs=0.05)  # exp(-1/2)
 
 
-def test_blur_is_the_function():
+def test_blur_equals_the_function():
     shown, clean = film(Blur(1.0))
     assert torch.equal(shown, fault_models.blur(clean, 1.0))
 
 
-def test_a_shift_stays_for_an_episode_and_every_one_is_drawn():
+def test_shift_lasts_for_an_episode_and_takes_all_values():
     shown, clean = film(Shift(1, 1), steps=2, episodes=30)
     ways = torch.cartesian_prod(torch.arange(-1, 2), torch.arange(-1, 2))
     drawn = set()
@@ -131,7 +131,7 @@ def test_a_shift_stays_for_an_episode_and_every_one_is_drawn():
     assert drawn == set(range(9))
 
 
-def test_parameters_are_shown():
+def test_repr_shows_parameters():
     assert repr(Blur(0.5)) == "Blur(width=0.5)"
     assert repr(Noise(0.1, 3)) == "Noise(strength=0.1, correlation_time=3)"
     assert repr(DeadRows(2, (1,), 0.5)) == "DeadRows(count=2, rows=(1,), level=0.5)"
@@ -164,6 +164,6 @@ def test_parameters_are_shown():
         ),
     ],
 )
-def test_bad_values_are_refused(make, message):
+def test_invalid_values_raise(make, message):
     with pytest.raises(InputError, match=message):
         make()

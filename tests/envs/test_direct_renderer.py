@@ -1,4 +1,4 @@
-"""What is seen without TorchRL's steps is what is seen with them."""
+"""Direct rendering gives the same observations as TorchRL's steps."""
 
 import pytest
 import torch
@@ -20,13 +20,13 @@ KEPT = [("next", name) for name in FLAGS]
 
 
 class Dark(GrayPixels):
-    """One of its own kind, which may make something else of pictures."""
+    """A subclass, which may transform images differently."""
 
 
 @pytest.mark.parametrize(
     ("first", "modality"), [(GrayPixels(), "gray"), (RgbPixels(), "rgb"), (Dark(), "rgb")]
 )
-def test_gray_is_drawn_gray_and_the_same(first, modality):
+def test_gray_is_rendered_directly_with_the_same_result(first, modality):
     env = with_transforms(DroneEnv(3, SHORT), [first, CropRows(5, 25)])
     renderer = DirectRenderer.try_create(env, ["pixels"], KEPT)
     assert renderer.view.modalities == (modality,)
@@ -36,7 +36,7 @@ def test_gray_is_drawn_gray_and_the_same(first, modality):
 
 
 @pytest.mark.parametrize(("size", "kept"), [((25, 64), 1), ((13, 32), 2), ((50, 128), 2)])
-def test_a_resize_to_the_size_of_the_camera_is_left_out(size, kept):
+def test_resize_to_the_camera_size_is_skipped(size, kept):
     camera = CameraSettings(height=size[0], width=size[1])
     transforms = [GrayPixels(), Resize(height=25, width=64), StandardizePixels()]
     env = with_transforms(DroneEnv(2, SHORT, camera), transforms)
@@ -51,14 +51,14 @@ def test_a_resize_to_the_size_of_the_camera_is_left_out(size, kept):
         each.close()
 
 
-def test_a_step_is_told_as_torchrl_tells_it():
+def test_step_entries_equal_torchrl():
     reason = ("next", "info", "end_reason")
     env = with_transforms(DroneEnv(3, SHORT), [GrayPixels()])
     renderer = DirectRenderer.try_create(env, ["pixels"], [*KEPT, reason])
     state = env.reset()
     action = torch.tensor([0, 1, 2])
     for step in range(5):
-        moved, reward = renderer.worlds.advance(renderer.worlds.state, action)  # changes nothing
+        moved, reward = renderer.worlds.advance(renderer.worlds.state, action)
         state = env.step(state.set("action", action))
         told, done = renderer.entries(moved, reward)
         assert set(told) == {*KEPT, reason}

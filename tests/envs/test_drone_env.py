@@ -27,22 +27,22 @@ def test_specs(num_envs, pixels):
     env.close()
 
 
-def piped(**settings):
-    """As a policy sees it, with the rewards' sums as TorchRL's collectors want them."""
+def make_transformed_env(**settings):
+    """Return an environment with pixel transforms and reward sums, as TorchRL's collectors need."""
     env = DroneEnv(2, SHORT, **settings)
     return TransformedEnv(env, Compose(GrayPixels(), StandardizePixels(), RewardSum()))
 
 
-def test_specs_behind_the_pixel_pipeline():
-    env = piped()
+def test_specs_with_transforms():
+    env = make_transformed_env()
     check_env_specs(env, break_when_any_done="both")
     env.close()
 
 
 @pytest.mark.parametrize("kind", [SerialEnv, pytest.param(ParallelEnv, marks=pytest.mark.slow)])
-def test_batches_of_batches(kind):
-    """Two workers of two worlds each are TorchRL's; their worlds are those of one batch of four."""
-    make = [functools.partial(piped, seed=4, first_world=first) for first in (0, 2)]
+def test_parallel_environments_equal_one_batch(kind):
+    """TorchRL's two workers with two environments each equal one batch of four."""
+    make = [functools.partial(make_transformed_env, seed=4, first_world=first) for first in (0, 2)]
     env = kind(2, make)
     try:
         check_env_specs(env, break_when_any_done="both")
@@ -55,11 +55,11 @@ def test_batches_of_batches(kind):
         env.close()
 
 
-def test_worlds_begin_anew_each_on_its_own():
-    """Ten steps in worlds of which one flies ahead and one sways until its limit."""
-    env = piped(pixels=True)
+def test_environments_reset_independently():
+    """Ten steps; one environment flies ahead and one moves left and right until its limit."""
+    env = make_transformed_env(pixels=True)
     moves = torch.tensor([[0], [1]])
-    policy = iter([moves, moves * 2] * 5)  # ahead all the time; left and right by turns
+    policy = iter([moves, moves * 2] * 5)  # always forward; alternating left and right
     rollout = env.rollout(
         10, lambda td: td.set("action", next(policy)[:, 0]), break_when_any_done=False
     )
@@ -73,11 +73,11 @@ def test_worlds_begin_anew_each_on_its_own():
             wanted = start if done[world, t] else after[world, t]
             assert torch.equal(drone[world, t + 1], wanted)
     sums = rollout["next", "episode_reward"][0, :, 0]
-    assert sums[done[0]].max() <= 1.0  # never more than its one cube
+    assert sums[done[0]].max() <= 1.0  # at most the reward of its only cube
     env.close()
 
 
-def test_same_seed_repeats_and_others_differ():
+def test_seed_determines_episodes():
     def first(seed):
         return DroneEnv(2, pixels=False, seed=seed).reset()["info", "cube_positions"]
 
@@ -88,7 +88,7 @@ def test_same_seed_repeats_and_others_differ():
     assert torch.equal(env.reset()["info", "cube_positions"], first(1))
 
 
-def test_batch_equals_single_worlds():
+def test_batch_equals_single_environments():
     together = DroneEnv(3, seed=4)
     alone = [DroneEnv(1, seed=4, first_world=i) for i in range(3)]
     states = [env.reset() for env in (together, *alone)]
@@ -103,7 +103,7 @@ def test_batch_equals_single_worlds():
         ]
 
 
-def test_partial_reset_touches_and_draws_only_masked_worlds():
+def test_partial_reset_resets_and_renders_only_masked_environments():
     env = DroneEnv(3, seed=0)
     state = env.reset()
     after = env.step(state.set("action", actions(env, 0)))["next"]
@@ -119,7 +119,7 @@ def test_partial_reset_touches_and_draws_only_masked_worlds():
     assert not torch.equal(reset["info", "cube_positions"][1], after["info", "cube_positions"][1])
 
 
-def test_partial_step_leaves_others_alone_and_undrawn():
+def test_partial_step_skips_the_other_environments():
     env = DroneEnv(2, seed=0)
     state = env.reset().set("action", actions(env, 0))
     state["_step"] = torch.tensor([True, False])
@@ -128,7 +128,7 @@ def test_partial_step_leaves_others_alone_and_undrawn():
     assert torch.equal(after["pixels"][1], state["pixels"][1])
 
 
-def test_truncation_step_is_exact_and_told_from_termination():
+def test_truncation_is_exact_and_distinct_from_termination():
     env = DroneEnv(1, SHORT, pixels=False)
     state = env.reset()
     for step in range(1, 6):
@@ -139,7 +139,7 @@ def test_truncation_step_is_exact_and_told_from_termination():
     assert state["info", "end_reason"].item() == EndReason.STEP_LIMIT
 
 
-def test_state_round_trip_repeats_the_next_episodes():
+def test_restored_state_repeats_the_next_episodes():
     env = DroneEnv(2, pixels=False, seed=0)
     env.reset()
     saved = env.state_dict()
@@ -151,7 +151,7 @@ def test_state_round_trip_repeats_the_next_episodes():
         DroneEnv(3, pixels=False).load_state_dict(saved)
 
 
-def test_running_state_goes_on_within_episodes():
+def test_running_state_resumes_within_episodes():
     env = DroneEnv(2, SHORT, seed=0)
     state = env.reset()
     state["action"] = torch.tensor([1, 2])
@@ -173,7 +173,7 @@ def test_running_state_goes_on_within_episodes():
 FOGGY = AppearanceSettings(fog_visibility=(5.0, 50.0), ground_texture="checker", ground_tile=1.0)
 
 
-def test_each_episode_has_its_own_look_and_worlds_are_the_same_in_any():
+def test_each_episode_has_its_own_appearance_and_the_same_scene():
     plain, foggy = DroneEnv(3, SHORT), DroneEnv(3, SHORT, appearance=FOGGY)
     alone = DroneEnv(1, SHORT, appearance=FOGGY)
     for episode in range(2):
@@ -190,7 +190,7 @@ def test_each_episode_has_its_own_look_and_worlds_are_the_same_in_any():
         env.close()
 
 
-def test_a_look_stays_for_an_episode_and_is_gone_on_with():
+def test_appearance_lasts_for_an_episode_and_is_restored():
     env, other = (DroneEnv(2, SHORT, appearance=FOGGY, seed=i) for i in range(2))
     started = env.reset()
     env.step(started.set("action", actions(env, 0)))
@@ -205,15 +205,15 @@ def test_a_look_stays_for_an_episode_and_is_gone_on_with():
     other.close()
 
 
-def test_a_texture_that_is_none_is_refused_before_anything_is_drawn(tmp_path):
+def test_invalid_texture_raises_at_construction(tmp_path):
     path = tmp_path / "ground.png"
-    path.write_text("no picture")
+    path.write_text("not an image")
     with pytest.raises(InputError, match=r"ground\.png.* can't be read as an image"):
         DroneEnv(1, SHORT, appearance=AppearanceSettings(ground_texture=str(path)))
 
 
 @pytest.mark.parametrize("num_envs", [0, -1, 2.0])
-def test_bad_number_of_worlds(num_envs):
+def test_invalid_num_envs_raises(num_envs):
     with pytest.raises(InputError, match="num_envs"):
         DroneEnv(num_envs)
 

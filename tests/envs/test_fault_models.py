@@ -1,4 +1,4 @@
-"""What goes wrong in a camera, against closed forms and numbers by hand."""
+"""Models of camera faults, compared with closed forms and hand-computed values."""
 
 import math
 
@@ -9,7 +9,7 @@ from drone_rl.envs import fault_models
 
 
 def noises(correlation_time, steps=400, pixels=5000):
-    """An AR(1) process. Shape: (steps, pixels)."""
+    """Return an AR(1) process. Shape: (steps, pixels)."""
     draw = torch.Generator().manual_seed(0)
     now, seen = torch.randn(pixels, generator=draw), []
     for _ in range(steps):
@@ -19,25 +19,25 @@ def noises(correlation_time, steps=400, pixels=5000):
 
 
 @pytest.mark.parametrize("correlation_time", [0.0, 1.0, 19.5])
-def test_noise_has_the_variance_and_the_correlation_that_are_stated(correlation_time):
+def test_noise_has_the_configured_variance_and_correlation(correlation_time):
     noise = noises(correlation_time)
     assert noise.mean().abs() < 0.02
-    assert noise[0].var() == pytest.approx(1.0, abs=0.06)  # from the first frame on
+    assert noise[0].var() == pytest.approx(1.0, abs=0.06)  # already in the first frame
     assert noise.var() == pytest.approx(1.0, abs=0.03)
     for lag in (1, 5):
         expected = math.exp(-lag / correlation_time) if correlation_time else 0.0
         assert (noise[lag:] * noise[:-lag]).mean() == pytest.approx(expected, abs=0.03)
-    assert (noise[:, 1:] * noise[:, :-1]).mean().abs() < 0.01  # from pixel to pixel there is none
+    assert (noise[:, 1:] * noise[:, :-1]).mean().abs() < 0.01  # pixels are uncorrelated
 
 
-def test_a_step_of_noise_by_hand():
+def test_noise_step_matches_hand_computed_values():
     kept = fault_models.correlate(torch.tensor([2.0]), torch.tensor([1.0]), 1 / math.log(2))
     torch.testing.assert_close(kept, torch.tensor([2 * 0.5 + math.sqrt(0.75)]))
     fresh = fault_models.correlate(torch.tensor([9.0]), torch.tensor([1.0]), 0.0)
     assert fresh.tolist() == [1.0]
 
 
-def test_noise_is_cut_off_at_black_and_white():
+def test_noise_is_clipped_at_black_and_white():
     pictures = torch.tensor([0.1, 0.5, 0.9]).reshape(1, 1, 3)
     noise = torch.tensor([-1.0, 0.5, 1.0]).reshape(1, 1, 3)
     noisy = fault_models.noise(0.2).show(pictures, noise, 0.0)
@@ -46,7 +46,7 @@ def test_noise_is_cut_off_at_black_and_white():
 
 
 @pytest.mark.parametrize("width", [0.3, 0.5, 2.0])
-def test_a_bright_pixel_becomes_a_gaussian(width):
+def test_blur_turns_a_bright_pixel_into_a_gaussian(width):
     picture = torch.zeros(1, 41, 51)
     picture[0, 20, 25] = 1.0
     blurred = fault_models.blur(picture, width)[0]
@@ -57,7 +57,7 @@ def test_a_bright_pixel_becomes_a_gaussian(width):
         assert float((blurred * down**2).sum()) == pytest.approx(4.0, rel=0.01)
 
 
-def test_weights_by_hand():
+def test_gaussian_weights_match_hand_computed_ones():
     half = math.exp(-0.5)
     weights = fault_models.gaussian(1.0)
     assert len(weights) == 9 and math.fsum(weights) == pytest.approx(1.0, abs=1e-15)
@@ -66,32 +66,32 @@ def test_weights_by_hand():
 
 
 @pytest.mark.parametrize("width", [0.0, 0.5, 3.0, 16.0])
-def test_a_constant_picture_stays_as_it_is(width):
+def test_blur_keeps_a_constant_image(width):
     picture = torch.full((2, 1, 5, 7), 0.7)
     torch.testing.assert_close(fault_models.blur(picture, width), picture)
 
 
-def test_beyond_an_edge_is_as_on_the_edge():
+def test_blur_replicates_the_border():
     picture = torch.tensor([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]).reshape(1, 1, 6)
-    weights = fault_models.gaussian(0.5)  # two pixels to each side
+    weights = fault_models.gaussian(0.5)  # two pixels on each side
     expected = [weights[0] + weights[1] + weights[2], weights[1] + weights[0], weights[0], 0, 0, 0]
     torch.testing.assert_close(fault_models.blur(picture, 0.5).flatten(), torch.tensor(expected))
 
 
-def test_a_picture_is_blurred_the_same_in_a_batch_of_any_size():
+def test_blur_does_not_depend_on_batch_size():
     pictures = torch.rand(7, 2, 9, 11, generator=torch.Generator().manual_seed(0))
     together = fault_models.blur(pictures, 1.3)
     for i in range(7):
         assert torch.equal(fault_models.blur(pictures[i : i + 1], 1.3)[0], together[i])
 
 
-def drawn(*values):
-    """A source that always gives the same numbers."""
+def fixed_source(*values):
+    """Return a random source that always gives the same values."""
     return lambda *shape, normal=False: torch.tensor(values)
 
 
-def test_more_dead_rows_include_fewer():
-    sample = drawn([0.4, 0.1, 0.9, 0.3], [0.2, 0.3, 0.1, 0.8])
+def test_more_dead_rows_include_the_fewer():
+    sample = fixed_source([0.4, 0.1, 0.9, 0.3], [0.2, 0.3, 0.1, 0.8])
     images = torch.zeros(2, 1, 4, 3)
     models = [fault_models.dead_rows(count) for count in range(5)]
     chosen = [model.begin(images, sample).int().tolist() for model in models]
@@ -103,7 +103,7 @@ def test_more_dead_rows_include_fewer():
     assert always == [[0, 1, 1, 0], [1, 0, 1, 0]]
 
 
-def test_dead_rows_show_nothing():
+def test_dead_rows_are_constant():
     pictures = torch.full((1, 2, 3, 2), 0.5)
     dead = torch.tensor([[False, True, False]])
     killed = fault_models.dead_rows(1, level=0.25).show(pictures, dead, 0.0)
@@ -112,16 +112,16 @@ def test_dead_rows_show_nothing():
     assert fault_models.dead_rows(1).show(pictures, dead, 0.0)[0, 0, 1].tolist() == [0.0, 0.0]
 
 
-def test_frozen_pictures_are_those_before():
+def test_frozen_images_are_the_previous_ones():
     now, before = torch.ones(2, 1, 1, 2), torch.zeros(2, 1, 1, 2)
-    shown = fault_models.frozen_frames(0.5).update(before, now, drawn([0.4], [0.5]))
+    shown = fault_models.frozen_frames(0.5).update(before, now, fixed_source([0.4], [0.5]))
     assert shown.flatten().tolist() == [0.0, 0.0, 1.0, 1.0]
 
 
 @pytest.mark.parametrize(
     ("frames", "shown"), [(0, [0, 1, 2, 3]), (2, [0, 0, 0, 1]), (9, [0, 0, 0, 0])]
 )
-def test_a_late_film_shows_its_first_picture_until_the_second_arrives(frames, shown):
+def test_late_frames_repeat_the_first_image_until_the_second_arrives(frames, shown):
     fault, images = fault_models.late_frames(frames), torch.arange(4.0).reshape(4, 1, 1, 1, 1)
     memory = fault.begin(images[0], None)
     seen = [fault.show(images[0], memory, 0.0).item()]
@@ -131,9 +131,9 @@ def test_a_late_film_shows_its_first_picture_until_the_second_arrives(frames, sh
     assert seen == shown
 
 
-def test_a_shift_by_hand():
+def test_shift_matches_hand_computed_images():
     picture = torch.arange(6.0).reshape(1, 1, 2, 3).repeat(3, 1, 1, 1)
-    by = torch.tensor([[0, 0], [1, 0], [-1, 2]])  # down, to the right
+    by = torch.tensor([[0, 0], [1, 0], [-1, 2]])  # down, right
     stays, down, up_and_right = fault_models.shift(picture, by)[:, 0].tolist()
     assert stays == [[0, 1, 2], [3, 4, 5]]
     assert down == [[0, 1, 2], [0, 1, 2]]

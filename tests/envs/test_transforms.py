@@ -49,7 +49,7 @@ def test_specs_agree_with_data(base, name):
 
 
 @pytest.mark.parametrize("name", PIPELINES)
-def test_any_leading_dimensions(name):
+def test_leading_dimensions_are_supported(name):
     pixels = torch.randint(0, 256, (2, 3, 25, 64, 3), dtype=torch.uint8)
     for transform in PIPELINES[name]()[:4]:
         flat = transform._apply_transform(pixels.flatten(0, 1))
@@ -68,7 +68,7 @@ def test_reset_and_step_agree(base):
     torch.testing.assert_close(after["pixels"], expected)
 
 
-def test_gray_by_hand():
+def test_gray_matches_hand_computed_values():
     pixels = torch.tensor([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [100, 100, 100]]])
     gray = GrayPixels()._apply_transform(pixels.to(torch.uint8))
     assert gray.shape == (1, 2, 2)
@@ -76,36 +76,36 @@ def test_gray_by_hand():
     torch.testing.assert_close(gray, expected)
 
 
-def test_colours_by_hand():
+def test_rgb_matches_hand_computed_values():
     pixels = torch.tensor([[[255, 0, 51], [0, 102, 0]]], dtype=torch.uint8)
-    colours = RgbPixels()._apply_transform(pixels)
-    torch.testing.assert_close(colours, torch.tensor([[[1.0, 0]], [[0, 0.4]], [[0.2, 0]]]))
+    rgb = RgbPixels()._apply_transform(pixels)
+    torch.testing.assert_close(rgb, torch.tensor([[[1.0, 0]], [[0, 0.4]], [[0.2, 0]]]))
 
 
-def test_gray_is_torchrls_to_tensor_image_and_gray_scale():
+def test_gray_equals_torchrls_transforms():
     pixels = torch.randint(0, 256, (4, 5, 7, 3), dtype=torch.uint8)
     theirs = GrayScale()._apply_transform(ToTensorImage()._apply_transform(pixels))
     torch.testing.assert_close(GrayPixels()._apply_transform(pixels), theirs, atol=2e-4, rtol=1e-3)
 
 
-def test_resize_averages_areas_and_keeps_height_apart_from_width():
+def test_resize_averages_areas_with_separate_height_and_width():
     pixels = torch.arange(8.0).reshape(1, 2, 4)
     resized = Resize(height=1, width=2)._apply_transform(pixels)
     assert resized.tolist() == [[[2.5, 4.5]]]
 
 
-def test_crop_keeps_top_and_drops_bottom():
+def test_crop_uses_top_inclusive_and_bottom_exclusive():
     pixels = torch.arange(5.0).reshape(1, 5, 1)
     assert CropRows(1, 4)._apply_transform(pixels).flatten().tolist() == [1.0, 2.0, 3.0]
 
 
-def test_parameters_are_shown():
+def test_repr_shows_parameters():
     assert repr(CropRows(1, 2)) == "CropRows(top=1, bottom=2)"
     assert repr(Resize(height=1, width=2)) == "Resize(height=1, width=2)"
     assert repr(StandardizePixels()) == "StandardizePixels(mean=0.53, std=0.21)"
 
 
-def test_bad_sizes_are_refused():
+def test_invalid_arguments_raise():
     with pytest.raises(InputError, match="0 <= top < bottom"):
         CropRows(5, 5)
     with pytest.raises(InputError, match="at most 4"):
@@ -119,30 +119,30 @@ def test_bad_sizes_are_refused():
             transform._apply_transform(torch.zeros(2, 2, 3))
 
 
-def as_picture(*colors):
+def as_image(*colors):
     return torch.tensor(colors).T[:, None]
 
 
-def test_chromaticity_is_each_colors_share_less_a_third():
+def test_chromaticity_is_the_fraction_of_each_color_minus_a_third():
     seen = ChromaticityPixels(floor=0.5)._apply_transform(
-        as_picture((1.0, 0.0, 0.0), (0.2, 0.2, 0.2), (0.0, 0.5, 1.0))
+        as_image((1.0, 0.0, 0.0), (0.2, 0.2, 0.2), (0.0, 0.5, 1.0))
     )
     thirds = [[2 / 3 / 1.5, 0.0, -0.5 / 2.0], [-1 / 3 / 1.5, 0.0, 0.5 / 2.0]]
     torch.testing.assert_close(seen, torch.tensor(thirds)[:, None])
 
 
-def test_light_changes_chromaticity_little_and_hue_much():
+def test_light_changes_chromaticity_less_than_hue_does():
     cube, dim, blue = (0.75, 0.12, 0.08), (0.375, 0.06, 0.04), (0.15, 0.30, 0.74)
-    seen = ChromaticityPixels()._apply_transform(as_picture(cube, dim, blue))[0, 0]
+    seen = ChromaticityPixels()._apply_transform(as_image(cube, dim, blue))[0, 0]
     assert abs(seen[0] - seen[1]) < 0.06 < 0.5 < seen[0] - seen[2]
 
 
-def test_chromaticity_of_the_dark_is_that_of_gray():
+def test_dark_pixels_have_the_chromaticity_of_gray():
     noise = 2 / 255 * torch.rand(3, 4, 4)
     assert ChromaticityPixels()._apply_transform(noise).abs().max() < 0.05
 
 
-def test_chromaticity_of_what_is_no_color_is_refused():
+def test_chromaticity_of_invalid_inputs_raises():
     with pytest.raises(InputError, match=r"shape \(1, 4, 4\); put it after rgb"):
         ChromaticityPixels()._apply_transform(torch.zeros(1, 4, 4))
     for floor in (0.0, -1.0, float("nan")):

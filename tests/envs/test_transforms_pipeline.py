@@ -12,7 +12,7 @@ from drone_rl.envs import (
 from drone_rl.envs.transforms import memory_of, see_film
 
 
-def test_transforms_are_applied_in_the_order_given():
+def test_transforms_are_applied_in_order():
     env = with_transforms(DroneEnv(2), [GrayPixels(), StandardizePixels()])
     assert [type(t) for t in env.transform] == [GrayPixels, StandardizePixels]
     pixels = env.reset()["pixels"]
@@ -20,13 +20,13 @@ def test_transforms_are_applied_in_the_order_given():
     env.close()
 
 
-def test_without_transforms_the_environment_is_as_it_was():
+def test_without_transforms_the_environment_is_unchanged():
     env = with_transforms(DroneEnv(2))
     assert env.reset()["pixels"].dtype == torch.uint8
     env.close()
 
 
-def test_pictures_alone_are_transformed_in_order_and_by_those_that_look_at_them():
+def test_on_pixels_applies_only_pixel_transforms_in_order():
     white = torch.full((3, 4, 2, 3), 255, dtype=torch.uint8)
     standard = StandardizePixels(mean=0.5, std=0.25)
     made = on_pixels([RewardSum(), GrayPixels(), standard, CropRows(1, 4)])(white)
@@ -34,12 +34,12 @@ def test_pictures_alone_are_transformed_in_order_and_by_those_that_look_at_them(
     assert on_pixels([])(white) is white
 
 
-def test_a_film_is_seen_frame_by_frame_and_stacked_where_the_stack_stands():
+def test_film_is_transformed_per_frame_and_stacked():
     standard = StandardizePixels(mean=0.5, std=0.25)
     stack = CatFrames(N=3, dim=-3, in_keys=["pixels"])
     film = [torch.full((2, 1, 2, 2), value) for value in (0.5, 0.75)]
     seen = see_film([standard, stack], film)
     assert seen.shape == (2, 3, 2, 2)
-    assert seen[0, :, 0, 0].tolist() == [0.0, 0.0, 1.0]  # the first repeats what is missing
+    assert seen[0, :, 0, 0].tolist() == [0.0, 0.0, 1.0]  # the first frame fills missing ones
     assert see_film([standard], film)[0, 0, 0, 0] == 1.0
     assert (memory_of([standard, stack]), memory_of([standard])) == (2, 0)

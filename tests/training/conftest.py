@@ -1,4 +1,4 @@
-"""A training of milliseconds: a bandit of two actions whose episodes have one to four steps."""
+"""Training on a two-armed bandit with episodes of one to four steps, which takes milliseconds."""
 
 import pytest
 import torch
@@ -12,7 +12,7 @@ from drone_rl.training import ReinforceLearner, Trainer
 
 
 class Bandit:
-    """A collector: action 1 is worth 1. All its randomness is in two generators."""
+    """A collector in which action 1 has reward 1, with two random generators."""
 
     def __init__(self, actor, episodes=8, seed=0, postproc=None):
         self.actor, self.episodes, self.postproc = actor, episodes, postproc
@@ -47,7 +47,7 @@ class Bandit:
 
 @pytest.fixture
 def make_trainer():
-    """Trainers of a REINFORCE learner; settings of the learner are among the arguments."""
+    """Return a factory of trainers with a REINFORCE learner; arguments include its settings."""
 
     def build(seed=0, *, max_grad_norm=None, minibatch_frames=512, **kwargs):
         network = nn.Linear(4, 2)

@@ -1,4 +1,4 @@
-"""Learners with a critic, from settings to policies that everything else takes as any other."""
+"""Training with a critic, from settings to exported policies."""
 
 import copy
 import shutil
@@ -57,7 +57,7 @@ def test_every_objective_has_its_learner():
         made.collector.shutdown()
 
 
-def test_gradients_by_the_kernel_teach_what_those_of_torch_do():
+def test_kernel_gradients_give_the_same_updates_as_torch():
     learned = {}
     for is_compiled in (True, False):
         limits = TrainerSettings(compiled=is_compiled, minibatch_frames=40)
@@ -76,7 +76,7 @@ def test_gradients_by_the_kernel_teach_what_those_of_torch_do():
         ]
     for by_kernel, by_torch in zip(learned[True], learned[False], strict=True):
         assert by_torch.any()
-        assert (by_kernel - by_torch).norm() < 0.01 * by_torch.norm()  # but for an output near 0
+        assert (by_kernel - by_torch).norm() < 0.01 * by_torch.norm()  # ReLU inputs near 0
 
 
 @pytest.mark.parametrize(
@@ -86,11 +86,11 @@ def test_gradients_by_the_kernel_teach_what_those_of_torch_do():
         ({"trainer": TrainerSettings(compiled=False)}, False),
         ({"collector": Threads(num_envs=4, num_threads=2)}, False),
         ({"collector": Threads(compiled=False)}, False),
-        ({"network": SmallCnn(hidden=(600,))}, False),  # too many weights to learn by the kernel
+        ({"network": SmallCnn(hidden=(600,))}, False),  # too many weights for the kernel
         ({"objective": Ppo(), "collector": Rollouts(), "returns": Gae()}, False),
     ],
 )
-def test_what_the_network_made_is_kept_where_it_is_learned_from(settings, is_kept):
+def test_activations_are_cached_if_the_learner_uses_them(settings, is_kept):
     settings = TrainSettings(task=TASK).replace(**settings)
     made = make_collector(settings)
     learner = settings.objective.learner(settings, made)
@@ -103,7 +103,7 @@ def test_what_the_network_made_is_kept_where_it_is_learned_from(settings, is_kep
     made.collector.shutdown()
 
 
-def test_what_was_made_in_flight_is_taken_and_teaches_the_same(monkeypatch):
+def test_cached_activations_are_used_and_give_the_same_update(monkeypatch):
     learned, taken = [], []
     for is_known in (True, False):
         find = ActivationCache.find
@@ -126,7 +126,7 @@ def test_what_was_made_in_flight_is_taken_and_teaches_the_same(monkeypatch):
 
 
 @pytest.mark.parametrize("shares", [True, False])
-def test_a_critic_begins_alike_for_a_seed_and_leaves_the_policy_as_it_is(shares):
+def test_critic_is_seeded_and_does_not_change_the_policy(shares):
     settings = TINY.replace(objective=Ppo(shares_trunk=shares))
     states = []
     for seed in (0, 0, 1):
@@ -162,23 +162,25 @@ def assert_same(one, two):
 
 
 @pytest.mark.parametrize("settings", KINDS.values(), ids=KINDS)
-def test_stopped_within_episodes_and_resumed_is_the_uninterrupted(settings, tmp_path):
+def test_resuming_within_episodes_equals_an_uninterrupted_run(settings, tmp_path):
     longer = settings.trainer.replace(total_frames=900)
     whole = drone_rl.train(settings, folder=tmp_path / "whole", trainer=longer, progress=silent)
     half = drone_rl.train(settings, folder=tmp_path / "half", progress=silent)
     assert half.result["frames"] == 300
     counts = [c["step_count"] for c in checkpoint(half)["collector"]["collectors"]]
-    assert torch.cat(counts).count_nonzero() > 0  # episodes are under way
+    assert torch.cat(counts).count_nonzero() > 0  # episodes are running
     again = drone_rl.train(folder=half.folder, resume=True, trainer=longer, progress=silent)
     one, two = checkpoint(whole), checkpoint(again)
     for key in ("policy", "critic", "optimiser", "minibatches", "generators", "collector"):
         assert_same(one[key], two[key])
-    told = [{k: v for k, v in state["progress"].items() if k != "seconds"} for state in (one, two)]
-    assert told[0] == told[1] and told[0]["episodes"] > 10
+    progress = [
+        {k: v for k, v in state["progress"].items() if k != "seconds"} for state in (one, two)
+    ]
+    assert progress[0] == progress[1] and progress[0]["episodes"] > 10
 
 
-def test_episodes_count_once_and_as_a_whole(trained):
-    """The frames of all episodes that ended, and of those that are under way, are all there are."""
+def test_episodes_are_counted_once_when_complete(trained):
+    """Frames of completed and of running episodes sum to all frames."""
     columns = trained.metrics()
     ended = [
         length * (episodes - before)
@@ -195,7 +197,7 @@ def test_episodes_count_once_and_as_a_whole(trained):
     assert sum(ended) + under_way == pytest.approx(trained.result["frames"])
 
 
-def test_its_policy_is_judged_and_exported_as_any_other(trained, tmp_path):
+def test_policy_can_be_judged_and_exported(trained, tmp_path):
     state = checkpoint(trained)
     assert set(state["policy"]) == set(trained.policy.description.expected_weights())
     judged = drone_rl.judge(trained.policy, episodes=4, progress=silent)
@@ -215,7 +217,7 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("where", HOSTILE)
-def test_worlds_that_no_training_left_are_refused(trained, tmp_path, where):
+def test_invalid_environment_states_raise(trained, tmp_path, where):
     value, message = HOSTILE[where]
     state = checkpoint(trained)
     part = state["collector"]["collectors"][0]["worlds"]["worlds"]
@@ -235,7 +237,7 @@ def test_worlds_that_no_training_left_are_refused(trained, tmp_path, where):
         ("collector", {"collectors": []}, "is not a list of 2"),
     ],
 )
-def test_other_parts_that_no_training_left_are_refused(trained, tmp_path, key, value, message):
+def test_other_invalid_checkpoint_parts_raise(trained, tmp_path, key, value, message):
     refused(trained, tmp_path, {**checkpoint(trained), key: value}, message)
 
 
@@ -247,8 +249,8 @@ def refused(trained, folder, state, message):
 
 
 @pytest.mark.parametrize("is_ours", [True, False])
-def test_advantages_are_torchrls_by_its_own_way_through_the_critic(is_ours):
-    """TorchRL looks at every next picture, too; its own collector's batches will do as well."""
+def test_advantages_equal_torchrls_gae(is_ours):
+    """TorchRL evaluates every next observation as well; batches of its collector are accepted."""
     made = make_collector(TINY.replace(collector=Rollouts(num_envs=5, num_threads=1)))
     learner, (ours,) = TINY.objective.learner(TINY, made), made.collector.collectors
     torch.nn.init.normal_(learner.model.critic.module.weight)
@@ -274,16 +276,16 @@ def test_advantages_are_torchrls_by_its_own_way_through_the_critic(is_ours):
     collector.shutdown()
 
 
-def test_a_collector_that_keeps_no_next_observations(monkeypatch, tmp_path):
-    """One of the user's own, of which the settings know nothing."""
+def test_collector_without_next_observations_raises(monkeypatch, tmp_path):
+    """It is user-defined, so the settings cannot detect it."""
     collector = type("Mine", (Threads,), {"is_known": False, "target": Threads.target})
     settings = TINY.replace(collector=collector(num_envs=2))
     with pytest.raises(InputError, match=r"no entry \('next', 'pixels'\).*collector=rollouts$"):
         drone_rl.train(settings, folder=tmp_path, progress=silent)
 
 
-def test_a_rate_far_too_high_fails_by_name(tmp_path):
-    """Numbers overflow: one line, and the checkpoint before it."""
+def test_too_high_learning_rate_raises_a_clear_error(tmp_path):
+    """Overflow gives a one-line error and keeps the previous checkpoint."""
     settings = TINY.replace(optimiser=Sgd(lr=1e30))
     with pytest.raises(InputError, match=r"NaN or infinite at update .*lower optimiser\.lr"):
         drone_rl.train(settings, folder=tmp_path, progress=silent)

@@ -22,7 +22,7 @@ def rows(path):
         return list(csv.DictReader(file))
 
 
-def test_newest_and_best_are_kept(make_trainer, tmp_path):
+def test_last_and_best_checkpoints_are_kept(make_trainer, tmp_path):
     trainer = make_trainer(callbacks=[CheckpointCallback(tmp_path, interval_s=0.0)])
     trainer.run()
     last, best = (load_checkpoint(tmp_path / name) for name in ("last.pt", "best.pt"))
@@ -31,17 +31,17 @@ def test_newest_and_best_are_kept(make_trainer, tmp_path):
     assert best["best"] == best["progress"]["running_reward"]
 
 
-def test_first_checkpoint_is_there_before_the_first_update(make_trainer, tmp_path):
+def test_first_checkpoint_precedes_the_first_update(make_trainer, tmp_path):
     callback = CheckpointCallback(tmp_path / "deep" / "folder")
     callback.on_start(make_trainer())
     assert load_checkpoint(callback.last_path)["progress"]["updates"] == 0
 
 
-def test_what_killed_trainings_left_is_deleted(make_trainer, tmp_path):
+def test_temporary_files_of_killed_runs_are_deleted(make_trainer, tmp_path):
     dead = subprocess.Popen(["true"])
     dead.wait()
     left = {f".last.pt.{dead.pid}", ".best.pt.ab12cd_3"}
-    kept = {".last.pt.1", ".mine", "mine.pt"}  # process 1 lives
+    kept = {".last.pt.1", ".mine", "mine.pt"}  # process 1 is running
     for name in left | kept:
         (tmp_path / name).touch()
     CheckpointCallback(tmp_path).on_start(make_trainer())
@@ -49,19 +49,19 @@ def test_what_killed_trainings_left_is_deleted(make_trainer, tmp_path):
 
 
 @pytest.mark.parametrize("row", ["x", "-1", "9" * 30, "1.5"])
-def test_damaged_metrics_are_refused(make_trainer, tmp_path, row):
+def test_damaged_metrics_raise(make_trainer, tmp_path, row):
     (tmp_path / "metrics.csv").write_text(f"update,frames\n{row},2\n")
     with pytest.raises(InputError, match="no number of an update"):
         CsvCallback(tmp_path / "metrics.csv").on_start(make_trainer())
 
 
-def test_folder_that_cannot_be_made(make_trainer, tmp_path):
+def test_uncreatable_folder_raises(make_trainer, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="can't be made"):
         CheckpointCallback(tmp_path / "file" / "sub").on_start(make_trainer())
 
 
-def test_one_row_an_update(make_trainer, tmp_path):
+def test_metrics_have_one_row_per_update(make_trainer, tmp_path):
     trainer = make_trainer(callbacks=[CsvCallback(tmp_path / "metrics.csv")])
     trainer.run()
     table = rows(tmp_path / "metrics.csv")
@@ -71,13 +71,13 @@ def test_one_row_an_update(make_trainer, tmp_path):
     )
 
 
-def test_resumed_run_repeats_no_row_and_loses_none(make_trainer, tmp_path):
+def test_resumed_run_has_each_row_once(make_trainer, tmp_path):
     path = tmp_path / "metrics.csv"
     first = make_trainer(callbacks=[CsvCallback(path)], total_frames=100)
     first.run()
     state = first.state_dict()
     first.total_frames = 200
-    first.run()  # rows that were never checkpointed
+    first.run()  # rows after the last checkpoint
     resumed = make_trainer(callbacks=[CsvCallback(path)], total_frames=300)
     resumed.load_state_dict(state)
     resumed.run()
@@ -85,13 +85,13 @@ def test_resumed_run_repeats_no_row_and_loses_none(make_trainer, tmp_path):
     assert updates == list(range(1, resumed.progress.updates + 1))
 
 
-def test_any_torchrl_logger(make_trainer, tmp_path):
+def test_torchrl_loggers_are_supported(make_trainer, tmp_path):
     logger = CSVLogger("run", log_dir=str(tmp_path))
     make_trainer(callbacks=[LoggerCallback([logger])]).run()
     assert list(tmp_path.glob("run/scalars/**/*reward*.csv"))
 
 
-def test_lines_instead_of_a_bar_where_there_is_no_terminal(make_trainer, caplog):
+def test_progress_is_logged_as_lines_without_a_terminal(make_trainer, caplog):
     caplog.set_level(logging.INFO)
     make_trainer(callbacks=[ProgressCallback(interval_s=0.0)]).run()
     lines = [r.getMessage() for r in caplog.records]
@@ -100,15 +100,15 @@ def test_lines_instead_of_a_bar_where_there_is_no_terminal(make_trainer, caplog)
 
 
 class Clock:
-    """Stands still until it is set."""
+    """A clock that advances only when set."""
 
     def __init__(self, monkeypatch):
         self.now = 1000.0
         monkeypatch.setattr(callbacks.time, "monotonic", lambda: self.now)
 
 
-def test_a_line_says_how_long_it_may_take_still(monkeypatch, caplog):
-    """70 of 100 frames at 10 a second; never less than no time."""
+def test_progress_line_estimates_the_remaining_time(monkeypatch, caplog):
+    """70 of 100 frames remain at 10 frames/s; the estimate is never negative."""
     caplog.set_level(logging.INFO)
     clock, callback = Clock(monkeypatch), ProgressCallback(interval_s=5.0)
     progress = types.SimpleNamespace(frames=30, episodes=2, running_reward=1.5)
@@ -125,7 +125,7 @@ def test_a_line_says_how_long_it_may_take_still(monkeypatch, caplog):
     assert lines[0].startswith("frames 30, episodes 2, running reward 1.50, 10 frames/s")
 
 
-def test_checkpoints_are_an_interval_apart(make_trainer, monkeypatch, tmp_path):
+def test_checkpoints_are_saved_at_intervals(make_trainer, monkeypatch, tmp_path):
     clock, trainer = Clock(monkeypatch), make_trainer()
     callback, saved = CheckpointCallback(tmp_path, interval_s=60.0), []
     callback.on_start(trainer)
@@ -133,4 +133,4 @@ def test_checkpoints_are_an_interval_apart(make_trainer, monkeypatch, tmp_path):
     for now in (1000.0, 1059.0, 1060.0, 1100.0):
         clock.now = now
         callback.on_update(trainer, {})
-    assert saved == [1060.0, 1100.0]  # which is what it noted, had it been saved
+    assert saved == [1060.0, 1100.0]  # the time of each save

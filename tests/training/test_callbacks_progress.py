@@ -1,4 +1,4 @@
-"""How far a training is, as files and callbacks know it."""
+"""Progress of a training run in files and callbacks."""
 
 import dataclasses
 
@@ -10,11 +10,11 @@ from tests.policies.zoo.test_files import CHECKPOINT
 from tests.verdicts.test_export_card_text import VERDICT
 
 
-def test_it_begins_at_nothing():
+def test_progress_starts_at_zero():
     assert set(dataclasses.asdict(Progress()).values()) == {0}
 
 
-def test_files_keep_all_of_it(tmp_path):
+def test_exported_files_contain_progress(tmp_path):
     progress = dataclasses.asdict(Progress(7, 5, 3, 1.5, 2.25))
     path = tmp_path / "policy.safetensors"
     checkpoint = {**CHECKPOINT, "progress": progress}
@@ -22,7 +22,7 @@ def test_files_keep_all_of_it(tmp_path):
     assert load_exported(path)["progress"] == progress
 
 
-def test_a_trainer_is_what_a_callback_sees(make_trainer):
+def test_callbacks_receive_the_trainer_interface(make_trainer):
     class Look(Callback):
         def on_update(self, training: OngoingTraining, metrics):
             names = [*OngoingTraining.__annotations__, "state_dict"]

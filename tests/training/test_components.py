@@ -1,4 +1,4 @@
-"""A training's worlds shared out: the same worlds and actions however they are built."""
+"""Distribution of environments over workers does not change environments and actions."""
 
 import pytest
 import torch
@@ -29,11 +29,11 @@ def collected(**settings):
         (Ray(num_envs=3, num_threads=2), "cuda", [2, 1]),
     ],
 )
-def test_worlds_are_shared_out_evenly(collector, device, shares):
+def test_environments_are_split_evenly(collector, device, shares):
     assert group_sizes(TrainSettings(collector=collector, device=device)) == shares
 
 
-def test_threads_share_one_network_and_draw_from_streams_of_their_own():
+def test_threads_share_a_network_but_not_random_streams():
     made, batch = collected(collector=Threads(num_envs=5, num_threads=2))
     assert isinstance(made.collector, ThreadedCollector)
     assert list(made.generators) == ["actions_0", "actions_1"]
@@ -42,7 +42,7 @@ def test_threads_share_one_network_and_draw_from_streams_of_their_own():
         assert collector.actor.module[0].module is made.network
 
 
-def test_a_seed_means_the_same_network_and_the_same_batch():
+def test_seed_determines_network_and_batch():
     (one, first), (two, again) = (collected(collector=Threads(num_envs=3)) for _ in range(2))
     assert torch.equal(first["action"], again["action"])
     weights, same = one.network.state_dict(), two.network.state_dict()

@@ -1,4 +1,4 @@
-"""A policy that is lucky while it draws its actions has not solved its task."""
+"""A policy must solve the task with its most probable actions."""
 
 import pytest
 import torch
@@ -27,34 +27,34 @@ def always(*logits):
     return network
 
 
-def test_the_most_probable_action_counts_however_close_the_others_are():
+def test_confirmation_uses_the_most_probable_action():
     ahead = SETTINGS.replace(task=SETTINGS.task.replace(lateral_bound=0.5))
     straight = Confirmation(ahead, always(0.02, 0.01, 0.0))
     assert straight(1)
     assert straight.told == {"confirming_flights": 40, "confirming_flights_succeeded": 40}
-    lucky = Confirmation(ahead, always(0.01, 0.02, 0.0))  # drawn actions come by it now and then
-    assert not lucky(1) and not lucky(2)
-    assert lucky.told == {"confirming_flights": 80, "confirming_flights_succeeded": 0}
+    confirmation = Confirmation(ahead, always(0.01, 0.02, 0.0))  # samples may reach it
+    assert not confirmation(1) and not confirmation(2)
+    assert confirmation.told == {"confirming_flights": 80, "confirming_flights_succeeded": 0}
 
 
-def test_the_share_is_that_of_flights_that_reach_everything():
+def test_success_rate_is_that_of_complete_episodes():
     straight = Confirmation(SETTINGS, always(1.0, 0.0, 0.0))
     assert not straight(1)
     reached = straight.succeeded
-    assert 0 < reached < 40  # a drone that flies straight on touches what is 1.65 m aside or less
+    assert 0 < reached < 40  # flying straight ahead touches cubes within 1.65 m
     for share, is_enough in ((reached / 40, True), (reached / 40 + 0.01, False)):
         trainer = SETTINGS.trainer.replace(confirm_share=share)
         again = Confirmation(SETTINGS.replace(trainer=trainer), always(1.0, 0.0, 0.0))
         assert again(1) is is_enough and again.succeeded == reached
 
 
-def test_worlds_are_of_their_own_after_each_update(monkeypatch):
-    asked, fly = [], confirming.run_episodes
+def test_each_update_confirms_in_new_environments(monkeypatch):
+    calls, fly = [], confirming.run_episodes
 
     def note(env, actor, episodes, **how):
         base = env.base_env
         base.reset()
-        asked.append(
+        calls.append(
             (base.stream, base.first_world, len(base.worlds.state), base.worlds.state.cubes.clone())
         )
         base.set_seed(SETTINGS.seed)
@@ -64,13 +64,13 @@ def test_worlds_are_of_their_own_after_each_update(monkeypatch):
     confirmation = Confirmation(SETTINGS, always(1.0, 0.0, 0.0))
     shares = [(confirmation(update), confirmation.succeeded)[1] for update in (1, 1, 2)]
     assert shares[0] == shares[1]
-    assert [a[:3] for a in asked] == [(Stream.CONFIRMATION, n, 40) for n in (250, 250, 500)]
-    assert torch.equal(asked[0][3], asked[1][3]) and not torch.equal(asked[0][3], asked[2][3])
+    assert [a[:3] for a in calls] == [(Stream.CONFIRMATION, n, 40) for n in (250, 250, 500)]
+    assert torch.equal(calls[0][3], calls[1][3]) and not torch.equal(calls[0][3], calls[2][3])
 
 
 @pytest.mark.parametrize(("episodes", "reason"), [(0, "solved"), (8, "frames")])
-def test_a_training_goes_on_until_it_is_confirmed(tmp_path, episodes, reason):
-    """The first reward passes for success, which only flights can gainsay."""
+def test_training_continues_until_confirmed(tmp_path, episodes, reason):
+    """The first reward meets the threshold, so only confirmation can continue the training."""
     trainer = SETTINGS.trainer.replace(
         total_frames=400, target_share=1e-3, confirm_episodes=episodes
     )

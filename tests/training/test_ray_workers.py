@@ -1,4 +1,4 @@
-"""Workers of a Ray cluster need the extra."""
+"""Ray workers need the extra `ray`."""
 
 import sys
 
@@ -13,7 +13,7 @@ from drone_rl.utils.errors import InputError
 TASK = TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60)
 
 
-def test_ray_that_is_not_installed(monkeypatch):
+def test_missing_ray_raises_with_install_command(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(InputError, match=r"pip install 'drone-rl\[ray\]'"):
         make_collector(TrainSettings(task=TASK, collector=Ray(num_envs=2)))

@@ -1,4 +1,4 @@
-"""A state that a training did not write is refused by name before anything of it is taken over."""
+"""Invalid states are rejected by name before any part is loaded."""
 
 import contextlib
 import copy
@@ -17,7 +17,7 @@ OWN = {"a": torch.zeros(2), "b": [1, 0.5], "c": None, "d": "x", "e": True, "f": 
     "change",
     [{}, {"a": torch.ones(2)}, {"b": (2, 3)}, {"b": [1, 2.5]}, {"c": object()}],
 )
-def test_what_fits(change):
+def test_matching_states_are_accepted(change):
     check_fits({**OWN, **change}, OWN, "state")
 
 
@@ -39,7 +39,7 @@ def test_what_fits(change):
         ({"h": 1}, "state has other names"),
     ],
 )
-def test_what_does_not(change, message):
+def test_mismatched_states_raise(change, message):
     with pytest.raises(InputError, match=message):
         check_fits({**OWN, **change}, OWN, "state")
 
@@ -53,7 +53,7 @@ def test_what_does_not(change, message):
         ([1.0, float("inf")], False),
     ],
 )
-def test_what_may_be_unknown_here_may_be_so_there(saved, fits):
+def test_nan_is_accepted_where_the_own_state_has_it(saved, fits):
     own = {"lateral": torch.tensor([0.5, float("nan")])}
     with contextlib.nullcontext() if fits else pytest.raises(InputError, match="infinity"):
         check_fits({"lateral": torch.tensor(saved)}, own, "state")
@@ -69,7 +69,7 @@ def stepped(kind=torch.optim.Adam, **settings):
 
 
 @pytest.mark.parametrize("kind", [torch.optim.Adam, torch.optim.SGD, torch.optim.RMSprop])
-def test_an_optimisers_own_state_fits_before_and_after_steps(kind):
+def test_own_optimizer_state_is_accepted(kind):
     network, optimiser = stepped(kind)
     before = {k: v.clone() for k, v in network.state_dict().items()}
     check_optimiser(optimiser.state_dict(), optimiser)
@@ -80,7 +80,7 @@ def test_an_optimisers_own_state_fits_before_and_after_steps(kind):
     assert not fresh.state_dict()["state"]
 
 
-def test_the_rate_may_be_another_and_nothing_else():
+def test_only_the_learning_rate_may_differ():
     _, optimiser = stepped()
     state = copy.deepcopy(optimiser.state_dict())
     state["param_groups"][0]["lr"] = 0.05
@@ -103,7 +103,7 @@ def test_the_rate_may_be_another_and_nothing_else():
         (lambda s: s.clear(), "other names"),
     ],
 )
-def test_an_optimisers_state_that_is_not_its_own(change, message):
+def test_foreign_optimizer_states_raise(change, message):
     _, optimiser = stepped()
     state = copy.deepcopy(optimiser.state_dict())
     change(state)

@@ -1,4 +1,4 @@
-"""What a training reads from its folder and writes to it."""
+"""Files that a training reads from and writes to its folder."""
 
 import pytest
 import yaml
@@ -18,12 +18,12 @@ from drone_rl.utils.errors import InputError
 
 
 @pytest.mark.parametrize("best", [float("nan"), float("inf"), 1e9, "high", None])
-def test_the_best_mean_of_a_checkpoint_is_a_number(best):
+def test_invalid_best_mean_raises(best):
     with pytest.raises(InputError, match=r"^the checkpoint's best="):
         _read_best(best)
 
 
-def test_the_settings_of_a_checkpoint_are_those_it_was_made_with():
+def test_checkpoint_settings_are_restored_and_validated():
     settings = TrainSettings(seed=3)
     assert settings_of(as_config(settings)) == settings
     foreign = {**as_config(settings), "network": {"_target_": "os.system"}}
@@ -31,7 +31,7 @@ def test_the_settings_of_a_checkpoint_are_those_it_was_made_with():
         settings_of(foreign)
 
 
-def test_a_new_run_is_described_in_its_folder(tmp_path):
+def test_new_run_writes_its_description(tmp_path):
     folder, state = RunFolder.open(tmp_path, resume=False)
     assert folder.path == tmp_path and state is None
     (folder.path / "run.yaml.1-0.tmp").touch()
@@ -42,13 +42,13 @@ def test_a_new_run_is_described_in_its_folder(tmp_path):
     assert new_folder().parent.name == "runs"
 
 
-def test_a_run_with_other_settings_is_not_resumed(tmp_path):
+def test_changed_settings_prevent_resuming(tmp_path):
     state = {"config": as_config(TrainSettings(seed=1))}
     with pytest.raises(InputError, match="seed=0: the run was started with seed=1"):
         RunFolder(tmp_path).prepare(TrainSettings(), state)
 
 
-def test_control_is_lost_only_where_there_are_dynamics():
+def test_lost_control_is_possible_only_with_dynamics():
     flying = TrainSettings(dynamics=DynamicsSettings(mode="simple_flight"))
     names = [[end.name for end in possible_ends(s)] for s in (TrainSettings(), flying)]
     assert "LOST_CONTROL" not in names[0] and names[1] == [*names[0], "LOST_CONTROL"]

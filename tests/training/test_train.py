@@ -1,4 +1,4 @@
-"""A training in Python is that of the command line, and goes on bit for bit."""
+"""Training from Python equals training from the command line and resumes bit for bit."""
 
 import json
 import shutil
@@ -28,21 +28,21 @@ TINY = TrainSettings(
 
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory):
-    said = []
+    messages = []
     folder = tmp_path_factory.mktemp("run") / "mine"
 
     def note(text, done=0, total=0):
-        said.append((text, done, total))
+        messages.append((text, done, total))
 
-    return drone_rl.train(TINY, folder=folder, progress=note), said
+    return drone_rl.train(TINY, folder=folder, progress=note), messages
 
 
 def weights(folder):
     return drone_rl.load_policy(folder).state["policy"]
 
 
-def test_it_leaves_what_the_command_line_leaves(trained):
-    done, said = trained
+def test_training_writes_the_same_files_as_the_command(trained):
+    done, messages = trained
     assert done.reason == "frames"
     assert {p.name for p in done.folder.iterdir() if p.suffix} == {
         *("metrics.csv", "result.json", "run.yaml"),
@@ -51,11 +51,11 @@ def test_it_leaves_what_the_command_line_leaves(trained):
     noted = yaml.safe_load((done.folder / "run.yaml").read_text())
     assert noted["config"]["task"]["num_cubes"] == 1
     assert noted["description"]["network"]["name"] == "small_cnn"
-    assert said[-1][0] == "stopped: frames"
+    assert messages[-1][0] == "stopped: frames"
     assert done.policy.name == "mine"
 
 
-def test_it_shows_itself(trained):
+def test_result_has_an_html_representation(trained):
     done, _ = trained
     assert done.metrics()["frames"][-1] == done.result["frames"]
     assert done.running_reward == done.result["running_reward"]
@@ -64,7 +64,7 @@ def test_it_shows_itself(trained):
     assert "data:image/png;base64," in shown
 
 
-def test_stopped_and_resumed_is_the_uninterrupted(trained, tmp_path):
+def test_resumed_training_equals_an_uninterrupted_one(trained, tmp_path):
     longer = TINY.trainer.replace(total_frames=900)
     whole = drone_rl.train(TINY, folder=tmp_path / "whole", trainer=longer, progress=silent)
     half = drone_rl.train(TINY, folder=tmp_path / "half", progress=silent)
@@ -75,7 +75,7 @@ def test_stopped_and_resumed_is_the_uninterrupted(trained, tmp_path):
     assert all(torch.equal(one[name], two[name]) for name in one)
 
 
-def test_a_run_goes_on_that_was_killed_before_its_first_update(trained, tmp_path):
+def test_run_killed_before_its_first_update_resumes(trained, tmp_path):
     class Killed(BaseException):
         pass
 
@@ -90,7 +90,7 @@ def test_a_run_goes_on_that_was_killed_before_its_first_update(trained, tmp_path
     assert all(torch.equal(there[name], whole[name]) for name in whole)
 
 
-def test_a_resumed_run_learns_as_it_did(trained):
+def test_resuming_with_other_settings_raises(trained):
     done, _ = trained
     with pytest.raises(InputError, match=r"can't resume with seed=5: .* seed=0"):
         drone_rl.train(TINY, folder=done.folder, resume=True, seed=5)
@@ -106,13 +106,13 @@ def test_a_resumed_run_learns_as_it_did(trained):
         ({"wind": 3}, "wind is unknown; there are: task, appearance, dynamics, actions, camera"),
     ],
 )
-def test_mistakes_name_the_argument(change, message, tmp_path):
+def test_invalid_arguments_are_named(change, message, tmp_path):
     with pytest.raises(InputError, match=f"^{message}"):
         drone_rl.train(folder=tmp_path, **change)
     assert not list(tmp_path.iterdir())
 
 
-def test_a_training_in_flight_is_described_and_goes_on_as_it_was(tmp_path, trained):
+def test_training_with_dynamics_resumes(tmp_path, trained):
     flight = DynamicsSettings(mode="simple_flight", gusts=1.0)
     task = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=20, front_margin=2.0)
     short = TrainerSettings(total_frames=100, confirm_episodes=0)
@@ -125,14 +125,14 @@ def test_a_training_in_flight_is_described_and_goes_on_as_it_was(tmp_path, train
     assert all(torch.equal(own[name], other[name]) for name in own)
     assert parts.policy.dynamics == flight and parts.policy.unlike == {}
     assert "end/lost_control" in parts.metrics()
-    assert "end/lost_control" not in trained[0].metrics()  # where nothing can be lost
+    assert "end/lost_control" not in trained[0].metrics()  # dynamics that cannot lose control
     with pytest.raises(InputError, match=r"^can't resume with dynamics\.gusts=2\.0: "):
         windy = whole.replace(dynamics=flight.replace(gusts=2.0))
         drone_rl.train(windy, folder=parts.folder, resume=True, progress=silent)
 
 
 class Stop(Callback):
-    """Sends signals to this process after an update, or before the first."""
+    """Send signals to this process after an update, or before the first."""
 
     def __init__(self, *numbers, update=1):
         self.numbers, self.update = numbers, update
@@ -152,7 +152,7 @@ class Stop(Callback):
 
 @pytest.fixture
 def handlers():
-    """Python's own handlers, whatever this process was started with; returns what sets others."""
+    """Install Python's default handlers; return a function that sets others."""
     defaults = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
     before = {number: signal.signal(number, handler) for number, handler in defaults.items()}
     yield signal.signal
@@ -160,8 +160,8 @@ def handlers():
         signal.signal(number, handler)
 
 
-def assert_goes_on(folder, trained):
-    """What is learned is that of the training which nobody stopped."""
+def assert_resumes(folder, trained):
+    """Assert that the resumed training equals the uninterrupted one."""
     drone_rl.train(folder=folder, resume=True, progress=silent)
     there, whole = weights(folder), weights(trained[0].folder)
     assert all(torch.equal(there[name], whole[name]) for name in whole)
@@ -175,7 +175,7 @@ def assert_goes_on(folder, trained):
         (signal.SIGTERM, SystemExit, "143"),
     ],
 )
-def test_a_signal_acts_once_the_state_is_saved(
+def test_signal_takes_effect_after_the_state_is_saved(
     trained, tmp_path, handlers, number, raised, args, update
 ):
     with pytest.raises(raised, match=args) as stopped:
@@ -184,34 +184,34 @@ def test_a_signal_acts_once_the_state_is_saved(
     assert done.reason == number.name
     assert json.loads((tmp_path / "result.json").read_text()) == done.result
     assert done.result["updates"] == update
-    assert_goes_on(tmp_path, trained)
+    assert_resumes(tmp_path, trained)
 
 
-def test_a_second_ctrl_c_does_not_wait_for_the_state(trained, tmp_path, handlers):
+def test_second_ctrl_c_stops_without_saving(trained, tmp_path, handlers):
     with pytest.raises(KeyboardInterrupt) as stopped:
         drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(signal.SIGINT, signal.SIGINT)])
     assert not hasattr(stopped.value, "training")
     assert not (tmp_path / "result.json").exists()
-    assert_goes_on(tmp_path, trained)
+    assert_resumes(tmp_path, trained)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_handler_of_the_callers_own_decides(tmp_path, handlers, number):
+def test_custom_signal_handler_is_called(tmp_path, handlers, number):
     got = []
     handlers(number, lambda n, frame: got.append(n))
     done = drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(number)], progress=silent)
     assert got == [number] and done.reason == number.name
 
 
-def test_a_signal_that_is_ignored_stops_training_too(tmp_path, handlers):
-    """As in a process started in the background of a script, which ignores Ctrl-C."""
+def test_ignored_signal_stops_training(tmp_path, handlers):
+    """A background process of a shell script ignores Ctrl-C."""
     handlers(signal.SIGINT, signal.SIG_IGN)
     with pytest.raises(KeyboardInterrupt):
         drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(signal.SIGINT)], progress=silent)
     assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
 
 
-def test_a_stopped_confirmation_is_repeated(tmp_path, handlers, monkeypatch):
+def test_stopped_confirmation_is_repeated_on_resume(tmp_path, handlers, monkeypatch):
     flown = []
 
     def confirm(self, update):
@@ -231,11 +231,11 @@ def test_a_stopped_confirmation_is_repeated(tmp_path, handlers, monkeypatch):
 @pytest.mark.parametrize(
     ("number", "statuses"),
     [
-        (signal.SIGINT, (-signal.SIGINT, 1)),  # 1 where Ray is installed: what it does at exit
+        (signal.SIGINT, (-signal.SIGINT, 1)),  # 1 if Ray is installed, because of its exit handler
         (signal.SIGTERM, (143,)),
     ],
 )
-def test_a_signal_ends_a_loop_of_trainings(tmp_path, number, statuses):
+def test_signal_ends_a_loop_of_trainings(tmp_path, number, statuses):
     code = (
         "import signal, drone_rl\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
@@ -263,7 +263,7 @@ def contents(folder):
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_a_refused_resume_changes_nothing(trained, tmp_path):
+def test_rejected_resume_changes_no_file(trained, tmp_path):
     folder = shutil.copytree(trained[0].folder, tmp_path / "run")
     before = contents(folder)
     with pytest.raises(InputError, match="can't resume with seed=9"):

@@ -12,7 +12,7 @@ from drone_rl.utils.checkpoint import load_checkpoint
 
 
 class At(Callback):
-    """Does something after an update."""
+    """Call a function after an update."""
 
     def __init__(self, update, action):
         self.update, self.action, self.metrics = update, action, []
@@ -34,7 +34,7 @@ def test_learns_the_bandit(make_trainer):
     assert trainer.learner.network(torch.zeros(4)).softmax(-1)[1].item() > before + 0.3
 
 
-def test_same_seed_gives_the_same_parameters_byte_for_byte(make_trainer):
+def test_seed_determines_parameters_bit_for_bit(make_trainer):
     first, second, other = make_trainer(), make_trainer(), make_trainer(1)
     for trainer in (first, second, other):
         trainer.run()
@@ -42,12 +42,12 @@ def test_same_seed_gives_the_same_parameters_byte_for_byte(make_trainer):
     assert not torch.equal(parameters(first), parameters(other))
 
 
-def test_resumed_is_bit_for_bit_the_uninterrupted(make_trainer, tmp_path):
+def test_resumed_run_equals_an_uninterrupted_one_bit_for_bit(make_trainer, tmp_path):
     whole = make_trainer(total_frames=400)
     whole.run()
     half = make_trainer(total_frames=150, callbacks=[CheckpointCallback(tmp_path)])
     half.run()
-    torch.rand(17)  # somebody else draws in between
+    torch.rand(17)  # changes the global random state
     resumed = make_trainer(seed=5, total_frames=400)
     resumed.load_state_dict(load_checkpoint(tmp_path / "last.pt"))
     assert resumed.progress.updates == half.progress.updates
@@ -70,21 +70,21 @@ def test_signal_saves_and_stops_after_the_update(make_trainer, tmp_path, number)
     assert signal.getsignal(number) == before
 
 
-def test_a_signal_during_the_confirmation_stops_after_it(make_trainer):
-    """Even if it succeeds: otherwise nobody would learn of the signal."""
-    asked = []
+def test_signal_during_confirmation_stops_after_it(make_trainer):
+    """It stops even if the confirmation succeeds, so the signal is reported."""
+    calls = []
 
     def confirm(update):
-        asked.append(update)
+        calls.append(update)
         signal.raise_signal(signal.SIGTERM)
         return True
 
     trainer = make_trainer(target=-1e6, confirm=confirm)
     assert trainer.run() == "SIGTERM"
-    assert asked == [0]
+    assert calls == [0]
 
 
-def test_a_signal_while_the_last_state_is_saved_is_returned(make_trainer):
+def test_signal_during_the_last_save_is_returned(make_trainer):
     class Late(Callback):
         def on_end(self, training, reason):
             assert reason == "frames"
@@ -93,7 +93,7 @@ def test_a_signal_while_the_last_state_is_saved_is_returned(make_trainer):
     assert make_trainer(callbacks=[Late()]).run() == "SIGTERM"
 
 
-def test_other_threads_watch_no_signals(make_trainer):
+def test_other_threads_install_no_signal_handlers(make_trainer):
     before = signal.getsignal(signal.SIGTERM)
     seen = []
     look = At(1, lambda _: seen.append(signal.getsignal(signal.SIGTERM)))
@@ -104,7 +104,7 @@ def test_other_threads_watch_no_signals(make_trainer):
     assert seen == [before] and trainer.progress.frames >= trainer.total_frames
 
 
-def test_a_handler_from_outside_python_is_left_alone(make_trainer, monkeypatch):
+def test_handler_from_outside_python_is_kept(make_trainer, monkeypatch):
     installed = []
     monkeypatch.setattr(signal, "getsignal", lambda number: None)
     monkeypatch.setattr(signal, "signal", lambda *args: installed.append(args))
@@ -117,7 +117,7 @@ def test_second_ctrl_c_aborts_at_once(make_trainer):
         signal.raise_signal(signal.SIGINT)
         signal.raise_signal(signal.SIGINT)
 
-    # a process started in the background may have been told to ignore Ctrl-C
+    # a background process may ignore Ctrl-C
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
@@ -127,7 +127,7 @@ def test_second_ctrl_c_aborts_at_once(make_trainer):
 
 
 @pytest.mark.parametrize("where", ["loss", "gradient"])
-def test_nan_stops_names_itself_and_keeps_the_last_good_checkpoint(make_trainer, tmp_path, where):
+def test_nan_stops_and_keeps_the_last_good_checkpoint(make_trainer, tmp_path, where):
     trainer = make_trainer(callbacks=[CheckpointCallback(tmp_path, interval_s=0.0)])
     good = []
 
@@ -155,12 +155,12 @@ def test_stops_when_solved(make_trainer):
     assert trainer.progress.running_reward >= 0.5
 
 
-def test_is_solved_only_once_that_is_confirmed(make_trainer):
-    asked = []
+def test_training_is_solved_only_after_confirmation(make_trainer):
+    calls = []
 
     def confirm(update):
-        asked.append(update)
-        return len(asked) == 3
+        calls.append(update)
+        return len(calls) == 3
 
     trainer = make_trainer(target=0.5, running_decay=0.9, total_frames=100_000)
     trainer.run()
@@ -168,11 +168,11 @@ def test_is_solved_only_once_that_is_confirmed(make_trainer):
     trainer = make_trainer(target=0.5, running_decay=0.9, total_frames=100_000)
     trainer.confirm = confirm
     assert trainer.run() == "solved"
-    assert asked[0] == first and asked[2] == trainer.progress.updates
-    assert asked == sorted(set(asked)) and trainer.progress.running_reward >= 0.5
+    assert calls[0] == first and calls[2] == trainer.progress.updates
+    assert calls == sorted(set(calls)) and trainer.progress.running_reward >= 0.5
 
 
-def test_memory_is_given_back_now_and_then(make_trainer, monkeypatch):
+def test_memory_is_released_periodically(make_trainer, monkeypatch):
     given, trainer = [], make_trainer(total_frames=100_000)
     monkeypatch.setattr(
         trainer_module, "return_freed_memory", lambda: given.append(trainer.progress.updates)
@@ -188,7 +188,7 @@ def test_stops_at_episodes(make_trainer):
     assert trainer.progress.episodes == 16
 
 
-def test_progress_counts_what_was_collected(make_trainer):
+def test_progress_counts_frames_and_episodes(make_trainer):
     trainer, batches = make_trainer(total_frames=100), []
     collect = trainer.collector.collect
     trainer.collector.collect = lambda: batches.append(collect()) or batches[-1]
@@ -209,7 +209,7 @@ class Parity(enum.IntEnum):
     ODD = 1
 
 
-def test_ends_are_told_by_the_names_that_the_trainer_is_given(make_trainer):
+def test_end_metrics_use_the_given_names(make_trainer):
     at, trainer = At(-1, None), make_trainer(ends=Parity)
     collect, trainer.callbacks = trainer.collector.collect, [at]
 
@@ -223,7 +223,7 @@ def test_ends_are_told_by_the_names_that_the_trainer_is_given(make_trainer):
     assert {metrics["end/odd"] for metrics in at.metrics} == {1.0}
 
 
-def test_metrics_of_an_update(make_trainer):
+def test_update_has_the_expected_metrics(make_trainer):
     at = At(-1, None)
     make_trainer(callbacks=[at], max_grad_norm=1e-3).run()
     names = {"train/reward", "train/running_reward", "train/length", "loss/loss_actor"}

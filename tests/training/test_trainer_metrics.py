@@ -11,11 +11,11 @@ from drone_rl.training.trainer import batch_metrics, episode_rewards, running_me
 from drone_rl.utils.errors import InputError
 
 
-def test_running_mean_by_hand():
+def test_running_mean_matches_hand_computed_value():
     assert running_mean(0.0, torch.tensor([1.0, 2.0]), 0.9) == pytest.approx(0.29)
 
 
-def test_episode_rewards_and_batch_metrics_by_hand():
+def test_episode_rewards_and_batch_metrics_match_hand_computed_values():
     batch = TensorDict(
         {
             "next": {
@@ -44,8 +44,8 @@ class End(enum.IntEnum):
     LOST = 3
 
 
-def test_ends_are_those_of_the_task():
-    """Three episodes: two by one of its reasons, one by the other."""
+def test_end_metrics_are_those_of_the_task():
+    """Three episodes: two end for one reason, one for the other."""
     batch = make_batch([[0, 1], [1], [0]])
     batch["next", "info"] = TensorDict({"end_reason": torch.tensor([0, 2, 3, 2])[:, None]}, [4])
     metrics = batch_metrics(batch, End)
@@ -54,8 +54,8 @@ def test_ends_are_those_of_the_task():
     assert not any(name.startswith("end/") for name in batch_metrics(batch))
 
 
-def test_pieces_of_episodes_by_their_sums_so_far():
-    """Two worlds, three steps: one episode began before, and one goes on after."""
+def test_partial_episodes_use_reward_sums():
+    """Two environments, three steps: one episode began earlier, and one continues later."""
     batch = TensorDict(
         {
             "next": {
@@ -76,8 +76,8 @@ def test_pieces_of_episodes_by_their_sums_so_far():
         episode_rewards(batch)
 
 
-def test_lengths_of_whole_episodes_where_they_are_counted():
-    """A batch of 4 frames, in which episodes of 7 and 2 steps end."""
+def test_lengths_use_the_step_count():
+    """In a batch of 4 frames, episodes of 7 and 2 steps end."""
     batch = make_batch([[0.0, 1.0], [0.0, 1.0]])
     batch["next", "episode_reward"] = torch.tensor([1.0, 2.0, 0.0, 1.0])[:, None]
     batch["next", "step_count"] = torch.tensor([6, 7, 1, 2])[:, None]
@@ -86,7 +86,7 @@ def test_lengths_of_whole_episodes_where_they_are_counted():
     assert all(value != value for value in batch_metrics(batch).values())  # NaN
 
 
-def test_no_episode_ends():
+def test_metrics_without_completed_episodes_are_nan():
     batch = make_batch([[0.0, 1.0]])
     batch["next", "episode_reward"] = batch["next", "reward"]
     batch["next", "done"][:] = False
@@ -106,7 +106,7 @@ EPISODES = st.lists(st.lists(st.integers(0, 3), min_size=1, max_size=6), min_siz
 
 @given(EPISODES)
 @settings(max_examples=40, deadline=None)
-def test_rewards_and_lengths_of_any_batch(episodes):
+def test_rewards_and_lengths_of_random_batches(episodes):
     batch = make_batch(episodes)
     rewards = [sum(e) for e in episodes]
     assert episode_rewards(batch).tolist() == rewards
@@ -119,8 +119,8 @@ def test_rewards_and_lengths_of_any_batch(episodes):
 
 @given(st.lists(st.floats(0, 3), max_size=8), st.floats(0, 3), st.floats(0, 1))
 @settings(max_examples=40, deadline=None)
-def test_running_mean_is_its_closed_form(values, old, decay):
-    """decay^n old + (1 - decay) sum of decay^(n - 1 - i) value_i; nothing changes nothing."""
+def test_running_mean_equals_its_closed_form(values, old, decay):
+    """decay^n old + (1 - decay) sum of decay^(n - 1 - i) value_i."""
     n = len(values)
     wanted = decay**n * old
     wanted += (1 - decay) * sum(decay ** (n - 1 - i) * v for i, v in enumerate(values))
@@ -128,7 +128,7 @@ def test_running_mean_is_its_closed_form(values, old, decay):
     assert found == pytest.approx(wanted, abs=1e-9)
 
 
-def test_end_of_an_episode_is_read_at_its_last_frame():
+def test_end_reason_is_read_at_the_last_frame():
     batch = make_batch([[0, 1], [1, 1, 0], [0]])
     reasons = torch.tensor([4, 1, 4, 4, 2, 3])[:, None]
     batch["next", "info"] = TensorDict({"end_reason": reasons}, [6])

@@ -1,4 +1,4 @@
-"""Many worlds at once are as many single ones: Gymnasium's own `SyncVectorEnv` is the yardstick."""
+"""The vector environment equals Gymnasium's `SyncVectorEnv` of single environments."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def make():
 
 
 def assert_same(ours, theirs, where=""):
-    """The same keys, types, shapes and values, however deep."""
+    """Assert equal keys, types, shapes and values, recursively."""
     assert type(ours) is type(theirs), where
     if isinstance(ours, dict):
         assert ours.keys() == theirs.keys(), where
@@ -45,7 +45,7 @@ def assert_same(ours, theirs, where=""):
 
 @pytest.mark.parametrize("observations", ["pixels", "state"])
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_they_are_as_many_single_worlds(make, mode, observations):
+def test_batch_equals_gymnasiums_sync_vector_env(make, mode, observations):
     options = {**SHORT, "observations": observations}
     ours = make(autoreset_mode=mode, **options)
     sync = {"vectorization_mode": "sync", "vector_kwargs": {"autoreset_mode": mode}}
@@ -62,7 +62,7 @@ def test_they_are_as_many_single_worlds(make, mode, observations):
         assert_same(step, theirs.step(actions), f"step {t}")
         ends += [step[2].sum(), step[3].sum()]
         assert step[0] in ours.observation_space
-    assert (ends >= 2).all()  # by the rules, and by the limit
+    assert (ends >= 2).all()  # both terminations and truncations
     assert_same(ours.reset(), theirs.reset(), "reset without a seed")
     seeds = [9, None, 9, 1, None]
     assert_same(ours.reset(seed=seeds)[0][:1], theirs.reset(seed=seeds)[0][:1], "seeds")
@@ -71,7 +71,7 @@ def test_they_are_as_many_single_worlds(make, mode, observations):
         assert one.bit_generator.state == other.bit_generator.state
 
 
-def test_worlds_that_wait_to_be_told(make):
+def test_disabled_autoreset_requires_a_reset(make):
     ours = make(autoreset_mode=AutoresetMode.DISABLED, **SHORT)
     sync = {"vectorization_mode": "sync", "vector_kwargs": {"autoreset_mode": "Disabled"}}
     theirs = make(**sync, **SHORT)
@@ -89,7 +89,7 @@ def test_worlds_that_wait_to_be_told(make):
         ended = step[2] | step[3]
 
 
-def test_the_first_worlds_are_the_same_whatever_their_number(make):
+def test_first_environments_do_not_depend_on_batch_size(make):
     one, many = make(1), make(3)
     assert np.array_equal(one.reset(seed=4)[0][0], many.reset(seed=4)[0][0])
     alone = gymnasium.make(NAME)
@@ -97,7 +97,7 @@ def test_the_first_worlds_are_the_same_whatever_their_number(make):
     alone.close()
 
 
-def test_they_are_drawn_from_behind_where_that_was_asked_for(make):
+def test_render_returns_frames_from_behind(make):
     env = make(2, render_mode="rgb_array")
     env.reset(seed=0)
     assert [frame.shape for frame in env.render()] == [(360, 640, 3)] * 2
@@ -105,7 +105,7 @@ def test_they_are_drawn_from_behind_where_that_was_asked_for(make):
         assert make(2).render() is None
 
 
-def test_gymnasiums_wrappers_go_around_them(make):
+def test_gymnasium_wrappers_work(make):
     env = gymnasium.wrappers.vector.RecordEpisodeStatistics(
         make(**SHORT, autoreset_mode="SameStep")
     )
@@ -127,12 +127,12 @@ def test_gymnasiums_wrappers_go_around_them(make):
         ({"render_mode": "human"}, "render_mode='human' is unknown; give rgb_array"),
     ],
 )
-def test_mistakes_are_told_in_a_line(make, options, message):
+def test_invalid_options_raise_one_line(make, options, message):
     with pytest.raises(InputError, match=f"^{message}"):
         make(**options)
 
 
-def test_mistakes_while_flying(make):
+def test_invalid_calls_raise(make):
     env = make(2)
     with pytest.raises(InputError, match=r"needs a running episode; call reset\(\) first"):
         env.step([0, 0])
@@ -150,14 +150,14 @@ def test_mistakes_while_flying(make):
     env.close()
 
 
-def test_worlds_that_were_never_told_to_start_do_so_in_their_turn(make):
+def test_step_starts_environments_that_were_never_reset(make):
     env = make(2, observations="state", **SHORT)
     env.reset(seed=0, options={"reset_mask": np.array([True, False])})
     *_, info = env.step([0, 0])
     assert info["drone"][:, 0].tolist() == [1.0, 0.0]
 
 
-def test_the_class_takes_settings_too():
+def test_class_accepts_settings():
     env = drone_rl.DroneWorlds(2, drone_rl.TaskSettings(num_cubes=2), step_limit=100)
     assert env.reset(seed=0)[1]["collected"].shape == (2, 2)
     env.close()

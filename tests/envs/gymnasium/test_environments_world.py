@@ -1,4 +1,4 @@
-"""One world by Gymnasium's book, as its own checker and Stable-Baselines3's have it."""
+"""A single environment complies with the checkers of Gymnasium and Stable-Baselines3."""
 
 import pickle
 import warnings
@@ -31,14 +31,14 @@ def make():
 
 
 def put(env, lateral):
-    """Where the cubes of the running episode stand, metres to the left."""
+    """Set the lateral positions of the cubes of the running episode in meters to the left."""
     env.unwrapped.batch.worlds.state.cubes[0, :, 1] = lateral
 
 
 @pytest.mark.parametrize(
     "options", [{}, {"observations": "state"}, {"render_mode": "rgb_array"}, {"num_cubes": 1}]
 )
-def test_gymnasiums_checker_has_nothing_to_say(make, options):
+def test_gymnasiums_checker_passes(make, options):
     from gymnasium.utils.env_checker import check_env
 
     with warnings.catch_warnings():
@@ -46,7 +46,7 @@ def test_gymnasiums_checker_has_nothing_to_say(make, options):
         check_env(make(**options).unwrapped)
 
 
-def test_gymnasiums_checker_and_another_task():
+def test_gymnasiums_checker_passes_for_a_user_task():
     from gymnasium.utils.env_checker import check_env
 
     gymnasium.register("posts-v0", entry_point="drone_rl:DroneWorld", kwargs={"task": Posts()})
@@ -57,7 +57,7 @@ def test_gymnasiums_checker_and_another_task():
 
 
 @pytest.mark.parametrize("options", [{"observations": "state"}, {"camera": WIDE}])
-def test_stable_baselines3s_checker_has_nothing_to_say(make, options):
+def test_stable_baselines3s_checker_passes(make, options):
     reason = "Stable-Baselines3 is not installed"
     checker = pytest.importorskip("stable_baselines3.common.env_checker", reason=reason)
     with warnings.catch_warnings():
@@ -65,7 +65,7 @@ def test_stable_baselines3s_checker_has_nothing_to_say(make, options):
         checker.check_env(make(**options).unwrapped)
 
 
-def test_stable_baselines3s_checker_warns_of_small_pictures_alone(make):
+def test_stable_baselines3s_checker_warns_only_of_small_images(make):
     reason = "Stable-Baselines3 is not installed"
     checker = pytest.importorskip("stable_baselines3.common.env_checker", reason=reason)
     with warnings.catch_warnings(record=True) as caught:
@@ -75,13 +75,13 @@ def test_stable_baselines3s_checker_warns_of_small_pictures_alone(make):
     assert "36x36 for the default `CnnPolicy`" in str(only.message)
 
 
-def test_an_episode_to_its_success(make):
+def test_collecting_all_cubes_terminates_with_success(make):
     env = make(num_cubes=1, first_distance=3.0, front_margin=5.0)
     seen, info = env.reset(seed=0)
     put(env, 0.0)
     assert (seen.shape, seen.dtype, info["cubes"].tolist()) == ((25, 64, 3), np.uint8, [0])
     assert env.step(0)[1:4] == (0.0, False, False)
-    _, reward, terminated, truncated, info = env.step(0)  # 2 m: touches from 1.65 m away
+    _, reward, terminated, truncated, info = env.step(0)  # 2 m ahead; contact starts at 1.65 m
     assert (reward, terminated, truncated) == (1.0, True, False)
     assert (info["is_success"], info["collected"].tolist()) == (True, [True])
     ends = env.unwrapped.batch.worlds.task.ends
@@ -92,7 +92,7 @@ def test_an_episode_to_its_success(make):
     env.step(0)
 
 
-def test_the_step_limit_truncates_once(make):
+def test_step_limit_truncates(make):
     env = make(**SHORT)
     env.reset(seed=0)
     put(env, 6.0)
@@ -108,7 +108,7 @@ def test_out_of_bounds_terminates(make):
     assert (reward, terminated, truncated, info["is_success"]) == (0.0, True, False, False)
 
 
-def test_the_seed_alone_determines_episodes(make):
+def test_episodes_depend_only_on_the_seed(make):
     def episodes(env, seed):
         first = env.reset(seed=seed)[1]["cube_positions"]
         return first, env.reset()[1]["cube_positions"]
@@ -121,7 +121,7 @@ def test_the_seed_alone_determines_episodes(make):
     assert not np.array_equal(*unseeded)
 
 
-def test_returned_arrays_are_the_users(make):
+def test_returned_arrays_are_copies(make):
     env = make(observations="state")
     seen, info = env.reset(seed=1)
     seen[:], info["cube_positions"][:], info["collected"][:] = 7.0, 7.0, True
@@ -129,7 +129,7 @@ def test_returned_arrays_are_the_users(make):
     assert again["cube_positions"][0, 0] == 15.0 and not again["collected"].any()
 
 
-def test_it_draws_the_drone_from_behind_where_that_was_asked_for(make):
+def test_render_returns_a_frame_from_behind(make):
     env = make(render_mode="rgb_array")
     env.reset(seed=0)
     assert env.render().shape == (360, 640, 3)
@@ -139,7 +139,7 @@ def test_it_draws_the_drone_from_behind_where_that_was_asked_for(make):
         assert silent.unwrapped.render() is None
 
 
-def test_a_list_of_pictures_is_gymnasiums_own_doing(make):
+def test_rgb_array_list_is_supported(make):
     env = make(render_mode="rgb_array_list")
     env.reset(seed=0)
     env.step(0)
@@ -155,12 +155,12 @@ def test_a_list_of_pictures_is_gymnasiums_own_doing(make):
         ({"num_cubes": "two"}, "num_cubes='two' is out of range"),
     ],
 )
-def test_mistakes_are_told_in_a_line(make, options, message):
+def test_invalid_options_raise_one_line(make, options, message):
     with pytest.raises(InputError, match=f"^{message}"):
         make(**options)
 
 
-def test_mistakes_while_flying(make):
+def test_invalid_calls_raise(make):
     env = make().unwrapped
     with pytest.raises(InputError, match=r"call reset\(\) first"):
         env.step(0)
@@ -171,10 +171,10 @@ def test_mistakes_while_flying(make):
     env.reset(seed=0)
     with pytest.raises(InputError, match="action=5 is invalid; give one of: 0 forward"):
         env.step(5)
-    env.step(0)  # the episode goes on
+    env.step(0)  # the episode continues
 
 
-def test_it_closes_twice_and_its_spec_makes_it_again(make):
+def test_second_close_is_allowed_and_spec_recreates_the_environment(make):
     env = make(num_cubes=2, camera={"width": 32})
     assert gymnasium.make(env.spec).observation_space.shape == (25, 32, 3)
     assert pickle.loads(pickle.dumps(env.spec)) == env.spec
@@ -183,6 +183,6 @@ def test_it_closes_twice_and_its_spec_makes_it_again(make):
     env.close()
 
 
-def test_the_class_takes_settings_too():
+def test_class_accepts_settings():
     env = drone_rl.DroneWorld(drone_rl.TaskSettings(num_cubes=2), num_cubes=4)
     assert env.reset(seed=0)[1]["collected"].shape == (4,)

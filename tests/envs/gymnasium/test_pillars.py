@@ -1,4 +1,4 @@
-"""The flight through pillars by Gymnasium's book: one world and many."""
+"""The task pillars as Gymnasium environments, single and batched."""
 
 import warnings
 
@@ -17,7 +17,7 @@ SHORT = {"num_rows": 1, "first_distance": 4.0, "finish_margin": 2.0, "step_limit
 @pytest.mark.parametrize(
     "options", [{}, {"observations": "state"}, {"render_mode": "rgb_array"}, {"width": 0.6}]
 )
-def test_gymnasiums_checker_has_nothing_to_say(options):
+def test_gymnasiums_checker_passes(options):
     from gymnasium.utils.env_checker import check_env
 
     with warnings.catch_warnings():
@@ -28,7 +28,7 @@ def test_gymnasiums_checker_has_nothing_to_say(options):
 
 
 @pytest.mark.parametrize("options", [{"observations": "state"}, {"camera": WIDE}])
-def test_stable_baselines3s_checker_has_nothing_to_say(options):
+def test_stable_baselines3s_checker_passes(options):
     reason = "Stable-Baselines3 is not installed"
     checker = pytest.importorskip("stable_baselines3.common.env_checker", reason=reason)
     env = gymnasium.make(NAME, **options)
@@ -38,8 +38,8 @@ def test_stable_baselines3s_checker_has_nothing_to_say(options):
     env.close()
 
 
-def test_a_touch_ends_it_by_the_rules_and_the_limit_cuts_it_off():
-    """Straight on for ever touches a pillar in some world; to and fro never does."""
+def test_touching_a_pillar_terminates_and_the_limit_truncates():
+    """Flying straight ahead touches a pillar; moving left and right never does."""
     ahead = gymnasium.make_vec(NAME, num_envs=8, autoreset_mode="Disabled", density=1.0, **SHORT)
     ahead.reset(seed=0)
     ended = np.zeros(8, bool)
@@ -58,7 +58,7 @@ def test_a_touch_ends_it_by_the_rules_and_the_limit_cuts_it_off():
     aside.close()
 
 
-def test_many_worlds_are_as_many_single_ones():
+def test_batch_equals_single_environments():
     ours = gymnasium.make_vec(NAME, num_envs=3, **SHORT)
     theirs = gymnasium.make_vec(NAME, num_envs=3, vectorization_mode="sync", **SHORT)
     draw = np.random.default_rng(0)
@@ -71,7 +71,7 @@ def test_many_worlds_are_as_many_single_ones():
     theirs.close()
 
 
-def test_what_is_no_field_or_no_option():
+def test_invalid_fields_and_options_raise():
     with pytest.raises(InputError, match=r"num_cubes"):
         gymnasium.make(NAME, num_cubes=2)
     with pytest.raises(InputError, match=r"pillars|density|path"):

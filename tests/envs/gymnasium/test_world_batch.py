@@ -1,4 +1,4 @@
-"""Options, and what is observed of worlds that were put where one wants them."""
+"""Options of the batch, and observations of environments in given states."""
 
 import itertools
 
@@ -23,7 +23,7 @@ def streams(*seeds):
 
 
 @pytest.mark.parametrize("task", [TASK, TaskSettings(num_cubes=5), None])
-def test_settings_of_task_and_camera(task):
+def test_options_set_task_and_camera(task):
     stage = WorldBatch(2, task, {"num_cubes": 2, "camera": {"width": 9}, "device": "cpu"})
     assert stage.worlds.task.settings == TaskSettings(num_cubes=2)
     assert stage.worlds.camera == CameraSettings(width=9)
@@ -50,18 +50,18 @@ def test_settings_of_task_and_camera(task):
         ({"device": "tpu"}, "device=tpu is unknown"),
     ],
 )
-def test_mistakes_name_the_option(options, message):
+def test_invalid_options_are_named(options, message):
     with pytest.raises(InputError, match=f"^{message}"):
         WorldBatch(1, TASK, options)
 
 
-def test_a_task_without_settings_takes_none():
+def test_task_without_settings_rejects_task_options():
     assert WorldBatch(1, Posts(), {}).worlds.task.name == "posts"
     with pytest.raises(InputError, match=r"^num_cubes is unknown; there are: .*observations"):
         WorldBatch(1, Posts(), {"num_cubes": 2})
 
 
-def test_episodes_are_drawn_from_the_streams_alone():
+def test_episodes_depend_only_on_the_streams():
     stage, (one, two) = WorldBatch(2, TASK, {"observations": "state"}), streams(3, 4)
     stage.reset(torch.arange(2), [one, two])
     first = stage.info()["cube_positions"]
@@ -72,7 +72,7 @@ def test_episodes_are_drawn_from_the_streams_alone():
     assert np.array_equal(after[0], first[0]) and not np.array_equal(after[1], first[1])
 
 
-def test_the_state_is_the_truth_in_a_row():
+def test_state_observation_concatenates_the_true_state():
     stage = WorldBatch(1, TASK, {"observations": "state", "num_cubes": 2})
     stage.reset(torch.tensor([0]), streams(0))
     stage.worlds.state.cubes[0, :, 1] = torch.tensor([4.0, -5.0])
@@ -84,7 +84,7 @@ def test_the_state_is_the_truth_in_a_row():
         "cubes": [0],
         "collected": [0, 0],
         "side": [0, -1],
-        "lateral": [4, 0],  # of the second nothing is known yet
+        "lateral": [4, 0],  # the second is unknown yet
         "next_cube": [0],
         "cube_positions": [15, 4, 2.5, 24, -5, 2.5],
         "drone": [0, 1, 2.5],
@@ -99,7 +99,7 @@ def test_the_state_is_the_truth_in_a_row():
     assert (info["end_reason"].tolist(), info["is_success"].tolist()) == ([0], [False])
 
 
-def test_pixels_are_those_of_the_batched_environment():
+def test_pixels_equal_the_batched_environment():
     stage, env = WorldBatch(2, TASK, {}), drone_rl.make_env(2, transforms=())
     env.reset()
     stage.worlds.state = env.base_env.worlds.state
@@ -108,7 +108,7 @@ def test_pixels_are_those_of_the_batched_environment():
     env.close()
 
 
-def test_the_end_is_told_from_being_cut_off():
+def test_terminated_and_truncated_are_distinguished():
     stage = WorldBatch(4, TASK, {})
     ends = stage.worlds.task.ends
     stage.worlds.state.end_reason = torch.tensor(
@@ -120,14 +120,14 @@ def test_the_end_is_told_from_being_cut_off():
     assert stage.info()["is_success"].tolist() == [False, True, False, False]
 
 
-def test_films_show_the_drone_from_behind():
+def test_film_shows_the_drone_from_behind():
     stage = WorldBatch(2, TASK, {"observations": "state", "render_mode": "rgb_array"})
     film = stage.film()
     assert (film.shape, film.dtype) == ((2, 360, 640, 3), np.uint8)
     assert film[0, :, 320].std() > 10  # sky, drone, ground
 
 
-def test_settings_of_dynamics_and_actions(monkeypatch):
+def test_options_set_dynamics_and_actions(monkeypatch):
     floating(monkeypatch)
     given = {"dynamics": {"mode": "simple_flight"}, "actions": {"move_speed": 1.0}}
     made = WorldBatch(1, TASK, given).worlds.dynamics

@@ -1,4 +1,4 @@
-"""Spaces and actions by hand."""
+"""Spaces and actions, compared with hand-written ones."""
 
 import numpy as np
 import pytest
@@ -18,18 +18,18 @@ from drone_rl.envs.gymnasium.world_batch import (  # noqa: E402 (after the skip)
 
 
 class Thrusts:
-    """Two numbers of either sign."""
+    """Actions of two numbers from -1 to 1."""
 
     names = ("roll", "pitch")
     entry = Entry((2,), torch.float32, -1.0, 1.0)
 
 
-def test_a_picture_is_what_the_camera_takes():
+def test_image_space_has_the_size_of_the_camera():
     space = image_space(CameraSettings(width=7, height=5))
     assert space == spaces.Box(0, 255, (5, 7, 3), np.uint8)
 
 
-def test_entries_stand_one_after_the_other_with_their_bounds():
+def test_state_space_concatenates_entries_and_bounds():
     space = vector_space(
         {
             "flags": Entry((2,), torch.bool),
@@ -43,19 +43,19 @@ def test_entries_stand_one_after_the_other_with_their_bounds():
     assert space.dtype == np.float32
 
 
-def test_actions_are_counted_or_bounded():
+def test_action_space_is_discrete_or_bounded():
     assert action_space(MOVES.entry) == spaces.Discrete(3)
     assert action_space(Entry((2,), torch.int64, 0, 4)) == spaces.MultiDiscrete([5, 5])
     assert action_space(Thrusts.entry) == spaces.Box(-1, 1, (2,), np.float32)
 
 
 @pytest.mark.parametrize("given", [2, np.int64(2), np.array(2), torch.tensor(2), np.uint8(2)])
-def test_one_action(given):
+def test_read_action_returns_one_action(given):
     action = read_action(given, MOVES)
     assert (action.shape, action.dtype, int(action)) == ((), torch.int64, 2)
 
 
-def test_an_action_a_world():
+def test_read_action_returns_one_action_per_environment():
     assert read_action([0, 2], MOVES, (2,)).tolist() == [0, 2]
     assert read_action(np.array([[0.5, -1]]), Thrusts(), (1,)).tolist() == [[0.5, -1]]
 
@@ -81,13 +81,13 @@ _BOTH = r"an array of shape \(2,\) of: 0 forward, 1 left, 2 right$"
         ([0.0, 1.0], (2,), _BOTH),
     ],
 )
-def test_what_is_no_action(given, batch, wanted):
+def test_invalid_actions_raise(given, batch, wanted):
     with pytest.raises(InputError, match=f"^action=.* is invalid; give {wanted}") as caught:
         read_action(given, MOVES, batch)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("given", [[0.0, 1.1], [0.0, np.nan], [0.0], 0.5])
-def test_what_is_out_of_bounds(given):
+def test_actions_out_of_bounds_raise(given):
     with pytest.raises(InputError, match=r"shape \(2,\) of: numbers from -1 to 1$"):
         read_action(given, Thrusts())

@@ -1,4 +1,4 @@
-"""The adapter against Stable-Baselines3's own, which steps one world after the other."""
+"""The adapter equals Stable-Baselines3's own, which steps environments in sequence."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def assert_equal(ours, theirs):
 
 
 @pytest.mark.parametrize("observations", ["pixels", "state"])
-def test_it_does_what_their_own_does(make, observations):
+def test_adapter_equals_stable_baselines3s_vec_env(make, observations):
     options = {**SHORT, "observations": observations}
     ours = make(**options)
     theirs = DummyVecEnv([lambda: gymnasium.make(NAME, **options)] * COUNT)
@@ -64,11 +64,11 @@ def test_it_does_what_their_own_does(make, observations):
             else:
                 assert infos[i] == {}
     assert {False, True} == set(cut)
-    assert np.array_equal(ours.reset(), theirs.reset())  # goes on with the streams
+    assert np.array_equal(ours.reset(), theirs.reset())  # the random streams continue
     theirs.close()
 
 
-def test_transforms_are_ours(make):
+def test_transforms_are_applied(make):
     raw, seen = make(**SHORT), make([Gray(), Standardize(), Crop(top=2, bottom=9)], **SHORT)
     assert seen.observation_space.shape == (1, 7, 64)
     for env in (raw, seen):
@@ -90,7 +90,7 @@ def test_transforms_are_ours(make):
 
 
 @pytest.mark.parametrize("algorithm", [sb3.PPO, sb3.A2C])
-def test_ppo_and_a2c_train_on_our_network(make, algorithm):
+def test_ppo_and_a2c_train_our_network(make, algorithm):
     env = VecMonitor(make([Gray(), Standardize()], **SHORT))
     kwargs = {"features_extractor_class": drone_rl.Sb3Trunk, "net_arch": []}
     batch = {"batch_size": 16, "n_epochs": 1} if algorithm is sb3.PPO else {}
@@ -109,24 +109,24 @@ def test_ppo_and_a2c_train_on_our_network(make, algorithm):
         ("MlpPolicy", {"observations": "state"}),
     ],
 )
-def test_their_own_policies_train_on_it_and_on_one_world(make, policy, options):
+def test_stable_baselines3s_policies_train(make, policy, options):
     for env in (make(**SHORT, **options), gymnasium.make(NAME, **SHORT, **options)):
         model = sb3.PPO(policy, env, n_steps=8, batch_size=8, n_epochs=1, seed=0).learn(16)
         assert model.num_timesteps >= 16
         env.close()
 
 
-def test_what_can_be_asked_of_worlds(make):
+def test_environment_attributes_are_accessible(make):
     env = make(num_envs=2, render_mode="rgb_array")
     env.reset()
     assert env.render_mode == "rgb_array"
     assert env.get_attr("render_mode", 1) == ["rgb_array"]
-    assert env.render().shape == (720, 640, 3)  # one below the other
+    assert env.render().shape == (720, 640, 3)  # frames are stacked vertically
     assert env.env_is_wrapped(gymnasium.Wrapper) == [False, False]
     assert not env.has_attr("wind")
 
 
-def test_mistakes_are_told_in_a_line(make):
+def test_invalid_options_raise_one_line(make):
     with pytest.raises(InputError, match=r"^autoreset_mode=NextStep, but Stable-Baselines3 needs"):
         drone_rl.Sb3Worlds(gymnasium.make_vec(NAME, num_envs=2))
     with pytest.raises(InputError, match=r"^transforms stack frames; use .* VecFrameStack$"):
@@ -145,7 +145,7 @@ def test_mistakes_are_told_in_a_line(make):
         env.reset()
 
 
-def test_without_it_one_line_tells_what_to_install(monkeypatch):
+def test_missing_extra_raises_with_install_command(monkeypatch):
     import sys
 
     for name in [*sys.modules]:

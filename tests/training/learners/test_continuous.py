@@ -1,4 +1,4 @@
-"""Continuous actions are learned by what learns discrete ones; gradients by hand."""
+"""The learners support continuous actions; gradients are computed by hand."""
 
 import math
 
@@ -20,7 +20,7 @@ from tests.continuous import SETTINGS, make_env, make_policy
 ACTIONS = ContinuousActions.of(SETTINGS)
 SHAPE = (1, 1, 2)
 DEVIATION = math.exp(-0.5)
-"""Of each number of an untrained policy."""
+"""Standard deviation of each component for an untrained policy."""
 
 
 def generator(seed=0):
@@ -29,7 +29,7 @@ def generator(seed=0):
 
 @pytest.fixture
 def policy():
-    """Linear, with weights of zero: means 0 and deviations exp(-0.5) whatever it sees."""
+    """Return a linear policy with zero weights: means 0, deviations exp(-0.5) everywhere."""
     network = MLP(SHAPE, 6, hidden=(), generator=generator())
     network.actions = ACTIONS
     torch.nn.init.zeros_(network.layers[-1].weight)
@@ -46,37 +46,37 @@ def steps(count=7):
     return TensorDict({"pixels": pixels, "action": action, "return_to_go": returns}, [count])
 
 
-def pushes(action):
-    """d log p / d outputs, where these are 0. Shape: (n, 6).
+def log_prob_gradient(action):
+    """Return d log p / d outputs at outputs of 0. Shape: (n, 6).
 
-    Of the mean (u - 0) / s^2, of the deviation's output (z^2 - 1) times its logarithm's slope.
+    For the mean it is (u - 0) / s^2, for the deviation (z^2 - 1) times the slope of its logarithm.
     """
     number = action.atanh()
     return torch.cat([number / DEVIATION**2, ((number / DEVIATION) ** 2 - 1) * 5 / 12], -1)
 
 
-def test_reinforces_gradient_is_the_analytic_one(policy):
+def test_reinforce_gradient_equals_the_analytic_one(policy):
     network, actor = policy
     batch = steps()
     ReinforceLoss(actor)(batch)["loss_actor"].backward()
-    weighted = pushes(batch["action"]) * batch["return_to_go"]
+    weighted = log_prob_gradient(batch["action"]) * batch["return_to_go"]
     expected = -(weighted.T @ batch["pixels"].reshape(7, 2)) / 7
     torch.testing.assert_close(network.layers[-1].weight.grad, expected, rtol=1e-4, atol=1e-5)
 
 
-def test_the_entropy_bonus_raises_the_entropy_of_actions(policy):
+def test_entropy_bonus_increases_action_entropy(policy):
     network, actor = policy
     batch = steps()
     ReinforceLoss(actor, entropy_coeff=0.1)(batch)["loss_entropy"].backward()
     bias = torch.zeros(6, requires_grad=True)
     (-0.1 * SquashedNormal(bias).entropy()).backward()
     torch.testing.assert_close(network.layers[-1].bias.grad, bias.grad)
-    assert (bias.grad[3:] < 0).all()  # deviations are below those of the most uniform actions
-    assert bias.grad[:3].abs().max() < 1e-6  # and means in the middle
+    assert (bias.grad[3:] < 0).all()  # a larger deviation makes actions more uniform
+    assert bias.grad[:3].abs().max() < 1e-6  # means are central
 
 
 @pytest.mark.parametrize("kind", [A2CLoss, ClipPPOLoss])
-def test_before_the_first_step_a_critics_gradient_is_the_policys(policy, kind):
+def test_actor_critic_gradient_before_the_first_step_is_the_policy_gradient(policy, kind):
     network, _ = policy
     model = ActorCritic(network, None, generator())
     learner = learner_of(network, model, kind)
@@ -90,7 +90,9 @@ def test_before_the_first_step_a_critics_gradient_is_the_policys(policy, kind):
         values = model.critic(model.trunk(given.clone()))["state_value"]
     given = given.set("advantage", advantage).set("value_target", values)
     learner._losses(given)["loss_objective"].backward()
-    expected = -((pushes(batch["action"]) * advantage).T @ batch["pixels"].reshape(7, 2)) / 7
+    expected = (
+        -((log_prob_gradient(batch["action"]) * advantage).T @ batch["pixels"].reshape(7, 2)) / 7
+    )
     torch.testing.assert_close(network.layers[-1].weight.grad, expected, rtol=1e-4, atol=1e-5)
 
 
@@ -106,8 +108,8 @@ def learner_of(network, model, kind, rate=0.02, **kwargs):
     )
 
 
-def test_reinforces_mean_gradient_is_that_of_the_expected_reward(policy):
-    """One step that earns its forward number: dJ / d mean = E[1 - tanh^2], by a fine sum."""
+def test_reinforce_mean_gradient_equals_that_of_the_expected_reward(policy):
+    """The reward is the forward component, so dJ / d mean = E[1 - tanh^2], by quadrature."""
     network, actor = policy
     number = torch.linspace(-8, 8, 10_001, dtype=torch.float64) * DEVIATION
     weight = (-0.5 * (number / DEVIATION) ** 2).exp()
@@ -128,8 +130,8 @@ def test_reinforces_mean_gradient_is_that_of_the_expected_reward(policy):
 
 
 @pytest.mark.parametrize("kind", [None, A2CLoss, ClipPPOLoss])
-def test_a_step_that_earns_most_at_one_action_leads_there(policy, kind):
-    """-|a - target|^2 is what an action earns; the policy gets near, and surer of itself."""
+def test_policy_converges_to_the_best_action(policy, kind):
+    """The reward is -|a - target|^2; the policy approaches the target with smaller deviations."""
     network, actor = policy
     target = torch.tensor([0.5, -0.3, 0.0])
     if kind is None:
@@ -141,23 +143,23 @@ def test_a_step_that_earns_most_at_one_action_leads_there(policy, kind):
         model = ActorCritic(network, None, generator())
         learner = learner_of(network, model, kind, epochs=2)
         estimate = learner.estimate
-    told = {}
+    metrics = {}
     for _ in range(120):
         batch = actor(TensorDict({"pixels": torch.ones(128, *SHAPE)}, [128]))
         reward = -((batch["action"] - target) ** 2).sum(-1, keepdim=True)
         ends = torch.ones(128, 1, dtype=torch.bool)
         after = {"pixels": batch["pixels"], "reward": reward, "done": ends, "terminated": ends}
         batch = batch.exclude("logits").set("next", TensorDict(after, [128]))
-        told = learner.update(estimate(batch if kind is None else batch.unsqueeze(1)))
+        metrics = learner.update(estimate(batch if kind is None else batch.unsqueeze(1)))
     with torch.no_grad():
         outputs = network(torch.ones(1, *SHAPE))
         assert (ACTIONS.greedy(outputs)[0] - target).abs().max() < 0.12
         assert SquashedNormal(outputs).scale.max() < 0.45 < DEVIATION
-    assert all(math.isfinite(value) for value in told.values())
+    assert all(math.isfinite(value) for value in metrics.values())
 
 
 @pytest.mark.parametrize("kind", ["reinforce", "ppo"])
-def test_a_policy_learns_to_fly_to_a_cube(kind):
+def test_policy_learns_to_reach_a_cube(kind):
     env, unseen = make_env(32), make_env(50, seed=9)
     network, actor = make_policy(env)
 

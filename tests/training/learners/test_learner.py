@@ -1,4 +1,4 @@
-"""A second learner fits: a critic, batches of fixed length and two passes over each."""
+"""A user-defined learner: a critic, batches of fixed length and two epochs per batch."""
 
 import pytest
 import torch
@@ -20,7 +20,7 @@ GAMMA, PASSES = 0.9, 2
 
 
 class CriticLearner:
-    """One-step actor-critic that bootstraps where an episode goes on or was cut."""
+    """One-step actor-critic that bootstraps unless the episode terminated."""
 
     in_keys = ("observation", "action", *(("next", k) for k in ("observation", "reward")))
 
@@ -76,7 +76,7 @@ def make_actor():
 
 @pytest.fixture
 def trainer(tmp_path):
-    """On TorchRL's own collector: 4 worlds, 5 steps of each a batch, episodes of up to 3."""
+    """Return a trainer with TorchRL's collector: 4 environments, 5 steps, episodes of up to 3."""
     actor = make_actor()
     collector = Collector(
         TransformedEnv(ThreeStateEnv(4), RewardSum()),
@@ -96,19 +96,19 @@ def trainer(tmp_path):
 
 
 def leaving(learner):
-    """Probability of the action that earns something, in state 0."""
+    """Return the probability of the rewarded action in state 0."""
     start = TensorDict({"observation": torch.tensor([1.0, 0.0, 0.0])}, [])
     return float(learner.actor.get_dist(start).probs[1].detach())
 
 
-def test_a_critic_learns_from_pieces_of_episodes(trainer, tmp_path):
+def test_critic_learns_from_partial_episodes(trainer, tmp_path):
     before = leaving(trainer.learner)
     assert trainer.run() == "frames"
     assert leaving(trainer.learner) > max(before, 0.9)
     progress = trainer.progress
     assert (progress.frames, progress.updates) == (4000, 200)
     assert 4000 / 3 - 4 <= progress.episodes <= 4000
-    assert 0.5 < progress.running_reward < 0.95  # at best 0.75
+    assert 0.5 < progress.running_reward < 0.95  # the optimum is 0.75
     state = load_checkpoint(tmp_path / "last.pt")
     assert {"policy", "critic", "optimiser", "progress"} <= set(state)
     again = CriticLearner(make_actor())
@@ -116,7 +116,7 @@ def test_a_critic_learns_from_pieces_of_episodes(trainer, tmp_path):
     assert leaving(again) == leaving(trainer.learner)
 
 
-def test_training_ends_with_its_collector(trainer):
+def test_training_ends_with_the_collector(trainer):
     batches = [next(iter(trainer.collector)) for _ in range(2)]
     trainer.collector = batches
     trainer.collector = type("Two", (list,), {"state_dict": dict})(batches)
@@ -124,7 +124,7 @@ def test_training_ends_with_its_collector(trainer):
     assert (trainer.progress.updates, trainer.progress.frames) == (2, 40)
 
 
-def test_batch_without_what_the_learner_needs(trainer):
+def test_batch_without_learner_inputs_raises(trainer):
     batch = next(iter(trainer.collector))
     check_batch(batch, trainer.learner)
     del batch["next", "observation"]
@@ -133,7 +133,7 @@ def test_batch_without_what_the_learner_needs(trainer):
         check_batch(batch, trainer.learner)
 
 
-def test_pieces_of_episodes_need_their_sums(trainer):
+def test_partial_episodes_need_reward_sums(trainer):
     batch = next(iter(trainer.collector))
     del batch["next", "episode_reward"]
     trainer.collector = type("One", (list,), {"state_dict": dict})([batch])
@@ -143,7 +143,7 @@ def test_pieces_of_episodes_need_their_sums(trainer):
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
-def test_no_number(value):
+def test_nan_or_infinite_values_raise(value):
     check_finite(torch.zeros(2), "loss")
     with pytest.raises(NotANumberError, match=r"^loss is NaN or infinite$"):
         check_finite(torch.tensor([0.0, value]), "loss")

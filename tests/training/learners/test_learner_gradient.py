@@ -1,4 +1,4 @@
-"""A gradient in pieces is that of the whole; a step only along numbers."""
+"""Accumulated gradients equal those of the whole batch; NaN gradients are rejected."""
 
 import pytest
 import torch
@@ -11,7 +11,7 @@ X = torch.tensor([[1.0], [2.0], [6.0]])
 
 
 def squares(layer, reduce=torch.mean):
-    """The loss (w x)^2, and a figure beside it."""
+    """Return the loss (w x)^2 and a metric."""
 
     def losses(chunk):
         value = reduce(layer(chunk["x"]).square())
@@ -28,7 +28,7 @@ def one_weight(value=1.0):
 
 @pytest.mark.parametrize("chunk", [1, 2, 3, 100])
 @pytest.mark.parametrize(("is_sum", "wanted"), [(False, 41 / 3), (True, 41.0)])
-def test_gradient_and_terms_by_hand(chunk, is_sum, wanted):
+def test_gradient_and_terms_match_hand_computed_values(chunk, is_sum, wanted):
     """1 + 4 + 36 = 41; the gradient of w^2 s at w = 1 is 2 s."""
     layer = one_weight()
     losses = squares(layer, torch.sum if is_sum else torch.mean)
@@ -38,7 +38,7 @@ def test_gradient_and_terms_by_hand(chunk, is_sum, wanted):
 
 
 @pytest.mark.parametrize(("most", "step"), [(None, 6.0), (10.0, 6.0), (1.5, 1.5)])
-def test_a_step_is_as_long_as_it_may_be(most, step):
+def test_gradient_norm_is_clipped(most, step):
     layer = one_weight()
     layer.weight.grad = torch.tensor([[6.0]])
     optimiser = torch.optim.SGD(layer.parameters(), lr=1.0)
@@ -46,7 +46,7 @@ def test_a_step_is_as_long_as_it_may_be(most, step):
     assert float(layer.weight.detach()) == pytest.approx(1.0 - step)
 
 
-def test_no_number():
+def test_nan_gradient_raises_without_a_step():
     layer = one_weight(float("nan"))
     with pytest.raises(NotANumberError, match=r"^loss_square is NaN"):
         accumulate(TensorDict({"x": X}, [3]), squares(layer), 2)

@@ -1,4 +1,4 @@
-"""One step of the optimiser, whatever the size of a batch and of its chunks."""
+"""One optimizer step for each batch, independent of the minibatch size."""
 
 import copy
 
@@ -12,7 +12,7 @@ from drone_rl.utils.errors import InputError
 
 
 @pytest.mark.parametrize("reduction", ["mean", "sum"])
-def test_minibatches_add_up_to_the_whole_batch(make_trainer, reduction):
+def test_minibatch_gradients_sum_to_the_batch_gradient(make_trainer, reduction):
     gradients = []
     for size in (10_000, 3):
         trainer = make_trainer(minibatch_frames=size)
@@ -25,7 +25,7 @@ def test_minibatches_add_up_to_the_whole_batch(make_trainer, reduction):
 
 
 @pytest.mark.parametrize("size", [1, 3, 7, 10_000])
-def test_every_frame_is_learned_from_once(make_trainer, size):
+def test_every_frame_is_used_once(make_trainer, size):
     """The loss reads every frame of the batch once, in order."""
     trainer = make_trainer(minibatch_frames=size)
     learner, batch = trainer.learner, trainer.collector.collect()
@@ -46,7 +46,7 @@ def test_every_frame_is_learned_from_once(make_trainer, size):
 
 
 @pytest.mark.parametrize("reduction", ["mean", "sum"])
-def test_loss_terms_add_up_over_minibatches(make_trainer, reduction):
+def test_loss_terms_are_summed_over_minibatches(make_trainer, reduction):
     terms = []
     for size in (10_000, 3):
         trainer = make_trainer(minibatch_frames=size)
@@ -59,18 +59,18 @@ def test_loss_terms_add_up_over_minibatches(make_trainer, reduction):
 def test_gradient_is_clipped_to_the_norm(make_trainer):
     trainer = make_trainer(max_grad_norm=1e-3)
     norm = trainer.learner.update(trainer.collector.collect())["loss/grad_norm"]
-    assert norm > 1e-3  # as it was before
+    assert norm > 1e-3  # before clipping
     clipped = torch.cat([p.grad.flatten() for p in trainer.learner.network.parameters()]).norm()
     assert float(clipped) == pytest.approx(1e-3, rel=1e-3)
 
 
-def test_what_a_batch_must_hold(make_trainer):
-    """What the loss reads, including the returns that the collector's estimator writes."""
+def test_in_keys_include_returns(make_trainer):
+    """The keys include the returns that the collector's estimator writes."""
     assert set(make_trainer().learner.in_keys) == {"return_to_go", "action", "pixels"}
 
 
-def test_a_step_by_hand(make_trainer):
-    """One frame, return 2: the gradient of -2 log p(a) is 2 (p - onehot(a)), and SGD follows it."""
+def test_sgd_step_matches_the_hand_computed_one(make_trainer):
+    """One frame with return 2: the gradient of -2 log p(a) is 2 (p - onehot(a))."""
     learner = make_trainer().learner
     learner.optimiser = torch.optim.SGD(learner.network.parameters(), lr=0.5)
     learner.scheduler = None
@@ -87,7 +87,7 @@ def test_a_step_by_hand(make_trainer):
     assert metrics["train/learning_rate"] == 0.5
 
 
-def test_rate_told_is_that_of_the_next_step(make_trainer):
+def test_reported_learning_rate_is_that_of_the_next_step(make_trainer):
     trainer = make_trainer()
     rates = [
         trainer.learner.update(trainer.collector.collect())["train/learning_rate"] for _ in range(4)
@@ -95,7 +95,7 @@ def test_rate_told_is_that_of_the_next_step(make_trainer):
     assert rates == pytest.approx([0.05, 0.045, 0.045, 0.0405])
 
 
-def test_not_a_number_changes_nothing(make_trainer):
+def test_nan_changes_nothing(make_trainer):
     trainer = make_trainer()
     learner, batch = trainer.learner, trainer.collector.collect()
     before = copy.deepcopy(learner.network.state_dict())
@@ -114,15 +114,15 @@ def test_not_a_number_changes_nothing(make_trainer):
         ("scheduler", None, "scheduler has other names"),
     ],
 )
-def test_state_of_another_learner_is_refused(make_trainer, part, value, message):
+def test_state_of_another_learner_raises(make_trainer, part, value, message):
     learner = make_trainer().learner
     with pytest.raises(InputError, match=message):
         learner.check_state({**learner.state_dict(), part: value})
     learner.check_state(learner.state_dict())
 
 
-def test_steps_of_unknown_return_change_nothing(make_trainer):
-    """Two rows of 3 steps, the second of which goes on: the update is that of the other 4."""
+def test_masked_steps_do_not_change_the_update(make_trainer):
+    """In two rows of 3 steps, 2 steps have no known return; the update uses the other 4."""
     weights = []
     for pieces in (True, False):
         learner = make_trainer(minibatch_frames=2).learner
