@@ -27,35 +27,35 @@ def build(seed=0):
     return make_actor(Fixed(), Categorical(3), torch.Generator().manual_seed(seed))
 
 
-def test_samples_with_the_given_probabilities_by_default():
+def test_samples_by_the_probabilities_by_default():
     shares = torch.bincount(act(build()), minlength=3) / 20_000
     expected = torch.tensor([0.1, 0.7, 0.2])
     deviation = (expected * (1 - expected) / 20_000).sqrt()
     assert ((shares - expected).abs() < 4 * deviation).all()
 
 
-def test_greedy_takes_the_most_probable():
+def test_deterministic_exploration_takes_the_most_probable_action():
     with set_exploration_type(ExplorationType.DETERMINISTIC):
         assert (act(build()) == 1).all()
 
 
 @pytest.mark.parametrize("how", [ExplorationType.RANDOM, ExplorationType.DETERMINISTIC])
-def test_the_straight_way_ends_where_torchrls_own_does(how):
+def test_fast_path_equals_torchrls_actor(how):
     pixels = TensorDict({"pixels": torch.zeros(500, 1)}, [500])
-    straight, around = build(3), build(3)
+    fast_actor, around = build(3), build(3)
     with set_exploration_type(how):
-        one, two = straight(pixels.clone()), ProbabilisticActor.forward(around, pixels.clone())
+        one, two = fast_actor(pixels.clone()), ProbabilisticActor.forward(around, pixels.clone())
     assert set(one.keys()) == set(two.keys()) == {"pixels", "logits", "action"}
     assert all(torch.equal(one[key], two[key]) for key in ("logits", "action"))
 
 
-def test_other_ways_to_explore_are_left_to_torchrl():
+def test_other_exploration_types_use_torchrls_actor():
     with set_exploration_type(ExplorationType.MODE):
         assert (act(build(), n=3) == 1).all()
     assert build()(pixels=torch.zeros(2, 1))[1].shape == (2,)  # logits, action
 
 
-def test_draws_from_its_own_generator_alone():
+def test_samples_use_only_the_own_generator():
     torch.manual_seed(0)
     before = torch.get_rng_state()
     first = act(build(1))
@@ -64,7 +64,7 @@ def test_draws_from_its_own_generator_alone():
     assert not torch.equal(first, act(build(2)))
 
 
-def test_copies_share_one_stream():
+def test_copies_share_the_random_stream():
     source = RandomSource(torch.Generator().manual_seed(0))
     one = SeededCategorical(torch.zeros(100, 3), source).sample()
     two = SeededCategorical(torch.zeros(100, 3), copy.deepcopy(source)).sample()
@@ -78,7 +78,7 @@ def test_log_prob_and_entropy():
 
 
 class Leaning(nn.Module):
-    """Means 0, 1 and -1 of deviation exp(-0.5)."""
+    """A network with means 0, 1 and -1 and deviation exp(-0.5)."""
 
     def forward(self, pixels):
         outputs = torch.tensor([0.0, *(sign * 3 * math.atanh(1 / 3) for sign in (1, -1)), 0, 0, 0])
@@ -90,7 +90,7 @@ def lean(seed=0):
     return make_actor(Leaning(), spec, torch.Generator().manual_seed(seed))
 
 
-def test_numbers_within_bounds_are_drawn_from_squashed_normals():
+def test_continuous_actions_are_sampled_from_squashed_normals():
     drawn = act(lean())
     assert drawn.shape == (20_000, 3) and drawn.dtype == torch.float32
     normal = drawn.double().atanh()
@@ -102,14 +102,14 @@ def test_numbers_within_bounds_are_drawn_from_squashed_normals():
 
 
 @pytest.mark.parametrize("how", [ExplorationType.RANDOM, ExplorationType.DETERMINISTIC])
-def test_of_numbers_too_the_straight_way_ends_where_torchrls_own_does(how):
+def test_fast_path_equals_torchrls_actor_for_continuous_actions(how):
     pixels = TensorDict({"pixels": torch.zeros(500, 1)}, [500])
-    straight, around = lean(3), lean(3)
+    fast_actor, around = lean(3), lean(3)
     with set_exploration_type(how):
-        one, two = straight(pixels.clone()), ProbabilisticActor.forward(around, pixels.clone())
+        one, two = fast_actor(pixels.clone()), ProbabilisticActor.forward(around, pixels.clone())
     assert all(torch.equal(one[key], two[key]) for key in ("logits", "action"))
 
 
-def test_the_type_of_actions_says_how_they_are_drawn():
+def test_distribution_follows_from_the_action_type():
     assert distribution_of(torch.int64) is SeededCategorical
     assert distribution_of(torch.float32) is SquashedNormal

@@ -1,4 +1,4 @@
-"""What policies out of files and from elsewhere have in common."""
+"""Behavior common to stored and external policies."""
 
 import pytest
 
@@ -6,15 +6,15 @@ import drone_rl
 from drone_rl.policies.base_policy import Pilot
 
 
-def straight_on(pictures):
+def straight_on(images):
     import torch
 
-    return torch.tensor([1.0, 0.0, 0.0]).expand(len(pictures), 3)
+    return torch.tensor([1.0, 0.0, 0.0]).expand(len(images), 3)
 
 
 @pytest.mark.parametrize("make", [lambda: drone_rl.load_policy("good"),
                                   lambda: drone_rl.policy_from(straight_on)])  # fmt: skip
-def test_worlds_are_closed_when_the_flights_end_or_fail(make):
+def test_environment_is_closed_at_the_end_or_on_failure(make):
     policy = make()
     assert isinstance(policy, Pilot)
     with pytest.raises(KeyError), policy.in_task(num_cubes=2).flying(3, seed=4) as (env, actor):
@@ -25,7 +25,7 @@ def test_worlds_are_closed_when_the_flights_end_or_fail(make):
     assert env.is_closed
 
 
-def test_where_they_come_from():
+def test_origin_of_policies():
     good = drone_rl.load_policy("good").origin
     assert good["policy"].endswith("good.safetensors")
     assert good["trained"]["progress"]["frames"] > 0

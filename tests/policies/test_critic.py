@@ -1,4 +1,4 @@
-"""A policy taken apart is the same policy; a critic shares its trunk, or nothing."""
+"""Trunk and heads of actor-critic networks; the critic shares the trunk or nothing."""
 
 import copy
 
@@ -30,7 +30,7 @@ def seen(model, count=5):
     return pixels, model.critic(model.trunk(TensorDict({"pixels": pixels}, [count])))
 
 
-def test_a_policy_taken_apart_is_the_same_policy(network):
+def test_trunk_and_head_equal_the_policy(network):
     model = ActorCritic(network)
     pixels, steps = seen(model)
     chances = model.actor.get_dist(steps)
@@ -41,7 +41,7 @@ def test_a_policy_taken_apart_is_the_same_policy(network):
     torch.testing.assert_close(acted[LOG_PROB], picked)
 
 
-def test_any_number_of_batch_dimensions(network):
+def test_batch_dimensions_are_supported(network):
     model = ActorCritic(network)
     pixels, steps = seen(model, 6)
     rows = TensorDict({"pixels": pixels.reshape(2, 3, *SHAPE)}, [2, 3])
@@ -49,7 +49,7 @@ def test_any_number_of_batch_dimensions(network):
     torch.testing.assert_close(found["state_value"].reshape(6, 1), steps["state_value"])
 
 
-def test_a_shared_trunk_has_one_layer_for_the_critic_and_learns_from_both(network):
+def test_shared_trunk_has_gradients_of_policy_and_critic(network):
     model = ActorCritic(network, generator=generator())
     own = {name: p for name, p in model.critic.named_parameters()}
     assert {tuple(p.shape) for p in own.values()} == {(1, 8), (1,)}
@@ -64,7 +64,7 @@ def test_a_shared_trunk_has_one_layer_for_the_critic_and_learns_from_both(networ
     assert network.layers[-1].weight.grad is None
 
 
-def test_a_critic_of_its_own_shares_nothing(network):
+def test_separate_critic_shares_no_parameters(network):
     own = copy.deepcopy(network)
     own.layers[-1] = nn.Linear(8, 1)
     model = ActorCritic(network, own)
@@ -75,7 +75,7 @@ def test_a_critic_of_its_own_shares_nothing(network):
     assert all(p.grad is not None for p in own.parameters())
 
 
-def test_the_parameters_are_those_of_the_policy_that_collects(network):
+def test_parameters_are_shared_with_the_collecting_policy(network):
     model = ActorCritic(network)
     pixels, _ = seen(model)
     before = network(pixels)
@@ -86,7 +86,7 @@ def test_the_parameters_are_those_of_the_policy_that_collects(network):
     assert not torch.equal(network(pixels), before)
 
 
-def test_the_first_values_are_small_and_of_the_generator(network):
+def test_initial_values_are_small_and_seeded(network):
     values = [seen(ActorCritic(network, generator=generator(s)))[1]["state_value"] for s in (3, 3)]
     assert torch.equal(*values)
     assert 0 < values[0].abs().max() < 0.1
@@ -94,6 +94,6 @@ def test_the_first_values_are_small_and_of_the_generator(network):
     assert not torch.equal(values[0], other)
 
 
-def test_a_network_that_is_not_made_of_layers():
+def test_network_without_layers_raises():
     with pytest.raises(InputError, match=r"policy of layers, which Linear is not; derive it from"):
         ActorCritic(nn.Linear(4, 2))

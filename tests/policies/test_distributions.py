@@ -20,8 +20,8 @@ def torchs(outputs):
     return Independent(TransformedDistribution(Normal(mean, deviation), squash), 1)
 
 
-def test_the_density_by_hand():
-    """Mean 0 and deviation exp(-0.5): at tanh(1), log N(1; 0, exp(-1)) - log(1 - tanh(1)^2)."""
+def test_density_matches_hand_computed_value():
+    """With mean 0, deviation exp(-0.5), at tanh(1): log N(1; 0, exp(-1)) - log(1 - tanh(1)^2)."""
     value = math.tanh(1.0)
     by_hand = -0.5 * math.e + 0.5 - 0.5 * math.log(2 * math.pi) - math.log(1 - value**2)
     one = SquashedNormal(torch.zeros(2, dtype=torch.float64))
@@ -31,7 +31,7 @@ def test_the_density_by_hand():
     assert there.item() == pytest.approx(3 * by_hand)
 
 
-def test_the_density_is_that_of_torchs_transformed_distribution():
+def test_density_equals_torchs_transformed_distribution():
     values = torch.tensor([[0.0, 0.5, -0.9], [0.999, -0.9999, 0.3]], dtype=torch.float64)
     expected = torchs(OUTPUTS).log_prob(values)
     torch.testing.assert_close(SquashedNormal(OUTPUTS).log_prob(values), expected)
@@ -39,14 +39,14 @@ def test_the_density_is_that_of_torchs_transformed_distribution():
     torch.testing.assert_close(single.double(), expected, rtol=2e-3, atol=1e-3)
 
 
-def test_the_density_adds_up_to_one():
+def test_density_integrates_to_one():
     grid = torch.linspace(-1, 1, 400_001, dtype=torch.float64)[1:-1, None]
     for outputs in ((0.0, 0.0), (1.0, -2.0), (-2.0, 9.0)):
         density = SquashedNormal(torch.tensor(outputs, dtype=torch.float64)).log_prob(grid).exp()
         assert (density.sum() * 2 / 400_000).item() == pytest.approx(1, abs=2e-3)
 
 
-def test_at_the_bounds_it_stays_a_number():
+def test_log_prob_is_finite_at_the_bounds():
     given = SquashedNormal(OUTPUTS.float().requires_grad_())
     for bound in (-1.0, 1.0):
         density = given.log_prob(torch.full((2, 3), bound))
@@ -56,10 +56,10 @@ def test_at_the_bounds_it_stays_a_number():
     assert far.abs().max() <= MOST and far.dtype == torch.float32
 
 
-def test_gradients_are_the_analytic_ones():
-    """By the outputs at 0: d log p / d mean = (u - m) / s^2; by log s: z^2 - 1, times 5 / 12.
+def test_gradients_equal_the_analytic_ones():
+    """At outputs of 0: d log p / d mean = (u - m) / s^2; d log p / d log s = z^2 - 1, times 5 / 12.
 
-    The logarithm goes from -3 to 0 and is -0.5 at 0: a share of 5/6, of slope 3 * 5/6 * 1/6.
+    log s ranges from -3 to 0 and is -0.5 at 0: a sigmoid of 5/6 with slope 3 * 5/6 * 1/6.
     """
     outputs = torch.zeros(2, dtype=torch.float64, requires_grad=True)
     SquashedNormal(outputs).log_prob(torch.tensor([0.5], dtype=torch.float64).tanh()).backward()
@@ -72,7 +72,7 @@ def test_gradients_are_the_analytic_ones():
     assert torch.autograd.gradcheck(lambda o: SquashedNormal(o).entropy(), free)
 
 
-def test_the_entropy_is_the_mean_of_minus_the_log_density():
+def test_entropy_equals_the_mean_negative_log_density():
     generator = torch.Generator().manual_seed(0)
     given = SquashedNormal(OUTPUTS, RandomSource(generator))
     drawn = given.loc + given.scale * torch.randn(200_000, 2, 3, generator=generator).double()
@@ -81,8 +81,8 @@ def test_the_entropy_is_the_mean_of_minus_the_log_density():
     assert ((values.mean(0) - given.entropy()).abs() < 4 * error + 1e-3).all()
 
 
-def test_the_entropy_is_greatest_where_actions_are_about_uniform():
-    """Log 2 is that of the uniform distribution; tanh of a normal comes within 0.01 of it."""
+def test_entropy_is_greatest_for_nearly_uniform_actions():
+    """The entropy of the uniform distribution is log 2; tanh of a normal reaches it within 0.01."""
     logs = torch.linspace(-12, 12, 200, dtype=torch.float64)
     entropy = SquashedNormal(torch.stack([torch.zeros(200).double(), logs], -1)).entropy()
     assert math.log(2) - 0.01 < entropy.max() <= math.log(2)
@@ -90,7 +90,7 @@ def test_the_entropy_is_greatest_where_actions_are_about_uniform():
     assert mean[0] > mean[1]
 
 
-def test_what_is_drawn_has_the_mean_and_the_deviation_that_outputs_ask_for():
+def test_samples_have_the_configured_mean_and_deviation():
     source = RandomSource(torch.Generator().manual_seed(0))
     given = SquashedNormal(torch.tensor([1.0, -0.5, 0.0, 0.0, -2.0, 9.0]), source)
     drawn = given.sample((40_000,)).double().atanh()
@@ -98,7 +98,7 @@ def test_what_is_drawn_has_the_mean_and_the_deviation_that_outputs_ask_for():
     assert (drawn.std(0) / given.scale - 1).abs().max() < 4 / 280
 
 
-def test_draws_are_its_own_and_copies_go_on_with_them():
+def test_samples_use_an_own_stream_shared_by_copies():
     torch.manual_seed(0)
     before = torch.get_rng_state()
     source = RandomSource(torch.Generator().manual_seed(1))

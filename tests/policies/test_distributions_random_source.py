@@ -6,7 +6,7 @@ from torch import nn
 from drone_rl.policies.distributions import RandomSource
 
 
-def test_a_copy_is_the_same_stream():
+def test_copy_shares_the_stream():
     module = nn.Module()
     module.source = RandomSource(torch.Generator().manual_seed(0))
     other = copy.deepcopy(module)

@@ -15,7 +15,7 @@ from tests.fake_flight import floating
 from tests.second_dynamics import Turning
 
 
-def test_worlds_as_policies_see_them():
+def test_specs_of_a_policys_environment():
     env = drone_rl.make_env(2, task=drone_rl.TaskSettings(num_cubes=2), seed=3)
     assert env.reset()["pixels"].shape == (2, 1, 25, 64)
     assert env.reset()["info", "cube_positions"].shape == (2, 2, 3)
@@ -23,7 +23,7 @@ def test_worlds_as_policies_see_them():
     env.close()
 
 
-def test_images_of_any_camera_have_the_networks_size():
+def test_images_are_resized_to_the_network():
     camera = drone_rl.CameraSettings(width=32, height=13)
     env = drone_rl.make_env(1, camera=camera)
     assert env.reset()["pixels"].shape == (1, 1, 25, 64)
@@ -37,14 +37,14 @@ def test_images_of_any_camera_have_the_networks_size():
     assert [step.name for step in parse(before).transforms] == ["gray", "standardize"]
 
 
-def test_other_pictures():
+def test_other_image_sizes():
     camera = drone_rl.CameraSettings(width=20, height=10)
     env = drone_rl.make_env(1, camera=camera, transforms=[Gray(), Resize(height=5, width=8)])
     assert env.reset()["pixels"].shape == (1, 1, 5, 8)
     env.close()
 
 
-def test_a_task_by_its_name():
+def test_task_is_selected_by_name():
     env = drone_rl.make_env(1, task="pillars")
     assert isinstance(env.base_env.worlds.task, Pillars)
     env.close()
@@ -63,12 +63,12 @@ def test_a_task_by_its_name():
         ({"transforms": [Gray(), 3]}, "transforms=3 is no Transform"),
     ],
 )
-def test_values_of_another_type_are_refused_by_name(given, message):
+def test_values_of_wrong_type_raise_with_the_name(given, message):
     with pytest.raises(InputError, match=f"^{message}"):
         drone_rl.make_env(1, **given)
 
 
-def test_a_seed_means_the_same_worlds():
+def test_seed_determines_the_environments():
     found = []
     for _ in range(2):
         env = drone_rl.make_env(2, seed=7)
@@ -78,8 +78,8 @@ def test_a_seed_means_the_same_worlds():
 
 
 @pytest.fixture
-def asked(monkeypatch):
-    """Names of the renderers that worlds were asked to be drawn by; our own draws them all."""
+def requested(monkeypatch):
+    """Record the names of requested renderers; the default renderer handles all of them."""
     names = []
 
     def find(which):
@@ -90,23 +90,23 @@ def asked(monkeypatch):
     return names
 
 
-def test_whoever_is_asked_for_draws(asked, tmp_path):
-    """In worlds to train in, to be judged in, to be looked at, and of others."""
+def test_selected_renderer_is_used_everywhere(requested, tmp_path):
+    """This includes training, judging, inspection and Gymnasium environments."""
     chosen = {"renderer": "mujoco_warp"}
     drone_rl.make_env(1, **chosen).close()
-    assert asked == ["mujoco_warp"]
+    assert requested == ["mujoco_warp"]
     make_collector(drone_rl.TrainSettings(**chosen)).collector.shutdown()
-    assert set(asked) == {"mujoco_warp"}
-    asked.clear()
+    assert set(requested) == {"mujoco_warp"}
+    requested.clear()
     drone_rl.evaluate("good", episodes=1, baselines=False, **chosen)
-    assert asked == ["mujoco_warp"]
-    asked.clear()
+    assert requested == ["mujoco_warp"]
+    requested.clear()
     film(drone_rl.load_policy("right_and_forward"), tmp_path, 1, **chosen)
     drone_rl.DroneWorld(**chosen).close()
-    assert asked == ["mujoco_warp"] * 2
-    asked.clear()
+    assert requested == ["mujoco_warp"] * 2
+    requested.clear()
     drone_rl.judge("right_and_forward", episodes=1, **chosen)
-    assert asked[0] == "mujoco_warp"  # luck and the oracle see nothing
+    assert requested[0] == "mujoco_warp"  # baselines and the oracle need no images
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_whoever_is_asked_for_draws(asked, tmp_path):
         ("check", certificate_path(policy_path("proved"))),
     ],
 )
-def test_every_command_that_draws_asks_for_it(command, given, monkeypatch, tmp_path):
+def test_commands_pass_the_renderer_on(command, given, monkeypatch, tmp_path):
     def refuse(which):
         raise InputError(f"asked for {which}")
 
@@ -126,7 +126,7 @@ def test_every_command_that_draws_asks_for_it(command, given, monkeypatch, tmp_p
         getattr(drone_rl, command)(given, renderer="mujoco_warp", progress=lambda *_: None)
 
 
-def test_a_renderer_that_there_is_not():
+def test_unknown_renderer_raises():
     with pytest.raises(InputError, match="renderer='opengl' is unknown; give one of: raytrace"):
         drone_rl.make_env(1, renderer="opengl")
     with pytest.raises(InputError, match="renderer='opengl' is unknown; give raytrace, mujoco"):

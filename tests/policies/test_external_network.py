@@ -1,4 +1,4 @@
-"""Callables that were made elsewhere, by hand."""
+"""External callables as networks."""
 
 import numpy as np
 import pytest
@@ -10,11 +10,11 @@ from drone_rl.sim.actions import MOVES
 from drone_rl.utils.errors import InputError
 
 SHAPE = (1, 2, 4)
-"""Of one picture."""
+"""Shape of one image."""
 
 
 def left_half(x):
-    """Logits: the mean, that of the left half, and that of the right."""
+    """Return logits: the mean of the image, of its left half and of its right half."""
     mean = x.flatten(1).mean(1)
     return torch.stack([mean, x[..., :2].flatten(1).mean(1), x[..., 2:].flatten(1).mean(1)], 1)
 
@@ -23,28 +23,28 @@ def make(logits, shape=SHAPE, **kwargs):
     return ForeignNetwork(logits, shape, MOVES, **kwargs)
 
 
-def test_any_function_of_pictures():
+def test_function_of_images_is_a_network():
     network = make(left_half)
-    picture = torch.tensor([[[0.0, 2.0, 4.0, 6.0], [0.0, 2.0, 4.0, 6.0]]])
-    assert network(picture).tolist() == [3.0, 1.0, 5.0]
-    assert network(picture.expand(2, 5, *SHAPE)).shape == (2, 5, 3)
+    image = torch.tensor([[[0.0, 2.0, 4.0, 6.0], [0.0, 2.0, 4.0, 6.0]]])
+    assert network(image).tolist() == [3.0, 1.0, 5.0]
+    assert network(image.expand(2, 5, *SHAPE)).shape == (2, 5, 3)
     assert (network.in_shape, network.num_actions, network.is_differentiable) == (SHAPE, 3, True)
     assert not [*network.parts.children()] and not network.has_weights
 
 
-def test_arrays_are_logits_too_but_have_no_gradients():
+def test_numpy_logits_are_accepted_without_gradients():
     network = make(lambda x: left_half(x).detach().numpy())
     assert not network.is_differentiable
     assert network(torch.ones(1, *SHAPE)).tolist() == [[1.0, 1.0, 1.0]]
 
 
-def test_what_computes_without_gradients_has_none():
+def test_function_without_gradients_is_not_differentiable():
     assert not make(torch.no_grad()(left_half)).is_differentiable
     weight = nn.Parameter(torch.zeros(1, 3))
-    assert not make(lambda x: weight.expand(len(x), 3)).is_differentiable  # it sees nothing
+    assert not make(lambda x: weight.expand(len(x), 3)).is_differentiable  # ignores its input
 
 
-def test_bytes_are_handed_over_as_the_camera_took_them():
+def test_byte_images_are_passed_unchanged():
     seen = []
 
     def note(x):
@@ -53,23 +53,23 @@ def test_bytes_are_handed_over_as_the_camera_took_them():
 
     network = make(note, (3, 2, 4), takes_bytes=True)
     frames = torch.arange(256, dtype=torch.uint8)[:192].reshape(8, 2, 4, 3)
-    pictures = frames.movedim(-1, 1).float() / 255
-    network(pictures)
+    images = frames.movedim(-1, 1).float() / 255
+    network(images)
     assert torch.equal(seen[-1], frames)
     assert not network.is_differentiable
 
 
-def test_a_module_is_copied_and_computes_as_in_use():
+def test_module_is_copied_in_eval_mode():
     module = nn.Sequential(nn.Dropout(0.5), nn.ReLU(inplace=True), nn.Flatten(), nn.Linear(8, 3))
     network = make(module)
     assert module.training and module[1].inplace
-    picture = torch.randn(4, *SHAPE)
-    before = network(picture)
+    image = torch.randn(4, *SHAPE)
+    before = network(image)
     with torch.no_grad():
         module[3].weight.zero_()
-    assert torch.equal(network(picture), before)
+    assert torch.equal(network(image), before)
     module.eval()
-    assert not torch.equal(module(picture), before)
+    assert not torch.equal(module(image), before)
     assert network.has_weights
     assert [type(part) for part in network.parts] == [nn.Dropout, nn.ReLU, nn.Flatten, nn.Linear]
 
@@ -89,30 +89,30 @@ def test_a_module_is_copied_and_computes_as_in_use():
         (lambda x: torch.rand(len(x), 3), "gives other logits for the same picture"),
     ],
 )  # fmt: skip
-def test_what_can_not_be_judged(logits, message):
+def test_invalid_logits_raise(logits, message):
     with pytest.raises(InputError, match=f"^the network {message}") as caught:
         make(logits)
     assert "\n" not in str(caught.value)
 
 
-def test_bytes_of_another_size():
+def test_byte_images_of_another_size_raise():
     with pytest.raises(InputError, match=r"can't take pictures of shape \(1, 2, 4, 3\)"):
         make(lambda x: x.reshape(len(x), 5), (3, 2, 4), takes_bytes=True)
 
 
-def test_what_is_not_finite_later_is_told_then():
+def test_later_non_finite_logits_raise():
     network = make(lambda x: left_half(x).log())
     with pytest.raises(InputError, match="not finite"):
         network(torch.zeros(1, *SHAPE))
 
 
-def test_a_module_that_can_not_be_copied():
+def test_uncopyable_module_raises():
     module = nn.Flatten()
-    module.held = torch.ones(1, requires_grad=True) * 2  # no leaf: torch copies leaves alone
+    module.held = torch.ones(1, requires_grad=True) * 2  # not a leaf, and torch copies only leaves
     with pytest.raises(InputError, match=r"^the network Flatten can't be copied .* function that"):
         make(module)
 
 
-def test_numpy_in_double_is_taken_as_it_is_meant():
+def test_numpy_float64_is_converted():
     network = make(lambda x: np.asarray(left_half(x).detach(), np.float64))
     assert network(torch.ones(2, *SHAPE)).dtype == torch.float32

@@ -1,4 +1,4 @@
-"""Policies that were made elsewhere are flown, judged and explained as ours are."""
+"""External policies are evaluated, judged and explained like our own."""
 
 import pytest
 import torch
@@ -22,7 +22,7 @@ def network():
 
 
 def on_bytes(network):
-    """The same network, behind what becomes of a frame before it, outside of torch's sight."""
+    """Return the network with its transforms in NumPy, which torch cannot differentiate."""
 
     def logits(frames):
         assert frames.dtype == torch.uint8 and frames.shape[1:] == (25, 64, 3)
@@ -33,24 +33,24 @@ def on_bytes(network):
     return logits
 
 
-def left(pictures):
-    return torch.tensor([0.0, 99.0, 0.0]).expand(len(pictures), 3)
+def left(images):
+    return torch.tensor([0.0, 99.0, 0.0]).expand(len(images), 3)
 
 
-def test_the_same_network_gets_the_same_verdict_wherever_it_comes_from(network):
+def test_verdict_does_not_depend_on_the_wrapping(network):
     own = drone_rl.judge("good", **FEW).as_dict()
-    ways = {
+    wrappings = {
         "module": network,
         "function": lambda x: network(x),
         "bytes": drone_rl.policy_from(on_bytes(network), transforms=()),
     }
-    for name, way in ways.items():
-        found = drone_rl.judge(way, **FEW).as_dict()
+    for name, wrapping in wrappings.items():
+        found = drone_rl.judge(wrapping, **FEW).as_dict()
         for key in ("kind", "greedy", "skill", "quantities"):
             assert found[key] == own[key], (name, key)
 
 
-def test_drawn_actions_are_those_of_the_same_network(network):
+def test_sampled_actions_equal_those_of_the_network(network):
     few = {"episodes": 6, "num_envs": 6, "seed": 0, "progress": silent}
     own, found = drone_rl.evaluate("good", **few), drone_rl.evaluate(network, **few)
     assert found.flown == own.flown
@@ -58,7 +58,7 @@ def test_drawn_actions_are_those_of_the_same_network(network):
     assert (told["policy"], told["trained"]) == ("SmallCNN", None)
 
 
-def test_a_changed_task_and_a_task_of_another_kind():
+def test_in_task_changes_or_replaces_the_task():
     done = drone_rl.judge(left, task={"num_cubes": 1}, **FEW)
     assert (done.name, done.as_dict()["num_cubes"]) == ("left", 1)
     assert done.verdict.kind == "poor"
@@ -79,12 +79,12 @@ def test_a_changed_task_and_a_task_of_another_kind():
         ([Gray(), EpisodeReward()], (1, 25, 64)),
     ],
 )
-def test_it_sees_what_the_transforms_make(transforms, shape):
+def test_policy_receives_transformed_images(transforms, shape):
     seen = []
 
-    def note(pictures):
-        seen.append(tuple(pictures.shape[1:]))
-        return left(pictures)
+    def note(images):
+        seen.append(tuple(images.shape[1:]))
+        return left(images)
 
     policy = drone_rl.policy_from(note, transforms=transforms)
     assert policy.make_network().in_shape == shape
@@ -93,22 +93,22 @@ def test_it_sees_what_the_transforms_make(transforms, shape):
     assert set(seen) == {shape}
 
 
-def test_it_shows_itself():
+def test_policy_has_an_html_representation():
     policy = drone_rl.policy_from(left, camera=drone_rl.CameraSettings(width=32), transforms=())
     assert repr(policy).startswith("ForeignPolicy(name='left', own_task=TaskSettings(")
     assert "<td>RGB bytes</td>" in policy._repr_html_()
     assert policy.make_network().in_shape == (3, 25, 32)
 
 
-def test_what_a_policy_can_be_given_as(network):
+def test_accepted_types_of_policies(network):
     policy = drone_rl.policy_from(left)
     assert as_pilot(policy) is policy
     assert as_pilot("good").name == "good"
     assert as_pilot(network).logits is network
 
 
-def test_a_model_of_stable_baselines3_is_judged_as_it_was_trained():
-    """On RGB frames of bytes, as the Gymnasium environments of the README give them."""
+def test_stable_baselines3_model_uses_its_training_observations():
+    """It observes RGB bytes, as the Gymnasium environments in the README return them."""
     gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
     sb3 = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
     env = gymnasium.make(
@@ -124,18 +124,18 @@ def test_a_model_of_stable_baselines3_is_judged_as_it_was_trained():
     assert done.name == "A2C of Stable-Baselines3"
     frames = env.observation_space.sample()[None]
     network = as_pilot(model).make_network()
-    pictures = torch.from_numpy(frames).movedim(-1, 1).float() / 255
+    images = torch.from_numpy(frames).movedim(-1, 1).float() / 255
     wanted = model.policy.get_distribution(torch.from_numpy(frames).movedim(-1, 1)).distribution
-    torch.testing.assert_close(network(pictures).softmax(-1), wanted.probs)
+    torch.testing.assert_close(network(images).softmax(-1), wanted.probs)
     env.close()
 
 
-def test_a_network_says_what_it_was_trained_on():
+def test_network_attributes_define_transforms():
     class Colour:
         observation_shape = (3, 8, 9)
 
-        def __call__(self, pictures):
-            return left(pictures)
+        def __call__(self, images):
+            return left(images)
 
     policy = drone_rl.policy_from(Colour())
     assert policy.transforms == (Rgb(),) and policy.make_network().in_shape == (3, 8, 9)
@@ -155,17 +155,17 @@ def test_a_network_says_what_it_was_trained_on():
         (left, {"transforms": [Gray(), Gray()]}, "the transform gray needs the camera's own RGB"),
     ],
 )
-def test_what_does_not_fit_is_told_when_it_is_given(given, options, message):
+def test_mismatched_arguments_raise_at_construction(given, options, message):
     with pytest.raises(InputError, match=f"^{message}"):
         drone_rl.policy_from(given, **options)
 
 
-def test_a_camera_that_does_not_fit_a_network_of_ours(network):
+def test_mismatched_camera_raises(network):
     with pytest.raises(InputError, match=r"built for pictures of shape \(1, 25, 64\), not \(1, 2"):
         drone_rl.policy_from(network, camera=drone_rl.CameraSettings(width=32))
 
 
-def test_nothing_is_proved_of_it(tmp_path):
+def test_external_policies_cannot_be_proved(tmp_path):
     policy = drone_rl.policy_from(left)
     for ask in (drone_rl.prove, drone_rl.chances, drone_rl.places, drone_rl.load_policy):
         with pytest.raises(InputError, match=r"^policy=left is in no file of drone-rl's") as caught:
@@ -176,7 +176,7 @@ def test_nothing_is_proved_of_it(tmp_path):
 
 
 @pytest.mark.slow
-def test_of_a_mere_callable_all_is_explained_that_can_be(network, tmp_path):
+def test_callable_gets_a_reduced_report(network, tmp_path):
     policy = drone_rl.policy_from(on_bytes(network), transforms=(), name="a function")
     small = {"frames": 40, "episodes": 6, "perplexity": 5}
     done = drone_rl.explain(policy, folder=tmp_path, progress=silent, **small)
@@ -200,7 +200,7 @@ def test_of_a_mere_callable_all_is_explained_that_can_be(network, tmp_path):
     )
 
 
-def test_dynamics_are_those_it_was_made_for_or_others(monkeypatch):
+def test_dynamics_can_be_replaced(monkeypatch):
     floating(monkeypatch)
     policy = drone_rl.policy_from(left)
     assert policy.dynamics.is_computer_vision and policy.unlike == {}

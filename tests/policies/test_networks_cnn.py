@@ -10,7 +10,7 @@ NETWORKS = [OriginalCNN, SmallCNN, MLP]
 
 @pytest.mark.parametrize("network", NETWORKS)
 @pytest.mark.parametrize("shape", [(1, 25, 64), (3, 40, 33), (2, 100, 256)])
-def test_sizes_follow_from_the_picture(network, shape):
+def test_sizes_follow_from_the_image(network, shape):
     net = network(shape, 3)
     assert net.num_actions == 3
     assert net(torch.zeros(5, *shape)).shape == (5, 3)
@@ -18,7 +18,7 @@ def test_sizes_follow_from_the_picture(network, shape):
     assert net(torch.zeros(2, 4, *shape)).shape == (2, 4, 3)
 
 
-def test_original_is_the_original_studys():
+def test_original_cnn_has_the_published_shapes():
     net = OriginalCNN((1, 25, 64), 3)
     named = dict(net.layers.named_children())
     assert list(named) == [
@@ -30,7 +30,7 @@ def test_original_is_the_original_studys():
 
 
 @pytest.mark.parametrize("network", NETWORKS)
-def test_weights_come_from_the_generator_alone(network):
+def test_weights_depend_only_on_the_generator(network):
     def build(seed):
         return network((1, 25, 64), 3, generator=torch.Generator().manual_seed(seed)).state_dict()
 
@@ -40,27 +40,27 @@ def test_weights_come_from_the_generator_alone(network):
 
 
 @pytest.mark.parametrize("network", [SmallCNN, MLP])
-def test_first_policy_is_nearly_uniform(network):
+def test_initial_policy_is_nearly_uniform(network):
     net = network((1, 25, 64), 3, generator=torch.Generator().manual_seed(0))
     probabilities = net(torch.randn(64, 1, 25, 64)).softmax(-1)
     assert (probabilities - 1 / 3).abs().max() < 0.1
 
 
-def test_he_normal_convolutions():
+def test_convolutions_are_he_normal():
     net = OriginalCNN((1, 25, 64), 3, channels=(64, 64), generator=torch.Generator().manual_seed(0))
     weight = net.layers.conv2.weight
     assert float(weight.detach().std()) == pytest.approx((2 / (64 * 25)) ** 0.5, rel=0.05)
 
 
 @pytest.mark.parametrize("network", [OriginalCNN, SmallCNN])
-def test_picture_too_small_names_the_size_that_works(network):
+def test_too_small_image_raises_with_the_smallest_size(network):
     with pytest.raises(InputError, match="2x2 pixels is too small") as error:
         network((1, 2, 2), 3)
     smallest = int(str(error.value).split("at least ")[1].split("x")[0])
     network((1, smallest, smallest), 3)
 
 
-def test_picture_of_another_size_is_refused():
+def test_image_of_another_size_raises():
     with pytest.raises(InputError, match="was built for"):
         SmallCNN((1, 25, 64), 3)(torch.zeros(1, 1, 30, 64))
 
@@ -72,8 +72,8 @@ def test_linear_and_convolutional_layers_are_trainable():
     assert sum(isinstance(m, nn.Conv2d) for m in net.layers) == 2
 
 
-def test_gains_of_the_last_layer_and_of_those_before_it():
-    """Rows of orthogonal weights are as long as the gain."""
+def test_layers_have_orthogonal_gains():
+    """The norm of rows of orthogonal weights is the gain."""
     network = SmallCNN((1, 25, 64), 3, generator=torch.Generator().manual_seed(0))
     for name, gain in (("conv1", 2**0.5), ("fc1", 2**0.5), ("logits", 0.01)):
         weight = network.layers.get_parameter(f"{name}.weight").flatten(1)
@@ -81,7 +81,7 @@ def test_gains_of_the_last_layer_and_of_those_before_it():
         assert not network.layers.get_parameter(f"{name}.bias").any()
 
 
-def test_widths_by_default():
+def test_default_widths():
     layers = SmallCNN((1, 25, 64), 3).layers
     shapes = {n: tuple(p.shape) for n, p in layers.named_parameters() if n.endswith("weight")}
     assert shapes == {

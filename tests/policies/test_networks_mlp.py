@@ -3,7 +3,7 @@ import torch
 from drone_rl.policies import MLP
 
 
-def test_layers_are_named_and_sized_by_the_picture():
+def test_layers_follow_from_the_image_size():
     net = MLP((2, 3, 4), 3, hidden=(5, 6))
     named = dict(net.layers.named_children())
     assert list(named) == ["flatten", "fc1", "fc_relu1", "fc2", "fc_relu2", "logits"]
@@ -11,14 +11,14 @@ def test_layers_are_named_and_sized_by_the_picture():
     assert shapes == [(5, 24), (6, 5), (3, 6)]
 
 
-def test_no_hidden_layer_is_a_linear_policy():
+def test_network_without_hidden_layers_is_linear():
     net = MLP((1, 1, 2), 3, hidden=())
     with torch.no_grad():
         net.layers.logits.weight.copy_(torch.tensor([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]))
     assert net(torch.tensor([[[2.0, 5.0]]])).tolist() == [2.0, 5.0, 7.0]
 
 
-def test_hidden_layers_are_orthogonal_of_gain_root_two_and_the_last_small():
+def test_layers_have_orthogonal_gains():
     net = MLP((1, 4, 4), 3, hidden=(8,), generator=torch.Generator().manual_seed(0))
     hidden, last = net.layers.fc1.weight, net.layers.logits.weight
     assert torch.allclose(hidden @ hidden.T, 2 * torch.eye(8), atol=1e-5)

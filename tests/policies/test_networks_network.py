@@ -1,4 +1,4 @@
-"""What all networks have in common, whoever made them."""
+"""Behavior common to all networks."""
 
 import pytest
 import torch
@@ -10,7 +10,7 @@ from drone_rl.sim.actions import MOVES
 X = torch.randn(7, 1, 12, 16, generator=torch.Generator().manual_seed(0))
 
 
-def test_one_that_nobody_made():
+def test_base_class_raises_not_implemented():
     network = PictureNetwork()
     assert (network.num_actions, network.parts, network.is_differentiable) == (3, network, True)
     assert not network.has_weights
@@ -29,7 +29,7 @@ def test_one_that_nobody_made():
     ],
     ids=lambda network: type(network).__name__,
 )
-def test_logits_are_scaled_and_shifted_once_and_again(network):
+def test_rescale_can_be_repeated(network):
     before = network(X)
     factor, shift = torch.tensor([2.0, -1.0, 0.5]), torch.tensor([0.0, 10.0, 1.0])
     network.rescale(factor, shift)

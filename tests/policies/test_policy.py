@@ -1,4 +1,4 @@
-"""Policies by name, by file, by run; in a changed task."""
+"""Policies by name, file and run, and in a changed task."""
 
 import os
 import shutil
@@ -13,17 +13,17 @@ from drone_rl.utils.errors import InputError
 from tests.fake_flight import FLIGHT, Floating, floating
 
 
-def test_a_policy_that_travels_with_the_package():
+def test_bundled_policy_is_loaded():
     policy = drone_rl.load_policy("good")
     assert (policy.name, policy.task.num_cubes) == ("good", 3)
     assert policy.path == policy_path("good")
     shown = policy._repr_html_()
     assert "<td>network</td>" in shown
     assert "small_cnn" in shown
-    assert repr(policy) == f"Policy(name='good', path={policy.path!r})"  # not all its weights
+    assert repr(policy) == f"Policy(name='good', path={policy.path!r})"  # without its weights
 
 
-def test_worlds_are_closed_when_the_flights_end_or_fail():
+def test_environment_is_closed_at_the_end_or_on_failure():
     policy = drone_rl.load_policy("good")
     with pytest.raises(KeyError), policy.flying(2) as (env, actor):
         assert actor(env.reset())["action"].shape == (2,)
@@ -32,7 +32,7 @@ def test_worlds_are_closed_when_the_flights_end_or_fail():
     assert env.is_closed
 
 
-def test_a_changed_task_changes_the_worlds_alone():
+def test_changed_task_changes_only_the_environment():
     policy = drone_rl.load_policy("good")
     other = policy.in_task(num_cubes=5, spacing=None)
     assert (other.task.num_cubes, other.task.spacing) == (5, policy.task.spacing)
@@ -52,18 +52,18 @@ def test_a_changed_task_changes_the_worlds_alone():
         ({"step_limit": 5}, "task.step_limit=5 ends every episode"),
     ],
 )
-def test_a_task_that_can_not_be(changes, message):
+def test_invalid_task_changes_raise(changes, message):
     with pytest.raises(InputError, match=f"^{message}"):
         drone_rl.load_policy("good").in_task(**changes)
 
 
-def test_its_network_has_its_weights():
+def test_network_has_the_stored_weights():
     policy = drone_rl.load_policy("poor")
     weights = policy.make_network().state_dict()
     assert all(torch.equal(weights[k], v) for k, v in policy.state["policy"].items())
 
 
-def test_an_actor_needs_no_environment():
+def test_actor_can_be_created_without_environment():
     policy = drone_rl.load_policy("good")
     env = policy.make_env(2, seed=3)
     flown = []
@@ -76,7 +76,7 @@ def test_an_actor_needs_no_environment():
         policy.make_actor(2)
 
 
-def test_what_latest_and_a_folder_mean(tmp_path):
+def test_latest_and_folders_are_resolved(tmp_path):
     runs = tmp_path / "train" / "runs"
     for number, name in enumerate(("b", "a")):
         (runs / name / "checkpoints").mkdir(parents=True)
@@ -86,14 +86,14 @@ def test_what_latest_and_a_folder_mean(tmp_path):
     assert find_policy(runs / "b") == runs / "b" / "checkpoints" / "last.pt"
 
 
-def test_what_is_not_there(tmp_path):
+def test_missing_policies_raise(tmp_path):
     with pytest.raises(InputError, match="policy=latest, but there is no run"):
         drone_rl.load_policy("latest", outputs=tmp_path)
     with pytest.raises(InputError, match=r"policy=nobody does not exist.*good, .*poor"):
         drone_rl.load_policy("nobody")
 
 
-def test_changed_dynamics_change_the_worlds_alone(monkeypatch):
+def test_changed_dynamics_change_only_the_environment(monkeypatch):
     floating(monkeypatch)
     policy = drone_rl.load_policy("good")
     other = policy.in_dynamics(mode="simple_flight", wind=[5.0, 0.0, 0.0], gusts=None)
@@ -121,6 +121,6 @@ def test_changed_dynamics_change_the_worlds_alone(monkeypatch):
         ({"mass": 50.0}, r"dynamics\.rotor_thrust=4\.17945 can't hover"),
     ],
 )
-def test_dynamics_that_can_not_be(changes, message):
+def test_invalid_dynamics_changes_raise(changes, message):
     with pytest.raises(InputError, match=f"^{message}"):
         drone_rl.load_policy("good").in_dynamics(**changes)

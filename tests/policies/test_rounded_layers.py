@@ -4,8 +4,8 @@ from torch import nn
 from drone_rl.policies.rounded_layers import layer_of
 
 
-def test_a_bound_holds_for_inputs_that_another_evaluation_has():
-    """One evaluation's input is 0, the exact one up to 1, and another one's up to 2."""
+def test_bound_covers_inputs_of_other_evaluations():
+    """The input is 0 in one evaluation, up to 1 exactly, and up to 2 in another evaluation."""
     layer = nn.Linear(1, 1)
     with torch.no_grad():
         layer.weight.fill_(1.5e38)

@@ -1,4 +1,4 @@
-"""Rounding bounds by brute force: no order of summation in float32 goes beyond them."""
+"""Rounding bounds hold for random summation orders in float32."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ BIG = 2.0**24
 
 
 def in_some_order(weight, bias, value, random, is_fused):
-    """A linear layer whose terms are added one by one in a random order, in float32."""
+    """Evaluate a linear layer in float32 with terms added in a random order."""
     made = np.empty(len(weight), np.float32)
     for out, row in enumerate(weight):
         order = random.permutation(len(row) + 1)
@@ -51,8 +51,8 @@ def test_no_order_of_summation_exceeds_the_bounds(seed):
     layers = [layer for layer in network.layers if isinstance(layer, nn.Linear)]
     worst = torch.zeros_like(exact)
     for trial in range(30):
-        for row, picture in enumerate(pixels.flatten(1).numpy()):
-            value = picture
+        for row, image in enumerate(pixels.flatten(1).numpy()):
+            value = image
             for layer in layers:
                 parameters = layer.weight.detach().numpy(), layer.bias.detach().numpy()
                 value = in_some_order(*parameters, value, random, trial % 2 == 0)
@@ -62,7 +62,7 @@ def test_no_order_of_summation_exceeds_the_bounds(seed):
     assert (worst <= each).all()
     assert (worst <= together).all()
     assert (each <= together * 1.01).all()
-    assert (worst > each / 1000).any()  # nor is it absurdly loose
+    assert (worst > each / 1000).any()  # the bound is not too loose
 
 
 @pytest.mark.parametrize("make", [SmallCNN, OriginalCNN])
@@ -78,8 +78,8 @@ def test_bounds_of_convolutions_hold_for_float32_and_are_close(make):
     assert (each < 0.01 * exact.abs().max()).all()
 
 
-def test_orders_that_decide_are_found():
-    """The unit is 2^24 + 1 - 2^24; by it the first action wins, or the second one."""
+def test_summation_orders_that_change_the_action_are_found():
+    """The hidden unit is 2^24 + 1 - 2^24; it decides between the first and second action."""
     network = MLP((1, 1, 2), 2, hidden=(1,))
     with torch.no_grad():
         network.layers.get_parameter("fc1.weight").copy_(torch.tensor([[BIG, -BIG]]))
@@ -110,7 +110,7 @@ def test_subnormal_numbers_may_count_as_zero():
     assert RoundingBound.find(network).decide(torch.ones(1, 1, 1, 1)).is_fragile.all()
 
 
-def test_a_network_of_unknown_layers_is_given_a_tolerance():
+def test_unknown_layers_use_a_tolerance():
     logits = torch.tensor([[3.0, 1.0, 0.0], [1.0, 1.0 - TOLERANCE, 0.0]])
     network = ForeignNetwork(lambda pixels: logits[: len(pixels)], (1, 1, 1), MOVES)
     decide, is_bound = decider(network)
@@ -120,7 +120,7 @@ def test_a_network_of_unknown_layers_is_given_a_tolerance():
 
 
 class Cancelling(nn.Module):
-    """The first logit is 2^24 + 1 - 2^24 in whatever precision it computes."""
+    """The first logit is 2^24 + 1 - 2^24 in the given precision."""
 
     def __init__(self, precision=None):
         super().__init__()
@@ -132,14 +132,14 @@ class Cancelling(nn.Module):
         return torch.stack([first, 0 * first + 0.5, 0 * first], -1)
 
 
-def test_a_module_of_unknown_layers_is_compared_with_itself_in_float64():
+def test_unknown_module_is_compared_with_float64():
     for precision, is_fragile in ((None, True), (torch.float32, False)):
         network = ForeignNetwork(Cancelling(precision), (1, 1, 1), MOVES)
         found = decider(network)[0](torch.zeros(2, 1, 1, 1))
         assert found.is_fragile.tolist() == [is_fragile] * 2
 
 
-def test_a_module_that_only_takes_float32_is_given_a_tolerance():
+def test_float32_only_module_uses_a_tolerance():
     class Strict(nn.Linear):
         def forward(self, pixels):
             return nn.functional.linear(pixels.flatten(1).float(), self.weight, self.bias)
@@ -148,7 +148,7 @@ def test_a_module_that_only_takes_float32_is_given_a_tolerance():
     assert decider(network)[0](torch.ones(1, 1, 1, 1)).outputs.shape == (1, 3)
 
 
-def test_bounds_do_not_hold_where_convolutions_are_computed_in_tf32(monkeypatch):
+def test_tf32_convolutions_are_reported(monkeypatch):
     for allowed in (True, False):
         monkeypatch.setattr(torch.backends.cudnn, "allow_tf32", allowed)
         name = "float32 (convolutions in TF32) on cuda" if allowed else "float32 on cuda"

@@ -7,7 +7,7 @@ from drone_rl.sim.actions import MOVES
 
 
 @pytest.mark.parametrize("groups", ["single", "mixed"])
-def test_a_function_of_the_frame_gives_the_same_in_any_group(groups):
+def test_grouping_does_not_change_a_function_of_the_frame(groups):
     sizes = []
 
     def logits(pixels):
@@ -21,7 +21,7 @@ def test_a_function_of_the_frame_gives_the_same_in_any_group(groups):
     assert set(sizes) == {1} if groups == "single" else len(set(sizes)) > 1
 
 
-def test_what_depends_on_the_batch_shows():
+def test_dependence_on_the_batch_is_detected():
     network = ForeignNetwork(lambda x: torch.full((len(x), 3), float(len(x))), (1, 1, 3), MOVES)
     pixels = torch.rand(20, 1, 1, 3)
     assert not torch.equal(Regrouped(network, "mixed")(pixels), network(pixels))

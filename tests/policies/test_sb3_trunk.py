@@ -1,4 +1,4 @@
-"""The trunk is the network without its head."""
+"""The trunk is the network without its last layer."""
 
 import numpy as np
 import pytest
@@ -11,11 +11,11 @@ spaces = pytest.importorskip("gymnasium.spaces", reason="Gymnasium is not instal
 pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
 from drone_rl.policies.sb3 import Sb3Trunk  # noqa: E402 (after the skip)
 
-PICTURES = spaces.Box(-np.inf, np.inf, (1, 25, 64), np.float32)
+IMAGES = spaces.Box(-np.inf, np.inf, (1, 25, 64), np.float32)
 
 
-def test_its_layers_are_those_before_the_logits():
-    trunk, network = Sb3Trunk(PICTURES), SmallCnn().make((1, 25, 64), 3)
+def test_trunk_has_the_layers_before_the_logits():
+    trunk, network = Sb3Trunk(IMAGES), SmallCnn().make((1, 25, 64), 3)
     names = [name for name, _ in trunk.layers.named_children()]
     assert [*names, "logits"] == [name for name, _ in network.layers.named_children()]
     trunk.layers.load_state_dict(network.layers[:-1].state_dict())
@@ -24,11 +24,11 @@ def test_its_layers_are_those_before_the_logits():
     torch.testing.assert_close(network.layers[-1](trunk(x)), network(x))
 
 
-def test_other_networks():
-    assert Sb3Trunk(PICTURES, Mlp(hidden=(7, 5))).features_dim == 5
-    assert Sb3Trunk(PICTURES, SmallCnn(channels=(4,), hidden=())).features_dim == 4 * 6 * 16
+def test_other_networks_are_supported():
+    assert Sb3Trunk(IMAGES, Mlp(hidden=(7, 5))).features_dim == 5
+    assert Sb3Trunk(IMAGES, SmallCnn(channels=(4,), hidden=())).features_dim == 4 * 6 * 16
 
 
-def test_a_vector_is_no_picture():
+def test_vector_observations_raise():
     with pytest.raises(InputError, match=r"^Sb3Trunk got observations of shape \(28,\); give pic"):
         Sb3Trunk(spaces.Box(0, 1, (28,)))

@@ -1,4 +1,4 @@
-"""A description is strict, says everything, and builds what it says."""
+"""Descriptions are strict and complete, and build the described policy."""
 
 import copy
 import subprocess
@@ -41,7 +41,7 @@ DEAD = {"name": "dead_rows", "count": 0, "rows": [], "level": 0.0}
 
 
 def changed(where, value):
-    """The default with one value changed; a missing one is `...`."""
+    """Return the default description with one value changed, or removed if it is `...`."""
     data, *keys = copy.deepcopy(DEFAULT), *where.split(".")
     part = data
     for key in keys[:-1]:
@@ -53,7 +53,7 @@ def changed(where, value):
     return data
 
 
-def test_a_critic_is_the_described_network_with_one_output():
+def test_critic_is_the_network_with_one_output():
     described = parse(DEFAULT)
     critic = described.build_critic(torch.Generator().manual_seed(0))
     wanted = dict(described.expected_weights())
@@ -63,12 +63,12 @@ def test_a_critic_is_the_described_network_with_one_output():
     assert critic(torch.zeros(5, 1, 25, 64)).shape == (5, 1)
 
 
-def test_it_comes_back_as_it_was():
+def test_description_round_trip():
     assert parse(DEFAULT).as_dict() == DEFAULT
     assert parse(parse(DEFAULT).as_dict()) == parse(DEFAULT)
 
 
-def test_the_weights_are_known_before_there_are_any():
+def test_expected_weights_are_known_without_building():
     expected = parse(DEFAULT).expected_weights()
     built = parse(DEFAULT).build_network(torch.Generator().manual_seed(0)).state_dict()
     assert all(value.is_meta for value in expected.values())
@@ -90,7 +90,7 @@ def test_the_weights_are_known_before_there_are_any():
         ),
     ],
 )
-def test_pictures_are_of_the_foretold_shape(camera, transforms, shape):
+def test_image_shape_is_predicted(camera, transforms, shape):
     data = {**DEFAULT, "transforms": transforms}
     data["camera"] = {"height": camera[0], "width": camera[1], "horizontal_fov": 90.0}
     described = parse(data)
@@ -166,7 +166,7 @@ def test_pictures_are_of_the_foretold_shape(camera, transforms, shape):
         ("network.bias", True, "'bias' is unknown"),
     ],
 )
-def test_what_is_out_of_bounds_is_named(where, value, message):
+def test_out_of_bounds_values_are_named(where, value, message):
     if message is None:
         parse(changed(where, value))  # at the bound
         return
@@ -175,7 +175,7 @@ def test_what_is_out_of_bounds_is_named(where, value, message):
     assert "\n" not in str(error.value)
 
 
-def test_frames_are_bounded_as_a_whole():
+def test_number_of_pixels_is_bounded():
     camera = {"width": 1024, "height": 256, "horizontal_fov": 90.0}
     network = {"name": "small_cnn", "patch": 64, "channels": [4], "hidden": []}
     parse({**DEFAULT, "camera": camera, "network": network})
@@ -184,13 +184,13 @@ def test_frames_are_bounded_as_a_whole():
 
 
 @pytest.mark.parametrize("data", [None, [], "text", {}, {1: 2}])
-def test_what_is_no_description(data):
+def test_invalid_descriptions_raise(data):
     with pytest.raises(InputError):
         parse(data)
 
 
-def test_reading_a_description_computes_nothing():
-    """What is computed on no device loads torch's symbolic algebra: half a second a start."""
+def test_parsing_computes_nothing():
+    """Computing on the meta device would load torch's symbolic algebra, which takes 0.5 s."""
     code = """import sys
 from drone_rl.utils.imports import leave_compiler_unloaded
 leave_compiler_unloaded()
@@ -203,13 +203,13 @@ print("sympy" in sys.modules)"""
     assert done.stdout == "False\n"
 
 
-def test_frames_seen_at_once_are_those_of_all_stacks():
+def test_frames_multiply_over_stacks():
     assert parse(DEFAULT).frames == 1
     stacks = [{"name": "gray"}, {"name": "stack", "N": 2}, {"name": "stack", "N": 3}]
     assert parse({**DEFAULT, "transforms": stacks}).frames == 6
 
 
-def test_given_weights_are_taken_as_they_are_laid_out():
+def test_loaded_weights_keep_their_memory_layout():
     description = parse(DEFAULT)
     built = description.build_network(torch.Generator().manual_seed(0))
     loaded = description.load_network(built.state_dict())
@@ -220,7 +220,7 @@ def test_given_weights_are_taken_as_they_are_laid_out():
     assert loaded.actions is built.actions and loaded.training
 
 
-def test_what_a_policy_sees_through_a_camera_of_which_no_fault_is_known():
+def test_without_faults_removes_camera_faults():
     blur, late = {"name": "blur", "width": 1.0}, {"name": "late_frames", "frames": 2}
     described = parse({**DEFAULT, "transforms": [GRAY, blur, DEAD, late]})
     assert described.faults == ("dead_rows", "late_frames")
@@ -228,7 +228,7 @@ def test_what_a_policy_sees_through_a_camera_of_which_no_fault_is_known():
     assert parse(DEFAULT).without_faults() == parse(DEFAULT)
 
 
-def test_a_look_is_told_where_it_is_not_minimal():
+def test_appearance_is_written_unless_minimal():
     assert "appearance" not in parse(DEFAULT).as_dict() and parse(DEFAULT).appearance.is_minimal
     look = AppearanceSettings(fog_visibility=(20.0, 50.0), ground_texture="grid").values()
     described = parse({**DEFAULT, "appearance": look})
@@ -242,7 +242,7 @@ def test_a_look_is_told_where_it_is_not_minimal():
             parse({**DEFAULT, "appearance": wrong})
 
 
-def test_dynamics_and_actions_are_told_where_they_are_not_the_first_ones():
+def test_dynamics_and_actions_are_written_unless_default():
     plain = parse(DEFAULT)
     assert plain.dynamics.is_computer_vision and plain.actions == MOVES_SETTINGS
     windy, fast = FLIGHT.replace(wind=(2.0, 0.0, 0.0)).values(), ActionSettings(move_speed=5.0)
@@ -269,13 +269,13 @@ def test_dynamics_and_actions_are_told_where_they_are_not_the_first_ones():
         ("actions", [], "actions="),
     ],
 )
-def test_dynamics_and_actions_out_of_bounds_are_named(part, value, message):
+def test_out_of_bounds_dynamics_and_actions_are_named(part, value, message):
     with pytest.raises(InputError, match=message) as error:
         parse({**DEFAULT, part: value})
     assert "\n" not in str(error.value)
 
 
-def test_worlds_move_as_described_or_as_told(monkeypatch):
+def test_environment_uses_described_or_given_dynamics(monkeypatch):
     floating(monkeypatch)
     fast = ActionSettings(move_speed=5.0)
     flight = {"dynamics": FLIGHT.values(), "actions": fast.values()}

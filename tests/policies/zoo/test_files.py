@@ -1,4 +1,4 @@
-"""Policies in files: what is written comes back, old files are read, anything else is refused."""
+"""Policy files: round trips, old formats, and rejection of all other files."""
 
 import hashlib
 import json
@@ -56,7 +56,7 @@ ABOUT = {
 
 
 def exported(weights=None, about=None, description=DESCRIPTION, **metadata):
-    """An exported file's content."""
+    """Return the content of an exported file."""
     texts = {
         "format": "drone_rl policy",
         "about": json.dumps({**ABOUT, **(about or {})}),
@@ -71,7 +71,7 @@ DAMAGED_DESCRIPTION = save(
 )
 
 
-def test_what_is_exported_comes_back_without_traces_of_the_machine(tmp_path):
+def test_export_round_trip_has_no_machine_details(tmp_path):
     path = tmp_path / "mine.safetensors"
     origin = {"command": "drone-rl train", "seed": 5, "chosen": None}
     export_policy(path, CHECKPOINT, verdict=VERDICT, **origin)
@@ -88,7 +88,7 @@ def test_what_is_exported_comes_back_without_traces_of_the_machine(tmp_path):
     assert "three cubes of 2.5 m, up to 6 m" in card
 
 
-def test_a_checkpoint_is_read_by_its_description_alone(tmp_path):
+def test_checkpoint_is_read_by_its_description(tmp_path):
     save_checkpoint(tmp_path / "a.pt", {**CHECKPOINT, "best": 0.5})
     found = read_policy(tmp_path / "a.pt")
     assert found["description"] == DESCRIPTION
@@ -96,7 +96,7 @@ def test_a_checkpoint_is_read_by_its_description_alone(tmp_path):
     torch.testing.assert_close(found["policy"], WEIGHTS)
 
 
-def test_version_0_1_wrote_another_name_of_the_running_reward(tmp_path):
+def test_name_of_the_running_reward_in_version_0_1_is_read(tmp_path):
     older = {**PROGRESS, "running_cubes": PROGRESS["running_reward"]}
     del older["running_reward"]
     save_checkpoint(tmp_path / "a.pt", {**CHECKPOINT, "progress": older})
@@ -133,7 +133,7 @@ def test_version_0_1_wrote_another_name_of_the_running_reward(tmp_path):
         (DAMAGED_DESCRIPTION, "its description is damaged"),
     ],
 )
-def test_a_damaged_or_hostile_file_is_refused_in_one_line(tmp_path, content, message):
+def test_damaged_or_malicious_file_raises_one_line(tmp_path, content, message):
     (tmp_path / "x.safetensors").write_bytes(content)
     with pytest.raises(InputError, match=message) as error:
         load_exported(tmp_path / "x.safetensors")
@@ -153,13 +153,13 @@ def test_a_damaged_or_hostile_file_is_refused_in_one_line(tmp_path, content, mes
         ({"config": [1]}, r"config=\(list\)"),
     ],
 )
-def test_a_checkpoint_that_lies(tmp_path, change, message):
+def test_inconsistent_checkpoint_raises(tmp_path, change, message):
     save_checkpoint(tmp_path / "a.pt", {**CHECKPOINT, **change})
     with pytest.raises(InputError, match=message):
         read_policy(tmp_path / "a.pt")
 
 
-def test_the_policies_travel_with_their_cards():
+def test_bundled_policies_have_cards():
     assert {"good", "poor", "right_and_forward", "proved"} <= set(policy_names())
     for name in policy_names():
         path, card = policy_path(name), card_path(name).read_text()
@@ -186,13 +186,13 @@ def test_the_policies_travel_with_their_cards():
         ("robust", "good"),
     ],
 )
-def test_each_is_what_its_name_says(name, kind):
+def test_bundled_policies_match_their_names(name, kind):
     found = load_exported(policy_path(name))
     assert (found["verdict"]["kind"], found["verdict"]["certain"]) == (kind, True)
     assert (found["worlds"], found["verdict"]["greedy"]["episodes"]) == ("report", 1000)
 
 
-def test_where_certificates_lie(tmp_path, monkeypatch):
+def test_certificate_paths(tmp_path, monkeypatch):
     assert shifts_path(policy_path("good")).name == "good.shifts.json"
     assert certificate_path(policy_path("good")).name == "good.certificate.json"
     assert certificate_path(policy_path("good")).parent == policy_path("good").parent
@@ -204,7 +204,7 @@ def test_where_certificates_lie(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("where", ["mine.md", "mine.shifts.json"])
-def test_an_export_that_fails_writes_nothing(tmp_path, where):
+def test_failed_export_writes_nothing(tmp_path, where):
     (tmp_path / where).mkdir()
     path, carried = tmp_path / "mine.safetensors", {tmp_path / "mine.shifts.json": b"{}"}
     origin = {"command": "drone-rl train", "seed": 5, "chosen": None, "carried": carried}

@@ -1,4 +1,4 @@
-"""An ONNX model computes what the pipeline does, and says all that is needed to fly it."""
+"""ONNX models equal the pipeline and document all that is needed to use them."""
 
 import json
 import logging
@@ -25,13 +25,13 @@ BLIND = [{"name": "episode_reward"}, {"name": "step_count"}]
 LINEAR = {"name": "mlp", "hidden": []}
 
 
-def described(height, width, transforms, network):
+def describe(height, width, transforms, network):
     camera = {**DEFAULT["camera"], "height": height, "width": width}
     parts = {"camera": camera, "transforms": transforms, "network": network}
     return parse({**DEFAULT, **parts})
 
 
-def built(description, scale=1.0):
+def build(description, scale=1.0):
     network = description.build_network(torch.Generator().manual_seed(0))
     network.layers.get_parameter("logits.weight").data.mul_(scale)
     return network
@@ -39,9 +39,9 @@ def built(description, scale=1.0):
 
 @pytest.fixture(scope="module")
 def linear():
-    """A picture of 1x2 pixels, of which the logits are gray levels and nothing else."""
-    description = described(1, 2, [GRAY], LINEAR)
-    network = built(description)
+    """Return a model of images of 1x2 pixels whose logits are gray levels."""
+    description = describe(1, 2, [GRAY], LINEAR)
+    network = build(description)
     with torch.no_grad():
         network.layers.get_parameter("logits.bias").copy_(torch.tensor([0.0, 0.0, 1.0]))
         weights = torch.tensor([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
@@ -49,7 +49,7 @@ def linear():
     return make_onnx(description, network, {"command": "drone-rl train seed=7"})
 
 
-def test_probabilities_of_a_picture_by_hand(linear):
+def test_probabilities_match_hand_computed_ones(linear):
     red_and_white = [[[255, 0, 0], [255, 255, 255]]]
     black_and_blue = [[[0, 0, 0], [0, 0, 255]]]
     green_twice = [[[0, 255, 0], [0, 255, 0]]]
@@ -59,27 +59,27 @@ def test_probabilities_of_a_picture_by_hand(linear):
     torch.testing.assert_close(open_onnx(linear)(frames[:1]), logits[:1].softmax(-1))
 
 
-def test_inputs_outputs_and_what_they_mean_are_told(linear):
+def test_model_documents_inputs_and_outputs(linear):
     session = onnxruntime.InferenceSession(linear)
     ((given,), (got,)) = (session.get_inputs(), session.get_outputs())
     assert (given.name, given.type, given.shape[1:]) == ("frames", "tensor(uint8)", [1, 2, 3])
     assert (got.name, got.type, got.shape[1:]) == ("probabilities", "tensor(float)", [3])
-    assert isinstance(given.shape[0], str) and given.shape[0] == got.shape[0]  # any number
-    told = session.get_modelmeta().custom_metadata_map
-    told = {key: json.loads(text) for key, text in told.items()}
-    assert told.pop("actions") == ["forward", "left", "right"]
-    assert told.pop("command") == "drone-rl train seed=7"
-    assert parse(told) == described(1, 2, [GRAY], LINEAR)
+    assert isinstance(given.shape[0], str) and given.shape[0] == got.shape[0]  # any batch size
+    metadata = session.get_modelmeta().custom_metadata_map
+    metadata = {key: json.loads(text) for key, text in metadata.items()}
+    assert metadata.pop("actions") == ["forward", "left", "right"]
+    assert metadata.pop("command") == "drone-rl train seed=7"
+    assert parse(metadata) == describe(1, 2, [GRAY], LINEAR)
 
 
-def test_speeds_are_told_beside_the_probabilities_of_their_parts():
-    description = described(1, 2, [GRAY], LINEAR)
+def test_continuous_actions_are_outputs():
+    description = describe(1, 2, [GRAY], LINEAR)
     network = MLP((1, 1, 2), 6, hidden=(), generator=torch.Generator().manual_seed(0))
     network.actions = ContinuousActions.of(SETTINGS)
     content = make_onnx(description, network, {})
     session = onnxruntime.InferenceSession(content)
-    told = json.loads(session.get_modelmeta().custom_metadata_map["actions"])
-    assert told == ["forward", "left", "right", "turn left", "turn right"]
+    actions = json.loads(session.get_modelmeta().custom_metadata_map["actions"])
+    assert actions == ["forward", "left", "right", "turn left", "turn right"]
     frames = torch.tensor([[[[255, 0, 0], [9, 99, 255]]]], dtype=torch.uint8)
     found = dict(
         zip(
@@ -100,13 +100,13 @@ def test_speeds_are_told_beside_the_probabilities_of_their_parts():
     torch.testing.assert_close(open_onnx(content)(frames), torch.from_numpy(found["probabilities"]))
 
 
-def test_it_is_a_valid_model_that_tells_nothing_of_the_machine(linear):
+def test_model_is_valid_without_machine_details(linear):
     onnx.checker.check_model(onnx.load_from_string(linear), full_check=True)
     for word in (b"stack_trace", b"onnx_model.py", sys.prefix.encode()):
         assert word not in linear
 
 
-def test_frames_of_another_camera_are_refused_by_the_runtime(linear):
+def test_frames_of_another_camera_raise(linear):
     with pytest.raises(Exception, match="Got: 3 Expected: 2"):
         open_onnx(linear)(torch.zeros(1, 1, 3, 3, dtype=torch.uint8))
 
@@ -126,9 +126,9 @@ def test_frames_of_another_camera_are_refused_by_the_runtime(linear):
     ],
     ids=["default", "original", "averaged unevenly", "enlarged", "in colour", "blurred"],
 )
-def test_it_agrees_with_the_pipeline_in_flight(height, width, transforms, network):
-    description = described(height, width, transforms, network)
-    policy = built(description, scale=20.0)
+def test_model_agrees_with_the_pipeline(height, width, transforms, network):
+    description = describe(height, width, transforms, network)
+    policy = build(description, scale=20.0)
     env = description.build_env(8, seed=0, device="cpu")
     actor = make_actor(policy, env.action_spec, torch.Generator().manual_seed(0))
     found = agreement(env, actor, open_onnx(make_onnx(description, policy, {})), 40)
@@ -136,47 +136,47 @@ def test_it_agrees_with_the_pipeline_in_flight(height, width, transforms, networ
     assert found.difference <= 1e-5 and found.actions_differ == 0 and found.frames == 320
 
 
-def test_the_same_policy_makes_the_same_file():
-    description = described(5, 6, [GRAY], LINEAR)
-    assert make_onnx(description, built(description), {}) == make_onnx(
-        description, built(description), {}
+def test_export_is_deterministic():
+    description = describe(5, 6, [GRAY], LINEAR)
+    assert make_onnx(description, build(description), {}) == make_onnx(
+        description, build(description), {}
     )
 
 
-def test_stacks_of_frames_are_refused():
-    description = described(25, 64, [GRAY, {"name": "stack", "N": 2}], LINEAR)
+def test_frame_stacks_raise():
+    description = describe(25, 64, [GRAY, {"name": "stack", "N": 2}], LINEAR)
     with pytest.raises(InputError, match=r"stack of frames.*format=safetensors"):
-        make_onnx(description, built(description), {})
+        make_onnx(description, build(description), {})
 
 
-class Torn(MLP):
-    """A network that takes different ways with different pictures, which no graph can."""
+class Branching(MLP):
+    """A network with data-dependent control flow, which no graph can represent."""
 
     def forward(self, pixels):
         return super().forward(pixels if pixels.sum() > 0 else -pixels)
 
 
-def test_what_onnx_cant_say_is_one_line(registered):
-    registered(register_network("torn")(Torn))
-    description = described(5, 6, [GRAY], {"name": "torn", "hidden": []})
-    with pytest.raises(InputError, match=r"can't be written as an ONNX model \(.*safeten") as told:
-        make_onnx(description, built(description), {})
-    assert "\n" not in str(told.value)
+def test_unsupported_graph_raises_one_line(registered):
+    registered(register_network("torn")(Branching))
+    description = describe(5, 6, [GRAY], {"name": "torn", "hidden": []})
+    with pytest.raises(InputError, match=r"can't be written as an ONNX model \(.*safeten") as error:
+        make_onnx(description, build(description), {})
+    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("missing", ["onnxscript", "onnxruntime"])
-def test_a_missing_package_is_named_with_its_remedy(missing, monkeypatch, linear):
+def test_missing_package_raises_with_install_command(missing, monkeypatch, linear):
     monkeypatch.setitem(sys.modules, missing, None)
-    description = described(5, 6, [GRAY], LINEAR)
+    description = describe(5, 6, [GRAY], LINEAR)
     with pytest.raises(InputError, match=rf"format=onnx needs {missing}.*'drone-rl\[onnx\]'"):
-        open_onnx(make_onnx(description, built(description), {}))
+        open_onnx(make_onnx(description, build(description), {}))
 
 
-def test_nothing_is_said_and_nothing_is_left_changed(caplog, capfd):
-    description = described(5, 6, [GRAY], LINEAR)
+def test_export_prints_nothing_and_restores_logging(caplog, capfd):
+    description = describe(5, 6, [GRAY], LINEAR)
     caplog.set_level(logging.INFO)
     with warnings.catch_warnings(record=True) as warned:
-        make_onnx(description, built(description), {})
+        make_onnx(description, build(description), {})
     printed = capfd.readouterr()
     assert (caplog.text, printed.out, printed.err, warned) == ("", "", "", [])
     assert logging.root.manager.disable == 0
