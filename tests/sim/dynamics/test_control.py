@@ -9,12 +9,12 @@ from tests.flying import POSITIONS, doubles
 FOUR = doubles((1.0, 2.0, 3.0, 4.0))
 
 
-def test_nothing_drifts_by_default():
+def test_drifts_default_to_zero():
     assert Goals(POSITIONS, FOUR).drifts.tolist() == [[0, 0, 0, 0]]
     assert Goals(POSITIONS, FOUR, FOUR).drifts is FOUR
 
 
-def test_rotors_are_told_all_together():
+def test_rotor_goals_use_rotor_modes():
     goals = rotor_goals(FOUR)
     assert goals.modes == (Mode.ROTOR,) * 4 and goals.values is FOUR
 
@@ -42,7 +42,7 @@ P, V, A, R, H, T, S = (
         ((R, A, A, P), "the first two go together"),
     ],
 )
-def test_what_no_controller_can_do_is_refused(modes, message):
+def test_invalid_mode_combinations_raise(modes, message):
     with pytest.raises(InputError, match=message):
         Goals(modes, FOUR)
 
@@ -50,11 +50,11 @@ def test_what_no_controller_can_do_is_refused(modes, message):
 @pytest.mark.parametrize(
     "modes", [(P, P, A, P), (V, V, R, T), (A, A, R, V), (R, R, A, T), (H, H, R, P)]
 )
-def test_what_goes_together_is_taken(modes):
+def test_valid_mode_combinations_are_accepted(modes):
     assert Goals(modes, FOUR).modes == modes
 
 
-def test_a_number_for_each_axis_is_asked_for():
+def test_goals_and_drifts_of_wrong_shape_raise():
     with pytest.raises(InputError, match=r"goals of shape \(4,\) are not \(num_worlds, 4\)"):
         Goals(POSITIONS, FOUR[0])
     with pytest.raises(InputError, match=r"goals of shape \(1, 3\)"):

@@ -1,4 +1,4 @@
-"""Each controller by itself, as a function of what is missing."""
+"""Each controller separately, as a function of the control error."""
 
 import math
 
@@ -49,16 +49,16 @@ def controlled(part, *rows, **changes):
     return found.numpy()[:, first : first + PARTS.get(part, 1)].squeeze()
 
 
-def test_position_asks_for_a_velocity_of_a_quarter_of_the_most_for_each_metre():
-    """6 m/s and 4 m/s of climb at most: 1.5 and 1 m/s a metre, until 4 metres."""
+def test_position_controller_sets_velocity():
+    """The gains are 1.5 and 1 m/s per meter up to the limits of 6 m/s and, for climb, 4 m/s."""
     found = controlled("position", (1.0, -2.0, 3.0), (100.0, -100.0, -100.0), (0.0, 0.0, 0.0))
     np.testing.assert_allclose(found[0], (1.5, -3.0, 3.0))
     np.testing.assert_allclose(found[1], (6.0, -6.0, -4.0))
     np.testing.assert_array_equal(found[2], 0.0)
 
 
-def test_velocity_asks_for_pitch_forward_and_roll_to_the_side():
-    """Forward needs the nose down, a positive pitch; left needs a roll to the left, a negative."""
+def test_velocity_controller_sets_pitch_and_roll():
+    """Forward needs a positive pitch (nose down); left needs a negative roll."""
     found = controlled("velocity", (1.0, 0.0), (0.0, 2.0), (-50.0, -50.0))
     most = math.pi / 5.5
     np.testing.assert_allclose(found[0], (0.0, 0.2 * most), rtol=1e-6)
@@ -66,19 +66,19 @@ def test_velocity_asks_for_pitch_forward_and_roll_to_the_side():
     np.testing.assert_allclose(found[2], (most, -most), rtol=1e-6)
 
 
-def test_climb_asks_for_thrust_around_one_half():
+def test_climb_controller_sets_thrust_around_one_half():
     found = controlled("climb", (0.0, 0.0), (0.1, 0.0), (0.1, 0.2), (-9.0, 0.5), (9.0, 0.0))
     np.testing.assert_allclose(found, (0.5, 0.6, 0.7, 0.0, 1.0), rtol=1e-6)
 
 
-def test_climb_remembers_what_was_missing_and_no_more_than_it_can_use():
-    """Half a metre a second for 3 ms by a gain of 2: 0.003."""
+def test_climb_integral_is_limited():
+    """0.5 m/s for 3 ms with a gain of 2 gives 0.003."""
     found = controlled("memory", (0.5, 0.1), (-0.5, 0.1), (500.0, 0.1), (-500.0, 0.1))
     np.testing.assert_allclose(found, (0.103, 0.097, 1.0, -1.0), rtol=1e-6)
 
 
-def test_attitude_asks_for_rates():
-    """2.5 rad/s of each axis at most, all of it for 0.4 rad."""
+def test_attitude_controller_sets_rates():
+    """The limit of 2.5 rad/s is reached at 0.4 rad."""
     found = controlled("attitude", (0.1, -0.2, 0.3), (1.0, -1.0, 3.0))
     np.testing.assert_allclose(found[0], (0.625, -1.25, 1.875), rtol=1e-6)
     np.testing.assert_allclose(found[1], (2.5, -2.5, 2.5))
@@ -88,7 +88,7 @@ def test_attitude_asks_for_rates():
     )
 
 
-def test_rates_ask_for_torques():
+def test_rate_controller_sets_torques():
     found = controlled("rate", (1.0, -2.0, 3.0), (9.0, -9.0, 9.0))
     np.testing.assert_allclose(found[0], (0.25, -0.5, 0.75))
     np.testing.assert_allclose(found[1], (1.0, -1.0, 1.0))
@@ -96,7 +96,7 @@ def test_rates_ask_for_torques():
     np.testing.assert_allclose(gains, (0.1, 0.2, 0.3), rtol=1e-6)
 
 
-def test_no_limit_is_ever_exceeded():
+def test_outputs_reach_but_do_not_exceed_limits():
     rows = np.random.default_rng(0).normal(size=(1000, 4)) * 10.0 ** np.arange(-1, 3)[
         :, None
     ].repeat(250, 0).reshape(1000, 1)
@@ -110,8 +110,8 @@ def test_no_limit_is_ever_exceeded():
     assert mixed.min() >= 0.0 and mixed.max() <= 1.0
 
 
-def test_each_torque_is_the_work_of_its_own_rotors():
-    """Front right, rear left, front left, rear right: up on the left, up in the rear, clockwise."""
+def test_mixer_assigns_torques_to_rotors():
+    """Rotors: front right, rear left, front left, rear right."""
     throttle = 0.5
     found = controlled("mix", (0.1, 0, 0, throttle), (0, 0.1, 0, throttle), (0, 0, 0.1, throttle))
     np.testing.assert_allclose(found[0], (0.4, 0.6, 0.6, 0.4), rtol=1e-6)
@@ -121,18 +121,18 @@ def test_each_torque_is_the_work_of_its_own_rotors():
     np.testing.assert_allclose(both, (0.43, 0.49, 0.53, 0.55), rtol=1e-6)
 
 
-def test_what_rotors_cannot_pull_is_lifted():
-    """Without thrust, torque comes of thrust that nobody asked for."""
+def test_mixer_raises_negative_thrust_to_zero():
+    """Torque without thrust adds thrust."""
     np.testing.assert_allclose(controlled("mix", (0.2, 0, 0, 0)), (0, 0.4, 0.4, 0), atol=1e-7)
     np.testing.assert_allclose(controlled("mix", (0.2, 0, 0, 0.1)), (0, 0.4, 0.4, 0), atol=1e-7)
 
 
-def test_what_rotors_cannot_push_is_scaled_down():
-    """All thrust and a torque: 0.8 and 1.2, over 1.2. Thrust gives way, and torque a little."""
+def test_mixer_scales_excess_thrust():
+    """Full thrust and a torque give 0.8 and 1.2, which are divided by 1.2."""
     np.testing.assert_allclose(
         controlled("mix", (0.2, 0, 0, 1.0)), (2 / 3, 1.0, 1.0, 2 / 3), rtol=1e-6
     )
-    found = controlled("mix", (1.0, 1.0, 1.0, 0.5))  # -2.5, 1.5, 1.5, 1.5: lifted to 0 and 4
+    found = controlled("mix", (1.0, 1.0, 1.0, 0.5))  # -2.5, 1.5, 1.5, 1.5 are shifted to 0 and 4
     np.testing.assert_allclose(found, (0.0, 1.0, 1.0, 1.0), atol=1e-6)
 
 
@@ -140,5 +140,5 @@ def test_what_rotors_cannot_push_is_scaled_down():
     ("angle", "same"),
     [(1.0, 1.0), (4.0, 4.0 - 2 * math.pi), (-4.0, 2 * math.pi - 4.0), (20.0, 20.0 - 6 * math.pi)],
 )
-def test_an_angle_is_turned_to_its_least(angle, same):
+def test_angles_are_wrapped(angle, same):
     assert controlled("turned", (angle,)) == pytest.approx(same, abs=2e-6)

@@ -1,4 +1,4 @@
-"""What the whole cascade asks of rotors that answer at once; and how each of its levels answers."""
+"""Outputs of the cascaded controller for ideal rotors, and step responses of each level."""
 
 import math
 
@@ -25,8 +25,8 @@ BARE = (Mode.RATE, Mode.RATE, Mode.RATE, Mode.THROTTLE)
 HEADS = (Mode.HEADING_VELOCITY, Mode.HEADING_VELOCITY, Mode.RATE, Mode.VELOCITY)
 
 
-def asked(modes, *values, yaw=0.0, drift=None, change=None):
-    """What a drone that hovers at (0, 0, 100) asks of each rotor in the first tick."""
+def setpoints(modes, *values, yaw=0.0, drift=None, change=None):
+    """Return the rotor setpoints of a drone hovering at (0, 0, 100) in the first tick."""
     drone = quadrotor(rotor_time_constant=0.0)
     state = hovering(drone)
     state.attitude[:] = doubles((math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)))
@@ -36,7 +36,7 @@ def asked(modes, *values, yaw=0.0, drift=None, change=None):
 
 
 def control(rotors):
-    """Throttle, and the share of control about each axis."""
+    """Return the throttle and the control about each axis."""
     rows = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1], [-1, -1, 1, 1]])
     return rows @ rotors / 4
 
@@ -44,80 +44,84 @@ def control(rotors):
 HOVER = 9.81 / (4 * 4.179446268)
 
 
-def test_rates_are_told_and_limited():
-    """A quarter of the control for each radian a second."""
+def test_rate_goals_are_followed_and_limited():
+    """The gain is 0.25 of the control per rad/s."""
     np.testing.assert_allclose(
-        control(asked(BARE, 0.2, 0.4, 0.6, 0.5)), (0.5, 0.05, 0.1, 0.15), atol=1e-6
+        control(setpoints(BARE, 0.2, 0.4, 0.6, 0.5)), (0.5, 0.05, 0.1, 0.15), atol=1e-6
     )
-    spinning = asked(BARE, 0.2, 0.4, 0.6, 0.5, change={"angular_velocity": (0.2, 0.4, 0.2)})
+    spinning = setpoints(BARE, 0.2, 0.4, 0.6, 0.5, change={"angular_velocity": (0.2, 0.4, 0.2)})
     np.testing.assert_allclose(control(spinning), (0.5, 0.0, 0.0, 0.1), atol=1e-6)
     np.testing.assert_allclose(
-        control(asked(BARE, 90.0, 0.0, 0.0, 0.5))[1] / control(asked(BARE, 2.5, 0, 0, 0.5))[1], 1.0
+        control(setpoints(BARE, 90.0, 0.0, 0.0, 0.5))[1]
+        / control(setpoints(BARE, 2.5, 0, 0, 0.5))[1],
+        1.0,
     )
-    assert control(asked(BARE, 0.0, 0.0, -90.0, 0.2))[3] < 0
+    assert control(setpoints(BARE, 0.0, 0.0, -90.0, 0.2))[3] < 0
 
 
-def test_angles_are_told():
-    """0.1 rad asks for 0.625 of 2.5 rad/s, and so for 0.15625 of the control."""
-    found = control(asked((*ANGLES[:3], Mode.THROTTLE), 0.1, -0.1, 0.05, 0.5))
+def test_angle_goals_set_control():
+    """0.1 rad sets 0.625 rad/s, and so 0.15625 of the control."""
+    found = control(setpoints((*ANGLES[:3], Mode.THROTTLE), 0.1, -0.1, 0.05, 0.5))
     np.testing.assert_allclose(found, (0.5, 0.15625, -0.15625, 0.078125), atol=1e-6)
 
 
-def test_a_heading_is_sought_by_the_shorter_way():
+def test_heading_takes_the_shorter_turn():
     modes = (*ANGLES[:3], Mode.THROTTLE)
-    assert control(asked(modes, 0, 0, -3.0, 0.5, yaw=3.0))[3] > 0.1
-    assert control(asked(modes, 0, 0, 3.0, 0.5, yaw=-3.0))[3] < -0.1
-    np.testing.assert_allclose(control(asked(modes, 0, 0, 3.0, 0.5, yaw=3.0))[3], 0, atol=1e-6)
+    assert control(setpoints(modes, 0, 0, -3.0, 0.5, yaw=3.0))[3] > 0.1
+    assert control(setpoints(modes, 0, 0, 3.0, 0.5, yaw=-3.0))[3] < -0.1
+    np.testing.assert_allclose(control(setpoints(modes, 0, 0, 3.0, 0.5, yaw=3.0))[3], 0, atol=1e-6)
 
 
-def test_a_heading_that_drifts_is_followed_at_its_rate():
+def test_drifting_heading_sets_its_rate():
     modes = (*ANGLES[:3], Mode.THROTTLE)
-    found = control(asked(modes, 0, 0, 0.0, 0.5, drift=(0, 0, 0.4, 0)))
+    found = control(setpoints(modes, 0, 0, 0.0, 0.5, drift=(0, 0, 0.4, 0)))
     np.testing.assert_allclose(found[3], 0.1, atol=1e-6)
 
 
 SHARE = 0.2 * math.pi / 5.5 * 2.5 * 2.5 * 0.25
-"""Of control for a metre a second: gain times angle, times rates, times control."""
+"""Control per m/s: product of the gains of velocity, angle and rate."""
 
 
 @pytest.mark.parametrize("yaw", [0.0, 1.0, -2.5, math.pi])
-def test_velocities_are_of_the_world_or_of_the_heading(yaw):
+def test_velocity_goals_are_in_world_or_heading_frame(yaw):
     x, y, c, s = 0.3, -0.2, math.cos(yaw), math.sin(yaw)
-    world = control(asked(VELOCITIES, x, y, 0.0, 0.0, yaw=yaw))
+    world = control(setpoints(VELOCITIES, x, y, 0.0, 0.0, yaw=yaw))
     forward, left = c * x + s * y, c * y - s * x
     np.testing.assert_allclose(world, (HOVER, -SHARE * left, SHARE * forward, 0), atol=1e-6)
-    same = control(asked(HEADS, forward, left, 0.0, 0.0, yaw=yaw))
+    same = control(setpoints(HEADS, forward, left, 0.0, 0.0, yaw=yaw))
     np.testing.assert_allclose(same, world, atol=1e-6)
     moving = {"velocity": (x, y, 0.0)}
     for modes, goal in ((VELOCITIES, (x, y)), (HEADS, (forward, left))):
-        at_it = control(asked(modes, *goal, 0.0, 0.0, yaw=yaw, change=moving))
+        at_it = control(setpoints(modes, *goal, 0.0, 0.0, yaw=yaw, change=moving))
         np.testing.assert_allclose(at_it, (HOVER, 0, 0, 0), atol=1e-6)
 
 
-def test_places_are_led_to_by_velocities():
-    """Half a metre ahead asks for 0.75 m/s; a metre up for 1 m/s, which is all thrust there is."""
-    found = control(asked(POSITIONS, 0.5, -0.5, 0.0, 100.0))
+def test_position_goals_set_velocities():
+    """0.5 m ahead sets 0.75 m/s; 1 m up sets 1 m/s, which needs full thrust."""
+    found = control(setpoints(POSITIONS, 0.5, -0.5, 0.0, 100.0))
     np.testing.assert_allclose(found, (HOVER, 0.75 * SHARE, 0.75 * SHARE, 0), atol=1e-6)
-    found = control(asked(POSITIONS, 0.0, 0.0, 0.0, 100.1))
+    found = control(setpoints(POSITIONS, 0.0, 0.0, 0.0, 100.1))
     np.testing.assert_allclose(found[0], HOVER + 0.5 * 2.0 * 0.1, atol=1e-6)
-    assert control(asked(POSITIONS, 0.0, 0.0, 0.0, 101.0))[0] == pytest.approx(1.0)
+    assert control(setpoints(POSITIONS, 0.0, 0.0, 0.0, 101.0))[0] == pytest.approx(1.0)
 
 
-def test_a_place_that_drifts_is_followed_at_its_speed():
-    found = control(asked(POSITIONS, 0.0, 0.0, 0.0, 100.0, drift=(0.3, -0.2, 0.0, 0.05)))
+def test_drifting_position_sets_its_velocity():
+    found = control(setpoints(POSITIONS, 0.0, 0.0, 0.0, 100.0, drift=(0.3, -0.2, 0.0, 0.05)))
     np.testing.assert_allclose(found, (HOVER + 0.05, 0.2 * SHARE, 0.3 * SHARE, 0), atol=1e-6)
-    far = control(asked(POSITIONS, 50.0, 0.0, 0.0, 100.0, drift=(50.0, 0.0, 0.0, 0.0)))
+    far = control(setpoints(POSITIONS, 50.0, 0.0, 0.0, 100.0, drift=(50.0, 0.0, 0.0, 0.0)))
     moving = {"velocity": (6.0, 0.0, 0.0)}
-    fast = control(asked(POSITIONS, 50.0, 0, 0, 100.0, drift=(50.0, 0, 0, 0), change=moving))
-    assert far[2] > 0.1 and fast[2] == pytest.approx(0.0, abs=1e-6)  # 6 m/s is the most
+    fast = control(setpoints(POSITIONS, 50.0, 0, 0, 100.0, drift=(50.0, 0, 0, 0), change=moving))
+    assert far[2] > 0.1 and fast[2] == pytest.approx(0.0, abs=1e-6)  # the limit is 6 m/s
 
 
-def test_rotors_are_told_without_a_controller():
+def test_rotor_goals_bypass_controllers():
     every = (Mode.ROTOR,) * 4
-    np.testing.assert_allclose(asked(every, 0.1, 0.2, 0.3, 0.4), (0.1, 0.2, 0.3, 0.4), atol=1e-7)
+    np.testing.assert_allclose(
+        setpoints(every, 0.1, 0.2, 0.3, 0.4), (0.1, 0.2, 0.3, 0.4), atol=1e-7
+    )
 
 
-STEPS = {  # modes, goal, axis, what, rise, overshoot, settled
+STEPS = {  # modes, goal, axis, quantity, rise time, overshoot
     "rate": (RATES, (0, 0, 1.0, 100.0), 2, "rates", 0.6, 0.01),
     "angle": (ANGLES, (0.3, 0, 0, 100.0), 0, "angles", 0.6, 0.02),
     "velocity": (VELOCITIES, (2.0, 0, 0, 0), 0, "speed", 3.0, 0.05),
@@ -128,7 +132,7 @@ STEPS = {  # modes, goal, axis, what, rise, overshoot, settled
 
 
 @pytest.mark.parametrize("name", STEPS)
-def test_a_step_is_answered(name):
+def test_step_responses(name):
     modes, goal, axis, what, rise, overshoot = STEPS[name]
     drone = quadrotor()
     states = trajectory(drone, hovering(drone), make_goals(modes, *goal), 3300, 3)
@@ -147,8 +151,8 @@ def test_a_step_is_answered(name):
     assert response.settling_time(0.05) < 2.0 * rise
 
 
-def test_no_limit_is_exceeded_whatever_is_wanted():
-    """Sixty drones between random places: what they do stays near what controllers may ask for."""
+def test_limits_hold_for_random_goals():
+    """60 drones with random goals stay near the limits of the controllers."""
     drone, source = quadrotor(), np.random.default_rng(0)
     state = hovering(drone, count=60)
     most = np.zeros(4)

@@ -1,4 +1,4 @@
-"""What actions ask of controllers, by hand-computed numbers."""
+"""Hand-computed goals of actions."""
 
 import math
 
@@ -19,14 +19,14 @@ def drones():
     return FlightState.at_rest(place)
 
 
-def test_a_move_shifts_the_place_where_the_drone_is_wanted():
+def test_move_shifts_the_position_goal():
     goals = Moves(MOVES).goals(drones(), torch.tensor([Move.FORWARD, Move.LEFT, Move.RIGHT]))
     assert goals.modes == (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
     assert goals.values.tolist() == [[1.0, 2.0, 0.0, 2.5]] * 3
     assert goals.drifts.tolist() == [[4, 0, 0, 0], [0, 4, 0, 0], [0, -4, 0, 0]]
 
 
-def test_the_place_does_not_run_away_nor_back():
+def test_position_goal_stays_within_its_lead():
     body = drones()
     body.reference[:] = torch.tensor([[1.3, 9.0, 0.1, 2.5], [-7.0, 1.8, 0.1, 2.5], [1, 2, 0.1, 3]])
     goals = Moves(MOVES).goals(body, torch.zeros(3, dtype=torch.int64))
@@ -35,7 +35,7 @@ def test_the_place_does_not_run_away_nor_back():
     assert body.reference[0, 1] == 9.0
 
 
-def test_velocities_are_of_the_heading_and_the_height_is_kept():
+def test_velocity_actions_use_the_heading_frame_and_keep_height():
     body = drones()
     body.reference[:, 3] = 2.0
     action = torch.tensor([[-1.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, -0.5, -2.0]])
@@ -52,6 +52,6 @@ def test_velocities_are_of_the_heading_and_the_height_is_kept():
     assert goals.drift is None
 
 
-def test_settings_say_which():
+def test_settings_select_the_steering():
     assert isinstance(make_steering(MOVES), Moves)
     assert make_steering(VELOCITY).actions.names[3] == "turn left"

@@ -1,4 +1,4 @@
-"""Another way of moving fits wherever computer-vision mode does, and nothing else changes."""
+"""User-defined dynamics work in batches, dm_control and TorchRL."""
 
 import pytest
 import torch
@@ -16,7 +16,7 @@ from tests.fake_flight import FLIGHT, Floating, floating
 from tests.second_dynamics import TURN, Turning
 
 
-def test_the_batch_flies_it():
+def test_batch_uses_custom_dynamics():
     worlds = Worlds(2, dynamics=Turning())
     worlds.reset(torch.arange(2), [world_random_state(0, i) for i in range(2)])
     for actions in ([1, 0], [0, 4], [3, 0]):
@@ -29,8 +29,8 @@ def test_the_batch_flies_it():
     worlds.close()
 
 
-def test_the_camera_turns_with_the_drone():
-    """A cube at the drone's left is unseen, and in the middle of the picture after a turn."""
+def test_camera_turns_with_the_drone():
+    """A cube to the left is out of view, and in the image center after a turn."""
     worlds = Worlds(1, dynamics=Turning())
     cubes = [[0.5, 8.0, 2.5], [0.5, 90.0, 2.5], [0.5, 90.0, 2.5]]
     state = worlds.start(torch.tensor([cubes], dtype=torch.float64))
@@ -42,7 +42,7 @@ def test_the_camera_turns_with_the_drone():
     worlds.close()
 
 
-def test_dm_control_flies_it_to_the_same_poses():
+def test_dm_control_reaches_the_same_poses():
     env = make_environment(dynamics=Turning(), pixels=False, random_state=world_random_state(0, 0))
     worlds = Worlds(1, dynamics=Turning())
     env.reset()
@@ -59,7 +59,7 @@ def test_dm_control_flies_it_to_the_same_poses():
     torch.testing.assert_close(torch.tensor(attitude)[None], worlds.state.body.attitude)
 
 
-def test_torchrl_sees_its_actions_and_its_attitude():
+def test_torchrl_specs_follow_the_dynamics():
     env = DroneEnv(2, dynamics=Turning())
     check_env_specs(env)
     assert env.action_spec.space.n == 5
@@ -74,15 +74,15 @@ def test_torchrl_sees_its_actions_and_its_attitude():
     assert ComposerEnv(single).action_spec.space.n == 5
 
 
-def test_who_derives_from_it_says_no_more_than_it_must():
-    class Still(Dynamics):
+def test_base_class_has_defaults():
+    class Static(Dynamics):
         pass
 
-    still = Still()
-    assert (still.mount, still.is_random, still.needs_obstacles) == ("body", False, False)
+    static = Static()
+    assert (static.mount, static.is_random, static.needs_obstacles) == ("body", False, False)
 
 
-def test_an_episode_of_random_dynamics_has_a_seed_of_its_worlds_stream():
+def test_random_dynamics_are_seeded_by_the_environments_stream():
     gusty = Floating(FLIGHT.replace(gusts=1.0), MOVES_SETTINGS)
     calm = Floating(FLIGHT, MOVES_SETTINGS)
     states = {}
@@ -90,7 +90,7 @@ def test_an_episode_of_random_dynamics_has_a_seed_of_its_worlds_stream():
         worlds = Worlds(2, dynamics=dynamics)
         worlds.reset(torch.arange(2), [world_random_state(0, i) for i in range(2)])
         states[name] = worlds.state
-    assert torch.equal(states["gusty"].cubes, states["calm"].cubes)  # the task draws first
+    assert torch.equal(states["gusty"].cubes, states["calm"].cubes)  # the task samples first
     expected = []
     for i in range(2):
         stream = world_random_state(0, i)
@@ -101,7 +101,7 @@ def test_an_episode_of_random_dynamics_has_a_seed_of_its_worlds_stream():
     assert worlds.start(states["calm"].cubes).body.seed.tolist() == [0, 0]
 
 
-def test_dm_control_draws_the_same_seed():
+def test_dm_control_samples_the_same_seed():
     gusty = Floating(FLIGHT.replace(gusts=1.0), MOVES_SETTINGS)
     env = make_environment(dynamics=gusty, pixels=False, random_state=world_random_state(0, 0))
     env.reset()
@@ -112,11 +112,11 @@ def test_dm_control_draws_the_same_seed():
 
 
 @pytest.mark.parametrize("mount", ["gimbal", "body"])
-def test_a_gimbal_keeps_cameras_level_wherever_they_are_drawn(mount):
+def test_gimbal_keeps_cameras_level(mount):
     dynamics = Floating(FLIGHT.replace(camera_mount=mount), MOVES_SETTINGS)
     worlds = Worlds(1, dynamics=dynamics)
     half = 0.5**0.5
-    level = torch.tensor([[half, 0.0, 0.0, half]]).double()  # a quarter turn to the left
+    level = torch.tensor([[half, 0.0, 0.0, half]]).double()  # heading 90 degrees to the left
     tilted = worlds.bodies(1).attitude
     shown = worlds.poses(worlds.state).attitude
     torch.testing.assert_close(shown, level if mount == "gimbal" else tilted)
@@ -128,11 +128,11 @@ def test_a_gimbal_keeps_cameras_level_wherever_they_are_drawn(mount):
     attitude = torch.tensor(env.task.drone.get_pose(env.physics)[1])[None]
     torch.testing.assert_close(attitude, shown)
     env.task.drone.set_pose(env.physics, [0.0, 0.0, 2.5], [0.0, 0.0, 0.0, 1.0])
-    env.step(0)  # turned by hand
+    env.step(0)  # after setting the attitude
     assert env.task.state.body.attitude.tolist() == [[0.0, 0.0, 0.0, 1.0]]
 
 
-def test_settings_of_dynamics_do_wherever_dynamics_do(monkeypatch):
+def test_settings_are_accepted_in_place_of_dynamics(monkeypatch):
     floating(monkeypatch)
     windy = FLIGHT.replace(wind=(1.0, 0.0, 0.0))
     for made in (
@@ -144,7 +144,7 @@ def test_settings_of_dynamics_do_wherever_dynamics_do(monkeypatch):
         assert made.action_settings == MOVES_SETTINGS
 
 
-def test_a_lost_drone_ends_its_own_episode_alone():
+def test_lost_drone_ends_only_its_own_episode():
     env = DroneEnv(2, dynamics=Floating(FLIGHT, MOVES_SETTINGS), pixels=False)
     state = env.reset()
     for _ in range(6):

@@ -18,7 +18,7 @@ def flown(*actions, timestep=0.1):
     return body
 
 
-def test_a_step_goes_as_fast_as_it_is_told():
+def test_step_length_follows_from_the_velocity():
     body = flown((0.0, 0.5, 0.0))
     assert body.position[0].tolist() == pytest.approx([1.2, 2.15, 3.0])  # 2 and 1.5 m/s
     assert body.velocity[0].tolist() == pytest.approx([2.0, 1.5, 0.0])
@@ -27,8 +27,8 @@ def test_a_step_goes_as_fast_as_it_is_told():
     assert flown((1.0, 0.0, 0.0), timestep=0.5).position[0, 0] == 3.0
 
 
-def test_it_turns_after_the_step_and_then_flies_where_it_looks():
-    """A second at 90 degrees a second, then 4 m/s forward, which is to the left; left is back."""
+def test_turn_takes_effect_in_the_next_step():
+    """1 s at 90 degrees/s, then 4 m/s forward, which is world left, and left, which is back."""
     turned = flown((-1.0, 0.0, 1.0), timestep=1.0)
     assert turned.angular_velocity[0].tolist() == pytest.approx([0, 0, math.pi / 2])
     half = math.sqrt(0.5)
@@ -38,13 +38,13 @@ def test_it_turns_after_the_step_and_then_flies_where_it_looks():
     assert there.position[0].tolist() == pytest.approx([-2.0, 6.0, 3.0])
 
 
-def test_the_heading_goes_around():
+def test_heading_wraps_around():
     around = flown(*[(-1.0, 0.0, 0.5)] * 8, timestep=1.0)  # 8 times 45 degrees
     assert heading_of(around.attitude).item() == pytest.approx(0, abs=1e-12)
     assert heading_of(flown((0, 0, -1.0)).attitude).item() == pytest.approx(-math.radians(9))
 
 
-def test_worlds_are_apart_and_the_body_before_stays():
+def test_environments_are_independent_and_inputs_unchanged():
     dynamics = Kinematic(SETTINGS)
     body = dynamics.start(torch.zeros(2, 3, dtype=torch.float64))
     after = dynamics.step(body, torch.tensor([[1.0, 0, 0], [-1.0, -1.0, 0]]))

@@ -1,4 +1,4 @@
-"""The same numbers whoever flies beside a drone, and nothing lost between commands."""
+"""States do not depend on other drones or on the split into commands."""
 
 import numpy as np
 import pytest
@@ -19,8 +19,8 @@ from tests.flying import (
 )
 
 
-def crowd(drone, count=96):
-    """Drones that are all told something else, in gusts of their own."""
+def make_batch(drone, count=96):
+    """Return drones with distinct goals and gusts."""
     source = np.random.default_rng(1)
     state = hovering(drone, count=count, seeds=torch.arange(count))
     goals = make_goals(POSITIONS, 0, 0, 0, 100.0, count=count)
@@ -29,9 +29,9 @@ def crowd(drone, count=96):
     return state, goals
 
 
-def test_one_thread_or_two_alone_or_among_others():
+def test_results_do_not_depend_on_threads_or_batch():
     drone = quadrotor(gusts=1.0, wind=(2.0, 0.0, 0.0))
-    state, goals = crowd(drone)
+    state, goals = make_batch(drone)
     both = drone.fly(state, goals, 330).numbers
     alone = quadrotor(gusts=1.0, wind=(2.0, 0.0, 0.0))
     vars(alone)["_workers"] = WorkerPool(1, size=1)
@@ -40,11 +40,11 @@ def test_one_thread_or_two_alone_or_among_others():
     assert torch.equal(alone.fly(state, goals, 330).numbers, both)
     for world in (0, 17, 95):
         one = FlightState(state.numbers[world : world + 1].clone())
-        told_one = make_goals(POSITIONS, *goals.values[world].tolist())
-        assert torch.equal(drone.fly(one, told_one, 330).numbers[0], both[world])
+        single_goals = make_goals(POSITIONS, *goals.values[world].tolist())
+        assert torch.equal(drone.fly(one, single_goals, 330).numbers[0], both[world])
 
 
-def test_what_is_given_stays_as_it_was():
+def test_input_state_is_unchanged():
     drone = quadrotor()
     state = hovering(drone)
     before = state.numbers.clone()
@@ -56,8 +56,8 @@ def test_what_is_given_stays_as_it_was():
     ("modes", "goal"),
     [(POSITIONS, (2, 1, 1, 101)), (VELOCITIES, (2, 1, 1, 1)), (ANGLES, (0.3, 0.2, 1, 99))],
 )
-def test_one_command_of_66_ticks_is_two_of_33(modes, goal):
-    """But for what single precision rounds: less than a micrometre."""
+def test_command_of_66_ticks_equals_two_of_33(modes, goal):
+    """They agree up to rounding, less than 1 micrometer."""
     drone = quadrotor()
     whole = drone.fly(hovering(drone), make_goals(modes, *goal), 66)
     half = drone.fly(
@@ -67,8 +67,8 @@ def test_one_command_of_66_ticks_is_two_of_33(modes, goal):
     assert whole.ticks.tolist() == half.ticks.tolist() == [66]
 
 
-def test_far_away_nothing_is_lost():
-    """A hundred kilometres from the origin a drone flies as it does there."""
+def test_precision_does_not_depend_on_the_distance_to_the_origin():
+    """A drone 100 km from the origin moves as at the origin."""
     drone, far = quadrotor(), doubles((1e5, -1e5, 0.0))
     near = drone.fly(hovering(drone), make_goals(POSITIONS, 1.0, 2.0, 0.0, 101.0), 330)
     state = hovering(drone)
@@ -78,7 +78,7 @@ def test_far_away_nothing_is_lost():
     np.testing.assert_allclose(away.position - far, near.position, atol=1e-9)
 
 
-def test_where_a_drone_is_wanted_is_written_down():
+def test_reference_is_the_goal_position():
     drone = quadrotor()
     places = drone.fly(hovering(drone), make_goals(POSITIONS, 1.0, 2.0, 0.5, 101.0), 33)
     np.testing.assert_allclose(places.reference[0], (1.0, 2.0, 0.5, 101.0))
@@ -98,7 +98,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_lost_drone_stays_flagged_and_still_and_harms_no_other(name):
+def test_lost_drone_stays_flagged_and_does_not_affect_others(name):
     drone = quadrotor()
     state = hovering(drone, count=3)
     goals = make_goals(POSITIONS, 1.0, 0.0, 0.0, 100.0, count=3)
@@ -116,7 +116,7 @@ def test_a_lost_drone_stays_flagged_and_still_and_harms_no_other(name):
 
 @pytest.mark.parametrize("modes", [POSITIONS, VELOCITIES, ANGLES, (Mode.ROTOR,) * 4])
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_a_drone_that_is_told_no_number_is_lost(modes, bad):
+def test_nan_goals_lose_the_drone(modes, bad):
     drone = quadrotor()
     for axis in range(4):
         goal = [0.0, 0.0, 0.0, 0.0]
@@ -124,13 +124,13 @@ def test_a_drone_that_is_told_no_number_is_lost(modes, bad):
         assert drone.fly(hovering(drone), make_goals(modes, *goal), 3).is_lost.item()
 
 
-def test_a_drone_that_spins_out_of_all_measure_is_lost():
+def test_drone_with_excessive_spin_is_lost():
     drone = quadrotor(rotor_thrust=10_000.0, inertia=(1e-6, 1e-6, 1e-6))
     after = drone.push(falling(), doubles((0.0, 1.0, 1.0, 0.0)), 10)
     assert after.is_lost.item() and after.position.tolist() == [[0, 0, 100]]
 
 
-def test_time_and_contacts_go_on_from_command_to_command():
+def test_time_and_contacts_continue_across_commands():
     drone = quadrotor()
     state = falling(0.8)
     none = doubles((0.0, 0.0, 0.0, 0.0))
@@ -138,7 +138,7 @@ def test_time_and_contacts_go_on_from_command_to_command():
     for _ in range(4):
         state = drone.push(state, none, 30)
     assert state.ticks.tolist() == [120]
-    first = float(state.contact.time)  # 0.5 m take 0.319 s
+    first = float(state.contact.time)  # a fall of 0.5 m takes 0.319 s
     assert first == pytest.approx(0.319, abs=0.007)
     later = drone.push(state, none, 1)
-    assert float(later.contact.time) == first  # it is in the air, and still knows
+    assert float(later.contact.time) == first  # the contact is kept in the air

@@ -1,4 +1,4 @@
-"""Against one drone in double precision, written anew; and what ends a tick."""
+"""Comparison with the reference drone in double precision, and the end of a tick."""
 
 import numpy as np
 import pytest
@@ -34,8 +34,8 @@ FLIGHTS = {
 
 
 @pytest.mark.parametrize("name", FLIGHTS)
-def test_single_precision_drifts_by_less_than_a_millimetre_in_ten_seconds(name):
-    """And by less than 0.01 degrees, where nothing is touched; commands are of 33 ticks."""
+def test_single_precision_error_is_below_1_mm_in_10_s(name):
+    """The angular error without contacts is below 0.01 degrees; commands have 33 ticks."""
     modes, goal, changes = FLIGHTS[name]
     drone = quadrotor(**changes)
     after = trajectory(drone, hovering(drone), make_goals(modes, *goal), TICKS, 33)[-1]
@@ -46,7 +46,7 @@ def test_single_precision_drifts_by_less_than_a_millimetre_in_ten_seconds(name):
     np.testing.assert_allclose(after.rotors[0], reference.rotors, atol=1e-3)
 
 
-def test_a_place_that_drifts_is_where_the_drift_has_brought_it():
+def test_drift_moves_the_reference():
     drone, drift = quadrotor(), (0.5, -0.3, 0.1, 0.2)
     goals = make_goals(POSITIONS, 0.0, 0.0, 0.0, 100.0, drift=drift)
     after = drone.fly(hovering(drone), goals, 1000)
@@ -57,7 +57,7 @@ def test_a_place_that_drifts_is_where_the_drift_has_brought_it():
     np.testing.assert_allclose(after.reference[0], (1.5, -0.9, 0.3, 100.6), atol=1e-6)
 
 
-def test_the_climbs_memory_counts_only_where_height_is_sought():
+def test_climb_integral_is_used_only_with_height_goals():
     drone = quadrotor()
     thrown = (Mode.ANGLE, Mode.ANGLE, Mode.ANGLE, Mode.THROTTLE)
     state = hovering(drone)
@@ -67,7 +67,7 @@ def test_the_climbs_memory_counts_only_where_height_is_sought():
     assert float(gained) == pytest.approx(2.0 * 0.5 * 0.003, rel=1e-4)
 
 
-def test_a_drone_on_the_ground_keeps_its_tilt_while_rotors_carry_it():
+def test_drone_on_the_ground_keeps_its_tilt_under_thrust():
     drone = quadrotor(rotor_time_constant=0.0)
     state = falling(0.3)
     state.attitude[:] = doubles((0.9950042, 0.0998334, 0.0, 0.0))  # 0.2 rad
@@ -76,8 +76,8 @@ def test_a_drone_on_the_ground_keeps_its_tilt_while_rotors_carry_it():
     assert weak.attitude.tolist() == [[1, 0, 0, 0]]
 
 
-def test_a_fast_drone_misses_no_obstacle():
-    """At 60 m/s, 6 m in a command; and with rotors of 100 m/s2."""
+def test_fast_drone_hits_obstacles():
+    """The drone has 60 m/s, which is 6 m per command, or rotors of 100 m/s2."""
     box = Obstacles(doubles((7.0, 0.0, 100.0))[None], (0.5, 0.5, 5.0))
     none = doubles((0.0, 0.0, 0.0, 0.0))
     hit = quadrotor().fly(falling(100.0, (66.0, 0.0, 0.0)), rotor_goals(none), 34, box)

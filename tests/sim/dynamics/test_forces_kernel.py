@@ -1,4 +1,4 @@
-"""One tick's forces: those that the batch moves by, told to somebody else."""
+"""Forces of one tick, returned to an external simulator, equal those of the batch."""
 
 import math
 
@@ -25,7 +25,7 @@ from tests.flying import make_goals as goals_of
 ROTORS = (Mode.ROTOR,) * 4
 
 
-def test_a_hovering_drone_is_carried():
+def test_hovering_drone_is_supported():
     drone = quadrotor()
     state = hovering(drone)
     after, pushes = forces(drone.frame, state, goals_of(POSITIONS, 0, 0, 0, 100.0), 0)
@@ -34,7 +34,7 @@ def test_a_hovering_drone_is_carried():
 
 
 def test_torques_and_thrust_turn_with_the_body():
-    """Rolled to the right by 90 degrees: thrust to the right, yaw about the world's -y."""
+    """Rolled right by 90 degrees: thrust to the right, yaw torque about the world's -y."""
     drone = quadrotor(rotor_time_constant=0.0)
     state = falling()
     root = math.sqrt(0.5)
@@ -45,8 +45,8 @@ def test_torques_and_thrust_turn_with_the_body():
 
 
 @pytest.mark.parametrize("tick", [0, 7])
-def test_they_are_what_a_tick_of_flight_moves_by(tick):
-    """The gain of speed and spin of the batch itself, of drones in all attitudes and gusts."""
+def test_forces_equal_the_acceleration_of_one_tick(tick):
+    """Compare with velocity changes of the batch, in random attitudes and gusts."""
     count, source = 20, np.random.default_rng(3)
     drone = quadrotor(wind=(3.0, 0.0, 0.0), gusts=1.0)
     state = hovering(drone, count=count, seeds=torch.arange(count))
@@ -59,7 +59,7 @@ def test_they_are_what_a_tick_of_flight_moves_by(tick):
         goals = goals_of(modes, 0.5, -0.4, 0.3, 100.5, count=count, drift=drift)
         state.numbers[:, fs.TICKS] = tick
         after, pushes = forces(drone.frame, state, goals, tick)
-        since = goals.values + tick * 0.003 * goals.drifts  # the batch's tick is its first
+        since = goals.values + tick * 0.003 * goals.drifts  # the batch starts at its first tick
         if modes == VELOCITIES:
             since = goals.values
         flown = drone.fly(state, type(goals)(modes, since, goals.drift), 1)
@@ -76,7 +76,7 @@ def test_they_are_what_a_tick_of_flight_moves_by(tick):
         assert torch.equal(after.ticks, flown.ticks)
 
 
-def test_a_lost_drone_is_left_alone():
+def test_lost_drone_has_no_forces():
     drone = quadrotor()
     state = hovering(drone, count=2)
     state.velocity[0] = float("nan")
@@ -85,7 +85,7 @@ def test_a_lost_drone_is_left_alone():
     assert not pushes[0].any() and pushes[1, 2] > 9
 
 
-def test_where_a_drone_is_wanted_after_a_command():
+def test_reference_after_a_command():
     state = hovering(quadrotor())
     state.attitude[:] = doubles((math.cos(0.2), 0.0, 0.0, math.sin(0.2)))
     goals = goals_of(POSITIONS, 1.0, 2.0, 0.5, 101.0, drift=(0.1, 0.2, 0.3, 0.4))

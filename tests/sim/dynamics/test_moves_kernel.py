@@ -1,4 +1,4 @@
-"""Moves by the kernel of whole episodes are those of the quadrotor, bit for bit."""
+"""Moves of the fused kernel equal those of the quadrotor bit for bit."""
 
 import pytest
 import torch
@@ -37,7 +37,7 @@ def moved(
 
 
 @pytest.mark.parametrize("mount", ["gimbal", "body"])
-def test_the_same_as_step_by_step(mount):
+def test_moves_equal_quadrotor_steps(mount):
     settings = DynamicsSettings(mode="simple_flight", camera_mount=mount, wind=(1.0, -2.0, 0.3))
     quadrotor = Quadrotor(settings)
     state = quadrotor.start(torch.tensor([[0.0, 0.0, 2.5], [9.0, -3.0, 4.0]], dtype=torch.float64))
@@ -55,10 +55,10 @@ def test_the_same_as_step_by_step(mount):
         seen = state.attitude if mount == "body" else heading_only(state.attitude)
         assert torch.equal(turns, seen.float())
     assert not flags.any()
-    assert state.attitude[0, 2].abs() > 1e-3  # it leans, so that mounts differ
+    assert state.attitude[0, 2].abs() > 1e-3  # the drone is tilted, so mounts differ
 
 
-def test_a_lost_drone_is_known():
+def test_lost_drone_is_flagged():
     quadrotor = Quadrotor(DynamicsSettings(mode="simple_flight"))
     state = quadrotor.start(torch.zeros(1, 3, dtype=torch.float64))
     state.velocity[:] = torch.nan

@@ -1,4 +1,4 @@
-"""Arrays of drones that kernels fly are the states' own, and begin anew with each batch."""
+"""State arrays of the fused kernel are set from states at the start of each batch."""
 
 import pytest
 import torch
@@ -14,11 +14,11 @@ FLIGHT = DynamicsSettings(mode="simple_flight", camera_mount="body")
 
 @pytest.fixture(autouse=True)
 def warp():
-    """Started, as whoever flies or draws has it."""
+    """Start Warp."""
     start_warp("cpu")
 
 
-def test_takes_drones_over_and_leaves_them_alone():
+def test_fleet_copies_states():
     quadrotor = Quadrotor(FLIGHT, ActionSettings(move_lead=0.25))
     fleet = FlyingFleet(3, quadrotor)
     state = quadrotor.start(torch.tensor([[0.0, 1.0, 2.5]] * 2, dtype=torch.float64))
@@ -31,10 +31,10 @@ def test_takes_drones_over_and_leaves_them_alone():
     assert fleet.fleet.command.ticks == 33
 
 
-def test_none_fly_in_computer_vision_mode():
+def test_computer_vision_mode_has_no_fleet_states():
     assert FlyingFleet(3, None).fleet.numbers.shape == (0, 37)
 
 
-def test_velocities_are_not_known():
+def test_velocity_actions_are_not_supported():
     assert FlyingFleet.knows(Quadrotor(FLIGHT))
     assert not FlyingFleet.knows(Quadrotor(FLIGHT, ActionSettings(kind="velocity")))

@@ -22,7 +22,7 @@ from tests.flying import (
 CONF = Path(__file__).parents[3] / "conf" / "dynamics"
 
 
-def test_it_starts_in_a_hover():
+def test_quadrotor_starts_hovering():
     drone = quadrotor(mass=1.2)
     state = drone.start(doubles((1.0, 2.0, 3.0)), torch.tensor([9]))
     after = drone.fly(state, make_goals(POSITIONS, 1.0, 2.0, 0.0, 3.0), 333)
@@ -31,8 +31,8 @@ def test_it_starts_in_a_hover():
     assert state.rotors[0, 0].item() == pytest.approx(1.2 * 9.81 / (4 * 4.179446268))
 
 
-def test_moves_shift_where_it_is_wanted():
-    """By 0.4 m in 0.1 s, at 4 m/s."""
+def test_moves_shift_the_reference():
+    """A move shifts it by 0.4 m in 0.1 s, at 4 m/s."""
     drone = quadrotor()
     state = hovering(drone, count=3)
     moved = drone.step(state, torch.tensor([Move.FORWARD, Move.LEFT, Move.RIGHT]))
@@ -42,14 +42,14 @@ def test_moves_shift_where_it_is_wanted():
     assert not state.position[:, :2].any() and moved.ticks.tolist() == [33] * 3
 
 
-def test_the_place_where_it_is_wanted_runs_ahead_only_so_far():
+def test_lead_of_the_reference_is_limited():
     drone = Quadrotor(settings(), ActionSettings(move_lead=0.25))
     state = hovering(drone)
     state.reference[0, 0] = 10.0
     assert drone.steering.goals(state, torch.tensor([0])).values[0].tolist() == [0.25, 0, 0, 100]
 
 
-def test_ten_moves_forward_become_a_flight():
+def test_ten_moves_forward_reach_cruise_speed():
     drone = quadrotor()
     state = hovering(drone)
     for _ in range(30):
@@ -58,21 +58,21 @@ def test_ten_moves_forward_become_a_flight():
     assert state.position[0, 1:].tolist() == pytest.approx([0.0, 100.0], abs=0.05)
 
 
-def test_what_it_is_told_about_itself():
+def test_properties_of_the_quadrotor():
     drone = quadrotor(camera_mount="body")
     assert drone.mount == "body" and drone.needs_obstacles and not drone.is_random
     assert drone.actions.entry.high == 2
 
 
-def test_no_drone_is_flown_without_complaint():
+def test_empty_batch_is_supported():
     drone = quadrotor()
     empty = drone.start(torch.zeros(0, 3, dtype=torch.float64))
     assert len(drone.step(empty, torch.zeros(0, dtype=torch.int64)).position) == 0
 
 
 @pytest.mark.parametrize("name", ["quadrotor", "crazyflie"])
-def test_a_drone_out_of_a_file_hovers_steps_and_flies_moves(name):
-    """A drone is data; what it answers is bounded, and dies away."""
+def test_preset_drone_hovers_and_executes_moves(name):
+    """Responses of drones from preset files are bounded and damped."""
     values = yaml.safe_load((CONF / f"{name}.yaml").read_text())
     del values["defaults"]
     drone = Quadrotor(DynamicsSettings(**values))
@@ -97,7 +97,7 @@ def test_a_drone_out_of_a_file_hovers_steps_and_flies_moves(name):
 
 @pytest.mark.gpu
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA GPU")
-def test_a_gpu_flies_the_same():
+def test_gpu_equals_cpu():
     drone = quadrotor(gusts=1.0)
     state, goals = hovering(drone, count=8), make_goals(POSITIONS, 3.0, 1.0, 1.0, 101.0, count=8)
     here = drone.fly(state, goals, 330)

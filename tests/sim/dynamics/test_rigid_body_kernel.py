@@ -6,7 +6,7 @@ from pytest import approx
 from tests.flying import frame
 
 
-def test_numbers_are_those_of_the_settings_and_what_follows_from_them():
+def test_airframe_follows_from_the_settings():
     drone = frame(mass=1.25, wind=(1.0, 2.0, 3.0), drag_area=(0.1, 0.2, 0.4), air_density=1.5)
     assert drone.weight == pytest.approx(12.2625) and drone.per_mass == approx(0.8)
     assert tuple(drone.wind) == (1.0, 2.0, 3.0)
@@ -20,5 +20,5 @@ def test_numbers_are_those_of_the_settings_and_what_follows_from_them():
 
 
 @pytest.mark.parametrize(("lag", "pace"), [(0.003, 1 - math.exp(-1)), (0.0, 1.0), (3.0, 0.0009995)])
-def test_a_rotors_pace_is_what_a_filter_of_first_order_gains_in_a_tick(lag, pace):
+def test_rotor_pace_is_the_gain_of_a_first_order_filter(lag, pace):
     assert frame(rotor_time_constant=lag).rotor_pace == pytest.approx(pace, rel=1e-4)

@@ -23,18 +23,18 @@ def pillar(*centers, half=(0.5, 0.5, 5.0)):
     return Obstacles(doubles(*centers)[None], half)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.55, 1.0])
-def test_a_bounce_gives_back_its_share_of_speed(share):
-    """Thrown at 2 m/s from 3 mm above the touch: within the first two ticks it is on its way up."""
-    drone = quadrotor(restitution=share, friction=0.0, **VACUUM)
+@pytest.mark.parametrize("restitution", [0.0, 0.55, 1.0])
+def test_bounce_returns_the_restitution_of_the_speed(restitution):
+    """Thrown at 2 m/s from 3 mm above contact, it moves up after two ticks."""
+    drone = quadrotor(restitution=restitution, friction=0.0, **VACUUM)
     after = flown(drone, falling(0.303, (1.0, 0.0, -2.0)), 1)
     into = 2.0 + 9.81 * 0.003
-    np.testing.assert_allclose(after.velocity[0], (1.0, 0.0, share * into), atol=1e-5)
+    np.testing.assert_allclose(after.velocity[0], (1.0, 0.0, restitution * into), atol=1e-5)
     assert float(after.position[0, 2]) == pytest.approx(0.3, abs=1e-6)
 
 
-def test_friction_takes_what_the_bounce_returns_into_account():
-    """Coulomb: the impulse into the ground, 1 + 0.5 of the speed, times 0.2 is lost sideways."""
+def test_friction_includes_the_impulse_of_the_bounce():
+    """Coulomb friction: the tangential loss is 0.2 times the normal impulse, 1.5 of the speed."""
     drone = quadrotor(restitution=0.5, friction=0.2, **VACUUM)
     after = flown(drone, falling(0.303, (3.0, 0.0, -2.0)), 1)
     into = 2.0 + 9.81 * 0.003
@@ -42,8 +42,8 @@ def test_friction_takes_what_the_bounce_returns_into_account():
     np.testing.assert_allclose(after.velocity[0], expected, atol=1e-5)
 
 
-def test_a_slide_ends_where_friction_has_eaten_it():
-    """v^2 / (2 mu g), within what a tick of it is."""
+def test_slide_distance_follows_from_friction():
+    """The distance is v^2 / (2 mu g) up to one tick."""
     for friction in (0.5, 0.25):
         drone = quadrotor(friction=friction, **VACUUM)
         after = flown(drone, falling(0.3, (2.0, -1.0, 0.0)), 1000)
@@ -53,28 +53,28 @@ def test_a_slide_ends_where_friction_has_eaten_it():
         assert not after.velocity.any()
 
 
-def test_it_rests_level_at_its_radius():
+def test_drone_rests_level_at_its_radius():
     drone = quadrotor()
     state = falling(3.0, (1.0, 0.5, 0.0), rates=(1.0, 2.0, 3.0))
     after = flown(drone, state, 3000)
     assert float(after.position[0, 2]) == pytest.approx(0.3, abs=1e-6)
     assert not after.velocity.any() and not after.angular_velocity.any()
-    assert after.attitude[0, 1:3].tolist() == [0.0, 0.0]  # its heading stays
+    assert after.attitude[0, 1:3].tolist() == [0.0, 0.0]  # the heading is kept
     assert float(after.attitude.norm()) == pytest.approx(1.0, abs=1e-6)
     assert after.contact.thing.tolist() == [GROUND]
     again = flown(drone, after, 3000)
     np.testing.assert_allclose(again.position, after.position, atol=1e-6)
 
 
-def test_rotors_lift_it_off_the_ground_again():
+def test_rotors_lift_the_drone_off_the_ground():
     drone = quadrotor()
     rested = flown(drone, falling(0.3), 100)
     risen = flown(drone, rested, 333, rotors=doubles((0.7,) * 4))
     assert float(risen.position[0, 2]) > 0.6
 
 
-def test_an_obstacle_throws_it_back_and_is_remembered():
-    """A ball of 0.3 m at 2 m/s, 1 m before the side of a box: touched after 0.35 s."""
+def test_obstacle_reflects_the_drone_and_is_recorded():
+    """A ball of 0.3 m at 2 m/s, 1 m in front of a box, hits it after 0.35 s."""
     drone = quadrotor(**VACUUM)
     boxes = pillar((0.0, 50.0, 100.0), (2.0, 0.0, 98.0))
     state = falling(100.0, (2.0, 0.0, 0.0))
@@ -90,8 +90,8 @@ def test_an_obstacle_throws_it_back_and_is_remembered():
     assert flown(drone, state, 100, boxes).contact.thing.tolist() == [NOTHING]
 
 
-def test_edges_are_round_for_a_ball():
-    """It hits the edge at 45 degrees: what comes back goes along the other axis."""
+def test_edges_reflect_along_the_contact_normal():
+    """It hits the edge at 45 degrees and leaves along the other axis."""
     drone = quadrotor(restitution=1.0, friction=0.0, **VACUUM)
     state = falling(100.0, (2.0, 0.0, 0.0))
     reach = 0.3 * math.sqrt(0.5)
@@ -114,22 +114,22 @@ def test_edges_are_round_for_a_ball():
         ((0.1, 0.1, -4.9), (0.1, 0.1, -5.3)),
     ],
 )
-def test_what_is_inside_leaves_by_the_nearest_side(inside, out):
+def test_penetrating_drone_leaves_by_the_nearest_side(inside, out):
     state = falling(100.0)
     state.position[:] += doubles(inside)
     after = flown(quadrotor(**VACUUM), state, 1, pillar((0.0, 0.0, 100.0)))
     np.testing.assert_allclose(after.position[0] - doubles((0, 0, 100))[0], out, atol=1e-3)
 
 
-def test_it_lands_on_a_box():
+def test_drone_lands_on_a_box():
     drone = quadrotor()
     after = flown(drone, falling(7.0), 3000, pillar((0.2, 0.0, 5.0), half=(0.5, 0.5, 1.0)))
     assert float(after.position[0, 2]) == pytest.approx(6.3, abs=1e-3)
     assert after.contact.thing.tolist() == [0]
 
 
-def test_obstacles_count_more_than_the_ground():
-    """On the ground and against a box at once."""
+def test_obstacle_contact_precedes_ground_contact():
+    """The drone touches the ground and a box at the same time."""
     drone = quadrotor()
     state = falling(0.3, (1.0, 0.0, 0.0))
     after = flown(drone, state, 60, pillar((0.9, 0.0, 0.5)))
@@ -137,7 +137,7 @@ def test_obstacles_count_more_than_the_ground():
     assert float(after.position[0, 2]) == pytest.approx(0.3, abs=1e-6)
 
 
-def test_each_world_has_obstacles_of_its_own():
+def test_each_environment_has_its_own_obstacles():
     state = falling(100.0, (2.0, 0.0, 0.0))
     both = type(state)(state.numbers.repeat(2, 1))
     boxes = Obstacles(doubles((1.0, 0, 100.0), (1.0, 0, -900.0)).reshape(2, 1, 3), (0.5, 0.5, 5.0))
@@ -147,6 +147,6 @@ def test_each_world_has_obstacles_of_its_own():
     assert float(after.velocity[0, 0]) < 0 < float(after.velocity[1, 0])
 
 
-def test_nothing_slow_bounces():
+def test_slow_contacts_do_not_bounce():
     after = flown(quadrotor(**VACUUM), falling(0.3, (0.0, 0.0, -0.05)), 1)
     assert float(after.velocity[0, 2]) == 0.0

@@ -1,4 +1,4 @@
-"""Forces and motion by closed forms: free fall, terminal speed, spin-up, spin, drag."""
+"""Forces and motion compared with closed forms: free fall, drag, rotors and rotation."""
 
 import math
 
@@ -24,8 +24,8 @@ THRUST, LEVER, TWIST = 4.179446268, 4.179446268 * 0.2275 / math.sqrt(2), 0.05556
 NONE = doubles((0.0, 0.0, 0.0, 0.0))
 
 
-def test_what_falls_without_air_gains_speed_by_gravity_alone():
-    """Velocities first: after n ticks g t^2 (n + 1) / (2 n) have been fallen."""
+def test_free_fall_in_vacuum():
+    """Symplectic Euler: the fall after n ticks is g t^2 (n + 1) / (2 n)."""
     drone = quadrotor(**VACUUM)
     after = drone.push(falling(velocity=(1.0, -2.0, 3.0)), NONE, 1000)
     np.testing.assert_allclose(after.velocity[0], (1, -2, 3 - 3 * GRAVITY), rtol=1e-5)
@@ -34,7 +34,7 @@ def test_what_falls_without_air_gains_speed_by_gravity_alone():
     assert after.attitude[0].tolist() == [1, 0, 0, 0]
 
 
-def test_energy_is_kept_in_free_fall_but_for_the_length_of_a_tick():
+def test_energy_is_conserved_in_free_fall_up_to_the_tick():
     drone = quadrotor(**VACUUM)
     states = trajectory(drone, falling(velocity=(2.0, 0.0, 10.0)), rotor_goals(NONE), 1000, 100)
     energy = [0.5 * s.velocity.square().sum() + GRAVITY * s.position[0, 2] for s in states]
@@ -43,7 +43,7 @@ def test_energy_is_kept_in_free_fall_but_for_the_length_of_a_tick():
 
 
 @pytest.mark.parametrize("mass", [1.0, 0.5])
-def test_terminal_speed_is_where_drag_carries_the_weight(mass):
+def test_terminal_speed_balances_drag_and_weight(mass):
     after = quadrotor(mass=mass).push(falling(1000.0), NONE, 4000)
     speed = math.sqrt(mass * GRAVITY / (1.225 * 0.02989))
     np.testing.assert_allclose(after.velocity[0], (0, 0, -speed), rtol=1e-4)
@@ -51,7 +51,7 @@ def test_terminal_speed_is_where_drag_carries_the_weight(mass):
 
 @pytest.mark.parametrize(("axis", "area"), enumerate((0.00538, 0.00611, 0.02989)))
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_each_side_drags_by_its_area_against_the_motion(axis, area, sign):
+def test_drag_depends_on_the_area_of_each_side(axis, area, sign):
     state = falling()
     state.velocity[0, axis] = 10.0 * sign
     after = quadrotor().push(state, NONE)
@@ -62,7 +62,7 @@ def test_each_side_drags_by_its_area_against_the_motion(axis, area, sign):
 
 
 def test_drag_turns_with_the_body():
-    """Yawed by 90 degrees, the left side faces the world's -x; rolled to the right, the top +y."""
+    """With 90 degrees of yaw the left side faces -x; with 90 degrees of roll the top faces +y."""
     root = math.sqrt(0.5)
     for attitude, axis, area in (
         ((root, 0, 0, root), 0, 0.00611),
@@ -77,7 +77,7 @@ def test_drag_turns_with_the_body():
         assert gained == pytest.approx(0.003 * 1.225 * area * 25.0, abs=1e-6)
 
 
-def test_rotors_spin_up_and_down_like_a_filter_of_first_order():
+def test_rotors_follow_a_first_order_filter():
     drone = quadrotor(rotor_time_constant=0.05)
     up = drone.push(falling(), doubles((1.0, 0.5, 0.0, 0.2)), 20)
     gained = 1 - math.exp(-20 * 0.003 / 0.05)
@@ -86,8 +86,8 @@ def test_rotors_spin_up_and_down_like_a_filter_of_first_order():
     np.testing.assert_allclose(down.rotors[0], up.rotors[0] * math.exp(-1.2), rtol=1e-5)
 
 
-def test_thrust_is_along_the_bodys_z():
-    """Pitched by 30 degrees, nose down: half of it pushes forward; rolled right: to the right."""
+def test_thrust_is_along_the_body_z_axis():
+    """At 30 degrees nose down, half the thrust points forward; rolled right, to the right."""
     whole, angle = 4 * THRUST, math.radians(15)
     for attitude, axis, sign in (
         ((math.cos(angle), 0, math.sin(angle), 0), 0, 1),
@@ -104,23 +104,23 @@ def test_thrust_is_along_the_bodys_z():
 @pytest.mark.parametrize(
     ("shares", "torque"),
     [
-        ((0.0, 0.1, 0.1, 0.0), (0.2 * LEVER, 0, 0)),  # both at the left: it rolls to the right
+        ((0.0, 0.1, 0.1, 0.0), (0.2 * LEVER, 0, 0)),  # both left rotors: roll to the right
         ((0.1, 0.0, 0.0, 0.1), (-0.2 * LEVER, 0, 0)),
-        ((0.0, 0.1, 0.0, 0.1), (0, 0.2 * LEVER, 0)),  # both in the rear: the nose goes down
+        ((0.0, 0.1, 0.0, 0.1), (0, 0.2 * LEVER, 0)),  # both rear rotors: nose down
         ((0.1, 0.0, 0.1, 0.0), (0, -0.2 * LEVER, 0)),
-        ((0.0, 0.0, 0.1, 0.1), (0, 0, 0.2 * TWIST)),  # both that turn clockwise: to the left
+        ((0.0, 0.0, 0.1, 0.1), (0, 0, 0.2 * TWIST)),  # both clockwise rotors: yaw to the left
         ((0.1, 0.1, 0.0, 0.0), (0, 0, -0.2 * TWIST)),
         ((0.1, 0.0, 0.0, 0.0), (-0.1 * LEVER, -0.1 * LEVER, -0.1 * TWIST)),
     ],
 )
-def test_each_rotor_turns_the_body_by_its_place_and_its_spin(shares, torque):
+def test_rotor_torques_follow_from_position_and_spin(shares, torque):
     after = quadrotor(**AT_ONCE).push(falling(), doubles(shares))
     gained = 0.003 * np.array(torque) / (0.00672, 0.00804, 0.01428)
     np.testing.assert_allclose(after.angular_velocity[0], gained, rtol=1e-5, atol=1e-8)
 
 
-def test_a_constant_torque_turns_faster_and_faster():
-    """The rate grows with time, the angle with its square."""
+def test_constant_torque_accelerates_rotation():
+    """The rate is linear and the angle quadratic in time."""
     drone = quadrotor(**AT_ONCE, **VACUUM)
     after = drone.push(falling(), doubles((0.0, 0.005, 0.005, 0.0)), 100)
     rate = 0.3 * 0.01 * LEVER / 0.00672
@@ -130,7 +130,7 @@ def test_a_constant_torque_turns_faster_and_faster():
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_a_spin_about_a_principal_axis_stays(axis):
+def test_spin_about_a_principal_axis_is_constant(axis):
     rates = np.zeros(3)
     rates[axis] = 4.0
     after = quadrotor(**VACUUM).push(falling(rates=tuple(rates)), NONE, 1000)
@@ -138,15 +138,15 @@ def test_a_spin_about_a_principal_axis_stays(axis):
     np.testing.assert_allclose(matrix(after.attitude[0]), rotation(rates * 3.0), atol=2e-5)
 
 
-def test_a_symmetric_body_nutates_as_euler_says():
-    """(I3 - I1) / I1 of the spin: half of 2 rad/s, so a quarter turn in 1.5708 s."""
+def test_symmetric_body_nutates_by_eulers_equations():
+    """The nutation rate is (I3 - I1) / I1 of the spin: 1 rad/s, a quarter turn in 1.5708 s."""
     drone = quadrotor(inertia=(0.01, 0.01, 0.015), tick=0.0005, **VACUUM)
     after = drone.push(falling(rates=(0.1, 0.0, 2.0)), NONE, 3142)
     np.testing.assert_allclose(after.angular_velocity[0], (0.0, 0.1, 2.0), atol=2e-4)
 
 
-def test_spin_keeps_its_momentum_and_energy():
-    """About no axis of symmetry, for 3 s, within what a tick of 0.5 ms costs."""
+def test_angular_momentum_and_energy_are_conserved():
+    """The spin axis is no symmetry axis; 3 s with ticks of 0.5 ms."""
     inertia = np.array([0.00672, 0.00804, 0.01428])
     drone, state = quadrotor(tick=0.0005, **VACUUM), falling(rates=(2.0, -1.0, 1.5))
 
@@ -159,7 +159,7 @@ def test_spin_keeps_its_momentum_and_energy():
     assert left == pytest.approx(energy, rel=0.01)
 
 
-def test_attitudes_stay_of_length_one():
+def test_attitudes_stay_normalized():
     rates = torch.tensor(np.random.default_rng(0).normal(size=(20, 3)) * 5)
     state = falling()
     state = type(state)(state.numbers.repeat(20, 1))
@@ -175,7 +175,7 @@ CURVE = np.array([0.0, -5.382196214637237e-7, 2.4582929831265485e-10])
 
 
 def theirs(models, attitude, velocity, rates, speeds):
-    """Accelerations, metres and radians a second squared. Shapes: (count, 3) both."""
+    """Return accelerations in m/s2 and rad/s2. Shapes: both (count, 3)."""
     mixing = np.array([[-1, -1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]], float)
     _, _, linear, angular, _ = models.dynamics(
         np.zeros_like(velocity),
@@ -199,9 +199,9 @@ def theirs(models, attitude, velocity, rates, speeds):
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_rotors_accelerate_a_crazyflie_as_they_do_there():
-    """Beside the package drone-models. Drag, which is linear there, is left out, as is what this
-    drone has not: the spin of its propellers, and curves of their torques of their own."""
+def test_accelerations_of_a_crazyflie_equal_drone_models():
+    """Compare with the package drone-models, without its linear drag, propeller inertia and
+    separate torque curves, which this drone does not model."""
     models = pytest.importorskip(
         "drone_models.first_principles", reason="needs drone-models", exc_type=ImportError
     )
@@ -222,7 +222,7 @@ def test_rotors_accelerate_a_crazyflie_as_they_do_there():
     state.attitude[:], state.velocity[:] = doubles(*attitude), doubles(*velocity)
     state.angular_velocity[:] = doubles(*rates)
     shares = (CURVE[1] * speeds + CURVE[2] * speeds**2) / MOST
-    ours = [0, 2, 3, 1]  # theirs: front right, rear right, rear left, front left
+    ours = [0, 2, 3, 1]  # their order: front right, rear right, rear left, front left
     after = drone.push(state, torch.tensor(shares[:, ours]))
     linear, angular = theirs(models, attitude, velocity, rates, speeds)
     tick = drone.settings.tick

@@ -7,7 +7,7 @@ from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.dynamics.state import heading_only
 
 
-def test_a_body_at_rest_is_level_unless_it_is_turned():
+def test_body_at_rest_is_level_by_default():
     place = torch.tensor([[1.0, 2.0, 3.0]], dtype=torch.float64)
     body = BodyState.at_rest(place)
     assert body.position.tolist() == [[1, 2, 3]] and body.attitude.tolist() == [[1, 0, 0, 0]]
@@ -17,7 +17,7 @@ def test_a_body_at_rest_is_level_unless_it_is_turned():
     assert BodyState.at_rest(place, turned).attitude is turned
 
 
-def test_no_two_fields_share_memory():
+def test_fields_share_no_memory():
     body = BodyState.at_rest(torch.zeros(2, 3, dtype=torch.float64))
     body.velocity += 1.0
     body.attitude[0] = 0.5
@@ -25,8 +25,8 @@ def test_no_two_fields_share_memory():
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7, -3.0, 3.0])
-def test_of_a_turn_only_the_heading_is_left(yaw):
-    """A roll or a pitch comes first, and the turn is what comes after it."""
+def test_heading_only_removes_roll_and_pitch(yaw):
+    """Attitudes apply roll and pitch first, then yaw."""
 
     def about(axis, angle):
         return [math.cos(angle / 2), *(math.sin(angle / 2) * float(i == axis) for i in range(3))]
@@ -46,11 +46,11 @@ def test_of_a_turn_only_the_heading_is_left(yaw):
             torch.testing.assert_close(found, sign * expected, atol=1e-12, rtol=0)
 
 
-def test_level_is_level_to_the_bit():
+def test_heading_only_keeps_level_attitudes_exactly():
     level = torch.tensor([[[1.0, 0.0, 0.0, 0.0]]]).double()
     assert torch.equal(heading_only(level), level)
 
 
-def test_who_is_upside_down_has_no_heading():
+def test_inverted_attitude_has_no_heading():
     turned = torch.tensor([[0.0, 1.0, 0.0, 0.0], [0.0, 0.6, 0.8, 0.0]]).double()
     assert heading_only(turned).tolist() == [[1.0, 0.0, 0.0, 0.0]] * 2

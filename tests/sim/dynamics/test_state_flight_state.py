@@ -9,7 +9,7 @@ from drone_rl.sim.dynamics import state as fs
 from tests.flying import doubles
 
 
-def test_parts_follow_each_other_without_a_gap():
+def test_parts_are_contiguous():
     sizes = {"POSITION": 3, "ATTITUDE": 4, "VELOCITY": 3, "RATES": 3, "ROTORS": 4, "REFERENCE": 4}
     sizes |= {"CLIMB": 1, "GUST": 3, "SEED": 1, "TICKS": 1, "LOST": 1, "THING": 1, "NORMAL": 3}
     sizes |= {"POINT": 3, "DEPTH": 1, "TIME": 1}
@@ -18,7 +18,7 @@ def test_parts_follow_each_other_without_a_gap():
     assert sum(sizes.values()) == fs.NUMBERS
 
 
-def test_at_rest_is_told_to_stay_where_it_is():
+def test_reference_at_rest_is_the_own_position():
     turned = doubles((math.cos(0.35), 0.0, 0.0, math.sin(0.35)))
     state = FlightState.at_rest(doubles((1.0, 2.0, 3.0)), turned, torch.tensor([5]))
     assert state.position.tolist() == [[1, 2, 3]] and not state.velocity.any()
@@ -29,7 +29,7 @@ def test_at_rest_is_told_to_stay_where_it_is():
     assert FlightState.at_rest(doubles((0.0, 0.0, 0.0))).attitude.tolist() == [[1, 0, 0, 0]]
 
 
-def test_parts_are_views():
+def test_parts_are_views_of_the_state():
     state = FlightState.at_rest(doubles((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)))
     state.velocity[1] = doubles((7.0, 8.0, 9.0))
     state.rotors[:] = 0.5
@@ -37,7 +37,7 @@ def test_parts_are_views():
     assert state.numbers[0, 13:17].tolist() == [0.5] * 4
 
 
-def test_moved_is_elsewhere_and_told_to_stay_there():
+def test_moved_state_has_a_moved_reference():
     state = FlightState.at_rest(doubles((1.0, 2.0, 3.0)))
     state.velocity[:] = 1.0
     moved = state.moved(doubles((4.0, 5.0, 6.0)))

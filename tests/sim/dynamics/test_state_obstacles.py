@@ -1,4 +1,4 @@
-"""What can be flown into is where the task has it, and only told to who asks."""
+"""Obstacles have the task's positions, and only dynamics that need them receive them."""
 
 import numpy as np
 import torch
@@ -14,28 +14,28 @@ SETTINGS = PillarsSettings(num_rows=2, width=0.5, height=6.0)
 
 
 def field(task):
-    """One world whose things stand straight ahead."""
+    """Return the state of one environment with obstacles straight ahead."""
     drawn = torch.zeros(1, *task.draw(np.random.RandomState(0)).shape).double()
     return task.start(drawn, BodyState.at_rest(torch.tensor([[0.0, 0.0, 2.5]]).double()))
 
 
-def test_pillars_are_boxes_where_they_stand_and_far_below_where_they_do_not():
+def test_absent_pillars_are_boxes_far_below():
     task = Pillars(SETTINGS)
     state = field(task)
     state.present[0, 0] = False
-    told = task.obstacles(state)
-    assert isinstance(told, Obstacles) and told.half_sizes == (0.25, 0.25, 3.0)
-    assert told.centers[0, 0].tolist() == [SETTINGS.first_distance, 0.0, 3.0 - 100.0]
-    assert told.centers[0, 1].tolist() == [SETTINGS.first_distance, 0.0, 3.0]
-    assert told.centers.shape == (1, SETTINGS.num_pillars, 3)
+    obstacles = task.obstacles(state)
+    assert isinstance(obstacles, Obstacles) and obstacles.half_sizes == (0.25, 0.25, 3.0)
+    assert obstacles.centers[0, 0].tolist() == [SETTINGS.first_distance, 0.0, 3.0 - 100.0]
+    assert obstacles.centers[0, 1].tolist() == [SETTINGS.first_distance, 0.0, 3.0]
+    assert obstacles.centers.shape == (1, SETTINGS.num_pillars, 3)
 
 
-def test_cubes_are_touched_and_not_hit():
+def test_cubes_are_no_obstacles():
     task = CollectCubes()
     assert task.obstacles(field(task)) is None
 
 
-def test_only_who_needs_obstacles_is_told():
+def test_only_dynamics_that_need_obstacles_receive_them():
     task = Pillars(SETTINGS)
     for needs in (True, False):
         worlds = Worlds(1, task, dynamics=Floating(FLIGHT, MOVES_SETTINGS, needs_obstacles=needs))
@@ -46,7 +46,7 @@ def test_only_who_needs_obstacles_is_told():
         assert after.body.near.item() == (SETTINGS.num_pillars // SETTINGS.num_rows) * needs
 
 
-def test_dm_control_tells_of_them_too():
+def test_dm_control_passes_obstacles():
     dynamics = Floating(FLIGHT, MOVES_SETTINGS)
     env = make_environment(Pillars(SETTINGS), dynamics=dynamics, pixels=False, random_state=0)
     env.reset()

@@ -8,7 +8,7 @@ RED = (1.0, 0.0, 0.0)
 SEVERAL = torch.tensor([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]])
 
 
-def test_a_part_has_the_looks_of_its_worlds_and_what_all_share():
+def test_slicing_keeps_shared_values():
     appearance = Appearance(
         colors={SemanticClass.SKY: RED, SemanticClass.TARGET: SEVERAL}, sun=SEVERAL, ambient=RED
     )
@@ -19,13 +19,13 @@ def test_a_part_has_the_looks_of_its_worlds_and_what_all_share():
     assert torch.equal(Appearance(ambient=torch.tensor(RED))[0:1].ambient, torch.tensor(RED))
 
 
-def test_one_value_stands_for_every_world():
+def test_single_color_expands_to_all_environments():
     assert expand_color(RED, 2).tolist() == [[1, 0, 0], [1, 0, 0]]
     assert torch.equal(expand_color(SEVERAL, 3).float(), SEVERAL)
     assert expand_color(RED, 2).dtype == torch.float64
 
 
-def test_lights_that_are_given_are_those_of_each_world():
+def test_lights_can_differ_by_environment():
     assert Appearance(colors={SemanticClass.SKY: RED}).lights(2) == {}
     lights = Appearance(sun=SEVERAL, sun_direction=(0.0, 3.0, -4.0)).lights(3)
     assert set(lights) == {"sun", "sun_direction"}
@@ -33,7 +33,7 @@ def test_lights_that_are_given_are_those_of_each_world():
     torch.testing.assert_close(lights["sun_direction"].float(), torch.tensor([[0, 0.6, -0.8]] * 3))
 
 
-def test_what_one_gives_is_over_what_another_does():
+def test_over_prefers_own_values():
     below = Appearance(
         colors={SemanticClass.SKY: RED, SemanticClass.GROUND: RED}, fog=50.0, shadows=1
     )
@@ -45,7 +45,7 @@ def test_what_one_gives_is_over_what_another_does():
     assert Appearance(shadows=0).over(below).shadows == 0
 
 
-def test_numbers_and_textures_are_cut_too():
+def test_numbers_and_textures_are_sliced():
     texture = Texture(images=("grid",), size=2.0, choice=torch.tensor([0, -1, 0]))
     appearance = Appearance(
         fog=torch.tensor([1.0, 2.0, 3.0]), textures={SemanticClass.GROUND: texture}, exposure=2.0
@@ -56,7 +56,7 @@ def test_numbers_and_textures_are_cut_too():
     assert part.textures[SemanticClass.GROUND].size == 2.0
 
 
-def test_flat_colours_alone_are_plain():
+def test_only_flat_colors_are_plain():
     assert Appearance(
         colors={SemanticClass.SKY: RED}, shadows=torch.zeros(3), exposure=2.0
     ).is_plain

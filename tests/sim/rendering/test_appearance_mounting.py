@@ -1,4 +1,4 @@
-"""Where a camera is and which way it looks, by hand."""
+"""Hand-computed position and direction of cameras."""
 
 import math
 
@@ -11,7 +11,7 @@ AHEAD = torch.tensor([1.0, 0.0, 0.0], dtype=torch.float64)
 HERE = torch.zeros(1, 3, dtype=torch.float64)
 
 
-def test_quaternions_multiply_as_rotations_do():
+def test_quaternion_product_composes_rotations():
     yaw = turned("yaw", 90.0)[None]
     torch.testing.assert_close(
         product(yaw, yaw), torch.tensor([[0.0, 0.0, 0.0, 1.0]], dtype=torch.float64)
@@ -27,20 +27,20 @@ def test_quaternions_multiply_as_rotations_do():
         ("roll", 45.0, (1.0, 0.0, 0.0)),
     ],
 )
-def test_which_way_a_turned_camera_looks(axis, degrees, there):
+def test_direction_of_a_rotated_camera(axis, degrees, there):
     assert rotate(turned(axis, degrees), AHEAD).tolist() == pytest.approx(there)
     several = turned(axis, torch.tensor([degrees, -degrees]))
     assert several.shape == (2, 4) and torch.equal(several[0, :1], several[1, :1])
 
 
-def test_two_moves_one_after_the_other():
+def test_mountings_compose():
     left = moved(None, HERE, turned("yaw", 90.0)[None])
     assert torch.as_tensor(left.offset).tolist() == [[0.0, 0.0, 0.0]]
     both = moved(left, 2.0 * AHEAD[None], turned("yaw", 90.0)[None])
-    assert both.offset.tolist()[0] == pytest.approx([0.0, 2.0, 0.0])  # ahead of who looks left
+    assert both.offset.tolist()[0] == pytest.approx([0.0, 2.0, 0.0])  # ahead of the camera
     assert rotate(both.turn, AHEAD)[0].tolist() == pytest.approx([-1.0, 0.0, 0.0])
     assert both.camera == Mounting().camera and both.zoom is None
 
 
-def test_a_wider_field_of_view_shows_things_smaller():
+def test_zoom_decreases_with_the_field_of_view():
     assert zoom_for_fov(90.0, torch.tensor([90.0, 120.0])).tolist() == pytest.approx([1.0, 3**-0.5])

@@ -14,24 +14,24 @@ from drone_rl.sim.rendering.devices import check_device, load_kernels
 from drone_rl.utils.errors import InputError
 
 
-def test_an_unknown_device_is_refused():
+def test_unknown_device_raises():
     with pytest.raises(InputError, match="device=tpu is unknown; give cpu, cuda or cuda:N"):
         check_device("tpu")
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
-def test_cuda_without_gpu_is_refused():
+def test_cuda_without_gpu_raises():
     with pytest.raises(InputError, match="give device=cpu"):
         check_device("cuda")
 
 
-def test_warp_starts_without_a_word():
+def test_warp_starts_without_output():
     code = "from drone_rl.sim.rendering.devices import start_warp; start_warp('cpu')"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("", "")
 
 
-def test_kernels_are_loaded_once_on_a_thread_aside(monkeypatch):
+def test_kernels_are_loaded_once_in_a_thread(monkeypatch):
     loaded = []
     monkeypatch.setattr(devices.wp, "load_module", lambda *_, **__: loaded.append(get_ident()))
     kernels = types.ModuleType("kernels")
@@ -42,7 +42,7 @@ def test_kernels_are_loaded_once_on_a_thread_aside(monkeypatch):
     assert loaded[0] != get_ident()
 
 
-def test_what_a_compiler_refuses_is_told_to_who_waits(monkeypatch):
+def test_compiler_errors_reach_the_caller(monkeypatch):
     def refuse(*_, **__):
         raise RuntimeError("no such kernel")
 
@@ -51,7 +51,7 @@ def test_what_a_compiler_refuses_is_told_to_who_waits(monkeypatch):
         load_kernels(types.ModuleType("kernels")).result()
 
 
-def test_another_process_loads_kernels_anew(monkeypatch):
+def test_forked_process_reloads_kernels(monkeypatch):
     monkeypatch.setattr(devices.wp, "load_module", lambda *_, **__: None)
     kernels = types.ModuleType("kernels")
     here = load_kernels(kernels)
@@ -59,7 +59,7 @@ def test_another_process_loads_kernels_anew(monkeypatch):
     assert load_kernels(kernels) is not here
 
 
-def test_threads_that_ask_at_once_load_once(monkeypatch):
+def test_concurrent_requests_load_once(monkeypatch):
     loaded = []
     monkeypatch.setattr(devices.wp, "load_module", lambda *_, **__: loaded.append(get_ident()))
     begin = devices._load_kernels.__wrapped__
@@ -67,11 +67,11 @@ def test_threads_that_ask_at_once_load_once(monkeypatch):
     monkeypatch.setattr(devices, "_load_kernels", slow)
     kernels = types.ModuleType("kernels")
     with ThreadPoolExecutor(4) as pool:
-        asked = [f.result() for f in [pool.submit(load_kernels, kernels) for _ in range(4)]]
-    assert len({id(future) for future in asked}) == 1
-    assert asked[0].result() is None and len(loaded) == 1
+        futures = [f.result() for f in [pool.submit(load_kernels, kernels) for _ in range(4)]]
+    assert len({id(future) for future in futures}) == 1
+    assert futures[0].result() is None and len(loaded) == 1
 
 
-def test_on_a_cpu_warp_reports_errors_alone():
+def test_warp_reports_only_errors_on_cpu():
     devices.start_warp("cpu")
     assert devices.wp.config.log_level >= devices.wp.LOG_ERROR

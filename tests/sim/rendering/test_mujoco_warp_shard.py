@@ -1,4 +1,4 @@
-"""One share of a batch: it may draw fewer worlds than it has room for, again and again."""
+"""One shard of a batch, which can render fewer environments than its capacity."""
 
 import mujoco
 import pytest
@@ -30,7 +30,7 @@ def shard(scene):
 
 
 def poses(*aside):
-    """A cube five metres ahead and so far to the left in each world; two far behind."""
+    """Return poses with a cube 5 m ahead and `aside` to the left, and two far behind."""
     count = len(aside)
     props = torch.full((count, 3, 3), -50.0)
     props[:, 0] = torch.tensor([[5.0, y, 2.0] for y in aside])
@@ -44,7 +44,7 @@ def draw(shard, of, appearance=None):
     return out
 
 
-def test_what_is_drawn_beside_does_not_matter(shard):
+def test_images_do_not_depend_on_other_environments(shard):
     both = draw(shard, poses(-2.0, 2.0))
     assert not torch.equal(both[0], both[1])
     for i, aside in enumerate((-2.0, 2.0)):

@@ -1,4 +1,4 @@
-"""dm_control's simulation as an appearance has it: in its model, and by its pictures."""
+"""Appearances in dm_control: the model and its images."""
 
 import dataclasses
 
@@ -21,10 +21,10 @@ BLOCKS = dataclasses.replace(
     camera_turn=((-3.0, -3.0, -3.0), (3.0, 3.0, 3.0)),
     camera_widening=(-5.0, 5.0),
 )
-"""As in conf/appearance/blocks.yaml, by a camera that differs from flight to flight, too."""
+"""The appearance of conf/appearance/blocks.yaml with a random camera."""
 
 
-def test_its_model_has_what_was_drawn_for_the_same_stream():
+def test_model_has_the_sampled_appearance():
     env = make_environment(pixels=False, random_state=world_random_state(0, 0), appearance=BLOCKS)
     worlds = DroneEnv(1, appearance=BLOCKS, pixels=False)
     look = None
@@ -49,7 +49,7 @@ def test_its_model_has_what_was_drawn_for_the_same_stream():
     worlds.close()
 
 
-def test_the_minimal_look_leaves_the_model_as_it_is():
+def test_minimal_appearance_keeps_the_model():
     plain, minimal = (
         make_environment(pixels=False, appearance=look, random_state=0)
         for look in (None, AppearanceSettings())
@@ -59,25 +59,25 @@ def test_the_minimal_look_leaves_the_model_as_it_is():
     )
 
 
-def test_fog_by_hand():
+def test_fog_matches_hand_computed_colors():
     look = Appearance(colors={SemanticClass.SKY: (1.0, 0.0, 0.0)}, fog=10.0)
-    picture = np.full((1, 1, 3), 100, np.uint8)
+    image = np.full((1, 1, 3), 100, np.uint8)
     for depth, share in ((0.0, 0.0), (10.0, 0.95), (5.0, 1 - 0.05**0.5), (90.0, 0.0)):
-        fogged = apply_fog(picture, np.full((1, 1), depth), look, 90.0, 80.0)
+        fogged = apply_fog(image, np.full((1, 1), depth), look, 90.0, 80.0)
         wanted = 100 + share * (np.array([255, 0, 0]) - 100)
         assert np.abs(fogged[0, 0] - wanted).max() <= 1
-    assert apply_fog(picture, np.ones((1, 1)), Appearance(), 90.0, 80.0) is picture
+    assert apply_fog(image, np.ones((1, 1)), Appearance(), 90.0, 80.0) is image
 
 
 def inner(mask):
-    """Without the pixels along its edges."""
+    """Remove the pixels along the edges."""
     around = (np.roll(mask, by, axis) for by in (-1, 1) for axis in (0, 1))
     return np.logical_and.reduce([mask, *around])
 
 
 @pytest.mark.render
-def test_pictures_of_blocks_agree_with_ours(egl):
-    """Mean colours within each thing, but for edges, which blend: 4 of 255; of all pixels: 5."""
+def test_images_of_blocks_agree_with_the_ray_tracer(egl):
+    """Mean colors differ by at most 4 of 255 in each class without edges, and by 5 overall."""
     camera = CameraSettings(width=240, height=120, horizontal_fov=100.0)
     env = make_environment(camera=camera, random_state=world_random_state(0, 0), appearance=BLOCKS)
     ours = DroneEnv(1, camera=camera, appearance=BLOCKS)
@@ -85,8 +85,8 @@ def test_pictures_of_blocks_agree_with_ours(egl):
     ours.reset()
     for action in (0, 0, 1, 0):
         view = worlds.view(modality=("rgb", "segmentation"))
-        pictures = worlds.render_all(worlds.state, view, ours.looks.drawn())
-        traced, seen = (pictures[name][0, 0].numpy() for name in view.modalities)
+        images = worlds.render_all(worlds.state, view, ours.looks.drawn())
+        traced, seen = (images[name][0, 0].numpy() for name in view.modalities)
         drawn = timestep.observation["drone/front_center"].astype(int)
         assert np.abs(traced - drawn).mean() < 5
         for geom in np.unique(seen):
@@ -111,7 +111,7 @@ def test_fog_grows_with_the_distance_along_each_ray():
 
 
 @pytest.mark.parametrize(("texture", "size", "repeat"), [("grid", 4.0, 0.25), (None, None, 1.0)])
-def test_tiles_of_the_ground_are_as_large_as_asked_for(texture, size, repeat):
+def test_ground_tiles_have_the_configured_size(texture, size, repeat):
     own = {} if texture is None else {"ground_texture": texture, "ground_tile": size}
     look = AppearanceSettings(sun_elevation=40.0, **own)
     env = make_environment(pixels=False, random_state=0, appearance=look)

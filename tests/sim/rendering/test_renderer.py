@@ -1,4 +1,4 @@
-"""A renderer of one colour fits wherever Warp's does."""
+"""A user-defined renderer of one color."""
 
 import pytest
 import torch
@@ -13,7 +13,7 @@ from drone_rl.utils.errors import InputError
 
 
 class OneColour:
-    """Paints everything in the sky's colour, and knows colours only."""
+    """Render all pixels in the color of the sky; only RGB is supported."""
 
     def __init__(self, scene, *, num_worlds, num_shards, device):
         self.scene, self.prepared, self.is_closed = scene, [], False
@@ -28,15 +28,15 @@ class OneColour:
         if appearance is not None:
             color = appearance.colors.get(SemanticClass.SKY, color)
         pixels = (torch.tensor(color) * 255).to(torch.uint8)
-        pictures = view.new_images(len(poses))
-        pictures["rgb"][:] = pixels
-        return pictures
+        images = view.new_images(len(poses))
+        images["rgb"][:] = pixels
+        return images
 
     def close(self):
         self.is_closed = True
 
 
-def test_worlds_draw_by_it():
+def test_worlds_use_a_custom_renderer():
     worlds = Worlds(2, renderer=OneColour)
     pixels = worlds.render(worlds.state)
     assert pixels.shape == (2, 25, 64, 3)
@@ -45,7 +45,7 @@ def test_worlds_draw_by_it():
     assert red[0, 0, 0].tolist() == [255, 0, 0]
 
 
-def test_a_view_that_it_cannot_draw_is_refused_in_one_line():
+def test_unsupported_view_raises_one_line():
     worlds = Worlds(2, renderer=OneColour)
     with pytest.raises(
         InputError, match="'depth' can't be drawn by OneColour; ask for one of: rgb"
@@ -53,7 +53,7 @@ def test_a_view_that_it_cannot_draw_is_refused_in_one_line():
         worlds.render(worlds.state, worlds.view(modality="depth"))
 
 
-def test_the_environment_flies_with_it_and_closes_it():
+def test_environment_uses_and_closes_the_renderer():
     env = DroneEnv(3, renderer=OneColour)
     check_env_specs(env)
     renderer = env.worlds.renderer
@@ -62,7 +62,7 @@ def test_the_environment_flies_with_it_and_closes_it():
     assert renderer.is_closed
 
 
-def test_explanations_show_the_policy_what_it_paints():
+def test_explanations_use_its_images():
     env = with_transforms(DroneEnv(2, renderer=OneColour), [GrayPixels(), StandardizePixels()])
     scenes = Scenes(env)
     seen = scenes.observe(place_target(scenes, torch.tensor([5.0, 9.0]), torch.zeros(2)))

@@ -6,23 +6,23 @@ from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 
 
-def test_each_name_stands_for_a_renderer():
+def test_names_select_renderers():
     assert find_renderer("raytrace") is Raytracer
     assert find_renderer("mujoco_warp") is WarpRenderer
 
 
-def test_what_makes_one_stands_for_itself():
+def test_renderer_classes_are_returned_unchanged():
     assert find_renderer(WarpRenderer) is WarpRenderer
 
 
-def test_worlds_are_drawn_by_our_own_unless_another_is_asked_for():
+def test_default_renderer_is_the_ray_tracer():
     for options, kind in (({}, Raytracer), ({"renderer": "mujoco_warp"}, WarpRenderer)):
         worlds = Worlds(1, **options)
         assert isinstance(worlds.renderer, kind)
         worlds.close()
 
 
-def test_an_unknown_name_is_refused_before_anything_is_drawn():
+def test_unknown_name_raises():
     message = "renderer='opengl' is unknown; give one of: raytrace, mujoco_warp"
     with pytest.raises(InputError, match=message):
         find_renderer("opengl")

@@ -1,4 +1,4 @@
-"""What every renderer of ours must do, each with the same tests."""
+"""Tests that every built-in renderer must pass."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def names_seen(worlds, segmentation):
     return {model.geom(int(i)).name for i in segmentation.unique() if i >= 0}
 
 
-def test_any_part_of_a_batch_is_the_same_picture(worlds):
+def test_images_do_not_depend_on_the_batch(worlds):
     together = worlds.render(worlds.state)
     assert together.shape == (3, 25, 64, 3)
     assert together.dtype == torch.uint8
@@ -43,7 +43,7 @@ def test_any_part_of_a_batch_is_the_same_picture(worlds):
         assert torch.equal(alone[0], together[i])
 
 
-def test_shards_draw_what_one_draws(worlds, renderer):
+def test_shards_render_the_same_images(worlds, renderer):
     single = Worlds(3, num_shards=1, renderer=renderer)
     double = Worlds(3, num_shards=2, renderer=renderer)
     assert torch.equal(single.render(worlds.state), double.render(worlds.state))
@@ -51,7 +51,7 @@ def test_shards_draw_what_one_draws(worlds, renderer):
     double.close()
 
 
-def test_more_imagined_worlds_than_there_are(worlds):
+def test_more_states_than_environments(worlds):
     index = torch.tensor([0, 1, 2, 0, 1])
     assert torch.equal(
         worlds.render(worlds.state[index]), worlds.render(worlds.state)[[0, 1, 2, 0, 1]]
@@ -62,12 +62,12 @@ def test_depth_of_the_cube_ahead(worlds):
     state = worlds.state[torch.tensor([0])]
     state.cubes[0, :, 1] = 0.0
     depth = worlds.render(state, worlds.view(modality="depth"))
-    # camera 0.4 m ahead of the drone's centre, front face 1.25 m before the cube's centre
+    # the camera is 0.4 m ahead of the drone's center, the front face 1.25 m before the cube's
     assert depth[0, 12, 32].item() == pytest.approx(15.0 - 1.25 - 0.4, abs=1e-3)
     assert depth[0, 0, 0].item() == 0.0  # sky
 
 
-def test_segmentation_names_what_is_seen(worlds):
+def test_segmentation_identifies_geoms(worlds):
     state = worlds.state[torch.tensor([0])]
     state.cubes[0, :, 1] = 0.0
     seen = worlds.render(state, worlds.view(modality="segmentation"))[0]
@@ -78,48 +78,48 @@ def test_segmentation_names_what_is_seen(worlds):
 
 
 @pytest.mark.parametrize("camera", [c.name for c in (*DRONE_CAMERAS, CHASE)])
-def test_every_camera_can_be_asked_for(worlds, camera):
-    picture = worlds.render(worlds.state, worlds.view(camera, height=20, width=30))
-    assert picture.shape == (3, 20, 30, 3)
+def test_every_camera_is_available(worlds, camera):
+    image = worlds.render(worlds.state, worlds.view(camera, height=20, width=30))
+    assert image.shape == (3, 20, 30, 3)
 
 
-def test_cameras_and_modalities_of_one_call_are_those_of_calls_of_their_own(worlds):
+def test_joint_call_equals_separate_calls(worlds):
     cameras, modalities = ("bottom_center", "chase", "front_left"), ("segmentation", "gray", "rgb")
-    pictures = worlds.render_all(worlds.state, worlds.view(cameras, modalities, 20, 30))
-    assert list(pictures) == list(modalities)
-    assert pictures["rgb"].shape == (3, 3, 20, 30, 3)
+    images = worlds.render_all(worlds.state, worlds.view(cameras, modalities, 20, 30))
+    assert list(images) == list(modalities)
+    assert images["rgb"].shape == (3, 3, 20, 30, 3)
     for i, camera in enumerate(cameras):
-        for modality, several in pictures.items():
+        for modality, several in images.items():
             alone = worlds.render(worlds.state, worlds.view(camera, modality, 20, 30))
             assert torch.equal(several[:, i], alone), (camera, modality)
 
 
-def test_gray_is_what_the_transform_makes_of_rgb_to_the_last_bit(worlds):
+def test_gray_equals_the_transform_of_rgb_bit_for_bit(worlds):
     draw = torch.Generator().manual_seed(0)
     several = {m: torch.rand(60, 3, generator=draw) for m in SemanticClass}
     states = worlds.state[torch.arange(60) % 3]
     view = worlds.view(modality=("rgb", "gray"))
     for appearance in (None, Appearance(colors=several)):
-        pictures = worlds.render_all(states, view, appearance)
-        expected = GrayPixels()._apply_transform(pictures["rgb"])
-        assert torch.equal(pictures["gray"], expected[:, :, 0])
+        images = worlds.render_all(states, view, appearance)
+        expected = GrayPixels()._apply_transform(images["rgb"])
+        assert torch.equal(images["gray"], expected[:, :, 0])
 
 
-def test_drone_is_unseen_by_itself_and_seen_by_the_chase_camera(worlds):
+def test_drone_is_visible_only_to_the_chase_camera(worlds):
     view = worlds.view(CHASE.name, "segmentation", 40, 60, show_drone=True)
     assert "drone/hull" in names_seen(worlds, worlds.render(worlds.state, view))
     own = worlds.render(worlds.state, worlds.view("bottom_center", "segmentation"))
     assert names_seen(worlds, own) == {"floor"}
 
 
-def test_vanished_cube_is_not_drawn(worlds):
+def test_removed_cube_is_not_rendered(worlds):
     state = worlds.state[torch.tensor([0])]
     state.collected[:] = True
     seen = worlds.render(state, worlds.view(modality="segmentation"))
     assert names_seen(worlds, seen) == {"floor"}
 
 
-def test_bad_requests_are_refused(worlds):
+def test_invalid_views_raise(worlds):
     with pytest.raises(InputError, match="choose from"):
         worlds.render(worlds.state, worlds.view("no_such_camera"))
     with pytest.raises(InputError, match="segmentation or normals"):
@@ -128,23 +128,23 @@ def test_bad_requests_are_refused(worlds):
         worlds.render(worlds.state, worlds.view(modality=("rgb", "depth")))
 
 
-def test_a_view_that_it_does_not_know_is_refused_in_one_line(worlds, renderer):
+def test_unsupported_view_raises_one_line(worlds, renderer):
     view = worlds.view()
-    object.__setattr__(view, "modalities", ("heat",))  # as another renderer's view may have it
+    object.__setattr__(view, "modalities", ("heat",))  # as a view for another renderer
     with pytest.raises(InputError, match=f"'heat' can't be drawn by {renderer.__name__}; ask"):
         worlds.prepare(view)
 
 
 @pytest.fixture
 def ahead(worlds):
-    """Two worlds, each with a cube before the camera."""
+    """Return two environments, each with a cube in front of the camera."""
     state = worlds.state[torch.tensor([0, 0])]
     state.cubes[:, 0, 1] = 0.0
     return state
 
 
 def regions(worlds, state):
-    """Whether each pixel shows the sky, the ground, a cube."""
+    """Return masks of sky, ground and cubes."""
     seen = worlds.render(state, worlds.view(modality="segmentation"))
     semantic_class = torch.tensor([*worlds.scene.semantic_classes, SemanticClass.SKY])[seen]
     return [
@@ -152,7 +152,7 @@ def regions(worlds, state):
     ]
 
 
-def test_an_appearance_colours_what_it_names_and_nothing_else(worlds, ahead):
+def test_appearance_colors_only_the_named_classes(worlds, ahead):
     plain, areas = worlds.render(ahead), regions(worlds, ahead)
     assert all(area.any() for area in areas)
     for semantic_class, area in zip(
@@ -162,18 +162,16 @@ def test_an_appearance_colours_what_it_names_and_nothing_else(worlds, ahead):
             ahead, appearance=Appearance(colors={semantic_class: (0.1, 0.3, 0.05)})
         )
         assert torch.equal((other != plain).any(-1), area), semantic_class
-    assert torch.equal(worlds.render(ahead), plain)  # and the next picture is as ever
+    assert torch.equal(worlds.render(ahead), plain)  # and the next image is unaffected
 
 
-def test_the_sky_has_just_the_colour_that_is_asked_for(worlds, ahead):
-    picture = worlds.render(
-        ahead, appearance=Appearance(colors={SemanticClass.SKY: (0.2, 0.5, 1.0)})
-    )
-    assert picture[:, 0].unique(dim=1).tolist() == [[[51, 127, 255]]] * 2
+def test_sky_has_the_exact_color(worlds, ahead):
+    image = worlds.render(ahead, appearance=Appearance(colors={SemanticClass.SKY: (0.2, 0.5, 1.0)}))
+    assert image[:, 0].unique(dim=1).tolist() == [[[51, 127, 255]]] * 2
 
 
-def test_each_world_of_a_call_may_look_its_own_way(worlds, ahead):
-    """Also in more worlds than are drawn together, and whatever part draws them."""
+def test_each_environment_can_have_its_own_appearance(worlds, ahead):
+    """This includes more states than environments, and all parts of the batch."""
     grounds = torch.tensor([[0.2, 0.2, 0.2], [0.8, 0.1, 0.1]])
     skies = torch.tensor([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
     rows, first = torch.tensor([0, 1, 1, 0, 1]), ahead[torch.tensor([0])]
@@ -191,15 +189,15 @@ def test_each_world_of_a_call_may_look_its_own_way(worlds, ahead):
     assert torch.equal(together, torch.stack(alone)[rows])
 
 
-def test_the_light_may_differ_from_world_to_world(worlds, ahead):
-    """Ambient light alone shows every colour just so, times its strength."""
+def test_lights_can_differ_by_environment(worlds, ahead):
+    """With ambient light only, a color is scaled by its strength."""
     dark = torch.tensor([[0.0, 0.0, 0.0]] * 2)
     shine = torch.tensor([[1.0, 1.0, 1.0], [0.5, 0.5, 0.5]])
-    picture = worlds.render(ahead, appearance=Appearance(ambient=shine, sun=dark))
+    image = worlds.render(ahead, appearance=Appearance(ambient=shine, sun=dark))
     _, ground, cube = (area[0] for area in regions(worlds, ahead))
     for world, strength in enumerate((1.0, 0.5)):
         for area, color in ((ground, FLOOR_COLOR), (cube, TaskSettings().cube_color)):
-            shown = picture[world][area].unique(dim=0)
+            shown = image[world][area].unique(dim=0)
             assert len(shown) == 1
             expected = strength * 255 * torch.tensor(color)
             torch.testing.assert_close(shown[0].float(), expected, atol=1.0, rtol=0)
@@ -210,8 +208,8 @@ def test_the_light_may_differ_from_world_to_world(worlds, ahead):
 
 
 @pytest.mark.render
-def test_pictures_agree_with_opengl(egl, renderer):
-    """Ours and OpenGL's on the same poses: equal but for edges, where OpenGL blends samples."""
+def test_images_agree_with_opengl(egl, renderer):
+    """Images of the same poses differ only at edges, where OpenGL blends samples."""
     camera = CameraSettings(width=256, height=100)
     env = make_environment(camera=camera, random_state=world_random_state(0, 0))
     worlds = Worlds(1, camera=camera, renderer=renderer)
@@ -222,7 +220,7 @@ def test_pictures_agree_with_opengl(egl, renderer):
         drawn = timestep.observation["drone/front_center"].astype(int)
         difference = np.abs(traced - drawn).max(-1)
         assert np.median(difference) <= 2
-        assert (difference > 8).mean() < 0.04  # edges and the horizon's haze
+        assert (difference > 8).mean() < 0.04  # edges and the haze of the horizon
         timestep = env.step(action)
         worlds.step(torch.arange(1), torch.tensor([action]))
     worlds.close()

@@ -7,7 +7,7 @@ from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.utils.errors import InputError
 
 
-def test_geoms_are_found_by_what_they_mean():
+def test_geoms_are_found_by_semantic_class():
     geoms = '<geom size="1"/>' * 4
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{geoms}</worldbody></mujoco>")
     semantic_classes = (
@@ -32,7 +32,7 @@ def test_cameras_are_found_by_name():
         scene.camera("c")
 
 
-def test_colours_are_the_materials_where_a_geom_has_none_of_its_own():
+def test_colors_default_to_the_material():
     xml = """<mujoco><asset><material name="m" rgba=".1 .2 .3 1"/></asset><worldbody>
     <geom size="1"/><geom size="1" material="m"/><geom size="1" material="m" rgba="1 0 0 1"/>
     <geom size="1" rgba="1 1 1 0"/></worldbody></mujoco>"""
@@ -41,4 +41,4 @@ def test_colours_are_the_materials_where_a_geom_has_none_of_its_own():
     )
     colors = [[0.5, 0.5, 0.5, 1], [0.1, 0.2, 0.3, 1], [1, 0, 0, 1], [1, 1, 1, 0]]
     np.testing.assert_allclose(scene.colors, colors, atol=1e-7)
-    assert scene.seen(show_drone=True) == [0, 1, 2]  # of the last there is nothing to be seen
+    assert scene.seen(show_drone=True) == [0, 1, 2]  # the last geom is invisible

@@ -1,4 +1,4 @@
-"""Pictures that cover things, made here or read from files."""
+"""Procedural textures and textures from files."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from drone_rl.utils.errors import InputError
 
 
 @pytest.mark.parametrize("name", PROCEDURAL)
-def test_those_made_here_are_gray_squares_of_a_power_of_two_and_not_even(name):
+def test_procedural_textures_are_gray_powers_of_two(name):
     texture = load(name)
     assert texture.shape == (256, 256, 3) and texture.dtype == np.uint8
     assert (texture[..., 0] == texture[..., 2]).all()
@@ -18,20 +18,20 @@ def test_those_made_here_are_gray_squares_of_a_power_of_two_and_not_even(name):
 
 
 @pytest.mark.parametrize("name", PROCEDURAL)
-def test_they_go_on_over_their_edges(name):
-    """What lies beside an edge is as like as what lies beside any other line."""
+def test_procedural_textures_are_seamless(name):
+    """Differences across the edge are not larger than across other lines."""
     gray = load(name)[..., 0].astype(float)
     steps = np.abs(gray - np.roll(gray, 1, 1)).mean(0)
     assert steps[0] <= steps[1:].max() + 1e-9
 
 
-def test_a_checkers_quarters():
+def test_quarters_of_the_checker_texture():
     texture = load("checker")[..., 0]
     assert (texture[:128, :128] == 255).all() and (texture[128:, 128:] == 255).all()
     assert (texture[:128, 128:] == 140).all() and (texture[128:, :128] == 140).all()
 
 
-def test_a_file_is_stretched_to_a_power_of_two(tmp_path):
+def test_file_is_resized_to_a_power_of_two(tmp_path):
     path = tmp_path / "blue.png"
     Image.new("RGB", (5, 3), (10, 20, 200)).save(path)
     texture = load(str(path))
@@ -47,7 +47,7 @@ def test_a_file_is_stretched_to_a_power_of_two(tmp_path):
         (b"", "can't be read as an image"),
     ],
 )
-def test_what_is_no_picture_is_refused_by_name(tmp_path, content, words):
+def test_invalid_image_raises_with_its_name(tmp_path, content, words):
     path = tmp_path / "ground.png"
     if content is not None:
         path.write_bytes(content)
@@ -56,19 +56,19 @@ def test_what_is_no_picture_is_refused_by_name(tmp_path, content, words):
     assert str(path) in str(refused.value) and "checker" in str(refused.value)
 
 
-def test_a_folder_is_no_picture(tmp_path):
+def test_folder_raises(tmp_path):
     with pytest.raises(InputError, match="can't be read as an image"):
         load(str(tmp_path))
 
 
-def test_a_picture_that_is_too_large_is_refused_with_its_size(tmp_path):
+def test_too_large_image_raises_with_its_size(tmp_path):
     path = tmp_path / "wide.png"
     Image.new("L", (4097, 1)).save(path)
     with pytest.raises(InputError, match=r"4097x1 pixels.* 4096 "):
         load(str(path))
 
 
-def test_each_level_is_the_mean_of_four_texels():
+def test_mip_level_is_the_mean_of_four_texels():
     texture = np.zeros((4, 4, 3), np.uint8)
     texture[:2, :2] = [[[100, 0, 0], [100, 0, 0]], [[100, 0, 0], [100, 40, 0]]]
     rows = levels(texture)
@@ -77,7 +77,7 @@ def test_each_level_is_the_mean_of_four_texels():
     assert rows[20].tolist() == [25, 2, 0]
 
 
-def test_a_grids_lines_by_the_texel():
+def test_lines_of_the_grid_texture():
     lines = PROCEDURAL["grid"]()
     assert (lines == lines.T).all()
     row = lines[32]  # between lines
@@ -87,7 +87,7 @@ def test_a_grids_lines_by_the_texel():
     assert lines[63, 32] == 0.8 and lines[2, 63] == 0.45
 
 
-def test_courses_of_bricks_by_the_texel():
+def test_courses_of_the_brick_texture():
     bricks = PROCEDURAL["bricks"]()
     bright = np.random.RandomState(0).uniform(0.75, 1.0, (8, 4))
     for course, shift in ((0, 0), (1, 32), (2, 0), (7, 32)):
@@ -98,7 +98,7 @@ def test_courses_of_bricks_by_the_texel():
             assert (row[64 * brick + 3 : 64 * brick + 64] == bright[course, brick]).all()
 
 
-def test_spots_are_smooth_between_their_middles_and_over_the_edges():
+def test_spots_are_smooth_and_seamless():
     spots = textures._stretched(np.array([[0.0, 4.0], [8.0, 12.0]]))
     assert spots.shape == (256, 256)
     places = {
@@ -110,7 +110,7 @@ def test_spots_are_smooth_between_their_middles_and_over_the_edges():
         assert spots[row, column] == pytest.approx(value), (row, column)
 
 
-def test_noise_has_a_mean_and_a_deviation():
+def test_noise_has_the_configured_mean_and_deviation():
     noise = PROCEDURAL["noise"]()
     assert noise.mean() == pytest.approx(0.78, abs=0.02)
     assert noise.std() == pytest.approx(0.11, abs=0.01)

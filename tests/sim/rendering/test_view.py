@@ -9,7 +9,7 @@ from drone_rl.utils.errors import InputError
 VIEW = View(cameras=("drone/front_center",), height=25, width=64)
 
 
-def test_a_view_is_a_fact_by_which_things_can_be_kept():
+def test_view_is_hashable_and_frozen():
     assert {VIEW: 1}[View(cameras=("drone/front_center",), height=25, width=64)] == 1
     assert dataclasses.replace(VIEW, modalities=("depth",)) != VIEW
     with pytest.raises(dataclasses.FrozenInstanceError):
@@ -29,7 +29,7 @@ def test_a_view_is_a_fact_by_which_things_can_be_kept():
         ({"width": 4097}, "view of 25x4097 pixels; give 1 to 4096"),
     ],
 )
-def test_what_no_camera_shows_is_refused(change, message):
+def test_invalid_views_raise(change, message):
     with pytest.raises(InputError, match=message):
         dataclasses.replace(VIEW, **change)
 
@@ -45,14 +45,14 @@ def test_what_no_camera_shows_is_refused(change, message):
         ("normals", (5, 2, 25, 64, 3), torch.float32),
     ],
 )
-def test_pictures_have_the_shape_and_type_of_what_they_show(modality, shape, dtype):
+def test_images_have_the_shape_and_type_of_their_modality(modality, shape, dtype):
     view = dataclasses.replace(VIEW, cameras=("a", "b"), modalities=(modality, "rgb"))
-    pictures = view.new_images(5)
-    assert set(pictures) == {modality, "rgb"}
-    assert (tuple(pictures[modality].shape), pictures[modality].dtype) == (shape, dtype)
+    images = view.new_images(5)
+    assert set(images) == {modality, "rgb"}
+    assert (tuple(images[modality].shape), images[modality].dtype) == (shape, dtype)
 
 
-def test_what_a_renderer_does_not_know_is_refused():
+def test_unsupported_modality_raises():
     VIEW.check_modalities(object(), {"rgb"})
     depth = dataclasses.replace(VIEW, modalities=("rgb", "depth"))
     with pytest.raises(InputError, match=r"'depth' can't be drawn by object; ask for one of: rgb$"):

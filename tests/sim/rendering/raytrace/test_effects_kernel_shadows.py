@@ -1,4 +1,4 @@
-"""How far shadows are looked for, where in the picture, and who casts them on what."""
+"""Reach of shadows, their search area in the image, and occlusion."""
 
 import numpy as np
 import pytest
@@ -45,8 +45,8 @@ def look(
     parts[0] = bounding_rectangle(job, box, sun * length[0])
 
 
-def looked(sun, box=(0.0, 0.0, -6.0), *, size=(0.0, 0.0, 1.0), floor=True):
-    """A box and a floor at z = -20, below a camera that looks down; it sees 50 m far."""
+def find_shadow(sun, box=(0.0, 0.0, -6.0), *, size=(0.0, 0.0, 1.0), floor=True):
+    """Return reach and search area of a box above a floor at z = -20; the far limit is 50 m."""
     scene = geoms(-6.0, -20.0, numbers=(0, 1)) if floor else geoms(-6.0)
     kinds, places = [int(BOX), int(PLANE)], [box, (0.0, 0.0, -20.0)]
     count = len(scene.kind)
@@ -66,40 +66,40 @@ def looked(sun, box=(0.0, 0.0, -6.0), *, size=(0.0, 0.0, 1.0), floor=True):
     return length.numpy()[0], parts.numpy()[0].tolist()
 
 
-def test_a_shadow_ends_on_the_ground():
-    """The box's top is 15 m above it: so far down, and 5 / 4 of it along a slope of 0.8."""
-    assert looked((0.0, 0.0, -1.0))[0] == pytest.approx(15.0)
-    assert looked((0.6, 0.0, -0.8))[0] == pytest.approx(15.0 / 0.8)
+def test_shadow_reach_ends_on_the_ground():
+    """The box is 15 m above the ground; along a slope of 0.8 that is 15 / 0.8 m."""
+    assert find_shadow((0.0, 0.0, -1.0))[0] == pytest.approx(15.0)
+    assert find_shadow((0.6, 0.0, -0.8))[0] == pytest.approx(15.0 / 0.8)
 
 
 @pytest.mark.parametrize(
     "given", [{"floor": False}, {"size": (3.0, 3.0, 1.0)}, {"sun": (0.0, 0.6, 0.8)}]
 )
-def test_without_a_wide_plane_that_the_sun_shines_on_it_is_looked_for_as_far_as_one_sees(given):
-    assert looked(**{"sun": (0.0, 0.0, -1.0), **given})[0] == 50.0
+def test_shadow_reach_without_a_sunlit_plane_is_the_far_limit(given):
+    assert find_shadow(**{"sun": (0.0, 0.0, -1.0), **given})[0] == 50.0
 
 
-def test_straight_down_the_shadow_is_behind_the_box():
-    """A square of a fifth of the picture, as in test_raytrace_sight."""
-    assert looked((0.0, 0.0, -1.0))[1] == [14, 25, 14, 25]
+def test_vertical_shadow_is_behind_the_box():
+    """A square of a fifth of the image, as in test_projection_kernel."""
+    assert find_shadow((0.0, 0.0, -1.0))[1] == [14, 25, 14, 25]
 
 
-def test_aside_the_picture_is_searched_to_where_the_shadow_ends():
-    """It moves 15 m / 0.8 * 0.6 to the right, where the floor is 20 m away: to a slope of 0.61."""
-    first, last, top, bottom = looked((0.6, 0.0, -0.8))[1]
+def test_search_area_includes_the_end_of_the_shadow():
+    """The shadow moves 15 m / 0.8 * 0.6 to the right at a depth of 20 m."""
+    first, last, top, bottom = find_shadow((0.6, 0.0, -0.8))[1]
     assert first == 14 and (top, bottom) == (14, 25)
-    end = (1.0 + 15.0 * 0.75) / 19.0  # the box's lower side ends there, 1 m above the floor's place
+    end = (1.0 + 15.0 * 0.75) / 19.0  # end of the shadow of the lower side
     assert abs(last - (20 + 20 * end)) <= 3
 
 
-def test_a_shadow_from_behind_the_camera_is_searched():
-    """A box above the camera, whose shadow falls into the picture."""
-    first, last, top, bottom = looked((0.0, 0.0, -1.0), box=(4.0, 0.0, 6.0))[1]
+def test_search_area_includes_shadows_from_behind_the_camera():
+    """A box above the camera casts a shadow into the image."""
+    first, last, top, bottom = find_shadow((0.0, 0.0, -1.0), box=(4.0, 0.0, 6.0))[1]
     assert first >= 20 and last == SIZE and top < 20 < bottom
 
 
-def test_what_stays_behind_the_camera_is_not():
-    first, last, _, _ = looked((0.0, 0.0, 1.0), box=(0.0, 0.0, 6.0))[1]
+def test_search_area_excludes_shadows_behind_the_camera():
+    first, last, _, _ = find_shadow((0.0, 0.0, 1.0), box=(0.0, 0.0, 6.0))[1]
     assert first >= last
 
 
@@ -115,8 +115,8 @@ def hide(
         behind[i] = int(is_shadowed(geom_view, job.rays[i], job.nearest[i], sun))
 
 
-def test_a_box_hides_what_is_beyond_it_alone():
-    """20,000 places around a box, as by the function that serves all solids."""
+def test_box_shadows_equal_those_of_the_generic_function():
+    """Compare 20,000 positions around a box with the generic function for solids."""
     source = np.random.RandomState(0)
     rays = source.normal(size=(20_000, 3))
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
@@ -133,7 +133,7 @@ def test_a_box_hides_what_is_beyond_it_alone():
     assert np.array_equal(dark.numpy()[others], behind.numpy()[others])
     assert 50 < dark.numpy().sum() < 5000 and not dark.numpy()[~others].any()
     place = np.array([0.5, 1.0, 2.0]) + nearest[:, None] * rays
-    beneath = place - sun / sun[2] * (place[:, 2:] + 0.5)  # back to the box's lower side
+    beneath = place - sun / sun[2] * (place[:, 2:] + 0.5)  # back to the lower side of the box
     is_under = (place[:, 2] < -0.5) & (np.abs(beneath[:, :2]) <= [1.0, 2.0]).all(1)
     assert dark.numpy()[others & is_under].all()
 
@@ -161,8 +161,8 @@ def surfaces(rays, nearest, owners, dark):
     ("kind", "reach"),
     [(SPHERE, (1.0, 1.0, 1.0)), (CYLINDER, (0.5, 0.5, 2.0)), (ELLIPSOID, (1.0, 2.0, 0.5))],
 )
-def test_what_may_be_in_the_shadow_is_all_that_is(kind, reach):
-    """20,000 places; those by whose way to the sun the ball of that reach lies, and no others."""
+def test_shadow_candidates_include_all_shadowed_positions(kind, reach):
+    """Candidates are those of 20,000 positions whose ray to the sun passes the bounding ball."""
     source = np.random.RandomState(0)
     rays = source.normal(size=(20_000, 3))
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""The kernels for GPUs, tried on a CPU; their images are in test_raytrace_painters."""
+"""The GPU kernels, run on a CPU; test_renderer_launchers tests their images."""
 
 import numpy as np
 import warp as wp
@@ -8,7 +8,7 @@ from drone_rl.sim.rendering.raytrace import structs_kernel
 from tests.box_ahead import geoms, poses, scratch, view
 
 
-def test_every_geom_is_aimed_at():
+def test_rays_are_transformed_to_every_geom():
     buffers = scratch(1, 2)
     scene = geoms(-6.0, -9.0, numbers=(1, 2))
     given = [view(int(structs_kernel.DEPTH)), scene, poses(), buffers]

@@ -1,4 +1,4 @@
-"""The kernel for GPUs, tried on a CPU, shows what the one for CPUs does, from anywhere."""
+"""The GPU kernel, run on a CPU, renders the same images as the CPU kernel."""
 
 import pytest
 import torch
@@ -26,7 +26,7 @@ APPEARANCE = Appearance(
 
 
 @pytest.mark.parametrize("modality", ["rgb", "depth", "segmentation"])
-def test_both_kernels_draw_the_same(modality):
+def test_both_kernels_render_the_same_images(modality):
     both = [Raytracer(scene(), num_worlds=32, num_shards=2) for _ in range(2)]
     both[1]._launcher = GpuLauncher("cpu")
     poses = scattered(32, 0.4)

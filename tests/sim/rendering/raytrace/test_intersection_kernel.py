@@ -1,4 +1,4 @@
-"""Hand-computed places where rays enter."""
+"""Hand-computed intersections of rays and geoms."""
 
 import math
 
@@ -40,7 +40,7 @@ def try_plane(size: wp.vec3, point: wp.vec3, ray: wp.vec3, along: wp.array[float
 
 
 def entered(kind, size, point, ray):
-    """How far along the ray, and the normal there."""
+    """Return the distance along the ray and the normal."""
     along = wp.zeros(1, dtype=float, device="cpu")
     normal = wp.zeros(1, dtype=wp.vec3, device="cpu")
     given = [int(kind), wp.vec3(*size), wp.vec3(*point), wp.vec3(*ray), along, normal]
@@ -74,39 +74,39 @@ ROOT = math.sqrt(0.5)
         (CAPSULE, (1, 2, 0), (5, 0, -2.6), (-1, 0, 0), 5 - 0.8, (0.8, 0, -0.6)),
     ],
 )
-def test_where_a_ray_enters(kind, size, point, ray, along, normal):
+def test_entry_of_a_ray(kind, size, point, ray, along, normal):
     found, direction = entered(kind, size, point, ray)
     assert found == pytest.approx(along, abs=1e-5)
     np.testing.assert_allclose(direction, normal, atol=1e-5)
 
 
 @pytest.mark.parametrize("kind", [BOX, SPHERE, ELLIPSOID, CYLINDER, CAPSULE])
-def test_a_ray_that_misses_leads_away_or_starts_inside_enters_nowhere(kind):
+def test_rays_that_miss_or_start_inside_have_no_entry(kind):
     size = (1.0, 1.0, 1.0)
     assert entered(kind, size, (-5, 0, 3), (1, 0, 0))[0] < 0  # above
-    assert entered(kind, size, (-5, 3, 0), (1, 0, 0))[0] < 0  # beside
-    assert entered(kind, size, (-5, 0, 0), (-1, 0, 0))[0] < 0  # away
+    assert entered(kind, size, (-5, 3, 0), (1, 0, 0))[0] < 0  # to the side
+    assert entered(kind, size, (-5, 0, 0), (-1, 0, 0))[0] < 0  # pointing away
     assert entered(kind, size, (0.1, 0.1, 0.1), (1, 0, 0))[0] < 0  # from inside
     assert entered(kind, size, (-5, 0, 0), (1, 0, 0))[0] == pytest.approx(4.0)
 
 
-def test_a_ray_along_a_wall_of_a_tube():
-    """It is parallel to the round side: only the ends decide."""
+def test_ray_parallel_to_a_cylinder():
+    """The ray is parallel to the round side, so only the ends matter."""
     assert entered(CYLINDER, (1, 2, 0), (0.5, 0, 9), (0, 0, -1))[0] == pytest.approx(7.0)
     assert entered(CYLINDER, (1, 2, 0), (1.5, 0, 9), (0, 0, -1))[0] < 0
     assert entered(CYLINDER, (1, 2, 0), (-3, 0, 2.5), (1, 0, 0))[0] < 0
 
 
-def test_a_plane_is_met_from_above_and_within_its_size():
+def test_plane_is_hit_from_above_within_its_size():
     assert met((0, 0, 1), (3, 4, 2), (0, 0, -1)) == pytest.approx(2.0)
     assert met((0, 0, 1), (0, 0, -2), (0, 0, 1)) < 0  # from below
-    assert met((0, 0, 1), (0, 0, 2), (1, 0, 0)) < 0  # along it
+    assert met((0, 0, 1), (0, 0, 2), (1, 0, 0)) < 0  # parallel
     assert met((1, 2, 1), (0.9, 1.9, 2), (0, 0, -1)) == pytest.approx(2.0)
     assert met((1, 2, 1), (1.1, 0, 2), (0, 0, -1)) < 0
     assert met((1, 2, 1), (0, 2.1, 2), (0, 0, -1)) < 0
 
 
-def test_kinds_have_mujocos_numbers():
+def test_geom_types_have_mujocos_numbers():
     numbers = [intersection_kernel.PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX]
     assert [int(n) for n in numbers] == [0, 2, 3, 4, 5, 6]
 
@@ -118,15 +118,15 @@ def try_nearest(hits: wp.array[wp.vec4], nearest: wp.array[int]):
     nearest[i] = int(is_nearest(hit[0], hit[1], hit[2], hit[3]))
 
 
-def test_the_nearest_is_in_front_and_not_too_far():
+def test_nearest_hit_is_selected_within_the_far_limit():
     cases = [
         ((4.0, 5.0, 1.0, 50.0), True),
         ((5.0, 4.0, 1.0, 50.0), False),
-        ((4.000001, 4.0, 1.0, 50.0), True),  # as near: the later is in front
+        ((4.000001, 4.0, 1.0, 50.0), True),  # equal depth: the later is in front
         ((4.0001, 4.0, 1.0, 50.0), False),
         ((-1.0, 1e10, 1.0, 50.0), False),  # no hit
         ((60.0, 1e10, 1.0, 50.0), False),  # too far along the axis
-        ((60.0, 1e10, 0.5, 50.0), True),  # but not along this one's
+        ((60.0, 1e10, 0.5, 50.0), True),  # but not along this axis
     ]
     hits = wp.array([hit for hit, _ in cases], dtype=wp.vec4, device="cpu")
     nearest = wp.zeros(len(cases), dtype=int, device="cpu")

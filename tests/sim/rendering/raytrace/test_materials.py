@@ -1,4 +1,4 @@
-"""Colours and lights as the kernel gets them."""
+"""Colors and lights as encoded for the kernel."""
 
 import mujoco
 import numpy as np
@@ -23,37 +23,37 @@ def materials():
     return MaterialsEncoder(Scene(model, meanings, (-1, 0), (0.2, 0.5, 1.0)), "cpu")
 
 
-def test_all_worlds_share_the_scenes(materials):
+def test_environments_share_the_scenes_materials(materials):
     plain, _ = materials.encode(None, 7)
     np.testing.assert_allclose(plain.colors.numpy(), [[[0.2, 0.4, 0.6], [0.1, 0.1, 0.1]]])
     np.testing.assert_allclose(plain.diffuse.numpy(), [[[0.5, 0.5, 0.5]]])
-    assert plain.sky.numpy().tolist() == [[51, 127, 255]]  # whole numbers
+    assert plain.sky.numpy().tolist() == [[51, 127, 255]]  # integers
 
 
-def test_worlds_may_differ_and_leave_no_trace(materials):
+def test_environments_can_differ_for_one_call(materials):
     ground = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     appearance = Appearance(
         colors={SemanticClass.GROUND: ground, SemanticClass.SKY: (0.0, 0.0, 1.0)},
         sun=(0.3, 0.2, 0.1),
         sun_direction=(0.0, 3.0, -4.0),
     )
-    worn, effects = materials.encode(appearance, 2)
+    encoded, effects = materials.encode(appearance, 2)
     assert effects is None
-    assert worn.colors.numpy()[:, 0].tolist() == ground.tolist()
-    np.testing.assert_allclose(worn.colors.numpy()[:, 1], [[0.1, 0.1, 0.1]] * 2)
-    np.testing.assert_allclose(worn.diffuse.numpy(), [[[0.3, 0.2, 0.1]]] * 2)
-    np.testing.assert_allclose(worn.direction.numpy(), [[[0.0, 0.6, -0.8]]] * 2, atol=1e-7)
-    np.testing.assert_allclose(worn.ambient.numpy(), [[[0.1, 0.1, 0.1]]] * 2)
-    assert worn.sky.numpy().tolist() == [[0, 0, 255]] * 2
+    assert encoded.colors.numpy()[:, 0].tolist() == ground.tolist()
+    np.testing.assert_allclose(encoded.colors.numpy()[:, 1], [[0.1, 0.1, 0.1]] * 2)
+    np.testing.assert_allclose(encoded.diffuse.numpy(), [[[0.3, 0.2, 0.1]]] * 2)
+    np.testing.assert_allclose(encoded.direction.numpy(), [[[0.0, 0.6, -0.8]]] * 2, atol=1e-7)
+    np.testing.assert_allclose(encoded.ambient.numpy(), [[[0.1, 0.1, 0.1]]] * 2)
+    assert encoded.sky.numpy().tolist() == [[0, 0, 255]] * 2
     np.testing.assert_allclose(materials.encode(None, 2)[0].colors.numpy()[0, 0], [0.2, 0.4, 0.6])
 
 
-def test_a_look_that_was_just_worn_is_kept_ready(materials):
+def test_last_appearance_is_cached(materials):
     red, blue = (
         Appearance(colors={SemanticClass.SKY: c}) for c in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     )
-    worn, _ = materials.encode(red, 2)
-    assert materials.encode(red, 2)[0] is worn
+    encoded, _ = materials.encode(red, 2)
+    assert materials.encode(red, 2)[0] is encoded
     assert materials.encode(red, 3)[0].sky.numpy().tolist() == [[255, 0, 0]] * 3
     assert materials.encode(blue, 2)[0].sky.numpy().tolist() == [[0, 0, 255]] * 2
     assert materials.encode(None, 2)[0].sky.numpy().tolist() == [[51, 127, 255]]

@@ -1,4 +1,4 @@
-"""What the kernels are given of sky, fog, shadows and textures."""
+"""Sky, fog, shadows and textures as encoded for the kernels."""
 
 import math
 
@@ -26,28 +26,28 @@ def sceneries():
     return EffectsEncoder(scene, "cpu")
 
 
-def test_what_is_not_given_is_not_there(sceneries):
-    made = sceneries.encode(Appearance(), ZENITH)
-    assert made.zenith.numpy().tolist() == [[51, 127, 255], [0, 0, 0]]
-    assert made.fog.numpy().tolist() == [0, 0] and made.shadows.numpy().tolist() == [0, 0]
-    assert (made.texture.numpy() == -1).all() and len(made.sides) == 0
+def test_effects_default_to_none(sceneries):
+    encoded = sceneries.encode(Appearance(), ZENITH)
+    assert encoded.zenith.numpy().tolist() == [[51, 127, 255], [0, 0, 0]]
+    assert encoded.fog.numpy().tolist() == [0, 0] and encoded.shadows.numpy().tolist() == [0, 0]
+    assert (encoded.texture.numpy() == -1).all() and len(encoded.sides) == 0
 
 
-def test_fog_is_told_by_what_is_lost_in_a_metre(sceneries):
-    made = sceneries.encode(Appearance(fog=torch.tensor([100.0, math.inf])), ZENITH)
-    assert made.fog.numpy().tolist() == pytest.approx([math.log(20) / 100, 0.0])
+def test_fog_is_encoded_as_extinction_per_meter(sceneries):
+    encoded = sceneries.encode(Appearance(fog=torch.tensor([100.0, math.inf])), ZENITH)
+    assert encoded.fog.numpy().tolist() == pytest.approx([math.log(20) / 100, 0.0])
 
 
-def test_textures_are_stored_once_and_worn_by_world_and_thing(sceneries):
+def test_textures_are_stored_once(sceneries):
     ground = Texture(images=("grid", "bricks"), size=4.0, choice=torch.tensor([1, -1]))
     target = Texture(images=("bricks",), size=torch.tensor([0.5, 2.0]))
     appearance = Appearance(textures={SemanticClass.GROUND: ground, SemanticClass.TARGET: target})
-    made = sceneries.encode(appearance, ZENITH)
-    assert made.texture.numpy().tolist() == [[1, 1, -1], [-1, 1, -1]]
-    assert made.tiles.numpy().tolist() == [[0.25, 2.0, 0.0], [0.25, 0.5, 0.0]]
-    assert made.sides.numpy().tolist() == [256, 256]
-    count = (4**9 - 1) // 3  # of a texture of 256 texels and all its levels
-    assert made.starts.numpy().tolist() == [0, count]
-    first = made.texels.numpy()[count : count + 256]
+    encoded = sceneries.encode(appearance, ZENITH)
+    assert encoded.texture.numpy().tolist() == [[1, 1, -1], [-1, 1, -1]]
+    assert encoded.tiles.numpy().tolist() == [[0.25, 2.0, 0.0], [0.25, 0.5, 0.0]]
+    assert encoded.sides.numpy().tolist() == [256, 256]
+    count = (4**9 - 1) // 3  # of a texture of 256x256 texels with all mip levels
+    assert encoded.starts.numpy().tolist() == [0, count]
+    first = encoded.texels.numpy()[count : count + 256]
     red, green, blue = (load("bricks")[0, :, i] for i in range(3))
     assert np.array_equal(first, red + 256 * green.astype(int) + 65536 * blue.astype(int))

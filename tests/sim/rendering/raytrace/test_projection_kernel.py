@@ -1,4 +1,4 @@
-"""The rectangle around a geom holds whatever can be seen of it, and little more."""
+"""Bounds of geoms in the image contain all visible pixels and little more."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def find_visible(
 
 
 def found(position, size=(1.0, 1.0, 1.0)):
-    """Columns and rows, from and to."""
+    """Return first and last column and row."""
     scene = geoms(-6.0)
     scene.position = wp.array([position], dtype=wp.vec3, device="cpu")
     scene.reach = wp.array([size], dtype=wp.vec3, device="cpu")
@@ -36,32 +36,32 @@ def found(position, size=(1.0, 1.0, 1.0)):
     return part.numpy()[0].tolist()
 
 
-def test_around_a_box_ahead():
-    """Its front takes the pixels 16 to 23; a pixel more is for rounding."""
+def test_bounds_of_a_box_ahead():
+    """The front covers pixels 16 to 23; the margin is for rounding."""
     assert found((0.0, 0.0, -6.0)) == [14, 25, 14, 25]
 
 
 @pytest.mark.parametrize(
     "position", [(0.0, 0.0, 6.0), (30.0, 0.0, -6.0), (0.0, -30.0, -6.0), (5.0, 0.0, 1.5)]
 )
-def test_what_is_behind_or_aside_takes_no_pixel(position):
+def test_geoms_out_of_view_have_empty_bounds(position):
     first, last, top, bottom = found(position)
     assert first >= last or top >= bottom
 
 
-def test_around_the_camera_it_is_the_whole_picture():
+def test_box_around_the_camera_covers_the_image():
     assert found((0.0, 0.0, 0.0)) == [0, SIZE, 0, SIZE]
 
 
-def test_beside_the_camera_it_is_a_part():
-    """A wall from 1 m behind the camera to 1 m before it, 0.5 m to the right: from half way on."""
+def test_box_beside_the_camera_covers_a_part():
+    """A wall from 1 m behind to 1 m in front of the camera, 0.5 m to the right."""
     first, last, top, bottom = found((1.5, 0.0, 0.0))
     assert (last, top, bottom) == (SIZE, 0, SIZE)
-    assert first == 20 + 10 - 2  # a slope of 0.5 is half way to the edge
+    assert first == 20 + 10 - 2  # a slope of 0.5 is halfway to the edge
 
 
-def test_frames_carry_what_is_fixed_to_them():
-    """A camera on the drone, which is turned to look along x; the box is the world's."""
+def test_frames_move_attached_cameras():
+    """The camera is on the drone, which looks along x; the box is in the world frame."""
     turned = poses()
     half = np.sqrt(0.5)
     turned.positions = wp.array([[[0, 0, 0], [1.0, 2.0, 3.0]]], dtype=wp.vec3, device="cpu")

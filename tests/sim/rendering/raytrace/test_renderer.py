@@ -1,4 +1,4 @@
-"""Held against MuJoCo Warp's ray tracer, on scenes of every kind of solid, from everywhere."""
+"""Comparison with MuJoCo Warp's ray tracer on scenes with all geom types."""
 
 import mujoco
 import numpy as np
@@ -59,7 +59,7 @@ def view(modality="rgb", height=30, width=40):
 
 
 def render(renderer, view, poses, appearance=None):
-    """The only picture of each world."""
+    """Return the only image of each environment."""
     return renderer.render(view, poses, appearance)[view.modalities[0]][:, 0]
 
 
@@ -83,11 +83,11 @@ def both():
 
 @pytest.mark.parametrize("tilt", [0.0, 0.2, 1.0])
 @pytest.mark.parametrize("modality", ["rgb", "depth", "segmentation"])
-def test_pictures_are_those_of_mujoco_warp(both, modality, tilt):
-    """But for single pixels on edges of round things, whose equations are solved otherwise."""
+def test_images_equal_mujoco_warp(both, modality, tilt):
+    """Single pixels on edges of round geoms may differ because of a different solver."""
     ours, theirs = (render(r, view(modality), scattered(64, tilt)) for r in both)
     assert ours.dtype == theirs.dtype and ours.shape == theirs.shape
-    assert len(theirs.flatten().unique()) > 5  # there is something to see
+    assert len(theirs.flatten().unique()) > 5  # the scene is not empty
     difference = (ours.double() - theirs.double()).abs()
     tolerance = {"rgb": 1, "depth": 1e-3, "segmentation": 0}[modality]
     scale = theirs.double().clamp(min=1) if modality == "depth" else 1.0
@@ -96,8 +96,8 @@ def test_pictures_are_those_of_mujoco_warp(both, modality, tilt):
 
 @pytest.mark.parametrize("camera", ["front_center", "chase"])
 @pytest.mark.parametrize("modality", ["rgb", "segmentation"])
-def test_in_our_own_worlds_not_a_byte_differs(camera, modality):
-    """So that every policy trained with one sees the same with the other."""
+def test_images_of_task_scenes_equal_mujoco_warp_exactly(camera, modality):
+    """A policy trained with one renderer has the same observations with the other."""
     several = [Worlds(200, renderer=kind) for kind in (Raytracer, WarpRenderer)]
     states = [world_random_state(3, i) for i in range(200)]
     several[0].reset(torch.arange(200), states)
@@ -110,12 +110,12 @@ def test_in_our_own_worlds_not_a_byte_differs(camera, modality):
         worlds.close()
 
 
-def test_every_kind_of_geom_is_seen(both):
+def test_every_geom_type_is_visible(both):
     seen = render(both[0], view("segmentation"), scattered(64, 0.2)).unique().tolist()
-    assert seen == [-1, 0, 1, 2, 4, 5, 6, 7, 8]  # all but the drone's own hull
+    assert seen == [-1, 0, 1, 2, 4, 5, 6, 7, 8]  # all but the drone's hull
 
 
-def test_colours_and_lights_of_each_world_are_those_of_mujoco_warp(both):
+def test_colors_and_lights_equal_mujoco_warp(both):
     draw = torch.Generator().manual_seed(0)
     appearance = Appearance(
         colors={m: torch.rand(64, 3, generator=draw) for m in set(MEANINGS) | {SemanticClass.SKY}},
@@ -129,8 +129,8 @@ def test_colours_and_lights_of_each_world_are_those_of_mujoco_warp(both):
     assert (plain != ours).double().mean() > 0.9
 
 
-def test_from_inside_a_solid_it_is_not_there(both):
-    """As in MuJoCo's images, where only outsides are drawn."""
+def test_solids_are_invisible_from_inside(both):
+    """MuJoCo also renders only the outside."""
     poses = scattered(5, 0.0)
     eyes = poses.position + torch.tensor([0.4, 0.0, 0.0])
     for world, prop in enumerate(range(5)):
@@ -142,7 +142,7 @@ def test_from_inside_a_solid_it_is_not_there(both):
 
 @pytest.fixture
 def ball():
-    """Draws a ball of 1 m, 5 m straight ahead of a camera that looks along x."""
+    """Return a function that renders a ball of 1 m, 5 m ahead of a camera that looks along x."""
     xml = """<mujoco><statistic extent="1"/><visual><headlight active="0"/></visual><worldbody>
     <light directional="true" castshadow="false"/><body name="drone"><freejoint/>
     <geom type="box" size=".1 .1 .1"/>
@@ -158,13 +158,13 @@ def ball():
     renderer.close()
 
 
-def test_a_ball_ahead_has_the_size_and_distance_that_geometry_gives_it(ball):
+def test_size_and_distance_of_a_ball_match_geometry(ball):
     depth, distance = ball("depth"), ball("distance")
     assert depth[100, 100].item() == distance[100, 100].item() == pytest.approx(4.0)
-    # tan of the angle to its rim, 1 / sqrt(5^2 - 1), of a half picture of 100.5 pixels
+    # the tangent of the angle to the rim is 1 / sqrt(5^2 - 1); the half image has 100.5 pixels
     assert (depth > 0)[100].sum().item() == pytest.approx(2 * 100.5 / np.sqrt(24), abs=1)
     assert (depth > 0).sum().item() == pytest.approx(np.pi * 100.5**2 / 24, rel=0.01)
-    # ten pixels aside the ray's slope is 10 / 100.5: |t (1, s) - (5, 0)| = 1
+    # ten pixels to the side the slope is s = 10 / 100.5: |t (1, s) - (5, 0)| = 1
     s = 10 / 100.5
     t = (5 - np.sqrt(25 - 24 * (1 + s * s))) / (1 + s * s)
     assert depth[100, 110].item() == pytest.approx(t, rel=1e-5)
@@ -172,12 +172,12 @@ def test_a_ball_ahead_has_the_size_and_distance_that_geometry_gives_it(ball):
     assert depth[0, 0].item() == distance[0, 0].item() == 0.0
 
 
-def test_a_balls_normals_lead_away_from_its_middle(ball):
+def test_normals_of_a_ball_point_outward(ball):
     normals = ball("normals")
     np.testing.assert_allclose(normals[100, 100], [-1.0, 0.0, 0.0], atol=1e-5)
     s = 10 / 100.5
     t = (5 - np.sqrt(25 - 24 * (1 + s * s))) / (1 + s * s)
-    right, up = normals[100, 110], normals[90, 100]  # the world's y is to the left, z up
+    right, up = normals[100, 110], normals[90, 100]  # world frame: y left, z up
     np.testing.assert_allclose(right, [t - 5, -t * s, 0.0], atol=1e-4)
     np.testing.assert_allclose(up, [t - 5, 0.0, t * s], atol=1e-4)
     assert not normals[0, 0].any()
@@ -186,8 +186,8 @@ def test_a_balls_normals_lead_away_from_its_middle(ball):
 
 
 @pytest.mark.parametrize("height", [0.01, 1.0])
-def test_a_plane_at_a_grazing_angle_is_as_far_as_geometry_has_it(both, height):
-    """From a height h a ray with a slope s downward meets it after h / s."""
+def test_distance_of_a_plane_at_grazing_angles_matches_geometry(both, height):
+    """From height h, a ray of downward slope s hits the plane at h / s."""
     poses = scattered(1, 0.0)
     poses.props[:] = -50.0
     poses.position[:] = torch.tensor([0.0, 0.0, height])
@@ -206,36 +206,36 @@ def test_a_plane_at_a_grazing_angle_is_as_far_as_geometry_has_it(both, height):
 
 
 @pytest.mark.parametrize("tilt", [0.2, 1.0])
-def test_a_gpus_painter_draws_the_same(tilt, both):
-    """Its kernels, tried on a CPU: the same functions, in another order."""
+def test_gpu_launcher_on_a_cpu_renders_the_same_images(tilt, both):
+    """The GPU kernels call the same functions in a different order."""
     alike = Raytracer(scene(), num_worlds=1)
     alike._launcher.close()
     alike._launcher = GpuLauncher("cpu")
-    asked = View(cameras=("front", "rear"), height=20, width=30, modalities=MODALITIES)
-    expected = both[0].render(asked, scattered(16, tilt))
-    for modality, picture in alike.render(asked, scattered(16, tilt)).items():
-        if picture.is_floating_point():
-            torch.testing.assert_close(picture, expected[modality], rtol=1e-6, atol=1e-6)
+    requested = View(cameras=("front", "rear"), height=20, width=30, modalities=MODALITIES)
+    expected = both[0].render(requested, scattered(16, tilt))
+    for modality, image in alike.render(requested, scattered(16, tilt)).items():
+        if image.is_floating_point():
+            torch.testing.assert_close(image, expected[modality], rtol=1e-6, atol=1e-6)
         else:
-            assert torch.equal(picture, expected[modality]), modality
+            assert torch.equal(image, expected[modality]), modality
 
 
 @pytest.mark.gpu
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA GPU")
-def test_a_gpu_draws_the_same(both):
+def test_gpu_renders_the_same_images(both):
     on_gpu = Raytracer(scene(), num_worlds=64, device="cuda")
-    asked = View(cameras=("front", "rear"), height=30, width=40, modalities=MODALITIES)
+    requested = View(cameras=("front", "rear"), height=30, width=40, modalities=MODALITIES)
     poses = scattered(64, 0.2)
     there = Poses(poses.position.cuda(), poses.attitude.cuda(), poses.props.cuda())
-    expected = both[0].render(asked, poses)
-    for modality, picture in on_gpu.render(asked, there).items():
-        assert picture.device.type == "cuda"
-        difference = (picture.cpu().double() - expected[modality].double()).abs()
+    expected = both[0].render(requested, poses)
+    for modality, image in on_gpu.render(requested, there).items():
+        assert image.device.type == "cuda"
+        difference = (image.cpu().double() - expected[modality].double()).abs()
         tolerance = 1 if modality == "rgb" else 1e-3
         assert (difference > tolerance * expected[modality].clamp(min=1)).double().mean() < 1e-4
 
 
-def test_what_lies_beyond_the_far_end_is_sky(both):
+def test_geoms_beyond_the_far_limit_are_sky(both):
     poses = scattered(1, 0.0)
     poses.props[:] = -50.0
     depth = render(both[0], view("depth", 200, 40), poses)
@@ -260,7 +260,7 @@ def test_what_lies_beyond_the_far_end_is_sky(both):
         ('name="front"', 'name="nose"', "'front' is not in the model; choose from: nose, rear"),
     ],
 )
-def test_what_it_cannot_draw_is_refused_by_name(old, new, message):
+def test_unsupported_geoms_raise_with_their_name(old, new, message):
     assert old in XML
     field = '<asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/></asset><worldbody>'
     xml = XML.replace(old, new).replace("<worldbody>", field)
@@ -281,7 +281,7 @@ def test_what_it_cannot_draw_is_refused_by_name(old, new, message):
         ),
     ],
 )
-def test_models_of_others_are_refused_in_one_line_that_names_who_draws_them(geom, message):
+def test_unsupported_models_raise_and_recommend_mujoco_warp(geom, message):
     xml = f"""<mujoco><asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset><worldbody>
     <light directional="true" castshadow="false"/>{geom}</worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(xml)
@@ -293,7 +293,7 @@ def test_models_of_others_are_refused_in_one_line_that_names_who_draws_them(geom
     assert "\n" not in str(refused.value)
 
 
-def test_a_scene_without_light_is_refused():
+def test_scene_without_light_raises():
     xml = "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
     with pytest.raises(InputError, match="no light"):
         Raytracer(scene(xml, (SemanticClass.TARGET,), (-1,)), num_worlds=1)

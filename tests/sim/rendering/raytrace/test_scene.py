@@ -1,4 +1,4 @@
-"""Frames, cameras and rays of a model in which nothing is where it is easy."""
+"""Frames, cameras and rays of a model with nested, rotated bodies."""
 
 import math
 
@@ -39,7 +39,7 @@ def scene():
     return Scene(model, meanings, (-1, -1, -1, 0), (0.0, 0.0, 0.0))
 
 
-def test_every_geom_is_in_the_frame_that_carries_it(scene):
+def test_geoms_belong_to_their_frames(scene):
     geoms = make_geoms(scene, Frames(scene), show_drone=True, device="cpu")
     assert geoms.number.numpy().tolist() == [0, 1, 2, 3]
     assert geoms.frame.numpy().tolist() == [0, 1, 1, 2]
@@ -49,27 +49,27 @@ def test_every_geom_is_in_the_frame_that_carries_it(scene):
     np.testing.assert_allclose(geoms.attitude.numpy()[2], [quarter, 0, 0, quarter], atol=1e-6)
 
 
-def test_the_box_around_a_geom(scene):
+def test_bounding_boxes_of_geoms(scene):
     reach = make_geoms(scene, Frames(scene), show_drone=True, device="cpu").reach.numpy()
     expected = [[1, 2, 3], [0.5, 0.5, 0.5], [0.1, 0.1, 0.3], [0.3, 0.3, 0.4]]
     np.testing.assert_allclose(reach, expected, atol=1e-6)
 
 
-def test_the_drone_is_left_out(scene):
+def test_drone_can_be_hidden(scene):
     geoms = make_geoms(scene, Frames(scene), show_drone=False, device="cpu")
     assert geoms.number.numpy().tolist() == [0, 3]
 
 
-def test_a_camera_is_carried_too(scene):
+def test_camera_belongs_to_its_frame(scene):
     camera = make_camera(scene, Frames(scene), "eye", aspect=2.0)
     assert camera.frame == 1
-    # one metre along the arm's y, which is the drone's -x, from the arm at (1, 0, 0)
+    # 1 m along the arm's y, the drone's -x, from the arm at (1, 0, 0)
     np.testing.assert_allclose(list(camera.position), [0, 0, 0], atol=1e-6)
     assert camera.half_height == pytest.approx(1.0)
     assert camera.half_width == pytest.approx(2.0)
 
 
-def test_rays_go_through_the_middles_of_pixels(scene):
+def test_rays_pass_through_pixel_centers(scene):
     rays = make_rays(make_camera(scene, Frames(scene), "eye", aspect=2.0), 2, 4)
     assert rays.shape == (2, 4, 3) and rays.dtype == np.float32
     np.testing.assert_allclose(np.linalg.norm(rays, axis=-1), 1.0, atol=1e-6)
@@ -77,7 +77,7 @@ def test_rays_go_through_the_middles_of_pixels(scene):
     np.testing.assert_allclose(rays[1, 2] / -rays[1, 2, 2], [0.5, -0.5, -1.0], atol=1e-6)
 
 
-def test_a_view_has_each_camera_with_rays_of_its_own(scene):
+def test_view_has_rays_for_each_camera(scene):
     view = View(cameras=("eye", "wide"), height=2, width=4)
     made = make_view(scene, Frames(scene), view, "cpu")
     assert (made.width, made.height) == (4, 2)

@@ -1,4 +1,4 @@
-"""Cameras that differ from world to world, against worlds whose cameras all are so."""
+"""Cameras that differ between environments, compared with environments of one camera."""
 
 import math
 
@@ -30,7 +30,7 @@ def of(*rows):
     return Appearance(camera=camera)
 
 
-def test_each_world_is_seen_by_its_own_camera(worlds):
+def test_each_environment_uses_its_own_camera(worlds):
     together = worlds.render(worlds.state, appearance=of(0, 1, 2))
     plain = worlds.render(worlds.state)
     assert torch.equal(together[0], plain[0])
@@ -40,7 +40,7 @@ def test_each_world_is_seen_by_its_own_camera(worlds):
         assert not torch.equal(alone[0], plain[i])
 
 
-def test_other_cameras_stay_as_they_are(worlds):
+def test_other_cameras_are_unchanged(worlds):
     view = worlds.view(("bottom_center", "front_center", "chase"), height=20, width=32)
     moved = worlds.render_all(worlds.state, view, of(0, 1, 2))["rgb"]
     plain = worlds.render_all(worlds.state, view)["rgb"]
@@ -49,7 +49,7 @@ def test_other_cameras_stay_as_they_are(worlds):
     assert torch.equal(moved[:, 1], worlds.render(worlds.state, own, of(0, 1, 2)))
 
 
-def test_a_zoomed_camera_is_one_of_another_field_of_view(worlds):
+def test_zoom_equals_a_smaller_field_of_view(worlds):
     own, wide = (math.tan(math.radians(angle) / 2) for angle in (135.0, 150.0))
     zoomed = Appearance(camera=Mounting(zoom=own / wide))
     other = Worlds(3, camera=CameraSettings(horizontal_fov=150.0), num_shards=1)
@@ -65,7 +65,7 @@ def test_a_zoomed_camera_is_one_of_another_field_of_view(worlds):
         assert far.float().mean() < 0.01
 
 
-def test_a_look_that_came_before_is_not_read_again(worlds):
+def test_previous_camera_is_not_reused(worlds):
     look = of(0, 1, 2)
     worlds.render(worlds.state, appearance=look)
     cameras, _ = worlds.renderer._views[worlds.policy_view]

@@ -1,4 +1,4 @@
-"""Frames as the kernels get them."""
+"""Frames as encoded for the kernels."""
 
 import pytest
 import torch
@@ -10,7 +10,7 @@ from drone_rl.sim.rendering.renderer import Poses
 
 @pytest.fixture(autouse=True)
 def warp():
-    """Started, as whoever flies or draws has it."""
+    """Start Warp."""
     start_warp("cpu")
 
 
@@ -21,7 +21,7 @@ def some(count, props=2):
     return Poses(*(v + torch.arange(count).reshape(-1, *[1] * (v.dim() - 1)) for v in one))
 
 
-def test_whatever_number_of_worlds_comes_the_kernels_find_theirs():
+def test_pose_buffers_support_any_number_of_environments():
     places = PoseBuffers(torch.device("cpu"))
     for count, props in ((2, 2), (5, 2), (3, 2), (3, 1), (0, 1), (4, 0)):
         poses = some(count, props)
@@ -33,7 +33,7 @@ def test_whatever_number_of_worlds_comes_the_kernels_find_theirs():
         assert (attitudes == poses.attitude.float().numpy()).all()
 
 
-def test_fewer_worlds_are_drawn_from_the_same_arrays():
+def test_pose_buffers_are_reused_for_fewer_environments():
     places = PoseBuffers(torch.device("cpu"))
     assert places.write(some(4)) is places.write(some(3))
     assert places.write(some(3)) is not places.write(some(5))

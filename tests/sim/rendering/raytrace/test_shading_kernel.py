@@ -1,4 +1,4 @@
-"""Spans of pixels of a face and of the sky; whole images are in test_renderer_launchers."""
+"""Pixel spans of a face and of the sky; test_renderer_launchers tests whole images."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def put(job: structs_kernel.Job, worn: structs_kernel.Materials, out: structs_ke
 
 
 def shown_by(*names):
-    """Three pixels of a face that looks along z, 4 to 6 m away, and one of the sky."""
+    """Return images of three pixels of a face along z at 4 to 6 m, and one of the sky."""
     out = images(**{name: dtype for name, (_, dtype) in KINDS.items() if name in names})
     box = structs_kernel.GeomView()
     box.kind, box.number, box.axes = int(BOX), 3, wp.mat33(*np.eye(3).flatten())
@@ -41,7 +41,7 @@ def shown_by(*names):
     return {name: getattr(out, name).numpy()[0, 2:6].tolist() for name in names}
 
 
-def test_three_pixels_of_a_geom_and_one_of_the_sky():
+def test_span_of_geom_and_sky_pixels():
     shown = shown_by(*KINDS)
     assert shown["rgb"] == [[173, 86, 0]] * 3 + [[10, 20, 30]]
     assert shown["distance"] == [4.0, 5.0, 6.0, 0.0]
@@ -54,5 +54,5 @@ def test_three_pixels_of_a_geom_and_one_of_the_sky():
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_any_modality_can_be_rendered_alone(name):
+def test_modalities_are_independent(name):
     assert shown_by(name)[name] == shown_by(*KINDS)[name]

@@ -1,4 +1,4 @@
-"""Light in the sun and in the shade, and how a texture lies on the faces of a geom."""
+"""Light in sun and shadow, and texture coordinates on the faces of a geom."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def light(worn: structs_kernel.Materials, out: wp.array[wp.vec3]):
     out[1] = dark
 
 
-def test_the_first_light_alone_is_kept_away():
+def test_shadow_blocks_only_the_first_light():
     worn = materials()
     worn.ambient = array([[[0.1] * 3, [0.05] * 3]], wp.vec3)
     worn.diffuse = array([[[0.5] * 3, [0.2, 0.0, 0.0]]], wp.vec3)
@@ -39,20 +39,20 @@ def cover(
 @pytest.mark.parametrize(
     "face, normal, corner",
     [
-        (1, (1, 0, 0), (4, -6)),  # that looks along x shows y to the right, z up
+        (1, (1, 0, 0), (4, -6)),  # a face along x shows y to the right, z up
         (2, (0, -1, 0), (2, -6)),
         (5, (0, 0, 1), (2, -4)),
         (int(ROUND), (0.1, 0.8, -0.5), (2, -6)),
         (int(ROUND), (0.1, 0.2, -0.9), (2, -4)),
     ],
 )
-def test_a_face_shows_two_coordinates_of_the_geom(face, normal, corner):
+def test_texture_axes_of_each_face(face, normal, corner):
     geom_view = structs_kernel.GeomView()
     geom_view.eye, geom_view.into = wp.vec3(1.0, 2.0, 3.0), wp.mat33(*np.eye(3).flatten())
     out = wp.zeros(1, dtype=TextureMap, device="cpu")
     wp.launch(cover, 1, inputs=[geom_view, face, wp.vec3(*normal), out], device="cpu")
     laid = out.numpy()[0]
     assert laid["corner"].tolist() == list(corner)
-    # a metre along its own axis goes two tiles across, or down
+    # 1 m along its axis is two tiles across or down
     assert np.abs(laid["across"]).sum() == 2.0 and np.abs(laid["down"]).sum() == 2.0
     np.testing.assert_allclose(laid["facing"], -np.array(normal), atol=1e-6)

@@ -1,4 +1,4 @@
-"""Loops over pixels, each between two ends."""
+"""Loops over spans of pixels."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def array(values, dtype):
     ("place", "dtype", "value"),
     [(0, float, 0.5), (1, int, 7), (2, wp.vec3ub, [1, 2, 3]), (3, wp.vec3, [1.0, 2.0, 3.0])],
 )
-def test_only_what_lies_between_is_filled(place, dtype, value):
+def test_only_the_span_is_filled(place, dtype, value):
     types = (float, int, wp.vec3ub, wp.vec3)
     given = [wp.zeros(8, dtype=kind, device="cpu") for kind in types]
     wp.launch(fill, 1, inputs=given, device="cpu")
@@ -52,7 +52,7 @@ def test_only_what_lies_between_is_filled(place, dtype, value):
     assert given[place].numpy().tolist() == expected.tolist()
 
 
-def test_numbers_are_copied_and_multiplied():
+def test_spans_are_copied_and_multiplied():
     copied, product = (wp.zeros(4, dtype=float, device="cpu") for _ in range(2))
     given, by = array([1.0, 2.0, 3.0, 4.0], float), array([5.0, 6.0, 7.0, 8.0], float)
     wp.launch(combine, 1, inputs=[copied, product, given, by], device="cpu")
@@ -60,8 +60,8 @@ def test_numbers_are_copied_and_multiplied():
     assert product.numpy().tolist() == [0, 12, 21, 0]
 
 
-def test_a_level_is_seen_where_it_is_nearer_or_as_near():
-    """From a height of 2 m: after 2 m straight down, after 4 m at half as steep."""
+def test_level_plane_replaces_pixels_that_are_not_nearer():
+    """From a height of 2 m the distance is 2 m straight down and 4 m at half the slope."""
     nearest = array([1e10, 1e10, 1e10, 3.9, 4.0, 1e10], float)
     owner = array([-1] * 6, int)
     rays = array([[0, -1, 0], [0, -1, 0], [0, -0.5, 0], [0, -0.5, 0], [0, -0.5, 0], [0, -1, 0]],

@@ -1,4 +1,4 @@
-"""Colours of single pixels; whole images are in test_raytrace_scenic."""
+"""Colors of single pixels; test_effects_kernel tests whole images."""
 
 import numpy as np
 import pytest
@@ -40,18 +40,18 @@ def shaded(what, rays, nearest=None, dark=None, texels=(0,), cover=None, fog=0.0
     return job.colors.numpy().tolist()
 
 
-def test_the_sky_is_between_its_two_colours():
+def test_sky_color_is_interpolated():
     rays = [(0.0, 0.0, -1.0), (0.0, 0.6, -0.8), (0.0, -0.6, -0.8)]
     found = shaded(0, rays)
     assert found == [[50, 60, 70], [140, 84, 208], [50, 60, 70]]
 
 
-def test_an_even_face_is_lit_or_dark_and_cut_off_at_white():
+def test_flat_face_is_lit_or_dark_and_clipped():
     assert shaded(1, [(0, 0, -1)] * 2, dark=[0, 1]) == [[200, 100, 255], [20, 10, 30]]
 
 
 @pytest.mark.parametrize("metres", [1.0, 7.0, 40.0, 1000.0])
-def test_what_fog_leaves_goes_with_the_exponential_of_the_way(metres):
+def test_fog_attenuates_exponentially(metres):
     clear = np.exp(-0.05 * metres)
     wanted = clear * np.array([200, 100, 255]) + (1 - clear) * np.array([50, 60, 70])
     (found,) = shaded(1, [(0, 0, -1)], [metres], fog=0.05)
@@ -59,7 +59,7 @@ def test_what_fog_leaves_goes_with_the_exponential_of_the_way(metres):
 
 
 def covered(place, metres=1.0, area=0.0):
-    """A texture of 2 by 2 texels, black, red / green, blue, of which a tile is 1 m."""
+    """Return the color of a texture with 2x2 texels (black, red; green, blue) and tiles of 1 m."""
     colors = np.array([[[0, 0, 0], [255, 0, 0]], [[0, 255, 0], [0, 0, 255]]], np.uint8)
     texels = levels(colors).astype(np.uint32) @ np.array([1, 256, 65536], np.uint32)
     cover = TextureMap()
@@ -69,20 +69,20 @@ def covered(place, metres=1.0, area=0.0):
 
 
 @pytest.mark.parametrize("tile", [-3, 0, 5])
-def test_the_middle_of_a_texel_has_its_colour(tile):
+def test_texel_center_has_its_color(tile):
     assert covered((tile + 0.25, tile + 0.25)) == [0, 0, 0]
     assert covered((tile + 0.75, tile + 0.25)) == pytest.approx([200, 0, 0], abs=1)
     assert covered((tile + 0.25, tile + 0.75)) == pytest.approx([0, 100, 0], abs=1)
     assert covered((tile + 0.75, tile + 0.75)) == pytest.approx([0, 0, 255], abs=1)
 
 
-def test_between_texels_their_colours_are_mixed():
+def test_colors_between_texels_are_interpolated():
     assert covered((0.5, 0.25)) == pytest.approx([100, 0, 0], abs=1)
-    assert covered((0.0, 0.25)) == pytest.approx([100, 0, 0], abs=1)  # over the edge of the tile
+    assert covered((0.0, 0.25)) == pytest.approx([100, 0, 0], abs=1)  # across the edge of the tile
     assert covered((0.5, 0.5)) == pytest.approx([50, 25, 75], abs=1)
 
 
-def test_a_pixel_that_covers_a_tile_has_its_mean():
+def test_pixel_covering_a_tile_has_its_mean():
     assert covered((0.25, 0.25), area=1.9) == [0, 0, 0]
     assert covered((0.25, 0.25), area=2.1) == pytest.approx([50, 25, 75], abs=1)
     assert covered((0.25, 0.25), metres=2.0, area=0.6) == pytest.approx([50, 25, 75], abs=1)
