@@ -6,7 +6,7 @@ from drone_rl.sim.actions import MOVES, DiscreteActions, Move
 from tests.five_actions import FIVE
 
 
-def test_numbers_of_the_moves_are_those_of_files_and_policies():
+def test_move_numbers_are_those_of_files():
     assert [(move.name, move.value) for move in Move] == [("FORWARD", 0), ("LEFT", 1), ("RIGHT", 2)]
     assert MOVES.names == ("forward", "left", "right")
     assert (MOVES.left, MOVES.right, MOVES.order) == (1, 2, (1, 0, 2))
@@ -15,66 +15,69 @@ def test_numbers_of_the_moves_are_those_of_files_and_policies():
     assert MOVES.output_names == MOVES.names and (MOVES.num_outputs, FIVE.num_outputs) == (3, 5)
 
 
-def test_what_is_done_blindly():
+def test_constant_and_random_actions():
     assert (MOVES.always("right"), FIVE.always("stay")) == (2, 4)
     drawn = FIVE.draw((5000,), torch.Generator().manual_seed(0))
     assert (drawn.bincount() / 5000 - 0.2).abs().max() < 0.03
     assert FIVE.draw((2, 3), torch.Generator()).shape == (2, 3)
 
 
-def test_of_outputs_the_greatest_is_taken_and_scored_as_it_is():
+def test_greedy_action_has_the_greatest_output():
     outputs = torch.tensor([[0.0, 3.0, 1.0], [2.0, 0.0, 1.0]])
     assert MOVES.greedy(outputs).tolist() == [1, 0]
     assert torch.equal(MOVES.scores(outputs), outputs)
 
 
-def test_an_action_is_a_part_and_is_kept_so():
+def test_recorded_actions_are_indices():
     action = torch.tensor([0, 4, 2])
     assert FIVE.part(action) is action and FIVE.kept(action) == {"actions": action}
     assert FIVE.fields() == {"actions": "action taken: 0 up, 1 down, 2 left, 3 right, 4 stay"}
     assert FIVE.sways(FIVE.kept(action)).tolist() == [True, False, True]
 
 
-def test_a_wish_is_the_softmax_and_the_chosen_action_its_peak():
+def test_probabilities_are_the_softmax_of_outputs():
     outputs = torch.tensor([[0.0, 0.0, 0.0, 0.0, 4.0**0.5], [1.0, 2.0, 0.0, 0.0, 0.0]])
-    wish = FIVE.wish(outputs)
-    torch.testing.assert_close(wish.sum(-1), torch.ones(2))
-    assert wish[0, 4] / wish[0, 0] == pytest.approx(np.exp(2.0))
-    assert FIVE.chosen(wish).tolist() == [4, 1]
+    probs = FIVE.wish(outputs)
+    torch.testing.assert_close(probs.sum(-1), torch.ones(2))
+    assert probs[0, 4] / probs[0, 0] == pytest.approx(np.exp(2.0))
+    assert FIVE.chosen(probs).tolist() == [4, 1]
 
 
 @pytest.mark.parametrize("kind", [torch.tensor, np.array])
-def test_the_mirror_swaps_left_and_right_alone(kind):
-    wish = kind([[0.1, 0.2, 0.3, 0.4, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0]])
-    assert FIVE.mirror(wish).tolist() == [wish[0, [0, 1, 3, 2, 4]].tolist(), [0, 0, 0, 1, 0]]
-    assert FIVE.mirror(FIVE.mirror(wish)).tolist() == wish.tolist()
-    assert FIVE.leaning(wish).tolist() == [wish[0, 2], 1.0]
+def test_mirror_swaps_only_left_and_right(kind):
+    probs = kind([[0.1, 0.2, 0.3, 0.4, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0]])
+    assert FIVE.mirror(probs).tolist() == [
+        probs[0, [0, 1, 3, 2, 4]].tolist(),
+        [0, 0, 0, 1, 0],
+    ]
+    assert FIVE.mirror(FIVE.mirror(probs)).tolist() == probs.tolist()
+    assert FIVE.leaning(probs).tolist() == [probs[0, 2], 1.0]
 
 
 @pytest.mark.parametrize("kind", [torch.tensor, np.array])
-def test_the_distance_of_wishes_is_their_total_variation(kind):
-    wish = kind([[0.5, 0.5, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0]])
+def test_distance_is_the_total_variation(kind):
+    probs = kind([[0.5, 0.5, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0]])
     other = kind([[0.25, 0.5, 0.25, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0]])
-    assert FIVE.distance(wish, other).tolist() == [0.25, 1.0]
-    assert FIVE.distance(wish, wish).tolist() == [0.0, 0.0]
+    assert FIVE.distance(probs, other).tolist() == [0.25, 1.0]
+    assert FIVE.distance(probs, probs).tolist() == [0.0, 0.0]
 
 
 @pytest.mark.parametrize(
-    ("wish", "other", "expected"),
+    ("probs", "other", "expected"),
     [
-        ((0, 0, 1, 0, 0), (0, 0, 0, 1, 0), 1.0),  # surely left, surely right
-        ((0, 0, 0, 1, 0), (0, 0, 1, 0, 0), -1.0),  # the other one leans left
+        ((0, 0, 1, 0, 0), (0, 0, 0, 1, 0), 1.0),  # left with certainty, right with certainty
+        ((0, 0, 0, 1, 0), (0, 0, 1, 0, 0), -1.0),  # reversed
         ((0, 0, 0.6, 0.4, 0), (0, 0, 0.5, 0.5, 0), 0.1),
         ((0, 0, 0.6, 0.1, 0.3), (0, 0, 0.4, 0.6, 0), 0.2),  # the lesser of 0.2 and 0.5
         ((0, 0, 0.6, 0.3, 0.1), (1, 0, 0, 0, 0), 0.0),  # both rise: no opposition
-        ((1, 0, 0, 0, 0), (0, 1, 0, 0, 0), 0.0),  # up and down are no sides
+        ((1, 0, 0, 0, 0), (0, 1, 0, 0, 0), 0.0),  # up and down are not sides
     ],
 )
-def test_opposition_is_the_lesser_swing_between_left_and_right(wish, other, expected):
-    assert FIVE.opposition(np.array(wish), np.array(other)) == pytest.approx(expected)
+def test_opposition_is_the_lesser_swing_between_left_and_right(probs, other, expected):
+    assert FIVE.opposition(np.array(probs), np.array(other)) == pytest.approx(expected)
 
 
-def test_what_undoes_what():
+def test_opposite_actions_undo_each_other():
     action = torch.tensor([1, 0, 3, 2, 4, 2, 0])
     before = torch.tensor([0, 1, 2, 3, 4, 2, 2])
     assert FIVE.undoes(action, before).tolist() == [True] * 4 + [False] * 3
@@ -82,7 +85,7 @@ def test_what_undoes_what():
     assert MOVES.can_be_undone(torch.arange(3)).tolist() == [False, True, True]
 
 
-def test_a_report_gets_plain_values():
+def test_as_dict_returns_plain_values():
     assert MOVES.as_dict() == {
         "names": ["forward", "left", "right"],
         "order": [1, 0, 2],
@@ -105,7 +108,7 @@ def test_a_report_gets_plain_values():
         ({"left": 0}, "left"),
     ],
 )
-def test_a_set_that_contradicts_itself_is_refused(change, message):
+def test_inconsistent_sets_raise(change, message):
     given = {name: getattr(MOVES, name) for name in MOVES.__dataclass_fields__}
     with pytest.raises(ValueError, match=message):
         DiscreteActions(**{**given, **change})

@@ -19,37 +19,40 @@ class Both(Parts):
     lefts = (0, 2)
 
 
-def test_what_leads_to_the_left_is_one_part_or_several():
+def test_opposition_sums_all_parts_that_lead_left():
     both = Both(**vars(FOUR))
     for kind in (torch.tensor, np.array):
-        wish = kind([[0.5, 0.0, 0.25, 0.25]])
-        assert (FOUR.leaning(wish).tolist(), both.leaning(wish).tolist()) == ([0.5], [0.75])
+        probs = kind([[0.5, 0.0, 0.25, 0.25]])
+        assert (FOUR.leaning(probs).tolist(), both.leaning(probs).tolist()) == (
+            [0.5],
+            [0.75],
+        )
     one, other = np.array([0.5, 0.0, 0.25, 0.25]), np.array([0.0, 0.25, 0.25, 0.5])
     assert FOUR.opposition(one, other) == 0.25  # 0.5 and 0.25
     assert both.opposition(one, other) == 0.5  # 0.5 and 0.5
 
 
-def test_parts_agree_that_are_the_same_or_lead_to_the_same_side():
+def test_agrees_is_true_for_equal_parts_or_sides():
     both, every = Both(**vars(FOUR)), torch.arange(4)
     assert FOUR.agrees(every, torch.tensor(0)).tolist() == [True, False, False, False]
     assert both.agrees(every, torch.tensor(0)).tolist() == [True, False, True, False]
     assert FOUR.agrees(every, every).all()
 
 
-def test_parts_that_are_not_one_anothers_mirror_images_are_refused():
+def test_mirrored_must_be_an_involution():
     with pytest.raises(ValueError, match="mirrored"):
         Parts(**{**vars(FOUR), "mirrored": (1, 2, 3, 0)})
 
 
-def test_names_and_numbers_of_a_set():
+def test_names_and_indices_of_a_set():
     assert (len(FOUR), FOUR.left, FOUR.right, FOUR.lefts) == (4, 0, 1, (0,))
-    wishes = torch.tensor([[0.1, 0.2, 0.6, 0.1], [0.4, 0.3, 0.2, 0.1], [0.0, 0.1, 0.2, 0.7]])
-    assert FOUR.chosen(wishes).tolist() == [2, 0, 3]
+    rows = torch.tensor([[0.1, 0.2, 0.6, 0.1], [0.4, 0.3, 0.2, 0.1], [0.0, 0.1, 0.2, 0.7]])
+    assert FOUR.chosen(rows).tolist() == [2, 0, 3]
     mirrored = torch.tensor([0.2, 0.1, 0.1, 0.6])
-    assert torch.equal(FOUR.mirror(wishes[0]), mirrored)
+    assert torch.equal(FOUR.mirror(rows[0]), mirrored)
 
 
-def test_wishes_differ_by_half_the_sum_of_what_each_part_gains_and_loses():
+def test_distance_is_half_the_sum_of_absolute_differences():
     one, other = [0.5, 0.25, 0.25, 0.0], [0.0, 0.25, 0.25, 0.5]
     for kind in (torch.tensor, np.array):
         assert float(FOUR.distance(kind(one), kind(other))) == 0.5
@@ -66,18 +69,18 @@ def test_wishes_differ_by_half_the_sum_of_what_each_part_gains_and_loses():
         ("opposite", (0, 1, 2, 2), "opposite"),
     ],
 )
-def test_a_set_that_contradicts_itself_is_refused(field, value, message):
+def test_inconsistent_sets_raise(field, value, message):
     with pytest.raises(ValueError, match=message):
         Parts(**{**vars(FOUR), field: value})
 
 
 @pytest.mark.parametrize("count", [3, 5])
-def test_neither_fewer_nor_more_arrows_and_colours_than_parts(count):
+def test_arrows_and_colors_must_match_the_parts(count):
     with pytest.raises(ValueError, match="give an arrow"):
         Parts(**{**vars(FOUR), "arrows": ((0, 0),) * count, "colors": ((0, 0, 0),) * count})
 
 
-def test_what_is_undone_and_what_turns():
+def test_undoing_and_turning_parts():
     every = torch.arange(4)
     assert FOUR.undoes(every, torch.tensor([1, 1, 3, 2])).tolist() == [True, False, True, True]
     assert FOUR.can_be_undone(every).all() and FOUR.turns(every).all()

@@ -20,7 +20,7 @@ def test_specs(env):
     check_env_specs(env)
 
 
-def test_seeding_repeats(env):
+def test_seed_determines_episodes(env):
     def places(seed):
         env.set_seed(seed)
         env.reset()
@@ -30,7 +30,7 @@ def test_seeding_repeats(env):
     assert not torch.equal(places(3), places(4))
 
 
-def test_time_limit_is_truncation_and_boundary_termination(env):
+def test_time_limit_truncates_and_boundary_terminates(env):
     state = env.rollout(40, policy=lambda td: td.set("action", torch.tensor(1)))
     assert state["next", "terminated"][-1].item()  # 27 steps to the left
     assert len(state) == 27
@@ -40,7 +40,7 @@ def test_time_limit_is_truncation_and_boundary_termination(env):
     assert len(state) == 32
 
 
-def test_speeds_are_numbers_within_bounds():
+def test_velocity_actions_are_bounded():
     dynamics = Kinematic(SETTINGS)
     env = ComposerEnv(make_environment(SHORT, pixels=False, random_state=0, dynamics=dynamics))
     check_env_specs(env)
@@ -51,6 +51,6 @@ def test_speeds_are_numbers_within_bounds():
     assert position[:2].tolist() == pytest.approx([2.0, 1.5])
 
 
-def test_wraps_composer_only():
+def test_other_environments_raise():
     with pytest.raises(TypeError, match="composer"):
         ComposerEnv(object())

@@ -40,7 +40,7 @@ def test_step_limit_truncates_with_discount_one():
     assert timestep.observation["end_reason"].item() == EndReason.STEP_LIMIT
 
 
-def test_drone_moved_by_hand_collects(env):
+def test_externally_moved_drone_collects_cubes(env):
     env.reset()
     task, physics = env.task, env.physics
     cube = task.state.cubes[0, 0].numpy()
@@ -51,7 +51,7 @@ def test_drone_moved_by_hand_collects(env):
     assert timestep.observation["collected"].tolist() == [True, False, False]
 
 
-def test_collected_cube_is_out_of_sight(env):
+def test_collected_cube_is_hidden(env):
     env.reset()
     place = env.task.state.cubes[0, 0].numpy()
     env.task.drone.set_pose(env.physics, place - (1.0, 0.0, 0.0), (1, 0, 0, 0))
@@ -69,7 +69,7 @@ def test_physics_does_not_move_the_drone(env):
     np.testing.assert_allclose(quaternion, (1, 0, 0, 0), atol=1e-12)
 
 
-def test_resets_differ_and_seeds_repeat():
+def test_seed_determines_the_sequence_of_episodes():
     def places(seed, episodes=3):
         env = make_environment(pixels=False, random_state=seed)
         return [env.reset() and env.task.state.cubes.numpy().copy() for _ in range(episodes)]
@@ -110,19 +110,19 @@ def test_cameras_on_a_gimbal_stay_level_and_those_on_the_body_tilt_with_it(mount
     flying = DynamicsSettings(mode="simple_flight", camera_mount=mount)
     task = ComposerTask(pixels=False, dynamics=flying)
     body = task.state.body
-    half = 0.3  # of a pitch, and no turn to either side
+    half = 0.3  # pitch only
     body.attitude[:] = torch.tensor([np.cos(half), 0.0, np.sin(half), 0.0])
     level = torch.tensor([[1.0, 0.0, 0.0, 0.0]], dtype=torch.float64)
     expected = level if mount == "gimbal" else body.attitude
     torch.testing.assert_close(task._shown(body), expected, check_dtype=False)
 
 
-def test_nothing_is_earned_before_the_first_step(env):
+def test_reward_before_the_first_step_is_zero(env):
     env.reset()
     assert env.task.get_reward(env.physics) == 0.0
 
 
-def test_a_drone_that_nobody_moved_is_where_the_rules_have_it(env):
+def test_unmoved_drone_keeps_the_exact_position(env):
     env.reset()
     env.step(Move.LEFT)
     body = env.task.state.body

@@ -16,7 +16,7 @@ DEVIATION = math.exp(-0.5)
 
 
 def outputs(forward=0.0, left=0.0, yaw=0.0):
-    """Outputs of these means, below 3, and of deviation exp(-0.5)."""
+    """Return outputs with these means, below 3, and deviation exp(-0.5)."""
     means = [3 * math.atanh(mean / 3) for mean in (forward, left, yaw)]
     return torch.tensor([*means, 0.0, 0.0, 0.0], dtype=torch.float64)
 
@@ -25,7 +25,7 @@ def phi(x):
     return 0.5 * math.erfc(-x / math.sqrt(2))
 
 
-def test_names_are_those_of_the_moves_and_of_turns():
+def test_part_names_are_moves_and_turns():
     assert STRAIGHT.names == MOVES.names and STRAIGHT.order == MOVES.order
     assert ALL.names == ("forward", "left", "right", "turn left", "turn right")
     assert ALL.names[ALL.order[0]] == "turn left"
@@ -34,7 +34,7 @@ def test_names_are_those_of_the_moves_and_of_turns():
     assert ContinuousActions.of(SETTINGS) == ALL != STRAIGHT
 
 
-def test_rates_are_in_units():
+def test_to_rates_converts_to_units():
     action = torch.tensor([[-1.0, 0, 0], [1, 1, 1], [0, -0.5, -1], [9, -9, 9]])
     turn = math.pi / 4
     expected = [[0, 0, 0], [4, 3, turn], [2, -1.5, -turn], [4, -3, turn]]
@@ -42,7 +42,7 @@ def test_rates_are_in_units():
     assert ALL.to_rates(action).dtype == torch.float64
 
 
-def test_outputs_of_zero_are_half_speed_ahead_and_an_open_mind():
+def test_zero_outputs_mean_half_speed_ahead():
     mean, deviation = normal_of(torch.zeros(2, 6, dtype=torch.float64))
     assert mean.tolist() == [[0.0] * 3] * 2
     torch.testing.assert_close(deviation, torch.full_like(deviation, DEVIATION))
@@ -51,12 +51,12 @@ def test_outputs_of_zero_are_half_speed_ahead_and_an_open_mind():
     assert (least[0].item(), least[1].item()) == pytest.approx((-3.0, math.exp(-3)))
 
 
-def test_a_wish_is_the_probability_of_each_part_by_hand():
+def test_part_probabilities_match_hand_computed_ones():
     left, right = phi((0.5 - EDGE) / DEVIATION), phi((-0.5 - EDGE) / DEVIATION)
-    wish = STRAIGHT.wish(outputs(left=0.5))
-    assert wish.tolist() == pytest.approx([1 - left - right, left, right])
+    probs = STRAIGHT.wish(outputs(left=0.5))
+    assert probs.tolist() == pytest.approx([1 - left - right, left, right])
     turn = phi(-EDGE / DEVIATION)  # to either side
-    wish = ALL.wish(outputs(left=0.5))
+    probs = ALL.wish(outputs(left=0.5))
     both = [
         (1 - left - right) * (1 - 2 * turn),
         left * (1 - turn),
@@ -64,10 +64,10 @@ def test_a_wish_is_the_probability_of_each_part_by_hand():
         turn * (1 - (left + right) / 2),
         turn * (1 - (left + right) / 2),
     ]
-    assert wish.tolist() == pytest.approx(both) and wish.sum().item() == pytest.approx(1)
+    assert probs.tolist() == pytest.approx(both) and probs.sum().item() == pytest.approx(1)
 
 
-def test_a_wish_is_what_drawn_actions_are():
+def test_part_probabilities_match_sampled_actions():
     given = outputs(1.0, 0.3, -0.4)
     mean, deviation = normal_of(given)
     draws = torch.randn(100_000, 3, generator=torch.Generator().manual_seed(0), dtype=mean.dtype)
@@ -84,22 +84,22 @@ def test_a_wish_is_what_drawn_actions_are():
         ],
         -1,
     )
-    assert (shares.mean(0) - ALL.wish(given)).abs().max() < 0.007  # 4 deviations of 0.5 / 316
+    assert (shares.mean(0) - ALL.wish(given)).abs().max() < 0.007  # 4 standard errors of 0.5 / 316
 
 
-def test_of_uniform_actions_a_third_goes_to_each_side():
+def test_uniform_actions_have_equal_parts():
     drawn = ALL.draw((30_000,), torch.Generator().manual_seed(0))
     assert drawn.shape == (30_000, 3) and drawn.abs().max() <= 1
     still = torch.stack([drawn[:, 0], drawn[:, 1], torch.zeros(30_000)], -1)
     assert (ALL.part(still).bincount() / 30_000 - 1 / 3).abs().max() < 0.012
 
 
-def test_what_part_an_action_is():
+def test_part_of_an_action():
     action = torch.tensor(
         [[1, 0, 0], [1, 0.5, 0], [-1, -0.5, 0], [1, 0.5, -0.6], [0, 0.2, 0.9], [1, 0.3, -0.3]]
     )
     assert ALL.part(action).tolist() == [0, 1, 2, 4, 3, 0]
-    assert STRAIGHT.part(action).tolist() == [0, 1, 2, 1, 0, 0]  # where turns are none
+    assert STRAIGHT.part(action).tolist() == [0, 1, 2, 1, 0, 0]  # without turns
     for number, name in enumerate(ALL.names):
         assert ALL.part(ALL.always(name)) == number
     expected = [[4, 0, 0], [0, 3, 0], [0, -3, 0], [0, 0, math.pi / 4], [0, 0, -math.pi / 4]]
@@ -107,14 +107,14 @@ def test_what_part_an_action_is():
     assert ALL.to_rates(always).tolist() == expected
 
 
-def test_the_mirror_image_of_a_wish_is_the_wish_of_mirrored_means():
+def test_mirrored_probabilities_equal_those_of_mirrored_means():
     there = ALL.wish(outputs(0.5, -0.7, 0.2))
     torch.testing.assert_close(ALL.mirror(ALL.wish(outputs(0.5, 0.7, -0.2))), there)
     assert ALL.leaning(there) == there[1] + there[3]
     assert STRAIGHT.leaning(STRAIGHT.wish(outputs())) == STRAIGHT.wish(outputs())[1]
 
 
-def test_going_left_and_turning_right_are_opposed():
+def test_left_and_turning_right_undo_each_other():
     one, other = np.array([0, 1.0, 0, 0, 0]), np.array([0, 0, 0, 0, 1.0])
     assert ALL.opposition(one, other) == 1.0 and ALL.opposition(other, one) == -1.0
     part, before = torch.tensor([1, 3, 3, 0]), torch.tensor([2, 4, 2, 0])
@@ -122,7 +122,7 @@ def test_going_left_and_turning_right_are_opposed():
     assert ALL.turns(torch.arange(5)).tolist() == [False, True, True, True, True]
 
 
-def test_shares_have_gradients_by_the_outputs_and_scores_everywhere():
+def test_probabilities_and_scores_have_gradients():
     free = torch.tensor([0.3, -0.2, 0.4, 0.1, -0.5, 0.7], dtype=torch.float64, requires_grad=True)
     assert torch.autograd.gradcheck(ALL.wish, free)
     given = torch.tensor([[1.0, 2.0, 3.0, 9.0, 9.0, 9.0], [0.0, -1.0, 4.0, 9.0, 9.0, 9.0]])
@@ -130,12 +130,12 @@ def test_shares_have_gradients_by_the_outputs_and_scores_everywhere():
     assert STRAIGHT.scores(given).tolist() == [[1.0, 2.0, -2.0], [0.0, -1.0, 1.0]]
 
 
-def test_who_draws_nothing_takes_the_means():
+def test_greedy_action_is_the_mean():
     expected = torch.tensor([1.0, -0.5, 0.25], dtype=torch.float64).tanh()
     torch.testing.assert_close(ALL.greedy(outputs(1.0, -0.5, 0.25)), expected)
 
 
-def test_what_is_kept_of_actions():
+def test_recorded_actions_have_rates_and_parts():
     kept = ALL.kept(torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]))
     assert set(kept) == set(ALL.fields())
     assert kept["actions"].tolist() == [0, 1]
@@ -143,18 +143,18 @@ def test_what_is_kept_of_actions():
     assert "3 turn left" in ALL.fields()["actions"]
 
 
-def test_going_aside_is_swaying_where_it_gets_nowhere():
+def test_lateral_motion_without_progress_is_swaying():
     action = torch.tensor([[-1.0, 0.5, 0], [-0.3, 0.5, 0], [-0.4, 0, -0.5], [-1, 0.2, 0.2]])
     assert ALL.sways(ALL.kept(action)).tolist() == [True, False, True, False]
 
 
-def test_a_report_can_name_and_draw_them():
-    told = ALL.as_dict()
-    assert told["names"] == list(ALL.names) and told["left"] == 1
-    assert all(math.hypot(*arrow) == pytest.approx(1) for arrow in told["arrows"])
-    for (across, up), other in zip(told["arrows"], told["mirrored"], strict=True):
-        assert told["arrows"][other] == [-across, up]
+def test_as_dict_has_names_arrows_and_colors():
+    description = ALL.as_dict()
+    assert description["names"] == list(ALL.names) and description["left"] == 1
+    assert all(math.hypot(*arrow) == pytest.approx(1) for arrow in description["arrows"])
+    for (across, up), other in zip(description["arrows"], description["mirrored"], strict=True):
+        assert description["arrows"][other] == [-across, up]
     assert (
-        told["colors"][:3] == MOVES.as_dict()["colors"]
-        and len(set(map(tuple, told["colors"]))) == 5
+        description["colors"][:3] == MOVES.as_dict()["colors"]
+        and len(set(map(tuple, description["colors"]))) == 5
     )

@@ -14,7 +14,7 @@ KINDS = [np.array, lambda rows: torch.tensor(rows, dtype=torch.float64)]
 
 
 def earth_centred(place):
-    """Metres from Earth's middle, by the definition of the ellipsoid."""
+    """Return the position in m from the center of the Earth, by the definition of the ellipsoid."""
     latitude, longitude = np.radians(place[..., 0]), np.radians(place[..., 1])
     squared = FLATTENING * (2 - FLATTENING)
     across = EQUATOR_RADIUS / np.sqrt(1 - squared * np.sin(latitude) ** 2)
@@ -24,7 +24,7 @@ def earth_centred(place):
 
 
 def tangent_plane(place):
-    """North, west, up on the plane that touches the ellipsoid at home."""
+    """Return north, west and up on the plane tangent to the ellipsoid at home."""
     latitude, longitude = np.radians(HOME.latitude), np.radians(HOME.longitude)
     sin_n, cos_n, sin_e, cos_e = (
         np.sin(latitude),
@@ -43,7 +43,7 @@ def tangent_plane(place):
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=["numpy", "torch"])
-def test_there_and_back_within_a_kilometre(kind):
+def test_round_trip_within_1_km(kind):
     random = np.random.default_rng(0)
     given = kind(random.uniform(-1000.0, 1000.0, (100, 3)).tolist())
     back = world_from_geo(geo_from_world(given))
@@ -51,21 +51,21 @@ def test_there_and_back_within_a_kilometre(kind):
     assert abs(back - given).max() < 1e-6
 
 
-def test_home_is_where_airsims_is():
+def test_default_home_is_that_of_airsim():
     there = geo_from_world(np.zeros(3))
     np.testing.assert_allclose(there, [47.641468, -122.140165, 122.0], atol=1e-12)
 
 
-def test_a_degree_of_latitude_there_is_111_18_km_and_of_longitude_75_14():
-    """Geographers' tables: 111.179 and 75.14 km at 47.64 degrees; 122 m of altitude add 2e-5."""
+def test_lengths_of_degrees_match_tables():
+    """Tables: 111.179 and 75.14 km at 47.64 degrees; 122 m of altitude add 2e-5."""
     north = world_from_geo(np.array([HOME.latitude + 0.001, HOME.longitude, 122.0]))
     np.testing.assert_allclose(north, [111.179, 0.0, 0.0], atol=0.01)
     east = world_from_geo(np.array([HOME.latitude, HOME.longitude + 0.001, 130.0]))
     np.testing.assert_allclose(east, [0.0, -75.14, 8.0], atol=0.01)
 
 
-def test_places_are_those_of_the_tangent_plane():
-    """Within 10 cm a kilometre away, but for the height that the curved Earth falls away."""
+def test_positions_match_the_tangent_plane():
+    """The error is below 10 cm at 1 km, except for the height due to curvature."""
     turns = np.linspace(0.0, 2 * np.pi, 17)
     ring = 1000.0 * np.stack([np.cos(turns), np.sin(turns), 0 * turns], -1)
     exact = tangent_plane(geo_from_world(ring))
@@ -75,15 +75,15 @@ def test_places_are_those_of_the_tangent_plane():
     assert np.abs(near - 0.1 * ring).max() < 0.002
 
 
-def test_longitudes_go_on_across_the_date_line():
+def test_longitudes_continue_across_the_date_line():
     home = HOME._replace(longitude=179.9999)
     there = geo_from_world(np.array([0.0, -1000.0, 0.0]), home)
     assert there[1] == pytest.approx(179.9999 - 360.0 + 1000.0 / 75140.0, abs=1e-4)
     np.testing.assert_allclose(world_from_geo(there, home), [0.0, -1000.0, 0.0], atol=1e-6)
 
 
-def test_the_ellipsoid_is_that_of_wgs84():
-    """Its polar radius and the square of its eccentricity, as published."""
+def test_ellipsoid_is_wgs84():
+    """Compare polar radius and squared eccentricity with published values."""
     assert pytest.approx(6356752.314245, abs=1e-5) == EQUATOR_RADIUS * (1 - FLATTENING)
     assert pytest.approx(6.69437999014e-3, abs=1e-13) == FLATTENING * (2 - FLATTENING)
     north = world_from_geo(np.array([HOME.latitude + 1e-3, HOME.longitude, 0.0]), HOME)

@@ -15,7 +15,7 @@ LOOKS = {
 
 
 @pytest.mark.parametrize("spec", entities.DRONE_CAMERAS, ids=lambda spec: spec.name)
-def test_each_camera_looks_where_its_name_says_and_stands_upright(spec):
+def test_cameras_have_the_direction_of_their_name(spec):
     root = mjcf.RootElement()
     camera = entities.add_camera(root.worldbody.add("body", name="body"), spec, vertical_fov=40.0)
     physics = mjcf.Physics.from_mjcf_model(root)
@@ -39,8 +39,8 @@ def test_cameras_are_found_by_airsims_names_and_numbers():
         entities.find_camera("nose")
 
 
-def test_where_cameras_sit():
-    """Metres forward, left and up of the drone's middle."""
+def test_positions_of_cameras():
+    """Offsets are in meters forward, left and up from the drone's center."""
     places = {spec.name: spec.pos for spec in (*entities.DRONE_CAMERAS, entities.CHASE)}
     assert places == {
         "front_center": (0.4, 0.0, 0.0),

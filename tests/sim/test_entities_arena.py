@@ -5,7 +5,7 @@ from drone_rl.sim.entities import DRAW_DISTANCE, FLOOR_COLOR, SKY_COLOR, Field
 from drone_rl.sim.rendering.scene import SemanticClass
 
 
-def test_the_field_is_a_floor_and_a_sun_without_shadows():
+def test_arena_has_a_floor_and_a_sun_without_shadows():
     field = Field()
     model = mjcf.Physics.from_mjcf_model(field.mjcf_model).model
     assert (model.ngeom, model.nlight) == (1, 1) and field.semantic_class is SemanticClass.GROUND
@@ -14,7 +14,7 @@ def test_the_field_is_a_floor_and_a_sun_without_shadows():
     np.testing.assert_allclose(model.light_ambient[0] + 0.75, 1.1)  # full light is white
 
 
-def test_the_floor_is_wide_and_the_sky_opaque():
+def test_floor_is_wide_and_sky_opaque():
     model = mjcf.Physics.from_mjcf_model(Field().mjcf_model).model
     assert model.geom("floor").size.tolist() == [300.0, 300.0, 100.0]
     assert model.vis.rgba.haze.tolist()[3] == 1.0

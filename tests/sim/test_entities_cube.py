@@ -5,7 +5,7 @@ from drone_rl.sim.entities import Cube
 from drone_rl.sim.rendering.scene import SemanticClass
 
 
-def test_a_cube_is_a_box_of_that_size_and_colour_and_pushes_nothing():
+def test_cube_is_a_box_without_collisions():
     cube = Cube(2.5, (0.1, 0.2, 0.3), name="cube_7")
     model = mjcf.Physics.from_mjcf_model(cube.mjcf_model).model
     assert model.geom_size[0].tolist() == [1.25] * 3  # half edges

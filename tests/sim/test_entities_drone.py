@@ -5,7 +5,7 @@ from drone_rl.sim.entities import BODY_GROUP, CHASE, DRONE_CAMERAS, Drone, hide_
 from drone_rl.sim.rendering.scene import SemanticClass
 
 
-def test_a_hull_four_rotors_and_six_cameras():
+def test_drone_has_hull_four_rotors_and_six_cameras():
     drone = Drone(size=0.8, camera=CameraSettings(width=40, height=40, horizontal_fov=90.0))
     model = mjcf.Physics.from_mjcf_model(drone.mjcf_model).model
     names = {model.geom(i).name for i in range(model.ngeom)}
@@ -26,13 +26,13 @@ def test_observables_are_off_until_a_task_enables_them():
     assert not any(o.enabled for o in drone.observables.as_dict().values())
 
 
-def test_its_own_cameras_leave_it_out():
+def test_own_cameras_hide_the_drone():
     groups = hide_drone().geomgroup
     assert not groups[BODY_GROUP] and groups[0]
 
 
-def test_its_shape_by_the_millimetre():
-    """Of a box of 1 m: half extents of the hull, radius and half height of the rotors."""
+def test_dimensions_scale_with_the_size():
+    """Sizes of a 1 m drone: half extents of the hull, radius and half height of rotors."""
     drone = Drone(size=1.0, camera=CameraSettings())
     model = mjcf.Physics.from_mjcf_model(drone.mjcf_model).model
     assert model.geom("hull").size.round(6).tolist() == [0.3, 0.18, 0.1]

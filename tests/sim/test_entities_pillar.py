@@ -2,7 +2,7 @@ from drone_rl.sim.entities import Pillar
 from drone_rl.sim.rendering.scene import SemanticClass
 
 
-def test_it_is_an_upright_box_that_pushes_nothing():
+def test_pillar_is_an_upright_box_without_collisions():
     pillar = Pillar(1.2, 6.0, (0.1, 0.2, 0.3), name="pillar_3")
     geom = pillar.geom
     assert pillar.mjcf_model.model == "pillar_3" and pillar.semantic_class is SemanticClass.OBSTACLE

@@ -26,12 +26,12 @@ def image(
 
 
 DEPTHS = torch.tensor([[[0.0, 2.0], [50.0, 250.0]]])
-"""One world; nothing is hit in the first pixel."""
+"""Depths of one environment; the first pixel has no hit."""
 
 
 @pytest.fixture(scope="module")
 def worlds():
-    """Cameras of 90 degrees across, 1 m above the ground; three red cubes before them."""
+    """Return environments with a field of view of 90 degrees, 1 m above ground, and red cubes."""
     fov = CameraSettings(width=15, height=9, horizontal_fov=90.0)
     made = Worlds(2, camera=fov)
     made.reset(torch.arange(2), [world_random_state(0, i) for i in range(2)])
@@ -46,7 +46,7 @@ def grays(found):
 
 
 @pytest.mark.parametrize("kind", [ImageType.DEPTH_PLANAR, ImageType.DEPTH_PERSPECTIVE])
-def test_depths_are_metres_far_away_where_nothing_is_hit(kind):
+def test_depth_is_in_meters_with_a_maximum_for_misses(kind):
     assert pixels(kind, DEPTHS, as_float=True).tolist() == [[[65504.0, 2.0], [50.0, 250.0]]]
     assert grays(pixels(kind, DEPTHS)) == [[[255, 2], [50, 250]]]
     beyond = torch.full((1, 1, 1), 1e6)
@@ -54,14 +54,14 @@ def test_depths_are_metres_far_away_where_nothing_is_hit(kind):
     assert pixels(kind, beyond + 0.0)[0, 0, 0].tolist() == [255, 255, 255]
 
 
-def test_depth_as_a_picture_is_white_from_100_metres_on():
+def test_depth_visualization_is_white_from_100_m():
     found = pixels(ImageType.DEPTH_VIS, DEPTHS, as_float=True)
     torch.testing.assert_close(found, torch.tensor([[[1.0, 0.02], [0.5, 1.0]]]))
     assert grays(pixels(ImageType.DEPTH_VIS, DEPTHS)) == [[[255, 5], [128, 255]]]
 
 
-def test_disparity_is_focal_length_times_baseline_over_depth_and_width():
-    """8 pixels * 0.25 m / 2 m = 1 pixel of 2; at 50 m 0.04 pixels; nearer than 1 m all of it."""
+def test_disparity_is_normalized_by_the_width():
+    """8 pixels * 0.25 m / 2 m = 1 pixel of 2; at 50 m 0.04 pixels; clipped below 1 m."""
     found = pixels(ImageType.DISPARITY_NORMALIZED, DEPTHS, as_float=True, focal=8.0)
     torch.testing.assert_close(found, torch.tensor([[[0.0, 0.5], [0.02, 0.004]]]))
     near = torch.tensor([[[0.5, 0.5]]])
@@ -70,7 +70,7 @@ def test_disparity_is_focal_length_times_baseline_over_depth_and_width():
     assert grays(pixels(ImageType.DISPARITY_NORMALIZED, DEPTHS, focal=8.0)) == [[[0, 128], [5, 1]]]
 
 
-def test_segments_have_airsims_colours():
+def test_segmentation_has_airsims_colors():
     geoms = torch.tensor([[[-1, 0], [1, 1]]], dtype=torch.int32)
     found = pixels(ImageType.SEGMENTATION, geoms, ids=torch.tensor([3, 255]))
     white = [255, 255, 255]
@@ -81,7 +81,7 @@ def test_segments_have_airsims_colours():
     assert own[0, 0, 1].tolist() == [0, 0, 0] and own[0, 1, 0].tolist() == [153, 108, 6]
 
 
-def test_normals_are_colours_around_grey():
+def test_normals_are_encoded_around_gray():
     directions = torch.tensor([[[[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [[-1.0, 0.0, 0.0]] * 2]])
     found = pixels(ImageType.SURFACE_NORMALS, directions)
     side = [0, 128, 128]
@@ -90,7 +90,7 @@ def test_normals_are_colours_around_grey():
     torch.testing.assert_close(reds, torch.tensor([[[0.0, 128 / 255], [0.0, 0.0]]]))
 
 
-def test_scenes_are_what_the_renderer_draws(worlds):
+def test_scene_images_equal_the_renderers(worlds):
     found = image(worlds)
     assert torch.equal(found, worlds.render(worlds.state))
     assert (tuple(found.shape), found.dtype) == ((2, 9, 15, 3), torch.uint8)
@@ -107,8 +107,8 @@ def test_all_types_have_the_same_shapes(worlds, kind):
     assert found.isfinite().all()
 
 
-def test_the_ground_seen_from_above(worlds):
-    """The camera under the drone is 0.9 m above it; rays 4 of 7.5 pixels aside are longer."""
+def test_ground_viewed_from_above(worlds):
+    """The bottom camera is 0.9 m above ground; rays at 4 of 7.5 pixels are longer."""
     requests = [ImageRequest("bottom_center", kind, as_float=True) for kind in range(1, 5)]
     planar, rays, visual, disparity = images(worlds, None, requests)
     middle = (0, 4, 7)
@@ -127,8 +127,8 @@ def test_the_ground_seen_from_above(worlds):
     assert segments[middle].tolist() == [206, 190, 59]
 
 
-def test_a_second_camera_sees_the_same_as_many_pixels_aside_as_disparity_says(worlds):
-    """The camera at the right is 0.25 m beside that in the middle; the cube's face is flat."""
+def test_disparity_is_the_offset_between_two_cameras(worlds):
+    """The right camera is 0.25 m from the center camera; the face of the cube is flat."""
     state = worlds.state[torch.tensor([0])]
     cube = worlds.task.places(state)[0, 0]
     state.body.position[0] = cube - torch.tensor([5.0, 0.0, 0.0])
@@ -143,7 +143,7 @@ def test_a_second_camera_sees_the_same_as_many_pixels_aside_as_disparity_says(wo
     assert (middle - other).item() == pytest.approx(150 * share[0, 45, 75].item(), abs=1.0)
 
 
-def test_what_there_is_not_is_refused(worlds):
+def test_invalid_requests_raise(worlds):
     with pytest.raises(InputError, match=r"image_type=8 is unknown; give one of: 0 \(scene\), 1"):
         ImageRequest("0", 8)
     with pytest.raises(InputError, match=r"camera '5' is unknown; choose from: front_center \(0\)"):
@@ -154,7 +154,7 @@ def test_what_there_is_not_is_refused(worlds):
         images(worlds, None, [])
 
 
-def test_what_is_asked_for_by_default():
+def test_default_request():
     request = ImageRequest()
     assert (request.camera, request.image_type) == ("front_center", ImageType.SCENE)
     assert request.as_float is False

@@ -1,4 +1,4 @@
-"""MuJoCo flies the drone of the batch: to the same place in the air, and to the same end below."""
+"""MuJoCo simulates the same drone as the batch."""
 
 import math
 
@@ -29,7 +29,7 @@ FAR = doubles((50.0, 50.0, 3.0))
 
 
 class Both:
-    """One drone in the batch and in MuJoCo, among the same pillars."""
+    """One drone in the batch and in MuJoCo, with the same pillars."""
 
     def __init__(self, place, **changes):
         self.drone = quadrotor(**changes)
@@ -48,7 +48,7 @@ class Both:
         self.move([(50.0, 50.0 + i, 3.0) for i in range(self.count)])
 
     def move(self, places):
-        """Puts the pillars elsewhere."""
+        """Move the pillars."""
         for frame, place in zip(self.env.task._frames, places, strict=True):
             self.physics.bind(frame).mocap_pos = place
         self.obstacles = Obstacles(doubles(*places)[None], self.half)
@@ -66,7 +66,7 @@ class Both:
         return self
 
     def apart(self):
-        """Metres and degrees."""
+        """Return the differences in meters and degrees."""
         turn = degrees_between(matrix(self.here.attitude[0]), matrix(self.there.attitude[0]))
         return float((self.here.position - self.there.position).norm()), turn
 
@@ -83,8 +83,8 @@ FLIGHTS = {
 
 @pytest.mark.parametrize("name", FLIGHTS)
 @pytest.mark.parametrize("air", [{}, {"wind": (4.0, -3.0, 0.5), "gusts": 1.0}])
-def test_in_the_air_they_stay_together(name, air):
-    """Four seconds, within a millimetre and a hundredth of a degree, and a bit of rounding."""
+def test_trajectories_in_the_air_agree(name, air):
+    """After 4 s they agree within 1 mm and 0.01 degrees."""
     both = Both((0.0, 0.0, 20.0), **air)
     for modes, goal in FLIGHTS[name]:
         both.fly(make_goals(modes, *goal), 660)
@@ -96,8 +96,8 @@ def test_in_the_air_they_stay_together(name, air):
     assert both.there.ticks.tolist() == [1320] and both.there.contact.thing.tolist() == [NOTHING]
 
 
-def test_both_land_and_rest_level():
-    """Down at half a metre a second, then rotors stop."""
+def test_both_simulators_land_and_rest_level():
+    """They descend at 0.5 m/s, then rotors stop."""
     both = Both((0.0, 0.0, 1.5))
     both.fly(make_goals(VELOCITIES, 0.3, 0.0, 0.0, -0.5), 990).fly(
         make_goals(DROP, 0, 0, 0, 0), 990
@@ -110,8 +110,8 @@ def test_both_land_and_rest_level():
     assert both.apart()[0] < 0.2
 
 
-def test_both_bounce_off_a_pillar_and_end_before_it():
-    """It is wanted on the other side of a pillar that stands in the way."""
+def test_both_simulators_bounce_off_a_pillar():
+    """The goal is on the other side of a pillar."""
     both = Both((0.0, 0.0, 2.0))
     both.move([(4.0, 0.0, both.half[2])] + [(50.0, 50.0 + i, 3.0) for i in range(both.count - 1)])
     both.fly(make_goals(POSITIONS, 8.0, 0.0, 0.0, 2.0), 700)
@@ -127,8 +127,8 @@ def test_both_bounce_off_a_pillar_and_end_before_it():
     np.testing.assert_allclose(both.there.position, both.here.position, atol=0.1)
 
 
-def test_a_bounce_gives_back_about_its_share():
-    """Dropped from a metre, 0.55 of the speed is 0.3 of the height."""
+def test_bounce_height_follows_from_restitution():
+    """After a drop of 1 m, 0.55 of the speed is 0.3 of the height."""
     both = Both((0.0, 0.0, 1.3), air_density=0.0)
     heights = {"here": [], "there": []}
     for _ in range(40):
@@ -140,7 +140,7 @@ def test_a_bounce_gives_back_about_its_share():
 
 
 @pytest.mark.parametrize("task", [None, PillarsSettings()])
-def test_an_environment_flies_like_the_batch(task):
+def test_environment_flies_like_the_batch(task):
     drone = quadrotor(gusts=0.5)
     env = make_environment(task, dynamics=drone, pixels=False, random_state=3)
     env.reset()
@@ -157,7 +157,7 @@ def test_an_environment_flies_like_the_batch(task):
     assert not env.task.state.body.velocity.any()
 
 
-def test_an_environment_takes_velocities_too():
+def test_environment_supports_velocities():
     drone = Quadrotor(settings(), ActionSettings(kind="velocity"))
     env = make_environment(dynamics=drone, pixels=False, random_state=3)
     env.reset()
@@ -168,7 +168,7 @@ def test_an_environment_takes_velocities_too():
     torch.testing.assert_close(env.task.state.body.numbers, state.numbers, atol=1e-3, rtol=0)
 
 
-def test_a_drone_moved_by_hand_is_told_to_stay_there():
+def test_externally_moved_drone_keeps_its_position():
     env = make_environment(dynamics=quadrotor(), pixels=False, random_state=3)
     env.reset()
     env.task.drone.set_pose(env.physics, (1.0, 2.0, 3.0), (1, 0, 0, 0))
@@ -177,7 +177,7 @@ def test_a_drone_moved_by_hand_is_told_to_stay_there():
 
 
 @pytest.mark.parametrize(("mount", "is_level"), [("gimbal", True), ("body", False)])
-def test_cameras_on_a_gimbal_stay_level(mount, is_level):
+def test_gimballed_cameras_stay_level(mount, is_level):
     both = Both((0.0, 0.0, 20.0), camera_mount=mount)
     modes = (Mode.ANGLE, Mode.ANGLE, Mode.ANGLE, Mode.POSITION)
     both.fly(make_goals(modes, 0.3, 0.2, 0.8, 20.0), 660)
@@ -190,7 +190,7 @@ def test_cameras_on_a_gimbal_stay_level(mount, is_level):
     np.testing.assert_allclose(ahead[:2] / np.linalg.norm(ahead[:2]), heading, atol=0.05)
 
 
-def test_drones_of_other_modes_know_no_physics():
+def test_other_modes_disable_physics():
     task = ComposerTask(pixels=False)
     assert task._flight is None and task.control_timestep == 0.1
     assert not np.any(task.root_entity.mjcf_model.option.gravity)

@@ -1,4 +1,4 @@
-"""Looks of many worlds: fixed ones, and those drawn at every reset."""
+"""Fixed appearances, and appearances sampled at every reset."""
 
 import math
 
@@ -35,16 +35,16 @@ def reset(settings, count):
     return looks
 
 
-def test_the_minimal_look_is_none_at_all():
+def test_minimal_appearance_is_none():
     looks = reset(MINIMAL, 3)
     assert looks.drawn() is None and looks.middle is None and not looks.varies
 
 
-def test_a_fixed_look_is_one_for_all_worlds():
+def test_fixed_appearance_is_shared_by_all_environments():
     looks = reset(AppearanceSettings(sun_elevation=30.0, sun_azimuth=90.0, sun_strength=0.5), 3)
     look = looks.middle
     assert looks.drawn() is None and not looks.varies
-    # from the left, 30 degrees up: light goes to the right and down
+    # sun on the left at 30 degrees: light points right and down
     wanted = [0.0, -math.sqrt(0.75), -0.5]
     assert look.sun_direction.tolist() == pytest.approx(wanted, abs=1e-9)
     assert look.sun.tolist() == [0.5] * 3 and look.ambient.tolist() == [0.35] * 3
@@ -52,7 +52,7 @@ def test_a_fixed_look_is_one_for_all_worlds():
     assert set(look.colors) == {SemanticClass.SKY, SemanticClass.GROUND}
 
 
-def test_what_is_drawn_lies_in_its_range_and_fills_it():
+def test_samples_fill_their_ranges():
     look = reset(DRAWN, 400).drawn()
     assert 50 <= look.fog.min() < 55 and 95 < look.fog.max() <= 100
     assert 160 < look.shadows.sum() < 240
@@ -63,13 +63,13 @@ def test_what_is_drawn_lies_in_its_range_and_fills_it():
     assert all(100 < (ground.choice == which).sum() < 170 for which in (-1, 0, 1))
 
 
-def test_imagined_worlds_look_as_in_the_middle():
+def test_middle_appearance_is_the_center_of_ranges():
     middle = Appearances(DRAWN, 2).middle
     assert middle.fog == 75.0 and middle.zenith.tolist() == [0.5, 0.5, 1.0]
     assert middle.textures[SemanticClass.GROUND].choice == -1  # the first
 
 
-def test_each_world_draws_by_itself_and_leaves_its_stream_alone():
+def test_sampling_does_not_advance_the_environments_stream():
     alone, together = reset(DRAWN, 1), reset(DRAWN, 5)
     assert torch.equal(alone.values[0], together.values[0])
     assert len({tuple(row) for row in together.values.tolist()}) == 5
@@ -78,7 +78,7 @@ def test_each_world_draws_by_itself_and_leaves_its_stream_alone():
     assert state.uniform() == streams(1)[0].uniform()
 
 
-def test_only_worlds_that_begin_draw_anew():
+def test_only_reset_environments_are_resampled():
     looks = reset(DRAWN, 3)
     before, part = looks.values, looks.drawn(torch.tensor([2]))
     looks.reset(torch.tensor([1]), [np.random.RandomState(9)])
@@ -94,14 +94,14 @@ MOUNTED = DRAWN.replace(
 )
 
 
-def test_what_was_added_later_changes_nothing_that_was_drawn():
+def test_later_settings_do_not_change_earlier_samples():
     before, after = reset(DRAWN, 5), reset(MOUNTED, 5)
-    own = before.values.shape[1] - 7  # those of the camera come last, then those of distractors
+    own = before.values.shape[1] - 7  # values of the camera are last, then those of distractors
     assert torch.equal(before.values[:, :own], after.values[:, :own])
     assert after.values.shape[1] == own + 7 + 3 * 7
 
 
-def test_camera_and_distractors_of_each_world():
+def test_camera_and_distractors_of_each_environment():
     looks = reset(MOUNTED, 50)
     look = looks.drawn()
     forward, left, up = look.camera.offset.T
@@ -117,19 +117,19 @@ def test_camera_and_distractors_of_each_world():
     assert looks.middle.distractors.expand(2).sizes.shape == (2, 3)
 
 
-def test_a_wider_camera_shows_things_smaller():
+def test_wider_field_of_view_decreases_zoom():
     look = reset(AppearanceSettings(camera_widening=(15.0, 15.0)), 2).middle
     wanted = math.tan(math.radians(67.5)) / math.tan(math.radians(75.0))
     assert float(look.camera.zoom) == pytest.approx(wanted)
 
 
-def test_what_has_no_room_is_refused_at_once():
+def test_impossible_settings_raise_at_construction():
     with pytest.raises(InputError, match="puts the camera into the ground"):
         Appearances(AppearanceSettings(camera_offset=(0, 0, -5)), 1)
 
 
 @pytest.mark.parametrize("size", [None, (4097, 2)])
-def test_textures_are_read_at_once(tmp_path, size):
+def test_textures_are_read_at_construction(tmp_path, size):
     path = tmp_path / "ground.png"
     if size:
         Image.new("RGB", size).save(path)
@@ -138,8 +138,8 @@ def test_textures_are_read_at_once(tmp_path, size):
 
 
 @pytest.mark.parametrize("task", [TaskSettings(), PillarsSettings()])
-def test_the_defaults_are_the_look_of_the_tasks(task):
-    """Told by a look that differs from them by nothing that can be seen."""
+def test_defaults_equal_the_appearance_of_the_tasks(task):
+    """Compare with an appearance whose differences are invisible."""
     worlds = Worlds(2, task)
     worlds.reset(torch.arange(2), streams(2))
     plain = worlds.render(worlds.state)

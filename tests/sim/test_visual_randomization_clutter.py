@@ -1,4 +1,4 @@
-"""Distractors: how many, where, how large, of which colour."""
+"""Number, position, size and color of distractors."""
 
 import numpy as np
 import pytest
@@ -30,19 +30,19 @@ def drawn(settings, seed):
     return torch.tensor(draw_distractors(settings, CUBES.things, source)).reshape(-1, WIDTH)
 
 
-def test_places_beside_the_way():
+def test_positions_are_beside_the_path():
     ahead, aside = torch.tensor([1.0, 2.0]), torch.tensor([3.0, 4.0])
     places = stand(CUBES.things, ahead, aside, torch.tensor([True, False]), 2.5)
-    assert places.tolist() == [[1.0, 9.0, 2.5], [2.0, -10.0, 2.5]]  # cubes reach to 6 m
+    assert places.tolist() == [[1.0, 9.0, 2.5], [2.0, -10.0, 2.5]]  # cubes are within 6 m
 
 
-def test_what_is_drawn_lies_in_its_range_and_fills_it():
+def test_samples_fill_their_ranges():
     rows = torch.stack([drawn(SOME, seed) for seed in range(200)])
     assert rows.shape == (200, 5, WIDTH)
     stands = rows[..., 2] > 0
     assert {*stands.sum(1).tolist()} == {2, 3, 4, 5} and stands[:, :2].all()
     x, y, z, size = rows[..., :4].unbind(-1)
-    assert x.min() >= 0 and 33 < x.max() <= 48  # the last cube at 33 m, the first at 15 m
+    assert x.min() >= 0 and 33 < x.max() <= 48  # the last cube is at 33 m, the first at 15 m
     beside = y.abs() - 6.0 - size / 2
     assert 3 <= beside.min() < 3.1 and 5.9 < beside.max() <= 6
     assert (z == size / 2)[stands].all() and torch.allclose(
@@ -50,10 +50,10 @@ def test_what_is_drawn_lies_in_its_range_and_fills_it():
     )
     assert 1 <= size.min() < 1.05 and 1.95 < size.max() <= 2
     assert (rows[..., 5] == 0.5).all() and 0.3 < rows[..., 4].max() <= 0.4
-    assert (y[:, 0] > 0).all() and (y[:, 1] < 0).all()  # by turns
+    assert (y[:, 0] > 0).all() and (y[:, 1] < 0).all()  # alternating sides
 
 
-def test_fewer_numbers_are_drawn_of_what_is_fixed():
+def test_fixed_settings_need_fewer_samples():
     fixed = AppearanceSettings(distractors=3, distractor_size=2.0, distractor_distance=4.0)
     rows = drawn(fixed, 0)
     assert (rows[:, 3] == 2.0).all() and (rows[:, 1].abs() == 11.0).all()
@@ -61,21 +61,21 @@ def test_fewer_numbers_are_drawn_of_what_is_fixed():
     assert not torch.equal(drawn(fixed, 1)[:, 0], rows[:, 0])
 
 
-def test_middles_and_none():
+def test_middle_values_and_no_distractors():
     middle = drawn(SOME, None)
     assert (middle[:, 3] == 1.5).all() and (middle[:, 4] - 0.2).abs().max() < 1e-6
     assert draw_distractors(MINIMAL, CUBES.things, None) == []
     assert draw_distractors(SOME, None, None) == []
 
 
-def test_who_knows_where_things_stand():
+def test_only_tasks_with_objects_have_distractors():
     assert things_of(CUBES) == things_of(as_task(CUBES)) == CUBES.things
     assert things_of(object()) is None
     assert (most_distractors(SOME), most_distractors(MINIMAL)) == (5, 0)
 
 
-def test_middles_go_on_by_the_golden_section_and_by_halves():
-    """From half of 48 m on: left and right by half of the way, each pair by 0.618 of it."""
+def test_middle_positions_follow_the_golden_section():
+    """Positions start at half of 48 m, alternate sides, and advance by 0.618 per pair."""
     turn = 0.6180339887498949
     shares = [(0.5 + pair * turn + side * 0.5) % 1.0 for pair in range(3) for side in (0, 1)][:5]
     rows = drawn(SOME, None)
@@ -83,7 +83,7 @@ def test_middles_go_on_by_the_golden_section_and_by_halves():
     assert rows[:, 1].tolist() == [sign * (6 + 4.5 + 0.75) for sign in (1, -1, 1, -1, 1)]
 
 
-def test_what_is_fixed_takes_no_number_of_the_stream():
+def test_fixed_settings_draw_no_random_numbers():
     fixed = AppearanceSettings(distractors=3, distractor_size=2.0, distractor_distance=4.0)
     source, other = np.random.RandomState(0), np.random.RandomState(0)
     begin, shift = other.uniform(0.0, 1.0), other.uniform(-0.5, 0.5, 3)

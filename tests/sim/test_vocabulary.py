@@ -6,7 +6,7 @@ from drone_rl.sim.vocabulary import CUBES, MOST, terms_of
 from drone_rl.utils.errors import InputError
 
 
-def test_words_go_through_files_and_older_files_are_about_cubes():
+def test_vocabulary_round_trip_and_default():
     assert terms_of({}) == CUBES
     other = dataclasses.replace(CUBES, goal="post", sides={"near": "close by"})
     assert terms_of({"terms": other.as_dict()}) == other
@@ -34,7 +34,7 @@ def test_phrases():
         ("wind", "strong", "where wind is strong"),
     ],
 )
-def test_failures_have_a_place(by, value, said):
+def test_descriptions_of_failures(by, value, said):
     assert CUBES.failing(by, value) == said
 
 
@@ -43,6 +43,6 @@ def test_failures_have_a_place(by, value, said):
     [{"goal": 3}, {"goal": "c" * 201}, {"sides": ["left"]}, {"follows": 1}, {"extra": ""},
      {"ends": {str(i): "" for i in range(MOST + 1)}}, {"goal": "a\nb"}],
 )  # fmt: skip
-def test_words_out_of_a_file_are_texts_in_bounds(change):
+def test_invalid_vocabulary_raises(change):
     with pytest.raises(InputError, match="terms"):
         terms_of({"terms": {**CUBES.as_dict(), **change}})

@@ -7,13 +7,13 @@ from drone_rl.utils.errors import InputError
 from tests.continuous import SETTINGS
 
 
-def test_the_moves_are_those_of_the_simulator_also_in_files_that_say_nothing():
-    told = shown_actions({"actions": actions.MOVES.as_dict()})
-    assert told == SHOWN_MOVES == shown_actions({"name": "an older one"})
+def test_moves_are_the_default_display():
+    display = shown_actions({"actions": actions.MOVES.as_dict()})
+    assert display == SHOWN_MOVES == shown_actions({"name": "an older one"})
     assert [SHOWN_MOVES.css(i) for i in range(3)] == ["#d62728", "#2ca02c", "#1f60c8"]
 
 
-def test_speeds_are_told_in_metres_and_degrees_a_second():
+def test_speeds_are_in_meters_and_degrees_per_second():
     velocities = ContinuousActions.of(SETTINGS.replace(forward_speed=5.0, yaw_rate=90.0))
     assert shown_actions({"actions": velocities.as_dict()}).speeds == pytest.approx((5, 3, 90))
 
@@ -35,6 +35,6 @@ def test_speeds_are_told_in_metres_and_degrees_a_second():
         ({"more": 1}, "unknown"),
     ],
 )
-def test_what_a_page_could_not_show_is_refused(change, message):
+def test_invalid_displays_raise(change, message):
     with pytest.raises(InputError, match=message):
         shown_actions({"actions": {**actions.MOVES.as_dict(), **change}})

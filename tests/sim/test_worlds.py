@@ -1,4 +1,4 @@
-"""One world in dm_control and many in the batch live by the same rules."""
+"""A batch of environments equals single environments in dm_control."""
 
 import numpy as np
 import torch
@@ -13,7 +13,7 @@ from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import world_random_state
 
 
-def test_same_seed_and_actions_give_the_same_poses_rewards_and_ends():
+def test_batch_equals_dm_control_for_the_same_seed():
     settings = TaskSettings(num_cubes=2, first_distance=5.0, spacing=4.0, step_limit=40)
     actions = np.random.RandomState(0)
     ends = set()
@@ -21,7 +21,7 @@ def test_same_seed_and_actions_give_the_same_poses_rewards_and_ends():
         env = make_environment(settings, pixels=False, random_state=world_random_state(seed, 0))
         random_state = world_random_state(seed, 0)
         worlds = Worlds(1, settings)
-        for _ in range(3):  # episodes of the same world follow one another alike
+        for _ in range(3):  # successive episodes of one environment
             timestep = env.reset()
             worlds.reset(torch.arange(1), [random_state])
             while not timestep.last():
@@ -41,7 +41,7 @@ def test_same_seed_and_actions_give_the_same_poses_rewards_and_ends():
     assert len(ends) >= 2
 
 
-def test_the_scene_is_the_dm_control_model_and_knows_what_its_geoms_mean():
+def test_scene_is_the_dm_control_model_with_semantic_classes():
     env = make_environment(pixels=False, random_state=world_random_state(0, 0))
     env.reset()
     worlds = Worlds(1)
@@ -58,7 +58,7 @@ def test_the_scene_is_the_dm_control_model_and_knows_what_its_geoms_mean():
     assert set(found.values()) == {(SemanticClass.DRONE, -1)} and len(found) == 4  # the rotors
 
 
-def test_only_all_worlds_in_their_order_are_stepped_as_a_whole():
+def test_indexed_and_whole_batches_step_alike():
     worlds, turned = Worlds(2), Worlds(2)
     for each in (worlds, turned):
         each.reset(torch.arange(2), [world_random_state(0, i) for i in range(2)])
@@ -69,7 +69,7 @@ def test_only_all_worlds_in_their_order_are_stepped_as_a_whole():
     assert torch.equal(worlds.state.cubes, turned.state.cubes)
 
 
-def test_a_look_is_put_together_once_and_anew_when_either_half_is_another():
+def test_combined_appearance_is_cached():
     worlds = Worlds(1, TaskSettings(), appearance=Appearance(fog=50.0))
     dark = Appearance(exposure=0.5)
     look = worlds._look(dark)

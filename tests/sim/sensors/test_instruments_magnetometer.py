@@ -26,17 +26,17 @@ def read(settings, body):
     return magnetometer.read(magnetometer.start(body, time, generator()), time)
 
 
-def test_a_constant_field_turns_against_the_body():
-    """North 0.34252, east 0.09805, down 0.93438: to the west, east is behind and north right."""
+def test_constant_field_is_rotated_to_the_body_frame():
+    """The field is 0.34252 north, 0.09805 east, 0.93438 down; facing west, east is behind."""
     assert read(CONSTANT, still()).field[0].tolist() == pytest.approx([0.34252, -0.09805, -0.93438])
     west = read(CONSTANT, still(attitude=turned("yaw", 90.0)[None]))
     assert west.field[0].tolist() == pytest.approx([-0.09805, -0.34252, -0.93438])
-    # Banked to the right by a quarter turn: what is down is on the right.
+    # Banked right by 90 degrees: down is to the right.
     right = read(CONSTANT, still(attitude=turned("roll", 90.0)[None]))
     assert right.field[0].tolist() == pytest.approx([0.34252, -0.93438, 0.09805])
 
 
-def test_the_dipole_at_its_poles_and_its_equator():
+def test_dipole_field_at_poles_and_equator():
     places = torch.tensor([[80.31, -72.62, 0.0], [-80.31, 107.38, 0.0], [0.0, -162.62, 0.0]])
     found = dipole_field(places.double())
     strong = 2 * 0.312
@@ -49,8 +49,8 @@ def test_the_dipole_at_its_poles_and_its_equator():
     assert high[0, 2].item() == pytest.approx(-strong / 8)
 
 
-def test_the_dipole_is_near_the_worlds_magnetic_model():
-    """WMM2015 at 47.637, -122.147, 622 m: 0.1835 north, 0.0520 east, 0.5016 down, gauss."""
+def test_dipole_field_is_near_the_world_magnetic_model():
+    """WMM2015 at 47.637, -122.147, 622 m in gauss: 0.1835 north, 0.0520 east, 0.5016 down."""
     found = dipole_field(torch.tensor([47.637, -122.147, 622.0], dtype=torch.float64))
     assert found.tolist() == pytest.approx([0.1835, -0.0520, -0.5016], abs=0.02)
     here = read(MagnetometerSettings(noise=0.0), still())
@@ -69,7 +69,7 @@ def test_noise_scale_and_bias():
     assert white.std().item() == pytest.approx(0.005, rel=0.02)
 
 
-def test_the_bias_of_a_sensor_stays_and_readings_are_held():
+def test_bias_is_constant_and_readings_are_held():
     settings = MagnetometerSettings(field="constant", bias=0.3, white_noise=0.0)
     magnetometer, stream = Magnetometer(settings), generator()
     state = magnetometer.start(still(), seconds(0.0), stream)
@@ -78,7 +78,7 @@ def test_the_bias_of_a_sensor_stays_and_readings_are_held():
     state = magnetometer.update(state, turned_about, seconds(0.018), stream)
     assert torch.equal(magnetometer.read(state, seconds(0.018)).field, first.field)
     state = magnetometer.update(state, turned_about, seconds(0.021), stream)
-    told = magnetometer.read(state, seconds(0.021))
-    assert told.time.item() == 0.021
+    reading = magnetometer.read(state, seconds(0.021))
+    assert reading.time.item() == 0.021
     changed = torch.tensor([[-0.09805 - 0.34252, -0.34252 + 0.09805, 0.0]], dtype=torch.float64)
-    torch.testing.assert_close(told.field - first.field, changed)
+    torch.testing.assert_close(reading.field - first.field, changed)

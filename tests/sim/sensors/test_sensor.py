@@ -9,7 +9,7 @@ TICK = 0.003
 
 
 def clock(ticks, start=0.0):
-    """Times that are summed up tick by tick, as physics does."""
+    """Yield times summed tick by tick, as the physics does."""
     time = torch.tensor([start], dtype=torch.float64)
     for _ in range(ticks + 1):
         yield time.clone()
@@ -17,7 +17,7 @@ def clock(ticks, start=0.0):
 
 
 def follow(sampling, ticks):
-    """At each tick: when, what was taken until then, and what is told, a reading being its time."""
+    """Yield time, number and time of samples, and reading at each tick; a reading is its time."""
     samples = sampling.start(torch.zeros(1, dtype=torch.float64), 1)
     for time in clock(ticks):
         samples = sampling.take(samples, time, time[:, None])
@@ -25,8 +25,8 @@ def follow(sampling, ticks):
         yield time.item(), int(samples.count), taken.item(), row.item()
 
 
-def test_readings_come_at_their_rate_whatever_the_ticks():
-    """50 a second, 3 s: the first, and 150 more; each at the first tick from its mark on."""
+def test_reading_rate_does_not_depend_on_ticks():
+    """50 Hz for 3 s gives 151 readings, each at the first tick after its due time."""
     seen = list(follow(Sampling(rate=50.0), 1000))
     assert seen[-1][1] == 151
     times = sorted({taken for _, _, taken, _ in seen})
@@ -34,19 +34,19 @@ def test_readings_come_at_their_rate_whatever_the_ticks():
     assert times == pytest.approx(marks, abs=1e-9)
 
 
-def test_between_readings_the_last_one_is_held():
+def test_last_reading_is_held():
     held = [round(taken / TICK) for _, _, taken, _ in follow(Sampling(rate=50.0), 14)]
     assert held == [0] * 7 + [7] * 7 + [14]
 
 
-def test_a_rate_above_the_ticks_gives_a_reading_a_tick():
+def test_rate_above_the_ticks_gives_one_reading_per_tick():
     for time, count, taken, row in follow(Sampling(rate=1000.0), 100):
         assert taken == row == time
         assert count == round(time * 1000) + 1
 
 
-def test_late_readings_are_told_when_they_are_old_enough():
-    """Taken at each tick of 3 ms, told 200 ms later: at the 67th tick, which is 201 ms."""
+def test_delayed_readings_appear_after_their_latency():
+    """A reading of each 3 ms tick is returned 200 ms later, at the 67th tick (201 ms)."""
     for time, _, taken, row in follow(Sampling(rate=1000.0, latency=0.2), 300):
         tick = round(time / TICK)
         if tick < 67:
@@ -55,17 +55,17 @@ def test_late_readings_are_told_when_they_are_old_enough():
             assert taken == row == pytest.approx((tick - 67) * TICK, abs=1e-9)
 
 
-def test_the_first_reading_is_taken_after_the_startup():
-    told = [
+def test_first_reading_follows_the_startup():
+    readings = [
         (round(time, 3), round(taken, 3))
         for time, _, taken, _ in follow(Sampling(rate=10.0, startup=0.3, latency=0.03), 200)
         if taken > -math.inf
     ]
-    assert told[0] == (0.33, 0.3)
-    assert sorted({taken for _, taken in told}) == [0.3, 0.402, 0.501]
+    assert readings[0] == (0.33, 0.3)
+    assert sorted({taken for _, taken in readings}) == [0.3, 0.402, 0.501]
 
 
-def test_a_time_on_the_mark_is_not_missed_for_its_rounding():
+def test_due_reading_is_not_missed_because_of_rounding():
     sampling = Sampling(rate=10.0, latency=0.1)
     samples = sampling.start(torch.zeros(1, dtype=torch.float64), 1)
     time = torch.zeros(1, dtype=torch.float64)
@@ -78,7 +78,7 @@ def test_a_time_on_the_mark_is_not_missed_for_its_rounding():
         time = time + 0.1
 
 
-def test_drones_have_clocks_of_their_own():
+def test_each_drone_has_its_own_clock():
     sampling = Sampling(rate=10.0)
     begin = torch.tensor([0.0, 5.0], dtype=torch.float64)
     samples = sampling.start(begin, 1)

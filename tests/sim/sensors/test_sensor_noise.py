@@ -17,8 +17,8 @@ def test_white_noise_has_mean_0_and_deviation_1():
 
 
 @pytest.mark.parametrize("steps", [1, 40])
-def test_a_walk_goes_as_far_in_many_steps_as_in_one(steps):
-    """2 in 5 s: in 20 s, twice as far."""
+def test_random_walk_does_not_depend_on_the_step_size(steps):
+    """The deviation is 2 after 5 s, and twice that after 20 s."""
     value, stream = torch.zeros(20_000, 1, dtype=torch.float64), generator()
     seconds = torch.full((20_000,), 20.0 / steps, dtype=torch.float64)
     for _ in range(steps):
@@ -27,8 +27,8 @@ def test_a_walk_goes_as_far_in_many_steps_as_in_one(steps):
 
 
 @pytest.mark.parametrize("steps", [1, 40])
-def test_what_forgets_itself_stays_within_bounds_however_small_the_steps(steps):
-    """From 3, after one time constant 37% are left, and 1 - e^-2 of the variance is there."""
+def test_gauss_markov_process_does_not_depend_on_the_step_size(steps):
+    """After one time constant, 37% of the initial 3 and 1 - e^-2 of the variance remain."""
     value, stream = torch.full((20_000, 1), 3.0, dtype=torch.float64), generator()
     seconds = torch.full((20_000,), 60.0 / steps, dtype=torch.float64)
     for _ in range(steps):
@@ -37,7 +37,7 @@ def test_what_forgets_itself_stays_within_bounds_however_small_the_steps(steps):
     assert value.std().item() == pytest.approx(0.5 * 0.92987, rel=0.02)
 
 
-def test_no_time_changes_nothing():
+def test_zero_time_step_changes_nothing():
     value = torch.tensor([[1.0], [2.0]], dtype=torch.float64)
     still = torch.zeros(2, dtype=torch.float64)
     assert torch.equal(random_walk_step(value, 1.0, 1.0, still, generator()), value)

@@ -5,7 +5,7 @@ from drone_rl.sim.sensors import suite
 
 
 def contact(things, times):
-    """Each in another place, to be told apart."""
+    """Return contacts at distinct positions."""
     count = len(things)
     numbers = torch.arange(1.0, count + 1, dtype=torch.float64)
     up = torch.tensor([[0.0, 0.0, 1.0]], dtype=torch.float64).repeat(count, 1)
@@ -17,7 +17,7 @@ def place(x):
     return torch.full((2, 3), float(x), dtype=torch.float64)
 
 
-def test_a_touch_is_remembered_until_it_is_read():
+def test_collision_is_kept_until_it_is_read():
     state = suite.start_collisions(place(0))
     assert state.has_collided.tolist() == [False, False]
     state = suite.update_collisions(state, contact([NOTHING] * 2, [0.0] * 2), place(1))
@@ -41,7 +41,7 @@ def test_a_touch_is_remembered_until_it_is_read():
     assert state.has_collided.tolist() == [False, False]
 
 
-def test_a_later_touch_of_the_same_thing_is_another():
+def test_later_contact_with_the_same_object_is_new():
     state = suite.update_collisions(
         suite.start_collisions(place(0)), contact([GROUND] * 2, [0.0] * 2), place(1)
     )
@@ -51,7 +51,7 @@ def test_a_later_touch_of_the_same_thing_is_another():
     assert state.position[:, 0].tolist() == [1.0, 2.0]
 
 
-def test_one_drone_is_read_alone():
+def test_collisions_are_read_per_drone():
     state = suite.update_collisions(
         suite.start_collisions(place(0)), contact([1, 2], [0.1] * 2), place(1)
     )

@@ -1,4 +1,4 @@
-"""What every task must keep is tested on each of them."""
+"""Fixtures for tests that every task must pass."""
 
 import pytest
 import torch
@@ -20,7 +20,7 @@ TASKS = (
 
 @pytest.fixture(params=TASKS, ids=("cubes", "two cubes", "pillars", "thin pillars", "posts"))
 def worlds(request):
-    """Five worlds of a task, each with an episode of its own."""
+    """Return five environments of each task, each with its own episode."""
     worlds = Worlds(5, request.param)
     worlds.reset(torch.arange(5), [world_random_state(0, i) for i in range(5)])
     yield worlds
@@ -34,7 +34,7 @@ def task(worlds):
 
 @pytest.fixture
 def truth(worlds):
-    """What an environment tells of the worlds."""
+    """Return the info of the environments."""
     body = worlds.state.body
     pose = {"drone": body.position.float(), "attitude": body.attitude.float()}
     return {**worlds.task.info(worlds.state), **pose}

@@ -1,4 +1,4 @@
-"""The rules of cube collection stated a second time, in torch, to test the kernels against."""
+"""A reference implementation of the rules of cube collection in torch."""
 
 import torch
 
@@ -27,7 +27,7 @@ def judge(settings, state, body):
 
 
 def sightings(settings, state, drone, present):
-    """Return side and lateral offset, recorded of each cube up to the next one."""
+    """Return side and lateral offset recorded for each cube up to the next one."""
     offset = state.cubes[..., 1] - drone[:, None, 1]
     right = torch.where(offset < -settings.touch_distance, Side.RIGHT.value, Side.AHEAD.value)
     side = torch.where(offset > settings.touch_distance, Side.LEFT.value, right)

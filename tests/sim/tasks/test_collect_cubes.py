@@ -12,18 +12,18 @@ from drone_rl.sim.dynamics import BodyState, ComputerVision
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason, Side
 from tests.fake_flight import FLIGHT, Floating
 
-SETTINGS = TaskSettings()  # drone and cubes touch up to 1.65 m on each axis
+SETTINGS = TaskSettings()  # contact up to 1.65 m on each axis
 
 
 def at(*ys, settings=SETTINGS):
-    """One world whose cubes stand at these y."""
+    """Return one environment with cubes at these y."""
     x = settings.first_distance + settings.spacing * torch.arange(len(ys))
     y, z = torch.tensor(ys).double(), torch.full((len(ys),), settings.altitude).double()
     return CollectCubes(settings).start(torch.stack([x, y, z], -1)[None])
 
 
 def body(*place):
-    """One drone at rest."""
+    """Return one drone at rest."""
     return BodyState.at_rest(torch.tensor([place], dtype=torch.float64))
 
 
@@ -32,12 +32,12 @@ def fly(state, x, y, settings=SETTINGS):
 
 
 def move(task, state, action):
-    """Flies all worlds in computer-vision mode."""
+    """Step all environments in computer-vision mode."""
     moves = torch.tensor([action] * len(state))
     return CollectCubes(task).judge(state, ComputerVision(task.step_length).step(state.body, moves))
 
 
-def test_cubes_are_drawn_within_their_bounds_and_uniformly():
+def test_cubes_are_sampled_uniformly_within_bounds():
     settings = TaskSettings(vertical_bound=1.0, altitude=5.0)
     draws = torch.stack(
         [CollectCubes(settings).draw(np.random.RandomState(i)) for i in range(2000)]
@@ -49,7 +49,7 @@ def test_cubes_are_drawn_within_their_bounds_and_uniformly():
     assert abs(float(draws[..., 1].std()) - 6 / 3**0.5) < 0.1
 
 
-def test_codes_are_those_of_recorded_files():
+def test_enumeration_values_are_those_of_files():
     assert [(a.name, a.value) for a in Move] == [("FORWARD", 0), ("LEFT", 1), ("RIGHT", 2)]
     assert [(s.name, s.value) for s in Side] == [("LEFT", 0), ("AHEAD", 1), ("RIGHT", 2)]
     ends = (
@@ -59,7 +59,7 @@ def test_codes_are_those_of_recorded_files():
     assert [(e.name, e.value) for e in EndReason] == [(n, i) for i, n in enumerate(ends)]
 
 
-def test_a_cube_stands_until_it_is_collected_or_passed_and_the_next_is_the_first_that_stands():
+def test_next_cube_is_the_first_present_one():
     flags = torch.tensor(list(itertools.product([False, True], repeat=6)))
     state = CollectCubes(SETTINGS).start(torch.zeros(64, 3, 3).double())
     state.collected, state.passed = flags[:, :3], flags[:, 3:]
@@ -75,7 +75,7 @@ def test_a_cube_stands_until_it_is_collected_or_passed_and_the_next_is_the_first
         assert following == ([*stands, True].index(True))
 
 
-def test_a_start_is_at_the_origin_with_everything_to_come():
+def test_start_state_has_all_cubes():
     settings = TaskSettings(altitude=4.0)
     cubes = CollectCubes(settings).draw(np.random.RandomState(0))
     state = CollectCubes(settings).start(torch.stack([cubes, cubes + 1.0]))
@@ -84,10 +84,10 @@ def test_a_start_is_at_the_origin_with_everything_to_come():
     assert not state.collected.any() and not state.passed.any()
     assert state.steps.tolist() == state.end_reason.tolist() == [0, 0]
     state.collected[0, 0] = True
-    assert not state.passed.any()  # no two fields share memory
+    assert not state.passed.any()  # fields share no memory
 
 
-def test_touching_collects_and_is_worth_one():
+def test_reward_is_one_per_collected_cube():
     state, reward = fly(at(1.0, 0.0, 0.0), 14.0, 0.0)
     assert reward.tolist() == [1.0]
     assert reward.dtype == torch.float64
@@ -99,14 +99,14 @@ def test_touching_collects_and_is_worth_one():
 
 
 def beyond(value):
-    """The next float64, away from zero."""
+    """Return the next float64 away from zero."""
     return float(np.nextafter(value, 2 * value))
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_touch_distance_is_exact(axis, sign):
-    """On each axis, from both sides: 1.65 m touches, the next float64 does not."""
+    """On each axis and from both sides, 1.65 m is a contact and the next float64 is none."""
     for distance, touches in ((1.65, True), (beyond(1.65), False)):
         cube = torch.zeros(1, 1, 3).double()
         cube[..., axis] = sign * distance
@@ -116,7 +116,7 @@ def test_touch_distance_is_exact(axis, sign):
         assert reward.item() == float(touches)
 
 
-def test_touch_needs_all_three_axes():
+def test_contact_needs_all_three_axes():
     corner = torch.tensor([[[1.6, -1.6, 1.6]]]).double()
     assert CollectCubes(SETTINGS).judge(CollectCubes(SETTINGS).start(corner), body(0, 0, 0))[1] == 1
     for axis in range(3):
@@ -126,7 +126,7 @@ def test_touch_needs_all_three_axes():
         assert CollectCubes(SETTINGS).judge(state, body(0, 0, 0))[1] == 0
 
 
-def test_two_cubes_touched_at_once_are_worth_two():
+def test_reward_is_two_for_two_simultaneous_cubes():
     cubes = torch.tensor([[[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [1.7, 0.0, 0.0]]]).double()
     state, reward = CollectCubes(SETTINGS).judge(CollectCubes(SETTINGS).start(cubes), body(0, 0, 0))
     assert reward.tolist() == [2.0] and reward.dtype == torch.float64
@@ -139,25 +139,25 @@ def test_passed_is_strictly_behind():
         assert state.passed.tolist() == [[passed, False]]
 
 
-def test_passed_cubes_vanish_without_reward():
+def test_passed_cubes_are_removed_without_reward():
     state, _ = fly(at(5.0, 0.0, 0.0), 15.0, 0.0)
-    assert state.present.tolist() == [[True, True, True]]  # level with it is not past it
+    assert state.present.tolist() == [[True, True, True]]  # a cube next to the drone is not passed
     state, reward = fly(state, 16.0, 0.0)
     assert reward.item() == 0.0
     assert state.passed.tolist() == [[True, False, False]]
     assert state.present.tolist() == [[False, True, True]]
     _, reward = fly(state, 16.0, 5.0)
-    assert reward.item() == 0.0  # bumping into a vanished cube is worth nothing
+    assert reward.item() == 0.0  # no reward for a removed cube
 
 
-def test_side_is_where_the_cube_stood_when_it_became_next():
+def test_side_is_recorded_when_the_cube_becomes_next():
     state = at(5.0, -5.0, 0.5)
     assert state.side.tolist() == [[Side.LEFT, -1, -1]]
     state, _ = fly(state, 14.0, 5.0)  # collects the first; the second is 10 m to the right
     assert state.side.tolist() == [[Side.LEFT, Side.RIGHT, -1]]
     state, _ = fly(state, 25.0, 1.0)  # passes the second
     assert state.side.tolist() == [[Side.LEFT, Side.RIGHT, Side.AHEAD]]
-    assert state.lateral.tolist() == [[5.0, -10.0, -0.5]]  # metres to the left, at that moment
+    assert state.lateral.tolist() == [[5.0, -10.0, -0.5]]  # meters to the left at that time
 
 
 def test_lateral_offset_is_unknown_until_a_cube_is_the_next_one():
@@ -174,7 +174,7 @@ def test_side_is_ahead_up_to_exactly_the_touch_distance():
             assert CollectCubes(SETTINGS).start(cubes).side.tolist() == [[mirrored]]
 
 
-def test_ends_in_the_order_of_algorithm_3():
+def test_end_conditions_of_algorithm_3():
     state = at(0.0, 0.0, 0.0)
     assert fly(state, 44.0, 0.0)[0].end_reason.item() == EndReason.RUNNING
     assert fly(state, beyond(44.0), 0.0)[0].end_reason.item() == EndReason.FRONT_BOUNDARY
@@ -188,7 +188,7 @@ def test_ends_in_the_order_of_algorithm_3():
 
 
 @pytest.mark.parametrize("coinciding", list(itertools.product([False, True], repeat=4)))
-def test_of_coinciding_ends_the_first_in_the_order_counts(coinciding):
+def test_first_of_simultaneous_end_conditions_counts(coinciding):
     all_cubes, front, side, limit = coinciding
     state = at(0.0, 0.0, 0.0)
     state.collected[:] = all_cubes
@@ -199,7 +199,7 @@ def test_of_coinciding_ends_the_first_in_the_order_counts(coinciding):
     assert ended.end_reason.item() == EndReason[expected]
 
 
-def test_a_lost_drone_ends_its_own_episode_and_for_that_reason():
+def test_lost_drone_ends_only_its_own_episode():
     cubes = torch.zeros(2, 3, 3).double()
     cubes[..., 0] = 50.0
     state = CollectCubes(SETTINGS).start(cubes)
@@ -214,7 +214,7 @@ def test_a_lost_drone_ends_its_own_episode_and_for_that_reason():
     assert ended.end_reason.tolist() == [EndReason.SIDE_BOUNDARY, EndReason.LOST_CONTROL]
 
 
-def test_collecting_but_not_passing_every_cube_ends_the_episode():
+def test_collecting_all_cubes_ends_the_episode():
     state = at(0.0, 0.0)
     state.collected[:, 0] = True
     assert fly(state, 24.0, 0.0)[0].end_reason.item() == EndReason.ALL_CUBES
@@ -222,7 +222,7 @@ def test_collecting_but_not_passing_every_cube_ends_the_episode():
     assert fly(state, 26.0, 0.0)[0].end_reason.item() == EndReason.RUNNING
 
 
-def test_numbers_of_enumerations_are_those_of_files_and_policies():
+def test_enumeration_names_are_those_of_files():
     assert [a.value for a in Move] == [0, 1, 2] and Move(1).name == "LEFT"
     assert [s.name for s in Side] == ["LEFT", "AHEAD", "RIGHT"]
     assert [s.value for s in Side] == [0, 1, 2]
@@ -230,7 +230,7 @@ def test_numbers_of_enumerations_are_those_of_files_and_policies():
     assert [EndReason(i).name for i in range(5)] == names
 
 
-def test_next_cube_is_the_first_that_stands_and_their_number_if_none_does():
+def test_next_cube_is_the_number_of_cubes_if_none_is_present():
     state = at(0.0, 0.0, 0.0)
     for collected, passed, index in (
         ([0, 0, 0], [0, 0, 0], 0),
@@ -247,7 +247,7 @@ def test_next_cube_is_the_first_that_stands_and_their_number_if_none_does():
         ]
 
 
-def test_a_start_is_at_the_altitude_with_nothing_done():
+def test_start_state_is_at_the_altitude():
     cubes = torch.arange(3.0).double()[:, None, None].expand(3, 2, 3)
     state = CollectCubes(TaskSettings(altitude=4.0)).start(cubes)
     assert state.drone.tolist() == [[0.0, 0.0, 4.0]] * 3 and state.drone.dtype == torch.float64
@@ -259,8 +259,8 @@ def test_a_start_is_at_the_altitude_with_nothing_done():
     assert state.to("cpu").side.tolist() == state.side.tolist()
 
 
-def test_draws_are_those_of_the_stream_in_order():
-    """Lateral and vertical offset of each cube in turn; figures rest on these very worlds."""
+def test_samples_follow_the_random_stream_in_order():
+    """Samples are lateral and vertical offsets of each cube in turn; published figures use them."""
     task = TaskSettings(vertical_bound=1.0, num_cubes=2)
     raw = np.random.RandomState(5).uniform(-1, 1, size=(2, 2))
     expected = [[15.0, 6 * raw[0, 0], 2.5 + raw[0, 1]], [24.0, 6 * raw[1, 0], 2.5 + raw[1, 1]]]
@@ -274,7 +274,7 @@ NEAR = TaskSettings(num_cubes=3, first_distance=4.0, spacing=4.0, front_margin=3
 
 
 def flight(places, moves, task=NEAR):
-    """States and rewards of one world, from its start to the end of the moves."""
+    """Return the states and rewards of one environment over all moves."""
     state, rewards = at(*places, settings=task), []
     states = [state]
     for action in moves:
@@ -286,7 +286,7 @@ def flight(places, moves, task=NEAR):
 
 @given(PLACES, MOVES)
 @QUICK
-def test_what_is_done_is_never_undone(places, moves):
+def test_collected_and_passed_are_monotone(places, moves):
     states, rewards = flight(places, moves)
     for before, after, reward in zip(states[:-1], states[1:], rewards, strict=True):
         assert (before.collected <= after.collected).all()
@@ -307,7 +307,7 @@ def test_what_is_done_is_never_undone(places, moves):
 
 @given(PLACES, MOVES)
 @QUICK
-def test_mirrored_worlds_under_mirrored_moves_are_mirrored(places, moves):
+def test_mirrored_scenes_with_mirrored_moves_are_mirrored(places, moves):
     swapped = {Move.LEFT: Move.RIGHT, Move.RIGHT: Move.LEFT, Move.FORWARD: Move.FORWARD}
     states, rewards = flight(places, moves)
     mirrored, others = flight([-y for y in places], [swapped[m] for m in moves])
@@ -323,7 +323,7 @@ def test_mirrored_worlds_under_mirrored_moves_are_mirrored(places, moves):
 
 @given(st.lists(PLACES.filter(lambda p: len(p) == 3), min_size=2, max_size=4), MOVES)
 @QUICK
-def test_worlds_know_nothing_of_each_other(worlds, moves):
+def test_environments_are_independent(worlds, moves):
     alone = [flight(places, moves)[0][-1] for places in worlds]
     cubes = torch.cat([at(*places, settings=NEAR).cubes for places in worlds])
     state = CollectCubes(NEAR).start(cubes)
@@ -337,7 +337,7 @@ def test_worlds_know_nothing_of_each_other(worlds, moves):
             torch.testing.assert_close(found[name], value, equal_nan=True, rtol=0, atol=0)
 
 
-def test_always_left_leaves_after_27_steps_as_in_the_chapter():
+def test_always_left_ends_after_27_steps():
     state, steps = at(0.0, 0.0, 0.0), 0
     while state.end_reason.item() == EndReason.RUNNING:
         state, _ = move(SETTINGS, state, Move.LEFT)
@@ -345,7 +345,7 @@ def test_always_left_leaves_after_27_steps_as_in_the_chapter():
     assert (steps, state.end_reason.item()) == (27, EndReason.SIDE_BOUNDARY)
 
 
-def test_judge_leaves_its_input_alone():
+def test_judge_does_not_modify_its_input():
     state = at(1.0, 0.0, 0.0)
     fly(state, 14.0, 0.0)
     assert not state.collected.any()
@@ -353,7 +353,7 @@ def test_judge_leaves_its_input_alone():
     assert state.drone[0, 0] == 0.0
 
 
-def test_select_and_overwrite_worlds():
+def test_states_support_indexing_and_assignment():
     states = CollectCubes(SETTINGS).start(torch.zeros(3, 3, 3).double())
     part = states[torch.tensor([2])]
     part.steps += 7
@@ -362,8 +362,8 @@ def test_select_and_overwrite_worlds():
     assert states.steps.tolist() == [0, 0, 7]
 
 
-def test_beyond_the_step_limit_an_episode_is_over_too():
-    """A state that was saved under a longer limit."""
+def test_episode_beyond_the_step_limit_ends():
+    """The state was saved with a longer limit."""
     short = TaskSettings(step_limit=40)
     state = at(5.0, 5.0, 5.0, settings=short)
     for steps, reason in ((38, 0), (39, EndReason.STEP_LIMIT), (60, EndReason.STEP_LIMIT)):

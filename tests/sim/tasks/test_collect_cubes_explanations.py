@@ -1,4 +1,4 @@
-"""States of cube collection that explanations ask for, with hand-computed places."""
+"""Hand-computed states of cube collection for explanations."""
 
 import math
 
@@ -15,7 +15,7 @@ TWO = TaskSettings(num_cubes=2)
 
 @pytest.fixture
 def state():
-    """Two worlds of two cubes; in the second none is left."""
+    """Return two environments with two cubes; in the second none is left."""
     cubes = torch.tensor([[[15.0, 1.0, 2.5], [24.0, -2.0, 2.5]]] * 2, dtype=torch.float64)
     state = CollectCubes(TWO).start(cubes)
     state.drone[:, 0], state.drone[:, 1] = 5.0, 4.0
@@ -23,7 +23,7 @@ def state():
     return state
 
 
-def test_the_next_cube_is_seen_from_the_drone(state):
+def test_next_offset_is_relative_to_the_drone(state):
     assert CollectCubes(TWO).next_offset(state)[0].tolist() == [10.0, -3.0, 0.0]
     assert CollectCubes(TWO).next_offset(state)[1].isnan().all()
     state.collected[0, 0] = True
@@ -31,7 +31,7 @@ def test_the_next_cube_is_seen_from_the_drone(state):
     assert CollectCubes(TWO)._is_next(state).tolist() == [[False, True], [False, False]]
 
 
-def test_one_cube_stands_where_it_is_asked_for_seen_from_each_drone():
+def test_one_target_is_placed_relative_to_each_drone():
     body = BodyState.at_rest(torch.tensor([[0.0, 0, 2.5], [7.0, -1.0, 3.0]], dtype=torch.float64))
     away = torch.tensor([[9.0, 2.0, 0.5], [9.0, 2.0, 0.5]])
     found = CollectCubes(TWO).one_target(body, away)
@@ -40,19 +40,19 @@ def test_one_cube_stands_where_it_is_asked_for_seen_from_each_drone():
     assert found.side.tolist()[0][0] == Side.LEFT and torch.equal(found.drone, body.position)
 
 
-def test_the_next_cube_alone_is_moved_or_taken_away(state):
+def test_only_the_next_cube_is_moved_or_removed(state):
     moved = CollectCubes(TWO).next_moved(state, torch.tensor([2.0, 2.0]))
     assert moved.cubes[0, :, 1].tolist() == [3.0, -2.0]
-    assert torch.equal(moved.cubes[1], state.cubes[1])  # nothing is left to be moved
+    assert torch.equal(moved.cubes[1], state.cubes[1])  # no cube is left
     assert CollectCubes(TWO).next_moved(state, -1.5).cubes[0, 0, 1] == -0.5
     gone = CollectCubes(TWO).without_next(state)
     assert gone.present.tolist() == [[False, True], [False, False]]
     assert CollectCubes(TWO).without_targets(state).present.any() == torch.tensor(False)
-    assert state.cubes[0, 0, 1] == 1.0 and state.present[0].all()  # the given one is as it was
+    assert state.cubes[0, 0, 1] == 1.0 and state.present[0].all()  # the input is unchanged
 
 
-def test_cubes_elsewhere_stand_where_cubes_can_stand():
-    """In view, from where one just fits before the camera to where the first one stands."""
+def test_elsewhere_places_cubes_at_valid_positions():
+    """Positions are in view, from the camera to the distance of the first cube."""
     task, camera = TaskSettings(vertical_bound=1.0, altitude=4.0), CameraSettings()
     state = CollectCubes(task).start(torch.zeros(400, 3, 3, dtype=torch.float64))
     state.drone[:] = torch.tensor([5.0, -2.0, 4.0])
@@ -65,29 +65,29 @@ def test_cubes_elsewhere_stand_where_cubes_can_stand():
     slope = aside / ahead
     assert -edge <= slope.min() < -0.95 * edge and 0.95 * edge < slope.max() <= edge
     drawn = torch.stack([ahead, slope, up])[:, slope.abs() < 0.5 * edge]
-    assert (torch.corrcoef(drawn) - torch.eye(3)).abs().max() < 0.2  # independent of one another
+    assert (torch.corrcoef(drawn) - torch.eye(3)).abs().max() < 0.2  # independent samples
     assert abs(slope.mean()) < 0.2 * edge and 11.5 < aside.abs().max() <= 12.0 + 1e-9
     assert -1.0 <= up.min() < -0.9 and 0.9 < up.max() <= 1.0 and abs(up.mean()) < 0.15
 
 
-def test_places_reach_as_far_as_cubes_stand():
+def test_grid_covers_the_range_of_cubes():
     def ends(**settings):
         height, *axes = CollectCubes(TaskSettings(**settings)).grid(3, 5)
         return [height.tolist(), *([axis[0].item(), axis[-1].item()] for axis in axes)]
 
-    near = pytest.approx([1.65 + 0.5, 15.0])  # half a step from touching
+    near = pytest.approx([1.65 + 0.5, 15.0])  # half a step before contact
     assert ends() == [[0.0], near, [12.0, -12.0]]
     near = pytest.approx([1.65 + 0.2, 9.0])
     task = {"step_length": 0.4, "first_distance": 9.0, "vertical_bound": 0.5}
     assert ends(lateral_bound=4.0, **task) == [[-0.5, 0.0, 0.5], near, [8.0, -8.0]]
-    assert ends(lateral_bound=0.0)[2] == pytest.approx([3.3, -3.3])  # twice the reach of a touch
+    assert ends(lateral_bound=0.0)[2] == pytest.approx([3.3, -3.3])  # twice the contact distance
 
 
 TASK = CollectCubes()
 
 
-def test_of_passed_and_collected_cubes_none_is_present():
-    """The first is collected, the second passed: the third is the next one."""
+def test_passed_and_collected_cubes_are_absent():
+    """The first is collected and the second passed, so the third is next."""
     info = {
         "next_cube": torch.tensor([[2], [0]]),
         "collected": torch.tensor([[True, False, False], [False] * 3]),
@@ -103,15 +103,15 @@ def test_of_passed_and_collected_cubes_none_is_present():
     assert state.cubes.dtype == torch.float64 and not state.end_reason.any()
 
 
-def test_what_a_cube_calls_for_and_on_which_side_it_stands():
-    """Up to 1.65 m aside flying straight on touches it."""
+def test_needed_action_and_stratum_follow_from_the_offset():
+    """Flying straight ahead touches cubes within 1.65 m."""
     aside = torch.tensor([3.0, 1.6, -1.6, -3.0])
     offset = torch.stack([torch.full((4,), 9.0), aside, torch.zeros(4)], -1)
     assert TASK.needed(offset).tolist() == [Move.LEFT, Move.FORWARD, Move.FORWARD, Move.RIGHT]
     assert TASK.stratum_at(offset).tolist() == [Side.LEFT, Side.AHEAD, Side.AHEAD, Side.RIGHT]
 
 
-def test_each_world_is_asked_about_a_cube_of_its_own():
+def test_is_behind_and_is_reached_use_each_environments_target():
     body = BodyState.at_rest(torch.tensor([[20.0, 0.0, 2.5]] * 2, dtype=torch.float64))
     state = TASK.start(torch.tensor([[[15.0, 0, 2.5], [24.0, 0, 2.5], [33.0, 0, 2.5]]] * 2), body)
     state.collected[1, 1] = True

@@ -1,4 +1,4 @@
-"""Episodes in given boxes, with numbers by hand."""
+"""Hand-computed placements within boxes of failures."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ BOXES = np.array([[[1.0, 2.0], [-6.0, -4.0]], [[3.0, 3.0], [0.0, 0.5]]])
 
 
 class Given:
-    """A stream that gives what it is told."""
+    """A random stream with fixed samples."""
 
     def __init__(self, *draws):
         self.draws = list(draws)
@@ -26,10 +26,10 @@ class Given:
 
 
 ANYWHERE = (0.5, 0.5, 0.75, 0.5)
-"""y and z of two cubes: 0 and 3 m to the left."""
+"""Samples of y and z of two cubes: y is 0 and 3 m."""
 
 
-def test_places_by_hand():
+def test_placements_match_hand_computed_ones():
     task = FailureReplayTask(TASK, BOXES, 0.5)
     left = [
         task.draw(Given(*ANYWHERE, chance, which, 0.25, 0.5)).tolist()
@@ -42,7 +42,7 @@ def test_places_by_hand():
     ]
 
 
-def test_a_share_of_none_and_of_all():
+def test_extreme_fractions_replay_none_or_all():
     usual, world = CollectCubes(TASK), world_random_state(3, 0)
     assert torch.equal(
         FailureReplayTask(TASK, BOXES, 0.0).draw(world_random_state(3, 0)), usual.draw(world)
@@ -51,10 +51,10 @@ def test_a_share_of_none_and_of_all():
     y = np.stack([always.draw(world)[:, 1].numpy() for _ in range(200)])
     is_inside = ((y[:, None] >= BOXES[..., 0]) & (y[:, None] <= BOXES[..., 1])).all(-1)
     assert is_inside.any(-1).all()
-    assert 60 < is_inside[:, 0].sum() < 140  # each box as often, whatever its size
+    assert 60 < is_inside[:, 0].sum() < 140  # boxes are equally frequent, regardless of size
 
 
-def test_a_world_goes_on_alike_from_its_saved_stream():
+def test_saved_stream_resumes_placements():
     task, world, other = (
         FailureReplayTask(TASK, BOXES, 0.5),
         world_random_state(1, 2),
@@ -66,7 +66,7 @@ def test_a_world_goes_on_alike_from_its_saved_stream():
         assert torch.equal(task.draw(world), task.draw(other))
 
 
-def test_boxes_reach_farther_but_not_beyond_the_placements():
+def test_inflated_boxes_stay_within_the_placements():
     reached = inflated(BOXES, 0.5, 6.0)
     assert reached.tolist() == [[[0.5, 2.5], [-6.0, -3.5]], [[2.5, 3.5], [-0.5, 1.0]]]
 
@@ -80,6 +80,6 @@ def test_boxes_reach_farther_but_not_beyond_the_placements():
         (np.array([[[1.0, 0.0], [0.0, 1.0]]]), "boxes reach beyond"),
     ],
 )
-def test_boxes_that_are_none(boxes, message):
+def test_invalid_boxes_raise(boxes, message):
     with pytest.raises(InputError, match=message):
         FailureReplayTask(TASK, boxes, 0.5)

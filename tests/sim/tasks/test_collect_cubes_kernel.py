@@ -1,4 +1,4 @@
-"""The fused kernel and the batched step agree with rules stated in torch, bit for bit."""
+"""The fused kernel and the batched step equal the reference rules bit for bit."""
 
 import pytest
 import torch
@@ -43,7 +43,7 @@ def step(
         ({"step_limit": 33, "step_length": 1.3}, {EndReason.STEP_LIMIT}),
     ],
 )
-def test_random_flights_go_as_the_rules_say(settings, ends):
+def test_random_episodes_follow_the_reference_rules(settings, ends):
     task = TaskSettings(**settings)
     worlds, draws = Worlds(WORLDS, task), torch.Generator().manual_seed(0)
     worlds.reset(torch.arange(WORLDS), [RandomState(i) for i in range(WORLDS)])
@@ -79,14 +79,14 @@ def test_random_flights_go_as_the_rules_say(settings, ends):
     assert ends <= seen
 
 
-def test_begins_where_worlds_are_and_leaves_them_alone():
+def test_kernel_state_starts_from_a_copy_of_the_environments():
     settings = TaskSettings(num_cubes=2, altitude=3.0, vertical_bound=0.5)
     worlds = Worlds(2, settings)
     cubes = torch.tensor([[[15.0, 1.0, 3.0], [24.0, -2.0, 3.5]], [[15.0, 0.0, 3.0]] * 2])
     worlds.state = worlds.start(cubes.double())
     flying = FlyingCubes(settings, worlds.dynamics, 3)
     for values in (flying.steps, flying.end_reasons, flying.state.collected):
-        values.fill_(1)  # of a batch before
+        values.fill_(1)  # left by a previous batch
     flying.begin(worlds.state)
     assert wp.to_torch(flying.flights.drones)[:2].tolist() == [[0.0, 0.0, 3.0]] * 2
     assert torch.equal(flying.state.cubes[:2], cubes.double())
@@ -97,7 +97,7 @@ def test_begins_where_worlds_are_and_leaves_them_alone():
     assert wp.to_torch(flying.poses.attitudes)[0].tolist() == [1.0, 0.0, 0.0, 0.0]
 
 
-def test_other_rules_and_other_moves_are_not_known():
+def test_other_rules_and_moves_are_unsupported():
     class Windy(ComputerVision):
         pass
 

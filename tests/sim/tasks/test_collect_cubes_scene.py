@@ -1,4 +1,4 @@
-"""Props, information, goals and oracle of cube collection, with numbers by hand."""
+"""Hand-computed props, info, goals and oracle actions of cube collection."""
 
 import torch
 
@@ -18,14 +18,14 @@ def start():
     return TASK.start(drawn, TASK.make_dynamics().start(origin))
 
 
-def test_what_settings_make_of_it():
+def test_settings_define_scene_and_moves():
     assert (TASK.largest_reward, TASK.drone_size, TASK.origin) == (2.0, 0.8, (0.0, 0.0, 3.0))
     moved = TASK.make_dynamics().step(start().body, torch.tensor([Move.LEFT]))
     assert moved.position.tolist() == [[0.0, 0.5, 3.0]]
     assert [cube.mjcf_model.model for cube in TASK.make_props()] == ["cube_0", "cube_1"]
 
 
-def test_vanished_cubes_are_deep_under_the_floor():
+def test_removed_cubes_are_below_the_floor():
     state = start()
     state.collected[0, 0] = True
     first, second = TASK.places(state)[0].tolist()
@@ -34,19 +34,19 @@ def test_vanished_cubes_are_deep_under_the_floor():
     assert (TASK.places(state)[..., 2] < 0).all()
 
 
-def test_information_by_hand():
+def test_info_matches_hand_computed_values():
     state = start()
-    told = TASK.info(state)
-    assert told["cubes"].tolist() == [[0]] and told["next_cube"].tolist() == [[0]]
-    assert told["side"].tolist() == [[1, -1]] and told["lateral"][0, 0] == 1.0
+    info = TASK.info(state)
+    assert info["cubes"].tolist() == [[0]] and info["next_cube"].tolist() == [[0]]
+    assert info["side"].tolist() == [[1, -1]] and info["lateral"][0, 0] == 1.0
     state.collected[0, 0] = True
-    told = TASK.info(state)
-    assert told["cubes"].tolist() == [[1]] and told["next_cube"].tolist() == [[1]]
-    told["collected"].zero_()
-    assert state.collected[0, 0]  # what is told is a copy
+    info = TASK.info(state)
+    assert info["cubes"].tolist() == [[1]] and info["next_cube"].tolist() == [[1]]
+    info["collected"].zero_()
+    assert state.collected[0, 0]  # info is a copy
 
 
-def test_the_first_worlds_are_the_same_whatever_the_number_of_worlds():
+def test_first_environments_do_not_depend_on_batch_size():
     few, many = Worlds(2, TASK), Worlds(4, TASK)
     for worlds in (few, many):
         number = worlds.num_worlds
@@ -55,20 +55,20 @@ def test_the_first_worlds_are_the_same_whatever_the_number_of_worlds():
     assert torch.equal(few.state.cubes, many.state.cubes[:2])
 
 
-def test_bounds_of_what_is_reported():
+def test_entries_have_bounds():
     bounds = {name: (entry.low, entry.high) for name, entry in TASK.entries.items()}
-    assert bounds["side"] == (-1, 2)  # not known yet, or one of three
+    assert bounds["side"] == (-1, 2)  # unknown, or one of three
     assert bounds["next_cube"] == bounds["cubes"] == (0, 2)
     assert bounds["end_reason"] == (0, 5)
 
 
-def test_classes_of_distance_fit_the_task():
+def test_distance_classes_follow_from_the_settings():
     assert CollectCubes(TaskSettings()).sideways_edges() == [1.65, 4.0, 6.0, 9.0]
     assert CollectCubes(TaskSettings(lateral_bound=3.0)).sideways_edges() == [1.65, 2.5, 3.0, 4.5]
     assert CollectCubes(TaskSettings(lateral_bound=0.5)).sideways_edges() == [1.65]
 
 
-def test_goals_are_made_of_the_last_information():
+def test_goals_use_the_last_info():
     info = {
         "collected": torch.tensor([[True, False]]),
         "side": torch.tensor([[2, -1]]),
@@ -91,13 +91,13 @@ def test_goals_are_made_of_the_last_information():
 F, L, R = Move.FORWARD, Move.LEFT, Move.RIGHT
 
 
-def test_it_turns_towards_what_is_farther_aside_than_it_tolerates():
+def test_oracle_turns_towards_cubes_beyond_its_tolerance():
     lateral = torch.tensor([3.0, 0.5, 0.0, -0.5, -3.0, 0.6, torch.nan])
     assert turn_towards(lateral, 0.5).tolist() == [L, F, F, F, R, L, F]
 
 
-def test_it_lines_up_with_the_next_cube_and_flies_on_when_none_is_left():
-    """It tolerates half the touch distance of 1.65 m."""
+def test_oracle_aligns_with_the_next_cube():
+    """The tolerance is half the contact distance of 1.65 m."""
     drone = torch.tensor([[0.0, 1.0, 2.5]] * 4)
     cubes = torch.tensor([[[9.0, 1.8, 2.5], [18.0, 1.9, 2.5]]] * 4)
     cubes[3, 1, 1] = 0.1
@@ -105,7 +105,7 @@ def test_it_lines_up_with_the_next_cube_and_flies_on_when_none_is_left():
     assert CollectCubes().line_up(drone, cubes, following).tolist() == [F, L, F, R]
 
 
-def test_it_is_never_finer_than_half_a_step():
+def test_oracle_tolerance_is_at_least_half_a_step():
     settings = TaskSettings(cube_size=0.3, drone_size=1.7, step_length=1.0, altitude=2.5)
     drone, near = torch.zeros(1, 3), torch.tensor([[[9.0, 0.49, 0.0]]])
     first = torch.tensor([[0]])
@@ -113,7 +113,7 @@ def test_it_is_never_finer_than_half_a_step():
     assert CollectCubes(settings).line_up(drone, near + 0.03, first).tolist() == [L]
 
 
-def test_names_are_those_of_verdicts():
+def test_task_names_its_ends():
     task = CollectCubes()
     assert (task.name, task.vocabulary.goal) == ("collect_cubes", "cube")
     assert task.strata == ("left", "ahead", "right")
@@ -122,7 +122,7 @@ def test_names_are_those_of_verdicts():
     assert task.ends(task.expected_end) is EndReason.FRONT_BOUNDARY
 
 
-def test_heights_are_a_class_only_where_cubes_differ_in_them():
+def test_height_classes_need_varying_heights():
     none = torch.zeros(1, 1)
     cube = CubeGoals(none > 0, none.long(), none, none.double(), none.double())
     level = {by for by, *_ in CollectCubes(TaskSettings(num_cubes=1)).classes(cube)}
@@ -131,6 +131,6 @@ def test_heights_are_a_class_only_where_cubes_differ_in_them():
     assert {by for by, *_ in tall} == level | {"height"}
 
 
-def test_the_default_is_the_original_studys():
+def test_default_settings_are_those_of_the_original_study():
     assert CollectCubes().settings == TaskSettings()
     assert CollectCubes(TaskSettings(num_cubes=5)).largest_reward == 5.0

@@ -1,4 +1,4 @@
-"""What several tasks share: props out of sight, sides, classes of goals, positions in view."""
+"""Functions shared by tasks: hidden props, sides, classes of goals, positions in view."""
 
 import math
 
@@ -37,7 +37,7 @@ def test_only_the_next_prop_moves_left():
     moved = task.next_moved(state, torch.tensor([1.0, -2.0])).cubes
     assert moved[..., 1].tolist() == [[1.0, 0.0], [0.0, -2.0]]
     assert torch.equal(moved[..., [0, 2]], places[..., [0, 2]])
-    assert not places[..., 1].any(), "the given places stay"
+    assert not places[..., 1].any(), "the input is unchanged"
     assert task.next_moved(state, 3.0).cubes[..., 1].tolist() == [[3.0, 0.0], [0.0, 3.0]]
 
 
@@ -51,7 +51,7 @@ def goals(shape=(2, 3)):
     return Goals(reached, torch.zeros(shape, dtype=torch.int64), torch.zeros(shape))
 
 
-def test_a_class_for_each_goal_of_an_episode():
+def test_ordinal_classes_have_one_class_per_goal():
     classes = list(number_classes("cube", goals()))
     assert [(name, label) for name, label, _ in classes] == [
         ("cube", "first"), ("cube", "second"), ("cube", "third"),
@@ -77,6 +77,6 @@ def test_classes_between_edges_include_the_upper_one():
     ],
 )
 def test_positions_are_in_view(draw, ahead, left):
-    camera = CameraSettings(horizontal_fov=90.0)  # a slope of 1 at the border
+    camera = CameraSettings(horizontal_fov=90.0)  # the slope at the border is 1
     found = place_in_view(torch.tensor([draw], dtype=torch.float64), camera, 2.0, 10.0, 3.0)
     torch.testing.assert_close(found, torch.tensor([[ahead, left]], dtype=torch.float64))

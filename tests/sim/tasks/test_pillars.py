@@ -1,4 +1,4 @@
-"""Fields by hand: rows at x = 9, 16, ...; drone and pillars touch up to 1 m on each axis."""
+"""Hand-made fields with rows at x = 9, 16, ...; contact up to 1 m on each axis."""
 
 import math
 
@@ -22,13 +22,13 @@ from tests.fake_flight import FLIGHT, Floating
 
 @pytest.fixture
 def settings():
-    """Two rows of two pillars, at x = 9 and 16; the line is at x = 20."""
+    """Return settings with rows of two pillars at x = 9 and 16 and the finish line at x = 20."""
     return PillarsSettings(num_rows=2, density=0.125, width=1.2, collision_penalty=0.0)
 
 
 @pytest.fixture
 def field(settings):
-    """Makes one world of the y of its pillars, row by row, and a drone at rest somewhere."""
+    """Return a factory of environments from the y of pillars by row, with a drone at rest."""
 
     def make(*rows, x=0.0, y=0.0):
         return Pillars(settings).start(torch.tensor([rows], dtype=torch.float64), body(x, y))
@@ -37,17 +37,17 @@ def field(settings):
 
 
 def body(x, y):
-    """One drone at rest."""
+    """Return one drone at rest."""
     return BodyState.at_rest(torch.tensor([[x, y, 2.5]], dtype=torch.float64))
 
 
 L, A, R = Side.LEFT, Side.AHEAD, Side.RIGHT
 FAR = (6.0, -6.0)
-"""Pillars that leave the middle free."""
+"""Positions of pillars that leave the center free."""
 
 
 def fly(settings, state, *places):
-    """From place to place; the last state and the sum of the rewards."""
+    """Fly through positions; return the last state and the sum of rewards."""
     total = 0.0
     for x, y in places:
         state, reward = Pillars(settings).judge(state, body(x, y))
@@ -55,7 +55,7 @@ def fly(settings, state, *places):
     return state, total
 
 
-def test_codes_are_those_of_recorded_files():
+def test_enumeration_values_are_those_of_files():
     ends = (
         *("RUNNING", "FINISH_LINE", "PILLAR_TOUCHED", "SIDE_BOUNDARY", "STEP_LIMIT"),
         "LOST_CONTROL",
@@ -64,39 +64,39 @@ def test_codes_are_those_of_recorded_files():
     assert [(s.name, s.value) for s in Side] == [("LEFT", 0), ("AHEAD", 1), ("RIGHT", 2)]
 
 
-def test_pillars_stand_in_rows(field):
+def test_pillars_are_in_rows(field):
     state = field((5.0, -5.0), (1.0, 2.0))
     assert state.pillars[0].tolist() == [[9, 5, 3], [9, -5, 3], [16, 1, 3], [16, 2, 3]]
     assert state.present.all() and not state.touched.any() and not state.passed.any()
 
 
-def test_progress_is_the_reward_and_the_whole_way_is_worth_one(settings, field):
+def test_reward_is_progress_as_a_fraction_of_the_path(settings, field):
     state, reward = fly(settings, field(FAR, FAR), (1, 0))
     assert reward == 1 / 20 and state.end_reason == EndReason.RUNNING
     state, reward = fly(settings, field(FAR, FAR), (1, 0), (1, 1), (1, 0))
-    assert reward == 1 / 20  # sideways is none
-    way = [(x, 0) for x in range(1, 21)]
-    state, reward = fly(settings, field(FAR, FAR), *way)
+    assert reward == 1 / 20  # no reward for lateral motion
+    path = [(x, 0) for x in range(1, 21)]
+    state, reward = fly(settings, field(FAR, FAR), *path)
     assert abs(reward - 1) < 1e-12 and state.end_reason == EndReason.FINISH_LINE
     state, reward = fly(settings, field(FAR, FAR, x=19.5), (21.5, 0))
-    assert abs(reward - 0.5 / 20) < 1e-12  # beyond the line there is nothing to gain
+    assert abs(reward - 0.5 / 20) < 1e-12  # no reward beyond the finish line
 
 
-def test_a_touched_pillar_ends_the_flight_and_costs_the_penalty(settings, field):
+def test_touching_a_pillar_ends_the_episode_with_a_penalty(settings, field):
     state, reward = fly(settings, field((0.9, -6.0), FAR, x=7.0), (8.0, 0.0))
     assert state.end_reason == EndReason.PILLAR_TOUCHED and reward == 1 / 20
     assert state.touched[0].tolist() == [True, False, False, False]
-    dear = settings.replace(collision_penalty=3.0)
-    assert fly(dear, field((0.9, -6.0), FAR, x=7.0), (8.0, 0.0))[1] == 1 / 20 - 3
+    penalized = settings.replace(collision_penalty=3.0)
+    assert fly(penalized, field((0.9, -6.0), FAR, x=7.0), (8.0, 0.0))[1] == 1 / 20 - 3
 
 
-def test_one_metre_is_a_touch_and_a_little_more_is_none(settings, field):
+def test_contact_distance_is_one_meter(settings, field):
     for y, touches in ((1.0, True), (1.001, False), (-1.0, True), (-1.001, False)):
         state, _ = fly(settings, field((y, 6.0), FAR, x=8.5), (9.0, 0.0))
         assert bool(state.touched.any()) is touches
 
 
-def test_what_is_flown_through_is_touched_however_long_the_move(settings):
+def test_long_moves_touch_pillars_on_their_path(settings):
     pillars = torch.tensor([[[9.0, 0.0, 3.0]]]).double()
 
     def touches(x, y, to_x, to_y):
@@ -113,19 +113,19 @@ def test_what_is_flown_through_is_touched_however_long_the_move(settings):
 
 @given(st.tuples(*[st.floats(-4, 4)] * 4))
 @hypothesis_settings(max_examples=200, deadline=None)
-def test_a_way_meets_a_pillar_where_any_of_its_points_does(way):
+def test_path_contact_equals_dense_sampling(path):
     settings = PillarsSettings(width=1.2)
-    x, y, to_x, to_y = way
+    x, y, to_x, to_y = path
     pillar = torch.zeros(1, 1, 3).double()
     start, end = (torch.tensor([[*p, 2.5]]).double() for p in ((x, y), (to_x, to_y)))
     found = bool(meets(settings.touch_distance, start, end, pillar))
     points = start[0, :2] + torch.linspace(0, 1, 2001)[:, None].double() * (end - start)[0, :2]
     reach = points.abs().amax(-1)
-    if found != bool((reach <= 1).any()):  # only within what 2,001 points can tell
+    if found != bool((reach <= 1).any()):  # up to the resolution of 2,001 points
         assert (reach - 1).abs().min() < 8 / 2000
 
 
-def test_who_leaves_the_field_is_out_and_who_takes_too_long_is_cut_off(settings, field):
+def test_side_boundary_and_step_limit_end_the_episode(settings, field):
     state, _ = fly(settings, field(FAR, FAR, y=8.0), (0.0, 8.0))
     assert state.end_reason == EndReason.RUNNING
     state, _ = fly(settings, state, (0.0, 8.5))
@@ -137,7 +137,7 @@ def test_who_leaves_the_field_is_out_and_who_takes_too_long_is_cut_off(settings,
     assert fly(short, state, (0.0, 0.0))[0].end_reason == EndReason.STEP_LIMIT
 
 
-def test_a_pillar_counts_more_than_the_line_and_the_line_more_than_the_limit(settings, field):
+def test_contact_precedes_finish_line_precedes_step_limit(settings, field):
     state, _ = fly(settings, field(FAR, (0.0, 6.0), x=14.0), (21.0, 0.0))
     assert state.end_reason == EndReason.PILLAR_TOUCHED
     short = settings.replace(step_limit=20)
@@ -145,7 +145,7 @@ def test_a_pillar_counts_more_than_the_line_and_the_line_more_than_the_limit(set
     assert state.end_reason == EndReason.FINISH_LINE
 
 
-def test_a_lost_drone_counts_more_than_a_pillar(settings, field):
+def test_lost_control_precedes_contact(settings, field):
     state = field((0.0, -6.0), FAR, x=7.0)
     lost = Floating(FLIGHT, None).start(torch.tensor([[8.5, 0.0, 2.5]]).double())
     state, _ = Pillars(settings).judge(state, lost)
@@ -155,35 +155,35 @@ def test_a_lost_drone_counts_more_than_a_pillar(settings, field):
     assert state.end_reason == EndReason.LOST_CONTROL and state.touched.any()
 
 
-def test_rows_come_up_one_after_the_other_and_are_passed_behind_them(settings, field):
+def test_rows_are_passed_in_order(settings, field):
     state = field(FAR, FAR)
     assert state.next_row == 0 and state.side[0].tolist() == [A, -1]
     state, _ = fly(settings, state, (10.0, 0.0))
-    assert state.next_row == 0  # still beside it
+    assert state.next_row == 0  # still next to the row
     state, _ = fly(settings, state, (10.1, 0.0))
     assert state.next_row == 1 and state.side[0].tolist() == [A, A]
     state, _ = fly(settings, state, (19.9, 0.0))
-    assert state.passed[0].tolist() == [True, False]  # the last one only at the line
+    assert state.passed[0].tolist() == [True, False]  # the last one is passed at the finish line
     state, _ = fly(settings, state, (20.0, 0.0))
     assert state.passed.all() and state.next_row == 2
 
 
-def test_the_nearest_way_through_has_a_side_and_a_gap(field):
-    # of 0.9 the lanes 0 and 1 touch: -1 is nearer than 2; between pillars at 0.9 and -6.0
+def test_nearest_lane_has_a_side_and_a_gap(field):
+    # the pillar at 0.9 blocks lanes 0 and 1; -1 is nearer than 2, between pillars at 0.9 and -6.0
     state = field((0.9, -6.0), FAR)
     assert state.side[0, 0] == R
     assert abs(float(state.gap[0, 0]) - (6.9 - 1.2)) < 1e-9
-    # of 0.0 the lanes -1, 0, 1 touch; 2 and -2 are as near, and the narrower gap's middle nearer
+    # the pillar at 0.0 blocks lanes -1, 0, 1; 2 and -2 are tied, and the narrower gap's center wins
     state = field((0.0, 5.0), FAR)
     assert state.side[0, 0] == L and abs(float(state.gap[0, 0]) - 3.8) < 1e-9
     state = field((0.0, -5.0), FAR)
     assert state.side[0, 0] == R
     assert field((3.0, -3.0), FAR).side[0, 0] == A
-    # the field ends at 8: a pillar at 7.5 leaves nothing on its left
+    # the field ends at 8, so a pillar at 7.5 leaves no lane on its left
     assert field((7.5, 5.4), FAR, y=7.0).side[0, 0] == R
 
 
-def test_where_the_drone_is_off_its_lattice_lanes_are_seen_from_it(settings):
+def test_lanes_are_relative_to_the_drone(settings):
     turns, is_open = Lanes(settings).seen_from(
         torch.tensor([[[0.0, 20.0]]]).double(), torch.tensor([0.5]).double()
     )
@@ -192,7 +192,7 @@ def test_where_the_drone_is_off_its_lattice_lanes_are_seen_from_it(settings):
     assert not ((lanes.abs() <= 1).any())
 
 
-def test_worlds_are_judged_each_for_itself(settings, field):
+def test_environments_are_independent(settings, field):
     one, two = field((0.0, 5.0), FAR, x=7.0), field(FAR, FAR, x=7.0)
     both = Pillars(settings).start(
         torch.tensor([[(0.0, 5.0), FAR], [FAR, FAR]]).double(), _pair(7.0)
@@ -209,7 +209,7 @@ def _pair(x):
     return type(at)(*(torch.cat([v, v]) for v in vars(at).values()))
 
 
-def test_a_way_is_ahead_within_half_a_step(settings):
+def test_lane_within_half_a_step_is_ahead(settings):
     for step in (1.0, 0.5):
         turns = step * torch.tensor([0.75, 0.51, 0.5, 0.0, -0.5, -0.51, -0.75])
         assert side_of(turns, 0.5 * step).tolist() == [L, L, A, A, A, R, R]
@@ -218,7 +218,7 @@ def test_a_way_is_ahead_within_half_a_step(settings):
 TASK = Pillars()
 
 
-def test_the_next_pillar_is_the_one_nearest_to_the_way_in_the_next_row(field):
+def test_next_target_is_the_nearest_pillar_of_the_next_row(field):
     assert TASK.next_target(field((5.0, -2.0), FAR)) == 1
     assert TASK.next_target(field((5.0, -2.0), FAR, y=4.0)) == 0
     state = field((5.0, -2.0), (7.0, 1.0))
@@ -229,19 +229,19 @@ def test_the_next_pillar_is_the_one_nearest_to_the_way_in_the_next_row(field):
     assert TASK.next_target(state) == 4 and TASK.next_offset(state).isnan().all()
 
 
-def test_a_pillar_that_does_not_stand_is_none(field):
+def test_absent_pillars_are_ignored(field):
     state = TASK.without_next(field((5.0, -2.0), FAR))
     assert state.present[0].tolist() == [True, False, True, True]
     assert TASK.next_target(state) == 0
     assert TASK.next_target(TASK.without_next(state)) == 4
 
 
-def test_one_pillar_alone(settings):
+def test_one_target_places_a_single_pillar(settings):
     state = Pillars(settings).one_target(body(3.0, 1.0), torch.tensor([[5.0, -2.0, 0.0]]))
     assert state.pillars[0, 0].tolist() == [8.0, -1.0, 3.0] and state.present.sum() == 1
 
 
-def test_pillars_elsewhere_stand_at_none_of_their_places_nor_at_the_drone(field, settings):
+def test_elsewhere_moves_all_pillars_away_from_the_drone(field, settings):
     state = field((5.0, -2.0), FAR)
     generator = torch.Generator().manual_seed(0)
     other = Pillars(settings).elsewhere(state, CameraSettings(), generator)
@@ -251,14 +251,14 @@ def test_pillars_elsewhere_stand_at_none_of_their_places_nor_at_the_drone(field,
     assert not torch.isclose(other.pillars, state.pillars)[..., :2].all(-1).any()
 
 
-def test_the_grid_reaches_over_the_field(settings):
+def test_grid_covers_the_field(settings):
     grid = Pillars(settings).grid(3, 5)
     assert grid.forward.tolist() == [1.5, 5.25, 9.0]
     assert grid.lateral.tolist() == [8.0, 4.0, 0.0, -4.0, -8.0]
 
 
-def test_pillars_elsewhere_fill_what_is_in_view(field, settings):
-    """From 2.2 m ahead to where the second row stands, 16 m; up to 16 m to either side."""
+def test_elsewhere_covers_the_field_of_view(field, settings):
+    """Positions reach from 2.2 m ahead to the second row at 16 m, and 16 m to each side."""
     state = field((5.0, -2.0), FAR)[torch.zeros(800, dtype=torch.int64)]
     camera = CameraSettings()
     found = Pillars(settings).elsewhere(state, camera, torch.Generator().manual_seed(0))
@@ -269,17 +269,17 @@ def test_pillars_elsewhere_fill_what_is_in_view(field, settings):
     slope = aside / ahead
     assert -edge <= slope.min() < -0.98 * edge and 0.98 * edge < slope.max() <= edge
     assert 15.5 < aside.abs().max() <= 16.0 + 1e-9 and abs(slope.mean()) < 0.1 * edge
-    near = slope.abs() < 0.4 * edge  # all as far as 16 m
+    near = slope.abs() < 0.4 * edge  # all up to 16 m
     assert torch.corrcoef(torch.stack([ahead, slope])[:, near])[0, 1].abs() < 0.1
     assert abs(ahead[near].mean() - (2.2 + 16.0) / 2) < 0.4
 
 
-def test_the_grid_begins_half_a_step_from_touching(settings):
+def test_grid_starts_half_a_step_before_contact(settings):
     short = settings.replace(step_length=0.5)
     assert Pillars(short).grid(2, 2).forward.tolist() == [1.25, 9.0]
 
 
-def test_a_pillar_in_the_way_calls_for_a_turn_away_from_it(settings):
+def test_needed_action_turns_away_from_a_pillar_ahead(settings):
     lateral = torch.tensor([3.0, 1.1, 1.0, 0.5, -0.5, -1.0, -1.1])
     offset = torch.stack([torch.full_like(lateral, 5.0), lateral, torch.zeros(7)], -1)
     task = Pillars(settings)
@@ -289,7 +289,7 @@ def test_a_pillar_in_the_way_calls_for_a_turn_away_from_it(settings):
     assert task.stratum_at(offset).tolist() == [a, a, r, r, le, le, a]
 
 
-def test_a_pillar_is_done_once_the_drone_is_beyond_it_untouched(settings, field):
+def test_pillar_is_reached_when_passed_untouched(settings, field):
     task, target = Pillars(settings), torch.tensor([0])
     state = field((5.0, -5.0), (5.0, -5.0), x=9.0)
     assert not task.is_behind(state, target) and not task.is_reached(state, target)
@@ -299,24 +299,24 @@ def test_a_pillar_is_done_once_the_drone_is_beyond_it_untouched(settings, field)
     assert task.is_behind(state, target) and not task.is_reached(state, target)
 
 
-def test_rows_are_counted(settings):
+def test_tally_counts_rows(settings):
     passed = torch.tensor([[True, False], [True, True]])
     reached, missed = Pillars(settings).tally({"passed": passed})
     assert reached.tolist() == [1, 2] and missed.tolist() == [0, 0]
 
 
-def test_of_what_does_not_stand_none_is_next(settings, field):
+def test_next_target_without_present_pillars_is_their_number(settings, field):
     task = Pillars(settings)
     state = task.without_targets(field((5.0, -5.0), (5.0, -5.0)))
-    told = {**task.info(state), "drone": state.drone.float()}
-    assert task.remember(told)["next_target"] == 4
+    info = {**task.info(state), "drone": state.drone.float()}
+    assert task.remember(info)["next_target"] == 4
 
 
-def test_classes_of_gaps_begin_at_the_drone():
+def test_gap_classes_start_at_the_drone_size():
     assert Pillars().gap_edges() == [0.8, 1.8, 3.8]
 
 
-def test_rows_fall_into_classes(settings):
+def test_classes_of_rows(settings):
     goals = RowGoals(
         reached=torch.tensor([[True, False]]),
         stratum=torch.tensor([[2, 1]]),
@@ -336,7 +336,7 @@ def test_rows_fall_into_classes(settings):
     }
 
 
-def test_goals_are_made_of_the_last_information(settings):
+def test_goals_use_the_last_info(settings):
     info = {
         "passed": torch.tensor([[True, False]]),
         "side": torch.tensor([[2, -1]]),
@@ -348,7 +348,7 @@ def test_goals_are_made_of_the_last_information(settings):
     assert goals.world.tolist() == [[1, 2, 3, 4]] and goals.gap[0, 0] == 1.5
 
 
-def test_what_verdicts_know_of_it():
+def test_baselines_and_scored_entries_exist():
     task = Pillars()
     assert (task.name, task.vocabulary.goal, task.vocabulary.target) == ("pillars", "row", "pillar")
     assert task.success_end == EndReason.FINISH_LINE
@@ -366,14 +366,14 @@ def test_there_is_a_prop_for_each_pillar(settings):
     assert len({prop.mjcf_model.model for prop in props}) == 4
 
 
-def test_what_does_not_stand_is_out_of_sight(settings, field):
+def test_absent_pillars_are_below_the_floor(settings, field):
     state = field((5.0, -5.0), (5.0, -5.0))
     state.present[0, 2] = False
     z = Pillars(settings).places(state)[0, :, 2]
     assert z.tolist() == [3.0, 3.0, -97.0, 3.0]
 
 
-def test_the_information_is_that_of_the_entries(settings, field):
+def test_info_matches_the_entries(settings, field):
     task = Pillars(settings)
     info = task.info(field((5.0, -5.0), (1.5, -5.0)))
     assert set(info) == set(task.entries)
@@ -382,21 +382,21 @@ def test_the_information_is_that_of_the_entries(settings, field):
     assert info["rows"].tolist() == [[[5.0, -5.0], [1.5, -5.0]]]
 
 
-def test_fields_are_drawn_from_the_world_s_own_stream(settings):
+def test_fields_are_sampled_from_the_given_stream(settings):
     task = Pillars(settings)
     one, two = (task.draw(np.random.RandomState(3)) for _ in range(2))
     assert one.shape == (2, 2) and torch.equal(one, two) and one.dtype == torch.float64
 
 
-def test_bounds_of_what_is_reported(settings):
+def test_entries_have_bounds(settings):
     entries = Pillars(settings).entries
     bounds = {name: (entry.low, entry.high) for name, entry in entries.items()}
-    assert bounds["side"] == (-1, 2)  # not known yet, or one of three
+    assert bounds["side"] == (-1, 2)  # unknown, or one of three
     assert bounds["next_row"] == (0, 2)
     assert bounds["end_reason"] == (0, 5)
 
 
-def test_every_side_and_end_has_words():
+def test_vocabulary_covers_sides_and_ends():
     said = Pillars().vocabulary
     assert set(said.sides) == set(said.places) == {side.name.lower() for side in Side}
     assert set(said.ends) == {end.name.lower() for end in EndReason if end}
@@ -406,7 +406,7 @@ def test_every_side_and_end_has_words():
     assert said.failing("gap", "0.8 to 1.8 m") == "at gaps of 0.8 to 1.8 m"
 
 
-def test_settings_make_the_task():
+def test_settings_create_the_task():
     task = as_task(PillarsSettings(num_rows=2))
     assert isinstance(task, Pillars) and task.settings.num_rows == 2
     assert Pillars().settings == PillarsSettings()

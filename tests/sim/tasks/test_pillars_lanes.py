@@ -12,20 +12,20 @@ from drone_rl.sim.tasks.pillars import EndReason, Pillars
 from drone_rl.sim.tasks.pillars_lanes import Lanes
 
 SETTINGS = PillarsSettings(num_rows=3, spread=4.0, density=0.4, width=1.2)
-"""Three pillars a row, nine lanes; drone and pillars touch up to 1 m."""
+"""Three pillars per row and nine lanes; contact up to 1 m."""
 LANES = Lanes(SETTINGS)
 
 
 def fewest_turns(rows, y, next_row):
-    """By trying every choice of lanes: metres of turns in all, and to the first row's lane."""
+    """Return, by enumeration, the least lateral distance and the best lanes of the next row."""
     lanes = LANES.within_field()
     opened = [lanes[o] for o in LANES.is_open(rows[next_row:])]
-    ways = [np.diff([y, *way]) for way in itertools.product(*opened)]
-    total = [np.abs(way).sum() for way in ways]
-    return min(total), {way[0] for way, t in zip(ways, total, strict=True) if t == min(total)}
+    paths = [np.diff([y, *path]) for path in itertools.product(*opened)]
+    total = [np.abs(path).sum() for path in paths]
+    return min(total), {path[0] for path, t in zip(paths, total, strict=True) if t == min(total)}
 
 
-def test_the_plan_has_the_fewest_turns_there_are():
+def test_plan_has_the_fewest_turns():
     random_state = np.random.RandomState(0)
     for _ in range(60):
         rows = LANES.draw_field(random_state)
@@ -36,8 +36,8 @@ def test_the_plan_has_the_fewest_turns_there_are():
         assert float(turn) in fewest_turns(rows, y, row)[1]
 
 
-def test_looking_ahead_beats_the_nearest_lane():
-    # the nearest ways lead right, then far back to the left
+def test_plan_looks_beyond_the_next_row():
+    # the nearest lanes are right, then far to the left
     rows = np.array([[0.2, 0.2, 0.2], [-2.0, -1.0, 1.2], [-2.0, -1.0, 1.2]])
     turn = LANES.first_turn(
         torch.from_numpy(rows)[None], torch.zeros(1).double(), torch.tensor([0])
@@ -46,21 +46,21 @@ def test_looking_ahead_beats_the_nearest_lane():
     assert (total, best) == (3.0, {2.0, 3.0}) and float(turn) in best
 
 
-def test_nothing_is_turned_for_behind_the_last_row():
+def test_plan_flies_straight_behind_the_last_row():
     rows = torch.zeros(1, 3, 3).double()
     assert LANES.first_turn(rows, torch.zeros(1).double(), torch.tensor([3])) == 0
     drone = torch.tensor([[SETTINGS.last_distance + 1.5, 0.0, 2.5]])
     assert LANES.fly_through(drone, rows, torch.tensor([[2]])) == Move.FORWARD
 
 
-def test_beside_a_row_one_flies_on():
+def test_plan_flies_straight_within_a_row():
     rows = torch.tensor([[[3.0, 3.0, 3.0], [0.0, 0.0, 0.0], [3.0, 3.0, 3.0]]]).double()
     drone = torch.tensor([[9.0, 0.0, 2.5], [11.0, 0.0, 2.5]])
     moves = LANES.fly_through(drone, rows.repeat(2, 1, 1), torch.tensor([[0], [1]]))
     assert moves[0] == Move.FORWARD and moves[1] in (Move.LEFT, Move.RIGHT)
 
 
-def test_every_field_is_crossed():
+def test_plan_crosses_every_field():
     random_state = np.random.RandomState(7)
     drawn = np.stack([LANES.draw_field(random_state) for _ in range(300)])
     dynamics = ComputerVision(SETTINGS.step_length)
@@ -77,35 +77,35 @@ def test_every_field_is_crossed():
 
 
 NARROW = PillarsSettings(spread=3.0, density=0.34, width=1.2)
-"""Two pillars a row, seven lanes; drone and pillars touch up to 1 m."""
+"""Two pillars per row and seven lanes; contact up to 1 m."""
 NARROW_LANES = Lanes(NARROW)
 
 
-def test_lanes_are_a_step_apart_and_within_the_field():
+def test_lanes_are_one_step_apart_within_the_field():
     assert NARROW_LANES.within_field().tolist() == [-3, -2, -1, 0, 1, 2, 3]
     assert Lanes(NARROW.replace(step_length=0.7)).within_field().tolist() == pytest.approx(
         [-2.8, -2.1, -1.4, -0.7, 0, 0.7, 1.4, 2.1, 2.8]
     )
 
 
-def test_a_lane_is_open_where_no_pillar_of_the_row_is_touched():
+def test_lane_is_open_without_contact():
     rows = np.array([[0.5, 0.5], [-1.0, 2.0], [-3.0, 3.0]])
     opened = [NARROW_LANES.within_field()[row].tolist() for row in NARROW_LANES.is_open(rows)]
-    # a pillar at -1 touches who is at -2, -1 or 0: 1 m is still a touch
+    # a pillar at -1 blocks -2, -1 and 0, as 1 m is a contact
     assert opened == [[-3, -2, -1, 2, 3], [-3], [-1, 0, 1]]
 
 
-def test_fields_that_no_path_crosses_are_never_made():
-    dense = PillarsSettings(spread=3.0, density=1.2, width=1.2)  # seven pillars in six metres
+def test_sampled_fields_are_crossable():
+    dense = PillarsSettings(spread=3.0, density=1.2, width=1.2)  # seven pillars in 6 m
     drawn = Lanes(dense).draw_rows(np.random.RandomState(0), 500)
     closed = ~Lanes(dense).is_open(drawn).any(-1)
-    assert 50 < closed.sum() < 480  # many rows are closed as they come
+    assert 50 < closed.sum() < 480  # many sampled rows are closed
     random_state = np.random.RandomState(1)
     made = np.concatenate([Lanes(dense).draw_field(random_state) for _ in range(200)])
     assert Lanes(dense).is_open(made).any(-1).all() and made.shape == (800, dense.row_size)
 
 
-def test_open_rows_are_as_they_are_drawn_and_each_world_repeats_its_own():
+def test_open_rows_are_kept_and_fields_are_seeded():
     first, again = (NARROW_LANES.draw_field(np.random.RandomState(3)) for _ in range(2))
     np.testing.assert_array_equal(first, again)
     drawn = NARROW_LANES.draw_rows(np.random.RandomState(3), NARROW.num_rows)
@@ -115,7 +115,7 @@ def test_open_rows_are_as_they_are_drawn_and_each_world_repeats_its_own():
     assert np.abs(first).max() <= NARROW.spread
 
 
-def test_a_field_that_is_never_open_is_an_error_and_no_endless_loop(monkeypatch):
+def test_field_without_open_lanes_raises(monkeypatch):
     monkeypatch.setattr(Lanes, "is_open", lambda _, rows: np.zeros((len(rows), 7), bool))
     monkeypatch.setattr(pillars_lanes, "MOST_TRIES", 5)
     with pytest.raises(RuntimeError, match="5 drawings"):

@@ -14,7 +14,7 @@ class PostsSettings(BaseTaskSettings):
     tall: bool = True
 
 
-def test_settings_ask_for_their_task():
+def test_invalid_settings_raise():
     assert isinstance(as_task(None), CollectCubes)
     assert as_task(TaskSettings(num_cubes=2)).settings.num_cubes == 2
     assert isinstance(as_task(PillarsSettings()), Pillars)
@@ -30,8 +30,8 @@ def test_settings_ask_for_their_task():
         as_task(PostsSettings())
 
 
-def test_a_user_s_task_is_known_once_it_is_registered(monkeypatch):
-    monkeypatch.setitem(MAKERS, PostsSettings, None)  # forgotten after the test
+def test_user_tasks_can_be_registered(monkeypatch):
+    monkeypatch.setitem(MAKERS, PostsSettings, None)  # removed after the test
     monkeypatch.setitem(TASKS, "posts", PostsSettings)
     register_task(PostsSettings, lambda _: Posts())
     register_task(PostsSettings, lambda _: Posts())  # a module may be imported twice

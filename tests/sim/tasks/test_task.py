@@ -1,4 +1,4 @@
-"""A second task fits wherever cube collection does."""
+"""User-defined tasks work in both simulators and in TorchRL."""
 
 import dataclasses
 
@@ -18,14 +18,14 @@ from tests.composer_env import ComposerEnv
 from tests.second_task import End, Posts
 
 
-def test_settings_are_those_of_cube_collection():
+def test_default_settings_select_cube_collection():
     assert isinstance(as_task(None), CollectCubes)
     assert as_task(TaskSettings(num_cubes=2)).settings.num_cubes == 2
     task = Posts()
     assert as_task(task) is task
 
 
-def test_both_simulators_play_it_alike():
+def test_both_simulators_give_the_same_episodes():
     env = make_environment(Posts(), pixels=False, random_state=world_random_state(3, 0))
     worlds = Worlds(1, Posts())
     stream, ends = world_random_state(3, 0), set()
@@ -48,19 +48,19 @@ def test_both_simulators_play_it_alike():
     worlds.close()
 
 
-def test_its_things_are_drawn_and_have_its_meanings():
+def test_props_are_rendered_with_their_semantic_classes():
     worlds = Worlds(1, Posts())
     state = worlds.start(torch.tensor([[1.0, -1.0]], dtype=torch.float64))
     seen = worlds.render(state, worlds.view(modality="segmentation"))[0]
     props = torch.tensor([*worlds.scene.props, -1])[seen.long()]
     columns = [(props == i).any(0).nonzero()[:, 0] for i in range(2)]
-    assert columns[0].max() < 32 <= columns[1].min()  # the first to the left, the second right
+    assert columns[0].max() < 32 <= columns[1].min()  # the first left, the second right
     assert [m.name for m in worlds.scene.semantic_classes].count("OBSTACLE") == 2
     assert not worlds.scene.geoms(SemanticClass.TARGET)
     worlds.close()
 
 
-def test_torchrl_sees_what_it_tells():
+def test_torchrl_specs_follow_the_task():
     env = DroneEnv(4, Posts(), pixels=False)
     check_env_specs(env)
     assert set(env.observation_spec["info"].keys()) == {
@@ -89,7 +89,7 @@ class Minimal(Task):
         return dataclasses.replace(state, body=body, steps=steps, end_reason=end), end.double()
 
 
-def test_all_but_the_name_the_draw_and_the_rules_has_a_default():
+def test_base_class_has_defaults():
     env = DroneEnv(3, Minimal(), pixels=False)
     check_env_specs(env)
     step = env.rollout(5, policy=lambda td: td.set("action", torch.zeros(3).long()))

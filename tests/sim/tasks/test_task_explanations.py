@@ -1,14 +1,14 @@
-"""What explanations count on, of every task."""
+"""Requirements of explanations that every task meets."""
 
 import torch
 
 
 def poses(worlds, state):
-    """Where everything that is drawn stands."""
+    """Return the poses of everything that is rendered."""
     return torch.cat([state.body.position[:, None], worlds.task.places(state)], 1)
 
 
-def test_recalled_worlds_stand_as_they_were_remembered(worlds, task, truth):
+def test_recall_restores_recorded_scenes(worlds, task, truth):
     state = worlds.state
     kept = task.remember(truth)
     assert set(kept) == set(task.remembered) and "next_target" in kept
@@ -17,7 +17,7 @@ def test_recalled_worlds_stand_as_they_were_remembered(worlds, task, truth):
     assert torch.equal(task.next_target(again), kept["next_target"])
 
 
-def test_a_single_target_stands_where_it_is_asked_for(worlds, task):
+def test_one_target_is_placed_at_the_offset(worlds, task):
     away = torch.tensor([[5.0, 2.0, 0.0], [7.0, -1.0, 0.0]], dtype=torch.float64)
     state = task.one_target(worlds.bodies(2), away)
     torch.testing.assert_close(task.next_offset(state), away)
@@ -29,19 +29,19 @@ def test_a_single_target_stands_where_it_is_asked_for(worlds, task):
     for nothing in (gone, task.without_targets(state)):
         seen = worlds.render(nothing, worlds.view(modality="segmentation")).long()
         assert (props[seen] < 0).all()
-    assert task.next_offset(state)[0, 0] == 5.0  # the given worlds are as they were
+    assert task.next_offset(state)[0, 0] == 5.0  # the input is unchanged
 
 
-def test_the_next_target_alone_is_moved_to_the_left(worlds, task):
+def test_next_moved_moves_only_the_next_target(worlds, task):
     before, target = poses(worlds, worlds.state), task.next_target(worlds.state)
     moved = task.next_moved(worlds.state, torch.full((5,), 1.5).double())
     expected = before.clone()
-    expected[torch.arange(5), 1 + target, 1] += 1.5  # the drone's pose comes first
+    expected[torch.arange(5), 1 + target, 1] += 1.5  # the drone's pose is first
     torch.testing.assert_close(poses(worlds, moved), expected, rtol=0, atol=0)
     assert torch.equal(poses(worlds, worlds.state), before)
 
 
-def test_targets_elsewhere_are_all_there_and_in_view(worlds, task):
+def test_elsewhere_places_all_targets_in_view(worlds, task):
     generator = torch.Generator().manual_seed(0)
     other = task.elsewhere(worlds.state, worlds.camera, generator)
     assert not torch.equal(poses(worlds, other), poses(worlds, worlds.state))
@@ -50,7 +50,7 @@ def test_targets_elsewhere_are_all_there_and_in_view(worlds, task):
     assert (props[seen] >= 0).flatten(1).any(1).all()
 
 
-def test_a_target_is_behind_once_the_drone_is_beyond_it(worlds, task):
+def test_is_behind_after_the_drone_has_passed(worlds, task):
     state = task.one_target(worlds.bodies(1), torch.tensor([[3.0, 0.0, 0.0]]).double())
     target = task.next_target(state)
     assert not task.is_behind(state, target) and not task.is_reached(state, target)
@@ -58,7 +58,7 @@ def test_a_target_is_behind_once_the_drone_is_beyond_it(worlds, task):
     assert task.is_behind(state, target)
 
 
-def test_the_grid_is_symmetric_and_what_is_called_for_is_so(worlds, task):
+def test_grid_and_needed_actions_are_symmetric(worlds, task):
     height, forward, lateral = task.grid(4, 5)
     assert (len(forward), len(lateral)) == (4, 5) and 0.0 in height
     torch.testing.assert_close(lateral, -lateral.flip(0))

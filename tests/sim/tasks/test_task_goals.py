@@ -1,11 +1,11 @@
-"""What verdicts count on, of every task."""
+"""Requirements of verdicts that every task meets."""
 
 import torch
 
 from drone_rl.sim.tasks import Goals
 
 
-def test_goals_are_made_of_what_the_task_says_it_reads(task, truth):
+def test_goals_need_only_the_scored_entries(task, truth):
     goals = task.score({name: truth[name] for name in task.scored})
     assert isinstance(goals, Goals) and len(goals) == 5
     assert goals.reached.dtype == torch.bool and goals.reached.shape == goals.stratum.shape
@@ -13,7 +13,7 @@ def test_goals_are_made_of_what_the_task_says_it_reads(task, truth):
     assert goals[:2].world.shape[0] == 2
 
 
-def test_worlds_are_told_apart_by_what_was_drawn_and_not_by_what_was_done(worlds, task, truth):
+def test_goals_identify_scenes_not_behavior(worlds, task, truth):
     before = task.score({name: truth[name] for name in task.scored}).world
     state, _ = worlds.advance(worlds.state, torch.tensor([0, 1, 2, 0, 1]))
     later = {**task.info(state), "drone": state.body.position.float()}
@@ -21,7 +21,7 @@ def test_worlds_are_told_apart_by_what_was_drawn_and_not_by_what_was_done(worlds
     assert len(before.unique(dim=0)) > 1
 
 
-def test_classes_are_of_goals_and_have_names(task, truth):
+def test_classes_are_named_subsets_of_goals(task, truth):
     goals = task.score({name: truth[name] for name in task.scored})
     found = list(task.classes(goals))
     assert found
@@ -30,7 +30,7 @@ def test_classes_are_of_goals_and_have_names(task, truth):
         assert by and value and of.dtype == torch.bool and of.shape == goals.reached.shape
 
 
-def test_the_oracle_reads_what_there_is_and_reaches_every_goal(worlds, task):
+def test_oracle_reaches_every_goal(worlds, task):
     rule, state = task.oracle, worlds.state
     done = torch.zeros(5, dtype=torch.bool)
     for _ in range(100):
@@ -44,6 +44,6 @@ def test_the_oracle_reads_what_there_is_and_reaches_every_goal(worlds, task):
     assert (state.end_reason == task.success_end).all()
 
 
-def test_luck_is_chance_and_actions_that_can_be_taken(worlds, task):
+def test_blind_baselines_are_random_or_valid_actions(worlds, task):
     assert set(task.blind_baselines) - {"random"} <= set(worlds.dynamics.actions.names)
     assert "oracle" not in task.blind_baselines and task.expected_end != task.success_end

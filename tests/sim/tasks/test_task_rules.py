@@ -1,4 +1,4 @@
-"""What simulators count on, of every task."""
+"""Requirements of simulators that every task meets."""
 
 import torch
 
@@ -6,24 +6,24 @@ from drone_rl.utils.seeding import world_random_state
 
 
 def tensors(state):
-    """All tensors of a state, those of its body among them."""
+    """Return all tensors of a state, including those of its body."""
     flat = dict(vars(state))
     body = flat.pop("body")
     return {**flat, **vars(body)}
 
 
-def test_information_is_as_announced(worlds, task):
-    told = task.info(worlds.state)
-    assert set(told) == set(task.entries)
+def test_info_matches_the_entries(worlds, task):
+    info = task.info(worlds.state)
+    assert set(info) == set(task.entries)
     for name, entry in task.entries.items():
-        assert told[name].shape == (5, *entry.shape), name
-        assert told[name].dtype == entry.dtype, name
+        assert info[name].shape == (5, *entry.shape), name
+        assert info[name].dtype == entry.dtype, name
         if entry.low is not None:
-            assert entry.low <= told[name].min() and told[name].max() <= entry.high, name
+            assert entry.low <= info[name].min() and info[name].max() <= entry.high, name
     assert set(task.observed) <= set(task.entries)
 
 
-def test_a_stream_draws_the_same_episodes_again_and_different_ones_in_turn(task):
+def test_random_stream_determines_episodes(task):
     def drawn():
         stream = world_random_state(4, 2)
         return [task.draw(stream) for _ in range(4)]
@@ -34,7 +34,7 @@ def test_a_stream_draws_the_same_episodes_again_and_different_ones_in_turn(task)
     assert any(not torch.equal(first[0], other) for other in first[1:])
 
 
-def test_judging_leaves_what_it_is_given_alone(worlds, task):
+def test_judge_does_not_modify_its_input(worlds, task):
     before = {name: value.clone() for name, value in tensors(worlds.state).items()}
     body = worlds.dynamics.step(worlds.state.body, torch.zeros(5, dtype=torch.int64))
     after, reward = task.judge(worlds.state, body)
@@ -44,7 +44,7 @@ def test_judging_leaves_what_it_is_given_alone(worlds, task):
     assert torch.equal(after.steps, before["steps"] + 1)
 
 
-def test_worlds_know_nothing_of_each_other(worlds, task):
+def test_environments_are_independent(worlds, task):
     action = torch.tensor([0, 1, 2, 0, 1])
     together, rewards = worlds.advance(worlds.state, action)
     for i in range(5):
@@ -56,7 +56,7 @@ def test_worlds_know_nothing_of_each_other(worlds, task):
             torch.testing.assert_close(found, value, equal_nan=True, rtol=0, atol=0, msg=name)
 
 
-def test_every_prop_has_a_place_and_a_geom(worlds, task):
+def test_every_prop_has_a_position_and_a_geom(worlds, task):
     props = task.make_props()
     assert task.places(worlds.state).shape == (5, len(props), 3)
     assert {p for p in worlds.scene.props if p >= 0} == set(range(len(props)))
@@ -69,8 +69,8 @@ def test_every_prop_has_a_place_and_a_geom(worlds, task):
         assert meanings == {prop.semantic_class}
 
 
-def test_episodes_end_by_a_reason_that_has_a_name(worlds, task):
-    """Going left and right for ever is cut off in the end, and earns no more than there is."""
+def test_episodes_end_with_a_named_reason(worlds, task):
+    """Moving left and right is truncated, with at most the largest reward."""
     state, earned = worlds.state, torch.zeros(5, dtype=torch.float64)
     for step in range(400):
         if (state.end_reason != 0).all():
@@ -81,6 +81,6 @@ def test_episodes_end_by_a_reason_that_has_a_name(worlds, task):
     assert (earned <= task.largest_reward).all() and task.ends(0).name == "RUNNING"
 
 
-def test_the_drone_starts_at_the_origin_of_the_task(worlds, task):
+def test_drone_starts_at_the_origin_of_the_task(worlds, task):
     assert worlds.state.body.position.tolist() == [list(task.origin)] * 5
     assert not worlds.state.end_reason.any() and task.drone_size > 0
