@@ -35,7 +35,7 @@ def test_same_seed_gives_same_transitions():
     assert not torch.equal(sample(1), sample(2))
 
 
-def test_outcomes_of_two_steps_by_hand():
+def test_outcomes_of_two_steps_match_hand_computed_ones():
     """Leave at once (1/5), later (4/5 * 1/2), or stay (4/5 * 1/2); 3/4 of departures succeed."""
     found = {(o.actions, o.rewards): o.probability for o in outcomes([0.2, 0.5])}
     assert found == pytest.approx(
@@ -95,7 +95,7 @@ def test_exact_gradient_is_the_derivative_of_the_expected_reward():
     assert exact_gradient([0.5]).tolist() == [0.75 / 4]
 
 
-def test_truncated_exactly_at_the_horizon_and_terminated_before():
+def test_truncation_is_at_the_horizon_and_termination_before():
     env = ThreeStateEnv(3, horizon=2)
     state = env.reset()
     state = env.step(state.set("action", torch.tensor([0, 1, 0])))["next"]

@@ -81,8 +81,8 @@ def test_fused_episodes_equal_their_replay_by_torchrl_bit_for_bit(dynamics):
             for key in (("next", "reward"), ("next", "done"), ("next", "truncated"), REASON):
                 assert torch.equal(torch.stack([row[key] for row in rows]), state[key][is_on])
             for name in ("collected", "drone"):
-                told = torch.stack([row["next", "info", name] for row in rows])
-                assert torch.equal(told, state["next", "info", name][is_on])
+                reported = torch.stack([row["next", "info", name] for row in rows])
+                assert torch.equal(reported, state["next", "info", name][is_on])
             state = state["next"]
         assert batch["next", "done"].sum() == 5
         network = collector.actor.module[0].module

@@ -48,9 +48,7 @@ def assert_same(one, two):
         assert torch.equal(one[key], two[key]), key
 
 
-def test_same_complete_episodes_as_on_threads_and_a_killed_worker_changes_nothing(
-    on_ray, on_threads, caplog
-):
+def test_episodes_equal_those_of_threads_also_after_a_worker_is_killed(on_ray, on_threads, caplog):
     first = on_ray.collect()
     assert_same(first, on_threads.collect())
     assert len(episode_rewards(first)) == 6

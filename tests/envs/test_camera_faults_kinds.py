@@ -114,15 +114,17 @@ def test_blur_equals_the_function():
 
 def test_shift_lasts_for_an_episode_and_takes_all_values():
     shown, clean = film(Shift(1, 1), steps=2, episodes=30)
-    ways = torch.cartesian_prod(torch.arange(-1, 2), torch.arange(-1, 2))
+    offsets = torch.cartesian_prod(torch.arange(-1, 2), torch.arange(-1, 2))
     drawn = set()
     for t in range(0, 60, 2):
         for world in range(N):
             fits = [
                 {
                     i
-                    for i, way in enumerate(ways)
-                    if torch.equal(shown[step, world], fault_models.shift(clean[step, world], way))
+                    for i, offset in enumerate(offsets)
+                    if torch.equal(
+                        shown[step, world], fault_models.shift(clean[step, world], offset)
+                    )
                 }
                 for step in (t, t + 1)
             ]

@@ -60,10 +60,10 @@ def test_step_entries_equal_torchrl():
     for step in range(5):
         moved, reward = renderer.worlds.advance(renderer.worlds.state, action)
         state = env.step(state.set("action", action))
-        told, done = renderer.entries(moved, reward)
-        assert set(told) == {*KEPT, reason}
-        assert not (told["next", "terminated"] & told["next", "truncated"]).any()
-        assert all(torch.equal(value, state[key]) for key, value in told.items())
+        entries, done = renderer.entries(moved, reward)
+        assert set(entries) == {*KEPT, reason}
+        assert not (entries["next", "terminated"] & entries["next", "truncated"]).any()
+        assert all(torch.equal(value, state[key]) for key, value in entries.items())
         assert torch.equal(done, state["next", "done"]) and bool(done.all()) is (step == 4)
         state = state["next"]
     env.close()

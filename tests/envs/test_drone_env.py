@@ -162,8 +162,8 @@ def test_running_state_resumes_within_episodes():
     other.load_running_state(saved)
     assert torch.equal(other.last_pixels, env.last_pixels)
     for action in ([0, 0], [1, 0]):
-        told = TensorDict({"action": torch.tensor(action)}, [2])
-        one, two = (e.step(told.clone())["next"] for e in (env, other))
+        command = TensorDict({"action": torch.tensor(action)}, [2])
+        one, two = (e.step(command.clone())["next"] for e in (env, other))
         assert all(torch.equal(one[k], two[k]) for k in ("pixels", "reward", "done"))
     assert torch.equal(*(e.reset()["info", "cube_positions"] for e in (env, other)))
     with pytest.raises(InputError, match="num_envs=2"):

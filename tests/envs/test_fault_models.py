@@ -38,18 +38,18 @@ def test_noise_step_matches_hand_computed_values():
 
 
 def test_noise_is_clipped_at_black_and_white():
-    pictures = torch.tensor([0.1, 0.5, 0.9]).reshape(1, 1, 3)
+    images = torch.tensor([0.1, 0.5, 0.9]).reshape(1, 1, 3)
     noise = torch.tensor([-1.0, 0.5, 1.0]).reshape(1, 1, 3)
-    noisy = fault_models.noise(0.2).show(pictures, noise, 0.0)
+    noisy = fault_models.noise(0.2).show(images, noise, 0.0)
     torch.testing.assert_close(noisy.flatten(), torch.tensor([0.0, 0.6, 1.0]))
-    assert torch.equal(fault_models.noise(0.0).show(pictures, noise, 0.0), pictures)
+    assert torch.equal(fault_models.noise(0.0).show(images, noise, 0.0), images)
 
 
 @pytest.mark.parametrize("width", [0.3, 0.5, 2.0])
 def test_blur_turns_a_bright_pixel_into_a_gaussian(width):
-    picture = torch.zeros(1, 41, 51)
-    picture[0, 20, 25] = 1.0
-    blurred = fault_models.blur(picture, width)[0]
+    image = torch.zeros(1, 41, 51)
+    image[0, 20, 25] = 1.0
+    blurred = fault_models.blur(image, width)[0]
     down, across = torch.meshgrid(torch.arange(41) - 20, torch.arange(51) - 25, indexing="ij")
     falls = torch.exp(-(down**2 + across**2).double() / (2 * width**2))
     torch.testing.assert_close(blurred, (falls / falls.sum()).float(), atol=2e-5, rtol=0)
@@ -67,22 +67,22 @@ def test_gaussian_weights_match_hand_computed_ones():
 
 @pytest.mark.parametrize("width", [0.0, 0.5, 3.0, 16.0])
 def test_blur_keeps_a_constant_image(width):
-    picture = torch.full((2, 1, 5, 7), 0.7)
-    torch.testing.assert_close(fault_models.blur(picture, width), picture)
+    image = torch.full((2, 1, 5, 7), 0.7)
+    torch.testing.assert_close(fault_models.blur(image, width), image)
 
 
 def test_blur_replicates_the_border():
-    picture = torch.tensor([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]).reshape(1, 1, 6)
+    image = torch.tensor([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]).reshape(1, 1, 6)
     weights = fault_models.gaussian(0.5)  # two pixels on each side
     expected = [weights[0] + weights[1] + weights[2], weights[1] + weights[0], weights[0], 0, 0, 0]
-    torch.testing.assert_close(fault_models.blur(picture, 0.5).flatten(), torch.tensor(expected))
+    torch.testing.assert_close(fault_models.blur(image, 0.5).flatten(), torch.tensor(expected))
 
 
 def test_blur_does_not_depend_on_batch_size():
-    pictures = torch.rand(7, 2, 9, 11, generator=torch.Generator().manual_seed(0))
-    together = fault_models.blur(pictures, 1.3)
+    images = torch.rand(7, 2, 9, 11, generator=torch.Generator().manual_seed(0))
+    together = fault_models.blur(images, 1.3)
     for i in range(7):
-        assert torch.equal(fault_models.blur(pictures[i : i + 1], 1.3)[0], together[i])
+        assert torch.equal(fault_models.blur(images[i : i + 1], 1.3)[0], together[i])
 
 
 def fixed_source(*values):
@@ -104,12 +104,12 @@ def test_more_dead_rows_include_the_fewer():
 
 
 def test_dead_rows_are_constant():
-    pictures = torch.full((1, 2, 3, 2), 0.5)
+    images = torch.full((1, 2, 3, 2), 0.5)
     dead = torch.tensor([[False, True, False]])
-    killed = fault_models.dead_rows(1, level=0.25).show(pictures, dead, 0.0)
+    killed = fault_models.dead_rows(1, level=0.25).show(images, dead, 0.0)
     assert killed.dtype == torch.float32
     assert killed[0, :, :, 0].tolist() == [[0.5, 0.25, 0.5]] * 2
-    assert fault_models.dead_rows(1).show(pictures, dead, 0.0)[0, 0, 1].tolist() == [0.0, 0.0]
+    assert fault_models.dead_rows(1).show(images, dead, 0.0)[0, 0, 1].tolist() == [0.0, 0.0]
 
 
 def test_frozen_images_are_the_previous_ones():
@@ -132,9 +132,9 @@ def test_late_frames_repeat_the_first_image_until_the_second_arrives(frames, sho
 
 
 def test_shift_matches_hand_computed_images():
-    picture = torch.arange(6.0).reshape(1, 1, 2, 3).repeat(3, 1, 1, 1)
+    image = torch.arange(6.0).reshape(1, 1, 2, 3).repeat(3, 1, 1, 1)
     by = torch.tensor([[0, 0], [1, 0], [-1, 2]])  # down, right
-    stays, down, up_and_right = fault_models.shift(picture, by)[:, 0].tolist()
+    stays, down, up_and_right = fault_models.shift(image, by)[:, 0].tolist()
     assert stays == [[0, 1, 2], [3, 4, 5]]
     assert down == [[0, 1, 2], [0, 1, 2]]
     assert up_and_right == [[3, 3, 3], [3, 3, 3]]

@@ -148,7 +148,7 @@ def test_discounting_rotates_the_gradient():
 
 
 @pytest.mark.parametrize(("episodes", "degrees", "length"), [(2, 2.89, 0.819), (3, 10.71, 1.093)])
-def test_bias_of_the_shipped_default(episodes, degrees, length):
+def test_bias_of_the_default_settings(episodes, degrees, length):
     """gamma 0.95, scaled, mean over steps, as in conf/train.yaml."""
     exact = exact_gradient(EVEN, 0.95).numpy()
     found = expected_update(EVEN, LeaveOneOut(0.95, scale=True), episodes, "mean")

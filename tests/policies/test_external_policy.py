@@ -54,8 +54,8 @@ def test_sampled_actions_equal_those_of_the_network(network):
     few = {"episodes": 6, "num_envs": 6, "seed": 0, "progress": silent}
     own, found = drone_rl.evaluate("good", **few), drone_rl.evaluate(network, **few)
     assert found.flown == own.flown
-    told = found.as_dict()
-    assert (told["policy"], told["trained"]) == ("SmallCNN", None)
+    verdict = found.as_dict()
+    assert (verdict["policy"], verdict["trained"]) == ("SmallCNN", None)
 
 
 def test_in_task_changes_or_replaces_the_task():

@@ -73,7 +73,7 @@ def test_distance_is_the_total_variation(kind):
         ((1, 0, 0, 0, 0), (0, 1, 0, 0, 0), 0.0),  # up and down are not sides
     ],
 )
-def test_opposition_is_the_lesser_swing_between_left_and_right(probs, other, expected):
+def test_opposition_is_the_smaller_change_of_left_and_right(probs, other, expected):
     assert FIVE.opposition(np.array(probs), np.array(other)) == pytest.approx(expected)
 
 

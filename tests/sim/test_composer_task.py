@@ -106,7 +106,7 @@ def test_pixels_through_opengl(egl):
 
 
 @pytest.mark.parametrize("mount", ["gimbal", "body"])
-def test_cameras_on_a_gimbal_stay_level_and_those_on_the_body_tilt_with_it(mount):
+def test_gimballed_cameras_stay_level_and_body_cameras_tilt(mount):
     flying = DynamicsSettings(mode="simple_flight", camera_mount=mount)
     task = ComposerTask(pixels=False, dynamics=flying)
     body = task.state.body

@@ -137,7 +137,7 @@ def test_disparity_is_the_offset_between_two_cameras(worlds):
     kinds = ImageType.SEGMENTATION, ImageType.DISPARITY_NORMALIZED
     requests = [ImageRequest(camera, kind, as_float=True) for camera in "01" for kind in kinds]
     seen, share, aside, _ = images(worlds, state, requests, height=90, width=150, ids=ids)
-    middle, other = (picture[0, 45].nonzero().float().mean() for picture in (seen, aside))
+    middle, other = (frame[0, 45].nonzero().float().mean() for frame in (seen, aside))
     face = 5.0 - 0.4 - 1.25
     assert share[0, 45, 75].item() == pytest.approx(75 * 0.25 / face / 150, rel=1e-4)
     assert (middle - other).item() == pytest.approx(150 * share[0, 45, 75].item(), abs=1.0)

@@ -81,8 +81,8 @@ def test_disabled_autoreset_requires_a_reset(make):
         if ended.any():
             with pytest.raises(InputError, match=r"worlds \[.*\] have ended; reset them by reset"):
                 ours.step(np.zeros(COUNT, int))
-            told = [env.reset(options={"reset_mask": ended}) for env in (ours, theirs)]
-            assert_same(*told, "partial reset")
+            resets = [env.reset(options={"reset_mask": ended}) for env in (ours, theirs)]
+            assert_same(*resets, "partial reset")
         actions = moves.integers(0, 3, COUNT)
         step = ours.step(actions)
         assert_same(step, theirs.step(actions))

@@ -73,15 +73,15 @@ def test_transforms_are_applied(make):
     assert seen.observation_space.shape == (1, 7, 64)
     for env in (raw, seen):
         env.seed(0)
-    frames, pictures = raw.reset(), seen.reset()
+    frames, images = raw.reset(), seen.reset()
     done = np.zeros(COUNT, bool)
     while not done.any():
         gray = frames.astype(np.float32) @ np.array([0.299, 0.587, 0.114], np.float32) / 255
         wanted = (gray[:, None, 2:9] - 0.53) / 0.21
-        np.testing.assert_allclose(pictures, wanted, atol=1e-5)
-        assert pictures.dtype == np.float32
+        np.testing.assert_allclose(images, wanted, atol=1e-5)
+        assert images.dtype == np.float32
         frames, _, done, infos = raw.step(np.zeros(COUNT, int))
-        pictures, _, _, same = seen.step(np.zeros(COUNT, int))
+        images, _, _, same = seen.step(np.zeros(COUNT, int))
     (world, *_) = np.flatnonzero(done)
     last = infos[world]["terminal_observation"].astype(np.float32)
     gray = last @ np.array([0.299, 0.587, 0.114], np.float32) / 255

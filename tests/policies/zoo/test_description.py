@@ -281,8 +281,8 @@ def test_environment_uses_described_or_given_dynamics(monkeypatch):
     flight = {"dynamics": FLIGHT.values(), "actions": fast.values()}
     described = parse({**DEFAULT, **flight})
 
-    def flown(**told):
-        env = described.build_env(1, seed=0, device="cpu", pixels=False, **told)
+    def flown(**options):
+        env = described.build_env(1, seed=0, device="cpu", pixels=False, **options)
         return env.base_env.worlds.dynamics
 
     own = flown()

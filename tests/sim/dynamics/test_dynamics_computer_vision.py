@@ -4,7 +4,7 @@ from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import ComputerVision
 
 
-def test_moves_are_one_metre_forward_left_and_right():
+def test_moves_are_one_meter_forward_left_and_right():
     body = ComputerVision().start(torch.zeros(3, 3, dtype=torch.float64))
     moved = ComputerVision().step(body, torch.tensor([Move.FORWARD, Move.LEFT, Move.RIGHT]))
     assert moved.position.tolist() == [[1, 0, 0], [0, 1, 0], [0, -1, 0]]

@@ -26,14 +26,14 @@ def test_collision_is_kept_until_it_is_read():
     state = suite.update_collisions(state, touched, place(2))
     state = suite.update_collisions(state, touched, place(3))
     assert state.has_collided.tolist() == [False, True]
-    told, state = suite.read_collisions(state)
-    assert told.has_collided.tolist() == [False, True]
-    assert told.contact.thing.tolist() == [NOTHING, 3]
-    assert told.contact.normal[1].tolist() == [0.0, 0.0, 1.0]
-    assert told.contact.point[1].tolist() == [0.0, 0.0, 2.0]
-    assert told.contact.depth[1].item() == 0.02
-    assert told.contact.time[1].item() == 0.5
-    assert told.position[1].tolist() == [2.0, 2.0, 2.0]
+    collision, state = suite.read_collisions(state)
+    assert collision.has_collided.tolist() == [False, True]
+    assert collision.contact.thing.tolist() == [NOTHING, 3]
+    assert collision.contact.normal[1].tolist() == [0.0, 0.0, 1.0]
+    assert collision.contact.point[1].tolist() == [0.0, 0.0, 2.0]
+    assert collision.contact.depth[1].item() == 0.02
+    assert collision.contact.time[1].item() == 0.5
+    assert collision.position[1].tolist() == [2.0, 2.0, 2.0]
     again, state = suite.read_collisions(state)
     assert again.has_collided.tolist() == [False, False]
     assert again.contact.thing.tolist() == [NOTHING, 3]
@@ -55,7 +55,7 @@ def test_collisions_are_read_per_drone():
     state = suite.update_collisions(
         suite.start_collisions(place(0)), contact([1, 2], [0.1] * 2), place(1)
     )
-    told, after = suite.read_collisions(state, torch.tensor([1]))
-    assert told.contact.thing.tolist() == [2]
+    collision, after = suite.read_collisions(state, torch.tensor([1]))
+    assert collision.contact.thing.tolist() == [2]
     assert after.has_collided.tolist() == [True, False]
     assert state.has_collided.tolist() == [True, True]

@@ -105,7 +105,7 @@ def beyond(value):
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_touch_distance_is_exact(axis, sign):
+def test_contact_distance_is_exact(axis, sign):
     """On each axis and from both sides, 1.65 m is a contact and the next float64 is none."""
     for distance, touches in ((1.65, True), (beyond(1.65), False)):
         cube = torch.zeros(1, 1, 3).double()
@@ -133,7 +133,7 @@ def test_reward_is_two_for_two_simultaneous_cubes():
     assert state.collected.tolist() == [[True, True, False]]
 
 
-def test_passed_is_strictly_behind():
+def test_cube_is_passed_strictly_behind_the_drone():
     for x, passed in ((15.0, False), (beyond(15.0), True)):
         state, _ = fly(at(5.0, 0.0), x, 0.0)
         assert state.passed.tolist() == [[passed, False]]
@@ -166,7 +166,7 @@ def test_lateral_offset_is_unknown_until_a_cube_is_the_next_one():
     assert state.lateral[0, 1:].isnan().all()
 
 
-def test_side_is_ahead_up_to_exactly_the_touch_distance():
+def test_side_is_ahead_up_to_the_contact_distance():
     for y, side in ((1.65, Side.AHEAD), (beyond(1.65), Side.LEFT)):
         for sign in (1, -1):
             cubes = torch.tensor([[[15.0, sign * y, 0.0]]], dtype=torch.float64)

@@ -41,7 +41,7 @@ def test_sky_blends_from_horizon_to_zenith(renderer):
 
 
 @pytest.mark.parametrize("visibility", [10.0, 20.0])
-def test_fog_leaves_a_twentieth_of_the_contrast_at_its_visibility(renderer, visibility):
+def test_fog_leaves_5_percent_of_the_contrast_at_its_visibility(renderer, visibility):
     colors = {**WHITE, SemanticClass.SKY: (0.0, 0.2, 0.4)}
     image = render(renderer, Appearance(colors=colors, fog=visibility, **EVEN))[0].double()
     aside = (2.5 + 0.125) / 10  # of the tested pixel, relative to its depth

@@ -20,9 +20,9 @@ KINDS = {
 
 
 @wp.kernel(enable_backward=False)
-def put(job: structs_kernel.Job, worn: structs_kernel.Materials, out: structs_kernel.Images):
-    shade_span(job, worn, out, 2, 5, job.owner[2], job.nearest[2])
-    shade_span(job, worn, out, 5, 6, job.owner[5], job.nearest[5])
+def put(job: structs_kernel.Job, material: structs_kernel.Materials, out: structs_kernel.Images):
+    shade_span(job, material, out, 2, 5, job.owner[2], job.nearest[2])
+    shade_span(job, material, out, 5, 6, job.owner[5], job.nearest[5])
 
 
 def shown_by(*names):

@@ -12,19 +12,19 @@ from tests.box_ahead import array, materials
 
 
 @wp.kernel(enable_backward=False)
-def light(worn: structs_kernel.Materials, out: wp.array[wp.vec3]):
-    lit, dark = light_surface(worn, 0, wp.vec3(0.0, 0.0, 1.0))
+def light(material: structs_kernel.Materials, out: wp.array[wp.vec3]):
+    lit, dark = light_surface(material, 0, wp.vec3(0.0, 0.0, 1.0))
     out[0] = lit
     out[1] = dark
 
 
 def test_shadow_blocks_only_the_first_light():
-    worn = materials()
-    worn.ambient = array([[[0.1] * 3, [0.05] * 3]], wp.vec3)
-    worn.diffuse = array([[[0.5] * 3, [0.2, 0.0, 0.0]]], wp.vec3)
-    worn.direction = array([[[0.0, -0.6, -0.8], [0.0, 0.0, -1.0]]], wp.vec3)
+    material = materials()
+    material.ambient = array([[[0.1] * 3, [0.05] * 3]], wp.vec3)
+    material.diffuse = array([[[0.5] * 3, [0.2, 0.0, 0.0]]], wp.vec3)
+    material.direction = array([[[0.0, -0.6, -0.8], [0.0, 0.0, -1.0]]], wp.vec3)
     out = wp.zeros(2, dtype=wp.vec3, device="cpu")
-    wp.launch(light, 1, inputs=[worn, out], device="cpu")
+    wp.launch(light, 1, inputs=[material, out], device="cpu")
     np.testing.assert_allclose(out.numpy()[0], [0.75, 0.55, 0.55], atol=1e-6)
     np.testing.assert_allclose(out.numpy()[1], [0.35, 0.15, 0.15], atol=1e-6)
 
