@@ -1,6 +1,6 @@
 """A small user-defined task, to test that no code depends on a particular task.
 
-The drone flies past posts beside its path without touching them. The reward is 1 for each passed
+The drone flies past posts next to its path without touching them. The reward is 1 for each passed
 post; touching one ends the episode. Nothing is collected or removed.
 """
 

@@ -43,7 +43,7 @@ def test_file_is_resized_to_a_power_of_two(tmp_path):
     "content, words",
     [
         (None, "can't be read as an image"),
-        (b"not a picture", "can't be read as an image"),
+        (b"not an image", "can't be read as an image"),
         (b"", "can't be read as an image"),
     ],
 )
