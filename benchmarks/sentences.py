@@ -1,7 +1,10 @@
 """Conditions of sentences: each must change or disappear when a change makes it false."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+import importlib
+import inspect
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from benchmarks import evidence_changes
@@ -18,34 +21,51 @@ from benchmarks.evidence import (
 )
 from drone_rl.evaluation import evaluate as evaluation
 from drone_rl.evaluation import verdict_text as verdict
-from drone_rl.explanations.report.behavior import SOURCE
+from drone_rl.explanations.report.behavior import say_source
 from drone_rl.explanations.report.page import PARTS
 from drone_rl.robustness import shifts_text as shifts
 from drone_rl.sweeps import text as sweep
 from drone_rl.utils import text as seeds
-from drone_rl.utils.text import Sentence, said
+from drone_rl.utils.text import Claims, Paragraph, said
 from drone_rl.verdicts import export as card
 
 Changes = Mapping[str, Any]
-SENTENCES: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
-    "verdict": (verdict.SENTENCES, VERDICT),
-    "evaluation": (evaluation.EVALUATION, EVALUATION),
+SENTENCES: dict[str, tuple[tuple[Paragraph, ...], Mapping[str, Any]]] = {
+    "verdict": ((verdict.SENTENCES,), VERDICT),
+    "evaluation": ((evaluation.EVALUATION,), EVALUATION),
     "explanation": (
-        (*SOURCE, *(s for part in PARTS.values() for group in part.text.values() for s in group)),
+        (say_source, *(paragraph for part in PARTS.values() for paragraph in part.text.values())),
         EXPLANATION,
     ),
-    "card": (card.SENTENCES, CARD),
-    "shifts": (shifts.SHIFTS, SHIFTS),
-    "sweep": (sweep.SENTENCES, SWEEP),
-    "setting": (sweep.GROUP_SENTENCES, GROUP),
-    "bodies": (seeds.BODIES, FIXED_SEED),
-    "looped": (seeds.LOOPED, FIXED_SEED),
-    "chances": (seeds.CHANCES, FIXED_SEED),
-    "check": (seeds.CHECK, FIXED_SEED),
+    "card": ((card.SENTENCES,), CARD),
+    "shifts": ((shifts.SHIFTS,), SHIFTS),
+    "sweep": ((sweep.SENTENCES,), SWEEP),
+    "setting": ((sweep.GROUP_SENTENCES,), GROUP),
+    "bodies": ((seeds.BODIES,), FIXED_SEED),
+    "looped": ((seeds.LOOPED,), FIXED_SEED),
+    "chances": ((seeds.CHANCES,), FIXED_SEED),
+    "check": ((seeds.CHECK,), FIXED_SEED),
 }
-"""All sentences of the program and evidence for them, by subject."""
+"""All paragraphs of the program and evidence for them, by subject."""
 NO_CLAIMS = {"card.intervals", "card.use"}
 """Sentences that explain terms or usage and state no finding."""
+
+
+def said_of(paragraphs: Iterable[Paragraph], evidence: Mapping[str, Any]) -> Claims:
+    """The permitted sentences of several paragraphs by name."""
+    return {n: text for paragraph in paragraphs for n, text in said(paragraph, evidence).items()}
+
+
+def sentence_names(paragraphs: Iterable[Paragraph]) -> list[str]:
+    """Names of all sentences, permitted or not; those of functions are read from their source."""
+    names, modules = list[str](), set[str]()
+    for paragraph in paragraphs:
+        if isinstance(paragraph, Sequence):
+            names += [sentence.name for sentence in paragraph]
+        else:
+            modules.add(paragraph.__module__)
+    sources = [inspect.getsource(importlib.import_module(name)) for name in sorted(modules)]
+    return [*names, *(n for s in sources for n in re.findall(r'"(\w+\.\w+)"(?:\] =|: )', s))]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,10 +84,10 @@ class EvidenceChange:
     @property
     def texts(self) -> tuple[str | None, str | None]:
         """The sentence before and after the change; None if it does not appear."""
-        sentences, evidence = SENTENCES[self.subject]
+        paragraphs, evidence = SENTENCES[self.subject]
         before = changed(evidence, self.given)
         after = changed(before, self.change)
-        return said(sentences, before).get(self.name), said(sentences, after).get(self.name)
+        return said_of(paragraphs, before).get(self.name), said_of(paragraphs, after).get(self.name)
 
     @property
     def is_flipped(self) -> bool:

@@ -1,12 +1,11 @@
 """Text for reports: numbers, lists, and sentences with the condition that permits each.
 
-The program states claims only through `Sentence`: a claim whose evidence is missing or contradicts
-it is not written. Evidence is plain data, as in the JSON files, so that a test can change the
-evidence and see the sentence change or disappear.
+A claim whose evidence is missing or contradicts it is not written. Evidence is plain data, as in
+the JSON files, so that a test can change the evidence and see the sentence change or disappear.
 """
 
 import dataclasses
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
@@ -68,14 +67,22 @@ class Sentence:
     """The claim; called only if the condition holds."""
 
 
-def say(sentences: Iterable[Sentence], evidence: Evidence) -> str:
+Claims = dict[str, str]
+"""Permitted sentences by name, such as "loops.none"."""
+Paragraph = Sequence[Sentence] | Callable[[Evidence], Claims]
+"""Sentences with their conditions, or a function that returns the permitted ones."""
+
+
+def say(paragraph: Paragraph, evidence: Evidence) -> str:
     """Return the permitted sentences as one paragraph."""
-    return " ".join(s.text(evidence) for s in sentences if s.may(evidence))
+    return " ".join(said(paragraph, evidence).values())
 
 
-def said(sentences: Iterable[Sentence], evidence: Evidence) -> dict[str, str]:
+def said(paragraph: Paragraph, evidence: Evidence) -> Claims:
     """Return the permitted sentences by name."""
-    return {s.name: s.text(evidence) for s in sentences if s.may(evidence)}
+    if isinstance(paragraph, Sequence):
+        return {s.name: s.text(evidence) for s in paragraph if s.may(evidence)}
+    return paragraph(evidence)
 
 
 def percent(share: float) -> str:

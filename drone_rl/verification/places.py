@@ -25,7 +25,7 @@ from drone_rl.utils.text import say
 from drone_rl.verification.prover.action_map import ActionMap, map_actions
 from drone_rl.verification.prover.arrangement import Window
 from drone_rl.verification.prover.policy_spec import make_policy_spec, one_thread
-from drone_rl.verification.text import PLACES, rows
+from drone_rl.verification.text import rows, say_places
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,13 +70,13 @@ class Places:
         (folder / "places.svg").write_text(head)
 
     def __str__(self) -> str:
-        about = say(PLACES, {"places": self.numbers})
+        about = say(say_places, {"places": self.numbers})
         return f"{aligned(rows(self.numbers, SHOWN_MOVES.names))}\n{about}"
 
     def _repr_html_(self) -> str:
         head, *lines = rows(self.numbers, SHOWN_MOVES.names)
         figure = regions.chart(self.numbers, self.places.outlines(), SHOWN_MOVES)
-        about = say(PLACES, {"places": self.numbers})
+        about = say(say_places, {"places": self.numbers})
         return table(head, lines) + paragraph(about) + picture(figure)
 
 

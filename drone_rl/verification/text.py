@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from drone_rl.sim.vocabulary import shown_actions
-from drone_rl.utils.text import Evidence, Sentence, all_cubes, exact, listed
+from drone_rl.utils.text import Claims, Evidence, all_cubes, exact, listed
 
 WHERE = {"left": "on its left", "ahead": "straight ahead", "right": "on its right"}
 """Sides, and how people say them."""
@@ -37,98 +37,60 @@ def rows(places: Evidence, names: Sequence[str]) -> list[list[str]]:
     ]
 
 
-def _made(evidence: Evidence) -> bool:
-    return "refused" not in evidence["places"]
-
-
-def _does(evidence: Evidence) -> str:
-    places, names = evidence["places"], shown_actions(evidence).names
-    window, parts = places["window"], []
+def say_places(evidence: Evidence) -> Claims:
+    """Say what the exact map shows, or why there is none."""
+    places = evidence["places"]
+    if "refused" in places:
+        return {"places.refused": f"Of this policy there is no exact map: {places['refused']}."}
+    names, window, claims = shown_actions(evidence).names, places["window"], Claims()
+    parts, blind = [], []
     for side, of in places["sides"].items():
         needed = "forward" if side == "ahead" else side
         share = of["actions"][names.index(needed)]
         parts.append(f"{needed} for {exact_percent(share)} of those {WHERE[side]}")
-    return (
+        if of["blind"]:
+            blind.append(f"{exact_percent(of['blind'])} of those {WHERE[side]}")
+    claims["places.does"] = (
         f"With one cube {window['nearest']:g} to {window['farthest']:g} m ahead of its camera and "
         f"up to {window['sideways']:g} m to either side, exactly and over all places, it goes "
         f"{listed(parts)}."
     )
+    if places["unseen"] > 0:
+        claims["places.unseen"] = (
+            f"At {exact_percent(places['unseen'])} of the places not one pixel shows the cube."
+        )
+    if places["blind"] > 0:
+        claims["places.blind"] = (
+            f"It is blind to {listed(blind)}: a turn is called for, and it goes "
+            f"{names[places['alone']]}, as with no cube in sight. Farther on it may see the cube "
+            "yet."
+        )
+    if places["blind"] == 0:
+        claims["places.sees"] = (
+            "Nowhere a turn is called for does it do just what it does with no cube in sight, "
+            "unless that is the turn."
+        )
+    return claims | _say_closeness(places)
 
 
-def _blind(evidence: Evidence) -> str:
-    places, names = evidence["places"], shown_actions(evidence).names
-    shares = [
-        f"{exact_percent(of['blind'])} of those {WHERE[side]}"
-        for side, of in places["sides"].items()
-        if of["blind"]
-    ]
-    return (
-        f"It is blind to {listed(shares)}: a turn is called for, and it goes "
-        f"{names[places['alone']]}, as with no cube in sight. Farther on it may see the cube yet."
-    )
-
-
-def _gap(evidence: Evidence) -> str:
-    places = evidence["places"]
-    left = places["least_gap_left"]
-    return (
+def _say_closeness(places: Evidence) -> Claims:
+    left, claims = places["least_gap_left"], Claims()
+    claims["places.gap"] = (
         f"Its two highest logits come closest, to {places['least_gap']:.2g}, with the cube "
         f"{places['least_gap_ahead']:.2f} m ahead and {abs(left):.2f} m to the "
         f"{'left' if left > 0 else 'right'}."
     )
-
-
-PLACES = (
-    Sentence("places.does", "every cell of places was decided", _made, _does),
-    Sentence(
-        "places.unseen",
-        "there are places where no pixel shows the cube",
-        lambda e: _made(e) and e["places"]["unseen"] > 0,
-        lambda e: (
-            f"At {exact_percent(e['places']['unseen'])} of the places not one pixel shows the cube."
-        ),
-    ),
-    Sentence(
-        "places.blind",
-        "there are places where a turn is called for and only what is done anyway is done",
-        lambda e: _made(e) and e["places"]["blind"] > 0,
-        _blind,
-    ),
-    Sentence(
-        "places.sees",
-        "there are none",
-        lambda e: _made(e) and e["places"]["blind"] == 0,
-        lambda e: (
-            "Nowhere a turn is called for does it do just what it does with no cube in sight, "
-            "unless that is the turn."
-        ),
-    ),
-    Sentence("places.gap", "all logits were compared", _made, _gap),
-    Sentence(
-        "places.close",
-        "somewhere the two highest logits are closer than sums are sure to be",
-        lambda e: _made(e) and e["places"]["close"] > 0,
-        lambda e: (
-            f"At {exact_percent(e['places']['close'])} of the places they are no farther apart "
-            f"than {e['places']['logit_gap']:g}, where rounding may decide between the two actions."
-        ),
-    ),
-    Sentence(
-        "places.doubt",
-        "pictures have borders",
-        lambda e: _made(e) and e["places"]["in_doubt"] > 0,
-        lambda e: (
-            f"At most {exact_percent(e['places']['in_doubt'])} of the places lie so near to a "
-            "border between two pictures that the renderer, by rounding, may show the other one."
-        ),
-    ),
-    Sentence(
-        "places.refused",
-        "no closed form is known of what it sees, or it chooses among other actions",
-        lambda e: not _made(e),
-        lambda e: f"Of this policy there is no exact map: {e['places']['refused']}.",
-    ),
-)
+    if places["close"] > 0:
+        claims["places.close"] = (
+            f"At {exact_percent(places['close'])} of the places they are no farther apart than "
+            f"{places['logit_gap']:g}, where rounding may decide between the two actions."
+        )
+    if places["in_doubt"] > 0:
+        claims["places.doubt"] = (
+            f"At most {exact_percent(places['in_doubt'])} of the places lie so near to a border "
+            "between two pictures that the renderer, by rounding, may show the other one."
+        )
+    return claims
 
 
 def describe_proof(certificate: Mapping[str, Any]) -> str:

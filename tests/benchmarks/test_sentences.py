@@ -1,11 +1,19 @@
 import importlib
 import pkgutil
+from collections.abc import Sequence
 
 import pytest
 
 import drone_rl
 from benchmarks.evidence import changed
-from benchmarks.sentences import CHANGES, NO_CLAIMS, SENTENCES, EvidenceChange, bench_sentences
+from benchmarks.sentences import (
+    CHANGES,
+    NO_CLAIMS,
+    SENTENCES,
+    EvidenceChange,
+    bench_sentences,
+    sentence_names,
+)
 from drone_rl.utils.text import Sentence
 
 
@@ -19,24 +27,27 @@ def test_a_false_sentence_disappears_or_changes(change):
 
 
 def test_every_sentence_with_a_claim_has_a_change():
-    known = {(subject, s.name) for subject, (texts, _) in SENTENCES.items() for s in texts}
+    known = {(subject, name) for subject, (p, _) in SENTENCES.items() for name in sentence_names(p)}
     changed_ones = {(change.subject, change.name) for change in CHANGES}
     assert changed_ones <= known
     assert {name for _, name in known - changed_ones} == NO_CLAIMS
 
 
 def test_names_of_sentences_are_unique():
-    for sentences, _ in SENTENCES.values():
-        names = [s.name for s in sentences]
+    for paragraphs, _ in SENTENCES.values():
+        names = sentence_names(paragraphs)
         assert len(set(names)) == len(names)
 
 
 def test_every_sentence_of_the_package_is_registered():
-    known = {id(s) for sentences, _ in SENTENCES.values() for s in sentences}
+    paragraphs = [p for given, _ in SENTENCES.values() for p in given]
+    known = {id(s) for p in paragraphs for s in (p if isinstance(p, Sequence) else [p])}
     for module in pkgutil.walk_packages(drone_rl.__path__, "drone_rl."):
-        for value in vars(importlib.import_module(module.name)).values():
+        for name, value in vars(importlib.import_module(module.name)).items():
             found = value if isinstance(value, tuple) else (value,)
             assert all(id(s) in known for s in found if isinstance(s, Sentence)), module.name
+            is_paragraph = getattr(value, "__name__", "").startswith("say_")
+            assert not is_paragraph or id(value) in known, name
 
 
 def test_a_sentence_that_stays_or_never_appears_is_not_flipped():

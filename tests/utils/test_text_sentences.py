@@ -9,6 +9,8 @@ NONE = Sentence("loops.never", "none", lambda e: e["loops"] == 0, lambda e: "No 
 def test_only_what_the_evidence_allows_is_said():
     assert say([MANY, NONE], {"loops": 3}) == "3 loops."
     assert said([MANY, NONE], {"loops": 0}) == {"loops.never": "No loop."}
+    assert said(lambda e: {"loops.first": f"{e['loops']}"}, {"loops": 3}) == {"loops.first": "3"}
+    assert say(lambda e: {"loops.a": "A.", "loops.b": "B."}, {}) == "A. B."
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,11 @@
 import pytest
 
 from benchmarks.evidence import EXPLANATION, changed
-from drone_rl.utils.text import said
-from drone_rl.verification.text import PLACES, exact_percent, rows
+from drone_rl.verification.text import exact_percent, rows, say_places
 
 
 def speak(**changes):
-    return said(PLACES, changed(EXPLANATION, {f"places.{k}": v for k, v in changes.items()}))
+    return say_places(changed(EXPLANATION, {f"places.{k}": v for k, v in changes.items()}))
 
 
 def test_what_it_does_by_side():
@@ -37,7 +36,7 @@ def test_the_closest_logits():
 
 
 def test_without_a_map_only_that_is_said():
-    found = said(PLACES, {"places": {"refused": "it sees a stack of frames"}})
+    found = say_places({"places": {"refused": "it sees a stack of frames"}})
     assert found == {
         "places.refused": "Of this policy there is no exact map: it sees a stack of frames."
     }

@@ -9,7 +9,7 @@ from PIL import Image
 from drone_rl.evaluation.plots import images
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.explanations.report.validation import METHOD_NAMES
-from drone_rl.utils.text import Evidence, Sentence
+from drone_rl.utils.text import Claims, Evidence
 
 BLOCK = 16
 """Sides of a film are multiples of this many pixels, as its encoder requires."""
@@ -19,43 +19,27 @@ def _heat_by(evidence: Evidence) -> Sequence[str | None]:
     return evidence["attribution"]["film"]["heat_by"]
 
 
-def _count(evidence: Evidence, method: str | None) -> str:
-    by = _heat_by(evidence)
-    return f"On {list(by).count(method)} of the {len(by)} steps shown"
-
-
-ATTRIBUTION = (
-    Sentence(
-        "attribution.layer",
-        "the policy has a convolution",
-        lambda e: e["attribution"]["layer"] is not None,
-        lambda e: f"Grad-CAM of layer {e['attribution']['layer']}, on the first recorded episode.",
-    ),
-    Sentence(
-        "attribution.no_convolution",
-        "no convolution is known",
-        lambda e: e["attribution"]["layer"] is None,
-        lambda e: (
+def say_attribution(evidence: Evidence) -> Claims:
+    """Say which map is shown, and where it has no heat."""
+    layer, by, claims = evidence["attribution"]["layer"], _heat_by(evidence), Claims()
+    if layer is not None:
+        claims["attribution.layer"] = f"Grad-CAM of layer {layer}, on the first recorded episode."
+    else:
+        shown = METHOD_NAMES[evidence["attribution"].get("shown", "saliency")]
+        claims["attribution.no_convolution"] = (
             "Grad-CAM needs a convolution with gradients, and none is known in this policy; "
-            f"{METHOD_NAMES[e['attribution'].get('shown', 'saliency')]} is shown instead."
-        ),
-    ),
-    Sentence(
-        "attribution.stand_in",
-        "some steps show Grad-CAM of the logit",
-        lambda e: "grad_cam_logit" in _heat_by(e),
-        lambda e: (
-            f"{_count(e, 'grad_cam_logit')}, Grad-CAM of the probability is zero everywhere; "
-            "Grad-CAM of the logit is shown instead."
-        ),
-    ),
-    Sentence(
-        "attribution.no_heat",
-        "some steps have a map of zeros",
-        lambda e: None in _heat_by(e),
-        lambda e: f"{_count(e, None)}, the map is zero everywhere.",
-    ),
-)
+            f"{shown} is shown instead."
+        )
+    if "grad_cam_logit" in by:
+        claims["attribution.stand_in"] = (
+            f"On {list(by).count('grad_cam_logit')} of the {len(by)} steps shown, Grad-CAM of the "
+            "probability is zero everywhere; Grad-CAM of the logit is shown instead."
+        )
+    if None in by:
+        claims["attribution.no_heat"] = (
+            f"On {list(by).count(None)} of the {len(by)} steps shown, the map is zero everywhere."
+        )
+    return claims
 
 
 def key_frames(explanation: Explanation) -> Image.Image:
@@ -97,6 +81,6 @@ PART = Part(
     label="Grad-CAM",
     needs=("attribution",),
     is_slow=True,
-    text={"attribution": ATTRIBUTION},
+    text={"attribution": say_attribution},
     draw=lambda explanation: {"sequence": key_frames(explanation), "episode": film(explanation)},
 )

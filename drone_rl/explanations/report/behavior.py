@@ -1,7 +1,4 @@
-"""Report sections "evaluation" and "shifts" (the verdict, robustness), "dataset", and "flaws".
-
-Evidence of all sentences: `explanation.json`; of `SOURCE` also "source", the name of that file.
-"""
+"""Report sections "evaluation" and "shifts" (the verdict, robustness), "dataset", and "flaws"."""
 
 from PIL import Image
 
@@ -15,8 +12,8 @@ from drone_rl.robustness.shifts_text import QUOTED, is_quoted, rows, untested
 from drone_rl.sim.vocabulary import shown_actions, terms_of
 from drone_rl.utils.schema import as_mapping
 from drone_rl.utils.text import (
+    Claims,
     Evidence,
-    Sentence,
     among,
     bounds,
     is_fixed,
@@ -27,87 +24,73 @@ from drone_rl.utils.text import (
     seed_of,
 )
 
-SOURCE = (
-    Sentence(
-        "source.file",
-        "always",
-        lambda e: True,
-        lambda e: (
-            f"This page repeats what {e['source']} says (written "
-            f"{e.get('date') or 'on an unknown date'}, revision "
-            f"{as_mapping(e.get('provenance', {}), 'provenance').get('git_revision') or 'unknown'})"
-            ". The figures were read from this file and not measured again."
-        ),
-    ),
-)
+
+def say_source(evidence: Evidence) -> Claims:
+    """Say which file the page repeats; "source" is its name."""
+    revision = as_mapping(evidence.get("provenance", {}), "provenance").get("git_revision")
+    return {
+        "source.file": (
+            f"This page repeats what {evidence['source']} says (written "
+            f"{evidence.get('date') or 'on an unknown date'}, revision {revision or 'unknown'}). "
+            "The figures were read from this file and not measured again."
+        )
+    }
 
 
-def _is(evidence: Evidence, is_certain: bool, is_good: bool | None = None) -> bool:
-    """Return whether the verdict is certain, or not, and good, or not; None allows both."""
+def say_advice(evidence: Evidence) -> Claims:
+    """Say what to do about the verdict."""
     verdict = evidence["verdict"]
-    return verdict["certain"] == is_certain and is_good in (None, verdict["kind"] == "good")
+    if verdict["certain"] and verdict["kind"] == "good":
+        return {
+            "advice.use": (
+                "What to do: rely on it in environments like those tested, and in no others."
+            )
+        }
+    if verdict["certain"]:
+        return {
+            "advice.refuse": (
+                "What to do: do not rely on it; drone-rl verdict with require=good ends with exit "
+                f"status {verdict['exit_code']}."
+            )
+        }
+    if depends_on_rounding(verdict):
+        more = "do not rely on it; more episodes do not change that."
+    elif (enough := verdict["enough"]) is None:
+        more = "evaluate many more episodes, or do not rely on it; this may stay open."
+    else:
+        more = f"evaluate more episodes (episodes={enough}) before relying on it."
+    return {"advice.more": f"What to do: {more}"}
 
 
-def _more_episodes(evidence: Evidence) -> str:
-    if depends_on_rounding(evidence["verdict"]):
-        return "What to do: do not rely on it; more episodes do not change that."
-    enough = evidence["verdict"]["enough"]
-    if enough is None:
-        return "What to do: evaluate many more episodes, or do not rely on it; this may stay open."
-    return f"What to do: evaluate more episodes (episodes={enough}) before relying on it."
+def say_scope(evidence: Evidence) -> Claims:
+    """Say with which colours, light or sizes the policy was not evaluated."""
+    if not (names := untested(evidence)):
+        return {}
+    start = "The verdict holds for" if is_quoted(evidence) else "Tested in"
+    return {
+        "scope.one_look": (
+            f"{start} one appearance and one light only, those of its task: nothing here tests "
+            f"other {listed(names, 'or')}."
+        )
+    }
 
 
-ADVICE = (
-    Sentence("advice.more", "the verdict is not certain", lambda e: _is(e, False), _more_episodes),
-    Sentence(
-        "advice.use",
-        "the verdict is good and certain",
-        lambda e: _is(e, True, True),
-        lambda e: "What to do: rely on it in environments like those tested, and in no others.",
-    ),
-    Sentence(
-        "advice.refuse",
-        "the verdict is not good, and certain",
-        lambda e: _is(e, True, False),
-        lambda e: (
-            "What to do: do not rely on it; drone-rl verdict with require=good ends with exit "
-            f"status {e['verdict']['exit_code']}."
-        ),
-    ),
-)
+def say_seed(evidence: Evidence) -> Claims:
+    """Warn of a seed that was known before the analysis."""
+    if not is_fixed(evidence):
+        return {}
+    return {
+        "explanation.fixed_seed": (
+            f"Fixed seed {seed_of(evidence)}: a policy could have been fitted to the environments, "
+            "frames and placements of all sections."
+        )
+    }
 
 
-SCOPE = (
-    Sentence(
-        "scope.one_look",
-        "the policy was not evaluated with other colours, light or sizes",
-        lambda e: bool(untested(e)),
-        lambda e: (
-            f"{'The verdict holds for' if is_quoted(e) else 'Tested in'} one appearance and one "
-            "light only, those of its task: nothing here tests other "
-            f"{listed(untested(e), 'or')}."
-        ),
-    ),
-)
-SEED = (
-    Sentence(
-        "explanation.fixed_seed",
-        "the seed was known before the analysis",
-        is_fixed,
-        lambda e: (
-            f"Fixed seed {seed_of(e)}: a policy could have been fitted to the environments, frames "
-            "and placements of all sections."
-        ),
-    ),
-)
-LEFT_OUT = (
-    Sentence(
-        "left_out.why",
-        "some sections could not be computed for this policy",
-        lambda e: bool(e.get("left_out")),
-        lambda e: " ".join(e["left_out"].values()),
-    ),
-)
+def say_left_out(evidence: Evidence) -> Claims:
+    """Say why sections could not be computed for this policy."""
+    reasons = evidence.get("left_out")
+    return {"left_out.why": " ".join(reasons.values())} if reasons else {}
 
 
 def _evaluation_extras(explanation: Explanation) -> dict[str, str]:
@@ -120,7 +103,7 @@ EVALUATION_PART = Part(
     title="Verdict",
     label="Verdict",
     needs=("verdict",),
-    text={"advice": ADVICE, "scope": SCOPE, "seed": SEED},
+    text={"advice": say_advice, "scope": say_scope, "seed": say_seed},
     extras=_evaluation_extras,
 )
 
@@ -151,7 +134,7 @@ LEFT_OUT_PART = Part(
     title="What is left out, and why",
     label="Left out",
     needs=("left_out",),
-    text={"left_out": LEFT_OUT},
+    text={"left_out": say_left_out},
 )
 
 
@@ -160,121 +143,74 @@ MOST_PAIRS = 4
 """Pairs of each kind that are shown."""
 
 
-def _shares(evidence: Evidence) -> dict[str, float]:
-    """Return the fraction of the steps by name of the action."""
-    shares, names = evidence["dataset"]["action_shares"], shown_actions(evidence).names
-    return dict(zip(names, shares, strict=True))
+def say_dataset(evidence: Evidence) -> Claims:
+    """Say what was recorded, and which actions the policy took."""
+    found, terms, claims = evidence["dataset"], terms_of(evidence), Claims()
+    shares = dict(zip(shown_actions(evidence).names, found["action_shares"], strict=True))
+    if found["frames"] > 0:
+        claims["dataset.size"] = (
+            f"{found['frames']} frames, spread evenly over {found['episodes']} whole episodes of "
+            f"{found['steps']:,} steps with sampled actions."
+        )
+    if max(shares.values()) < 1:
+        parts = listed([f"{percent(share)} {name}" for name, share in shares.items()])
+        claims["dataset.actions"] = f"Actions taken: {parts}."
+    if max(shares.values()) == 1:
+        only = next(name for name, share in shares.items() if share == 1)
+        claims["dataset.one_action"] = f"Every step took the same action, {only}."
+    if found["entropy"]["mean"] is not None:
+        claims["dataset.entropy"] = (
+            f"The policy's mean entropy is {found['entropy']['mean']:.2f}, where 0 is "
+            f"deterministic and 1 is uniform ({bounds(found['entropy'])})."
+        )
+    if found["goals_reached"] == 0:
+        claims["dataset.none_reached"] = f"No {terms.goal} was {terms.reached} in these episodes."
+    return claims
 
 
-DATASET = (
-    Sentence(
-        "dataset.size",
-        "frames were recorded",
-        lambda e: e["dataset"]["frames"] > 0,
-        lambda e: (
-            f"{e['dataset']['frames']} frames, spread evenly over {e['dataset']['episodes']} whole "
-            f"episodes of {e['dataset']['steps']:,} steps with sampled actions."
-        ),
-    ),
-    Sentence(
-        "dataset.actions",
-        "more than one action was taken",
-        lambda e: max(e["dataset"]["action_shares"]) < 1,
-        lambda e: (
-            f"Actions taken: {listed([f'{percent(s)} {name}' for name, s in _shares(e).items()])}."
-        ),
-    ),
-    Sentence(
-        "dataset.one_action",
-        "every step took the same action",
-        lambda e: max(e["dataset"]["action_shares"]) == 1,
-        lambda e: (
-            "Every step took the same action, "
-            f"{next(name for name, s in _shares(e).items() if s == 1)}."
-        ),
-    ),
-    Sentence(
-        "dataset.entropy",
-        "the policy's probabilities were recorded",
-        lambda e: e["dataset"]["entropy"]["mean"] is not None,
-        lambda e: (
-            f"The policy's mean entropy is {e['dataset']['entropy']['mean']:.2f}, where 0 is "
-            f"deterministic and 1 is uniform ({bounds(e['dataset']['entropy'])})."
-        ),
-    ),
-    Sentence(
-        "dataset.none_reached",
-        "no step reached a goal",
-        lambda e: e["dataset"]["goals_reached"] == 0,
-        lambda e: f"No {terms_of(e).goal} was {terms_of(e).reached} in these episodes.",
-    ),
-)
-
-
-def _pairs(evidence: Evidence) -> str:
-    found, target = evidence["contradictions"], terms_of(evidence).target
-    verb = "gets" if found["pairs"] == 1 else "get"
-    unknown = found["unknown"]
-    last = f", {unknown} unknown (a frame has no next {target})." if unknown else "."
-    return (
-        f"Among these {found['frames']} frames, {plural(found['pairs'], 'pair')} of similar ones "
-        f"{verb} opposite actions (each frame is in one pair at most): "
-        f"{plural(found['contradictions'], 'contradiction')} (the next {target} is at about the "
-        f"same place in both), {found['justified']} justified (it is elsewhere){last}"
-    )
-
-
-CONTRADICTIONS = (
-    Sentence(
-        "contradictions.none",
-        "no pair was found among the analysed frames",
-        lambda e: e["contradictions"]["pairs"] == 0,
-        lambda e: (
-            f"Among these {e['contradictions']['frames']} frames, no two similar ones get "
-            "opposite actions."
-        ),
-    ),
-    Sentence(
-        "contradictions.pairs",
-        "pairs were found; all are counted",
-        lambda e: e["contradictions"]["pairs"] > 0,
-        _pairs,
-    ),
-    Sentence(
-        "contradictions.worst",
-        "one of the pairs is a contradiction",
-        lambda e: e["contradictions"]["contradictions"] > 0,
-        lambda e: (
+def say_contradictions(evidence: Evidence) -> Claims:
+    """Say how many similar frames get opposite actions, and whether that is justified."""
+    found, target, claims = evidence["contradictions"], terms_of(evidence).target, Claims()
+    if found["pairs"] == 0:
+        claims["contradictions.none"] = (
+            f"Among these {found['frames']} frames, no two similar ones get opposite actions."
+        )
+    if found["pairs"] > 0:
+        unknown = found["unknown"]
+        last = f", {unknown} unknown (a frame has no next {target})." if unknown else "."
+        claims["contradictions.pairs"] = (
+            f"Among these {found['frames']} frames, {plural(found['pairs'], 'pair')} of similar "
+            f"ones {'gets' if found['pairs'] == 1 else 'get'} opposite actions (each frame is in "
+            f"one pair at most): {plural(found['contradictions'], 'contradiction')} (the next "
+            f"{target} is at about the same place in both), {found['justified']} justified (it is "
+            f"elsewhere){last}"
+        )
+    if found["contradictions"] > 0:
+        claims["contradictions.worst"] = (
             "In the worst contradiction, the probability of a turn changes sides by "
-            f"{e['contradictions']['worst_opposition']:.2f}."
-        ),
-    ),
-)
+            f"{found['worst_opposition']:.2f}."
+        )
+    return claims
 
 
-def _loops(evidence: Evidence) -> str:
-    found = evidence["loops"]
-    share = found["episodes"]
-    return (
-        f"In {among(share)} of these sampled episodes the drone moves back and forth in a loop "
-        f"({bounds(share, percent)}); the longest loop has {found['longest']} steps, and all loops "
-        f"together have {percent(found['frames_share'])} of the steps."
-    )
-
-
-LOOPS = (
-    Sentence(
-        "loops.none",
-        "no episode has a loop",
-        lambda e: not e["loops"]["loops"],
-        lambda e: (
-            f"None of these {e['loops']['episodes']['trials']} sampled episodes has a loop, in "
-            "which the drone moves back and forth; up to "
-            f"{percent(e['loops']['episodes']['upper95'])} of such episodes may have one (95%)."
-        ),
-    ),
-    Sentence("loops.some", "episodes have loops", lambda e: e["loops"]["loops"] > 0, _loops),
-)
+def say_loops(evidence: Evidence) -> Claims:
+    """Say in how many episodes the drone moves back and forth."""
+    found, share = evidence["loops"], evidence["loops"]["episodes"]
+    if found["loops"] > 0:
+        return {
+            "loops.some": (
+                f"In {among(share)} of these sampled episodes the drone moves back and forth in a "
+                f"loop ({bounds(share, percent)}); the longest loop has {found['longest']} steps, "
+                f"and all loops together have {percent(found['frames_share'])} of the steps."
+            )
+        }
+    return {
+        "loops.none": (
+            f"None of these {share['trials']} sampled episodes has a loop, in which the drone "
+            f"moves back and forth; up to {percent(share['upper95'])} of such episodes may have "
+            "one (95%)."
+        )
+    }
 
 
 def pairs(explanation: Explanation, kind: str) -> Image.Image | None:
@@ -294,13 +230,13 @@ def pairs(explanation: Explanation, kind: str) -> Image.Image | None:
 
 
 DATASET_PART = Part(
-    title="Recorded rollouts", label="Rollouts", needs=("dataset",), text={"dataset": DATASET}
+    title="Recorded rollouts", label="Rollouts", needs=("dataset",), text={"dataset": say_dataset}
 )
 FLAWS_PART = Part(
     title="Contradictions and loops",
     label="Contradictions and loops",
     needs=("contradictions", "loops"),
-    text={"contradictions": CONTRADICTIONS, "loops": LOOPS},
+    text={"contradictions": say_contradictions, "loops": say_loops},
     draw=lambda explanation: {
         f"pairs_{kind}": image for kind in KINDS if (image := pairs(explanation, kind)) is not None
     },

@@ -7,43 +7,30 @@ from PIL import Image
 from drone_rl.evaluation.plots import images
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.sim.vocabulary import shown_actions
-from drone_rl.utils.text import Evidence, Sentence, listed
+from drone_rl.utils.text import Claims, Evidence, listed
 
 _OBJECTIVES = ("probability", "logit")
 
 
-def _reached(evidence: Evidence) -> str:
-    reached = evidence["class_model"]["logit"]["probabilities"]
-    names = shown_actions(evidence).names
-    parts = listed([f"{a} {p:.3f}" for a, p in zip(names, reached, strict=True)])
-    return f"Probabilities of the actions on the observations optimized by logit: {parts}."
-
-
-def _unreached(evidence: Evidence) -> list[str]:
-    """Return actions that no attempt of either objective made more probable than not."""
+def say_class_models(evidence: Evidence) -> Claims:
+    """Say which actions the optimized observations make probable, and which none does."""
     found, names = evidence["class_model"], shown_actions(evidence).names
+    pairs = zip(names, found["logit"]["probabilities"], strict=True)
+    claims = {
+        "class_model.reached": (
+            "Probabilities of the actions on the observations optimized by logit: "
+            f"{listed([f'{action} {p:.3f}' for action, p in pairs])}."
+        )
+    }
     highest = [max(p) for p in zip(*(found[o]["highest"] for o in _OBJECTIVES), strict=True)]
-    return [action for action, p in zip(names, highest, strict=True) if p <= 0.5]
-
-
-def _not_reached(evidence: Evidence) -> str:
-    found = evidence["class_model"]
-    attempts = sum(found[o]["starts"] * found[o]["num_settings"] for o in _OBJECTIVES)
-    return (
-        f"None of the {attempts} attempts made {listed(_unreached(evidence), 'or')} more probable "
-        "than not; this does not show that no observation does."
-    )
-
-
-CLASS_MODEL = (
-    Sentence("class_model.reached", "always", lambda e: True, _reached),
-    Sentence(
-        "class_model.not_reached",
-        "no start under any setting gave an action a probability above one half",
-        lambda e: bool(_unreached(e)),
-        _not_reached,
-    ),
-)
+    unreached = [action for action, p in zip(names, highest, strict=True) if p <= 0.5]
+    if unreached:
+        attempts = sum(found[o]["starts"] * found[o]["num_settings"] for o in _OBJECTIVES)
+        claims["class_model.not_reached"] = (
+            f"None of the {attempts} attempts made {listed(unreached, 'or')} more probable than "
+            "not; this does not show that no observation does."
+        )
+    return claims
 
 
 def grid(explanations: Sequence[Explanation]) -> Image.Image:
@@ -70,7 +57,7 @@ PART = Part(
     title="Observations that maximize each action (class models)",
     label="Class models",
     needs=("class_model",),
-    text={"class_model": CLASS_MODEL},
+    text={"class_model": say_class_models},
     draw=lambda explanation: {"class_model": grid([explanation])},
     compare=lambda explanations: {"class_models": grid(explanations)},
 )

@@ -11,7 +11,7 @@ from scipy.spatial.distance import cdist
 from drone_rl.evaluation.plots import images
 from drone_rl.evaluation.plots.saving import Rows, to_png, to_uri
 from drone_rl.explanations.report.explanation import Explanation, Part
-from drone_rl.utils.text import Evidence, Sentence, listed, percent
+from drone_rl.utils.text import Claims, Evidence, listed, percent
 
 MOST_THUMBNAILS = 900
 """If there are more frames, an evenly spaced selection is shown."""
@@ -24,34 +24,26 @@ TILES_ACROSS = 30
 MAPS = ("features", "pixels")
 
 
-def _faithful(evidence: Evidence) -> str:
-    one, two = evidence["tsne"]["features"], evidence["tsne"]["pixels"]
-    return (
-        f"Faithfulness of the maps: of the {one['neighbours']} nearest neighbours on a map, "
-        f"{percent(one['neighbours_kept'])} (features of layer {one['layer']}) and "
-        f"{percent(two['neighbours_kept'])} (pixels) are nearest neighbours in the original space "
-        f"(chance: {percent(one['neighbours_chance'])} and "
-        f"{percent(two['neighbours_chance'])}); trustworthiness "
-        f"{one['trustworthiness']:.3f} and {two['trustworthiness']:.3f} of 1."
-    )
-
-
-def _unfaithful(evidence: Evidence) -> list[str]:
-    return [n for n in MAPS if evidence["tsne"][n]["neighbours_kept"] < 0.5]
-
-
-TSNE = (
-    Sentence("tsne.faithful", "always", lambda e: True, _faithful),
-    Sentence(
-        "tsne.unfaithful",
-        "less than half of the neighbours on a map are neighbours in the original space",
-        lambda e: bool(_unfaithful(e)),
-        lambda e: (
-            f"Most neighbours on the map of {listed(_unfaithful(e))} are not neighbours in the "
+def say_embedding(evidence: Evidence) -> Claims:
+    """Say how well the maps keep neighbourhoods."""
+    one, two = (evidence["tsne"][name] for name in MAPS)
+    claims = {
+        "tsne.faithful": (
+            f"Faithfulness of the maps: of the {one['neighbours']} nearest neighbours on a map, "
+            f"{percent(one['neighbours_kept'])} (features of layer {one['layer']}) and "
+            f"{percent(two['neighbours_kept'])} (pixels) are nearest neighbours in the original "
+            f"space (chance: {percent(one['neighbours_chance'])} and "
+            f"{percent(two['neighbours_chance'])}); trustworthiness "
+            f"{one['trustworthiness']:.3f} and {two['trustworthiness']:.3f} of 1."
+        )
+    }
+    unfaithful = [name for name in MAPS if evidence["tsne"][name]["neighbours_kept"] < 0.5]
+    if unfaithful:
+        claims["tsne.unfaithful"] = (
+            f"Most neighbours on the map of {listed(unfaithful)} are not neighbours in the "
             "original space."
-        ),
-    ),
-)
+        )
+    return claims
 
 
 def tsne_map(explanation: Explanation, which: str) -> Image.Image:
@@ -145,7 +137,7 @@ PART = Part(
     label="t-SNE",
     needs=("tsne",),
     is_slow=True,
-    text={"tsne": TSNE},
+    text={"tsne": say_embedding},
     draw=lambda explanation: {f"tsne_{which}": tsne_map(explanation, which) for which in MAPS},
     tables=lambda explanation: {"tsne": table(explanation)},
     extras=lambda explanation: {"points": points(explanation)},

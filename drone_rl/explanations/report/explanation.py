@@ -19,7 +19,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes, refuse_links
 from drone_rl.utils.limits import ARRAYS_BYTES, EXPLANATION_BYTES, EXPLANATION_VALUES, Allowance
 from drone_rl.utils.schema import Flag, Maybe, Text, Whole, as_mapping
-from drone_rl.utils.text import SEED_KEYS, Sentence
+from drone_rl.utils.text import SEED_KEYS, Paragraph
 
 FORMAT = "drone_rl explanation"
 FORMAT_VERSION = 3
@@ -130,8 +130,8 @@ class Part:
     """Entries of `explanation.json` that it shows; if one is missing, the part is left out."""
     is_slow: bool = False
     """Whether it is rendered after the other parts, so that their errors are found first."""
-    text: Mapping[str, Sequence[Sentence]] = dataclasses.field(default_factory=dict)
-    """Sentences by paragraph."""
+    text: Mapping[str, Paragraph] = dataclasses.field(default_factory=dict)
+    """Paragraphs by name."""
     draw: Callable[[Explanation], Drawn] = _nothing
     """Returns the figures of one policy by file name."""
     tables: Callable[[Explanation], Mapping[str, Rows]] = _nothing

@@ -142,8 +142,8 @@ class Policy:
         for part in PARTS.values():
             if part.fits(self.explanation):
                 part.tables(self.explanation)
-                for sentences in part.text.values():
-                    say(sentences, self.explanation.numbers)
+                for paragraph in part.text.values():
+                    say(paragraph, self.explanation.numbers)
 
     def show(self, part: Part) -> dict[str, Any]:
         """Save the figures and numbers of a part; return what its template needs."""
@@ -157,7 +157,7 @@ class Policy:
             "numbers": numbers,
             "actions": explanation.actions,
             "pictures": _save(part.draw(explanation), self.folder, f"{self.prefix}_"),
-            "text": {name: say(sentences, numbers) for name, sentences in part.text.items()},
+            "text": {name: say(paragraph, numbers) for name, paragraph in part.text.items()},
             "terms": explanation.terms,
             "extras": part.extras(explanation),
         }
@@ -172,7 +172,7 @@ def render_page(policies: Sequence[Policy]) -> str:
         title="Can these policies be trusted?" if policies[1:] else "Can this policy be trusted?",
         parts=_parts(environment, policies),
         policies=explanations,
-        sources=[say(behavior.SOURCE, {**e.numbers, "source": e.source}) for e in explanations],
+        sources=[say(behavior.say_source, {**e.numbers, "source": e.source}) for e in explanations],
         policy=content_security_policy(style, script),
         style=style,
         script=script,

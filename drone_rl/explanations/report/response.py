@@ -15,115 +15,77 @@ from PIL import Image
 from drone_rl.evaluation.plots import images, regions
 from drone_rl.evaluation.plots.saving import Rows
 from drone_rl.explanations.report.explanation import Explanation, Part
-from drone_rl.sim.vocabulary import ShownActions, terms_of
-from drone_rl.utils.text import Evidence, Sentence, bounds, listed, percent
-from drone_rl.verification.text import PLACES
+from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary, terms_of
+from drone_rl.utils.text import Claims, Evidence, bounds, listed, percent
 from drone_rl.verification.text import rows as place_rows
+from drone_rl.verification.text import say_places
 
 _OUTCOMES = ("#d9d9de", "#4269d0")
 """Colours of targets that are not handled, and of those that are."""
 
 
-def _level(evidence: Evidence, level: bool = True) -> list[Evidence]:
-    """Return rows of targets at the drone's height, or of all others."""
-    return [row for row in evidence["response"]["rows"] if (row["height"] == 0) == level]
+def say_response(evidence: Evidence) -> Claims:
+    """Say from where targets are handled, and where the policy is blind to them."""
+    rows, terms, claims = evidence["response"]["rows"], terms_of(evidence), Claims()
+    level = [row for row in rows if row["height"] == 0]
+    other = [row for row in rows if row["height"] != 0]
+    if any(row["places"] for row in level):
+        claims["response.collected"] = (
+            f"With one {terms.target} alone and its most probable actions, the policy "
+            f"{terms.handles} from {_collected(level, terms)}."
+        )
+    if other:
+        parts = [
+            f"{abs(height):g} m {'higher' if height > 0 else 'lower'}: from "
+            f"{_collected([row for row in other if row['height'] == height], terms)}"
+            for height in sorted({row["height"] for row in other})
+        ]
+        claims["response.heights"] = f"With the {terms.target} {'; '.join(parts)}."
+    blind = {row["side"]: row["blind"] for row in level if row["side"] != "ahead"}
+    if None not in blind.values():
+        parts = [f"{percent(of)} of the places {terms.place(side)}" for side, of in blind.items()]
+        claims["response.blind"] = (
+            f"It is blind at {listed(parts)}: a turn is needed, it makes none, and its "
+            f"probabilities differ by less than {evidence['response']['blind_below']:g} from those "
+            f"without a {terms.target}. It may still detect the {terms.target} farther on."
+        )
+    return claims
 
 
-def _collected(evidence: Evidence, rows: Sequence[Evidence]) -> str:
-    place = terms_of(evidence).place
-    found = [row for row in rows if row["places"]]
-    return listed([f"{r['collected']} of {r['places']} places {place(r['side'])}" for r in found])
-
-
-def _heights(evidence: Evidence) -> str:
-    other = _level(evidence, level=False)
-    parts = []
-    for height in sorted({row["height"] for row in other}):
-        word = "higher" if height > 0 else "lower"
-        rows = [row for row in other if row["height"] == height]
-        parts.append(f"{abs(height):g} m {word}: from {_collected(evidence, rows)}")
-    return f"With the {terms_of(evidence).target} {'; '.join(parts)}."
-
-
-def _blind(evidence: Evidence) -> str:
-    rows = {row["side"]: row["blind"] for row in _level(evidence)}
-    terms = terms_of(evidence)
-    parts = [f"{percent(rows[s])} of the places {terms.place(s)}" for s in rows if s != "ahead"]
-    return (
-        f"It is blind at {listed(parts)}: a turn is needed, it makes none, and its probabilities "
-        f"differ by less than {evidence['response']['blind_below']:g} from those without a "
-        f"{terms.target}. It may still detect the {terms.target} farther on."
+def _collected(rows: Sequence[Evidence], terms: TaskVocabulary) -> str:
+    return listed(
+        [
+            f"{row['collected']} of {row['places']} places {terms.place(row['side'])}"
+            for row in rows
+            if row["places"]
+        ]
     )
 
 
-RESPONSE = (
-    Sentence(
-        "response.collected",
-        "episodes were run from places of the grid",
-        lambda e: any(row["places"] for row in _level(e)),
-        lambda e: (
-            f"With one {terms_of(e).target} alone and its most probable actions, the policy "
-            f"{terms_of(e).handles} from {_collected(e, _level(e))}."
-        ),
-    ),
-    Sentence(
-        "response.heights",
-        "the task has targets at other heights",
-        lambda e: bool(_level(e, level=False)),
-        _heights,
-    ),
-    Sentence(
-        "response.blind",
-        "places on both sides need a turn",
-        lambda e: all(r["blind"] is not None for r in _level(e) if r["side"] != "ahead"),
-        _blind,
-    ),
-)
-
-
-def _absolute(evidence: Evidence) -> Evidence:
-    return evidence["asymmetry"]["dataset"]["absolute"]
-
-
-def _signed(evidence: Evidence) -> Evidence:
-    return evidence["asymmetry"]["dataset"]["signed"]
-
-
-def _prefers(evidence: Evidence) -> str:
-    signed = _signed(evidence)
-    side = "left" if signed["mean"] > 0 else "right"
-    ends = sorted(abs(signed[end]) for end in ("lower95", "upper95"))
-    size = {"lower95": ends[0], "upper95": ends[1]}
-    return f"It prefers the {side}, by {abs(signed['mean']):.2f} in probability ({bounds(size)})."
-
-
-def _is_sure(evidence: Evidence) -> bool:
-    signed = _signed(evidence)
-    return signed["lower95"] > 0 or signed["upper95"] < 0
-
-
-ASYMMETRY = (
-    Sentence(
-        "asymmetry.differs",
-        "always",
-        lambda e: True,
-        lambda e: (
+def say_asymmetry(evidence: Evidence) -> Claims:
+    """Say how far the policy differs from its mirror image, and which side it prefers."""
+    found = evidence["asymmetry"]["dataset"]
+    absolute, signed = found["absolute"], found["signed"]
+    claims = {
+        "asymmetry.differs": (
             "On these frames the policy differs from its mirror image by "
-            f"{_absolute(e)['mean']:.2f} on average (0: perfectly symmetric, 1: always opposite; "
-            f"{bounds(_absolute(e))}), on the grid by {e['asymmetry']['grid']['absolute']:.2f}."
-        ),
-    ),
-    Sentence("asymmetry.prefers", "the interval of the preference excludes 0", _is_sure, _prefers),
-    Sentence(
-        "asymmetry.undecided",
-        "the interval of the preference contains 0",
-        lambda e: not _is_sure(e),
-        lambda e: (
+            f"{absolute['mean']:.2f} on average (0: perfectly symmetric, 1: always opposite; "
+            f"{bounds(absolute)}), on the grid by {evidence['asymmetry']['grid']['absolute']:.2f}."
+        )
+    }
+    if signed["lower95"] > 0 or signed["upper95"] < 0:
+        side = "left" if signed["mean"] > 0 else "right"
+        low, high = sorted(abs(signed[end]) for end in ("lower95", "upper95"))
+        size = bounds({"lower95": low, "upper95": high})
+        claims["asymmetry.prefers"] = (
+            f"It prefers the {side}, by {abs(signed['mean']):.2f} in probability ({size})."
+        )
+    else:
+        claims["asymmetry.undecided"] = (
             "These episodes do not show whether it prefers a side "
-            f"({_signed(e)['mean']:+.2f}, {bounds(_signed(e))}; above 0: left)."
-        ),
-    ),
-)
+            f"({signed['mean']:+.2f}, {bounds(signed)}; above 0: left)."
+        )
+    return claims
 
 
 def response_chart(explanation: Explanation) -> Figure:
@@ -223,7 +185,7 @@ RESPONSE_PART = Part(
     title="Response to one target by its place",
     label="Response map",
     needs=("response",),
-    text={"response": RESPONSE},
+    text={"response": say_response},
     draw=lambda explanation: {"response": response_chart(explanation)},
     tables=response_tables,
 )
@@ -231,7 +193,7 @@ ASYMMETRY_PART = Part(
     title="Left-right asymmetry",
     label="Asymmetry",
     needs=("asymmetry",),
-    text={"asymmetry": ASYMMETRY},
+    text={"asymmetry": say_asymmetry},
     draw=lambda explanation: {"asymmetry": worst_frames(explanation)},
 )
 
@@ -252,7 +214,7 @@ PLACES_PART = Part(
     title="Exact action map of one cube",
     label="Exact map",
     needs=("places",),
-    text={"places": PLACES},
+    text={"places": say_places},
     draw=lambda e: {"places": regions.chart(*_exact_map(e))} if _exact_map(e) else {},
     tables=lambda e: {"places": _place_rows(e)} if _exact_map(e) else {},
     extras=lambda e: (

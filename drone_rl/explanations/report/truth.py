@@ -13,7 +13,7 @@ from drone_rl.evaluation.plots import images
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.text import Evidence, Sentence, bounds, listed, percent, plural
+from drone_rl.utils.text import Claims, Evidence, bounds, listed, percent, plural
 
 _METHOD, _PLACEBO = "#4269d0", "#b4b8c0"
 _COLORS = ("#4269d0", "#efb118", "#ff725c", "#6cc5b0", "#9c6b4e")
@@ -161,18 +161,106 @@ def best_placebo(truth: Mapping[str, Any]) -> str:
     return max(truth["placebos"], key=lambda name: truth["placebos"][name]["mean"])
 
 
-def _is_trusted(evidence: Evidence) -> bool:
-    return evidence["truth"]["trusted"] is not None
+def say_findings(evidence: Evidence) -> Claims:
+    """Say what the tests of heat maps, the rollouts and the changes of scenes show."""
+    return {**_say_tests(evidence), **_say_outcomes(evidence), **_say_effects(evidence)}
 
 
-def _refused(evidence: Evidence) -> list[str]:
-    """Return each method that is not trusted, with the tests that it failed."""
-    return [
-        f"{METHOD_NAMES.get(name, name)} "
-        f"({'; '.join(_reason(result, test) for test in result['failed'])})"
-        for name, result in evidence["truth"]["methods"].items()
+def _say_tests(evidence: Evidence) -> Claims:
+    truth, claims = evidence["truth"], Claims()
+    affects_any = truth["frames"] > 0
+    if (name := truth["trusted"]) is not None:
+        method, rival = truth["methods"][name], best_placebo(truth)
+        score, pointing = method["score"], method["pointing"]
+        claims["truth.trusted"] = (
+            f"The heat map to trust is {_name(name)}: it shows which patches of a frame affect the "
+            f"policy (score {score['mean']:.2f}, {bounds(score)}) reliably better than every map "
+            f"that does not use the policy (the best, {rival!r}: "
+            f"{truth['placebos'][rival]['mean']:.2f}), and it depends on the weights."
+        )
+        claims["truth.hits"] = (
+            "Its hottest patch is one of those that affect the policy most in "
+            f"{percent(pointing['hit'])} of these frames (chance: {percent(pointing['chance'])})."
+        )
+    elif affects_any:
+        claims["truth.none"] = "No heat map of this policy can be trusted."
+    if not affects_any:
+        claims["truth.unmoved"] = (
+            "No change of a part of these frames affects this policy, so no heat map of it could "
+            "be verified: trust none."
+        )
+    elif not truth["methods"]:
+        claims["truth.untested"] = (
+            "No method could be tested: whether a map depends on the weights can't be measured "
+            "where they are unknown. Give the policy as a torch module."
+        )
+    if affects_any and (unmoved := truth["frames_unmoved"]) > 0:
+        claims["truth.left_out"] = (
+            f"Of {truth['frames'] + unmoved} frames {unmoved} are left out, since no part of them "
+            "affects the policy."
+        )
+    return claims
+
+
+def _say_outcomes(evidence: Evidence) -> Claims:
+    outcomes, terms, claims = evidence["truth"].get("outcomes"), terms_of(evidence), Claims()
+    if outcomes is None:
+        return claims
+    follows, ground = outcomes["follows"], outcomes["ground_changed"]
+    if terms.follows and _is_above(follows["lower95"], 0):
+        claims["truth.follows"] = (
+            f"When the next {terms.target} is moved sideways, "
+            f"{plural(outcomes['flights'], 'rollout')} from these frames follow it by "
+            f"{follows['mean']:.2f} m per metre ({bounds(follows)})."
+        )
+    elif terms.follows:
+        claims["truth.follows_not"] = (
+            f"When the next {terms.target} is moved sideways, rollouts from these frames do not "
+            f"reliably follow it ({follows['mean']:.2f} m per metre, {bounds(follows)})."
+        )
+    claims["truth.ground"] = (
+        "Another ground colour, which should not matter, changes the outcome of "
+        f"{percent(ground['mean'])} of these rollouts, and of no more than "
+        f"{percent(ground['upper95'])} (95%)."
+    )
+    return claims
+
+
+def _say_effects(evidence: Evidence) -> Claims:
+    truth, claims = evidence["truth"], Claims()
+    taken, patch = (
+        truth["interventions"][name] for name in ("target taken away", "ground patch changed")
+    )
+    if patch["upper95"] is not None:
+        claims["truth.patch"] = (
+            "A patch of ground, which should not matter, changes the action probabilities by no "
+            f"more than {patch['upper95']:.2f} of 1 on average (95%)."
+        )
+        if _is_above(taken["lower95"], patch["upper95"]):
+            claims["truth.target"] = (
+                f"Removing the next {terms_of(evidence).target} changes the action probabilities "
+                f"by {taken['mean']:.2f} of 1 ({bounds(taken)}), reliably more than a patch of "
+                "ground does."
+            )
+    if (error := truth["integration_error"]) is not None:
+        claims["truth.integral"] = (
+            "Integrated gradients differ from the change in probability that they must add up to "
+            f"by {error['mean']:.4f} on average and {error['max']:.4f} at most, on "
+            f"{plural(error['pictures'], 'frame')}."
+        )
+    return claims
+
+
+def say_reasons(evidence: Evidence) -> Claims:
+    """Say why methods are not trusted; the page shows it only on request."""
+    truth = evidence["truth"]
+    refused = [
+        f"{_name(name)} ({'; '.join(_reason(result, test) for test in result['failed'])})"
+        for name, result in truth["methods"].items()
         if not result["trusted"]
     ]
+    is_said = truth["frames"] > 0 and refused
+    return {"truth.refused": f"Not trusted: {listed(refused)}."} if is_said else {}
 
 
 def _reason(result: Mapping[str, Any], test: str) -> str:
@@ -185,177 +273,6 @@ def _reason(result: Mapping[str, Any], test: str) -> str:
 
 def _is_above(value: float | None, bar: float) -> bool:
     return value is not None and value > bar
-
-
-def _has_outcomes(evidence: Evidence) -> bool:
-    return evidence["truth"].get("outcomes") is not None
-
-
-def _can_follow(evidence: Evidence) -> bool:
-    """Return whether the task's targets are approached, so that a policy can follow them."""
-    return _has_outcomes(evidence) and terms_of(evidence).follows
-
-
-def _outcome(evidence: Evidence, name: str) -> Mapping[str, Any]:
-    return evidence["truth"]["outcomes"][name]
-
-
-def _follows(evidence: Evidence) -> bool:
-    return _can_follow(evidence) and _is_above(_outcome(evidence, "follows")["lower95"], 0)
-
-
-def _next(evidence: Evidence) -> str:
-    return f"the next {terms_of(evidence).target}"
-
-
-def _trusted(evidence: Evidence) -> str:
-    truth = evidence["truth"]
-    name, rival = truth["trusted"], best_placebo(truth)
-    score = truth["methods"][name]["score"]
-    return (
-        f"The heat map to trust is {METHOD_NAMES.get(name, name)}: it shows which patches of a "
-        f"frame affect the policy (score {score['mean']:.2f}, {bounds(score)}) reliably better "
-        f"than every map that does not use the policy (the best, {rival!r}: "
-        f"{truth['placebos'][rival]['mean']:.2f}), and it depends on the weights."
-    )
-
-
-def _pointing(evidence: Evidence) -> Mapping[str, Any]:
-    return evidence["truth"]["methods"][evidence["truth"]["trusted"]]["pointing"]
-
-
-def _effect(evidence: Evidence, change: str) -> Mapping[str, Any]:
-    return evidence["truth"]["interventions"][change]
-
-
-def _target_counts(evidence: Evidence) -> bool:
-    taken = _effect(evidence, "target taken away")["lower95"]
-    patch = _effect(evidence, "ground patch changed")["upper95"]
-    return taken is not None and patch is not None and taken > patch
-
-
-def _has_any(evidence: Evidence) -> bool:
-    return evidence["truth"]["frames"] > 0
-
-
-FINDINGS = (
-    Sentence("truth.trusted", "a method passed every test", _is_trusted, _trusted),
-    Sentence(
-        "truth.hits",
-        "a method passed every test",
-        _is_trusted,
-        lambda e: (
-            "Its hottest patch is one of those that affect the policy most in "
-            f"{percent(_pointing(e)['hit'])} of these frames "
-            f"(chance: {percent(_pointing(e)['chance'])})."
-        ),
-    ),
-    Sentence(
-        "truth.none",
-        "some patch affects the policy, and no method passed every test",
-        lambda e: _has_any(e) and not _is_trusted(e),
-        lambda e: "No heat map of this policy can be trusted.",
-    ),
-    Sentence(
-        "truth.untested",
-        "some patch affects the policy, and no method was tested",
-        lambda e: _has_any(e) and not e["truth"]["methods"],
-        lambda e: (
-            "No method could be tested: whether a map depends on the weights can't be measured "
-            "where they are unknown. Give the policy as a torch module."
-        ),
-    ),
-    Sentence(
-        "truth.unmoved",
-        "no patch of any frame affects the policy",
-        lambda e: not _has_any(e),
-        lambda e: (
-            "No change of a part of these frames affects this policy, so no heat map of it could "
-            "be verified: trust none."
-        ),
-    ),
-    Sentence(
-        "truth.left_out",
-        "some frames were left out of the tests",
-        lambda e: _has_any(e) and e["truth"]["frames_unmoved"] > 0,
-        lambda e: (
-            f"Of {e['truth']['frames'] + e['truth']['frames_unmoved']} frames "
-            f"{e['truth']['frames_unmoved']} are left out, since no part of them affects the "
-            "policy."
-        ),
-    ),
-    Sentence(
-        "truth.follows",
-        "the task's targets are approached, and rollouts reliably follow a moved target",
-        _follows,
-        lambda e: (
-            f"When {_next(e)} is moved sideways, "
-            f"{plural(e['truth']['outcomes']['flights'], 'rollout')} from these frames follow it "
-            f"by {_outcome(e, 'follows')['mean']:.2f} m per metre "
-            f"({bounds(_outcome(e, 'follows'))})."
-        ),
-    ),
-    Sentence(
-        "truth.follows_not",
-        "the task's targets are approached, and rollouts do not reliably follow a moved target",
-        lambda e: _can_follow(e) and not _follows(e),
-        lambda e: (
-            f"When {_next(e)} is moved sideways, rollouts from these frames do not reliably follow "
-            f"it ({_outcome(e, 'follows')['mean']:.2f} m per metre, "
-            f"{bounds(_outcome(e, 'follows'))})."
-        ),
-    ),
-    Sentence(
-        "truth.ground",
-        "rollouts with another ground were run",
-        _has_outcomes,
-        lambda e: (
-            "Another ground colour, which should not matter, changes the outcome of "
-            f"{percent(_outcome(e, 'ground_changed')['mean'])} of these rollouts, and of no more "
-            f"than {percent(_outcome(e, 'ground_changed')['upper95'])} (95%)."
-        ),
-    ),
-    Sentence(
-        "truth.patch",
-        "a patch of ground was changed",
-        lambda e: _effect(e, "ground patch changed")["upper95"] is not None,
-        lambda e: (
-            "A patch of ground, which should not matter, changes the action probabilities by no "
-            f"more than {_effect(e, 'ground patch changed')['upper95']:.2f} of 1 on average (95%)."
-        ),
-    ),
-    Sentence(
-        "truth.target",
-        "the effect of removing the target is above that of a patch of ground (95% bounds)",
-        _target_counts,
-        lambda e: (
-            f"Removing {_next(e)} changes the action probabilities by "
-            f"{_effect(e, 'target taken away')['mean']:.2f} of 1 "
-            f"({bounds(_effect(e, 'target taken away'))}), reliably more than a patch of ground "
-            "does."
-        ),
-    ),
-    Sentence(
-        "truth.integral",
-        "the error of integrated gradients was measured",
-        lambda e: e["truth"]["integration_error"] is not None,
-        lambda e: (
-            "Integrated gradients differ from the change in probability that they must add up to "
-            f"by {e['truth']['integration_error']['mean']:.4f} on average and "
-            f"{e['truth']['integration_error']['max']:.4f} at most, "
-            f"on {plural(e['truth']['integration_error']['pictures'], 'frame')}."
-        ),
-    ),
-)
-REASONS = (
-    Sentence(
-        "truth.refused",
-        "some patch affects the policy, and a method failed a test",
-        lambda e: _has_any(e) and bool(_refused(e)),
-        lambda e: f"Not trusted: {listed(_refused(e))}.",
-    ),
-)
-"""Shown only on request: why methods are not trusted."""
 
 
 def changes(explanation: Explanation) -> Image.Image:
@@ -376,7 +293,7 @@ PART = Part(
     title="Tests of the heat maps",
     label="Tests of the heat maps",
     needs=("truth",),
-    text={"truth": FINDINGS, "reasons": REASONS},
+    text={"truth": say_findings, "reasons": say_reasons},
     draw=lambda explanation: {
         "truth": truth_chart(explanation),
         "curves": curves_chart(explanation),

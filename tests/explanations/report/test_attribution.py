@@ -3,13 +3,12 @@ import pytest
 
 from benchmarks.evidence import EXPLANATION
 from drone_rl.explanations.report.attribution import (
-    ATTRIBUTION,
     BLOCK,
     explained_step,
     film,
     key_frames,
+    say_attribution,
 )
-from drone_rl.utils.text import said
 
 STEPS = 5
 
@@ -49,7 +48,7 @@ def test_a_step_without_heat_says_so(explanation):
 
 
 def test_empty_maps_are_counted_and_no_reason_is_made_up():
-    found = said(ATTRIBUTION, EXPLANATION)
+    found = say_attribution(EXPLANATION)
     assert found["attribution.stand_in"].startswith("On 1 of the 4 steps shown")
     assert found["attribution.no_heat"] == "On 1 of the 4 steps shown, the map is zero everywhere."
     assert "because" not in " ".join(found.values())

@@ -1,8 +1,7 @@
 import pytest
 
 from benchmarks.evidence import EXPLANATION, changed
-from drone_rl.explanations.report.behavior import ADVICE, SCOPE
-from drone_rl.utils.text import said, say
+from drone_rl.explanations.report.behavior import say_advice, say_scope
 
 
 @pytest.mark.parametrize(
@@ -16,10 +15,13 @@ from drone_rl.utils.text import said, say
 )
 def test_one_thing_to_do(verdict, name, part):
     evidence = changed(EXPLANATION, {f"verdict.{k}": v for k, v in verdict.items()})
-    found = said(ADVICE, evidence)
+    found = say_advice(evidence)
     assert list(found) == [f"advice.{name}"]
     assert part in found[f"advice.{name}"]
 
 
 def test_nothing_reads_as_if_other_looks_had_been_tested():
-    assert "nothing here tests other colours, light or sizes" in say(SCOPE, EXPLANATION)
+    assert (
+        "nothing here tests other colours, light or sizes"
+        in say_scope(EXPLANATION)["scope.one_look"]
+    )

@@ -1,15 +1,12 @@
 """Sentences on the recorded rollouts, contradictions and loops, word for word."""
 
 from benchmarks.evidence import EXPLANATION, changed
-from drone_rl.explanations.report.behavior import CONTRADICTIONS, DATASET, LOOPS
-from drone_rl.utils.text import said
+from drone_rl.explanations.report.behavior import say_contradictions, say_dataset, say_loops
 
 
 def speak(**changes):
-    return said(
-        (*DATASET, *CONTRADICTIONS, *LOOPS),
-        changed(EXPLANATION, {k.replace("__", "."): v for k, v in changes.items()}),
-    )
+    evidence = changed(EXPLANATION, {k.replace("__", "."): v for k, v in changes.items()})
+    return say_dataset(evidence) | say_contradictions(evidence) | say_loops(evidence)
 
 
 def test_the_data_set():

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from benchmarks.evidence import EXPLANATION, changed
-from drone_rl.explanations.report.class_models import CLASS_MODEL, PART, grid
-from drone_rl.utils.text import said
+from drone_rl.explanations.report.class_models import PART, grid, say_class_models
 
 
 @pytest.fixture
@@ -47,9 +46,8 @@ def test_policies_stand_below_each_other(explanation):
 
 
 def speak(**changes):
-    return said(
-        CLASS_MODEL, changed(EXPLANATION, {k.replace("__", "."): v for k, v in changes.items()})
-    )
+    evidence = changed(EXPLANATION, {k.replace("__", "."): v for k, v in changes.items()})
+    return say_class_models(evidence)
 
 
 def test_a_search_that_found_nothing_proves_nothing():

@@ -3,13 +3,12 @@
 import pytest
 
 from benchmarks.evidence import EXPLANATION, HIGHER, changed
-from drone_rl.explanations.report.response import ASYMMETRY, RESPONSE
-from drone_rl.utils.text import said
+from drone_rl.explanations.report.response import say_asymmetry, say_response
 
 
 def speak(**changes):
     evidence = changed(EXPLANATION, {k.replace("__", "."): v for k, v in changes.items()})
-    return said((*RESPONSE, *ASYMMETRY), evidence)
+    return say_response(evidence) | say_asymmetry(evidence)
 
 
 def test_outcomes_are_counted_and_blindness_is_told_of_both_sides():

@@ -1,6 +1,5 @@
 from benchmarks.evidence import EXPLANATION, changed
-from drone_rl.explanations.report.truth import FINDINGS, REASONS, best_placebo
-from drone_rl.utils.text import said
+from drone_rl.explanations.report.truth import best_placebo, say_findings, say_reasons
 
 NONE = {
     "truth.trusted": None,
@@ -10,7 +9,8 @@ NONE = {
 
 
 def speak(changes=None):
-    return said((*FINDINGS, *REASONS), changed(EXPLANATION, changes or {}))
+    evidence = changed(EXPLANATION, changes or {})
+    return say_findings(evidence) | say_reasons(evidence)
 
 
 def test_the_map_to_trust_stands_beside_the_best_placebo():
