@@ -15,8 +15,7 @@ SHOWN = ("grad_cam", "grad_cam_logit")
 """Maps of the film; the second is shown where the first has no heat."""
 INSTEAD = ("saliency", "occlusion")
 """Without Grad-CAM, the first of these that the policy allows is shown."""
-COUNT = 6
-"""Key frames of an episode, as in Figs. 13 to 15."""
+COUNT = 6  # key frames of an episode, as in Figs. 13 to 15.
 
 
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:

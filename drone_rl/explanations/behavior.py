@@ -22,10 +22,8 @@ from drone_rl.utils.intervals import mean_interval, proportion
 
 ALIKE_METRES = 1.0
 """Next targets at places that differ by at most this, relative to the drone, count as equal."""
-MIN_OPPOSITION = 0.2
-"""Pairs with a smaller opposition are ignored."""
-LISTED = 50
-"""Number of pairs that are listed; all are counted."""
+MIN_OPPOSITION = 0.2  # pairs with a smaller opposition are ignored
+LISTED = 50  # number of pairs that are listed; all are counted
 
 
 def evaluation_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
@@ -89,26 +87,19 @@ def flaws_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]
 class Kind(enum.StrEnum):
     """Kind of a pair of frames, by the simulator's ground truth."""
 
-    CONTRADICTION = "contradiction"
-    """The next target is at about the same place in both."""
-    JUSTIFIED = "justified"
-    """The next target is elsewhere."""
-    UNKNOWN = "unknown"
-    """One of the frames has no next target."""
+    CONTRADICTION = "contradiction"  # the next target is at about the same place in both
+    JUSTIFIED = "justified"  # the next target is elsewhere
+    UNKNOWN = "unknown"  # one of the frames has no next target
 
 
 @dataclasses.dataclass(frozen=True)
 class Pair:
     """Two similar frames with opposite actions."""
 
-    left: int
-    """The frame with the higher probability of left."""
-    right: int
-    """The frame with the higher probability of right."""
-    distance: float
-    """Root mean square difference of the observations."""
-    opposition: float
-    """From 0 to 1; see `Actions.opposition`."""
+    left: int  # the frame with the higher probability of left
+    right: int  # the frame with the higher probability of right
+    distance: float  # root mean square difference of the observations
+    opposition: float  # from 0 to 1; see `Actions.opposition`
     kind: Kind
 
 
@@ -180,11 +171,9 @@ def summarise_pairs(pairs: list[Pair], dataset: RolloutDataset, alike: float) ->
 class Loop:
     """A stretch of an episode in which the drone moves back and forth."""
 
-    first: int
-    """First frame."""
+    first: int  # first frame
     length: int
-    reversals: int
-    """Moves that undo the one before."""
+    reversals: int  # moves that undo the one before
 
 
 def find_loops(flights: RolloutDataset, actions: Actions, min_reversals: int = 2) -> list[Loop]:

@@ -54,24 +54,18 @@ class ClassModelSettings:
     """Maximized: the action's probability (Eq. 18), or its logit minus the mean of the logits."""
     parameterisation: Literal["pixel", "fourier"] = "pixel"
     """The variables to optimize: pixels, or their Fourier coefficients scaled by 1 / frequency."""
-    steps: int = 64
-    """Steps of gradient ascent."""
-    lr: float = 20.0
-    """Length of a step (pixel), or Adam's learning rate times 400 (fourier)."""
-    blur: float = 0.6
-    """Standard deviation of a Gaussian blur after each step, pixels."""
-    jitter: int = 1
-    """Largest random shift before each gradient, pixels."""
-    starts: int = 8
-    """Number of random starts."""
+    steps: int = 64  # steps of gradient ascent
+    lr: float = 20.0  # length of a step (pixel), or Adam's learning rate times 400 (fourier)
+    blur: float = 0.6  # standard deviation of a Gaussian blur after each step, pixels
+    jitter: int = 1  # largest random shift before each gradient, pixels
+    starts: int = 8  # number of random starts
 
 
 @dataclasses.dataclass
 class Attempts:
     """Results of one setting from each random start, for each action."""
 
-    images: Tensor  # (num_actions, starts, C, H, W)
-    """Optimized observations."""
+    images: Tensor  # (num_actions, starts, C, H, W); optimized observations
     probabilities: Tensor  # (num_actions, starts)
     """The policy's probability of the action on each of them."""
     roughness: Tensor  # (num_actions, starts)
@@ -92,8 +86,7 @@ class Attempts:
 class ClassModel:
     """The best optimized observation of each action, and all attempts."""
 
-    tried: list[Attempts]
-    """Attempts of each setting, with the same number of starts."""
+    tried: list[Attempts]  # attempts of each setting, with the same number of starts
 
     @property
     def every(self) -> Attempts:

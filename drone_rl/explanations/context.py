@@ -27,8 +27,7 @@ from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
 from drone_rl.verdicts.certificate import Claim
 
 T = TypeVar("T")
-FILMED = 0
-"""The episode shown as a film: always the first."""
+FILMED = 0  # the episode shown as a film: always the first
 
 
 class LeftOutError(Exception):

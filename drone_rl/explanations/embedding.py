@@ -14,14 +14,10 @@ from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.seeding import legacy_seed
 
 logging.getLogger("openTSNE").setLevel(logging.ERROR)  # its messages are not for users
-COMPONENTS = 50
-"""Principal components to which points are reduced first."""
-NEIGHBOURS = 10
-"""Neighbours by which faithfulness is measured."""
-QUERIES = 1000
-"""Most points whose neighbourhoods are compared."""
-FEW = 2000
-"""Up to so many points, exact methods on one thread are the fastest."""
+COMPONENTS = 50  # principal components to which points are reduced first
+NEIGHBOURS = 10  # neighbours by which faithfulness is measured
+QUERIES = 1000  # most points whose neighbourhoods are compared
+FEW = 2000  # up to so many points, exact methods on one thread are the fastest
 
 
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:

@@ -40,8 +40,7 @@ from drone_rl.verdicts.coverage import find_domain
 FORMAT_VERSION = 3
 _Result = tuple[dict[str, Any], dict[str, NDArray], float] | LeftOutError
 """Numbers, arrays and seconds of a section, or why it is left out."""
-Given = str | Path | Pilot | Logits
-"""A policy or something that `as_pilot` converts to one."""
+Given = str | Path | Pilot | Logits  # a policy or something that `as_pilot` converts to one
 Section = Callable[[Context], tuple[dict[str, Any], dict[str, NDArray]]]
 """Returns entries of `explanation.json` and `arrays.npz`; writes nothing, runs at any time."""
 SECTIONS: dict[str, Section] = {

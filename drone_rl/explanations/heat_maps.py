@@ -16,8 +16,7 @@ from drone_rl.policies import PictureNetwork
 from drone_rl.utils.errors import InputError
 
 Objective = Literal["probability", "logit"]
-BATCH = 256
-"""Observations in one call, which bounds memory."""
+BATCH = 256  # observations in one call, which bounds memory
 INTEGRATION_STEPS = 64
 """Steps of integrated gradients; with 16, errors of up to 0.7 occur on a steep softmax."""
 MapMethod = Callable[[Tensor, Tensor], Tensor]
@@ -29,10 +28,8 @@ class Explainer:
     """Computes heat maps of one policy by several methods, all of the size of its observations."""
 
     network: PictureNetwork
-    absent: Tensor
-    """Baseline: the observation of the scene without targets. Shape: (C, H, W)."""
-    layer: str | None = None
-    """Layer of Grad-CAM; the last convolution's nonlinearity by default."""
+    absent: Tensor  # baseline: the observation of the scene without targets. Shape: (C, H, W).
+    layer: str | None = None  # layer of Grad-CAM; the last convolution's nonlinearity by default
 
     def __post_init__(self) -> None:
         """Find the layer.

@@ -11,10 +11,8 @@ from drone_rl.policies import PictureNetwork
 from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.utils.errors import InputError
 
-BATCH = 512
-"""Observations in one forward pass, which bounds memory."""
-_TRIED = 2
-"""Observations in the forward pass that finds the layers."""
+BATCH = 512  # observations in one forward pass, which bounds memory
+_TRIED = 2  # observations in the forward pass that finds the layers
 
 
 @torch.no_grad()

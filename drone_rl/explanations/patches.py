@@ -22,31 +22,24 @@ from drone_rl.explanations.hooks import BATCH, actions_of, probabilities
 from drone_rl.policies import PictureNetwork
 from drone_rl.utils.intervals import episode_means, mean_bounds
 
-PATCHES = 40
-"""Approximate number of patches of a frame."""
-UNMOVED = 1e-4
-"""Frames on which every patch has a smaller effect are left out of tests of maps."""
-TOP = 0.1
-"""Fraction of the patches that count as those with the largest effect."""
+PATCHES = 40  # approximate number of patches of a frame
+UNMOVED = 1e-4  # frames on which every patch has a smaller effect are left out of tests of maps
+TOP = 0.1  # fraction of the patches that count as those with the largest effect
 _EQUAL = 1e-6
 """Differences below this are ties: of effects, and of heat relative to the map's maximum."""
-NO_HEAT = 1e-6
-"""Heat up to this fraction of the map's maximum counts as none."""
-NO_CHANGE = 1e-9
-"""A logit with a smaller standard deviation over observations is constant."""
+NO_HEAT = 1e-6  # heat up to this fraction of the map's maximum counts as none
+NO_CHANGE = 1e-9  # a logit with a smaller standard deviation over observations is constant
 
 
 @dataclasses.dataclass(frozen=True)
 class Grid:
     """Patches of one size; remaining rows and columns of pixels are left out on both sides."""
 
-    height: int
-    """Height of a patch, pixels."""
+    height: int  # height of a patch, pixels
     width: int
     rows: int
     columns: int
-    top: int = 0
-    """Rows of pixels above the first patch."""
+    top: int = 0  # rows of pixels above the first patch
     left: int = 0
 
     @property

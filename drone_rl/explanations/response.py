@@ -27,10 +27,8 @@ from drone_rl.verification.prover.cube_images import NOTHING, CameraModel, CubeI
 from drone_rl.verification.prover.lattice import Lattice
 from drone_rl.verification.prover.policy_spec import check_task
 
-BLIND = 0.1
-"""A policy is blind to a target that changes its action probabilities by less than this."""
-_RESPONSE, _OUTCOME = 0, 1
-"""Numbers of the maps' grids."""
+BLIND = 0.1  # a policy is blind to a target that changes its action probabilities by less than this
+_RESPONSE, _OUTCOME = 0, 1  # numbers of the maps' grids
 
 
 def policy_response(context: Context) -> "ResponseMap":
@@ -66,21 +64,14 @@ def asymmetry_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArr
 class ResponseMap:
     """Action probabilities for one target at each place of a grid: Z up, F ahead, L sideways."""
 
-    height: NDArray  # (Z,)
-    """Metres above the drone."""
-    forward: NDArray  # (F,)
-    """Metres ahead of it."""
-    lateral: NDArray  # (L,)
-    """Metres to its left."""
+    height: NDArray  # (Z,); metres above the drone
+    forward: NDArray  # (F,); metres ahead of it
+    lateral: NDArray  # (L,); metres to its left
     probabilities: NDArray  # (Z, F, L, A)
-    without_target: NDArray  # (A,)
-    """Action probabilities without a target."""
-    oracle: NDArray  # (L,)
-    """The needed action: a turn where flying straight on would miss."""
-    stratum: NDArray  # (L,)
-    """The task's stratum of a target there: its side."""
-    blind: NDArray  # (Z, F, L) bool
-    """See `find_blind`."""
+    without_target: NDArray  # (A,); action probabilities without a target
+    oracle: NDArray  # (L,); the needed action: a turn where flying straight on would miss
+    stratum: NDArray  # (L,); the task's stratum of a target there: its side
+    blind: NDArray  # (Z, F, L) bool; see `find_blind`
 
 
 @dataclasses.dataclass
@@ -262,8 +253,7 @@ def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, Any]:
     }
 
 
-_COMPARED = 1000
-"""Rendered frames that are compared with the closed form."""
+_COMPARED = 1000  # rendered frames that are compared with the closed form
 
 
 def places_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:

@@ -40,8 +40,7 @@ SEEN = {
 }
 """Fields of rendered frames only."""
 _POSE = ("drone", "attitude")
-_SAME = 1e-9
-"""Poses (metres, quaternion) that differ by less are equal up to rounding."""
+_SAME = 1e-9  # poses (metres, quaternion) that differ by less are equal up to rounding
 
 
 def flown_fields(task: Task[Any], actions: Actions) -> dict[str, str]:
@@ -65,10 +64,8 @@ class RolloutDataset:
     """Frames of episodes in order of time; see `flown_fields` and `SEEN`."""
 
     arrays: dict[str, NDArray]
-    features: dict[str, NDArray]
-    """Output of each recorded layer, by name. Shape: (T, *)."""
-    meta: dict[str, Any]
-    """Origin; its "fields" describe the arrays."""
+    features: dict[str, NDArray]  # output of each recorded layer, by name. Shape: (T, *).
+    meta: dict[str, Any]  # origin; its "fields" describe the arrays
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -246,14 +243,11 @@ def _events(
 class Step:
     """One step of the active environments of a `rollout`; n of them."""
 
-    rows: Tensor
-    """Indices of the active environments. Shape: (n,)."""
+    rows: Tensor  # indices of the active environments. Shape: (n,).
     before: State
     after: State
-    action: Tensor
-    """Shape: (n, *)."""
-    reward: Tensor
-    """Shape: (n,)."""
+    action: Tensor  # shape: (n, *)
+    reward: Tensor  # shape: (n,)
 
 
 @torch.no_grad()

@@ -19,8 +19,7 @@ DARK = Appearance(colors={**DARK_GROUND.colors, SemanticClass.SKY: (0.3, 0.36, 0
 BRIGHT = Appearance(
     colors={SemanticClass.GROUND: (0.75, 0.78, 0.7), SemanticClass.SKY: (0.9, 0.93, 0.97)}
 )
-PLACEMENTS = 3
-"""Random placements of all targets among the alternatives of a scene."""
+PLACEMENTS = 3  # random placements of all targets among the alternatives of a scene
 
 
 class Region(enum.IntEnum):

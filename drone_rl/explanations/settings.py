@@ -7,8 +7,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings
 
-MIN_EPISODES = 30
-"""Intervals from fewer episodes are too wide to be useful."""
+MIN_EPISODES = 30  # intervals from fewer episodes are too wide to be useful
 
 
 class ExplainSettings(Settings):

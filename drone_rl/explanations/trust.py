@@ -46,12 +46,9 @@ from drone_rl.utils.intervals import episode_means, median_bounds
 
 MapOf = Callable[[PictureNetwork, Tensor, Tensor], Tensor]
 """A method: network, observations (T, C, h, w) and actions (T,) to maps (T, h, w), 0 or more."""
-ERROR_RATE = 0.05
-"""Probability that any method is trusted whose maps do not depend on the policy."""
-FRAMES_AN_EPISODE = 10
-"""Frames of an episode that are tested, evenly spaced."""
-WEIGHT_SEEDS = 5
-"""Shuffled policies whose maps are compared with the policy's, pixel by pixel."""
+ERROR_RATE = 0.05  # probability that any method is trusted whose maps do not depend on the policy
+FRAMES_AN_EPISODE = 10  # frames of an episode that are tested, evenly spaced
+WEIGHT_SEEDS = 5  # shuffled policies whose maps are compared with the policy's, pixel by pixel
 MOST_ALIKE = 0.5
 """From this rank correlation with maps of shuffled weights on, a map does not depend on them."""
 
@@ -62,15 +59,12 @@ class Trial:
 
     network: PictureNetwork
     observations: Tensor  # (T, C, h, w)
-    actions: Tensor  # (T,)
-    """Actions to explain."""
-    effects: NDArray  # (T, patches)
-    """Effect of each patch; see `patch_effects`."""
+    actions: Tensor  # (T,); actions to explain
+    effects: NDArray  # (T, patches); effect of each patch; see `patch_effects`
     placebos: dict[str, Tensor]  # (T, h, w) each
     episode: NDArray  # (T,)
     grid: Grid
-    still: int = 0
-    """Frames left out because no patch affects the policy."""
+    still: int = 0  # frames left out because no patch affects the policy
     seed: int = 0
 
     def __getitem__(self, rows: NDArray) -> "Trial":
@@ -107,8 +101,7 @@ class Pictures:
 
     observations: Tensor  # (T, C, h, w)
     others: list[Tensor]  # (T, C, h, w) each
-    absent: Tensor  # (C, h, w)
-    """Observation of the scene without targets."""
+    absent: Tensor  # (C, h, w); observation of the scene without targets
     episode: NDArray  # (T,)
     seed: int = 0
 

@@ -156,10 +156,8 @@ OTHER_TARGETS = Appearance(
     colors={SemanticClass.TARGET: (0.9, 0.85, 0.2), SemanticClass.OBSTACLE: (0.9, 0.85, 0.2)}
 )
 MOVED_METRES = 2.0
-FLIGHTS_AN_EPISODE = 2
-"""Frames of an episode from which rollouts start, evenly spaced."""
-PATIENCE = 80
-"""Steps after which a target that is neither reached nor passed counts as missed."""
+FLIGHTS_AN_EPISODE = 2  # frames of an episode from which rollouts start, evenly spaced
+PATIENCE = 80  # steps after which a target that is neither reached nor passed counts as missed
 
 
 @dataclasses.dataclass
@@ -167,12 +165,10 @@ class Intervention:
     """One change to many scenes and its effect on the policy."""
 
     name: str
-    area: Tensor  # (T, H, W) bool
-    """Changed pixels."""
+    area: Tensor  # (T, H, W) bool; changed pixels
     effect: NDArray  # (T,)
     """Distance of the action probabilities; NaN where there was nothing to change."""
-    frames: Tensor  # (T, H, W, 3) uint8
-    """Frames after the change."""
+    frames: Tensor  # (T, H, W, 3) uint8; frames after the change
 
 
 def intervene(
@@ -233,10 +229,8 @@ def _patches(ground: Tensor, size: Tensor, seed: int) -> Tensor:
 class TargetRollouts:
     """N rollouts, each until one target was reached or passed."""
 
-    collected: NDArray
-    """Whether the target was reached. Shape: (N,), bool."""
-    decided: NDArray
-    """Steps until then, or until the episode ended. Shape: (N,)."""
+    collected: NDArray  # whether the target was reached. Shape: (N,), bool.
+    decided: NDArray  # steps until then, or until the episode ended. Shape: (N,).
     lateral: NDArray
     """The drone's y after each step, metres; constant once decided. Shape: (N, steps + 1)."""
 

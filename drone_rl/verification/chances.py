@@ -39,10 +39,8 @@ _BOUNDS = {
     "mean_least": "on average at least",
     "mean_most": "on average at most",
 }
-CELLS_AT_A_TIME = 2**22
-"""Bounds memory."""
-PLACEMENTS_AT_A_TIME = 20
-"""Placements between two reports of progress."""
+CELLS_AT_A_TIME = 2**22  # bounds memory
+PLACEMENTS_AT_A_TIME = 20  # placements between two reports of progress
 
 
 @dataclasses.dataclass(frozen=True)

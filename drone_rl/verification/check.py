@@ -24,8 +24,7 @@ from drone_rl.verification.checker.certificate import (
 )
 from drone_rl.verification.checker.checker import Findings, check_certificate
 
-REFUSED = 14
-"""Exit status for a refused certificate."""
+REFUSED = 14  # exit status for a refused certificate
 
 
 @dataclasses.dataclass(frozen=True)

@@ -48,10 +48,8 @@ from drone_rl.verification.prove import Proof, prove
 from drone_rl.verification.prover.boxes import volumes
 from drone_rl.verification.requirements import require_cubes
 
-WORLDS = 250
-"""Environments of a search; each search uses other seeds."""
-HOW_MAY_CHANGE = ("rounds", "limit_s")
-"""Settings of rounds that a resumed run may change."""
+WORLDS = 250  # environments of a search; each search uses other seeds
+HOW_MAY_CHANGE = ("rounds", "limit_s")  # settings of rounds that a resumed run may change
 _Count = Annotated[int, Whole(0, 2**62)]
 _Seconds = Annotated[float, Real(0.0, 1e12)]
 _Share = Annotated[float, Real(0.0, 1.0)]

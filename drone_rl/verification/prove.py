@@ -27,8 +27,7 @@ from drone_rl.verification.prover.proof_files import certify, load, save
 from drone_rl.verification.prover.prover import Prover
 from drone_rl.verification.text import describe_proof, why_stopped
 
-_BYTES_PER_SIDE = 64
-"""Bytes of a saved state per cube and box: two borders, kept up to four times."""
+_BYTES_PER_SIDE = 64  # bytes of a saved state per cube and box: two borders, kept up to four times
 
 
 @dataclasses.dataclass(frozen=True)

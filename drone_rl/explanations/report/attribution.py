@@ -11,8 +11,7 @@ from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.utils.text import Claims, Evidence
 
-BLOCK = 16
-"""Sides of a film are multiples of this many pixels, as its encoder requires."""
+BLOCK = 16  # sides of a film are multiples of this many pixels, as its encoder requires
 
 
 def _heat_by(evidence: Evidence) -> Sequence[str | None]:

@@ -139,8 +139,7 @@ LEFT_OUT_PART = Part(
 
 
 KINDS = ("contradiction", "justified", "unknown")
-MOST_PAIRS = 4
-"""Pairs of each kind that are shown."""
+MOST_PAIRS = 4  # pairs of each kind that are shown
 
 
 def say_dataset(evidence: Evidence) -> Claims:

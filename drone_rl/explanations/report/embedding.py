@@ -13,14 +13,10 @@ from drone_rl.evaluation.plots.saving import Rows, to_png, to_uri
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.utils.text import Claims, Evidence, listed, percent
 
-MOST_THUMBNAILS = 900
-"""If there are more frames, an evenly spaced selection is shown."""
-CELLS_A_THUMBNAIL = 2.2
-"""Empty cells show where clusters end."""
-ASPECT = 1.5
-"""Width to height of a map of thumbnails."""
-TILES_ACROSS = 30
-"""Frames in a row of the sprite, as map.js cuts it."""
+MOST_THUMBNAILS = 900  # if there are more frames, an evenly spaced selection is shown
+CELLS_A_THUMBNAIL = 2.2  # empty cells show where clusters end
+ASPECT = 1.5  # width to height of a map of thumbnails
+TILES_ACROSS = 30  # frames in a row of the sprite, as map.js cuts it
 MAPS = ("features", "pixels")
 
 

@@ -36,14 +36,10 @@ FRAME = frozenset(
 class Explanation:
     """The files that `drone-rl explain` wrote for one policy."""
 
-    numbers: dict[str, Any]
-    """Contents of explanation.json."""
-    arrays: dict[str, NDArray]
-    """Arrays of arrays.npz."""
-    data: dict[str, NDArray]
-    """Arrays of dataset.npz."""
-    source: str = "explanation.json"
-    """Display name of the file of the numbers."""
+    numbers: dict[str, Any]  # contents of explanation.json
+    arrays: dict[str, NDArray]  # arrays of arrays.npz
+    data: dict[str, NDArray]  # arrays of dataset.npz
+    source: str = "explanation.json"  # display name of the file of the numbers
 
     @property
     def name(self) -> str:

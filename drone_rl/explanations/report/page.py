@@ -42,8 +42,7 @@ PARTS: dict[str, Part] = {
 }
 """All parts in the order of the page, by the names of `explanations.explain.SECTIONS`; entries of
 an explanation that no part shows are printed as JSON."""
-STYLES = ("style.css", "report.css")
-"""Files of the page's one style element."""
+STYLES = ("style.css", "report.css")  # files of the page's one style element
 SCRIPTS = ("map.js", "zoom.js")
 """Files of the page's one script element; their data are in elements of type JSON."""
 _INCOMPLETE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
@@ -132,10 +131,8 @@ class Policy:
     """One explanation and where its figures are saved."""
 
     explanation: Explanation
-    folder: Path
-    """Folder of the figures."""
-    prefix: str
-    """Start of their file names."""
+    folder: Path  # folder of the figures
+    prefix: str  # start of their file names
 
     def check(self) -> None:
         """Make all sentences and tables once, so that a wrong number is found before rendering."""

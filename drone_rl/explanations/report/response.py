@@ -20,8 +20,7 @@ from drone_rl.utils.text import Claims, Evidence, bounds, listed, percent
 from drone_rl.verification.text import rows as place_rows
 from drone_rl.verification.text import say_places
 
-_OUTCOMES = ("#d9d9de", "#4269d0")
-"""Colours of targets that are not handled, and of those that are."""
+_OUTCOMES = ("#d9d9de", "#4269d0")  # colours of targets that are not handled, and of those that are
 
 
 def say_response(evidence: Evidence) -> Claims:

@@ -21,8 +21,7 @@ METHOD_NAMES = {
     "occlusion": "occlusion",
 }
 """Attribution methods and their display names."""
-_SIDE = 512
-"""Largest width and height of an image, pixels."""
+_SIDE = 512  # largest width and height of an image, pixels
 _ACTIONS = 16
 _MANY = 100_000
 _INTEGER, _FLOAT, _BOOL, _PIXEL = "iu", "f", "b", "u"
@@ -90,8 +89,7 @@ _FINITE = {
     *("response_forward", "response_lateral", "outcome_forward", "outcome_lateral"),
 }
 """Arrays of coordinates, which must be finite."""
-_LONGEST = 2000
-"""Most entries of any other list or mapping."""
+_LONGEST = 2000  # most entries of any other list or mapping
 _METRES = Real(-1e4, 1e4)
 _SHARE = Real(0.0, 1.0)
 _PLACES: Mapping[str, Kind] = {
@@ -107,8 +105,7 @@ _WINDOW: Mapping[str, Kind] = {
     "farthest": Real(0.0, 1e3, is_above=True),
     "sideways": Real(0.0, 1e3, is_above=True),
 }
-_FARTHEST_RATIO = 20
-"""Largest ratio of the sides of the exact map."""
+_FARTHEST_RATIO = 20  # largest ratio of the sides of the exact map
 
 
 def check_sizes(

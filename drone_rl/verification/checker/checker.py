@@ -45,8 +45,7 @@ ProgressCallback = Callable[[int, int], None]  # called with the number done, an
 class Contradiction:
     """An episode that ended otherwise than stated."""
 
-    where: str
-    """Why it was simulated: "inside" a box, at a "border", or "anywhere"."""
+    where: str  # why it was simulated: "inside" a box, at a "border", or "anywhere"
     placement: tuple[float, ...]  # metres to the left of each cube
     stated: str
     found: str

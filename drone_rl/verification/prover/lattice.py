@@ -163,8 +163,7 @@ class Nodes(Batch):
     collected: Tensor  # (K,) int64; bit k is set if cube k is collected
 
 
-Shape = tuple[int, int, int]
-"""Number of values of each part of a node, without the placement."""
+Shape = tuple[int, int, int]  # number of values of each part of a node, without the placement
 
 
 @dataclasses.dataclass

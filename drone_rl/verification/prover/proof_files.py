@@ -34,8 +34,7 @@ _MOST = 2**40  # bound on every integer in a row
 _NOWHERE = (-1, 0, 0)  # stands for an unknown ending
 
 _Row = tuple[int, ...]
-_Set = list[tuple[_Row, Boxes]]
-"""Boxes, each with the integers that say what they are."""
+_Set = list[tuple[_Row, Boxes]]  # boxes, each with the integers that say what they are
 
 
 def certify(
