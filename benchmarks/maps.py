@@ -12,10 +12,10 @@ import torch
 from torch import Tensor
 
 from benchmarks.adversarial_maps import adversarial_maps
-from benchmarks.known_map_policies import KnownMapPolicy, make_policies, path_weights
+from benchmarks.known_map_policies import make_policies, path_weights
 from drone_rl.explanations.hooks import probabilities
-from drone_rl.explanations.scenes import Scenes
-from drone_rl.explanations.trust import Pictures, Trial, check_maps, draw_pictures
+from drone_rl.explanations.scenes import Scenes, alternatives, empty_scene
+from drone_rl.explanations.trust import Trial, check_maps, measure
 from drone_rl.policies import PictureNetwork, SmallCNN
 from drone_rl.policies.environment import make_env
 from drone_rl.policies.zoo import load_exported, parse, policy_names, policy_path
@@ -43,15 +43,21 @@ def bench_maps(folder: Path, quick: bool) -> dict[str, Any]:
     env = make_env(64)
     scenes = Scenes(env)
     state, episode = imagined(scenes, 14 if quick else 40, 4 if quick else 6)
-    pictures = draw_pictures(scenes, state, episode)
-    known = make_policies(pictures.absent, pictures.observations, expert(scenes, state))
+    seen, absent = scenes.observe(state), scenes.observe(empty_scene(scenes))[0]
+    others = list(alternatives(scenes, state).values())
+
+    def trial(network: PictureNetwork) -> Trial:
+        greedy = probabilities(network, seen).argmax(-1)
+        return measure(network, greedy, seen, others, absent, episode)
+
+    known = make_policies(absent, seen, expert(scenes, state))
     known = known[::7] if quick else known
-    failed = {p.name: failed_tests(pictures, p) for p in known}
+    failed = {p.name: failed_tests(trial(p.network)) for p in known}
     seeing = [p for p in known if not p.is_blind]
     policies = {p.name: p.network for p in seeing[:: 3 if quick else 2]}
-    policies |= shipped(pictures) if not quick else {}
-    policies |= untrained(pictures, 1 if quick else 4)
-    trusted = {name: trusted_adversarial(pictures, network) for name, network in policies.items()}
+    policies |= shipped(absent) if not quick else {}
+    policies |= untrained(absent, 1 if quick else 4)
+    trusted = {name: trusted_adversarial(trial(n), absent) for name, n in policies.items()}
     env.close()
     return {
         "placebo_maps_trusted": sum(len(names) for names, _ in trusted.values()),
@@ -67,18 +73,16 @@ def bench_maps(folder: Path, quick: bool) -> dict[str, Any]:
     }
 
 
-def failed_tests(pictures: Pictures, policy: KnownMapPolicy) -> list[str]:
+def failed_tests(trial: Trial) -> list[str]:
     """Return the tests that the true map of a policy fails; none if it is trusted."""
-    trial = _trial(pictures, policy.network)
     checks = check_maps(trial, {"true": path_weights}, num_methods=NUM_METHODS)
     return checks["methods"]["true"]["failed"]
 
 
-def trusted_adversarial(pictures: Pictures, network: PictureNetwork) -> tuple[list[str], int]:
+def trusted_adversarial(trial: Trial, absent: Tensor) -> tuple[list[str], int]:
     """Return the names of the adversarial maps that are trusted on a policy, and their total."""
-    trial = _trial(pictures, network)
-    other = SmallCNN(network.in_shape, 3, generator=torch.Generator().manual_seed(99))
-    candidates = adversarial_maps(pictures.absent, other)
+    other = SmallCNN(trial.network.in_shape, 3, generator=torch.Generator().manual_seed(99))
+    candidates = adversarial_maps(absent, other)
     methods = check_maps(trial, candidates, num_methods=NUM_METHODS)["methods"]
     return [name for name, method in methods.items() if method["trusted"]], len(candidates)
 
@@ -112,34 +116,29 @@ def expert(scenes: Scenes, state: WorldState) -> Tensor:
     return scenes.needed(scenes.task.next_offset(state))
 
 
-def shipped(pictures: Pictures) -> dict[str, PictureNetwork]:
+def shipped(absent: Tensor) -> dict[str, PictureNetwork]:
     """Return the shipped policies with discrete moves and this image shape, by name."""
     networks = {}
     for name in policy_names():
         exported = load_exported(policy_path(name))
         description = parse(exported["description"])
         is_of_moves = description.actions.kind == "moves"  # else outputs are not three logits
-        if description.input.shape != tuple(pictures.absent.shape) or not is_of_moves:
+        if description.input.shape != tuple(absent.shape) or not is_of_moves:
             continue
         parameters = exported["policy"]
-        network = SmallCNN(pictures.absent.shape, 3, hidden=(128,))
+        network = SmallCNN(absent.shape, 3, hidden=(128,))
         network.load_state_dict(parameters)
         networks[name] = network
     return networks
 
 
-def untrained(pictures: Pictures, count: int = 4) -> dict[str, PictureNetwork]:
+def untrained(absent: Tensor, count: int = 4) -> dict[str, PictureNetwork]:
     """Return policies with random weights and confident outputs, by name."""
     networks = {}
     for seed in range(count):
         generator = torch.Generator().manual_seed(seed)
-        network = SmallCNN(pictures.absent.shape, 3, generator=generator)
+        network = SmallCNN(absent.shape, 3, generator=generator)
         with torch.no_grad():
             network.layers.get_parameter("logits.weight").mul_(300)
         networks[f"random weights {seed}"] = network
     return networks
-
-
-def _trial(pictures: Pictures, network: PictureNetwork) -> Trial:
-    greedy = probabilities(network, pictures.observations).argmax(-1)
-    return pictures.trial(network, greedy)

@@ -21,7 +21,7 @@ plain data.
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -95,44 +95,36 @@ class Trial:
         return self[np.array([r[len(r) // 2] for r in rows], np.int64)]
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Pictures:
-    """The part of a trial that does not depend on the policy."""
+def measure(
+    network: PictureNetwork,
+    actions: Tensor,
+    observations: Tensor,
+    others: Sequence[Tensor],
+    absent: Tensor,
+    episode: NDArray,
+    seed: int = 0,
+) -> Trial:
+    """Return a trial on the frames in which some patch affects a policy.
 
-    observations: Tensor  # (T, C, h, w)
-    others: list[Tensor]  # (T, C, h, w) each
-    absent: Tensor  # (C, h, w); observation of the scene without targets
-    episode: NDArray  # (T,)
-    seed: int = 0
-
-    def trial(self, network: PictureNetwork, actions: Tensor) -> Trial:
-        """Measure which patches affect a policy; `actions` (T,) are those to explain."""
-        grid = make_grid(*self.observations.shape[-2:])
-        effects = patches.patch_effects(network, self.observations, self.others, grid)
-        moved = patches.moving(effects)
-        trial = Trial(
-            network=network,
-            observations=self.observations,
-            actions=actions,
-            effects=effects,
-            placebos=placebo_maps(self.observations, self.absent, self.others, self.seed),
-            episode=self.episode,
-            grid=grid,
-            still=int((~moved).sum()),
-            seed=self.seed,
-        )
-        return trial[moved]
-
-
-def draw_pictures(scenes: Scenes, state: State, episode: NDArray, seed: int = 0) -> Pictures:
-    """Render T scenes and alternatives; the seed is that of places, noise and shuffled weights."""
-    return Pictures(
-        observations=scenes.observe(state),
-        others=list(alternatives(scenes, state, seed).values()),
-        absent=scenes.observe(empty_scene(scenes))[0],
+    `others` are the observations (T, C, h, w) with other contents, see `alternatives`; `absent` is
+    that of the scene without targets (C, h, w). Actions to explain and episodes have shape (T,);
+    the seed is that of noise and shuffled weights.
+    """
+    grid = make_grid(*observations.shape[-2:])
+    effects = patches.patch_effects(network, observations, others, grid)
+    moved = patches.moving(effects)
+    trial = Trial(
+        network=network,
+        observations=observations,
+        actions=actions,
+        effects=effects,
+        placebos=placebo_maps(observations, absent, others, seed),
         episode=episode,
+        grid=grid,
+        still=int((~moved).sum()),
         seed=seed,
     )
+    return trial[moved]
 
 
 def make_trial(
@@ -143,15 +135,18 @@ def make_trial(
     episode: NDArray,
     seed: int = 0,
 ) -> Trial:
-    """Measure which patches affect a policy on some frames of T steps of its rollouts.
+    """Return a trial on some frames of T steps of a policy's rollouts.
 
-    The states are those of `RolloutDataset.state()`, with the actions taken there; see
-    `draw_pictures` for the seed.
+    The states are those of `RolloutDataset.state()`, with the actions taken there. The seed is also
+    that of the places of targets.
     """
     rows = sample_frames(episode, FRAMES_AN_EPISODE)
-    chosen = state[torch.from_numpy(rows)].to(scenes.worlds.device)
-    pictures = draw_pictures(scenes, chosen, episode[rows], seed)
-    return pictures.trial(network, actions[torch.from_numpy(rows)])
+    index = torch.from_numpy(rows)
+    chosen = state[index].to(scenes.worlds.device)
+    others = list(alternatives(scenes, chosen, seed).values())
+    absent = scenes.observe(empty_scene(scenes))[0]
+    seen = scenes.observe(chosen)
+    return measure(network, actions[index], seen, others, absent, episode[rows], seed)
 
 
 def method_maps(explainer: Explainer) -> dict[str, MapOf]:

@@ -1,5 +1,3 @@
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 import torch
@@ -18,7 +16,7 @@ def test_no_adversarial_map_is_trusted_and_true_maps_are_found(tmp_path):
 
 def test_shipped_policies_with_discrete_moves_are_used():
     """`flight_velocity` has continuous actions, and others have two frames; they are left out."""
-    networks = shipped(SimpleNamespace(absent=torch.zeros(1, 25, 64)))
+    networks = shipped(torch.zeros(1, 25, 64))
     assert {"good", "poor", "proved", "flight"} <= networks.keys()
     assert not networks.keys() & {"flight_velocity", "robust", "pillars_good"}
     assert all(network(torch.zeros(2, 1, 25, 64)).shape == (2, 3) for network in networks.values())

@@ -10,7 +10,6 @@ from drone_rl.explanations import patches, trust
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.patches import Grid, placebo_maps
 from drone_rl.explanations.trust import (
-    Pictures,
     Trial,
     check_maps,
     check_method,
@@ -202,14 +201,6 @@ def test_a_trial_is_a_fact(trial):
         trial.still = 1
     with pytest.raises(TypeError):  # nine fields, told apart by name alone
         Trial(*vars(trial).values())
-    pictures = Pictures(
-        observations=trial.observations, others=[], absent=trial.observations[0], episode=[]
-    )
-    assert pictures.seed == 0
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        pictures.seed = 1
-    with pytest.raises(TypeError):
-        Pictures(*vars(pictures).values())
 
 
 def test_a_trial_on_some_of_its_pictures(trial):
