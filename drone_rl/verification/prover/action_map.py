@@ -105,9 +105,8 @@ class ActionMap:
     def outlines(self) -> dict[str, NDArray]:
         """Return closed polygons around regions of equal action, for plots.
 
-        Returns:
-            "points", the corners of all polygons, shape (P, 2); "ends", the end of each polygon
-            among them; "labels", the action of each, or one more than the last action if unseen.
+        "points" has the corners of all polygons, shape (P, 2); "ends" the end of each polygon among
+        them; "labels" the action of each, or one more than the last action if unseen.
         """
         ways = self.arrangement.outlines(self.action)
         unseen = self.arrangement.outlines(self.is_unseen.astype(np.int64))
@@ -128,15 +127,10 @@ def map_actions(
     touch_distance: float,
     most_cells: int,
 ) -> ActionMap:
-    """Compute a policy's action for every position of one cube.
+    """Compute a policy's action for every position of one cube within a window.
 
-    Args:
-        camera: The policy's camera.
-        window: The positions.
-        look: Maps faces to the network's input.
-        network: Maps images to the logits of `MOVES`, shape (N, 3); on the CPU.
-        touch_distance: Metres; a cube further to the side requires a turn.
-        most_cells: See `arrange`.
+    The network maps images to the logits of `MOVES`, shape (N, 3), on the CPU. A cube further than
+    `touch_distance` metres to the side requires a turn.
 
     Raises:
         InputError: The window reaches into the cube, or there are more cells.

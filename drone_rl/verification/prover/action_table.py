@@ -1,9 +1,4 @@
-"""The possible actions at one x of the drone, for all lateral positions of the visible cubes.
-
-The positions of each cube are cut into cells and bands (see `Cells`); the table holds the possible
-actions of each combination. It is filled on demand: a block of images is decided at once if bounds
-over all of them leave a single action, else it is halved. So most images are never evaluated alone.
-"""
+"""The possible actions at one x of the drone, for all lateral positions of the visible cubes."""
 
 import functools
 from collections.abc import Callable, Iterator, Sequence
@@ -28,7 +23,11 @@ FEW, PRICE = 8, 6.0
 
 
 class ActionTable:
-    """The possible actions for all combinations of positions of the visible cubes."""
+    """The possible actions for all combinations of cells and bands of the visible cubes.
+
+    It is filled on demand: a block of images is decided at once if bounds over all of them leave a
+    single action, else it is halved. So most images are never evaluated alone.
+    """
 
     def __init__(
         self,
@@ -39,8 +38,8 @@ class ActionTable:
     ) -> None:
         """Start with nothing known of visible cubes, nearest first.
 
-        All tables of a proof share `record`: bounds tried, and decisive ones, by log2 of the
-        uncertain pixels. Shape: (32, 2).
+        All tables of a proof share `record` (32, 2): bounds tried, and decisive ones, by log2 of
+        the uncertain pixels.
         """
         self.cells = list(cells)
         self.table = np.zeros([len(c) for c in reversed(self.cells)], np.uint8)
@@ -177,8 +176,6 @@ class ActionTable:
 
     def _doubts(self, blocks: NDArray) -> NDArray[np.int64]:
         """Return the number of uncertain pixels per cube. Shape: (N, cubes)."""
-        if not self._ranges:
-            return np.zeros((len(blocks), 0), int)
         return np.stack([r.doubts(blocks[:, k]) for k, r in enumerate(self._ranges)], -1)
 
     def _is_worth(self, pixels: NDArray, counts: NDArray) -> NDArray[np.bool_]:

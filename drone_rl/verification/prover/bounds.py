@@ -1,10 +1,4 @@
-"""Bounds on images with uncertain faces, and on the network's logits over such images.
-
-Interval bound propagation (Gowal et al., 2018): the sum of an interval's ends passes through a
-linear layer as it is, their difference through the absolute weights. The last layer's weights are
-subtracted pairwise first, so that common terms cancel. ReLU, pooling and flattening are positively
-homogeneous, so biases are scaled instead of halving the sums.
-"""
+"""Bounds on images with uncertain faces, and on the network's logits over such images."""
 
 import functools
 from collections.abc import Callable, Sequence
@@ -25,19 +19,22 @@ from drone_rl.verification.prover.cube_images import NOTHING
 
 
 class NetworkBounds:
-    """The possible argmax actions of a network over sets of images."""
+    """The possible argmax actions of a network over sets of images.
+
+    Interval bound propagation (Gowal et al., 2018): the sum of an interval's ends passes through a
+    linear layer as it is, their difference through the absolute weights. The last layer's weights
+    are subtracted pairwise first, so that common terms cancel. ReLU, pooling and flattening are
+    positively homogeneous, so biases are scaled instead of halving the sums.
+    """
 
     def __init__(self, network: PolicyNetwork, gap: float) -> None:
         """Prepare the layers.
 
-        Args:
-            network: Convolutions, linear layers, ReLU, max pooling and flattening; the last is
-                linear.
-            gap: An action is certain only if its logit leads by more than this and by more than the
-                bound on rounding errors, see `drone_rl.policies.rounding`.
+        An action is certain only if its logit leads by more than `gap` and by more than the bound
+        on rounding errors, see `drone_rl.policies.rounding`.
 
         Raises:
-            InputError: A layer has another type.
+            InputError: A layer is none of those of `layer_of`, or the last one is not linear.
         """
         *inner, last = network.layers
         if not isinstance(last, nn.Linear):
@@ -45,6 +42,7 @@ class NetworkBounds:
                 "the network's last layer is not linear; prove a policy that ends in a linear layer"
             )
         self.gap = gap
+        self._errors = [_errors_of(layer) for layer in network.layers]
         self._answers = accelerated_inference(network)
         scale, self._steps = 2, []
         for layer in inner:
@@ -58,7 +56,6 @@ class NetworkBounds:
         self._weight = weight[first] - weight[second]
         self._bias = bias[first] - bias[second]
         self.num_actions = len(weight)
-        self._errors = [_errors_of(layer) for layer in network.layers]
         self._rounding = RoundingBound(self._errors, getattr(network, "actions", MOVES))
         self._hull: tuple[Tensor, Tensor, Tensor] | None = None
         """Bounds on all images decided so far, and the lead that is certain for them."""
@@ -83,10 +80,7 @@ class NetworkBounds:
         return 1 / (-lead).exp().sum(-1), 1 / lead.transpose(1, 2).exp().sum(-1)
 
     def _least(self, lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor]:
-        """Return lower bounds of the logit differences, and the lead that is certain.
-
-        Shapes: (N, pairs), times the scale; (pairs,), float64.
-        """
+        """Return lower bounds of logit differences, times the scale, and the certain lead."""
         total, width = lower + upper, upper - lower
         largest: list[Tensor] = []
         for step, scale in self._steps:
@@ -113,10 +107,7 @@ class NetworkBounds:
         return bits, highest[:, 0] - highest[:, 1]
 
     def _gap(self, pictures: Tensor) -> Tensor:
-        """Return the lead that is certain for any order of summation. Shape: (pairs,).
-
-        It holds for all images seen so far.
-        """
+        """Return the lead that is certain for all images seen so far. Shape: (pairs,)."""
         lower, upper = pictures.amin(0, keepdim=True), pictures.amax(0, keepdim=True)
         if self._hull is not None:
             lowest, highest, gap = self._hull
@@ -147,8 +138,9 @@ def _errors_of(layer: nn.Module) -> Layer:
     found = layer_of(layer)
     if found is None:
         raise InputError(
-            f"rounding errors of the network's layer {layer} have no known bound; prove a policy "
-            "of convolutions without padding, linear layers, ReLU, MaxPool2d and Flatten"
+            f"proofs do not support the network's layer {layer}: its rounding errors have no known "
+            "bound; prove a policy of convolutions without padding, linear layers, ReLU, MaxPool2d "
+            "and Flatten"
         )
     return found
 
@@ -170,12 +162,7 @@ def _step(layer: nn.Module, scale: int) -> Step:
         bias = None if bias is None else scale * bias.detach()
         apply = layer._conv_forward if isinstance(layer, nn.Conv2d) else functional.linear
         return lambda total, width: (apply(total, weight, bias), apply(width, weight.abs(), None))
-    if isinstance(layer, nn.ReLU | nn.MaxPool2d | nn.Flatten):  # larger inputs, larger outputs
-        return functools.partial(_monotone, layer)
-    raise InputError(
-        f"proofs do not support the network's layer {type(layer).__name__}; prove a policy of "
-        "convolutions, linear layers, ReLU, MaxPool2d and Flatten"
-    )
+    return functools.partial(_monotone, layer)  # ReLU, pooling and flattening
 
 
 def _monotone(layer: nn.Module, total: Tensor, width: Tensor) -> tuple[Tensor, Tensor]:
@@ -194,13 +181,10 @@ class Compositor:
     def __init__(
         self, background: Tensor, faces: Tensor, rest: Callable[[Tensor], Tensor] | None = None
     ) -> None:
-        """Store the brightness of everything.
+        """Store the brightness of the background (height, width) and of the faces (3,), float32.
 
-        Args:
-            background: Image without cubes. Shape: (height, width), float32.
-            faces: Brightness of a cube's front, left and right side. Shape: (3,), float32.
-            rest: Maps an image (N, 1, height, width) to the network's input; must be monotone.
-                Identity by default.
+        The faces are a cube's front, left and right side. `rest` maps images (N, 1, height, width)
+        to the network's input and must be monotone; it is the identity by default.
         """
         self._background = background
         self._rest = rest

@@ -30,14 +30,10 @@ class Cells:
         highest: float,
         renderer: CubeView | None = None,
     ) -> None:
-        """Find the cells.
+        """Find the cells of a cube whose centre is `ahead` metres from the camera.
 
-        Args:
-            camera: The policy's.
-            ahead: Metres from the camera to the cube's centre.
-            lowest: Start of the first cell, metres to the left of the camera.
-            highest: End of the last cell.
-            renderer: Renders the images within bands; without it bands may show either neighbour's.
+        They reach at least from `lowest` to `highest`, metres to the left of the camera. The
+        renderer renders the images within bands; without it bands may show either neighbour's.
 
         Raises:
             InputError: The renderer contradicts the closed form.
@@ -119,10 +115,9 @@ def _middle_faces(camera: CameraModel, ahead: float, limits: NDArray) -> NDArray
 def _within(
     bands: NDArray, camera: CameraModel, ahead: float, renderer: CubeView
 ) -> list[NDArray[np.uint8]] | None:
-    """Return the images inside each band, in order, without those of the neighbouring cells.
+    """Return the images inside each band, without the neighbours'; None if it is too narrow.
 
-    None if a neighbour's image is not yet visible as far inside the band's ends as rounding may
-    move a cube: then the bands are too narrow.
+    It is if a neighbour's image is not visible as far inside its ends as rounding may move a cube.
     """
     if not len(bands):
         return []
@@ -134,7 +129,7 @@ def _within(
     drawn = _look(renderer, left)
     pure = _middle_faces(camera, ahead, _limits(bands, np.inf, -np.inf))
     next_to = np.concatenate([drawn[:, 0], drawn[-1:, -1]])
-    if (drawn[:-1, -1] != drawn[1:, 0]).any() or (renderer.read(next_to) != pure).any():
+    if (drawn[:-1, -1] != drawn[1:, 0]).any() or (renderer.images.read(next_to) != pure).any():
         return None
     band, found = np.arange(len(bands)), []
     while True:
@@ -156,7 +151,7 @@ def _within(
     is_inner = band[order][1:] == band[order][:-1]  # the last of a band is that of its end
     inner = order[:-1][is_inner]
     counts = np.bincount(band[inner], minlength=len(bands))
-    return np.split(renderer.read(pictures[inner]), np.cumsum(counts)[:-1])
+    return np.split(renderer.images.read(pictures[inner]), np.cumsum(counts)[:-1])
 
 
 def _look(renderer: CubeView, left: NDArray[np.float32]) -> NDArray[np.uint8]:

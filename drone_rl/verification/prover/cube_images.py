@@ -61,17 +61,12 @@ class CameraModel:
         )
 
     def borders(self, ahead: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the lateral positions of a cube at which its image changes.
+        """Return the lateral positions, ascending, at which a cube's image changes, metres.
 
-        Args:
-            ahead: Metres from the camera to the cube's centre.
-
-        Returns:
-            Metres to the left of the camera, ascending; and how far to either side of each a
-            float32 renderer may show the other image. Its error, in units of 2^-24, is at most 16
-            per metre of a ray's lateral offset (slopes are good to 10; a division, a product and a
-            sum add 4), 3 times the slope per metre of x (rounding of both positions and their
-            difference), and 3 per metre of y.
+        Also returns how far to either side of each a float32 renderer may show the other image. Its
+        error, in units of 2^-24, is at most 16 per metre of a ray's lateral offset (slopes are good
+        to 10; a division, a product and a sum add 4), 3 times the slope per metre of x (rounding of
+        both positions and their difference), and 3 per metre of y.
         """
         front, back = self._depths(ahead)
         shown = back >= front
@@ -91,14 +86,9 @@ class CameraModel:
     def faces(
         self, ahead: float | NDArray[np.float64], left: NDArray[np.float64]
     ) -> NDArray[np.uint8]:
-        """Compute what each pixel shows of a cube.
+        """Compute what each pixel shows of a cube, such as `FRONT`. Shape: (N, height, width).
 
-        Args:
-            ahead: Metres from the camera to the cube's centre; one for all, or shape (N,).
-            left: The same to the left. Shape: (N,).
-
-        Returns:
-            NOTHING, FRONT, LEFT_SIDE or RIGHT_SIDE. Shape: (N, height, width).
+        The cube's centre is `ahead` metres from the camera, one for all or (N,), and `left` (N,).
         """
         ahead = np.reshape(ahead, (-1, 1))
         front, back = self._depths(ahead)
@@ -208,15 +198,11 @@ class CubeImages:
     def render(
         self, cubes: NDArray, places: NDArray, hidden: NDArray[np.bool_] | None = None
     ) -> Tensor:
-        """Render images.
+        """Render RGB images. Shape: (N, height, width, 3), uint8.
 
-        Args:
-            cubes: Metres to the left of the start. Shape: (N, num_cubes).
-            places: Steps of the drone ahead and to the left. Shape: (N, 2).
-            hidden: Cubes to leave out; by default those that the drone has touched or passed.
-
-        Returns:
-            RGB. Shape: (N, height, width, 3), uint8.
+        The cubes stand so many metres to the left of the start (N, num_cubes), the drone so many
+        steps ahead and to the left (N, 2). Hidden cubes are left out, by default those that the
+        drone has touched or passed.
         """
         task = self._lattice.task
         hidden = self._gone(cubes, places) if hidden is None else hidden
@@ -311,7 +297,3 @@ class CubeView:
         cubes[:, self.cube] = left
         hidden = np.broadcast_to(np.arange(cubes.shape[1]) != self.cube, cubes.shape)
         return self.images.render(cubes, np.array([[self.steps, 0]] * count), hidden).numpy()
-
-    def read(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """See `CubeImages.read`."""
-        return self.images.read(pictures)

@@ -1,8 +1,4 @@
-"""A policy and a task in the form that proofs need; refuses what cannot be proved.
-
-Also cuts large tasks into parts: each cube multiplies the number of images by a few hundred, so the
-placements of the furthest cubes are cut into strips whose images fit into memory.
-"""
+"""A policy and a task in the form that proofs need, and the parts of large tasks."""
 
 import contextlib
 import dataclasses
@@ -64,13 +60,9 @@ def make_policy_spec(
     gap: float,
     renderer: str = "raytrace",
 ) -> PolicySpec:
-    """Build the components of a proof.
+    """Build the components of a proof from a description with the task to prove.
 
-    Args:
-        description: The policy's, with the task to prove.
-        network: The policy's network, on the CPU.
-        gap: See `NetworkBounds`.
-        renderer: Name, see `drone_rl.sim.rendering.find_renderer`.
+    The network must be on the CPU; for the gap see `NetworkBounds`.
 
     Raises:
         InputError: The policy or task is not supported; the message says why.
@@ -162,6 +154,9 @@ def pictures_of_each(spec: PolicySpec) -> list[int]:
 
 def partition_placements(spec: PolicySpec, most: int) -> Boxes:
     """Cut all placements into parts of about `most` images each. Shape: (N, num_cubes, 2).
+
+    Each cube multiplies the number of images by a few hundred, so the placements of the furthest
+    cubes are cut into strips.
 
     Raises:
         InputError: There are too many parts.
