@@ -1,8 +1,4 @@
-"""Train until a proof finds no placement at which the policy fails.
-
-Each round searches for failures, first in episodes, which are fast, and where those find none by a
-proof, which misses none. Then training continues with a fraction of its episodes at the failures.
-"""
+"""Train until a proof finds no placement at which the policy fails."""
 
 import dataclasses
 import io
@@ -95,16 +91,10 @@ class Journal(Callback):
         state: Mapping[str, Any] | None,
         changes: Mapping[str, Any],
     ) -> Self:
-        """Start a journal, or continue the one in the folder.
+        """Start a journal or, with a checkpoint, continue the one in the folder, if there is one.
 
-        With a checkpoint, nothing is written before `on_start`.
-
-        Args:
-            folder: Folder of the training.
-            settings: Settings of the training; None for the saved ones, or the defaults.
-            how: Settings of rounds; None likewise.
-            state: Checkpoint to resume, if any; may be of a usual training.
-            changes: Changes to the settings.
+        Settings that are None are the saved ones, or the defaults. With a checkpoint, nothing is
+        written before `on_start`.
 
         Raises:
             InputError: It is damaged, or has other settings.
@@ -211,6 +201,8 @@ def train_until_proved(
 ) -> Training:
     """Train as usual, then in rounds, until the policy succeeds from every placement.
 
+    Each round searches for failures, first in episodes, which are fast, and where those find none
+    by a proof, which misses none. Then training continues with a fraction of its episodes there.
     The result's reason is then "proved", and its "rounds" list what each search found. If the last
     search was a proof, its certificate is `certificate.json` in the folder.
 

@@ -159,10 +159,7 @@ def _prove(
 def _go_on(
     prover: Prover, settings: ProveSettings, progress: Progress, state: Path | None, known: str
 ) -> str | None:
-    """Advance a proof until it is finished or must stop, saving it regularly.
-
-    Returns the setting that stopped it; None if it is finished.
-    """
+    """Advance a proof, saving it regularly; return the setting that stops it, if one does."""
     task, last = prover.lattice.task, prover.lattice.last
     total = (2 * task.lateral_bound) ** task.num_cubes
     begin = saved = time.monotonic()

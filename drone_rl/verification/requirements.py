@@ -6,15 +6,11 @@ from drone_rl.utils.errors import InputError
 
 
 def require_cubes(described: PolicyDescription, what: str) -> TaskSettings:
-    """Return the settings of cube collection by the three moves of computer-vision mode.
-
-    Args:
-        described: The policy. A position of the drone must determine its observation.
-        what: What needs it, plural, such as "proofs".
+    """Return the task of a policy that verification supports; `what` needs it, such as "proofs".
 
     Raises:
-        InputError: The task, the dynamics or the actions are others, or the policy stacks frames or
-            its camera simulates faults.
+        InputError: The task is not cube collection by the three moves of computer-vision mode, or a
+            position of the drone does not determine the observation.
     """
     task, dynamics, actions = described.task, described.dynamics, described.actions
     if not isinstance(task, TaskSettings):

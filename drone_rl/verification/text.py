@@ -19,12 +19,7 @@ def exact_percent(share: float) -> str:
 
 
 def rows(places: Evidence, names: Sequence[str]) -> list[list[str]]:
-    """Return the figures as a table: a header, one row per side and one for all.
-
-    Args:
-        places: "places" of `explanation.json`, or `places.json`.
-        names: Names of the actions.
-    """
+    """Return "places" of an explanation, or `places.json`, as a table by side, with a header."""
     head = ["one cube", "share of places", *names, "not seen", "blind"]
     every = {**{n: places[n] for n in ("actions", "unseen", "blind")}, "share": 1.0}
     told = {WHERE[s]: of for s, of in places["sides"].items()} | {"anywhere": every}
@@ -94,11 +89,7 @@ def _say_closeness(places: Evidence) -> Claims:
 
 
 def describe_proof(certificate: Mapping[str, Any]) -> str:
-    """Summarise a certificate in one sentence that claims no more.
-
-    Args:
-        certificate: See `drone_rl.verification.prover.proof_files`.
-    """
+    """Summarise a certificate, see `proof_files`, in one sentence that claims no more."""
     task = certificate["policy"]["description"]["task"]
     cubes = all_cubes(task["num_cubes"])
     outcomes, undecided = certificate["outcomes"], certificate["undecided"]
@@ -117,11 +108,7 @@ def describe_proof(certificate: Mapping[str, Any]) -> str:
 
 
 def why_stopped(setting: str | None) -> str:
-    """Return why a proof has not finished, and the remedy.
-
-    Args:
-        setting: The setting that stopped it, if known.
-    """
+    """Return why a proof has not finished and, by the setting that stopped it, the remedy."""
     if setting != "most_boxes":
         return "the proof was stopped"
     return (
@@ -131,11 +118,7 @@ def why_stopped(setting: str | None) -> str:
 
 
 def found(search: Mapping[str, Any]) -> str:
-    """Describe one search for failures of a training.
-
-    Args:
-        search: A row of "rounds" in `result.json`, see `drone_rl.verification.provable.Round`.
-    """
+    """Describe a search for failures of a training, see `drone_rl.verification.provable.Round`."""
     text = f"at frame {search['frames']:,}: {search['failures']} of {search['flights']:,} flights"
     if search["losing"] is None:
         return f"{text} failed"

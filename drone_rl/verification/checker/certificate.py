@@ -71,11 +71,6 @@ class Certificate:
         return require_cubes(self.description, "certificates")
 
     @property
-    def bound(self) -> float:
-        """Largest |y| of cubes, metres."""
-        return self.task.lateral_bound
-
-    @property
     def groups(self) -> list[NDArray[np.float64]]:
         """The boxes of each outcome, then the undecided ones."""
         return [*(outcome.boxes for outcome in self.outcomes), self.undecided]
@@ -235,13 +230,9 @@ def check_same_policy(
     weights: Mapping[str, torch.Tensor],
     task: BaseTaskSettings | None = None,
 ) -> None:
-    """Check that a certificate is of this policy, and that the policy can have one.
+    """Check that a certificate is of this policy and task, and that the policy can have one.
 
-    Args:
-        certificate: The certificate.
-        described: The policy's description; its task does not count.
-        weights: State dict of its network.
-        task: The required task; any by default.
+    The task of the description does not count; any task will do by default.
 
     Raises:
         InputError: It is of another network, camera or task, or the policy has memory or camera

@@ -115,7 +115,6 @@ class Simulator:
         device: str = "cpu",
         renderer: str = "raytrace",
     ) -> None:
-        """Build the environment of a policy's task, and its network; see `check_certificate`."""
         pixels = described.camera.width * described.camera.height
         self.at_once = max(1, min(MOST_AT_ONCE, MOST_PIXELS // pixels))
         count = min(self.at_once, 64)
@@ -193,16 +192,9 @@ def check_certificate(
 ) -> Findings:
     """Check a certificate of a policy with these weights, see `check_same_policy`.
 
-    An inconsistent certificate is refused without simulation. Undecided placements are skipped.
-
-    Args:
-        certificate: The certificate.
-        weights: State dict of the network.
-        flights: Largest number of episodes.
-        seed: Seed of their placements, see `sample_placements`.
-        device: Device of the simulation.
-        renderer: Name, see `drone_rl.sim.rendering.find_renderer`.
-        tell: Called with the number of episodes done, and of all.
+    An inconsistent certificate is refused without simulation. Else up to `flights` episodes are
+    simulated; the seed is that of their placements, see `sample_placements`. Undecided placements
+    are skipped. `tell` is called with the number of episodes done, and of all.
 
     Raises:
         InputError: There is no such device.
@@ -240,11 +232,6 @@ def read_validated(
 ) -> Certificate:
     """Read a certificate of this policy and task, and check its consistency without simulation.
 
-    Args:
-        path: The file.
-        described: The policy's description, in the task that counts.
-        weights: State dict of its network.
-
     Raises:
         InputError: It can't be read, is of another policy or task, or is inconsistent.
     """
@@ -270,10 +257,7 @@ def ends_as_stated(outcome: Outcome, flown: Rollouts, i: int) -> bool:
 def _rounding_errors(
     stated: Sequence[Outcome], exact: Rollouts, is_wrong: NDArray[np.bool_]
 ) -> list[str]:
-    """Return what float64 alone refutes; a proof holds for any order of summation.
-
-    `is_wrong` marks the episodes that end otherwise in float32, too. Shape: (k,).
-    """
+    """Return what float64 alone refutes, and not float32, which `is_wrong` (k,) marks."""
     ended = np.array([ends_as_stated(outcome, exact, i) for i, outcome in enumerate(stated)], bool)
     if not (count := int((~ended & ~is_wrong).sum())):
         return []

@@ -91,7 +91,7 @@ TOLERANCE = 1e-12  # relative error of a stated fraction from summing floats
 
 def find_inconsistencies(certificate: Certificate) -> Iterator[str]:
     """Yield what is impossible, one line each."""
-    whole = Fraction(2 * certificate.bound) ** certificate.task.num_cubes
+    whole = Fraction(2 * certificate.task.lateral_bound) ** certificate.task.num_cubes
     yield from _misfits(certificate, whole)
     seen: dict[tuple, int] = {}
     for i, outcome in enumerate(certificate.outcomes):
@@ -129,13 +129,13 @@ def _missing(certificate: Certificate) -> Iterator[str]:
 
 def _misfits(certificate: Certificate, whole: Fraction) -> Iterator[str]:
     """Check twice that the boxes partition the placements: by corners and by volume."""
-    boxes = np.concatenate(certificate.groups)
-    misfit = find_partition_error(boxes, certificate.bound)
+    boxes, bound = np.concatenate(certificate.groups), certificate.task.lateral_bound
+    misfit = find_partition_error(boxes, bound)
     if misfit is not None:
         place, count = misfit
         yield (
             f"the boxes are no partition of the placements: {count} of them hold the place "
-            f"{place}, where lateral_bound={certificate.bound}"
+            f"{place}, where lateral_bound={bound}"
         )
     if (total := volume(boxes)) != whole:
         yield f"the boxes have {float(total / whole):.17g} of the volume of all placements"
@@ -166,12 +166,9 @@ DOUBT = 1e-9  # probability of refusing a true statement by chance, per number o
 def find_wrong_step_counts(
     outcomes: Sequence[Outcome], owner: NDArray[np.int64], steps: NDArray[np.int64]
 ) -> Iterator[str]:
-    """Yield the fractions of step counts that random episodes refute, one line each.
+    """Yield the stated fractions of step counts that random episodes refute, one line each.
 
-    Args:
-        outcomes: As stated.
-        owner: Index of each episode's outcome; their number where nothing is stated. (flights,)
-        steps: Steps of each episode. Shape: (flights,).
+    `owner` (flights,) has each episode's outcome; their number where nothing is stated.
     """
     for i, outcome in enumerate(outcomes):
         here, missing = steps[owner == i], missing_steps(outcome)

@@ -125,7 +125,7 @@ def sample_placements(certificate: Certificate, count: int, rng: np.random.Gener
     boxes = np.concatenate(groups)
     group = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])
     parts = [(p, np.full(len(p), i), INSIDE) for i, p in _inside(groups[:-1], count // 2, rng)]
-    border = sample_borders(groups, certificate.bound, count // 4, rng)
+    border = sample_borders(groups, certificate.task.lateral_bound, count // 4, rng)
     parts.append((border, group[find(boxes, border)], BORDER))
     points, chosen = sample_anywhere(boxes, count - sum(len(p) for p, *_ in parts), rng)
     parts.append((points, group[chosen], ANYWHERE))

@@ -1,1 +1,1 @@
-"""What a policy does, said exactly and not estimated from flights."""
+"""The prover: exact statements about a policy over all placements of the cubes."""

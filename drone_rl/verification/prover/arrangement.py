@@ -1,9 +1,4 @@
-"""Planar arrangements: the cells into which line segments cut a rectangle.
-
-The segments, cut where they meet, are the edges of a plane graph. Each edge is two half-edges, one
-per adjacent cell. A cell is a cycle of half-edges, each followed by the one that turns furthest
-left, so no cell is missed.
-"""
+"""Planar arrangements: the cells into which line segments cut a rectangle."""
 
 import dataclasses
 
@@ -56,13 +51,8 @@ class Pieces:
         x, low, high = self.upright.T
         low, high = np.maximum(low, -side), np.minimum(high, side)
         stands = (np.minimum(x - window.nearest, window.farthest - x) > SAME) & (high - low > SAME)
-        return Pieces(
-            slope[kept],
-            offset[kept],
-            begin[kept],
-            end[kept],
-            np.stack([x, low, high], -1)[stands],
-        )
+        upright = np.stack([x, low, high], -1)[stands]
+        return Pieces(slope[kept], offset[kept], begin[kept], end[kept], upright)
 
     def framed(self, window: Window) -> "Pieces":
         """Return the segments and the four sides of the window."""
@@ -78,7 +68,12 @@ class Pieces:
 
 @dataclasses.dataclass(frozen=True)
 class Arrangement:
-    """Cells as half-edges. The second half of the half-edges are the twins of the first half."""
+    """Cells as half-edges. The second half of the half-edges are the twins of the first half.
+
+    The segments, cut where they meet, are the edges of a plane graph; each edge is two half-edges,
+    one per adjacent cell. A cell is a cycle of half-edges, each followed by the one that turns
+    furthest left, so no cell is missed.
+    """
 
     points: NDArray[np.float64]  # points where segments meet or end. Shape: (P, 2)
     origin: NDArray[np.int64]  # index of the start point of each half-edge. Shape: (E,)
@@ -169,16 +164,13 @@ class Arrangement:
 
 
 def arrange(pieces: Pieces, window: Window, most_cells: int) -> Arrangement:
-    """Compute all cells into which segments cut a window.
+    """Compute all cells into which segments inside a window cut it, see `Pieces.clipped`.
 
-    Args:
-        pieces: Segments inside the window, see `Pieces.clipped`. Collinear segments must not
-            overlap, and each must connect to the sides of the window, directly or through others.
-        window: The rectangle.
-        most_cells: Bounds memory.
+    Collinear segments must not overlap, and each must connect to the sides of the window, directly
+    or through others.
 
     Raises:
-        InputError: There are more cells.
+        InputError: There are more cells than `most_cells`.
     """
     pieces = pieces.framed(window)
     points, piece = _meetings(pieces, most_cells)

@@ -126,11 +126,8 @@ def resolve_forks(
 ) -> tuple[dict[E, Boxes], Boxes]:
     """Assign placements with several possible actions to the ending that all branches share.
 
-    Args:
-        forks: Placements with more than one possible action, disjoint.
-        endings: Placements from which some branch has each ending; together they cover the forks.
-        unknown: Placements from which some branch has no known ending.
-        num_cubes: Number of intervals of a box.
+    The forks are disjoint. Some branch from each box of `endings` has that ending, and some from
+    each box of `unknown` has no known one; together they cover the forks.
 
     Returns:
         The forks with exactly one possible ending, disjoint, by ending; and the rest.

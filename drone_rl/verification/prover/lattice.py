@@ -1,8 +1,7 @@
-"""The task's rules on the lattice of drone positions.
+"""The task's rules on the lattice of drone positions, a whole number of steps from the start.
 
-In computer-vision mode every move is one step forward, left or right, so the drone is always a
-whole number of steps from its start. `Lattice` moves boxes of placements; `explore` builds the
-graph of everything reachable past cubes at given positions, by the simulator's own rules.
+`Lattice` moves boxes of placements; `explore` builds the graph of everything reachable past cubes
+at given positions, by the simulator's own rules.
 """
 
 import dataclasses
@@ -152,10 +151,7 @@ MOST_NODES = 2**24  # reachable or not, per placement; bounds memory
 
 @dataclasses.dataclass
 class Nodes(Batch):
-    """Graph nodes, K in number: a position and the set of collected cubes.
-
-    A node determines the image and the effect of each move, but not the number of steps.
-    """
+    """Graph nodes, K in number; each determines the image and the effect of each move."""
 
     placement: Tensor  # (K,) int64; index of the placement of the cubes
     ahead: Tensor  # (K,) int64; steps forward from the origin
@@ -226,10 +222,7 @@ def explore(settings: TaskSettings, cubes: Tensor) -> Graph:
 
 
 def _follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes, Tensor]:
-    """Return the nodes after each move, those of the first node first (K * A), and their ends.
-
-    The `EndReason` of each move, never the step limit, has shape (K, A).
-    """
+    """Return the nodes after each move (K * A), and the `EndReason` of each move (K, A)."""
     moves = torch.tensor(DIRECTIONS).long()
     each = torch.arange(len(nodes)).repeat_interleave(len(moves))
     before = nodes[each]
@@ -269,8 +262,8 @@ def shape_of(settings: TaskSettings) -> Shape:
 def _positions(settings: TaskSettings, nodes: Nodes) -> Tensor:
     """Return positions, metres, rounded like the simulator's repeated addition. Shape: (K, 3).
 
-    x equals the simulator's to the last bit. So does y if the drone came straight or steps are sums
-    of powers of two; otherwise the simulator's y depends on the path by about 1e-15.
+    They equal the simulator's to the last bit, but for y: where steps are no sums of powers of two,
+    it depends on the path by about 1e-15.
     """
     farthest = max(int(nodes.ahead.max()), int(nodes.aside.abs().max()))
     steps = np.full(farthest + 1, settings.step_length)

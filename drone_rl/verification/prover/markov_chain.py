@@ -1,10 +1,4 @@
-"""Exact success probabilities of a policy that samples its actions.
-
-`propagate` carries the probability of every lattice node from step to step in float64; nothing is
-sampled, and what is not followed is reported as undecided. `bound_success` bounds the same over a
-box of placements: network bounds over all images in the box give an interval Markov chain (Givan,
-Leach and Dean, 2000), solved backwards for its best and worst case.
-"""
+"""Exact success probabilities of a policy that samples its actions, and bounds on them."""
 
 import dataclasses
 from collections.abc import Callable, Iterable
@@ -83,10 +77,7 @@ class Outcomes(Batch):
 
 
 def propagate(graph: Graph, evaluate: Evaluate) -> Outcomes:
-    """Propagate the probability of every node until all episodes have ended.
-
-    The policy is evaluated once at each node that matters.
-    """
+    """Carry the probability of every node from step to step until all episodes have ended."""
     count, sets = len(graph.cubes), 2 ** graph.cubes.shape[1]
     placement = graph.nodes.placement.numpy()
     probability, visits, last, dropped = _propagate(graph, evaluate)
@@ -104,10 +95,9 @@ def propagate(graph: Graph, evaluate: Evaluate) -> Outcomes:
 
 
 def _propagate(graph: Graph, evaluate: Evaluate) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return what is known of each node once every episode has ended.
+    """Return action probabilities (K, A), 0 where not evaluated, and three values of each node.
 
-    The action probabilities, 0 where not evaluated (K, A); the expected number of visits; the
-    probability at the step limit; and that not followed. Shapes: (K,).
+    They are the expected visits, the probability at the step limit, and that not followed. (K,).
     """
     target = graph.target.numpy()
     goes_on = target >= 0
@@ -135,7 +125,6 @@ class NodeEvaluator:
     """Renders graph nodes and evaluates the policy's action probabilities there."""
 
     def __init__(self, env: TransformedEnv, network: nn.Module) -> None:
-        """Use an environment's renderer and transforms, and a network from images to logits."""
         self.pictures = 0  # images rendered so far
         self._worlds, self._network = worlds_of(env), network
         self._rounding = RoundingBound.find(network)
@@ -199,12 +188,11 @@ class SuccessBounds:
 
 
 def bound_success(spec: PolicySpec, box: Boxes, most: int = 1) -> SuccessBounds:
-    """Bound the probability that all cubes are collected, over a box of placements.
+    """Bound the probability that all cubes are collected, over a box of placements (C, 2).
 
-    Args:
-        spec: Policy and task.
-        box: Positions of the cubes, metres to the left, nearest first. Shape: (C, 2).
-        most: Number of parts the box is cut into; smaller parts give tighter bounds.
+    Network bounds over all images in the box give an interval Markov chain (Givan, Leach and Dean,
+    2000), solved backwards for its best and worst case. The box is cut into up to `most` parts;
+    smaller parts give tighter bounds.
 
     Raises:
         InputError: See `Cells`.
@@ -227,7 +215,6 @@ def bound_success(spec: PolicySpec, box: Boxes, most: int = 1) -> SuccessBounds:
 
 
 def _halves(box: Boxes) -> tuple[Boxes, Boxes]:
-    """Cut across the longest side."""
     cube = int(np.diff(box).argmax())
     first, second = box.copy(), box.copy()
     first[cube, 1] = second[cube, 0] = box[cube].mean()
@@ -251,10 +238,9 @@ def _bound(actions: "_ActionBounds", box: Boxes) -> tuple[float, float]:
 
 
 def _reachable(spec: PolicySpec, box: Boxes) -> tuple[list[LatticeState], NDArray[np.int64]]:
-    """Return all reachable states, the start first, and where each move may lead.
+    """Return all reachable states, and where moves may lead (states, moves, possible targets).
 
-    Targets are 0 for failure, 1 for success, else 2 plus the index of the state. Shape: (states,
-    moves, possible targets).
+    A target is 0 for failure, 1 for success, else 2 plus the index of the state.
     """
     lattice, number = spec.lattice, {LatticeState(0, 0): 0}
     places, found = [LatticeState(0, 0)], []

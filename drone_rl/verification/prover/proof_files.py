@@ -47,13 +47,8 @@ def certify(
 ) -> dict[str, Any]:
     """Return the certificate of what is known so far, as plain data.
 
-    Args:
-        name: The policy's name, for people.
-        description: The policy's, in the task of the proof.
-        weights: SHA-256 hash of the network's weights.
-        prover: The proof.
-        seconds: Duration.
-        stopped_by: The setting that stopped it early.
+    The description is in the task of the proof; `weights` is the SHA-256 hash of the network's;
+    `stopped_by` is the setting that stopped the proof early.
     """
     findings, task = prover.findings(), prover.lattice.task
     total = (2 * task.lateral_bound) ** task.num_cubes
@@ -194,7 +189,6 @@ def _ending(row: _Row) -> Ending:
 
 
 def _steps(state: dict[str, NDArray]) -> dict[Ending, dict[int, float]]:
-    """See `Findings`."""
     rows, volumes = state["steps_rows"], state["steps_volumes"]
     if rows.shape != (*volumes.shape, 4) or not np.isfinite(volumes).all():
         raise ValueError(f"steps are {volumes.dtype} of shape {rows.shape}")

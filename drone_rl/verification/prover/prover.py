@@ -1,10 +1,4 @@
-"""Follow all placements of the cubes at once through a policy's whole episode.
-
-Lattice states are visited in an order in which none precedes one that leads to it. Each holds the
-placements, as boxes, with which the drone arrives there. The action table cuts them by the possible
-actions, and each part moves on. Where several actions are possible, all are followed, and a
-placement counts as decided only if all its branches end alike.
-"""
+"""Follow all placements of the cubes at once through a policy's whole episode."""
 
 import dataclasses
 import math
@@ -55,7 +49,13 @@ class Findings:
 
 
 class Prover:
-    """A proof in progress; its findings are available at any time."""
+    """A proof in progress; its findings are available at any time.
+
+    Lattice states are visited in an order in which none precedes one that leads to it. Each holds
+    the placements, as boxes, with which the drone arrives there. The action table cuts them by the
+    possible actions, and each part moves on. Where several actions are possible, all are followed,
+    and a placement counts as decided only if all its branches end alike.
+    """
 
     def __init__(self, spec: PolicySpec, most_combinations: int = 500_000_000) -> None:
         """Start with every placement, in parts of about `most_combinations` images in memory.
@@ -155,10 +155,8 @@ class Prover:
                 self._gather(moved, part)
 
     def _gather(self, place: LatticeState, boxes: Boxes) -> None:
-        """Merge forks that reach a state by different paths, with the most steps of any.
-
-        The positions of cubes that are gone are rounded outwards: at worst more stays undecided.
-        """
+        """Merge forks that reach a state by different paths, with the most steps of any."""
+        # positions of cubes that are gone are rounded outwards: at worst more stays undecided
         gone = [k for k in range(boxes.shape[1]) if k not in self.lattice.standing(place)]
         boxes = boxes.copy()
         boxes[:, gone, 0] = np.floor(boxes[:, gone, 0] / COARSE) * COARSE
@@ -209,10 +207,7 @@ class Prover:
         return spans
 
     def _foresee(self, place: LatticeState) -> None:
-        """Fill the table for all waiting states beside this one: one large batch is faster.
-
-        None of them leads to another one. Tables of another x are dropped.
-        """
+        """Fill the table for all waiting states beside this one: one large batch is faster."""
         if place.ahead != self._seen_from:
             self._seen_from = place.ahead
             for known in (self._foreseen, self._tables, self._cells):
@@ -242,7 +237,6 @@ class Prover:
         return known
 
     def _fits(self, cells: list[Cells]) -> bool:
-        """Return whether all combinations of images fit into memory."""
         return math.prod(len(c.pictures) for c in cells) <= self._most
 
     def _all_cells(self, place: LatticeState, cubes: list[int], boxes: Boxes) -> list[Cells]:

@@ -16,7 +16,11 @@ def test_a_certificate_is_read(one_sided, write):
     assert lost.end == EndReason.FRONT_BOUNDARY and set(lost.steps) == {27, 28, 29}
     assert won.share == pytest.approx(0.6375, abs=2e-6)
     assert won.boxes.shape == (1, 1, 2) and won.boxes.dtype == np.float64
-    assert (found.name, found.bound, found.finished) == ("right_and_forward", 6.0, True)
+    assert (found.name, found.task.lateral_bound, found.finished) == (
+        "right_and_forward",
+        6.0,
+        True,
+    )
     assert [len(boxes) for boxes in found.groups] == [1, 1, 1]
     assert str(won) == "all_cubes, cubes collected: 1"
     assert str(lost) == "front_boundary, cubes collected: none"
