@@ -1,9 +1,4 @@
-"""Sections "evaluation", "shifts" (robustness), "dataset" (rollout statistics) and "flaws".
-
-Flaws are contradictions and loops. A contradiction (the flaw of Fig. 9) is a pair of similar
-observations with opposite actions. A loop is a stretch of an episode in which the drone moves back
-and forth.
-"""
+"""Sections "evaluation", "shifts" (robustness), "dataset" (rollout statistics) and "flaws"."""
 
 import dataclasses
 import enum
@@ -73,7 +68,7 @@ def dataset_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray
 
 
 def flaws_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "contradictions" of the analysed frames, and "loops" of the whole episodes."""
+    """Return "contradictions" (Fig. 9) of the analysed frames, and "loops" of whole episodes."""
     data, flights, scenes = context.dataset, context.flights, context.scenes
     alike = one_move(flights)
     pairs = find_pairs(data, alike, scenes.actions, data.offset(scenes.task))
@@ -167,19 +162,13 @@ def summarise_pairs(pairs: list[Pair], dataset: RolloutDataset, alike: float) ->
     }
 
 
-@dataclasses.dataclass(frozen=True)
-class Loop:
-    """A stretch of an episode in which the drone moves back and forth."""
+def find_loops(
+    flights: RolloutDataset, actions: Actions, min_reversals: int = 2
+) -> list[dict[str, int]]:
+    """Find stretches of an episode in which the drone moves back and forth.
 
-    first: int  # first frame
-    length: int
-    reversals: int  # moves that undo the one before
-
-
-def find_loops(flights: RolloutDataset, actions: Actions, min_reversals: int = 2) -> list[Loop]:
-    """Find runs of reversible moves with at least so many reversals.
-
-    With two, the drone is back where it was, and away again; no move undoes forward.
+    Each is a run of reversible moves, of which at least `min_reversals` undo the one before: with
+    two, the drone is back where it was, and away again. No move undoes forward.
     """
     moves, episode = flights.tensor("actions"), flights.episode
     sways = actions.sways({name: flights.tensor(name) for name in actions.fields()}).numpy()
@@ -190,17 +179,18 @@ def find_loops(flights: RolloutDataset, actions: Actions, min_reversals: int = 2
     for start, end in zip(starts, [*starts[1:], len(moves)], strict=True):
         reversals = int(turns[start : end - 1].sum())
         if reversals >= min_reversals and sways[start]:
-            loops.append(Loop(int(start), int(end - start), reversals))
+            found = {"first": int(start), "length": int(end - start), "reversals": reversals}
+            loops.append(found)
     return loops
 
 
-def summarise_loops(flights: RolloutDataset, loops: list[Loop]) -> dict[str, Any]:
+def summarise_loops(flights: RolloutDataset, loops: list[dict[str, int]]) -> dict[str, Any]:
     """Return counts; "episodes" is the fraction of episodes with a loop."""
-    looping = len({int(flights.episode[loop.first]) for loop in loops})
+    looping = len({int(flights.episode[loop["first"]]) for loop in loops})
     return {
         "loops": len(loops),
-        "longest": max((loop.length for loop in loops), default=0),
-        "frames_share": sum(loop.length for loop in loops) / len(flights),
+        "longest": max((loop["length"] for loop in loops), default=0),
+        "frames_share": sum(loop["length"] for loop in loops) / len(flights),
         "episodes": proportion(looping, len(np.unique(flights.episode))),
-        "list": [dataclasses.asdict(loop) for loop in loops],
+        "list": loops,
     }

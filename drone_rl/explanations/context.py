@@ -1,8 +1,4 @@
-"""State that all sections share: a policy, its environments, rollouts and heat maps.
-
-Each shared value is computed when it is first needed and does not depend on who needs it first, so
-sections can run in any order.
-"""
+"""State that all sections share: a policy, its environments, rollouts and heat maps."""
 
 import copy
 import dataclasses
@@ -35,7 +31,11 @@ class LeftOutError(Exception):
 
 
 class Context:
-    """One policy that is being explained."""
+    """One policy that is being explained.
+
+    Each shared value is computed when it is first needed and does not depend on who needs it first,
+    so sections can run in any order.
+    """
 
     def __init__(
         self,

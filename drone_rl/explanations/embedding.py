@@ -46,12 +46,10 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
 def embed(
     originals: NDArray, *, perplexity: float = 30.0, seed: int = 0
 ) -> tuple[NDArray, dict[str, float]]:
-    """Embed points (T, *), one a row, in the plane (Eqs. 16 and 17); a seed below 2**32 fixes it.
+    """Embed points (T, *) in the plane (Eqs. 16 and 17); return them (T, 2), and `faithfulness`.
 
-    The perplexity is the effective number of neighbours of a point.
-
-    Returns:
-        The points (T, 2) and their `faithfulness`.
+    The perplexity is the effective number of neighbours of a point; a seed below 2**32 fixes the
+    result.
 
     Raises:
         InputError: There are too few points for the perplexity, or one is not finite.

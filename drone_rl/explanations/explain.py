@@ -1,20 +1,16 @@
-"""Explain policies: compute all sections, write them as files, and make one report.
-
-The files of a policy, `explanation.json`, `arrays.npz` and `dataset.npz`, are all that a report is
-built from, so it can be built again without the policy.
-"""
+"""Explain policies: compute all sections, write them as files, and make one report."""
 
 import dataclasses
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from torchrl.envs import TransformedEnv
 
@@ -22,6 +18,7 @@ from drone_rl.evaluation.rounding_sensitivity import require_function
 from drone_rl.explanations import attribution, behavior, class_models, embedding, response, truth
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.report import write_report
+from drone_rl.explanations.report.explanation import FORMAT, FORMAT_VERSION
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import PictureNetwork
 from drone_rl.policies.base_policy import Pilot
@@ -36,8 +33,8 @@ from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import seed_line
 from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import find_domain
+from drone_rl.verification.prover.policy_spec import one_thread
 
-FORMAT_VERSION = 3
 _Result = tuple[dict[str, Any], dict[str, NDArray], float] | LeftOutError
 """Numbers, arrays and seconds of a section, or why it is left out."""
 Given = str | Path | Pilot | Logits  # a policy or something that `as_pilot` converts to one
@@ -75,7 +72,6 @@ class Explanations:
     """Root of all random streams."""
 
     def __str__(self) -> str:
-        """Return a line for each verdict, and the seed."""
         lines = []
         for name, numbers in self.numbers.items():
             verdict = numbers["verdict"]
@@ -122,7 +118,7 @@ def explain(
     def explain_one(policy: Pilot, folder: Path) -> dict[str, Any]:
         require_function(policy, seed=seed.value, renderer=settings.renderer)
         env = policy.make_env(num_envs, seed=seed.value, renderer=settings.renderer)
-        try:
+        with closing(env):
             return explain_policy(
                 env,
                 policy.make_network(),
@@ -136,15 +132,9 @@ def explain(
                 unlike=policy.unlike,
                 seed=seed,
             )
-        finally:
-            env.close()
 
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)  # the same file on every machine; small observations gain nothing
-    try:
+    with one_thread():  # the same file on every machine; small observations gain nothing
         numbers = {name: explain_one(one, folders[name]) for name, one in chosen.items()}
-    finally:
-        torch.set_num_threads(threads)
     progress("report")
     report = write_report(list(folders.values()), folder)
     progress("explained", 1, 1)
@@ -202,7 +192,7 @@ def explain_policy(
     left_out = {title: str(one) for title, one in results.items() if isinstance(one, LeftOutError)}
     made = {title: one for title, one in results.items() if not isinstance(one, LeftOutError)}
     written = {
-        "format": "drone_rl explanation",
+        "format": FORMAT,
         "format_version": FORMAT_VERSION,
         "name": name,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -224,8 +214,7 @@ def _run(
     sections: Mapping[str, Section], context: Context, progress: Callable[[str], None]
 ) -> dict[str, _Result]:
     """Run all sections, those in `ASIDE` in a second thread."""
-    twin = context.aside()
-    results: dict[str, _Result] = {}
+    twin, results = context.aside(), dict[str, _Result]()
     with ThreadPoolExecutor(1) as pool:
         aside = {t: pool.submit(_compute, sections[t], twin) for t in sections if t in ASIDE}
         for title in sorted(sections, key=ASIDE.__contains__):

@@ -25,7 +25,7 @@ MapMethod = Callable[[Tensor, Tensor], Tensor]
 
 @dataclasses.dataclass
 class Explainer:
-    """Computes heat maps of one policy by several methods, all of the size of its observations."""
+    """Heat maps of one policy by several methods, all of the size of its observations."""
 
     network: PictureNetwork
     absent: Tensor  # baseline: the observation of the scene without targets. Shape: (C, H, W).

@@ -16,10 +16,11 @@ _TRIED = 2  # observations in the forward pass that finds the layers
 
 
 @torch.no_grad()
-def _layers(network: PictureNetwork) -> dict[str, tuple[nn.Module, tuple[int, ...]]]:
-    """Return layers in the order of the forward pass, with the shapes of their outputs.
+def layers(network: PictureNetwork) -> dict[str, tuple[nn.Module, tuple[int, ...]]]:
+    """Return layers by name in the order of the forward pass, with the shapes of their outputs.
 
-    A layer has no submodules, runs once, and returns one tensor.
+    A layer has no submodules, runs once, and returns one tensor; a policy that is no torch module
+    has none.
     """
     names = {part: name for name, part in network.parts.named_modules() if name}
     ran: list[tuple[nn.Module, tuple[int, ...]]] = []
@@ -40,11 +41,6 @@ def _layers(network: PictureNetwork) -> dict[str, tuple[nn.Module, tuple[int, ..
     return {names[layer]: (layer, shape) for layer, shape in ran if shape and times[layer] == 1}
 
 
-def layer_names(network: PictureNetwork) -> list[str]:
-    """Return the names of the layers, in order; none if it is not a torch module."""
-    return [*_layers(network)]
-
-
 def find_layer(network: PictureNetwork, name: str) -> nn.Module:
     """Return the layer of that name.
 
@@ -53,7 +49,7 @@ def find_layer(network: PictureNetwork, name: str) -> nn.Module:
     """
     found = dict(network.parts.named_modules()).get(name) if name else None
     if found is None or [*found.children()]:
-        there = ", ".join(layer_names(network)) or "none, for it is no torch module"
+        there = ", ".join(layers(network)) or "none, for it is no torch module"
         raise InputError(f"layer={name} is not in the policy; choose from: {there}")
     return found
 
@@ -64,18 +60,17 @@ def spatial_layers(network: PictureNetwork) -> list[str]:
     Each is the layer after a convolution if it keeps the shape, usually a nonlinearity, or else the
     convolution itself.
     """
-    layers = [*_layers(network).items()]
-    found = []
-    for i, (name, (layer, shape)) in enumerate(layers):
+    every, found = [*layers(network).items()], []
+    for i, (name, (layer, shape)) in enumerate(every):
         if isinstance(layer, nn.Conv2d):
-            after, (_, then) = layers[i + 1] if i + 1 < len(layers) else ("", (None, ()))
+            after, (_, then) = every[i + 1] if i + 1 < len(every) else ("", (None, ()))
             found.append(after if then == shape else name)
     return found
 
 
 def feature_layer(network: PictureNetwork) -> str | None:
     """Return the last layer before the logits; None if there is none."""
-    names = layer_names(network)
+    names = [*layers(network)]
     return names[-2] if len(names) > 1 else None
 
 

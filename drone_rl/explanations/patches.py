@@ -1,9 +1,7 @@
-"""Measures of heat maps, and their controls.
+"""Scores of heat maps by the effects of patches, and controls: placebos and shuffled weights.
 
-A map's score is its agreement with the effects of patches on the policy. All patches of a frame
-have one size, so neither the size of a target nor the sharpness of a map matters: an uninformative
-map has a mean score of 0 with any policy. Controls are placebo maps, and maps of policies with
-shuffled weights.
+All patches of a frame have one size, so neither the size of a target nor the sharpness of a map
+matters: an uninformative map has a mean score of 0 with any policy.
 """
 
 import copy
@@ -88,11 +86,8 @@ def replaced(
 ) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
     """Evaluate the policy with one part of an observation replaced, for all parts that differ.
 
-    Observations and replacements are (T, C, h, w), the masks of the parts (P, h, w).
-
-    Yields:
-        In batches: indices of observations (n,) and of parts (n,), and the action probabilities
-        (n, num_actions). Parts that are equal in both are left out.
+    Observations and replacements are (T, C, h, w), the masks of the parts (P, h, w). Yields batches
+    of indices of observations (n,) and of parts (n,), and the probabilities (n, num_actions).
     """
     masks = masks.to(observations.device)
     pixels = (observations != other).any(1).flatten(1).float()
@@ -107,8 +102,7 @@ def patch_effects(
 ) -> NDArray:
     """Return the effect on the policy of replacing each patch by alternatives (T, C, h, w).
 
-    Returns:
-        Distance of the action probabilities, averaged over the alternatives. Shape: (T, count).
+    It is the mean distance of the action probabilities. Shape: (T, count).
     """
     base = probabilities(network, observations)
     masks, effects = grid.masks(observations.shape[-2:]), []
@@ -127,20 +121,15 @@ def moving(effects: NDArray) -> NDArray:
 
 
 def scores(heat: NDArray, effects: NDArray) -> NDArray:
-    """Return how well each map agrees with the effects of the patches, both (T, count).
-
-    Returns:
-        Spearman's rank correlation within each frame; 0 where either is constant. Shape: (T,).
-    """
+    """Return the rank correlation of heat with effects of patches, both (T, count). Shape: (T,)."""
     return rank_correlation(_levels(heat), np.round(effects / _EQUAL))
 
 
 def pointing(heat: NDArray, effects: NDArray) -> tuple[NDArray, NDArray]:
-    """Return whether the hottest patch is one of those with the largest effect; both (T, count).
+    """Return the fraction of the hottest patches, and of all (chance), with the largest effect.
 
-    Returns:
-        The fraction of the hottest patches that are, and the fraction of all patches that are
-        (chance): a tenth, more if effects tie, fewer if other patches have none. Both (T,).
+    Heat and effects are (T, count), the fractions (T,). Chance is a tenth, more if effects tie,
+    less if other patches have none.
     """
     levels, moved = _levels(heat), np.round(effects / _EQUAL)
     number = max(1, round(TOP * effects.shape[1]))
@@ -183,8 +172,7 @@ def placebo_maps(
 ) -> dict[str, Tensor]:
     """Return maps (T, h, w) that do not use the policy, by name; a method must beat all of them.
 
-    They use the observations (T, C, h, w), that of the scene without targets (C, h, w), and the
-    alternatives (T, C, h, w) of `scenes.alternatives`. The seed is that of the noise.
+    Observations and `others`, see `alternatives`, are (T, C, h, w), `absent` is (C, h, w).
     """
     count, _, height, width = observations.shape
     generator = torch.Generator().manual_seed(seed)
@@ -240,9 +228,9 @@ def shuffled_networks(
 ) -> Iterator[PictureNetwork]:
     """Yield copies of a policy with weights and biases shuffled within each layer.
 
-    Networks with shuffled weights are often nearly constant, which alone would distinguish their
-    maps. Therefore each copy's logits, unless constant, are rescaled to the policy's mean and
-    standard deviation on observations (T, C, h, w). The first copies do not depend on `count`.
+    They are often nearly constant, which alone would distinguish their maps. So each copy's logits,
+    unless constant, are rescaled to the policy's mean and standard deviation on observations
+    (T, C, h, w). The first copies do not depend on `count`.
     """
     generator = torch.Generator().manual_seed(seed)
     with torch.no_grad():
@@ -263,9 +251,7 @@ def likeness(first: Tensor, second: Tensor) -> NDArray:
     """Return the rank correlation of maps (T, h, w) over the pixels on which one of them has heat.
 
     Pixels without heat in both (such as those equal to the baseline) would make any maps similar.
-
-    Returns:
-        Shape: (T,); 1 where both are constant or one has no heat, which shows no dependence.
+    The result (T,) is 1 where both are constant or one has no heat, which shows no dependence.
     """
     likeness = np.ones(len(first))
     pairs = zip(first.flatten(1).double().numpy(), second.flatten(1).double().numpy(), strict=True)

@@ -193,10 +193,8 @@ def outcome_map(
 def summarise(response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str]) -> dict[str, Any]:
     """Return counts by height and stratum, such as "left", "ahead" and "right".
 
-    Returns:
-        "without_target"; "rows": for each height and side the fraction of places at which the
-        policy is "blind" (None if the grid has none on that side), and the number of "places" and
-        of those "collected".
+    "rows" has for each height and side the fraction of places at which the policy is "blind" (None
+    if the grid has none on that side), and the number of "places" and of those "collected".
     """
     rows = []
     for layer, height in enumerate(response.height.tolist()):
@@ -218,12 +216,10 @@ def summarise(response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str])
 def asymmetry(
     network: PictureNetwork, observations: Tensor, episode: NDArray, actions: Actions
 ) -> dict[str, Any]:
-    """Compare pi(left | x) with pi(right | mirrored x) on observations (T, C, H, W).
+    """Compare the policy with its mirror image on observations x (T, C, H, W).
 
-    Returns:
-        "signed": mean of pi(left | x) - pi(right | mirrored x), below 0 if the policy prefers
-        right; "absolute": mean distance between the policy and its mirror image; "worst": frames
-        with the largest distances.
+    "signed" is the mean of pi(left | x) - pi(right | mirrored x), below 0 if the policy prefers
+    right; "absolute" the mean distance of the probabilities; "worst" the frames with the largest.
     """
     here = probabilities(network, observations)
     there = actions.mirror(probabilities(network, observations.flip(-1)))

@@ -1,8 +1,7 @@
 """Recorded rollouts of a policy with the simulator's ground truth, and rollouts from given states.
 
-A data set is an ordinary compressed `.npz`: `numpy.load(file)` gives its arrays, and the entry
-"meta", a JSON text, describes them under "fields". It has whole episodes; only some frames of each
-are rendered and analysed, evenly spread, so that a long episode counts no more than a short one.
+Only some frames of each episode are rendered and analysed, evenly spread, so that a long episode
+counts no more than a short one.
 """
 
 import dataclasses
@@ -29,7 +28,6 @@ from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State, Task
-from drone_rl.utils.errors import InputError
 
 SEEN = {
     "observations": "what the policy's network got, float32 (T, C, h, w)",
@@ -68,11 +66,9 @@ class RolloutDataset:
     meta: dict[str, Any]  # origin; its "fields" describe the arrays
 
     def __len__(self) -> int:
-        """Return the number of frames."""
         return len(self.arrays["actions"])
 
     def __getattr__(self, name: str) -> NDArray:
-        """Return an array by name."""
         if name in (arrays := vars(self).get("arrays", {})):
             return arrays[name]
         raise AttributeError(name)
@@ -120,12 +116,7 @@ def collect(
     """Collect at least so many whole episodes and steps of a policy, with sampled actions.
 
     Only observations are rendered. `meta` is the origin of the policy.
-
-    Raises:
-        InputError: num_frames is below 1.
     """
-    if num_frames < 1:
-        raise InputError(f"frames={num_frames} records nothing; give 1 or more")
     worlds = worlds_of(env)
     keep = (("next", "info", "end_reason"),)
     collector = EpisodeCollector(env, _WithTruth(actor, (*worlds.task.entries, *_POSE)), keep=keep)
@@ -169,9 +160,7 @@ def render_frames(
     network: PictureNetwork,
     layers: tuple[str, ...] = (),
 ) -> RolloutDataset:
-    """Return some steps with rendered frames, ground truth, probabilities and outputs of layers.
-
-    The steps are given as indices (T,) into what `collect` returned.
+    """Return the steps `rows` (T,) with frames, ground truth, probabilities and outputs of layers.
 
     Raises:
         InputError: A layer doesn't exist.

@@ -39,7 +39,6 @@ class Scenes:
     """
 
     def __init__(self, env: TransformedEnv) -> None:
-        """Use the simulated environments and the transforms of `env`."""
         self.worlds = worlds_of(env)
         self.task = self.worlds.task
         self.actions = self.worlds.dynamics.actions
@@ -144,8 +143,7 @@ def alternatives(scenes: Scenes, state: State, seed: int = 0) -> dict[str, Tenso
     """Return observations (T, C, h, w) from the same places with other contents, by name.
 
     These are: no targets; targets at random places, `PLACEMENTS` times; ground and sky darker, and
-    brighter. Patches of an observation are replaced by patches of these. Unlike a gray box, they
-    are similar to observations that the policy was trained on.
+    brighter. Unlike a gray box, they are similar to observations that the policy was trained on.
     """
     generator = torch.Generator().manual_seed(seed)
     found = {"no targets": scenes.observe(scenes.task.without_targets(state))}

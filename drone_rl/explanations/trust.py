@@ -4,18 +4,13 @@ A method is trusted if it passes four tests:
 
 - "placebos": its maps agree better with the effects of patches than every placebo map.
 - "random weights": they do so better than its maps of policies with shuffled weights. This is a
-  permutation test: the maps of a method that ignores the weights score as well with any weights, so
-  they beat all shuffled policies with a probability of at most the level.
+  permutation test: the level bounds the probability that a method that ignores the weights passes.
 - "pointing": its hottest patch is one of those with the largest effect, more often than chance.
 - "likeness": its maps change when the weights do.
 
 A method must pass all tests, so each is made at the full level; the level is divided by the number
-of methods, so that the best one is not a chance find. Bounds are for the median of the episodes'
-means: its order statistics are exact for any distribution and any dependence within episodes, while
-means of differences would need some hundred episodes.
-
-To test methods of your own: `make_trial` from scenes and rollouts, then `check_maps`; the result is
-plain data.
+of methods. Bounds are for the median of the episodes' means: its order statistics are exact for any
+distribution and any dependence within episodes.
 """
 
 import dataclasses
@@ -165,13 +160,9 @@ def check_maps(
     *,
     num_methods: int | None = None,
 ) -> dict[str, Any]:
-    """Test methods.
+    """Test methods, by name; `maps` has `trial.maps` of those for which it is already computed.
 
-    Args:
-        trial: Effects of patches on the policy.
-        methods: By name.
-        maps: `trial.maps` of each method, if already computed.
-        num_methods: Number of methods that share the error rate; that of `methods` by default.
+    The error rate is shared by `num_methods`, by default those that are given.
 
     Returns:
         "trusted": name of the best method that passed all tests, None if none did; "methods", by
@@ -243,8 +234,8 @@ def random_weights(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
     It stops at the first policy on which the method scores as much.
 
     Returns:
-        "score" on one frame of each episode; "best" and "mean" of the other scores; "tried": number
-        of shuffled policies; "as_good": how many of them scored as much.
+        "score" on one frame of each episode; "best" and "mean" of the others; "tried": number of
+        shuffled policies; "as_good": how many of them scored as much.
     """
     few = trial.thinned()
     own = float(few.scores(few.maps(method)).mean())

@@ -1,9 +1,4 @@
-"""Section "truth": tests of the heat maps against the effects of changes to the scene.
-
-Besides the tests in `trust`: pixel-level deletion and insertion curves (Petsiuk et al., 2018), the
-heat by region, and interventions. That an action's probability changes does not show that the
-outcome changes, so rollouts with and without a change are compared, each from the same frame.
-"""
+"""Section "truth": tests of the heat maps against the effects of changes to the scene."""
 
 import dataclasses
 from concurrent.futures import ThreadPoolExecutor
@@ -89,12 +84,9 @@ def _integration_error(context: Context, trial: Trial) -> dict[str, float] | Non
 
 
 def heat_shares(maps: NDArray, regions: NDArray, episode: NDArray) -> dict[str, Any]:
-    """Return the fractions of a map's heat on targets, horizon, ground and sky.
+    """Return the "share" of a map's heat by region, and "chance": the region's share of the frame.
 
     Maps (T, H, W) are 0 or more; `regions` has the `Region` of each pixel; `episode` is (T,).
-
-    Returns:
-        By region name, "share" of the heat and "chance": the region's fraction of the frame.
     """
     flat = maps.reshape(len(maps), -1).astype(np.float64)
     areas = regions.reshape(flat.shape)
@@ -113,7 +105,8 @@ def deletion_insertion(trial: Trial, maps: Tensor, absent: Tensor) -> dict[str, 
     """Return the action's probability as the hottest pixels are replaced first, or restored first.
 
     Pixels are replaced by the scene without targets, `absent` (C, h, w). That scene has a most
-    probable action of its own, so results are given for each action taken. Maps are (T, h, w).
+    probable action of its own, so results are given for each action taken. Maps are (T, h, w). See
+    Petsiuk et al., 2018.
 
     Returns:
         By name of the action: "frames"; for "deletion" (lower is better) and "insertion" (higher is
@@ -176,7 +169,7 @@ def intervene(
 ) -> list[Intervention]:
     """Remove, move and recolour the next target; as a control, change a patch of ground.
 
-    `regions` has the `Region` of each pixel (T, H, W); the seed is that of the patches' places.
+    `regions` has the `Region` of each pixel (T, H, W).
     """
     before = scenes.frames(state)
     base = probabilities(network, scenes.transform(before))
@@ -240,7 +233,8 @@ def measure_outcomes(
 ) -> dict[str, Any]:
     """Compare greedy rollouts with the next target moved, and with another ground.
 
-    They start from states of the data set (T of them); `episode` has shape (T,).
+    That an action's probability changes does not show that the outcome changes. The rollouts start
+    from T states of the data set; `episode` has shape (T,).
 
     Returns:
         Means over episodes with intervals: "collected", by variant ("as it was", "moved left",
@@ -279,10 +273,7 @@ def run_to_target(
     target: Tensor,
     appearance: Appearance | None = None,
 ) -> TargetRollouts:
-    """Step until one target of each environment is reached or passed; see `rollout`.
-
-    The states and the targets' numbers have shape (N,).
-    """
+    """Step until one target (N,) of each environment is reached or passed; see `rollout`."""
     task = scenes.task
     decided = torch.zeros_like(target)
     lateral = [state.body.position[:, 1].clone()]
@@ -306,8 +297,7 @@ def run_to_target(
 def followed(left: TargetRollouts, right: TargetRollouts) -> NDArray:
     """Return how far the drone moved with a target, per metre that it was moved; in [-1, 1].
 
-    Both rollouts are compared at the step at which the first of them ends, so that a longer rollout
-    does not count as following.
+    Both are compared where the first of them ends: a longer rollout does not count as following.
     """
     when = np.minimum(left.decided, right.decided)
     ends = [r.lateral[np.arange(len(when)), when] for r in (left, right)]

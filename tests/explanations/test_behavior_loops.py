@@ -19,7 +19,7 @@ def test_loops_are_turns_without_progress():
     actions = [F, L, R, L, R, L, F, L, L, R, F, L, R, R, L, R, F]
     data = flights(actions, [0] * 12 + [1] * 5)
     loops = find_loops(data, MOVES)
-    assert [(loop.first, loop.length, loop.reversals) for loop in loops] == [(1, 5, 4), (12, 4, 2)]
+    assert [tuple(loop.values()) for loop in loops] == [(1, 5, 4), (12, 4, 2)]
     summary = summarise_loops(data, loops)
     assert (summary["episodes"]["successes"], summary["episodes"]["trials"]) == (2, 2)
     assert summary["longest"] == 5 and summary["frames_share"] == pytest.approx(9 / 17)
@@ -27,7 +27,7 @@ def test_loops_are_turns_without_progress():
 
 def test_loops_at_the_first_and_at_the_last_frame():
     loops = find_loops(flights([L, R, L, F, R, L, R], [0] * 7), MOVES)
-    assert [(loop.first, loop.length, loop.reversals) for loop in loops] == [(0, 3, 2), (4, 3, 2)]
+    assert [tuple(loop.values()) for loop in loops] == [(0, 3, 2), (4, 3, 2)]
     assert find_loops(flights([L, R], [0, 0]), MOVES) == []  # one turn
     assert len(find_loops(flights([L, R], [0, 0]), MOVES, min_reversals=1)) == 1
     assert (
@@ -58,4 +58,4 @@ def test_in_another_set_of_actions_loops_are_made_of_whatever_undoes_what():
     """Up and down go nowhere; up and left is a way; staying is nothing that one can undo."""
     moves = [UP, DOWN, UP, STAY, UP, LEFT, UP, LEFT, STAY, LEFT, RIGHT, LEFT, RIGHT]
     loops = find_loops(flights(moves, [0] * len(moves)), FIVE)
-    assert [(loop.first, loop.length, loop.reversals) for loop in loops] == [(0, 3, 2), (9, 4, 3)]
+    assert [tuple(loop.values()) for loop in loops] == [(0, 3, 2), (9, 4, 3)]

@@ -6,7 +6,7 @@ from drone_rl.explanations.hooks import (
     feature_layer,
     features,
     find_layer,
-    layer_names,
+    layers,
     probabilities,
     spatial_layers,
 )
@@ -42,7 +42,7 @@ def test_layers_of_networks_with_and_without_convolutions(world):
     assert feature_layer(world[2]) == "fc_relu1"
     mlp = MLP((1, 4, 4), 3, hidden=(5,))
     assert spatial_layers(mlp) == []
-    assert layer_names(mlp) == ["flatten", "fc1", "fc_relu1", "logits"]
+    assert [*layers(mlp)] == ["flatten", "fc1", "fc_relu1", "logits"]
 
 
 def test_probabilities_add_up_to_one(world):
@@ -73,7 +73,7 @@ def elsewhere():
 
 
 def test_layers_from_elsewhere_stand_in_the_order_in_which_they_act(elsewhere):
-    assert layer_names(elsewhere) == ["body.0", "body.1", "body.2", "head.before", "head.last"]
+    assert [*layers(elsewhere)] == ["body.0", "body.1", "body.2", "head.before", "head.last"]
     assert spatial_layers(elsewhere) == ["body.1", "body.2"]  # what follows the second acts twice
     assert feature_layer(elsewhere) == "head.before"
     assert num_hooks(elsewhere) == 0
@@ -90,7 +90,7 @@ def test_what_is_no_layer(elsewhere, name):
 
 def test_a_function_has_no_layers():
     network = ForeignNetwork(lambda x: x.flatten(1)[:, :3], (1, 8, 10), MOVES)
-    assert (layer_names(network), spatial_layers(network), feature_layer(network)) == ([], [], None)
+    assert ([*layers(network)], spatial_layers(network), feature_layer(network)) == ([], [], None)
     with pytest.raises(InputError, match="choose from: none, for it is no torch module"):
         find_layer(network, "conv1")
     one = ForeignNetwork(nn.Sequential(nn.Flatten(), nn.Linear(80, 3)), (1, 8, 10), MOVES)
@@ -116,5 +116,5 @@ class Over(nn.Module):
 
 def test_a_convolution_may_be_the_last_and_what_is_of_no_picture_is_no_layer():
     network = ForeignNetwork(Last(), (1, 8, 10), MOVES)
-    assert layer_names(network) == ["conv"]
+    assert [*layers(network)] == ["conv"]
     assert spatial_layers(network) == ["conv"] and feature_layer(network) is None

@@ -3,7 +3,6 @@ import pytest
 
 from drone_rl.explanations.rollouts import collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes
-from drone_rl.utils.errors import InputError
 
 
 @pytest.fixture
@@ -49,8 +48,3 @@ def test_drawn_frames_are_those_that_were_asked_for(flights, world):
     np.testing.assert_array_equal(seen.observations, flights.observations[rows])
     assert len(seen.features["relu1"]) == len(seen.frames) == 2
     np.testing.assert_allclose(seen.probabilities.sum(-1), 1, atol=1e-6)
-
-
-def test_no_frames_are_refused(world):
-    with pytest.raises(InputError, match="frames=0"):
-        collect(*world[:2], num_episodes=1, num_frames=0)
