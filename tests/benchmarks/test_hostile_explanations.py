@@ -4,14 +4,13 @@ import pytest
 
 from benchmarks import hostile_explanations
 from benchmarks.evidence import changed
-from drone_rl.explanations.report.validation import check_fit, check_sizes
+from drone_rl.explanations.report.validation import check_files
 from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.utils.errors import InputError
 
 
 def check(numbers, arrays):
-    check_sizes(numbers, arrays, hostile_explanations.data())
-    check_fit(numbers, arrays, hostile_explanations.data(), SHOWN_MOVES)
+    check_files(numbers, arrays, hostile_explanations.data(), SHOWN_MOVES)
 
 
 def test_the_unchanged_explanation_is_valid():

@@ -11,7 +11,7 @@ from PIL import Image
 
 from drone_rl.evaluation.consistency import check_verdict
 from drone_rl.evaluation.plots.saving import Rows
-from drone_rl.explanations.report.validation import check_fit, check_sizes
+from drone_rl.explanations.report.validation import check_files
 from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary, shown_actions, terms_of
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.consistency import check_intervals
@@ -74,8 +74,7 @@ class Explanation:
             arrays = read_arrays(folder / "arrays.npz", allowance=allowance)
             data = read_arrays(folder / "dataset.npz", allowance=allowance)
             data.pop("meta", None)
-            check_sizes(numbers, arrays, data)
-            check_fit(numbers, arrays, data, shown_actions(numbers))
+            check_files(numbers, arrays, data, shown_actions(numbers))
             terms_of(numbers)
             if "name" in numbers:
                 Text(1000).read(numbers["name"], "name")

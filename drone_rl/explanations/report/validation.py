@@ -1,7 +1,7 @@
 """Check an explanation's files before rendering: sizes, types, and that they fit each other."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -35,8 +35,9 @@ _SIZES = {
     "starts to the side": _SIDE,
 }
 """Largest sizes of dimensions; dimensions of the same name must have the same size."""
-_Arrays = Mapping[str, tuple[str, tuple[str | int, ...], int]]
-_ARRAYS: _Arrays = {
+_Described = tuple[str, tuple[str | int, ...], int]
+"""Kind of dtype, dimensions or their largest sizes, most bytes."""
+_ARRAYS: Mapping[str, _Described] = {
     "film_frames": (_PIXEL, ("steps of the film", _SIDE, _SIDE, 3), 2**23),
     "film_heat": (_FLOAT, ("steps of the film", _SIDE, _SIDE), 2**23),
     "film_probabilities": (_FLOAT, ("steps of the film", "actions"), 2**20),
@@ -64,14 +65,13 @@ _ARRAYS: _Arrays = {
     "patch_effects": (_FLOAT, (_SIDE, _SIDE), 2**20),
     "shifts_[a-z_]+": (_PIXEL, (8, _SIDE, _SIDE, 3), 2**22),
 }
-"""Arrays of `arrays.npz`: kind of dtype, dimensions or their largest sizes, most bytes."""
-_DATA: _Arrays = {
+_DATA: Mapping[str, _Described] = {
     "frames": (_PIXEL, ("frames", _SIDE, _SIDE, 3), 2**27),
     "probabilities": (_FLOAT, ("frames", "actions"), 2**23),
     "(actions|episode|step|event)": (_INTEGER, ("frames",), 2**20),
     "flights/episode": (_INTEGER, (10 * _MANY,), 2**23),
 }
-"""The same for `dataset.npz`."""
+"""Arrays of `arrays.npz` and of `dataset.npz`, by patterns of their names."""
 _LENGTHS: Mapping[tuple[str, ...], int] = {
     ("attribution", "film", "key_steps"): 12,
     ("truth", "methods"): 16,
@@ -82,7 +82,7 @@ _LENGTHS: Mapping[tuple[str, ...], int] = {
     ("shifts", "axes"): 64,
 }
 """Most entries of lists and mappings in `explanation.json` that figures show one by one."""
-_INDICES = {"actions": _ACTIONS, "film_actions": _ACTIONS, "episode": _MANY, "step": 10**7}
+_INDICES = {"episode": _MANY, "step": 10**7}
 """Arrays used as indices, and their exclusive upper limits."""
 _FINITE = {
     *("tsne_features", "tsne_pixels", "places_points", "response_height", "outcome_height"),
@@ -108,33 +108,48 @@ _WINDOW: Mapping[str, Kind] = {
 _FARTHEST_RATIO = 20  # largest ratio of the sides of the exact map
 
 
-def check_sizes(
-    numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], data: Mapping[str, NDArray]
+def check_files(
+    numbers: Mapping[str, Any],
+    arrays: Mapping[str, NDArray],
+    data: Mapping[str, NDArray],
+    actions: ShownActions,
 ) -> None:
-    """Refuse an explanation with a part that is too large to render or has another type.
+    """Refuse an explanation that can't be rendered, or whose parts do not fit each other.
 
-    The arguments are the contents of `explanation.json`, `arrays.npz` and `dataset.npz`.
+    The arguments are the contents of `explanation.json`, `arrays.npz` and `dataset.npz`, and the
+    policy's actions.
 
     Raises:
-        InputError: There is one; the message names it.
+        InputError: A part is too large, of another type or does not fit; the message names it.
     """
     _check_shown(numbers)
     _check_lengths(numbers)
-    _check_arrays(arrays, _ARRAYS)
-    _check_arrays(data, _DATA)
-    known = {**arrays, **data}
-    for name in _FINITE & known.keys():
-        if not np.isfinite(known[name]).all():
+    if (count := max(len(arrays), len(data))) > _LONGEST:
+        raise InputError(f"it holds {count} arrays; give at most {_LONGEST}")
+    lengths = {"actions": (len(actions.names), "the list of actions")}
+    for given, table in ((data, _DATA), (arrays, _ARRAYS)):
+        for pattern, described in table.items():
+            for name in (name for name in given if re.fullmatch(pattern, name)):
+                _check_array(name, given[name], described, lengths)
+    _check_values(arrays, data, len(actions.names))
+    steps, frames = (lengths.get(what, (0, ""))[0] for what in ("steps of the film", "frames"))
+    _check_items(numbers, steps, frames)
+    _check_places(numbers, arrays, len(actions.names))
+
+
+def _check_values(arrays: Mapping[str, NDArray], data: Mapping[str, NDArray], count: int) -> None:
+    """Check coordinates and indices."""
+    for name in _FINITE & arrays.keys():
+        if not np.isfinite(arrays[name]).all():
             raise InputError(f"{name} holds NaN or infinity")
-    if "places_ends" in arrays:
-        ends = arrays["places_ends"]
-        check_indices(ends, 1 + len(arrays.get("places_points", ())), "places_ends")
-        if (np.diff(ends) < 0).any():
-            raise InputError("places_ends go down")
     flown = len(data.get("flights/episode", ()))  # each episode has at least one step
-    for name, most in {**_INDICES, "flights/episode": max(1, flown)}.items():
-        if name in known:
-            check_indices(known[name], most, name)
+    ends = 1 + len(arrays.get("places_points", ()))
+    limits = {"actions": count, "film_actions": count, "flights/episode": flown, **_INDICES}
+    for given, most in ((data, limits), (arrays, {**limits, "places_ends": ends})):
+        for name in most.keys() & given.keys():
+            check_indices(given[name], max(1, most[name]), name)
+    if (np.diff(arrays.get("places_ends", np.empty(0))) < 0).any():
+        raise InputError("places_ends go down")
 
 
 def _check_shown(numbers: Mapping[str, Any]) -> None:
@@ -156,56 +171,32 @@ def _check_lengths(value: Any) -> None:
         level = [v for v in inner if isinstance(v, dict | list)]
 
 
-def _check_arrays(arrays: Mapping[str, NDArray], known: _Arrays) -> None:
-    if len(arrays) > _LONGEST:
-        raise InputError(f"it holds {len(arrays)} arrays; give at most {_LONGEST}")
-    for name, (kinds, dimensions, size) in _matches(arrays, known):
-        value = arrays[name]
-        most = tuple(_SIZES[d] if isinstance(d, str) else d for d in dimensions)
-        is_small = len(value.shape) == len(most) and value.nbytes <= size
-        if (
-            value.dtype.kind not in kinds
-            or not is_small
-            or not np.less_equal(value.shape, most).all()
-        ):
-            raise InputError(
-                f"{name} is {value.shape} of {value.dtype}, which can't be rendered; give at most "
-                f"{most} and {size} bytes"
-            )
-        if kinds == _PIXEL and value.dtype != np.uint8:
-            raise InputError(f"{name} is of {value.dtype}; images have uint8")
-
-
-def _matches(
-    names: Iterable[str], known: _Arrays
-) -> Iterator[tuple[str, tuple[str, tuple[str | int, ...], int]]]:
-    """Yield the known arrays among names, in the order of the table."""
-    for pattern, described in known.items():
-        yield from ((name, described) for name in names if re.fullmatch(pattern, name))
-
-
-def check_fit(
-    numbers: Mapping[str, Any],
-    arrays: Mapping[str, NDArray],
-    data: Mapping[str, NDArray],
-    actions: ShownActions,
+def _check_array(
+    name: str, value: NDArray, described: _Described, lengths: dict[str, tuple[int, str]]
 ) -> None:
-    """Refuse an explanation whose arrays and numbers do not fit each other or its actions.
+    """Check one array; `lengths` has the length of each named dimension, and where it was found."""
+    kinds, dimensions, size = described
+    most = tuple(_SIZES[d] if isinstance(d, str) else d for d in dimensions)
+    is_small = len(value.shape) == len(most) and value.nbytes <= size
+    if value.dtype.kind not in kinds or not is_small or not np.less_equal(value.shape, most).all():
+        raise InputError(
+            f"{name} is {value.shape} of {value.dtype}, which can't be rendered; give at most "
+            f"{most} and {size} bytes"
+        )
+    if kinds == _PIXEL and value.dtype != np.uint8:
+        raise InputError(f"{name} is of {value.dtype}; images have uint8")
+    for length, what in zip(value.shape, dimensions, strict=True):
+        if length == 0 and any(isinstance(dimension, str) for dimension in dimensions):
+            raise InputError(f"{name} has the shape {value.shape}: it is empty")
+        if isinstance(what, str):
+            before, where = lengths.setdefault(what, (length, name))
+            if before != length:
+                raise InputError(f"{name} has {length} {what}, but {where} has {before}")
 
-    Raises:
-        InputError: They do not; the message names the part.
-    """
-    known, count = {**data, **arrays}, len(actions.names)
-    lengths: dict[str, tuple[int, str]] = {"actions": (count, "the list of actions")}
-    for name, (_, dimensions, _) in _matches(known, {**_DATA, **_ARRAYS}):
-        if any(isinstance(dimension, str) for dimension in dimensions):
-            _check_dimensions(name, known[name].shape, dimensions, lengths)
-    steps, frames = (lengths.get(what, (0, ""))[0] for what in ("steps of the film", "frames"))
-    for name in ("actions", "film_actions"):
-        if name in known:
-            check_indices(known[name], count, name)
-    film = _part(numbers, "attribution", "film") or {}
-    heat = film.get("heat_by")
+
+def _check_items(numbers: Mapping[str, Any], steps: int, frames: int) -> None:
+    """Check the steps of the film, and the frames that sections show."""
+    heat = (_part(numbers, "attribution", "film") or {}).get("heat_by")
     if isinstance(heat, list) and len(heat) != steps:
         raise InputError(f"attribution.film.heat_by has {len(heat)} steps; the film has {steps}")
     for i, method in enumerate(_list(heat)):
@@ -214,24 +205,6 @@ def check_fit(
     _read_items(numbers, ("attribution", "film", "key_steps"), {"step": step})
     _read_items(numbers, ("asymmetry", "dataset", "worst"), {"frame": frame})
     _read_items(numbers, ("contradictions", "list"), {"left": frame, "right": frame})
-    _check_places(numbers, arrays, count)
-
-
-def _check_dimensions(
-    name: str,
-    shape: tuple[int, ...],
-    dimensions: tuple[str | int, ...],
-    lengths: dict[str, tuple[int, str]],
-) -> None:
-    if len(shape) != len(dimensions):
-        raise InputError(f"{name} has {len(shape)} dimensions, not {len(dimensions)}")
-    for length, what in zip(shape, dimensions, strict=True):
-        if length == 0:
-            raise InputError(f"{name} has the shape {shape}: it is empty")
-        if isinstance(what, str):
-            before, where = lengths.setdefault(what, (length, name))
-            if before != length:
-                raise InputError(f"{name} has {length} {what}, but {where} has {before}")
 
 
 def _check_places(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], count: int) -> None:

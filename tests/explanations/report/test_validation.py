@@ -5,7 +5,7 @@ import copy
 import numpy as np
 import pytest
 
-from drone_rl.explanations.report.validation import check_fit
+from drone_rl.explanations.report.validation import check_files
 from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.utils.errors import InputError
 
@@ -48,9 +48,9 @@ DATA = {"actions": np.array([0, 1, 2]), "frames": np.zeros((3, 4, 6, 3), np.uint
 
 
 def test_what_explain_writes_is_accepted():
-    check_fit(NUMBERS, ARRAYS, DATA, SHOWN_MOVES)
-    check_fit({"places": {"refused": "why"}}, {}, {}, SHOWN_MOVES)
-    check_fit({}, {}, {}, SHOWN_MOVES)
+    check_files(NUMBERS, ARRAYS, DATA, SHOWN_MOVES)
+    check_files({"places": {"refused": "why"}}, {}, {}, SHOWN_MOVES)
+    check_files({}, {}, {}, SHOWN_MOVES)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_a_wrong_number(path, value, message):
         part = part[key]
     part[last] = value
     with pytest.raises(InputError, match=message):
-        check_fit(numbers, ARRAYS, DATA, SHOWN_MOVES)
+        check_files(numbers, ARRAYS, DATA, SHOWN_MOVES)
 
 
 @pytest.mark.parametrize(
@@ -103,4 +103,4 @@ def test_a_wrong_number(path, value, message):
 )
 def test_an_array_that_fits_no_other(name, value, message):
     with pytest.raises(InputError, match=message):
-        check_fit(NUMBERS, {**ARRAYS, name: value}, DATA, SHOWN_MOVES)
+        check_files(NUMBERS, {**ARRAYS, name: value}, DATA, SHOWN_MOVES)

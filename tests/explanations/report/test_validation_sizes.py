@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from drone_rl.explanations.report.validation import check_sizes
+from drone_rl.explanations.report.validation import check_files
+from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.utils.errors import InputError
 
 GOOD = {
@@ -12,12 +13,16 @@ GOOD = {
     "tsne_pixels": np.zeros((5, 2)),
     "something_else": np.zeros((3, 3, 3)),
 }
-DATA = {"flights/episode": np.array([0, 0, 1]), "actions": np.array([1]), "step": np.array([7])}
+DATA = {
+    "flights/episode": np.array([0, 0, 1]),
+    "actions": np.array([1] * 5),
+    "step": np.array([7] * 5),
+}
 
 
 def test_what_explain_writes_is_accepted():
-    check_sizes({"truth": {"methods": {"a": 1}}, "more": [1] * 2000}, GOOD, DATA)
-    check_sizes({"truth": 5}, {}, {})
+    check_files({"truth": {"methods": {"a": 1}}, "more": [1] * 2000}, GOOD, DATA, SHOWN_MOVES)
+    check_files({"truth": 5}, {}, {}, SHOWN_MOVES)
 
 
 @pytest.mark.parametrize(
@@ -43,4 +48,4 @@ def test_what_explain_writes_is_accepted():
 )
 def test_what_is_refused(numbers, arrays, data, name):
     with pytest.raises(InputError, match=name):
-        check_sizes(numbers, arrays, data)
+        check_files(numbers, arrays, data, SHOWN_MOVES)
