@@ -1,6 +1,7 @@
 """Heat maps of a policy's observations: Grad-CAM (section 5.3) and other methods, by Captum."""
 
 import dataclasses
+import itertools
 from collections.abc import Callable
 from typing import Any, Literal
 
@@ -32,11 +33,7 @@ class Explainer:
     layer: str | None = None  # layer of Grad-CAM; the last convolution's nonlinearity by default
 
     def __post_init__(self) -> None:
-        """Find the layer.
-
-        Raises:
-            InputError: It has no feature map.
-        """
+        """Find the layer, or raise InputError if it has no feature map."""
         spatial = spatial_layers(self.network) if self.network.is_differentiable else []
         if self.layer is None:
             self.layer = spatial[-1] if spatial else None
@@ -61,11 +58,7 @@ class Explainer:
     def grad_cam(
         self, observations: Tensor, actions: Tensor, objective: Objective = "probability"
     ) -> Tensor:
-        """Return Grad-CAM of the actions, enlarged to the observation. Shape: (T, H, W).
-
-        Raises:
-            InputError: The policy has no convolution.
-        """
+        """Return Grad-CAM in the observation's size (T, H, W); raise InputError without a layer."""
         if self.layer is None:
             raise InputError("Grad-CAM needs a convolution, and this policy has none")
         method = LayerGradCam(self._forward(objective), find_layer(self.network, self.layer))
@@ -150,7 +143,6 @@ def _windows(height: int, width: int) -> Tensor:
     tops = [*range(0, height - tall, down), height - tall]
     lefts = [*range(0, width - wide, across), width - wide]
     windows = torch.zeros(len(tops) * len(lefts), height, width, dtype=torch.bool)
-    for i, top in enumerate(tops):
-        for j, left in enumerate(lefts):
-            windows[i * len(lefts) + j, top : top + tall, left : left + wide] = True
+    for window, (top, left) in zip(windows, itertools.product(tops, lefts), strict=True):
+        window[top : top + tall, left : left + wide] = True
     return windows

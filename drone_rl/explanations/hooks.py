@@ -42,11 +42,7 @@ def layers(network: PictureNetwork) -> dict[str, tuple[nn.Module, tuple[int, ...
 
 
 def find_layer(network: PictureNetwork, name: str) -> nn.Module:
-    """Return the layer of that name.
-
-    Raises:
-        InputError: There is none; the message lists those that exist.
-    """
+    """Return the layer of that name; if there is none, raise InputError with those that exist."""
     found = dict(network.parts.named_modules()).get(name) if name else None
     if found is None or [*found.children()]:
         there = ", ".join(layers(network)) or "none, for it is no torch module"
@@ -76,11 +72,7 @@ def feature_layer(network: PictureNetwork) -> str | None:
 
 @torch.no_grad()
 def features(network: PictureNetwork, observations: Tensor, layer: str) -> Tensor:
-    """Return a layer's output (T, *) on observations (T, C, h, w).
-
-    Raises:
-        InputError: There is no such layer.
-    """
+    """Return a layer's output (T, *) on observations (T, C, h, w); see `find_layer` for errors."""
     method = LayerActivation(network, find_layer(network, layer))
     return torch.cat([cast(Tensor, method.attribute(part)) for part in observations.split(BATCH)])
 

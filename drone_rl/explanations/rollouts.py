@@ -82,10 +82,7 @@ class RolloutDataset:
         return task.next_offset(self.state(task))[:, :2].numpy()
 
     def state(self, task: Task[Any], dynamics: Dynamics | None = None) -> State:
-        """Return the environments' states, with the drones at rest.
-
-        Other variables of `dynamics`, such as rotor speeds, are as at the start of an episode.
-        """
+        """Return the environments' states, drones at rest and rotors as at an episode's start."""
         kept = {name: self.tensor(name) for name in (*task.remembered, "step")}
         attitude, place = self.tensor("attitude").double(), self.tensor("drone").double()
         body = BodyState.at_rest(place, attitude)
@@ -160,11 +157,7 @@ def render_frames(
     network: PictureNetwork,
     layers: tuple[str, ...] = (),
 ) -> RolloutDataset:
-    """Return the steps `rows` (T,) with frames, ground truth, probabilities and outputs of layers.
-
-    Raises:
-        InputError: A layer doesn't exist.
-    """
+    """Return steps (T,) with frames, ground truth, probabilities and outputs of layers."""
     arrays = {name: value[rows] for name, value in flights.arrays.items()}
     fields = {**flights.meta["fields"], **SEEN}
     dataset = RolloutDataset(arrays, {}, {**flights.meta, "fields": fields})

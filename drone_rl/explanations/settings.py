@@ -48,11 +48,7 @@ class ExplainSettings(Settings):
 
 
 def check_perplexity(perplexity: float, count: int) -> None:
-    """Check that a perplexity is possible for `count` points.
-
-    Raises:
-        InputError: It is out of range.
-    """
+    """Raise InputError if a perplexity is not possible for `count` points."""
     largest = (count - 1) // 3
     if not 1 <= perplexity <= largest:
         raise InputError(

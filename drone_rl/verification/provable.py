@@ -55,22 +55,14 @@ _JOURNAL = Record({"settings": Plain(), "how": Plain(), "rounds": Several(Plain(
 class Round(Settings):
     """The result of a search for failures, which are trained on next."""
 
-    frames: _Count
-    """Frames collected by training so far."""
-    trained_s: _Seconds
-    """Training time so far, seconds."""
-    flights: _Count
-    """Greedy episodes, each from its own placement."""
-    failures: _Count
-    """Failed episodes."""
-    losing: _Share | None = None
-    """Fraction of all placements proved to fail; None without a proof."""
-    undecided: _Share | None = None
-    """Fraction of all placements that the proof leaves open."""
-    proof_s: _Seconds | None = None
-    """Duration of the proof, seconds."""
-    boxes: _Count
-    """Number of boxes of failures to train on."""
+    frames: _Count  # collected by training so far
+    trained_s: _Seconds  # training time so far, seconds
+    flights: _Count  # greedy episodes, each from its own placement
+    failures: _Count  # failed episodes
+    losing: _Share | None = None  # fraction of all placements proved to fail; None without a proof
+    undecided: _Share | None = None  # fraction of all placements that the proof leaves open
+    proof_s: _Seconds | None = None  # duration of the proof, seconds
+    boxes: _Count  # number of boxes of failures to train on
 
 
 @dataclasses.dataclass

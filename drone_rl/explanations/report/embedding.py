@@ -67,11 +67,7 @@ def cells(explanation: Explanation, which: str) -> NDArray:
 
 
 def snap_to_grid(points: NDArray, columns: int, rows: int) -> NDArray:
-    """Assign each point (T, 2) a cell of its own; the total squared distance is minimal.
-
-    Returns:
-        Column and row of each point. Shape: (T, 2), int.
-    """
+    """Assign each point its own cell, at the least squared distance: column and row. (T, 2)."""
     low, high = points.min(0), points.max(0)
     wanted = (points - low) / np.maximum(high - low, 1e-12) * (columns - 1, rows - 1)
     cells = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2)
@@ -94,7 +90,8 @@ def points(explanation: Explanation) -> dict[str, Any]:
     """Return the data of each shown frame that the interactive map uses."""
     data, chosen = explanation.data, shown_frames(explanation)
     height, width = data["frames"].shape[1:3]
-    last = np.bincount(data["flights/episode"]) - 1
+    last, terms = np.bincount(data["flights/episode"]) - 1, explanation.terms
+    events = {1: f"{terms.reaches} a {terms.goal}", -1: f"misses a {terms.goal}"}
     return {
         "tile": [width, height],
         "cells": {which: cells(explanation, which).tolist() for which in MAPS},
@@ -102,18 +99,13 @@ def points(explanation: Explanation) -> dict[str, Any]:
         "probabilities": np.round(data["probabilities"][chosen].astype(float), 3).tolist(),
         "episode": data["episode"][chosen].tolist(),
         "step": data["step"][chosen].tolist(),
-        "event": [_event(explanation, int(event)) for event in data["event"][chosen]],
+        "event": [events.get(event, "") for event in data["event"][chosen].tolist()],
         "last": last.tolist(),
         "names": explanation.actions.names,
         "order": explanation.actions.order,
         "colors": explanation.actions.colors,
         "sprite": to_uri(to_png(sprite(explanation)), "image/png"),
     }
-
-
-def _event(explanation: Explanation, event: int) -> str:
-    terms = explanation.terms
-    return {1: f"{terms.reaches} a {terms.goal}", -1: f"misses a {terms.goal}"}.get(event, "")
 
 
 def table(explanation: Explanation) -> Rows:

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import torch
@@ -99,11 +99,6 @@ class Rollouts:
     repeats: NDArray[np.int64]  # (k,)
     """Number of final steps in a row after which the state was that of two steps before."""
 
-    @classmethod
-    def join(cls, parts: Iterable["Rollouts"]) -> Self:
-        """Concatenate."""
-        return cls(*map(np.concatenate, zip(*(vars(p).values() for p in parts), strict=True)))
-
 
 class Simulator:
     """Simulates a policy without memory."""
@@ -134,7 +129,7 @@ class Simulator:
         for first in range(0, len(placements), self.at_once):
             parts.append(self._fly(placements[first : first + self.at_once]))
             tell(min(first + self.at_once, len(placements)), len(placements))
-        return Rollouts.join(parts)
+        return Rollouts(*map(np.concatenate, zip(*(vars(p).values() for p in parts), strict=True)))
 
     def compute_in(self, dtype: torch.dtype) -> None:
         """Evaluate the network in another precision from now on."""

@@ -7,7 +7,6 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from drone_rl.utils.provenance import num_cores
 from drone_rl.verification.prover.bounds import Compositor, Crop, ImageRanges, NetworkBounds
@@ -77,8 +76,8 @@ class ActionTable:
             if len(tasks) > BATCH:
                 stack.append(tasks[:-BATCH])
                 tasks = tasks[-BATCH:]
-            doubts, counts = self._doubts(tasks), _counts(tasks)
-            pixels = doubts.sum(-1)
+            doubts = np.stack([r.doubts(tasks[:, k]) for k, r in enumerate(self._ranges)], -1)
+            pixels, counts = doubts.sum(-1), _counts(tasks)
             tried = np.flatnonzero(self._is_worth(pixels, counts))
             bits = np.zeros(len(tasks), np.uint8)
             bits[tried] = self._share_out(self._bound, tasks[tried])
@@ -166,17 +165,10 @@ class ActionTable:
 
     def _bound(self, blocks: NDArray) -> NDArray[np.uint8]:
         """Return the only possible action of each block; 0 where bounds leave several."""
-        bits = self._bounds.possible(*self._paint(blocks))
-        return (bits * (bits & (bits - 1) == 0)).numpy()
-
-    def _paint(self, blocks: NDArray) -> tuple[Tensor, Tensor]:
         cases = [(r.part, *r.of(blocks[:, k])) for k, r in enumerate(self._ranges)]
-        lower, upper = self._painter.paint(cases, len(blocks))
-        return self._painter.see(lower), self._painter.see(upper)
-
-    def _doubts(self, blocks: NDArray) -> NDArray[np.int64]:
-        """Return the number of uncertain pixels per cube. Shape: (N, cubes)."""
-        return np.stack([r.doubts(blocks[:, k]) for k, r in enumerate(self._ranges)], -1)
+        lower, upper = map(self._painter.see, self._painter.paint(cases, len(blocks)))
+        bits = self._bounds.possible(lower, upper)
+        return (bits * (bits & (bits - 1) == 0)).numpy()
 
     def _is_worth(self, pixels: NDArray, counts: NDArray) -> NDArray[np.bool_]:
         """Return which blocks bounds probably decide faster than single images would."""

@@ -106,8 +106,8 @@ class CameraModel:
     def rounding(self, left: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return how far float32 may move a cube that stands so far to the left of the camera.
 
-        Its y, at most `bound`, and its difference from the camera's are rounded; one metre more
-        covers the error of this sum. The drone's own position is exact.
+        Its y and its difference from the camera's, which is exact, are rounded; one metre more
+        covers the error of this sum.
         """
         return UNIT * (self.bound + np.abs(left) + 1)
 
@@ -141,11 +141,7 @@ class CubeImages:
     """Images of cubes at given positions, rendered and in closed form."""
 
     def __init__(self, worlds: Worlds, lattice: Lattice, camera: CameraModel) -> None:
-        """Read the colours from the renderer.
-
-        Raises:
-            InputError: A face or the background has several colours, or two share one.
-        """
+        """Read the colours; raise InputError if a face has several, or shares one."""
         self._worlds, self._lattice, self._camera = worlds, lattice, camera
         task = lattice.task
         self.num_cubes = task.num_cubes
@@ -178,11 +174,7 @@ class CubeImages:
             )
 
     def read(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Convert rendered images of one cube to faces, as `CameraModel.faces` returns them.
-
-        Raises:
-            InputError: A pixel shows something else.
-        """
+        """Convert images of one cube to faces; raise InputError if a pixel shows something else."""
         faces = np.full(pictures.shape[:3], ANYTHING, np.uint8)
         packed = _packed(pictures)
         for face, color in enumerate(self.colors):

@@ -101,11 +101,7 @@ def check_task(task: TaskSettings) -> None:
 
 
 def make_compositor(description: PolicyDescription, images: CubeImages) -> Compositor:
-    """Apply the policy's transforms to the colours of faces and background.
-
-    Raises:
-        InputError: A transform is not monotone.
-    """
+    """Apply the transforms to the colours; raise InputError if one is not monotone."""
     chosen = [choice for choice in description.transforms if choice.name not in _BLIND]
     names = [choice.name for choice in chosen]
     if strange := [name for name in names if name not in _MONOTONE]:

@@ -123,7 +123,7 @@ def save(prover: Prover, path: Path, proof_id: str) -> None:
 
 
 def load(prover: Prover, path: Path, proof_id: str, most: int = ARRAYS_BYTES) -> None:
-    """Resume a new proof from a saved state of at most `most` bytes.
+    """Resume a new proof from a state of at most `most` bytes.
 
     Raises:
         InputError: The file is damaged or of another proof; the proof is unchanged.

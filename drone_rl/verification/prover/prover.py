@@ -58,11 +58,7 @@ class Prover:
     """
 
     def __init__(self, spec: PolicySpec, most_combinations: int = 500_000_000) -> None:
-        """Start with every placement, in parts of about `most_combinations` images in memory.
-
-        Raises:
-            InputError: There are too many parts.
-        """
+        """Start with all placements in parts of so many images, see `partition_placements`."""
         self.spec, self.lattice = spec, spec.lattice
         self.parts = partition_placements(spec, most_combinations)  # not yet started
         self.part = self.parts[:0]  # in progress, if any

@@ -7,7 +7,7 @@ import torch
 import drone_rl
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.sim.tasks.collect_cubes import EndReason
-from drone_rl.verification.checker.checker import Rollouts, Simulator
+from drone_rl.verification.checker.checker import Simulator
 
 
 @pytest.fixture
@@ -100,8 +100,3 @@ def test_straight_flights_repeat_nothing(make):
 def test_large_pictures_come_in_small_batches():
     policy = drone_rl.load_policy("good")
     assert Simulator(policy.description, policy.state["policy"]).at_once == 1024
-
-
-def test_joining_keeps_the_order():
-    part = Rollouts(np.array([1]), np.array([[True]]), np.array([3]), np.array([0]))
-    assert Rollouts.join([part, part]).steps.tolist() == [3, 3]
