@@ -13,8 +13,7 @@ from drone_rl.sim.tasks import Task
 
 SHOWN = ("grad_cam", "grad_cam_logit")
 """Maps of the film; the second is shown where the first has no heat."""
-INSTEAD = ("saliency", "occlusion")
-"""Without Grad-CAM, the first of these that the policy allows is shown."""
+INSTEAD = ("saliency", "occlusion")  # without Grad-CAM, the first one that the policy allows
 COUNT = 6  # key frames of an episode, as in Figs. 13 to 15.
 
 

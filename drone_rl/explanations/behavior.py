@@ -15,8 +15,7 @@ from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.actions import Actions
 from drone_rl.utils.intervals import mean_interval, proportion
 
-ALIKE_METRES = 1.0
-"""Next targets at places that differ by at most this, relative to the drone, count as equal."""
+ALIKE_METRES = 1.0  # next targets that differ by at most this, relative to the drone, are equal
 MIN_OPPOSITION = 0.2  # pairs with a smaller opposition are ignored
 LISTED = 50  # number of pairs that are listed; all are counted
 

@@ -18,8 +18,7 @@ from drone_rl.explanations.hooks import actions_of
 from drone_rl.policies import PictureNetwork
 
 OBJECTIVES: tuple[Objective, ...] = ("probability", "logit")
-AS_PROBABLE = 0.01
-"""Of two observations whose probabilities differ by less, the smoother one is better."""
+AS_PROBABLE = 0.01  # of observations whose probabilities differ by less, the smoothest is the best
 
 
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
@@ -66,10 +65,8 @@ class Attempts:
     """Results of one setting from each random start, for each action."""
 
     images: Tensor  # (num_actions, starts, C, H, W); optimized observations
-    probabilities: Tensor  # (num_actions, starts)
-    """The policy's probability of the action on each of them."""
-    roughness: Tensor  # (num_actions, starts)
-    """Mean difference of neighbouring pixels, relative to the data set's."""
+    probabilities: Tensor  # (num_actions, starts), the policy's of the action
+    roughness: Tensor  # (num_actions, starts), mean difference of neighbours, of the data set's
     settings: ClassModelSettings
 
     def best(self) -> list[int]:

@@ -35,8 +35,7 @@ from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import find_domain
 from drone_rl.verification.prover.policy_spec import one_thread
 
-_Result = tuple[dict[str, Any], dict[str, NDArray], float] | LeftOutError
-"""Numbers, arrays and seconds of a section, or why it is left out."""
+_Result = tuple[dict[str, Any], dict[str, NDArray], float] | LeftOutError  # or why it is left out
 Given = str | Path | Pilot | Logits  # a policy or something that `as_pilot` converts to one
 Section = Callable[[Context], tuple[dict[str, Any], dict[str, NDArray]]]
 """Returns entries of `explanation.json` and `arrays.npz`; writes nothing, runs at any time."""

@@ -18,10 +18,8 @@ from drone_rl.utils.errors import InputError
 
 Objective = Literal["probability", "logit"]
 BATCH = 256  # observations in one call, which bounds memory
-INTEGRATION_STEPS = 64
-"""Steps of integrated gradients; with 16, errors of up to 0.7 occur on a steep softmax."""
-MapMethod = Callable[[Tensor, Tensor], Tensor]
-"""Observations (T, C, H, W) and actions (T,) to heat maps (T, H, W), 0 or more."""
+INTEGRATION_STEPS = 64  # with 16, errors of up to 0.7 occur on a steep softmax
+MapMethod = Callable[[Tensor, Tensor], Tensor]  # observations and actions (T,) to maps (T, H, W)
 
 
 @dataclasses.dataclass

@@ -23,8 +23,7 @@ from drone_rl.utils.intervals import episode_means, mean_bounds
 PATCHES = 40  # approximate number of patches of a frame
 UNMOVED = 1e-4  # frames on which every patch has a smaller effect are left out of tests of maps
 TOP = 0.1  # fraction of the patches that count as those with the largest effect
-_EQUAL = 1e-6
-"""Differences below this are ties: of effects, and of heat relative to the map's maximum."""
+_EQUAL = 1e-6  # smaller differences are ties: of effects, and of heat relative to the map's maximum
 NO_HEAT = 1e-6  # heat up to this fraction of the map's maximum counts as none
 NO_CHANGE = 1e-9  # a logit with a smaller standard deviation over observations is constant
 

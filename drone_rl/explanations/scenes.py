@@ -48,8 +48,7 @@ class Scenes:
         colors = {ChromaticityPixels: "chromaticity", RgbPixels: "rgb"}
         self.channels: str = next((name for kind, name in colors.items() if kind in kinds), "gray")
         """Channels of an observation: "gray", "rgb", or "chromaticity" (of red and blue)."""
-        self.memory: int = memory_of(self._transforms)
-        """Number of earlier frames in an observation."""
+        self.memory: int = memory_of(self._transforms)  # number of earlier frames in observations
 
     def frames(self, state: State, appearance: Appearance | None = None) -> Tensor:
         """Render RGB frames. Shape: (T, H, W, 3), uint8."""

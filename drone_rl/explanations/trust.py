@@ -44,8 +44,7 @@ MapOf = Callable[[PictureNetwork, Tensor, Tensor], Tensor]
 ERROR_RATE = 0.05  # probability that any method is trusted whose maps do not depend on the policy
 FRAMES_AN_EPISODE = 10  # frames of an episode that are tested, evenly spaced
 WEIGHT_SEEDS = 5  # shuffled policies whose maps are compared with the policy's, pixel by pixel
-MOST_ALIKE = 0.5
-"""From this rank correlation with maps of shuffled weights on, a map does not depend on them."""
+MOST_ALIKE = 0.5  # from this correlation with maps of shuffled weights on, a map ignores them
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

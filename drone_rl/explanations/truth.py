@@ -159,8 +159,7 @@ class Intervention:
 
     name: str
     area: Tensor  # (T, H, W) bool; changed pixels
-    effect: NDArray  # (T,)
-    """Distance of the action probabilities; NaN where there was nothing to change."""
+    effect: NDArray  # (T,), distance of the probabilities; NaN where there was nothing to change
     frames: Tensor  # (T, H, W, 3) uint8; frames after the change
 
 

@@ -7,7 +7,6 @@ from drone_rl.sim.vocabulary import shown_actions
 from drone_rl.utils.text import Claims, Evidence, all_cubes, exact, listed
 
 WHERE = {"left": "on its left", "ahead": "straight ahead", "right": "on its right"}
-"""Sides, and how people say them."""
 
 
 def exact_percent(share: float) -> str:

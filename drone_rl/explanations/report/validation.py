@@ -35,8 +35,7 @@ _SIZES = {
     "starts to the side": _SIDE,
 }
 """Largest sizes of dimensions; dimensions of the same name must have the same size."""
-_Described = tuple[str, tuple[str | int, ...], int]
-"""Kind of dtype, dimensions or their largest sizes, most bytes."""
+_Described = tuple[str, tuple[str | int, ...], int]  # kind of dtype, (largest) sizes, most bytes
 _ARRAYS: Mapping[str, _Described] = {
     "film_frames": (_PIXEL, ("steps of the film", _SIDE, _SIDE, 3), 2**23),
     "film_heat": (_FLOAT, ("steps of the film", _SIDE, _SIDE), 2**23),
@@ -82,8 +81,7 @@ _LENGTHS: Mapping[tuple[str, ...], int] = {
     ("shifts", "axes"): 64,
 }
 """Most entries of lists and mappings in `explanation.json` that figures show one by one."""
-_INDICES = {"episode": _MANY, "step": 10**7}
-"""Arrays used as indices, and their exclusive upper limits."""
+_INDICES = {"episode": _MANY, "step": 10**7}  # arrays used as indices, and their exclusive limits
 _FINITE = {
     *("tsne_features", "tsne_pixels", "places_points", "response_height", "outcome_height"),
     *("response_forward", "response_lateral", "outcome_forward", "outcome_lateral"),

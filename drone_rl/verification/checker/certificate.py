@@ -29,8 +29,7 @@ MOST_OUTCOMES = 2**11
 MOST_STEPS = 20_000  # step counts of all outcomes together
 LEAST_BORDER = 2.0**-100  # metres. Smallest nonzero |border|; bounds the bits of exact sums.
 MOST_BORDER = 2.0**20  # metres. Largest |border|
-_NO_ENDS = (EndReason.RUNNING, EndReason.LOST_CONTROL)
-"""Control cannot be lost in computer-vision mode."""
+_NO_ENDS = (EndReason.RUNNING, EndReason.LOST_CONTROL)  # no control is lost in computer-vision mode
 _ENDS = tuple(end.name.lower() for end in EndReason if end not in _NO_ENDS)
 _DIGITS = len(str(10**5))
 

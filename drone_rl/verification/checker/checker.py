@@ -61,8 +61,7 @@ class Contradiction:
 class Findings:
     """The result of a check."""
 
-    inconsistencies: tuple[str, ...]
-    """Impossible or refuted statements, one line each, without single episodes."""
+    inconsistencies: tuple[str, ...]  # impossible or refuted statements, without single episodes
     contradictions: tuple[Contradiction, ...]  # the first episodes that ended otherwise than stated
     contradicted: int  # number of such episodes
     flights: Mapping[str, int]  # number of episodes, by why they were simulated
@@ -96,8 +95,7 @@ class Rollouts:
     end: NDArray[np.int64]  # (k,); `EndReason`
     collected: NDArray[np.bool_]  # (k, cubes); whether each cube was collected
     steps: NDArray[np.int64]  # (k,); number of steps
-    repeats: NDArray[np.int64]  # (k,)
-    """Number of final steps in a row after which the state was that of two steps before."""
+    repeats: NDArray[np.int64]  # (k,); final steps after which the state was that of two before
 
 
 class Simulator:

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from drone_rl.verification.checker.certificate import Certificate
 
-Boxes = NDArray[np.float64]
-"""Metres to the left of each cube, lowest and highest. Shape: (boxes, cubes, 2)."""
+Boxes = NDArray[np.float64]  # lowest and highest y of each cube, metres. (boxes, cubes, 2)
 Points = NDArray[np.float64]  # metres to the left of each cube. Shape: (points, cubes)
 Indices = NDArray[np.intp]  # shape: (points,) or (boxes,)
 
@@ -114,8 +113,7 @@ class Placements:
     """Placements; the first dimension counts them."""
 
     points: Points  # metres to the left of each cube. Shape: (k, cubes)
-    outcome: NDArray[np.int64]  # (k,)
-    """Index of the stated outcome; the number of outcomes where nothing is stated."""
+    outcome: NDArray[np.int64]  # (k,); index of the stated outcome; their number where none is
     why: NDArray[np.str_]  # (k,); INSIDE a box, near a BORDER of an outcome, or ANYWHERE
 
 

@@ -28,8 +28,7 @@ from drone_rl.verification.prover.arrangement import SAME, Arrangement, Pieces, 
 from drone_rl.verification.prover.boxes import unite
 from drone_rl.verification.prover.cube_images import NOTHING, UNIT, CameraModel
 
-RenderFaces = Callable[[NDArray[np.uint8]], Tensor]
-"""Maps faces, see `CameraModel.faces`, to the network's input images (N, C, H, W)."""
+RenderFaces = Callable[[NDArray[np.uint8]], Tensor]  # faces to the network's input (N, C, H, W)
 
 SIDES = ("left", "ahead", "right")  # flying straight on misses a cube to the left or right
 NEEDED = (Move.LEFT, Move.FORWARD, Move.RIGHT)  # the action that a cube on each side requires
@@ -44,16 +43,14 @@ class ActionMap:
 
     window: Window
     arrangement: Arrangement
-    places: NDArray[np.float64]
-    """A point of each cell: metres ahead of the camera and to its left. Shape: (cells, 2)."""
+    places: NDArray[np.float64]  # a point of each cell, metres ahead and left. Shape: (cells, 2)
     areas: NDArray[np.float64]  # area of each cell, m^2, by `SIDES`. Shape: (cells, 3)
     action: NDArray[np.int64]  # argmax action. Shape: (cells,)
     gap: NDArray[np.float64]  # gap of the two highest logits. Shape: (cells,)
     is_unseen: NDArray[np.bool_]  # whether no pixel shows the cube. Shape: (cells,)
     alone: int  # the action without a visible cube
     touch_distance: float  # metres; a cube further to the side requires a turn
-    doubtful: float
-    """Bound on the area, m^2, near borders where float32 may show a neighbour's image."""
+    doubtful: float  # bound on the area, m^2, where float32 may show a neighbour's image
 
     @property
     def is_blind(self) -> NDArray[np.bool_]:

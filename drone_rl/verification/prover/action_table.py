@@ -14,11 +14,9 @@ from drone_rl.verification.prover.boxes import Boxes, blocks, merge, ragged
 from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.cube_images import NOTHING
 
-BATCH, CHUNK, ALONE = 4096, 256, 64
-"""Blocks tried at a time, by one thread at a time, and without threads."""
+BATCH, CHUNK, ALONE = 4096, 256, 64  # blocks tried at a time, by one thread, and without threads
 SMALL = 1000  # combinations of a span that are enumerated
-FEW, PRICE = 8, 6.0
-"""Images of a block that are evaluated singly; cost of bounds on a block, in images."""
+FEW, PRICE = 8, 6.0  # images evaluated singly; cost of bounds on a block, in images
 
 
 class ActionTable:

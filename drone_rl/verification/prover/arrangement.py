@@ -78,8 +78,7 @@ class Arrangement:
     points: NDArray[np.float64]  # points where segments meet or end. Shape: (P, 2)
     origin: NDArray[np.int64]  # index of the start point of each half-edge. Shape: (E,)
     angle: NDArray[np.float64]  # direction of each half-edge, radians. Shape: (E,)
-    following: NDArray[np.int64]
-    """Next half-edge around the cell to the left of each half-edge. Shape: (E,)."""
+    following: NDArray[np.int64]  # next half-edge around the cell to its left. Shape: (E,)
     cell: NDArray[np.int64]  # cell of each half-edge; -1 outside the window. Shape: (E,)
     num_cells: int
 

@@ -151,8 +151,7 @@ def _size(total: Tensor, width: Tensor) -> Tensor:
 
 
 _AFFINE = (nn.Conv2d, nn.Linear)
-Step = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]
-"""Maps sums and differences of interval ends through a layer."""
+Step = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]  # of sums and differences of interval ends
 
 
 def _step(layer: nn.Module, scale: int) -> Step:

@@ -62,11 +62,9 @@ class Cells:
         for inner, after in zip(between, pure[1:], strict=True):
             begins += [begins[-1], begins[-1] + 1 + len(inner)]
             parts += [inner, after[None]]
-        self.pictures = np.concatenate(parts)
-        """Faces shown in the distinct images. Shape: (images, height, width)."""
-        self.first = np.array(begins)  # index of the first possible image of each cell or band
+        self.pictures = np.concatenate(parts)  # faces, (distinct images, height, width)
+        self.first = np.array(begins)  # first and last possible image of each cell or band
         self.last = np.array([begins[min(i + i % 2, len(begins) - 1)] for i in range(len(begins))])
-        """Index of the last one."""
 
     def __len__(self) -> int:
         return len(self.limits) - 1

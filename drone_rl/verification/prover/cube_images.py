@@ -28,8 +28,7 @@ from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.lattice import Lattice
 
-NOTHING, FRONT, LEFT_SIDE, RIGHT_SIDE = range(4)
-"""What a pixel shows of a cube; a side is visible where the cube stands on that side."""
+NOTHING, FRONT, LEFT_SIDE, RIGHT_SIDE = range(4)  # sides are seen of cubes that stand there
 UNIT = 2.0**-24  # largest relative error of a float32 operation
 
 
@@ -37,10 +36,8 @@ UNIT = 2.0**-24  # largest relative error of a float32 operation
 class CameraModel:
     """The policy's camera among cubes of one size."""
 
-    left: NDArray[np.float64]
-    """Slope of each column's rays, metres left per metre ahead. Shape: (width,)."""
-    up: NDArray[np.float64]
-    """Slope of each row's rays, metres up per metre ahead. Shape: (height,)."""
+    left: NDArray[np.float64]  # slope of each column's rays, metres left per metre ahead. (width,)
+    up: NDArray[np.float64]  # slope of each row's rays, metres up per metre ahead. (height,)
     half: float  # half the edge of a cube, metres
     farthest: float  # bound on every x, metres
     widest: float  # bound on every |y|, metres

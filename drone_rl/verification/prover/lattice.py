@@ -64,8 +64,7 @@ class Lattice:
                 f"multiples of task.step_length={step} are rounded, so positions depend on the "
                 "path; give a multiple of a power of two, such as 0.5 or 1.25"
             )
-        self.cubes = task.first_distance + task.spacing * np.arange(task.num_cubes)
-        """x of each cube, metres."""
+        self.cubes = task.first_distance + task.spacing * np.arange(task.num_cubes)  # x, metres
         self.everything = (1 << task.num_cubes) - 1
 
     @property

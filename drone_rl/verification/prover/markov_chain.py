@@ -20,20 +20,16 @@ from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.lattice import AHEAD, LEFT, RIGHT, Graph, LatticeState
 from drone_rl.verification.prover.policy_spec import PolicySpec
 
-MIN_PROBABILITY = 1e-18
-"""Nodes less probable than this at every step are not evaluated; most are nearly unreachable."""
-NEGLIGIBLE = 1e-15
-"""Total probability of running episodes, over all placements, at which propagation stops."""
-MOST_ROUNDING = 0.1
-"""Largest bound on the rounding error of a logit; usual policies have about 0.01."""
+MIN_PROBABILITY = 1e-18  # nodes less probable than this at every step are not evaluated
+NEGLIGIBLE = 1e-15  # sum of the probabilities of running episodes at which propagation stops
+MOST_ROUNDING = 0.1  # largest rounding error of a logit; usual policies have about 0.01
 ROUNDING = 1e-9  # more than the float64 error of some hundred steps
 BATCH = 1000  # images rendered at a time; bounds memory
 _FEW = 256
 _BATCH = 512
 _LOST, _WON = 0, 1
 _MOVES = (AHEAD, LEFT, RIGHT)
-Evaluate = Callable[[Tensor], Tensor]
-"""Maps node indices (N,) to the probabilities of the actions there (N, A), float64."""
+Evaluate = Callable[[Tensor], Tensor]  # nodes (N,) to action probabilities (N, A), float64
 
 
 @dataclasses.dataclass

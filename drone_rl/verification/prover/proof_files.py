@@ -28,8 +28,7 @@ FORMAT = "drone_rl certificate"
 FORMAT_VERSION = 1
 _COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band", "decided")
 _SETS = ("waiting", "ended", "ways", "forked", "parts", "part", "done", "undecided")
-_DAMAGE = (ValueError, TypeError, LookupError, ArithmeticError, AttributeError)
-"""Errors from reading a damaged file."""
+_DAMAGE = (ValueError, TypeError, LookupError, ArithmeticError, AttributeError)  # of damaged files
 _MOST = 2**40  # bound on every integer in a row
 _NOWHERE = (-1, 0, 0)  # stands for an unknown ending
 

@@ -30,8 +30,7 @@ MOST_ROWS = 20_000  # rows of the action table cut at a time
 MARGIN = 2.0  # metres by which a table extends beyond what is needed: drones move sideways
 COARSE = 0.5  # metres to which forks record the positions of cubes that are gone
 
-Ended = Mapping[tuple[Ending, int], Sequence[Boxes]]
-"""Disjoint placements by ending and number of steps."""
+Ended = Mapping[tuple[Ending, int], Sequence[Boxes]]  # disjoint, by number of steps
 
 
 @dataclasses.dataclass
@@ -66,12 +65,9 @@ class Prover:
         self.waiting: dict[LatticeState, list[Boxes]] = defaultdict(list)
         self.ended: dict[tuple[Ending, int], list[Boxes]] = defaultdict(list)
         """Of the part in progress, by number of steps."""
-        self.forked: list[Boxes] = []
-        """Placements with several possible actions for the first time, disjoint."""
-        self.longest: dict[LatticeState, int] = {}
-        """Most steps of forks to each state; the states themselves count none."""
-        self.fork_ends: dict[Ending | None, list[Boxes]] = defaultdict(list)
-        """Endings of branches; None if unknown."""
+        self.forked: list[Boxes] = []  # placements with several possible actions for the first time
+        self.longest: dict[LatticeState, int] = {}  # most steps of forks to each state
+        self.fork_ends: dict[Ending | None, list[Boxes]] = defaultdict(list)  # by ending, if known
         self.boxes_under_way = 0  # boxes in all waiting states
         self.num_places = self.pictures = self.most_boxes = 0  # states, images, boxes of a state
         self.decided = 0.0  # volume known; of the part in progress, without forks
