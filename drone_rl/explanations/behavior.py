@@ -1,8 +1,7 @@
 """Sections "evaluation", "shifts" (robustness), "dataset" (rollout statistics) and "flaws"."""
 
 import dataclasses
-import enum
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,23 +77,19 @@ def flaws_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]
     return numbers, {}
 
 
-class Kind(enum.StrEnum):
-    """Kind of a pair of frames, by the simulator's ground truth."""
-
-    CONTRADICTION = "contradiction"  # the next target is at about the same place in both
-    JUSTIFIED = "justified"  # the next target is elsewhere
-    UNKNOWN = "unknown"  # one of the frames has no next target
-
-
 @dataclasses.dataclass(frozen=True)
 class Pair:
-    """Two similar frames with opposite actions."""
+    """Two similar frames with opposite actions.
+
+    It is a "contradiction" if the next target is at about the same place in both, "justified" if it
+    is elsewhere, and "unknown" if one of the frames has none.
+    """
 
     left: int  # the frame with the higher probability of left
     right: int  # the frame with the higher probability of right
     distance: float  # root mean square difference of the observations
     opposition: float  # from 0 to 1; see `Actions.opposition`
-    kind: Kind
+    kind: Literal["contradiction", "justified", "unknown"]
 
 
 def one_move(flights: RolloutDataset) -> float:
@@ -125,7 +120,9 @@ def find_pairs(
         swing = actions.opposition(probs[rows, None], probs[None])
         for i, j in zip(*np.nonzero((distance <= alike) & (swing >= MIN_OPPOSITION)), strict=True):
             left, right = start + int(i), int(j)
-            kind = _kind(offset[left], offset[right])
+            away = np.abs(offset[left] - offset[right]).max()
+            kind = "contradiction" if away <= ALIKE_METRES else "justified"
+            kind = "unknown" if np.isnan(away) else kind
             found.append(Pair(left, right, float(distance[i, j]), float(swing[i, j]), kind))
     used: set[int] = set()
     kept = []
@@ -136,23 +133,16 @@ def find_pairs(
     return kept
 
 
-def _kind(offset: NDArray, other: NDArray) -> Kind:
-    away = np.abs(offset - other).max()
-    if np.isnan(away):
-        return Kind.UNKNOWN
-    return Kind.CONTRADICTION if away <= ALIKE_METRES else Kind.JUSTIFIED
-
-
 def summarise_pairs(pairs: list[Pair], dataset: RolloutDataset, alike: float) -> dict[str, Any]:
     """Return counts by kind, and the first pairs."""
-    worst = [pair.opposition for pair in pairs if pair.kind == Kind.CONTRADICTION]
+    worst = [pair.opposition for pair in pairs if pair.kind == "contradiction"]
     return {
         "frames": len(dataset),
         "episodes": len(np.unique(dataset.episode)),
         "pairs": len(pairs),
         "contradictions": len(worst),
-        "justified": sum(pair.kind == Kind.JUSTIFIED for pair in pairs),
-        "unknown": sum(pair.kind == Kind.UNKNOWN for pair in pairs),
+        "justified": sum(pair.kind == "justified" for pair in pairs),
+        "unknown": sum(pair.kind == "unknown" for pair in pairs),
         "worst_opposition": max(worst, default=None),
         "alike": alike,
         "alike_metres": ALIKE_METRES,

@@ -13,7 +13,6 @@ image changes only along these lines:
 
 import dataclasses
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from torch import Tensor, nn
 
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.provenance import num_cores
+from drone_rl.verification.prover.action_table import workers
 from drone_rl.verification.prover.arrangement import SAME, Arrangement, Pieces, Window, arrange
 from drone_rl.verification.prover.boxes import unite
 from drone_rl.verification.prover.cube_images import NOTHING, UNIT, CameraModel
@@ -148,10 +147,7 @@ def map_actions(
         faces = camera.faces(*part.T)
         return *_decide(look, network, faces), (faces == NOTHING).all((1, 2))
 
-    with ThreadPoolExecutor(
-        num_cores(), "places", initializer=torch.set_num_threads, initargs=(1,)
-    ) as pool:
-        action, gap, is_unseen = map(np.concatenate, zip(*pool.map(decide, parts), strict=True))
+    action, gap, is_unseen = map(np.concatenate, zip(*workers().map(decide, parts), strict=True))
     return ActionMap(
         window=window,
         arrangement=cells,

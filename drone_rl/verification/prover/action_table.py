@@ -137,7 +137,7 @@ class ActionTable:
         if len(blocks) <= ALONE:
             return work(blocks) if len(blocks) else np.zeros(0, np.uint8)
         parts = np.array_split(blocks, max(-(-len(blocks) // CHUNK), num_cores()))
-        return np.concatenate(list(_workers().map(work, parts)))
+        return np.concatenate(list(workers().map(work, parts)))
 
     def _look_at(self, combinations: NDArray) -> None:
         """Evaluate the distinct images among some combinations that are not known yet."""
@@ -216,7 +216,7 @@ def _halve(blocks: NDArray, doubts: NDArray) -> NDArray:
 
 
 @functools.cache
-def _workers() -> ThreadPoolExecutor:
+def workers() -> ThreadPoolExecutor:
     """Return one thread per core, each running torch with one thread."""
     return ThreadPoolExecutor(
         num_cores(), "prove", initializer=torch.set_num_threads, initargs=(1,)

@@ -20,11 +20,6 @@ class Window:
     farthest: float  # largest x
     sideways: float  # largest |y|
 
-    @property
-    def area(self) -> float:
-        """Area, square metres."""
-        return 2 * self.sideways * (self.farthest - self.nearest)
-
 
 @dataclasses.dataclass(frozen=True)
 class Pieces:
@@ -188,9 +183,9 @@ def arrange(pieces: Pieces, window: Window, most_cells: int) -> Arrangement:
     areas = found.areas()
     is_outside = areas <= 0
     number = np.where(is_outside, -1, np.cumsum(~is_outside) - 1)
-    inside = areas[~is_outside]
-    if abs(inside.sum() - window.area) > 1e-9 * window.area:
-        raise ArithmeticError(f"cells of {inside.sum()} m2 do not fill {window.area} m2")
+    inside, area = areas[~is_outside], 2 * window.sideways * (window.farthest - window.nearest)
+    if abs(inside.sum() - area) > 1e-9 * area:
+        raise ArithmeticError(f"cells of {inside.sum()} m2 do not fill {area} m2")
     return dataclasses.replace(found, cell=number[found.cell], num_cells=len(inside))
 
 

