@@ -14,28 +14,15 @@ def require_cubes(described: PolicyDescription, what: str) -> TaskSettings:
     """
     task, dynamics, actions = described.task, described.dynamics, described.actions
     if not isinstance(task, TaskSettings):
-        raise InputError(
-            f"{what} support only task={TaskSettings.name}, got task={task.name}; give a policy of "
-            "that task"
-        )
-    if not dynamics.is_computer_vision:
-        raise InputError(
-            f"{what} support only dynamics=computer_vision, got dynamics.mode={dynamics.mode}; "
-            "give a policy trained with it"
-        )
-    if actions.kind != "moves":
-        raise InputError(
-            f"{what} support only actions=moves, got actions.kind={actions.kind}; give a policy "
-            "trained with it"
-        )
-    if any(choice.name == "stack" for choice in described.transforms):
-        raise InputError(
-            f"{what} support only policies that observe one frame; this one stacks frames "
-            "(transform stack)"
-        )
-    if described.faults:
-        raise InputError(
-            f"{what} support only cameras without faults; this policy's simulates faults "
-            f"(transform {described.faults[0]})"
-        )
-    return task
+        problem = f"task={TaskSettings.name}, got task={task.name}"
+    elif not dynamics.is_computer_vision:
+        problem = f"dynamics=computer_vision, got dynamics.mode={dynamics.mode}"
+    elif actions.kind != "moves":
+        problem = f"actions=moves, got actions.kind={actions.kind}"
+    elif any(choice.name == "stack" for choice in described.transforms):
+        problem = "policies that observe one frame; this one stacks frames (transform stack)"
+    elif described.faults:
+        problem = f"cameras without faults; its simulates faults (transform {described.faults[0]})"
+    else:
+        return task
+    raise InputError(f"{what} support only {problem}; give another policy")
