@@ -49,10 +49,8 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
 class ClassModelSettings:
     """Settings of the optimization."""
 
-    objective: Objective = "logit"
-    """Maximized: the action's probability (Eq. 18), or its logit minus the mean of the logits."""
-    parameterisation: Literal["pixel", "fourier"] = "pixel"
-    """The variables to optimize: pixels, or their Fourier coefficients scaled by 1 / frequency."""
+    objective: Objective = "logit"  # maximized: the probability (Eq. 18), or logit minus mean logit
+    parameterisation: Literal["pixel", "fourier"] = "pixel"  # or coefficients times the frequency
     steps: int = 64  # steps of gradient ascent
     lr: float = 20.0  # length of a step (pixel), or Adam's learning rate times 400 (fourier)
     blur: float = 0.6  # standard deviation of a Gaussian blur after each step, pixels
@@ -70,10 +68,7 @@ class Attempts:
     settings: ClassModelSettings
 
     def best(self) -> list[int]:
-        """Return each action's start with the highest probability; of similar ones, the smoothest.
-
-        Starts are similar if their probabilities differ by up to `AS_PROBABLE`.
-        """
+        """Return each action's most probable start; within `AS_PROBABLE` of it, the smoothest."""
         highest = self.probabilities.amax(1, keepdim=True)
         less_probable = self.probabilities < highest - AS_PROBABLE
         return self.roughness.masked_fill(less_probable, float("inf")).argmin(1).tolist()
@@ -99,12 +94,7 @@ class ClassModel:
         return torch.stack([every.images[a, i] for a, i in enumerate(every.best())])
 
     def summary(self) -> dict[str, Any]:
-        """Return plain values; lists are by action.
-
-        "highest" is the highest probability of all attempts (`starts` times `num_settings`),
-        "starts_above_half" the number of attempts above one half. A low "highest" does not show
-        that no observation has a high probability.
-        """
+        """Return plain values; lists are by action, "highest" is that of all attempts."""
         every, starts = self.every, self.tried[0].settings.starts
         best = every.best()
         rows = [

@@ -47,11 +47,7 @@ class Context:
         unlike: Mapping[str, Any] | None = None,
         seed: RootSeed | None = None,
     ) -> None:
-        """Store the policy and its environments; see `explain`.
-
-        Raises:
-            InputError: A setting does not fit the policy.
-        """
+        """See `explain`; raise InputError if a setting does not fit the policy."""
         self.env, self.network, self.claim = env, network, claim
         self.settings, self.seed = with_seed(settings, seed)
         self.measured, self.unlike = measured, unlike
@@ -75,8 +71,7 @@ class Context:
     def aside(self) -> "Context":
         """Return a copy for another thread, which must not step the environments.
 
-        Its network is a copy, so hooks and gradients of the two threads don't mix. The data set,
-        the film and the heat maps are shared.
+        Hooks and gradients don't mix, since the network is a copy; all else is shared.
         """
         _ = self.dataset, self.film  # computed by the thread that owns the environments
         twin = copy.copy(self)

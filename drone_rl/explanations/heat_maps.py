@@ -81,8 +81,7 @@ class Explainer:
     def completeness_error(self, observations: Tensor, actions: Tensor) -> Tensor:
         """Return the absolute error of the sum of integrated gradients. Shape: (T,).
 
-        The exact integral sums to the action's probability on the observation minus that on the
-        baseline; an integral with too few steps does not.
+        The exact integral sums to the action's probability minus that on the baseline.
         """
         total = self._integrated(observations, actions).flatten(1).sum(1)
         there = probabilities(self.network, observations).gather(1, actions[:, None])[:, 0]

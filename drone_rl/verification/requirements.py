@@ -22,7 +22,7 @@ def require_cubes(described: PolicyDescription, what: str) -> TaskSettings:
     elif any(choice.name == "stack" for choice in described.transforms):
         problem = "policies that observe one frame; this one stacks frames (transform stack)"
     elif described.faults:
-        problem = f"cameras without faults; its simulates faults (transform {described.faults[0]})"
+        problem = f"cameras without faults; it simulates faults (transform {described.faults[0]})"
     else:
         return task
     raise InputError(f"{what} support only {problem}; give another policy")

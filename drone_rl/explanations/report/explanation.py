@@ -82,7 +82,10 @@ class Explanation:
             check_intervals(numbers, "explanation")
             if numbers.get("verdict") is not None:
                 check_verdict(numbers["verdict"])
-            _check_seed(numbers)
+            # files of version 0.1 have the seed among their settings only
+            older = as_mapping(numbers.get("settings", {}), "settings").get("seed")
+            Maybe(Whole(0)).read(numbers.get("seed", older), "seed")
+            Flag().read(numbers.get("seed_is_fixed", True), "seed_is_fixed")
         except (InputError, OSError) as error:
             raise InputError(
                 f"explanation {folder} can't be read ({error}); run drone-rl explain again"
@@ -93,13 +96,6 @@ class Explanation:
                 "run drone-rl explain again"
             )
         return cls(numbers, arrays, data, f"{folder.name}/explanation.json")
-
-
-def _check_seed(numbers: dict[str, Any]) -> None:
-    """Refuse an invalid seed; files of version 0.1 have it among their settings only."""
-    older = as_mapping(numbers.get("settings", {}), "settings").get("seed")
-    Maybe(Whole(0)).read(numbers.get("seed", older), "seed")
-    Flag().read(numbers.get("seed_is_fixed", True), "seed_is_fixed")
 
 
 Drawn = Mapping[str, Image.Image | Figure | NDArray]

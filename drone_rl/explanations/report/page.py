@@ -68,13 +68,9 @@ def report(folders: Sequence[Path], target: Path) -> Path:
 
 
 def find_explanations(which: Sequence[str], outputs: str | Path = "outputs") -> list[Path]:
-    """Return folders of explanations.
+    """Return folders of explanations, or raise InputError if there is none.
 
-    `which` has such folders, folders that contain some, or "latest" alone, which is searched for
-    in `outputs`.
-
-    Raises:
-        InputError: There is none.
+    `which` has such folders, folders that contain some, or "latest" alone: that in `outputs`.
     """
     folders = [Path(path) for path in which]
     if tuple(which) == ("latest",):

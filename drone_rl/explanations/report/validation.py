@@ -112,10 +112,7 @@ def check_files(
     data: Mapping[str, NDArray],
     actions: ShownActions,
 ) -> None:
-    """Refuse an explanation that can't be rendered, or whose parts do not fit each other.
-
-    The arguments are the contents of `explanation.json`, `arrays.npz` and `dataset.npz`, and the
-    policy's actions.
+    """Refuse the contents of `explanation.json`, `arrays.npz` and `dataset.npz` unless they fit.
 
     Raises:
         InputError: A part is too large, of another type or does not fit; the message names it.

@@ -230,7 +230,7 @@ class CubeImages:
         return torch.from_numpy(pictures), is_clear
 
     def check(self, count: int, random_state: np.random.RandomState) -> int:
-        """Compare `count` random images with the closed form; return how many were on no border.
+        """Compare random images with the closed form; return how many were on no border.
 
         Raises:
             InputError: They differ.
