@@ -62,14 +62,10 @@ def _normalized(maps: Tensor) -> NDArray:
 
 
 def key_frames(dataset: RolloutDataset, episode: int, task: Task[Any]) -> list[tuple[int, str]]:
-    """Select six frames of an episode; fewer only if it is shorter.
+    """Select six frames of an episode, fewer only if it is shorter: number and reason, in order.
 
-    They are: the first frame; the frame half way to the first goal (or to the end); the frame
-    before each goal is reached; the frame before one is missed, and the last one of an episode that
-    failed. Remaining places go to the frames furthest from those selected.
-
-    Returns:
-        Frame number and reason, in order of time.
+    They are: the first; that half way to the first goal (or to the end); those before each goal is
+    reached or one is missed; the last one of an episode that failed; then those furthest from all.
     """
     frames = np.flatnonzero(dataset.episode == episode)
     chosen: dict[int, str] = {int(frames[0]): "start"}

@@ -167,17 +167,10 @@ def explain_policy(
 ) -> dict[str, Any]:
     """Compute all sections for one policy and write them to a folder.
 
-    Args:
-        env: A batch of held-out environments that have not been stepped, with the policy's
-            transforms.
-        network: The policy's network, on the CPU.
-        folder: Folder to write; created if needed.
-        settings: What to compute.
-        name: Name of the policy.
-        provenance: Origin of the policy, as plain values.
-        progress: Called with the title of each section.
-        sections: Sections to compute, `SECTIONS` by default. Their order changes no result.
-        more: See `Context`.
+    The environments are held out, have not been stepped, and have the policy's transforms; the
+    network is on the CPU. `provenance` is the origin of the policy as plain values. `progress` is
+    called with the title of each section, by default of `SECTIONS`; their order changes no result.
+    For `more` see `Context`.
 
     Returns:
         The contents of `explanation.json`; "left_out" gives the reason for each section that can't

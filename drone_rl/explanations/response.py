@@ -94,10 +94,7 @@ def response_map(
     num_forward: int = 31,
     seed: int | None = None,
 ) -> ResponseMap:
-    """Evaluate the policy with one target at each place of a grid; see `Task.grid`.
-
-    The seed is that of the places, see `shrink`; they are fixed by default.
-    """
+    """Evaluate the policy with one target at each place of `Task.grid`; `shrink` uses the seed."""
     fields, wishes = _over_grid(
         scenes,
         (num_forward, num_lateral),
@@ -140,9 +137,8 @@ def _over_grid(
 def shrink(grid: Grid, seed: int, number: int = 0) -> Grid:
     """Move the outermost places inwards by random lengths, and all others in proportion.
 
-    These places are unknown beforehand, so no policy can be fitted to their frames. Places stay
+    These places are unknown beforehand, so no policy can be fitted to their frames. They stay
     evenly spaced, and symmetric sideways. Each end moves by less than half the distance of two.
-    `number` is that of one grid among several from this seed.
     """
     generator = torch_generator(seed, Stream.SCENES, number=number)
     near, far, aside = (0.5 * torch.rand(3, dtype=torch.float64, generator=generator)).tolist()

@@ -29,10 +29,9 @@ SHARES = (0.0, 0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Return "truth".
 
-    It has the results of `check_maps`, of no method if the weights are unknown; "heat" of each
-    method by region; "curves" of deletion and insertion of methods and placebos; "interventions":
-    effects of changes to the scene; "outcomes" of rollouts (None if no frame has a next target);
-    "integration_error" of integrated gradients.
+    It has the results of `check_maps`, of no method if the weights are unknown; "heat" by method
+    and region; "curves" of deletion and insertion; "interventions": effects of changes to the
+    scene; "outcomes" of rollouts (None if no frame has a next target); "integration_error".
 
     Arrays: "interventions" (K, H, W, 3): one frame after each change; "patch_effects" (rows,
     columns): mean effect of each patch.
