@@ -73,20 +73,20 @@ class Chances:
 
     def rows(self) -> list[list[str]]:
         """Return a table: a header, then mean, minimum and maximum over placements."""
-        told, collected = self.outcomes, self.outcomes.collected.unbind(-1)
+        outcomes, collected = self.outcomes, self.outcomes.collected.unbind(-1)
         reasons = list(EndReason)[EndReason.FRONT_BOUNDARY : EndReason.LOST_CONTROL]
         rows = [
             ["", "mean", "least", "most"],
-            _row("all cubes", told.success),
-            _row("not all cubes", told.failure),
-            _row("mean cubes", told.cubes, "{:.4f}".format),
+            _row("all cubes", outcomes.success),
+            _row("not all cubes", outcomes.failure),
+            _row("mean cubes", outcomes.cubes, "{:.4f}".format),
             *(_row(f"cube {i} collected", share) for i, share in enumerate(collected, 1)),
             *(
-                _row(f"ended: {end.name.lower().replace('_', ' ')}", told.reasons[:, end])
+                _row(f"ended: {end.name.lower().replace('_', ' ')}", outcomes.reasons[:, end])
                 for end in reasons
             ),
-            _row("mean length", told.steps, "{:.2f}".format),
-            _row("undecided", told.undecided),
+            _row("mean length", outcomes.steps, "{:.2f}".format),
+            _row("undecided", outcomes.undecided),
         ]
         for name, words in _BOUNDS.items() if self.bounded else ():
             bounds = torch.tensor([getattr(b, name) for b in self.bounded], dtype=torch.float64)
@@ -128,17 +128,17 @@ class Chances:
         return [*filter(None, [about, say(CHANCES, seed), seed_line(seed, "placements")])]
 
     def _placement(self, i: int) -> dict[str, Any]:
-        told, ends, bounds = self.outcomes, self.outcomes.ends[i], None
+        outcomes, ends, bounds = self.outcomes, self.outcomes.ends[i], None
         if self.bounded:
             bounds = {"metres": self.within, **dataclasses.asdict(self.bounded[i])}
         return {
             "within": bounds,
             "cubes": self.cubes[i].tolist(),
-            "success": float(told.success[i]),
-            "failure": float(told.failure[i]),
-            "mean_cubes": float(told.cubes[i]),
-            "mean_length": float(told.steps[i]),
-            "undecided": float(told.undecided[i]),
+            "success": float(outcomes.success[i]),
+            "failure": float(outcomes.failure[i]),
+            "mean_cubes": float(outcomes.cubes[i]),
+            "mean_length": float(outcomes.steps[i]),
+            "undecided": float(outcomes.undecided[i]),
             "ends": [
                 {
                     "reason": EndReason(reason).name.lower(),

@@ -113,7 +113,7 @@ def places(
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
     whole = (slice(None), slice(None))
 
-    def look(faces: NDArray[np.uint8]) -> torch.Tensor:
+    def render(faces: NDArray[np.uint8]) -> torch.Tensor:
         shown = [(whole, torch.from_numpy(faces))]
         return spec.compositor.see(spec.compositor.paint_one(shown, len(faces)))
 
@@ -126,7 +126,7 @@ def places(
         found = map_actions(
             spec.camera,
             Window(settings.nearest, settings.farthest, settings.sideways),
-            look,
+            render,
             network.eval(),
             touch_distance=spec.lattice.task.touch_distance,
             most_cells=settings.most_cells,

@@ -21,12 +21,12 @@ def rows(places: Evidence, names: Sequence[str]) -> list[list[str]]:
     """Return "places" of an explanation, or `places.json`, as a table by side, with a header."""
     head = ["one cube", "share of places", *names, "not seen", "blind"]
     every = {**{n: places[n] for n in ("actions", "unseen", "blind")}, "share": 1.0}
-    told = {WHERE[s]: of for s, of in places["sides"].items()} | {"anywhere": every}
+    by_side = {WHERE[s]: of for s, of in places["sides"].items()} | {"anywhere": every}
     return [
         head,
         *(
             [where, *map(exact_percent, (of["share"], *of["actions"], of["unseen"], of["blind"]))]
-            for where, of in told.items()
+            for where, of in by_side.items()
         ),
     ]
 

@@ -117,7 +117,7 @@ class ActionMap:
 def map_actions(
     camera: CameraModel,
     window: Window,
-    look: RenderFaces,
+    render: RenderFaces,
     network: nn.Module,
     *,
     touch_distance: float,
@@ -140,12 +140,12 @@ def map_actions(
     cells = arrange(borders, window, most_cells)
     places = cells.inner_points()
     nothing = np.full((1, len(camera.up), len(camera.left)), NOTHING, np.uint8)
-    (alone,), _ = _decide(look, network, nothing)
+    (alone,), _ = _decide(render, network, nothing)
     parts = np.split(places, range(_BATCH, len(places), _BATCH))
 
     def decide(part: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         faces = camera.faces(*part.T)
-        return *_decide(look, network, faces), (faces == NOTHING).all((1, 2))
+        return *_decide(render, network, faces), (faces == NOTHING).all((1, 2))
 
     action, gap, is_unseen = map(np.concatenate, zip(*workers().map(decide, parts), strict=True))
     return ActionMap(
@@ -222,10 +222,10 @@ def _levels(aside: NDArray, outer: NDArray, leaves: NDArray, half: float) -> lis
 
 @torch.no_grad()
 def _decide(
-    look: RenderFaces, network: nn.Module, faces: NDArray[np.uint8]
+    render: RenderFaces, network: nn.Module, faces: NDArray[np.uint8]
 ) -> tuple[NDArray, NDArray]:
     """Return the actions and the gaps to the second-highest logit. Shapes: (N,)."""
-    highest = network(look(faces)).topk(2)
+    highest = network(render(faces)).topk(2)
     gap = highest.values[:, 0] - highest.values[:, 1]
     return highest.indices[:, 0].numpy(), gap.double().numpy()
 

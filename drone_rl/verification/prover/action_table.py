@@ -84,7 +84,7 @@ class ActionTable:
             is_open = bits == 0
             done = tuple(_combinations(tasks[~is_open]).T[::-1])
             self._known[done] = np.repeat(bits[~is_open], counts[~is_open])
-            self._look_at(_combinations(tasks[is_open & (counts <= FEW)]))
+            self._evaluate(_combinations(tasks[is_open & (counts <= FEW)]))
             is_open &= counts > FEW
             if is_open.any():
                 stack.append(_halve(tasks[is_open], doubts[is_open]))
@@ -93,7 +93,7 @@ class ActionTable:
 
     def nothing_in_sight(self) -> int:
         """Return the bits of the possible actions without a visible cube."""
-        return int(self._look(np.empty((1, 0), int))[0])
+        return int(self._decide(np.empty((1, 0), int))[0])
 
     def _is_unknown(self, spans: NDArray) -> NDArray[np.bool_]:
         """Return which spans have unknown entries."""
@@ -139,7 +139,7 @@ class ActionTable:
         parts = np.array_split(blocks, max(-(-len(blocks) // CHUNK), num_cores()))
         return np.concatenate(list(workers().map(work, parts)))
 
-    def _look_at(self, combinations: NDArray) -> None:
+    def _evaluate(self, combinations: NDArray) -> None:
         """Evaluate the distinct images among some combinations that are not known yet."""
         shown = combinations.copy()
         for k, nearer in enumerate(self._hidden):
@@ -149,10 +149,10 @@ class ActionTable:
         known = self._known.reshape(-1)
         new = np.unique(code[known[code] == 0])
         index = np.stack(np.unravel_index(new, self._known.shape)[::-1], -1)
-        known[new] = self._share_out(self._look, index)
+        known[new] = self._share_out(self._decide, index)
         self._known[tuple(combinations.T[::-1])] = known[code]
 
-    def _look(self, combinations: NDArray) -> NDArray[np.uint8]:
+    def _decide(self, combinations: NDArray) -> NDArray[np.uint8]:
         """Return the possible actions of single images, given by their indices."""
         index = torch.from_numpy(combinations)
         shown = [(r.part, r.pictures[index[:, k]]) for k, r in enumerate(self._ranges)]

@@ -124,10 +124,10 @@ def _within(
     middle, close = (low + high) / 2, (high - low) / 8
     # most changes lie close to where they would be without rounding
     left = np.stack([low, middle - close, middle + close, high], -1).astype(np.float32)
-    drawn = _look(renderer, left)
+    drawn = _render(renderer, left)
     pure = _middle_faces(camera, ahead, _limits(bands, np.inf, -np.inf))
     next_to = np.concatenate([drawn[:, 0], drawn[-1:, -1]])
-    if (drawn[:-1, -1] != drawn[1:, 0]).any() or (renderer.images.read(next_to) != pure).any():
+    if (drawn[:-1, -1] != drawn[1:, 0]).any() or (renderer.read(next_to) != pure).any():
         return None
     band, found = np.arange(len(bands)), []
     while True:
@@ -143,16 +143,16 @@ def _within(
         # several positions render as fast as one
         between = np.stack([(a + middle) / 2, middle, (middle + b) / 2], -1)
         left = np.concatenate([a[:, None], between, b[:, None]], -1)
-        drawn = np.concatenate([first[:, None], _look(renderer, between), last[:, None]], 1)
+        drawn = np.concatenate([first[:, None], _render(renderer, between), last[:, None]], 1)
     band, where, pictures = (np.concatenate(parts) for parts in zip(*found, strict=True))
     order = np.lexsort((where, band))
     is_inner = band[order][1:] == band[order][:-1]  # the last of a band is that of its end
     inner = order[:-1][is_inner]
     counts = np.bincount(band[inner], minlength=len(bands))
-    return np.split(renderer.images.read(pictures[inner]), np.cumsum(counts)[:-1])
+    return np.split(renderer.read(pictures[inner]), np.cumsum(counts)[:-1])
 
 
-def _look(renderer: CubeView, left: NDArray[np.float32]) -> NDArray[np.uint8]:
+def _render(renderer: CubeView, left: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Render several positions per band. Shape: (bands, places) to (bands, places, ...)."""
-    pictures = renderer.look(left.reshape(-1))
+    pictures = renderer.render(left.reshape(-1))
     return pictures.reshape(*left.shape, *pictures.shape[1:])

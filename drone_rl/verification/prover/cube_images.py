@@ -279,10 +279,14 @@ class CubeView:
     cube: int
     steps: int
 
-    def look(self, left: NDArray[np.float32]) -> NDArray[np.uint8]:
+    def render(self, left: NDArray[np.float32]) -> NDArray[np.uint8]:
         """Render the cube, metres left of the camera (N,), as RGB (N, height, width, 3)."""
         count = len(left)
         cubes = np.zeros((count, self.images.num_cubes))
         cubes[:, self.cube] = left
         hidden = np.broadcast_to(np.arange(cubes.shape[1]) != self.cube, cubes.shape)
         return self.images.render(cubes, np.array([[self.steps, 0]] * count), hidden).numpy()
+
+    def read(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """See `CubeImages.read`."""
+        return self.images.read(pictures)

@@ -18,7 +18,7 @@ class Drawn:
     def __init__(self, error=(0.0, 0.0), ahead=4.0):
         self.error, self.ahead, self.looks = error, ahead, 0
 
-    def look(self, left):
+    def render(self, left):
         self.looks += len(left)
         faces = [
             TINY.faces(self.ahead, left.astype(float) + e)[..., k] for k, e in enumerate(self.error)
@@ -62,7 +62,7 @@ def test_pictures_within_a_band_are_found():
     both = CameraModel(**{**vars(TINY), "left": np.array([1.0, 1.0])})
 
     class Late(Drawn):
-        def look(self, left):
+        def render(self, left):
             faces = [both.faces(4.0, left.astype(float) - e)[..., :1] for e in (0.0, 1e-6)]
             return np.concatenate(faces, -1)[..., None].repeat(3, -1)
 

@@ -62,8 +62,8 @@ def test_a_picture_that_is_another_is_told(images, monkeypatch):
 def test_one_cube_alone(images):
     one = CubeView(images, cube=1, steps=20)
     left = np.array([-1.0, 0.0, 30.0], np.float32)
-    pictures = one.look(left)
-    faces = images.read(pictures)
+    pictures = one.render(left)
+    faces = one.read(pictures)
     assert (faces == images._camera.faces(3.6, left.astype(float))).all()
     assert faces[1, 12, 32] == FRONT and (faces[2] == NOTHING).all()
 
