@@ -1,9 +1,8 @@
 """Sets of actions: names, mirror images, and distances between distributions of actions.
 
-A network's outputs become a *wish*: the shares of named *parts*, which add up to 1. For discrete
-actions, parts are the actions and shares are their probabilities. For continuous actions, a part is
-a kind of action, such as "left", and its share is the probability of that kind. Code that compares
-policies compares wishes, for any number and kind of actions.
+A network's outputs become a *wish*: the shares of named *parts*, which add up to 1. The parts of
+discrete actions are the actions, those of continuous ones are kinds of actions, such as "left"; the
+share is the probability of the part.
 """
 
 import abc
@@ -23,12 +22,23 @@ Rgb = tuple[int, int, int]
 """Red, green, blue, 0 to 255."""
 
 
+class Entry(NamedTuple):
+    """Shape, type and bounds of an array, for one environment."""
+
+    shape: tuple[int, ...]
+    dtype: torch.dtype
+    low: float | None = None
+    high: float | None = None
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Parts:
-    """Numbered parts of a wish.
+class Actions(abc.ABC):
+    """A set of actions and the numbered parts of a wish, which is a tensor or a NumPy array.
+
+    An *action* is what dynamics take, shaped as `entry` says; a *part* is a number, int64.
 
     Raises:
-        ValueError: A mirror image or opposite is not among them, or not mutual.
+        ValueError: A mirror image or opposite is not among the parts, or not mutual.
     """
 
     names: tuple[str, ...]
@@ -45,7 +55,6 @@ class Parts:
     colors: tuple[Rgb, ...]
 
     def __post_init__(self) -> None:
-        """Check that the fields are consistent."""
         every = list(range(len(self)))
         for name in ("mirrored", "opposite"):
             pairs = getattr(self, name)
@@ -59,7 +68,6 @@ class Parts:
             raise ValueError(f"left={self.left} is its own mirror image; give one that turns")
 
     def __len__(self) -> int:
-        """Return the number of parts."""
         return len(self.names)
 
     @property
@@ -130,35 +138,15 @@ class Parts:
             "colors": [list(color) for color in self.colors],
         }
 
-
-def _take(values: Sequence[int], part: Tensor) -> Tensor:
-    return torch.tensor(values, device=part.device)[part]
-
-
-class Entry(NamedTuple):
-    """Shape, type and bounds of an array, for one environment."""
-
-    shape: tuple[int, ...]
-    dtype: torch.dtype
-    low: float | None = None
-    high: float | None = None
-
-
-class Actions(Parts, abc.ABC):
-    """A set of actions. Wishes may be tensors or NumPy arrays.
-
-    An *action* is what dynamics take, shaped as `entry` says; a *part* is a number, int64.
-    """
-
     @property
     @abc.abstractmethod
     def entry(self) -> Entry:
         """Shape, type and bounds of one environment's action."""
 
     @property
-    @abc.abstractmethod
     def num_outputs(self) -> int:
         """Number of the network's outputs."""
+        return len(self.output_names)
 
     @property
     @abc.abstractmethod
@@ -202,6 +190,10 @@ class Actions(Parts, abc.ABC):
         """Return whether actions, as `kept`, are steps of going back and forth. (T,), bool."""
 
 
+def _take(values: Sequence[int], part: Tensor) -> Tensor:
+    return torch.tensor(values, device=part.device)[part]
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DiscreteActions(Actions):
     """A few numbered actions; a wish holds the probability of each. See `Actions`."""
@@ -212,13 +204,8 @@ class DiscreteActions(Actions):
         return Entry((), torch.int64, 0, len(self) - 1)
 
     @property
-    def num_outputs(self) -> int:
-        """One logit per action."""
-        return len(self)
-
-    @property
     def output_names(self) -> tuple[str, ...]:
-        """The names of the actions."""
+        """The names of the actions, one logit each."""
         return self.names
 
     def wish(self, outputs: Tensor) -> Tensor:

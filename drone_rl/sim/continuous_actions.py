@@ -2,16 +2,13 @@
 
 An action is three numbers in [-1, 1]. Forward: 1 is full speed, -1 is none; there is no backward
 flight. Sideways: 1 is full speed to the left, -1 to the right. Yaw: 1 is the greatest rate to the
-left. A policy samples each from a normal distribution and squashes it by tanh, see
-`drone_rl.policies.distributions`. A network's outputs are three for the means, then three for the
-deviations, see `normal_of`.
+left. A network's outputs are the means of three normal distributions, then their deviations, see
+`normal_of`; samples are squashed by tanh.
 
-The parts of a wish are forward, left, right, turn left and turn right (the last two only where
-drones can turn). An action is left if it goes left at more than a third of full speed, and turns
-left at more than a third of the greatest rate. It counts half to each if it does both, and is
-forward if it does neither. A part's share is its probability under the policy's distribution, in
-closed form. Small corrections count as forward, but change the shares, which are smooth in the
-outputs.
+The parts of a wish are forward, left, right, and, where drones can turn, turn left and turn right.
+An action is left if it goes left at more than a third of full speed, and turns left at more than a
+third of the greatest rate. It counts half to each if it does both, and is forward if it does
+neither. A part's share is its probability, in closed form.
 """
 
 import dataclasses
@@ -76,11 +73,6 @@ class ContinuousActions(Actions):
     def entry(self) -> Entry:
         """Three numbers."""
         return Entry((3,), torch.float32, -1.0, 1.0)
-
-    @property
-    def num_outputs(self) -> int:
-        """Three means and three deviations."""
-        return 6
 
     @property
     def output_names(self) -> tuple[str, ...]:

@@ -218,7 +218,7 @@ _NAME = re.compile(r"[a-z][a-z0-9 _-]{0,23}")
 
 @dataclasses.dataclass(frozen=True)
 class ShownActions:
-    """Actions by number, as `explanation.json` holds them under "actions"; see `Parts`."""
+    """Actions by number, as `explanation.json` holds them under "actions"; see `Actions`."""
 
     names: tuple[str, ...]
     order: tuple[int, ...]

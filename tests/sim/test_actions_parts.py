@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.sim.actions import Parts
+from drone_rl.sim.actions import DiscreteActions
 
-FOUR = Parts(
+FOUR = DiscreteActions(
     names=("left", "right", "far left", "far right"),
     mirrored=(1, 0, 3, 2),
     opposite=(1, 0, 3, 2),
@@ -15,7 +15,7 @@ FOUR = Parts(
 )
 
 
-class Both(Parts):
+class Both(DiscreteActions):
     lefts = (0, 2)
 
 
@@ -41,7 +41,7 @@ def test_agrees_is_true_for_equal_parts_or_sides():
 
 def test_mirrored_must_be_an_involution():
     with pytest.raises(ValueError, match="mirrored"):
-        Parts(**{**vars(FOUR), "mirrored": (1, 2, 3, 0)})
+        DiscreteActions(**{**vars(FOUR), "mirrored": (1, 2, 3, 0)})
 
 
 def test_names_and_indices_of_a_set():
@@ -71,19 +71,21 @@ def test_distance_is_half_the_sum_of_absolute_differences():
 )
 def test_inconsistent_sets_raise(field, value, message):
     with pytest.raises(ValueError, match=message):
-        Parts(**{**vars(FOUR), field: value})
+        DiscreteActions(**{**vars(FOUR), field: value})
 
 
 @pytest.mark.parametrize("count", [3, 5])
 def test_arrows_and_colors_must_match_the_parts(count):
     with pytest.raises(ValueError, match="give an arrow"):
-        Parts(**{**vars(FOUR), "arrows": ((0, 0),) * count, "colors": ((0, 0, 0),) * count})
+        DiscreteActions(
+            **{**vars(FOUR), "arrows": ((0, 0),) * count, "colors": ((0, 0, 0),) * count}
+        )
 
 
 def test_undoing_and_turning_parts():
     every = torch.arange(4)
     assert FOUR.undoes(every, torch.tensor([1, 1, 3, 2])).tolist() == [True, False, True, True]
     assert FOUR.can_be_undone(every).all() and FOUR.turns(every).all()
-    still = Parts(**{**vars(FOUR), "opposite": (0, 1, 2, 3), "mirrored": (1, 0, 2, 3)})
+    still = DiscreteActions(**{**vars(FOUR), "opposite": (0, 1, 2, 3), "mirrored": (1, 0, 2, 3)})
     assert not still.can_be_undone(every).any() and not still.undoes(every, every).any()
     assert still.turns(every).tolist() == [True, True, False, False]
