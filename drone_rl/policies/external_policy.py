@@ -106,7 +106,9 @@ class ForeignPolicy(Pilot):
         network = ForeignNetwork(
             self.logits,
             frame.shape,
-            make_dynamics(as_task(self.own_task), self.dynamics, self.actions).actions,
+            make_dynamics(
+                as_task(self.own_task).make_dynamics, self.dynamics, self.actions
+            ).actions,
             takes_bytes=not self.transforms,
             device=device,
         )

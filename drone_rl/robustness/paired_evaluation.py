@@ -83,7 +83,7 @@ class PairedEvaluator:
         )
         self.looks.reset(torch.arange(episodes), streams)
         self._drawn = torch.stack([task.draw(stream) for stream in streams])
-        dynamics = make_dynamics(task, subject.dynamics, subject.actions)
+        dynamics = make_dynamics(task.make_dynamics, subject.dynamics, subject.actions)
         self._seeds = draw_seeds(streams) if dynamics.is_random else None
         self._built: dict[tuple[Any, ...], Worlds] = {}
 

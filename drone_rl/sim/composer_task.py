@@ -72,7 +72,7 @@ class ComposerTask(composer.Task):
                 dynamics have their own actions.
         """
         self.rules = as_task(task)
-        self.dynamics = make_dynamics(self.rules, dynamics, actions)
+        self.dynamics = make_dynamics(self.rules.make_dynamics, dynamics, actions)
         self.camera = camera or CameraSettings()
         self._looks = self._worn = None
         if appearance is not None and not appearance.is_minimal:

@@ -59,7 +59,7 @@ class Worlds:
         self.num_worlds = num_worlds
         self.task = as_task(task)
         self.camera = camera or CameraSettings()
-        self.dynamics = make_dynamics(self.task, dynamics, actions)
+        self.dynamics = make_dynamics(self.task.make_dynamics, dynamics, actions)
         self.device = torch.device(device)
         self._every = torch.arange(num_worlds, device=self.device)
         self._make_renderer, self._num_shards = find_renderer(renderer), num_shards

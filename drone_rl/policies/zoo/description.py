@@ -172,7 +172,7 @@ class PolicyDescription:
 
     def make_dynamics(self) -> Dynamics:
         """How the drone moves."""
-        return make_dynamics(as_task(self.task), self.dynamics, self.actions)
+        return make_dynamics(as_task(self.task).make_dynamics, self.dynamics, self.actions)
 
     def make_transforms(self) -> list[TorchrlTransform]:
         """Build the transforms in order."""

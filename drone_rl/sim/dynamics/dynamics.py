@@ -1,7 +1,7 @@
 """How a drone moves: the protocol, moves and speeds without inertia, and the choice by settings."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -17,36 +17,26 @@ from drone_rl.utils.errors import InputError
 
 
 class Dynamics(Protocol):
-    """Functions that move drones. A subclass needs only `actions`, `start` and `step`."""
+    """Functions that move drones. A subclass needs only `actions` and `step`."""
 
-    @property
-    def actions(self) -> Actions:
-        """The action set."""
-        ...
-
-    @property
-    def mount(self) -> str:
-        """Camera mount: "body", or "gimbal", which keeps cameras level."""
-        return "body"
-
-    @property
-    def is_random(self) -> bool:
-        """Whether `start` uses its `seeds`."""
-        return False
-
-    @property
-    def needs_obstacles(self) -> bool:
-        """Whether `step` needs the obstacles."""
-        return False
+    actions: Actions
+    """The action set."""
+    mount: str = "body"
+    """Camera mount: "body", or "gimbal", which keeps cameras level."""
+    is_random: bool = False
+    """Whether `start` uses its `seeds`."""
+    needs_obstacles: bool = False
+    """Whether `step` needs the obstacles."""
 
     def start(self, position: Tensor, seeds: Tensor | None = None) -> BodyState:
-        """Return drones at the start of an episode.
+        """Return drones at the start of an episode; by default they are level and at rest.
 
         Args:
             position: Metres, world frame. Shape: (num_worlds, 3), float64.
             seeds: Of the randomness of each episode; the mean without. Shape: (num_worlds,), int64.
         """
-        ...
+        del seeds
+        return BodyState.at_rest(position)
 
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
@@ -61,24 +51,10 @@ class Dynamics(Protocol):
         ...
 
 
-class _Level:
-    """Drones that never tilt: without randomness and without contacts."""
-
-    mount = "body"
-    """A drone that never tilts needs no gimbal."""
-    is_random = False
-    needs_obstacles = False
-
-    def start(self, position: Tensor, seeds: Tensor | None = None) -> BodyState:
-        """Return drones that are level, face forward and are at rest."""
-        del seeds
-        return BodyState.at_rest(position)
-
-
-class ComputerVision(_Level):
+class ComputerVision(Dynamics):
     """Moves a step forward, left or right, at once and without turning."""
 
-    actions = MOVES
+    actions: Actions = MOVES
 
     def __init__(self, step_length: float = 1.0) -> None:
         """Set the length of a move, metres."""
@@ -95,20 +71,20 @@ class ComputerVision(_Level):
         return body.moved(body.position + moves[action])
 
 
-class Kinematic(_Level):
+class Kinematic(Dynamics):
     """Flies level at the commanded speeds, without inertia; a step moves first, and then turns."""
 
     def __init__(self, actions: ActionSettings, timestep: float = 0.1) -> None:
         """Take the greatest speeds, and the seconds that an action lasts."""
-        self.actions = ContinuousActions.of(actions)
-        self.timestep = timestep
+        self._continuous = ContinuousActions.of(actions)
+        self.actions, self.timestep = self._continuous, timestep
 
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> BodyState:
         """Return the drones a time step later; velocities are those of the step."""
         del obstacles
-        forward, left, rate = self.actions.to_rates(action).unbind(-1)
+        forward, left, rate = self._continuous.to_rates(action).unbind(-1)
         heading = heading_of(body.attitude)
         cos, sin, zero = heading.cos(), heading.sin(), torch.zeros_like(heading)
         velocity = torch.stack([cos * forward - sin * left, sin * forward + cos * left, zero], -1)
@@ -126,23 +102,15 @@ _SEEDS = 2**31 - 1
 """Number of seeds of random dynamics."""
 
 
-class HasMoves(Protocol):
-    """A task, which has default dynamics."""
-
-    def make_dynamics(self) -> Dynamics:
-        """See `Task.make_dynamics`."""
-        ...
-
-
 def make_dynamics(
-    task: HasMoves,
+    default: Callable[[], Dynamics],
     dynamics: DynamicsSettings | Dynamics | None = None,
     actions: ActionSettings | None = None,
 ) -> Dynamics:
     """Return the dynamics of settings.
 
     Args:
-        task: Its own dynamics are used for moves in computer-vision mode.
+        default: Makes those of moves in computer-vision mode, such as `Task.make_dynamics`.
         dynamics: Settings, computer-vision mode by default; or dynamics, which are returned.
         actions: Moves by default.
 
@@ -160,7 +128,7 @@ def make_dynamics(
     if not dynamics.is_computer_vision:
         return Quadrotor(dynamics, actions)
     if actions.kind == "moves":
-        return task.make_dynamics()
+        return default()
     return Kinematic(actions, dynamics.control_timestep)
 
 

@@ -26,26 +26,11 @@ class Quadrotor:
         self.settings = settings
         self.steering = make_steering(actions or ActionSettings())
         self.frame = make_airframe(settings)
-
-    @property
-    def actions(self) -> Actions:
-        """The action set."""
-        return self.steering.actions
-
-    @property
-    def mount(self) -> str:
-        """See `DynamicsSettings.camera_mount`."""
-        return self.settings.camera_mount
-
-    @property
-    def is_random(self) -> bool:
+        self.actions: Actions = self.steering.actions
+        self.mount: str = settings.camera_mount
+        self.is_random = settings.gusts > 0.0
         """Whether there are gusts, which `seeds` make different."""
-        return self.settings.gusts > 0.0
-
-    @property
-    def needs_obstacles(self) -> bool:
-        """Drones collide with obstacles."""
-        return True
+        self.needs_obstacles = True
 
     def start(self, position: Tensor, seeds: Tensor | None = None) -> FlightState:
         """Return drones that hover at rest; see `Dynamics`."""

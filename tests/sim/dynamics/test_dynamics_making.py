@@ -51,9 +51,9 @@ def test_velocities_are_supported_by_the_quadrotor():
 
 def test_dynamics_objects_are_used_with_their_actions():
     turning = Turning()
-    assert make_dynamics(TASK, turning) is turning
+    assert make_dynamics(TASK.make_dynamics, turning) is turning
     with pytest.raises(InputError, match=r"^actions=velocity, but dynamics=Turning brings its own"):
-        make_dynamics(TASK, turning, VELOCITY)
+        make_dynamics(TASK.make_dynamics, turning, VELOCITY)
 
 
 def test_seeds_come_from_each_stream():
