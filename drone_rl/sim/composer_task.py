@@ -221,7 +221,6 @@ class ComposerTask(composer.Task):
         return heading_only(body.attitude) if self.dynamics.mount == "gimbal" else body.attitude
 
     def _show(self, physics: mjcf.Physics) -> None:
-        """Set the poses of the drone and the props."""
         body = self.state.body
         if self._flight is None:
             self.drone.set_pose(physics, body.position[0].numpy(), self._shown(body)[0].numpy())
@@ -239,7 +238,6 @@ class ComposerTask(composer.Task):
         return MujocoFlight(self.dynamics, self._arena, self.drone, solid)
 
     def _prepare(self) -> None:
-        """Allocate textures, and enable the camera's rendering flags and fog."""
         root: Any = self._arena.mjcf_model
         opengl.prepare(root)
         camera = self.drone.observables.front_center  # pyright: ignore[reportAttributeAccessIssue]
@@ -255,7 +253,6 @@ class ComposerTask(composer.Task):
         self._physics = physics
 
     def _in_fog(self, picture: np.ndarray, random_state: np.random.RandomState) -> np.ndarray:
-        """Return the image with fog."""
         del random_state
         if self.look is None or self.look.fog is None:
             return picture
@@ -272,7 +269,6 @@ class ComposerTask(composer.Task):
 
 
 def _is_same_turn(one: torch.Tensor, other: torch.Tensor) -> bool:
-    """Return whether quaternions are equal up to sign and rounding."""
     return 1.0 - float((one * other).sum().abs()) < 1e-12
 
 

@@ -100,7 +100,6 @@ class VisualEntity(composer.Entity):
     def _add_geom(
         self, kind: str, size: tuple[float, ...], color: tuple[float, float, float], name: str
     ) -> None:
-        """Add a geom of MuJoCo's type and size; `color` is RGB in [0, 1]."""
         self._mjcf_root: Any = mjcf.RootElement(model=name)
         shape = {"type": kind, "size": size, "rgba": (*color, 1.0)}
         self.geom: Any = self._mjcf_root.worldbody.add(

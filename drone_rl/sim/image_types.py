@@ -124,7 +124,6 @@ class ImageRequest:
     """Whether pixels are numbers (`pixels_as_float`) instead of red, green and blue."""
 
     def __post_init__(self) -> None:
-        """Check camera and type."""
         object.__setattr__(self, "camera", find_camera(self.camera).name)
         if self.image_type not in list(ImageType):
             names = ", ".join(f"{kind.value} ({kind.name.lower()})" for kind in ImageType)

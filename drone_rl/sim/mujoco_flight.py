@@ -172,7 +172,6 @@ class MujocoFlight:
         self._left = physics.data.qpos[self._pose].copy()
 
     def _rocking(self, physics: mjcf.Physics) -> NDArray:
-        """Return a torque that damps rocking on the ground."""
         data, share = physics.data, _CALM / self._settings.tick
         turn = data.xmat[self._body].reshape(3, 3)
         return turn @ (share * np.array(self._settings.inertia) * data.qvel[self._motion][3:])

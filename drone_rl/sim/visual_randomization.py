@@ -278,7 +278,6 @@ def _draw(settings: AppearanceSettings, source: np.random.RandomState | None) ->
 
 
 def _draw_camera(settings: AppearanceSettings, source: np.random.RandomState | None) -> list[float]:
-    """Offset, rotation and change of the field of view."""
     ends = [*_pairs(settings.camera_offset), *_pairs(settings.camera_turn)]
     ends.append(settings.camera_widening)
     return [float(_drawn(pair, source, ())) for pair in ends]

@@ -63,7 +63,6 @@ class Goals:
     """Rate of change of positions and headings, a second; 0 by default."""
 
     def __post_init__(self) -> None:
-        """Check that controllers support the modes."""
         for axis, (mode, allowed) in enumerate(zip(self.modes, ALLOWED, strict=True)):
             if mode not in allowed:
                 known = ", ".join(m.name.lower() for m in allowed)
@@ -120,7 +119,6 @@ class Moves:
     actions = MOVES
 
     def __init__(self, settings: ActionSettings) -> None:
-        """Take the speed of moves and the lead."""
         self.lead = settings.move_lead
         self.drifts = torch.zeros(len(DIRECTIONS), 4, dtype=torch.float64)
         self.drifts[:, :2] = torch.tensor(DIRECTIONS, dtype=torch.float64)[:, :2]
@@ -141,7 +139,6 @@ class Velocities:
     MODES = (Mode.HEADING_VELOCITY, Mode.HEADING_VELOCITY, Mode.RATE, Mode.POSITION)
 
     def __init__(self, settings: ActionSettings) -> None:
-        """Take the greatest speeds."""
         self.actions = ContinuousActions.of(settings)
 
     def goals(self, body: FlightState, action: Tensor) -> Goals:

@@ -171,7 +171,6 @@ class Appearance:
         return dataclasses.replace(other, **given)
 
     def __getitem__(self, worlds: slice | Tensor) -> "Appearance":
-        """Return the appearance of some environments."""
         return _select(self, worlds)
 
 

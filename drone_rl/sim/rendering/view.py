@@ -44,7 +44,6 @@ class View:
     """Whether to render the drone's own body, which its own cameras leave out."""
 
     def __post_init__(self) -> None:
-        """Validates the request."""
         if not self.cameras:
             raise InputError("cameras=() shows nothing; name a camera or more")
         if not self.modalities:

@@ -84,7 +84,6 @@ class Imu(Sensor[ImuState, ImuReading]):
     """Accelerometer and gyroscope; see `ImuSettings`."""
 
     def __init__(self, settings: ImuSettings | None = None) -> None:
-        """Use AirSim's settings by default."""
         self.settings = settings or ImuSettings()
         self.sampling = Sampling(rate=self.settings.rate)
 
@@ -159,7 +158,6 @@ class Magnetometer(Sensor[MagnetometerState, MagnetometerReading]):
     """A magnetometer; see `MagnetometerSettings`."""
 
     def __init__(self, settings: MagnetometerSettings | None = None, home: GeoPoint = HOME) -> None:
-        """Use AirSim's settings by default; `home` is the world's origin."""
         self.settings, self.home = settings or MagnetometerSettings(), home
         self.sampling = Sampling(rate=self.settings.rate, latency=self.settings.latency)
 
@@ -234,7 +232,6 @@ class Gps(Sensor[SensorState, GpsReading]):
     """A GPS receiver with latency, whose stated error shrinks after the start."""
 
     def __init__(self, settings: GpsSettings | None = None, home: GeoPoint = HOME) -> None:
-        """Use AirSim's settings by default; `home` is the world's origin."""
         own = settings or GpsSettings()
         self.settings, self.home = own, home
         self.sampling = Sampling(rate=own.rate, latency=own.latency, startup=own.startup)
@@ -295,7 +292,6 @@ class Barometer(Sensor[BarometerState, BarometerReading]):
     """A barometer; see `BarometerSettings`."""
 
     def __init__(self, settings: BarometerSettings | None = None, home: GeoPoint = HOME) -> None:
-        """Use AirSim's settings by default; `home` is the world's origin."""
         self.settings, self.home = settings or BarometerSettings(), home
         self.sampling = Sampling(rate=self.settings.rate, latency=self.settings.latency)
 

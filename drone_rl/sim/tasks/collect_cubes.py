@@ -90,7 +90,6 @@ class CollectCubes(PropTask[WorldState]):
     )
 
     def __init__(self, settings: TaskSettings | None = None) -> None:
-        """Take cubes, moves and boundaries; the original study's by default."""
         self.settings = settings = settings or TaskSettings()
         self.largest_reward = float(settings.num_cubes)
         self.drone_size = settings.drone_size

@@ -99,7 +99,6 @@ class Pillars(PropTask[FieldState]):
     )
 
     def __init__(self, settings: PillarsSettings | None = None) -> None:
-        """Take field, pillars and moves."""
         self.settings = s = settings or PillarsSettings()
         self.lanes = Lanes(s)
         self.drone_size, self.origin = s.drone_size, (0.0, 0.0, s.altitude)

@@ -20,7 +20,6 @@ class Lanes:
     """Lanes a step apart, which a row of pillars leaves open or not. Metres, world frame."""
 
     def __init__(self, settings: PillarsSettings) -> None:
-        """Take the settings of the task."""
         self.settings = settings
 
     def draw_field(self, random_state: np.random.RandomState) -> NDArray[np.float64]:

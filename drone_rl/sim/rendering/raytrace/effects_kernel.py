@@ -53,7 +53,6 @@ def render_images_with_effects(
 
 @wp.func
 def _cast_shadows(job: structs.Job, sun: wp.vec3) -> None:
-    """Mark the pixels that are in shadow."""
     ground = find_ground(job, sun)
     for geom in range(job.geom_views.shape[0]):
         caster = job.geom_views[geom]
@@ -191,7 +190,6 @@ def shadow_length(job: structs.Job, caster: structs.GeomView, ground: int, sun: 
 
 @wp.func
 def _upright(plane: structs.GeomView) -> wp.vec3:
-    """A plane's normal, world frame."""
     return plane.axes @ wp.vec3(0.0, 0.0, 1.0)
 
 

@@ -75,7 +75,6 @@ def render_pixels_with_effects(
 def _start(
     view: structs.View, poses: structs.Poses, scratch: structs.Scratch, row: int
 ) -> structs.Job:
-    """The job of an image, which has scratch buffers of its own."""
     return start_job(view, poses, scratch, row, row % view.cameras.shape[0], row // view.count, row)
 
 

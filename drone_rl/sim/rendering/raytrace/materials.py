@@ -28,7 +28,6 @@ class MaterialsEncoder:
     """Encodes a scene's own colours and lights, and appearances that differ from them."""
 
     def __init__(self, scene: Scene, device: str) -> None:
-        """Read the scene's colours and lights."""
         model = scene.model
         self._scene, self._device = scene, device
         stored = {
@@ -95,7 +94,6 @@ class EffectsEncoder:
     """Encodes effects; each set of textures is read once."""
 
     def __init__(self, scene: Scene, device: str) -> None:
-        """Keep the scene whose geoms are textured, and the kernels' device."""
         self._scene, self._device = scene, device
         self._textures: dict[tuple[str, ...], dict[str, Any]] = {}
 
@@ -134,7 +132,6 @@ class EffectsEncoder:
         return effects
 
     def _load(self, names: tuple[str, ...]) -> dict[str, Any]:
-        """The arrays of `Effects` that hold textures."""
         if names not in self._textures:
             images = [textures.load(name) for name in names]
             rows = [textures.levels(image) for image in images]

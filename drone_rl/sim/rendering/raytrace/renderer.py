@@ -145,7 +145,6 @@ class CpuLauncher:
     """Launches the CPU kernels; each core renders one image at a time."""
 
     def __init__(self, num_worlds: int, num_shards: int | None) -> None:
-        """Start the threads; see `Raytracer`."""
         self._workers = WorkerPool(num_worlds, num_shards)
         self._scratch: dict[tuple[int, int], structs.Scratch] = {}
 
@@ -175,7 +174,6 @@ class GpuLauncher:
     """Launches the GPU kernels, one thread per pixel; they also run, slowly, on a CPU."""
 
     def __init__(self, device: str) -> None:
-        """Take a device, "cuda" or "cuda:N"."""
         self._device = device
 
     def launch(self, launch: Launch) -> None:

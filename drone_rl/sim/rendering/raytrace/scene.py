@@ -71,7 +71,6 @@ class Frames:
     """Which frame each body is fixed to, and poses relative to frames."""
 
     def __init__(self, scene: Scene) -> None:
-        """Read the model's first pose, in which nothing has moved within its frame."""
         self._model = model = scene.model
         self._data = mujoco.MjData(model)
         mujoco.mj_forward(model, self._data)
@@ -179,7 +178,6 @@ class Cameras:
     """Cameras of a view, with the model's mounting or another one per environment."""
 
     def __init__(self, view: View, encoded: structs.View, device: torch.device) -> None:
-        """Take a view, and the same encoded for the kernels with the model's mounting."""
         self._view, self._encoded, self._device = view, encoded, device
         arrays: Any = encoded
         self._cameras = arrays.cameras.numpy()
@@ -232,7 +230,6 @@ class PoseBuffers:
     """Poses of frames in arrays that are reused: new Warp arrays would take longer to make."""
 
     def __init__(self, device: torch.device) -> None:
-        """Start empty; `write` allocates."""
         self._device = device
         self._positions: Tensor = torch.empty(0, 0, 3)
         self._attitudes: Tensor = torch.empty(0, 4)
