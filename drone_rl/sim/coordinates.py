@@ -3,13 +3,12 @@
 Our frames are x forward, y left, z up, for the world and for bodies; the world's forward is north.
 NED is north, east, down, with bodies forward, right, down (FRD), as in AirSim and PX4. ENU is east,
 north, up, as in ROS. Quaternions are (w, x, y, z), rotate the body's frame into the world's, and
-have length 1. All functions map tensors to tensors and NumPy arrays to arrays, of any number of
-vectors.
+have length 1.
 
 The world is flat and level, as AirSim's is: a drone that keeps its z keeps its altitude. North and
 east are measured along the meridian and the parallel of WGS84's ellipsoid, with the meridian's
-curvature taken at home. Both directions are exact inverses; within 1 km of home, positions are
-within 0.1 m of those of the plane that touches the ellipsoid there.
+curvature taken at home. Within 1 km of home, positions are within 0.1 m of those of the plane that
+touches the ellipsoid there.
 """
 
 import math
@@ -75,7 +74,7 @@ class GeoPoint(NamedTuple):
 
 
 HOME = GeoPoint(47.641468, -122.140165, 122.0)
-"""Where AirSim's worlds have their origin."""
+"""The origin of AirSim's environments."""
 
 
 def geo_from_world(position: Values, home: GeoPoint = HOME) -> Values:
@@ -83,39 +82,13 @@ def geo_from_world(position: Values, home: GeoPoint = HOME) -> Values:
 
     Positions are metres from home, world frame: north, west, up. Shapes: (*, 3), float64.
     """
-    meridian, _ = _radii(home.latitude)
+    library: Any = torch if isinstance(position, Tensor) else np
+    share = 1 - _ECCENTRICITY_2 * math.sin(math.radians(home.latitude)) ** 2
+    across = EQUATOR_RADIUS / math.sqrt(share)  # radii of curvature, metres
+    meridian = across * (1 - _ECCENTRICITY_2) / share
     north, west, up = position[..., 0], position[..., 1], position[..., 2]
     latitude = home.latitude + math.degrees(1.0) * north / (meridian + home.altitude)
-    parallel = _parallel(latitude, home)
+    parallel = library.cos(latitude * math.radians(1.0)) * (across + home.altitude)
     longitude = home.longitude - math.degrees(1.0) * west / parallel
-    return _stack(latitude, (longitude + 180.0) % 360.0 - 180.0, home.altitude + up)
-
-
-def world_from_geo(place: Values, home: GeoPoint = HOME) -> Values:
-    """Invert `geo_from_world`: return metres from home, world frame."""
-    meridian, _ = _radii(home.latitude)
-    latitude, longitude, altitude = place[..., 0], place[..., 1], place[..., 2]
-    north = math.radians(1.0) * (latitude - home.latitude) * (meridian + home.altitude)
-    east = (longitude - home.longitude + 180.0) % 360.0 - 180.0
-    west = -math.radians(1.0) * east * _parallel(latitude, home)
-    return _stack(north, west, altitude - home.altitude)
-
-
-def _radii(latitude: float) -> tuple[float, float]:
-    """Radii of curvature along the meridian and across it, metres."""
-    share = 1 - _ECCENTRICITY_2 * math.sin(math.radians(latitude)) ** 2
-    across = EQUATOR_RADIUS / math.sqrt(share)
-    return across * (1 - _ECCENTRICITY_2) / share, across
-
-
-def _parallel(latitude: Values, home: GeoPoint) -> Values:
-    """Radius of the circle around Earth's axis at a latitude, metres."""
-    _, across = _radii(home.latitude)
-    turn = latitude * math.radians(1.0)
-    if isinstance(turn, Tensor):
-        return turn.cos() * (across + home.altitude)
-    return np.cos(turn) * (across + home.altitude)
-
-
-def _stack(*axes: Any) -> Any:
-    return torch.stack(axes, -1) if isinstance(axes[0], Tensor) else np.stack(axes, -1)
+    longitude = (longitude + 180.0) % 360.0 - 180.0
+    return library.stack([latitude, longitude, home.altitude + up], -1)
