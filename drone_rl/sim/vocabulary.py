@@ -1,8 +1,13 @@
-"""Terms of reports: names of the goals, targets and actions of a task."""
+"""Terms of reports: names of the goals, targets and actions of a task.
+
+`vocabulary.toml` has the terms of the built-in tasks.
+"""
 
 import dataclasses
 import re
+import tomllib
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from drone_rl.utils.errors import InputError
@@ -19,7 +24,7 @@ class TaskVocabulary:
     """Terms of a task, as files hold them under "terms"."""
 
     goal: str = "goal"
-    """One of the things to reach: "cube"."""
+    """Something to reach: "cube"."""
     reach: str = "reach"
     """To do so: "collect"."""
     reached: str = "reached"
@@ -100,75 +105,10 @@ def _third(verb: str) -> str:
     return f"{verb}es" if verb.endswith(("s", "sh", "ch", "x")) else f"{verb}s"
 
 
-_ENDS = {
-    "side_boundary": "outside the field, left or right",
-    "step_limit": "at the step limit",
-    "lost_control": "with the drone out of control",
-}
-_SIDES = {"left": "on its left", "ahead": "ahead", "right": "on its right"}
-CUBES = TaskVocabulary(
-    goal="cube",
-    reach="collect",
-    reached="collected",
-    target="cube",
-    handle="collect the cube",
-    handled="collected",
-    unhandled="missed",
-    sides=_SIDES,
-    places=_SIDES,
-    classes={
-        "cube": "at the {value} cube",
-        "sideways": "with cubes {value} to its side",
-        "height": "with cubes {value}",
-        "height=lower": "with cubes lower than itself",
-        "height=level": "with cubes at its own height",
-        "height=higher": "with cubes higher than itself",
-    },
-    labels={
-        "cube": "number of the cube",
-        "side": "side",
-        "sideways": "distance to the side",
-        "height": "height",
-        "end": "how it ended",
-    },
-    ends={
-        "all_cubes": "with every cube collected",
-        "front_boundary": "behind the last cube",
-        **_ENDS,
-    },
-)
+_BUILT_IN = tomllib.loads(Path(__file__).with_name("vocabulary.toml").read_text(encoding="utf-8"))
+CUBES = TaskVocabulary(**_BUILT_IN["collect_cubes"])
 """Of cube collection, and of files without terms."""
-
-
-_SIDES_OF_ROWS = {
-    "left": "that call for a turn left",
-    "ahead": "that are open straight ahead",
-    "right": "that call for a turn right",
-}
-PILLARS = TaskVocabulary(
-    goal="row",
-    reach="pass",
-    reached="passed",
-    target="pillar",
-    handle="get past the pillar",
-    handled="flown around",
-    unhandled="touched, or never passed",
-    follows=False,
-    sides=_SIDES_OF_ROWS,
-    places={**_SIDES_OF_ROWS, "ahead": "that leave the way free"},
-    classes={"row": "at the {value} row", "gap": "at gaps of {value}"},
-    labels={
-        "row": "number of the row",
-        "side": "nearest way through",
-        "gap": "width of the gap",
-        "end": "how it ended",
-    },
-    ends={
-        "finish_line": "at the line",
-        "pillar_touched": "by touching a pillar",
-        **_ENDS,
-    },
-)
+PILLARS = TaskVocabulary(**_BUILT_IN["pillars"])
 
 
 def terms_of(evidence: Mapping[str, Any]) -> TaskVocabulary:
