@@ -2,7 +2,6 @@
 
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, FailureReplayTask
 from drone_rl.sim.tasks.pillars import Pillars
-from drone_rl.sim.tasks.registry import as_task, register_task
 from drone_rl.sim.tasks.task import (
     DrawnState,
     EndReason,
@@ -12,6 +11,8 @@ from drone_rl.sim.tasks.task import (
     Prop,
     State,
     Task,
+    as_task,
+    register_task,
 )
 
 __all__ = [

@@ -28,7 +28,7 @@ from drone_rl.sim.tasks.common import (
     place_in_view,
     side_of,
 )
-from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State
+from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State, register_task
 from drone_rl.sim.vocabulary import CUBES, some_cubes
 from drone_rl.utils.errors import InputError
 
@@ -300,6 +300,9 @@ class CollectCubes(PropTask[WorldState]):
         cubes = state.drone[:, None] + torch.cat([away, up], -1).to(state.drone)
         standing = torch.zeros_like(state.passed)
         return dataclasses.replace(state, cubes=cubes, passed=standing, collected=standing.clone())
+
+
+register_task(TaskSettings, CollectCubes)
 
 
 class FailureReplayTask(CollectCubes):

@@ -25,7 +25,7 @@ from drone_rl.sim.tasks.common import (
     side_of,
 )
 from drone_rl.sim.tasks.pillars_lanes import Lanes, meets, nearest_pillar
-from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State
+from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State, register_task
 from drone_rl.sim.vocabulary import PILLARS
 from drone_rl.utils.text import plural
 
@@ -335,3 +335,6 @@ class Pillars(PropTask[FieldState]):
         pillars = state.pillars.clone()
         pillars[..., :2] = state.drone[:, None, :2] + away
         return dataclasses.replace(state, pillars=pillars, present=torch.ones_like(state.present))
+
+
+register_task(PillarsSettings, Pillars)

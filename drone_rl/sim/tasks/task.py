@@ -1,4 +1,4 @@
-"""The base class of tasks: scene, reset, rules, goals and the changes that explanations make.
+"""The base class of tasks, and the tasks that settings and files name.
 
 A task holds no environment. Its methods are functions of batches of states: the first dimension of
 every tensor counts environments. World frame in metres: x forward, y left, z up.
@@ -15,13 +15,14 @@ import torch
 from dm_control import mjcf
 from torch import Tensor
 
-from drone_rl.config import CameraSettings
+from drone_rl.config import TASKS, BaseTaskSettings, CameraSettings, TaskSettings, settings_of
 from drone_rl.sim.actions import Actions, Entry
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, Obstacles
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
 
 
 @dataclasses.dataclass
@@ -99,14 +100,9 @@ class OracleRule(NamedTuple):
         return set(self.actions.names) <= set(actions.names)
 
     def decide(self, known: Sequence[Tensor], actions: Actions) -> Tensor:
-        """Return actions of a set that `can_fly` accepts, by name and at full speed.
+        """Return actions, (N,) and then the entry's, of a set that `can_fly` accepts.
 
-        Args:
-            known: What it reads. Each shape: (N, *).
-            actions: The action set to act in.
-
-        Returns:
-            Shape: (N,), then the entry's.
+        They are found by name and have full speed. `known`: what it reads, each of shape (N, *).
         """
         own = self.act(*known)
         if actions == self.actions:
@@ -188,9 +184,7 @@ class Task(abc.ABC, Generic[S]):
     def start(self, drawn: Tensor, body: BodyState) -> S:
         """Return states at the start of episodes.
 
-        Args:
-            drawn: From `draw`, stacked. Shape: (N, *).
-            body: The drones at `origin`.
+        `drawn` is from `draw`, stacked, shape (N, *); `body` are the drones at `origin`.
         """
         zero = torch.zeros(len(drawn), dtype=torch.int64, device=drawn.device)
         state: Any = DrawnState(body, zero, zero.clone(), drawn)
@@ -198,14 +192,9 @@ class Task(abc.ABC, Generic[S]):
 
     @abc.abstractmethod
     def judge(self, state: S, body: BodyState) -> tuple[S, Tensor]:
-        """Apply the rules after a step.
+        """Return the state after a step, and the reward: float64, shape (N,).
 
-        Args:
-            state: Before the step; stays as it is.
-            body: The drones after the step.
-
-        Returns:
-            The state after the step, and the reward: float64, shape (N,).
+        `state` is that before the step and stays as it is; `body` are the drones after it.
         """
 
     def fused_rules(self, dynamics: Dynamics, num_envs: int) -> Any:
@@ -309,9 +298,47 @@ class Task(abc.ABC, Generic[S]):
         self._lacks("elsewhere")
 
     def _is_next(self, state: S) -> Tensor:
-        """Return which prop is the next target. Shape: (N, P), bool."""
         target = self.next_target(state)[:, None]
         return torch.arange(self.places(state).shape[1], device=target.device) == target
 
     def _lacks(self, method: str) -> NoReturn:
         raise InputError(f"task={self.name} cannot be explained; define {method} in its class")
+
+
+MAKERS: dict[type[BaseTaskSettings], Callable[[Any], Task[Any]]] = {}
+"""What makes a task, by the class of its settings."""
+
+
+def register_task(settings: type[BaseTaskSettings], make: Callable[[Any], Task[Any]]) -> None:
+    """Register a task by the class of its settings and a function that takes such settings.
+
+    Raises:
+        InputError: Another task has its name.
+    """
+    if TASKS.get(settings.name, settings) is not settings:
+        raise InputError(f"there is a task called {settings.name}; give another name")
+    TASKS[settings.name], MAKERS[settings] = settings, make
+
+
+def as_task(task: BaseTaskSettings | Task[Any] | str | None) -> Task[Any]:
+    """Return the task of settings or of a name such as "pillars"; cube collection by default.
+
+    Raises:
+        InputError: The task is unknown.
+    """
+    task = TaskSettings() if task is None else task
+    if isinstance(task, str):
+        task = settings_of(task, "task")()
+    if isinstance(task, Task):
+        return task
+    if not isinstance(task, BaseTaskSettings):
+        raise InputError(
+            f"task={shown(task)} is no task; give one of {', '.join(TASKS)}, settings such as "
+            "drone_rl.TaskSettings(num_cubes=2), or a task of your own"
+        )
+    if type(task) not in MAKERS:
+        raise InputError(
+            f"{type(task).__name__} is the settings of no task; call drone_rl.sim.tasks."
+            "register_task with what makes it"
+        )
+    return MAKERS[type(task)](task)

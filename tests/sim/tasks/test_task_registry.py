@@ -4,7 +4,7 @@ import pytest
 
 from drone_rl.config import TASKS, BaseTaskSettings, PillarsSettings, TaskSettings, read_task
 from drone_rl.sim.tasks import CollectCubes, Pillars
-from drone_rl.sim.tasks.registry import MAKERS, as_task, register_task
+from drone_rl.sim.tasks.task import MAKERS, as_task, register_task
 from drone_rl.utils.errors import InputError
 from tests.second_task import Posts
 
