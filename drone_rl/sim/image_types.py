@@ -39,36 +39,13 @@ def palette() -> Tensor:
     return colors
 
 
-def object_names(scene: Scene) -> list[str]:
-    """Return the object that each geom belongs to: "ground", "target_0", "obstacle_2"."""
-    pairs = zip(scene.semantic_classes, scene.props, strict=True)
-    return [of.name.lower() + (f"_{prop}" if prop >= 0 else "") for of, prop in pairs]
+def segmentation_ids(scene: Scene) -> Tensor:
+    """Return AirSim's ids of the geoms of a scene. Shape: (num_geoms,), int64.
 
-
-def default_id(name: str) -> int:
-    """Return AirSim's id of an object by its name; digits do not count."""
-    return (5 + sum(ord(letter) for letter in name.lower() if letter >= "a")) % NUM_IDS
-
-
-def default_ids(scene: Scene) -> Tensor:
-    """Return AirSim's ids of the geoms of a scene. Shape: (num_geoms,), int64."""
-    return torch.tensor([default_id(name) for name in object_names(scene)])
-
-
-def check_ids(ids: Tensor, num_geoms: int) -> Tensor:
-    """Check segmentation ids of geoms. Shape: (num_geoms,).
-
-    Raises:
-        InputError: There are more or fewer, or one is not a whole number from 0 to 255.
+    An id follows from the letters of an object's name: "ground", "target_0", "obstacle_2".
     """
-    if ids.shape != (num_geoms,):
-        raise InputError(
-            f"ids of shape {tuple(ids.shape)} don't fit {num_geoms} geoms; give one for each"
-        )
-    for number in ids.tolist():
-        if number not in range(NUM_IDS):
-            raise InputError(f"id {number} is out of range; give whole numbers from 0 to 255")
-    return ids.long()
+    names = [semantic_class.name.lower() for semantic_class in scene.semantic_classes]
+    return torch.tensor([(5 + sum(map(ord, name))) % NUM_IDS for name in names])
 
 
 FARTHEST = 65504.0
@@ -133,44 +110,32 @@ class ImageRequest:
 
 def images(
     worlds: Worlds,
-    state: State | None,
+    state: State,
     requests: Sequence[ImageRequest],
     *,
     height: int | None = None,
     width: int | None = None,
-    ids: Tensor | None = None,
 ) -> list[Tensor]:
-    """Render several images of each environment, of one size, in one pass.
+    """Render several images of environments in a state, of one size, in one pass.
 
-    Args:
-        worlds: Batch of environments to render.
-        state: Their state; the current one by default.
-        requests: Camera and type of each image.
-        height: Pixels, as `width`; by default that of the policy's camera.
-        width: See `height`. Cameras keep their vertical field of view.
-        ids: Segmentation ids of the geoms, 0 to 255; AirSim's by default. Shape: (num_geoms,).
-
-    Returns:
-        One for each request; see `pixels` for types and shapes.
+    The default size, in pixels, is that of the policy's camera; cameras keep their vertical field
+    of view. Returns one tensor for each request; see `pixels` for types and shapes.
 
     Raises:
-        InputError: There are no requests, a size or an id is out of range, or the renderer does not
-            support a type.
+        InputError: There are no requests, a size is out of range, or the renderer does not support
+            a type.
     """
     cameras = list(dict.fromkeys(str(request.camera) for request in requests))
     kinds = [ImageType(request.image_type) for request in requests]
     wanted: list[Modality] = list(dict.fromkeys(kind.modality for kind in kinds))
-    view = worlds.view(cameras, wanted, height, width)
-    scene = worlds.scene
-    known = default_ids(scene) if ids is None else check_ids(ids, scene.model.ngeom)
-    rendered = worlds.render_all(worlds.state if state is None else state, view)
-    found = []
+    view, scene = worlds.view(cameras, wanted, height, width), worlds.scene
+    ids, rendered, found = segmentation_ids(scene), worlds.render_all(state, view), []
     for request, kind in zip(requests, kinds, strict=True):
         number = cameras.index(str(request.camera))
         fov = float(scene.model.cam_fovy[scene.camera(view.cameras[number])])
         focal = view.height / 2 / math.tan(math.radians(fov) / 2)
         values = rendered[kind.modality][:, number]
-        found.append(pixels(kind, values, as_float=request.as_float, focal=focal, ids=known))
+        found.append(pixels(kind, values, as_float=request.as_float, focal=focal, ids=ids))
     return found
 
 
@@ -183,8 +148,6 @@ def pixels(
     ids: Tensor | None = None,
 ) -> Tensor:
     """Convert a rendered image to an image type.
-
-    Disparity is (Xl - Xr) / width: `focal * BASELINE / depth / width`.
 
     Args:
         image_type: The type.
