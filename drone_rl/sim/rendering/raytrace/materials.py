@@ -25,7 +25,10 @@ _Encoded: TypeAlias = "tuple[structs.Materials, structs.Effects | None]"
 
 
 class MaterialsEncoder:
-    """Encodes a scene's own colours and lights, and appearances that differ from them."""
+    """Encodes a scene's own colours and lights, and appearances that differ from them.
+
+    The last appearance is cached by identity; each set of textures is read once.
+    """
 
     def __init__(self, scene: Scene, device: str) -> None:
         model = scene.model
@@ -39,13 +42,11 @@ class MaterialsEncoder:
         }
         self._plain = {name: torch.tensor(v)[None].double() for name, v in stored.items()}
         self._own = self._materials(self._plain)
-        self._effects = EffectsEncoder(scene, device)
+        self._textures: dict[tuple[str, ...], dict[str, Any]] = {}
         self._last: tuple[Appearance | None, int, _Encoded] = (None, 1, (self._own, None))
 
     def encode(self, appearance: Appearance | None, num_worlds: int) -> _Encoded:
         """Return materials, and effects if the appearance has any.
-
-        The last appearance and its number of environments are cached by identity.
 
         Raises:
             InputError: A texture can't be read.
@@ -79,7 +80,7 @@ class MaterialsEncoder:
                 values[name] *= exposure[:, None, None]
             values["sky"] = (values["sky"] * exposure[:, None]).clamp(max=1.0)
             zenith = (zenith * exposure[:, None]).clamp(max=1.0)
-        effects = None if appearance.is_plain else self._effects.encode(appearance, zenith)
+        effects = None if appearance.is_plain else self.encode_effects(appearance, zenith)
         return self._materials(values), effects
 
     def _materials(self, values: dict[str, Tensor]) -> structs.Materials:
@@ -89,20 +90,8 @@ class MaterialsEncoder:
             setattr(materials, name, wp.from_torch(array, dtype=wp.vec3))
         return materials
 
-
-class EffectsEncoder:
-    """Encodes effects; each set of textures is read once."""
-
-    def __init__(self, scene: Scene, device: str) -> None:
-        self._scene, self._device = scene, device
-        self._textures: dict[tuple[str, ...], dict[str, Any]] = {}
-
-    def encode(self, appearance: Appearance, zenith: Tensor) -> structs.Effects:
-        """Return the effects; `zenith` holds colours in [0, 1], shape (num_worlds, 3).
-
-        Raises:
-            InputError: A texture can't be read.
-        """
+    def encode_effects(self, appearance: Appearance, zenith: Tensor) -> structs.Effects:
+        """Return the effects; `zenith` holds colours in [0, 1], shape (num_worlds, 3)."""
         count = len(zenith)
         names = tuple({n: 0 for t in appearance.textures.values() for n in t.images})
         texture = torch.full((count, self._scene.model.ngeom), -1, dtype=torch.int32)

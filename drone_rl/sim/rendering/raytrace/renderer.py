@@ -1,8 +1,7 @@
 """The renderer `raytrace`: a ray tracer of simple solids under distant lights, on CPU and GPU.
 
-It renders the same images as `mujoco_warp`, about twenty times as fast, without OpenGL. Kernels by
-device and appearance: `plain_kernel` (CPU, flat colours), `effects_kernel` (CPU, with fog,
-shadows, textures or a sky gradient) and `gpu_kernel` (both, on a GPU).
+Kernels by device and appearance: `plain_kernel` (CPU, flat colours), `effects_kernel` (CPU, with
+fog, shadows, textures or a sky gradient) and `gpu_kernel` (both, on a GPU).
 """
 
 from collections.abc import Mapping
@@ -38,15 +37,6 @@ _VECTORS = MappingProxyType({"rgb": wp.vec3ub, "normals": wp.vec3})
 """Warp types of modalities with several numbers per pixel."""
 
 
-class KernelInputs(NamedTuple):
-    """Arguments of `plain_kernel.render_image` for one view on a CPU."""
-
-    view: structs.View
-    geoms: structs.Geoms
-    materials: structs.Materials
-    scratch: structs.Scratch
-
-
 class Launch(NamedTuple):
     """Arguments of a launch."""
 
@@ -62,8 +52,8 @@ class Launch(NamedTuple):
 
     def inputs(self, scratch: structs.Scratch) -> list[Any]:
         """Return the structs that kernels take last, in their order."""
-        effects = [] if self.effects is None else [self.effects]
-        return [self.poses, self.materials, scratch, self.images, *effects]
+        inputs = [self.poses, self.materials, scratch, self.images]
+        return inputs if self.effects is None else [*inputs, self.effects]
 
 
 class Raytracer:
@@ -115,7 +105,9 @@ class Raytracer:
             self._launcher.launch(launch)
         return images
 
-    def kernel_inputs(self, view: View, num_workers: int) -> KernelInputs:
+    def kernel_inputs(
+        self, view: View, num_workers: int
+    ) -> tuple[structs.View, structs.Geoms, structs.Materials, structs.Scratch]:
         """Return the arguments with which another kernel calls `plain_kernel.render_image`.
 
         The appearance is the model's own; `num_workers` images are rendered at the same time.
@@ -125,7 +117,7 @@ class Raytracer:
         """
         encoded, geoms = self._encode(view)
         scratch = make_scratch(num_workers, view.height * view.width, len(geoms.kind))
-        return KernelInputs(encoded, geoms, self._materials.encode(None, 1)[0], scratch)
+        return encoded, geoms, self._materials.encode(None, 1)[0], scratch
 
     def close(self) -> None:
         """Stop the threads."""

@@ -120,11 +120,7 @@ def make_view(scene: Scene, frames: Frames, view: View, device: str) -> structs.
 
 
 def make_camera(scene: Scene, frames: Frames, name: str, aspect: float) -> structs.Camera:
-    """Return a camera for the kernels; `aspect` is the width of its image over the height.
-
-    Raises:
-        InputError: The model has no such camera, or it is not supported.
-    """
+    """Return a camera for the kernels; `aspect` is the width of its image over the height."""
     model = scene.model
     number = scene.camera(name)
     camera = model.camera(number)

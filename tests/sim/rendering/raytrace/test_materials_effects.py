@@ -9,12 +9,12 @@ import torch
 
 from drone_rl.sim.rendering import Appearance, Scene, Texture
 from drone_rl.sim.rendering.devices import start_warp
-from drone_rl.sim.rendering.raytrace.materials import EffectsEncoder
+from drone_rl.sim.rendering.raytrace.materials import MaterialsEncoder
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.textures import load
 
-XML = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><geom size="1"/><geom size="2"/>
-</worldbody></mujoco>"""
+XML = """<mujoco><worldbody><light/><geom type="plane" size="1 1 1"/><geom size="1"/>
+<geom size="2"/></worldbody></mujoco>"""
 MEANINGS = (SemanticClass.GROUND, SemanticClass.TARGET, SemanticClass.OBSTACLE)
 ZENITH = torch.tensor([[0.2, 0.5, 1.0], [0.0, 0.0, 0.0]])
 
@@ -23,7 +23,7 @@ ZENITH = torch.tensor([[0.2, 0.5, 1.0], [0.0, 0.0, 0.0]])
 def sceneries():
     start_warp("cpu")
     scene = Scene(mujoco.MjModel.from_xml_string(XML), MEANINGS, (-1, 0, 1), (0.0, 0.0, 0.0))
-    return EffectsEncoder(scene, "cpu")
+    return MaterialsEncoder(scene, "cpu")
 
 
 def test_effects_default_to_none(sceneries):
