@@ -1,8 +1,7 @@
-"""Sets of actions: names, mirror images, and distances between distributions of actions.
+"""Sets of actions, and distances between wishes.
 
-A network's outputs become a *wish*: the shares of named *parts*, which add up to 1. The parts of
-discrete actions are the actions, those of continuous ones are kinds of actions, such as "left"; the
-share is the probability of the part.
+A *wish* is a network's output as shares of named *parts*, which add up to 1. Parts are the discrete
+actions, or kinds of continuous actions, such as "left"; a share is the probability of a part.
 """
 
 import abc
@@ -35,10 +34,8 @@ class Entry(NamedTuple):
 class Actions(abc.ABC):
     """A set of actions and the numbered parts of a wish, which is a tensor or a NumPy array.
 
-    An *action* is what dynamics take, shaped as `entry` says; a *part* is a number, int64.
-
-    Raises:
-        ValueError: A mirror image or opposite is not among the parts, or not mutual.
+    An *action* is what dynamics take, shaped as `entry` says; a *part* is a number, int64. Raises a
+    `ValueError` if a mirror image or opposite is not among the parts, or not mutual.
     """
 
     names: tuple[str, ...]

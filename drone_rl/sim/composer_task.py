@@ -39,10 +39,9 @@ CONTROL_TIMESTEP_S = 0.1
 
 
 class ComposerTask(composer.Task):
-    """A field with the drone and a task's props.
+    """A field with the drone and a task's props. The discount is 0 at termination, 1 at truncation.
 
-    Dynamics move the drone without MuJoCo's gravity and contacts, except a quadrotor, which MuJoCo
-    integrates, see `MujocoFlight`. The discount is 0 at termination and 1 at truncation.
+    Dynamics move the drone without MuJoCo's physics, except a quadrotor: see `MujocoFlight`.
     """
 
     def __init__(
@@ -56,10 +55,10 @@ class ComposerTask(composer.Task):
         distractors: int = 0,
         appearance: AppearanceSettings | None = None,
     ) -> None:
-        """Assemble the scene.
+        """Assemble the scene; the task is cube collection by default.
 
         Args:
-            task: A task or its settings; cube collection by default.
+            task: A task or its settings.
             camera: The policy's camera.
             dynamics: Vehicle dynamics; the task's default if None.
             actions: Action space, if `dynamics` are settings; the moves by default.
@@ -68,8 +67,8 @@ class ComposerTask(composer.Task):
             appearance: Visual appearance, see `OpenGlAppearance`; the task's by default.
 
         Raises:
-            InputError: A texture can't be read, there is no room for camera or distractors, or the
-                dynamics have their own actions.
+            InputError: A texture can't be read, camera or distractors do not fit, or dynamics with
+                actions of their own are given other ones.
         """
         self.rules = as_task(task)
         self.dynamics = make_dynamics(self.rules.make_dynamics, dynamics, actions)

@@ -154,11 +154,10 @@ class ContinuousActions(Actions):
 
 
 def normal_of(outputs: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the normal distributions of a network's outputs, before squashing.
+    """Return means and deviations before squashing, each (*, n), of a network's outputs, (*, 2 n).
 
-    Both are bounded smoothly, so that float32 can distinguish the actions of any policy. Outputs
-    are n for means, then n for deviations, shape (*, 2 n). Means are from -3 to 3, deviations from
-    0.05 to 1. Shapes: (*, n).
+    Both are bounded smoothly, so that float32 can distinguish the actions of any policy: means from
+    -3 to 3, deviations from 0.05 to 1.
     """
     mean, log = outputs.chunk(2, -1)
     share = (log + _SHIFT).sigmoid()

@@ -1,14 +1,8 @@
 """Conversions of coordinates: NED, ENU and FRD frames, latitude and longitude.
 
-Our frames are x forward, y left, z up, for the world and for bodies; the world's forward is north.
-NED is north, east, down, with bodies forward, right, down (FRD), as in AirSim and PX4. ENU is east,
-north, up, as in ROS. Quaternions are (w, x, y, z), rotate the body's frame into the world's, and
-have length 1.
-
-The world is flat and level, as AirSim's is: a drone that keeps its z keeps its altitude. North and
-east are measured along the meridian and the parallel of WGS84's ellipsoid, with the meridian's
-curvature taken at home. Within 1 km of home, positions are within 0.1 m of those of the plane that
-touches the ellipsoid there.
+Our frames are x forward (north), y left, z up, for the world and for bodies. NED is north, east,
+down, with bodies forward, right, down (FRD), as in AirSim and PX4. ENU is east, north, up, as in
+ROS. Unit quaternions (w, x, y, z) rotate the body's frame into the world's.
 """
 
 import math
@@ -78,9 +72,11 @@ HOME = GeoPoint(47.641468, -122.140165, 122.0)
 
 
 def geo_from_world(position: Values, home: GeoPoint = HOME) -> Values:
-    """Return latitude and longitude in degrees, altitude in metres.
+    """Return latitude and longitude in degrees, altitude in metres. Shapes: (*, 3), float64.
 
-    Positions are metres from home, world frame: north, west, up. Shapes: (*, 3), float64.
+    Positions are metres from home: north, west, up. The world is flat and level, as AirSim's is;
+    north and east are measured along the meridian and the parallel of WGS84's ellipsoid. Within 1
+    km of home, positions are within 0.1 m of those of the tangent plane.
     """
     library: Any = torch if isinstance(position, Tensor) else np
     share = 1 - _ECCENTRICITY_2 * math.sin(math.radians(home.latitude)) ** 2

@@ -1,7 +1,6 @@
 """Entities of a scene, for dm_control: arena, cube, pillar, distractors, drone and cameras.
 
-Each has a semantic class. Only the drone moves by physics; the others are visual, because touching
-them is a rule of the task and not a contact.
+Only the drone moves by physics; the others are visual, because touching them is a rule of the task.
 """
 
 from typing import Any, NamedTuple
@@ -53,8 +52,7 @@ CHASE = CameraSpec("chase", (-7.0, 0, 3.5), (0, -1, 0, 0.34, 0, 0.94))
 def find_camera(name: str | int) -> CameraSpec:
     """Return a camera by AirSim's name or number; "" and "fpv" mean the front camera.
 
-    Raises:
-        InputError: There is no such camera.
+    Raises an `InputError` if there is no such camera.
     """
     if name in ("", "fpv"):
         return FRONT_CENTER

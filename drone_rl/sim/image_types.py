@@ -87,11 +87,7 @@ _MODALITIES: tuple[Modality, ...] = ("rgb", *_DISTANCES, "segmentation", "normal
 
 @dataclasses.dataclass(frozen=True)
 class ImageRequest:
-    """One image.
-
-    Raises:
-        InputError: The camera or type is unknown.
-    """
+    """One image. Raises an `InputError` if the camera or type is unknown."""
 
     camera: str | int = "front_center"
     """AirSim's name or number."""

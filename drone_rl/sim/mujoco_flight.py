@@ -47,11 +47,7 @@ class MujocoFlight:
     ) -> None:
         """Give a model mass, gravity and contacts, before it is compiled.
 
-        Args:
-            quadrotor: The drone's dynamics.
-            arena: With its floor. (dm_control's arenas are untyped.)
-            drone: Already attached to it.
-            obstacles: In the order of `Obstacles`.
+        The drone is attached to the arena; obstacles are in the order of `Obstacles`.
         """
         self.quadrotor, self.drone = quadrotor, drone
         self._settings = settings = quadrotor.settings

@@ -55,8 +55,7 @@ def stand(
 ) -> Tensor:
     """Return positions next to the path, metres, world frame. Shape: (*, 3), float64.
 
-    `ahead` and `height` are coordinates, `aside` is the distance from the region of the task's
-    props; all are in metres, shape (*).
+    `ahead` and `height` are coordinates, `aside` the distance from the region of the task's props.
     """
     side = (things.bound + aside) * (2.0 * is_left.double() - 1.0)
     return torch.stack([ahead, side, torch.as_tensor(height).expand(ahead.shape)], -1)
@@ -67,8 +66,7 @@ def draw_distractors(
 ) -> list[float]:
     """Sample `WIDTH` numbers of each distractor, alternately left and right on the ground.
 
-    `things` is where the task's props stand. Without a random stream, the middles of all ranges
-    are returned.
+    Without a random stream, return the middles of all ranges.
     """
     most = most_distractors(settings)
     if not most or things is None:
@@ -128,12 +126,8 @@ class Appearances:
     ) -> None:
         """Read all textures; environments start in the middle of all ranges.
 
-        The device is the renderer's, the camera the policy's, the task by default that of the
-        original study.
-
-        Raises:
-            InputError: A texture can't be read or is too large, or the camera or distractors do not
-                fit into the scene.
+        The device is the renderer's, the camera the policy's. Raises an `InputError` if a texture
+        can't be read or is too large, or the camera or distractors do not fit into the scene.
         """
         task, self._camera = as_task(task), camera or CameraSettings()
         self._things = things_of(task)

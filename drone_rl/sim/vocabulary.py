@@ -114,8 +114,7 @@ PILLARS = TaskVocabulary(**_BUILT_IN["pillars"])
 def terms_of(evidence: Mapping[str, Any]) -> TaskVocabulary:
     """Return the terms of `verdict.json`, `explanation.json` or a card's evidence.
 
-    Raises:
-        InputError: They are invalid.
+    Raises an `InputError` if they are invalid.
     """
     if "terms" not in evidence:
         return CUBES
@@ -185,8 +184,7 @@ in Figs. 7 and 8."""
 def shown_actions(numbers: Mapping[str, Any]) -> ShownActions:
     """Return the actions of `explanation.json`.
 
-    Raises:
-        InputError: They are inconsistent or out of bounds.
+    Raises an `InputError` if they are inconsistent or out of bounds.
     """
     if "actions" not in numbers:
         return SHOWN_MOVES

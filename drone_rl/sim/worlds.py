@@ -48,10 +48,9 @@ class Worlds:
         appearance: Appearance | None = None,
         distractors: int = 0,
     ) -> None:
-        """Create the environments; the model is compiled when something is rendered.
+        """Create the environments; arguments and errors are as of `drone_rl.envs.DroneEnv`.
 
-        Arguments and errors are as of `drone_rl.envs.DroneEnv`. The default appearance is the
-        task's; appearances position the distractors.
+        The default appearance is the task's; appearances position the distractors.
         """
         self.appearance, self.distractors = appearance, distractors
         self._looked: tuple[Appearance, Appearance | None, Appearance] | None = None
@@ -151,18 +150,11 @@ class Worlds:
     def render(
         self, state: State, view: View | None = None, appearance: Appearance | None = None
     ) -> Tensor:
-        """Render states with one camera.
+        """Render states, of any number of environments, with one camera and one modality.
 
-        Args:
-            state: Of any number of environments.
-            view: Of one camera and one modality; the policy's by default.
-            appearance: Differences from the environments' default appearance.
-
-        Returns:
-            See `Renderer.render`, without the dimension of cameras.
-
-        Raises:
-            InputError: The view is of several cameras or modalities.
+        The view is the policy's by default; `appearance` has differences from the environments'
+        own. Returns images as `Renderer.render`, without the dimension of cameras. Raises an
+        `InputError` if the view is of several cameras or modalities.
         """
         view = view or self.policy_view
         if len(view.cameras) * len(view.modalities) > 1:

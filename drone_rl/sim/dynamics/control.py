@@ -51,8 +51,7 @@ Modes = tuple[Mode, Mode, Mode, Mode]
 class Goals:
     """Goals of the controllers of `num_worlds` drones, all in the same modes.
 
-    Raises:
-        InputError: An axis has no such mode, or two that go together differ.
+    Raises an `InputError` if an axis has no such mode, or two that go together differ.
     """
 
     modes: Modes
@@ -89,14 +88,9 @@ class Goals:
         return torch.zeros_like(self.values) if self.drift is None else self.drift
 
     def reference_after(self, seconds: float, body: FlightState) -> Tensor:
-        """Return the reference of drones after a command: their pose on axes without a target.
+        """Return the references, see `FlightState`, of drones after a command of some seconds.
 
-        Args:
-            seconds: Duration of the command.
-            body: Its result.
-
-        Returns:
-            See `FlightState.reference`. Shape: (num_worlds, 4).
+        `body` is the command's result: its pose is the reference on axes without a target.
         """
         has_target = [mode is Mode.POSITION for mode in self.modes]
         has_target[HEADING] = self.modes[HEADING] is Mode.ANGLE

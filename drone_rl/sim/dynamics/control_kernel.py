@@ -1,8 +1,7 @@
 """SimpleFlight's controllers in a cascade: position, velocity, attitude, rates, rotors.
 
-Each is a function of an error (target minus state) and of gains. Its output is a fraction of a
-limit, clipped to -1 and 1. Body frame: x forward, y left, z up; roll to the right, pitch down and
-yaw to the left are positive. SI units, radians.
+Each maps an error (target minus state) to a fraction, -1 to 1, of a limit. Body frame: x forward, y
+left, z up; roll to the right, pitch down and yaw to the left are positive. SI units, radians.
 """
 
 import warp as wp
@@ -82,12 +81,8 @@ def rate_control(frame: Airframe, missing: wp.vec3) -> wp.vec3:
 def mix(throttle: float, torque: wp.vec3) -> wp.vec4:
     """Return each rotor's fraction of full thrust; torques take precedence over thrust.
 
-    Args:
-        throttle: Fraction of all thrust, 0 to 1.
-        torque: From `rate_control`.
-
-    Returns:
-        Front right, rear left, front left, rear right.
+    `throttle` is a fraction of all thrust, 0 to 1; `torque` is from `rate_control`. Rotors: front
+    right, rear left, front left, rear right.
     """
     front_right = throttle - torque[0] - torque[1] - torque[2]
     rear_left = throttle + torque[0] + torque[1] - torque[2]

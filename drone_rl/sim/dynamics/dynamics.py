@@ -31,9 +31,8 @@ class Dynamics(Protocol):
     def start(self, position: Tensor, seeds: Tensor | None = None) -> BodyState:
         """Return drones at the start of an episode; by default they are level and at rest.
 
-        Args:
-            position: Metres, world frame. Shape: (num_worlds, 3), float64.
-            seeds: Of the randomness of each episode; the mean without. Shape: (num_worlds,), int64.
+        Positions are metres, world frame, shape (num_worlds, 3), float64. Seeds, (num_worlds,),
+        int64, are those of each episode's randomness; without them it has its mean.
         """
         del seeds
         return BodyState.at_rest(position)
@@ -44,7 +43,7 @@ class Dynamics(Protocol):
         """Return the drones a control step later.
 
         Args:
-            body: Before; stays as it is.
+            body: The drones before.
             action: One of `actions` for each. Shape: (num_worlds,), then that of `actions.entry`.
             obstacles: Of each environment, if `needs_obstacles` and there are any.
         """
@@ -107,15 +106,10 @@ def make_dynamics(
     dynamics: DynamicsSettings | Dynamics | None = None,
     actions: ActionSettings | None = None,
 ) -> Dynamics:
-    """Return the dynamics of settings.
+    """Return dynamics, or those of settings: computer-vision mode and moves by default.
 
-    Args:
-        default: Makes those of moves in computer-vision mode, such as `Task.make_dynamics`.
-        dynamics: Settings, computer-vision mode by default; or dynamics, which are returned.
-        actions: Moves by default.
-
-    Raises:
-        InputError: Both dynamics and settings of actions are given.
+    `default` makes those of moves in computer-vision mode, such as `Task.make_dynamics`. Raises an
+    `InputError` if both dynamics and settings of actions are given.
     """
     if dynamics is not None and not isinstance(dynamics, DynamicsSettings):
         if actions is not None:

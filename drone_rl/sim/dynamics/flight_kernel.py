@@ -1,8 +1,7 @@
 """All ticks of a command: controllers, rotors, air, motion and contacts, drone by drone.
 
-On a CPU a launch goes through its drones in turn, on a GPU each has a thread. Numbers have single
-precision within a command and double precision between commands. Positions count from where the
-command began, so that an hour loses no more precision than a command.
+Numbers have single precision within a command and double precision between commands. Positions
+count from where the command began, so that an hour loses no more precision than a command.
 """
 
 import warp as wp

@@ -66,11 +66,11 @@ def forces(
         frame: The drones.
         body: At the beginning of the tick, on the CPU.
         goals: Since the command began.
-        tick: Number of this tick within the command, by which goals have drifted.
+        tick: Number of this tick within the command.
 
     Returns:
-        The drones with rotors, air and controllers a tick later, but neither moved nor touched; and
-        force without weight and torque, world frame. Shape: (num_worlds, 6), float64.
+        The drones with rotors, air and controllers a tick later, neither moved nor touched; and
+        force without weight and torque, world frame, shape (num_worlds, 6), float64.
     """
     start_warp("cpu")
     after = FlightState(torch.empty_like(body.numbers))

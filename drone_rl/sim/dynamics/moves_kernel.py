@@ -1,7 +1,4 @@
-"""The chapter's moves by a quadrotor, for kernels that run whole episodes.
-
-The results equal those of `Quadrotor.step` bit for bit.
-"""
+"""The chapter's moves by a quadrotor for fused kernels, bit for bit those of `Quadrotor.step`."""
 
 import torch
 import warp as wp

@@ -55,13 +55,10 @@ class Quadrotor:
     def fly(
         self, body: FlightState, goals: Goals, ticks: int, obstacles: Obstacles | None = None
     ) -> FlightState:
-        """Return the drones after ticks under their controllers; `body` stays as it is.
+        """Return the drones after some ticks under their controllers; `body` stays as it is.
 
-        Args:
-            body: Before.
-            goals: Of the controllers, during all ticks.
-            ticks: How many, each of `DynamicsSettings.tick` seconds.
-            obstacles: What they can collide with besides the ground.
+        A tick lasts `DynamicsSettings.tick` seconds. `obstacles` are what the drones can collide
+        with besides the ground.
         """
         device, count = body.numbers.device, len(body)
         _load_kernels(str(device))

@@ -1,11 +1,9 @@
 """A rigid body with rotors in moving air: forces, gusts, contacts, and a tick of motion.
 
-World frame: x forward, y left, z up; body frame the same where the drone is level and looks
-forward. SI units. A tick is MuJoCo's own (semi-implicit Euler): velocities first, by the forces of
-where the body is; then its pose, by the new velocities. Gusts have Dryden's longitudinal spectrum
+SI units; world and body frame x forward, y left, z up. A tick is MuJoCo's semi-implicit Euler:
+velocities first, then the pose by the new velocities. Gusts have Dryden's longitudinal spectrum
 along each axis: white noise through a filter of first order whose time constant is the length scale
-over the airspeed (MIL-F-8785C); the vertical and lateral spectra of second order are taken to be of
-first order too. In contacts the drone is a ball, ground and obstacles are planes and boxes.
+over the airspeed (MIL-F-8785C). In contacts the drone is a ball, obstacles are boxes.
 """
 
 import math
@@ -151,10 +149,7 @@ def drag_of(frame: Airframe, axes: Axes, velocity: wp.vec3) -> wp.vec3:
 
 @wp.func
 def advanced(frame: Airframe, motion: Motion, force: wp.vec3, torque: wp.vec3) -> Motion:
-    """Return the motion a tick later.
-
-    `force` is all but weight, newtons, world frame; `torque` newton metres, body frame.
-    """
+    """Return the motion after a tick of force without weight (N, world) and torque (N m, body)."""
     tick = frame.tick
     rates = motion.rates
     spin = wp.cw_mul(frame.inertia, rates)
@@ -202,9 +197,8 @@ def gust_after(
 ) -> wp.vec3:
     """Return the air's velocity minus its mean a tick later; metres a second, world frame.
 
-    `airspeed` is the drone's through air without gusts. With them, gusts against the wind would
-    last longer than others, and the mean would be below the wind. Each `tick` of the episode has
-    its own randomness.
+    `airspeed` is the drone's through air without gusts: otherwise gusts against the wind would last
+    longer than others, and bias the mean. Each `tick` of the episode has its own randomness.
     """
     decay = wp.exp(-frame.tick * wp.max(airspeed, SLOWEST) / frame.gust_length)
     strength = _SPREAD * frame.gusts * wp.sqrt(1.0 - decay * decay)

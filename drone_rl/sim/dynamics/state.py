@@ -13,13 +13,9 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 
 def heading_only(attitude: Tensor) -> Tensor:
-    """Remove the tilt of attitudes: return the nearest rotations about the world's z axis.
+    """Return the nearest rotations about the world's z axis: attitudes without tilt.
 
-    Args:
-        attitude: Unit quaternions (w, x, y, z). Shape: (*, 4).
-
-    Returns:
-        The same shape; level and looking forward for a drone upside down, which has no heading.
+    Unit quaternions (w, x, y, z), (*, 4). A drone upside down has no heading and faces forward.
     """
     w, z = attitude[..., 0], attitude[..., 3]
     length = (w * w + z * z).sqrt()

@@ -20,11 +20,7 @@ _LOADING = threading.Lock()
 
 
 def check_device(device: str) -> None:
-    """Check that this machine has a device.
-
-    Raises:
-        InputError: It is neither "cpu" nor an available CUDA device.
-    """
+    """Raise an `InputError` unless a device is "cpu" or an available CUDA device."""
     kind = device.split(":")[0]
     if kind not in ("cpu", "cuda"):
         raise InputError(f"device={device} is unknown; give cpu, cuda or cuda:N")
@@ -36,8 +32,7 @@ def check_device(device: str) -> None:
 def start_warp(device: str) -> None:
     """Initialize Warp once; on a CPU, without its warnings about missing CUDA.
 
-    Raises:
-        InputError: This machine has no such device.
+    Raises an `InputError` if this machine has no such device.
     """
     check_device(device)
     quiet = wp.LOG_ERROR if device == "cpu" else wp.LOG_WARNING
@@ -49,8 +44,8 @@ def start_warp(device: str) -> None:
 def load_kernels(kernels: ModuleType | wp.Module) -> Future[None]:
     """Compile a module's CPU kernels, or load them from Warp's cache, in a thread.
 
-    Compiling a module takes seconds, but several modules compile in parallel: call this early, and
-    wait for the result before the first launch. Later calls return the same future.
+    Compiling takes seconds: call this early, and wait for the result before the first launch. Later
+    calls return the same future.
     """
     start_warp("cpu")
     with _LOADING:

@@ -1,7 +1,4 @@
-"""The renderer `mujoco_warp`: MuJoCo Warp's ray tracer, which renders any model on CPU and GPU.
-
-It needs no OpenGL. Tests compare `Raytracer` with it.
-"""
+"""The renderer `mujoco_warp`: MuJoCo Warp's ray tracer, which renders any model on CPU and GPU."""
 
 import dataclasses
 import threading
@@ -50,11 +47,8 @@ class WarpRenderer:
     ) -> None:
         """Start the renderer; the first image of a view allocates buffers and builds kernels.
 
-        Batches larger than `num_worlds` are rendered in turn. By default there are as many
-        shards as cores, and one on a GPU. See `RendererFactory`.
-
-        Raises:
-            InputError: This machine has no such device.
+        See `RendererFactory`. Batches larger than `num_worlds` are rendered in turn; by default
+        there are as many shards as cores, and one on a GPU.
         """
         start_warp(device)
         self.scene = scene
@@ -64,11 +58,7 @@ class WarpRenderer:
         self._shards: dict[View, list[Shard]] = {}
 
     def prepare(self, view: View) -> None:
-        """Allocate buffers and build kernels for a view.
-
-        Raises:
-            InputError: The scene has no such camera, or a modality is not one of `SUPPORTED`.
-        """
+        """Allocate buffers and build kernels; see `Renderer.prepare` and `SUPPORTED`."""
         view.check_modalities(self, SUPPORTED)
         for camera in view.cameras:
             for modality in view.modalities:
@@ -79,8 +69,7 @@ class WarpRenderer:
     ) -> dict[Modality, Tensor]:
         """Render environments, one pass per camera and modality; see `Renderer.render`.
 
-        Raises:
-            InputError: The appearance has more than flat colours and light.
+        Raises an `InputError` if the appearance has more than flat colours and light.
         """
         if appearance is not None and not _is_supported(appearance):
             raise InputError(
@@ -129,10 +118,7 @@ class Shard:
     """Buffers and kernels of one worker's part of the batch."""
 
     def __init__(self, scene: Scene, view: View, camera: int, capacity: int) -> None:
-        """Allocate buffers for at most `capacity` environments.
-
-        The view has one modality and one camera, whose index in the model is `camera`.
-        """
+        """Allocate buffers for at most `capacity` environments, one camera and one modality."""
         model = scene.model
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
@@ -205,10 +191,7 @@ class ModelAppearance:
     """Writes an appearance into MuJoCo Warp's model, and restores the model afterwards."""
 
     def __init__(self, scene: Scene, model: Any, capacity: int) -> None:
-        """Give each of `capacity` environments its own colours, lights and cameras.
-
-        `model` is an `mjw.Model`, changed in place.
-        """
+        """Give each of `capacity` environments its own values in an `mjw.Model`."""
         self._scene = scene
         self._values: dict[str, Tensor] = {}
         for name, kind in _KINDS.items():

@@ -1,14 +1,10 @@
-"""Appearance of a dm_control simulation rendered with OpenGL: the same description, other means.
+"""Appearance of a dm_control simulation rendered with OpenGL.
 
-OpenGL renders all of an `Appearance`, partly in another way than the ray tracer. MuJoCo's own fog
-would cover the sky too, so fog is composited from depth: the camera's observations have it,
-dm_control's viewer does not. Light is clipped at white before the texture is applied; the ray
-tracer clips after. Shadow edges have the resolution of a shadow map, which covers `_SHADOWS`.
-Textures cover boxes, all of a semantic class at the size of the first; the ground's texture may
-have another origin.
-
-A cube map's sides come in the order +x, -x, +y, -y, +z, -z, each in OpenGL's layout of rows and
-columns.
+OpenGL differs from the ray tracer as follows. Fog is composited from depth, because MuJoCo's own
+would cover the sky; dm_control's viewer does not show it. Light is clipped at white before the
+texture is applied. Shadow edges have the resolution of a shadow map, which covers `_SHADOWS`.
+Textures cover boxes, all of a semantic class at the size of the first. The sides of a cube map are
++x, -x, +y, -y, +z, -z.
 """
 
 from typing import Any

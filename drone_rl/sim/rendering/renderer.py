@@ -1,8 +1,7 @@
 """The renderer interface, and the choice of a renderer by name.
 
 `raytrace` (the default) is this project's ray tracer of simple solids, on CPU and GPU;
-`mujoco_warp` renders any MuJoCo model, about twenty times slower. A dm_control simulation renders
-with OpenGL instead (see `opengl`).
+`mujoco_warp` renders any MuJoCo model, about twenty times slower.
 """
 
 import dataclasses
@@ -35,11 +34,7 @@ class Renderer(Protocol):
     """Renders a batch of environments that share one scene; it holds no simulation state."""
 
     def prepare(self, view: View) -> None:
-        """Prepare a view; kernels may be loaded by the first `render`.
-
-        Raises:
-            InputError: The renderer does not support the view.
-        """
+        """Prepare a view; raise an `InputError` if the renderer does not support it."""
 
     def render(
         self, view: View, poses: Poses, appearance: Appearance | None = None
@@ -75,11 +70,9 @@ class RendererFactory(Protocol):
     ) -> Renderer:
         """Make the renderer.
 
-        Args:
-            scene: What to render.
-            num_worlds: About how many environments one call renders.
-            num_shards: Worker threads that split the batch; the renderer's choice by default.
-            device: Where images are wanted: "cpu", "cuda" or "cuda:N".
+        About `num_worlds` environments are rendered per call, on the device "cpu", "cuda" or
+        "cuda:N". `num_shards` worker threads split the batch; their number is the renderer's choice
+        if None.
         """
         ...
 
@@ -92,11 +85,7 @@ _CLASSES = {
 
 
 def find_renderer(which: str | RendererFactory) -> RendererFactory:
-    """Return a renderer's factory, by a name of `RENDERERS`; a factory is returned itself.
-
-    Raises:
-        InputError: No renderer has that name.
-    """
+    """Return a renderer's factory, by a name of `RENDERERS`; a factory is returned itself."""
     if not isinstance(which, str):
         return which
     if which not in RENDERERS:

@@ -62,11 +62,7 @@ class Scene:
         return colors
 
     def camera(self, name: str) -> int:
-        """Return the index of a camera.
-
-        Raises:
-            InputError: The model has no camera of that name.
-        """
+        """Return the index of a camera; raise an `InputError` if there is none of that name."""
         try:
             return self.model.camera(name).id
         except KeyError as error:

@@ -62,10 +62,8 @@ PROCEDURAL: Mapping[str, Callable[[], NDArray[np.float64]]] = MappingProxyType(
 def load(name: str) -> NDArray[np.uint8]:
     """Load a texture: red, green, blue, shape (side, side, 3), the side a power of 2.
 
-    `name` is one of `PROCEDURAL`, or a PNG or JPEG file, which is stretched to a square.
-
-    Raises:
-        InputError: The file does not exist, is not an image, or is too large.
+    `name` is one of `PROCEDURAL`, or a PNG or JPEG file, which is stretched to a square. Raises an
+    `InputError` if the file does not exist, is not an image, or is too large.
     """
     if name in PROCEDURAL:
         gray = np.round(PROCEDURAL[name]() * 255.0).astype(np.uint8)

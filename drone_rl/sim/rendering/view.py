@@ -30,8 +30,8 @@ WEIGHTS = tuple((torch.tensor(LUMA) / 255.0).tolist())
 class View:
     """Cameras that a renderer renders for each environment, all at one image size.
 
-    Raises:
-        InputError: The size is out of range, nothing is requested, or a modality is unknown.
+    Raises an `InputError` if the size is out of range, nothing is requested, or a modality is
+    unknown.
     """
 
     cameras: tuple[str, ...]
@@ -55,11 +55,7 @@ class View:
             raise InputError(f"view of {self.height}x{self.width} pixels; give 1 to 4096 each way")
 
     def check_modalities(self, renderer: object, supported: Container[str]) -> None:
-        """Check that a renderer supports all modalities of this view.
-
-        Raises:
-            InputError: It does not support one of them.
-        """
+        """Raise an `InputError` if a renderer does not support all modalities of this view."""
         for modality in self.modalities:
             if modality not in supported:
                 known = ", ".join(name for name in MODALITIES if name in supported)
@@ -83,8 +79,7 @@ class View:
 def to_gray(rgb: Tensor) -> Tensor:
     """Convert RGB bytes to gray in [0, 1]. Shapes: (*, 3), uint8, to (*), float32.
 
-    Each sum is rounded as the kernels round it, so that gray is the same on every machine; a matrix
-    product would round as its library does.
+    Each sum is rounded as the kernels round it: gray is the same on every machine.
     """
     red, green, blue = rgb.unbind(-1)
     two = (red * WEIGHTS[0]).double() + green.double() * WEIGHTS[1]

@@ -72,9 +72,8 @@ class Sampling:
     def read(self, samples: Samples, time: Tensor) -> tuple[Tensor, Tensor]:
         """Return the newest reading that is old enough to be delivered.
 
-        Returns:
-            When it was taken, seconds, minus infinity for none, shape (num_worlds,), and its
-            values, zeros for none, shape (num_worlds, width).
+        When it was taken, seconds, minus infinity for none, shape (num_worlds,), and its values,
+        zeros for none, shape (num_worlds, width).
         """
         latest = (time - self.latency + _ROUNDING / self.rate)[:, None]
         newest = ((samples.times <= latest).sum(1) - 1).clamp(min=0)
@@ -139,9 +138,9 @@ def select(condition: Tensor, chosen: Tensor, other: Tensor) -> Tensor:
 
 
 def normal(like: Tensor, generator: Generator) -> Tensor:
-    """Draw standard normal numbers of the shape, type and device of a tensor.
+    """Sample standard normal numbers of the shape, type and device of a tensor.
 
-    They are drawn on the generator's device: a CPU generator gives the same on every device.
+    A CPU generator gives the same numbers on every device.
     """
     drawn = torch.randn(like.shape, dtype=like.dtype, generator=generator, device=generator.device)
     return drawn.to(like.device)

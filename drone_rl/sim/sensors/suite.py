@@ -53,16 +53,10 @@ class SensorSuite:
         number: int = 0,
         home: GeoPoint = HOME,
     ) -> None:
-        """Make the sensors.
+        """Make the sensors, with AirSim's settings by default.
 
-        Args:
-            settings: AirSim's by default.
-            seed: Of the noise.
-            number: Distinguishes the noise of several batches of drones under one seed.
-            home: The world's origin.
-
-        Raises:
-            InputError: The seed is not a whole number, 0 or more.
+        `number` distinguishes the noise of several batches of drones under one seed; `home` is the
+        world's origin. Raises an `InputError` if the seed is not a whole number, 0 or more.
         """
         own = settings or SensorSettings()
         self.settings, self.home = own, home
@@ -86,10 +80,10 @@ class SensorSuite:
         return SensorSuiteState(time=time, **states, collision=collision)
 
     def update(self, state: SensorSuiteState, body: BodyState, seconds: float) -> SensorSuiteState:
-        """Return the sensors some seconds after the last update.
+        """Return the sensors some seconds after the last update, usually a tick.
 
-        Called once a tick, no reading is late by more than that. Called less often, the
-        accelerometer reports means over the interval, and of several due readings one is taken.
+        Over a longer interval the accelerometer reports means, and of several due readings one is
+        taken.
         """
         time = state.time + seconds
         states = {
@@ -102,10 +96,7 @@ class SensorSuite:
     def read_collision(
         self, state: SensorSuiteState, worlds: Tensor | None = None
     ) -> tuple[CollisionState, SensorSuiteState]:
-        """Return the last collisions, and the sensors with the flag cleared.
-
-        See `read_collisions`.
-        """
+        """Return the last collisions, and the sensors with the flag cleared."""
         reading, after = read_collisions(state.collision, worlds)
         return reading, dataclasses.replace(state, collision=after)
 
@@ -122,8 +113,7 @@ def start_collisions(position: Tensor) -> CollisionState:
 def update_collisions(state: CollisionState, contact: Contact, position: Tensor) -> CollisionState:
     """Record each drone's last contact, at a position in metres, world frame, if it is new.
 
-    It is new if its time or its object differs from the recorded one; a drone that rests on
-    something touches it at every tick.
+    It is new if its time or its object differs from the recorded one.
     """
     known = state.contact
     is_other = (contact.thing != known.thing) | (contact.time != known.time)

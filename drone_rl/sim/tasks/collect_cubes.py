@@ -312,15 +312,10 @@ class FailureReplayTask(CollectCubes):
     """
 
     def __init__(self, settings: TaskSettings, boxes: NDArray[np.float64], share: float) -> None:
-        """Take the boxes.
+        """Take settings, and boxes: lowest and highest y of each cube, metres, (N, num_cubes, 2).
 
-        Args:
-            settings: The task's.
-            boxes: Lowest and highest y of each cube, metres. Shape: (N, num_cubes, 2).
-            share: Fraction of episodes in boxes, 0 to 1; boxes are equally likely.
-
-        Raises:
-            InputError: There is no box, or one is not within the task's bounds.
+        `share` is the fraction of episodes in boxes, 0 to 1; boxes are equally likely. Raises an
+        `InputError` if there is no box, or one is not within the task's bounds.
         """
         super().__init__(settings)
         boxes = np.asarray(boxes, np.float64)

@@ -1,7 +1,4 @@
-"""The rules of cube collection, as Warp functions of double precision.
-
-`judge` is the only statement of the rules: the batched step and the fused kernel both call it.
-"""
+"""The rules of cube collection, stated by the Warp function `judge` alone."""
 
 import enum
 import functools
@@ -75,13 +72,11 @@ class Outcome:
 
 @wp.func
 def judge(cubes: Cubes, env: int, drone: wp.vec3d, steps: int, is_lost: bool) -> Outcome:
-    """Apply Algorithms 1 and 3 after a drone has moved.
+    """Apply Algorithms 1 and 3 after a drone has moved, and write `cubes`.
 
     A touched cube is collected and worth 1; a cube left behind vanishes; the episode ends when all
     cubes are collected, when the drone is out of bounds, or at the step limit, in this order; a
-    drone whose motion has diverged ends it before all these.
-
-    `steps` includes this one; `is_lost` is whether the motion has diverged. Writes `cubes`.
+    drone whose motion has diverged ends it before all these. `steps` includes this one.
     """
     outcome = Outcome()
     num_collected = int(0)
@@ -255,8 +250,7 @@ def move(flights: Flights, world: int, action: int) -> float:
 class FlyingCubes:
     """Arrays of environments, rewritten for each batch of episodes; see `Task.fused_rules`.
 
-    The fused kernel reads `flights` (the states) and `poses` (to render), and also `steps` and
-    `end_reasons`.
+    The fused kernel reads `flights` (the states), `poses` (to render), `steps` and `end_reasons`.
     """
 
     functions = (Flights, place, move)

@@ -83,15 +83,8 @@ def place_in_view(
 ) -> Tensor:
     """Return random positions in view of a camera, uniform over the image's columns.
 
-    Args:
-        draw: Numbers in [0, 1) for distance and column. Shape: (*, 2).
-        camera: The policy's.
-        nearest: Metres ahead at least.
-        farthest: Metres ahead at most, or less where that is too far aside.
-        widest: Metres aside at most, except at the nearest distance.
-
-    Returns:
-        Metres ahead of the camera and to its left. Shape: (*, 2).
+    `draw` are numbers in [0, 1) for distance and column. Positions are metres ahead of the camera
+    and to its left, from `nearest` to `farthest` ahead, at most `widest` aside. Shapes: (*, 2).
     """
     slope = (2 * draw[..., 1] - 1) * math.tan(math.radians(camera.horizontal_fov / 2))
     most = (widest / slope.abs().clamp_min(1e-9)).clamp(max=farthest).clamp(min=nearest)

@@ -1,7 +1,4 @@
-"""Fly through a field of pillars to the line behind it, and touch none.
-
-N environments, R rows of K pillars, P = R K pillars.
-"""
+"""Fly through a field of pillars to the line behind it: R rows of K pillars, P = R K."""
 
 import dataclasses
 import enum

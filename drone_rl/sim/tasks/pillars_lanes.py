@@ -25,8 +25,7 @@ class Lanes:
     def draw_field(self, random_state: np.random.RandomState) -> NDArray[np.float64]:
         """Sample the y of all pillars of a field that can be crossed. Shape: (R, K).
 
-        Raises:
-            RuntimeError: None was found; `PillarsSettings` refuses settings that make this likely.
+        `PillarsSettings` refuses settings with which none is likely to be found.
         """
         rows = self.draw_rows(random_state, self.settings.num_rows)
         for _ in range(MOST_TRIES):

@@ -198,9 +198,9 @@ class Task(abc.ABC, Generic[S]):
         """
 
     def fused_rules(self, dynamics: Dynamics, num_envs: int) -> Any:
-        """Return the arrays on which the fused episode kernel runs the task; None without one.
+        """Return the arrays on which the fused episode kernel runs the task, or None.
 
-        See `FlyingCubes` in `collect_cubes_kernel.py` for the attributes that the kernel needs.
+        `collect_cubes_kernel.FlyingCubes` is an example with all attributes that the kernel needs.
         """
         del dynamics, num_envs
 
@@ -312,8 +312,7 @@ MAKERS: dict[type[BaseTaskSettings], Callable[[Any], Task[Any]]] = {}
 def register_task(settings: type[BaseTaskSettings], make: Callable[[Any], Task[Any]]) -> None:
     """Register a task by the class of its settings and a function that takes such settings.
 
-    Raises:
-        InputError: Another task has its name.
+    Raises an `InputError` if another task has its name.
     """
     if TASKS.get(settings.name, settings) is not settings:
         raise InputError(f"there is a task called {settings.name}; give another name")
@@ -323,8 +322,7 @@ def register_task(settings: type[BaseTaskSettings], make: Callable[[Any], Task[A
 def as_task(task: BaseTaskSettings | Task[Any] | str | None) -> Task[Any]:
     """Return the task of settings or of a name such as "pillars"; cube collection by default.
 
-    Raises:
-        InputError: The task is unknown.
+    Raises an `InputError` if the task is unknown.
     """
     task = TaskSettings() if task is None else task
     if isinstance(task, str):

@@ -1,10 +1,8 @@
 """The ray tracer on a CPU with effects: sky gradient, fog, shadows and textures.
 
-`plain_kernel.find_visible` finds the visible surfaces; then solids cast shadows, each within the
-rectangle of pixels around it and its shadow; then each pixel is coloured. This is a separate module
-so that training without effects need not compile it.
-
-The sun is the scene's first light. Planes cast no shadows, since they are visible from one side.
+Solids cast shadows, each within the rectangle of pixels around it and its shadow; then each pixel
+is coloured. The sun is the scene's first light. Planes cast no shadows: they are visible from one
+side. Training without effects need not compile this module.
 """
 
 import warp as wp
@@ -138,10 +136,9 @@ for (int i = first; i < last; ++i) {{
 def cast_box_shadow(
     job: structs.Job, first: int, last: int, geom: int, caster: structs.GeomView, sun: wp.vec3
 ) -> None:
-    """Set `dark` to 1 for the pixels from `first` to before `last` that a box shadows.
+    """Mark the pixels from `first` to before `last` that a box shadows, other than its own.
 
-    The box is the geom of index `geom` and does not shadow itself. The direction of the sunlight
-    is in the box's frame.
+    `geom` is the box's index; the direction of the sunlight is in the box's frame.
     """
 
 

@@ -1,8 +1,7 @@
 """Ray casting: intersections of rays with solids and planes, each in its own frame.
 
-All solids are convex and closed, so a ray from outside enters each at most once. Rays that start
-inside a solid miss it: only outsides are rendered. Sizes are MuJoCo's: half extents of boxes and
-ellipsoids, the radius of balls, radius and half length (without caps) of capsules and cylinders.
+Solids are convex and closed; rays that start inside one miss it. Sizes are MuJoCo's: half extents
+of boxes and ellipsoids, the radius of balls, radius and half length of capsules and cylinders.
 """
 
 import mujoco

@@ -1,10 +1,8 @@
 """The ray tracer on a CPU, for flat colours and light: one image at a time, geom by geom.
 
-`find_visible` takes the geoms in order and casts rays at each, in the geom's own frame, within the
-rectangle of pixels around its projection; the nearest hit owns the pixel. Then pixels are shaded,
-once for a span of pixels in a row that show the same flat face.
-
-Pixels are counted by `while`: Warp's code of a `for` loop is several times as slow on a CPU.
+Rays are cast at each geom, in the geom's own frame, within the rectangle of pixels around its
+projection; the nearest hit owns the pixel. Then pixels are shaded, once for a span of pixels in a
+row that show the same flat face. Warp's `for` loops are several times as slow as `while` on a CPU.
 """
 
 import warp as wp
@@ -43,9 +41,9 @@ def render_images(
     scratch: structs.Scratch,
     images: structs.Images,
 ) -> None:
-    """Render images from `first` up to, not including, `last`, with scratch buffer `member`.
+    """Render images from `first` up to, not including, `last`, as one worker, `member`.
 
-    Launch it with a dimension of 1: each worker renders one image after the other.
+    Launch it with a dimension of 1.
     """
     for row in range(first, last):
         world = row // view.count

@@ -64,10 +64,8 @@ class Raytracer:
     ) -> None:
         """Prepare a scene; the first image loads the kernels. See `RendererFactory`.
 
-        `num_shards` is used on a CPU, and is the number of cores by default.
-
-        Raises:
-            InputError: The scene has unsupported geoms or lights, or there is no such device.
+        `num_shards` is used on a CPU, and is the number of cores by default. Raises an `InputError`
+        if the scene has unsupported geoms or lights, or there is no such device.
         """
         start_warp(device)
         check_scene(scene)
@@ -79,11 +77,7 @@ class Raytracer:
         self._poses = PoseBuffers(self.device)
 
     def prepare(self, view: View) -> None:
-        """Build the kernels' structs of a view.
-
-        Raises:
-            InputError: The scene has no such camera, or a modality is unknown.
-        """
+        """Build the kernels' structs of a view; see `Renderer.prepare`."""
         if view not in self._views:
             encoded, geoms = self._encode(view)
             self._views[view] = Cameras(view, encoded, self.device), geoms
@@ -111,9 +105,6 @@ class Raytracer:
         """Return the arguments with which another kernel calls `plain_kernel.render_image`.
 
         The appearance is the model's own; `num_workers` images are rendered at the same time.
-
-        Raises:
-            InputError: See `prepare`.
         """
         encoded, geoms = self._encode(view)
         scratch = make_scratch(num_workers, view.height * view.width, len(geoms.kind))

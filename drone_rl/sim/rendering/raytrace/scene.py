@@ -37,11 +37,7 @@ REACH: Mapping[int, Callable[[NDArray], NDArray]] = MappingProxyType(
 
 
 def check_scene(scene: Scene) -> None:
-    """Check that the ray tracer supports a scene.
-
-    Raises:
-        InputError: It has an unsupported geom or light.
-    """
+    """Raise an `InputError` if the ray tracer does not support a geom or light of a scene."""
     model = scene.model
     for geom in range(model.ngeom):
         if model.geom_type[geom] not in REACH:
@@ -101,11 +97,7 @@ class Frames:
 
 
 def make_view(scene: Scene, frames: Frames, view: View, device: str) -> structs.View:
-    """Return a view for the kernels, without its modalities.
-
-    Raises:
-        InputError: A camera is not in the model, or is not supported.
-    """
+    """Return a view for the kernels, without its modalities."""
     model: Any = scene.model
     made: Any = structs.View()
     cameras = [make_camera(scene, frames, name, view.width / view.height) for name in view.cameras]
@@ -140,10 +132,7 @@ def make_camera(scene: Scene, frames: Frames, name: str, aspect: float) -> struc
 
 
 def make_rays(camera: structs.Camera, height: int, width: int) -> NDArray:
-    """Return unit vectors through the centres of all pixels, in the camera's frame.
-
-    Shape: (height, width, 3), float32.
-    """
+    """Return unit vectors through all pixels, camera frame. Shape: (height, width, 3), float32."""
     across = ((np.arange(width) + 0.5) / width * 2 - 1) * camera.half_width
     down = ((np.arange(height) + 0.5) / height * 2 - 1) * camera.half_height
     rays = np.stack(np.broadcast_arrays(across[None, :], -down[:, None], -1.0), -1)

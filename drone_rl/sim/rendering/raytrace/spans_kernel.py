@@ -1,9 +1,7 @@
-"""Vectorized loops in C++ over spans of pixels in a row; fog and textures are applied here.
+"""Vectorized loops in C++ over spans of contiguous pixels; fog and textures are applied here.
 
-Warp's own loops allow for strided arrays and recompute each pixel's address, so they are not
-vectorized. These arrays are contiguous. A GPU calls the same functions for one pixel.
-
-Each function processes the pixels from `first` up to, not including, `last`.
+Warp's own loops allow for strided arrays and are not vectorized. A GPU calls these functions for
+one pixel. Each processes the pixels from `first` up to, not including, `last`.
 """
 
 from typing import Any
@@ -15,7 +13,7 @@ from drone_rl.sim.rendering.raytrace.structs_kernel import Job, SurfaceLight, Te
 
 @wp.func_native("for (int i = first; i < last; ++i) values.data[i] = value;")
 def fill(values: wp.array[Any], first: int, last: int, value: Any) -> None:
-    """Write one value to the pixels from `first` up to, not including, `last`."""
+    """Write one value."""
 
 
 @wp.func_native("for (int i = first; i < last; ++i) values.data[i] = given.data[i];")

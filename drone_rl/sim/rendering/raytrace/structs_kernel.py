@@ -1,7 +1,4 @@
-"""Structs that the ray tracer's kernels share: cameras, geoms, poses, materials, images, scratch.
-
-A batch of images has one row per image: all cameras of the first environment, of the second, ...
-"""
+"""Structs of the ray tracer's kernels. A batch has a row per image, environment by environment."""
 
 from typing import TypeVar
 
