@@ -6,24 +6,10 @@ count from where the command began, so that an hour loses no more precision than
 
 import warp as wp
 
+from drone_rl.sim.dynamics import rigid_body_kernel as rigid
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.control import Goals, Mode
 from drone_rl.sim.dynamics.control_kernel import Goal, climb_memory, climb_missing, rotors_wanted
-from drone_rl.sim.dynamics.rigid_body_kernel import (
-    Airframe,
-    Axes,
-    Motion,
-    Overlap,
-    advanced,
-    answered,
-    axes_of,
-    box_overlap,
-    drag_of,
-    gust_after,
-    pushed_out,
-    thrust_of,
-    torque_of,
-)
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -39,7 +25,7 @@ _WILDEST = wp.constant(10.0)
 class Command:
     """A command to drones, and the obstacles around them. World frame, SI units."""
 
-    frame: Airframe
+    frame: rigid.Airframe
     ticks: int
     modes: wp.vec4i
     goals: wp.array2d[wp.float64]
@@ -51,7 +37,7 @@ class Command:
 
 
 def make_command(
-    frame: Airframe, goals: Goals, ticks: int = 1, obstacles: fs.Obstacles | None = None
+    frame: rigid.Airframe, goals: Goals, ticks: int = 1, obstacles: fs.Obstacles | None = None
 ) -> Command:
     """Return a command that lasts some ticks, for kernels on the device of the goals."""
     command = Command()
@@ -88,7 +74,7 @@ class Flight:
     """Ticks of the episode before the command."""
     tick: int
     """Number of the present tick within the command."""
-    motion: Motion
+    motion: rigid.Motion
     rotors: wp.vec4
     climb: float
     gust: wp.vec3
@@ -96,7 +82,7 @@ class Flight:
 
 
 @wp.func
-def is_sound(motion: Motion) -> bool:
+def is_sound(motion: rigid.Motion) -> bool:
     """Return whether all numbers are finite and plausible; comparisons with NaN are false."""
     place = wp.length_sq(motion.position)
     speed = wp.length_sq(motion.velocity)
@@ -143,7 +129,7 @@ def loaded(before: wp.array2d[wp.float64], world: int) -> Flight:
         flight.start[axis] = before[world, fs.POSITION + axis]
     flight.seed = wp.int64(before[world, fs.SEED])
     flight.past = wp.int64(before[world, fs.TICKS])
-    flight.motion = Motion()
+    flight.motion = rigid.Motion()
     flight.motion.attitude = four(before, world, fs.ATTITUDE)
     flight.motion.velocity = three(before, world, fs.VELOCITY)
     flight.motion.rates = three(before, world, fs.RATES)
@@ -170,41 +156,43 @@ def goal_of(command: Command, world: int, start: wp.vec3d) -> Goal:
 
 
 @wp.func
-def driven(frame: Airframe, goal: Goal, before: Flight, axes: Axes) -> Flight:
+def driven(frame: rigid.Airframe, goal: Goal, before: Flight, axes: rigid.Axes) -> Flight:
     """Return a flight whose controllers, rotors and air are a tick later; it has not moved yet."""
     flight = before
     motion = before.motion
     asked = rotors_wanted(frame, goal, motion, axes, before.climb)
     if goal.modes[3] == Mode.VELOCITY or goal.modes[3] == Mode.POSITION:
         flight.climb = climb_memory(frame, climb_missing(frame, goal, motion), before.climb)
-    flight.rotors = answered(frame, before.rotors, asked)
+    flight.rotors = rigid.answered(frame, before.rotors, asked)
     if frame.gusts > 0.0:
         speed = wp.length(motion.velocity - frame.wind)
         time = before.past + wp.int64(before.tick)
-        flight.gust = gust_after(frame, before.gust, speed, before.seed, time)
+        flight.gust = rigid.gust_after(frame, before.gust, speed, before.seed, time)
     return flight
 
 
 @wp.func
-def force_on(frame: Airframe, flight: Flight, axes: Axes) -> wp.vec3:
+def force_on(frame: rigid.Airframe, flight: Flight, axes: rigid.Axes) -> wp.vec3:
     """Return the force of rotors and air, newtons, world frame; without weight."""
     through = flight.motion.velocity - frame.wind - flight.gust
-    return thrust_of(frame, flight.rotors) * axes.up + drag_of(frame, axes, through)
+    return rigid.thrust_of(frame, flight.rotors) * axes.up + rigid.drag_of(frame, axes, through)
 
 
 @wp.func
-def ticked(frame: Airframe, goal: Goal, before: Flight) -> Flight:
+def ticked(frame: rigid.Airframe, goal: Goal, before: Flight) -> Flight:
     """Return a flight a tick later, over bare ground."""
-    axes = axes_of(before.motion.attitude)
+    axes = rigid.axes_of(before.motion.attitude)
     flight = driven(frame, goal, before, axes)
-    lift = thrust_of(frame, flight.rotors)
+    lift = rigid.thrust_of(frame, flight.rotors)
     force = force_on(frame, flight, axes)
-    flight.motion = advanced(frame, before.motion, force, torque_of(frame, flight.rotors))
-    overlap = Overlap()
+    flight.motion = rigid.advanced(
+        frame, before.motion, force, rigid.torque_of(frame, flight.rotors)
+    )
+    overlap = rigid.Overlap()
     overlap.normal = wp.vec3(0.0, 0.0, 1.0)
     overlap.depth = frame.radius - (float(before.start[2]) + flight.motion.position[2])
     if overlap.depth >= 0.0:
-        flight.motion = grounded(frame, pushed_out(frame, flight.motion, overlap), lift)
+        flight.motion = grounded(frame, rigid.pushed_out(frame, flight.motion, overlap), lift)
         flight.touch = touched(frame, flight, fs.GROUND, overlap)
     return flight
 
@@ -216,9 +204,9 @@ def among(command: Command, world: int, before: Flight) -> Flight:
     radius = command.frame.radius
     for thing in range(command.centers.shape[1]):
         center = flight.motion.position + wp.vec3(flight.start - command.centers[world, thing])
-        overlap = box_overlap(center, radius, command.half_sizes)
+        overlap = rigid.box_overlap(center, radius, command.half_sizes)
         if overlap.depth > 0.0:
-            flight.motion = pushed_out(command.frame, flight.motion, overlap)
+            flight.motion = rigid.pushed_out(command.frame, flight.motion, overlap)
             flight.touch = touched(command.frame, flight, thing, overlap)
     return flight
 
@@ -237,14 +225,14 @@ def is_near(command: Command, world: int, flight: Flight) -> bool:
     near = int(0)
     for thing in range(command.centers.shape[1]):
         center = wp.vec3(flight.start - command.centers[world, thing])
-        away = box_overlap(center, frame.radius + fastest * seconds, command.half_sizes)
+        away = rigid.box_overlap(center, frame.radius + fastest * seconds, command.half_sizes)
         if away.depth > 0.0:
             near = 1
     return near == 1
 
 
 @wp.func
-def grounded(frame: Airframe, motion: Motion, lift: float) -> Motion:
+def grounded(frame: rigid.Airframe, motion: rigid.Motion, lift: float) -> rigid.Motion:
     """Return the motion of a drone on the ground: level if its rotors can't carry it."""
     after = motion
     if lift < frame.weight:
@@ -257,7 +245,7 @@ def grounded(frame: Airframe, motion: Motion, lift: float) -> Motion:
 
 
 @wp.func
-def touched(frame: Airframe, flight: Flight, thing: int, overlap: Overlap) -> Touch:
+def touched(frame: rigid.Airframe, flight: Flight, thing: int, overlap: rigid.Overlap) -> Touch:
     """Return the contact to record of a drone that was pushed out of an overlap.
 
     Obstacles take precedence over the ground, later contacts over earlier ones.
@@ -310,7 +298,7 @@ def write_reference(command: Command, after: wp.array2d[wp.float64], world: int)
         reference = command.goals[world, axis] + seconds * command.drifts[world, axis]
         if axis == 2:
             if command.modes[2] != Mode.ANGLE:
-                axes = axes_of(four(after, world, fs.ATTITUDE))
+                axes = rigid.axes_of(four(after, world, fs.ATTITUDE))
                 reference = wp.float64(wp.atan2(axes.forward[1], axes.forward[0]))
         elif command.modes[axis] != Mode.POSITION:
             reference = after[world, fs.POSITION + wp.min(axis, 2)]

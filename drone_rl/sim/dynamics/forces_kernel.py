@@ -4,19 +4,9 @@ import torch
 import warp as wp
 from torch import Tensor
 
+from drone_rl.sim.dynamics import flight_kernel as kernel
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.control import Goals
-from drone_rl.sim.dynamics.flight_kernel import (
-    Command,
-    driven,
-    force_on,
-    goal_of,
-    is_finite,
-    is_sound,
-    loaded,
-    make_command,
-    write,
-)
 from drone_rl.sim.dynamics.rigid_body_kernel import Airframe, axes_of, torque_of
 from drone_rl.sim.dynamics.state import FlightState
 from drone_rl.sim.rendering.devices import start_warp
@@ -26,7 +16,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.kernel
 def push(
-    command: Command,
+    command: kernel.Command,
     tick: int,
     before: wp.array2d[wp.float64],
     after: wp.array2d[wp.float64],
@@ -37,24 +27,24 @@ def push(
     for i in range(fs.NUMBERS):
         after[world, i] = before[world, i]
     frame = command.frame
-    flight = loaded(before, world)
-    goal = goal_of(command, world, flight.start)
+    flight = kernel.loaded(before, world)
+    goal = kernel.goal_of(command, world, flight.start)
     lost = before[world, fs.LOST] != wp.float64(0.0)
-    if lost or not (is_finite(goal, flight.start) and is_sound(flight.motion)):
+    if lost or not (kernel.is_finite(goal, flight.start) and kernel.is_sound(flight.motion)):
         after[world, fs.LOST] = wp.float64(1.0)
         return
     axes = axes_of(flight.motion.attitude)
     flight.tick = tick
     flight.past = flight.past - wp.int64(tick)
     goal.seconds = frame.tick * float(tick)
-    flight = driven(frame, goal, flight, axes)
-    force = force_on(frame, flight, axes)
+    flight = kernel.driven(frame, goal, flight, axes)
+    force = kernel.force_on(frame, flight, axes)
     turning = torque_of(frame, flight.rotors)
     torque = turning[0] * axes.forward + turning[1] * axes.left + turning[2] * axes.up
     for i in range(3):
         pushes[world, i] = wp.float64(force[i])
         pushes[world, 3 + i] = wp.float64(torque[i])
-    write(after, world, flight, tick + 1)
+    kernel.write(after, world, flight, tick + 1)
 
 
 def forces(
@@ -76,5 +66,6 @@ def forces(
     after = FlightState(torch.empty_like(body.numbers))
     pushes = torch.zeros(len(body), 6, dtype=torch.float64)
     arrays = [wp.from_torch(array) for array in (body.numbers, after.numbers, pushes)]
-    wp.launch(push, len(body), inputs=[make_command(frame, goals), tick, *arrays], device="cpu")
+    inputs = [kernel.make_command(frame, goals), tick, *arrays]
+    wp.launch(push, len(body), inputs=inputs, device="cpu")
     return after, pushes

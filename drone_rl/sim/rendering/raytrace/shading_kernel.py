@@ -2,17 +2,9 @@
 
 import warp as wp
 
+from drone_rl.sim.rendering.raytrace import spans_kernel as spans
 from drone_rl.sim.rendering.raytrace import structs_kernel as structs
 from drone_rl.sim.rendering.raytrace.intersection_kernel import ROUND, surface_normal
-from drone_rl.sim.rendering.raytrace.spans_kernel import (
-    copy,
-    fill,
-    mix_gray,
-    multiply,
-    shade_plain,
-    shade_sky,
-    shade_textured,
-)
 from drone_rl.sim.rendering.view import WEIGHTS
 
 _RED, _GREEN, _BLUE = (wp.constant(weight) for weight in WEIGHTS)
@@ -56,15 +48,15 @@ def shade_span_with_effects(
         up = wp.transpose(job.looking) @ wp.vec3(0.0, 0.0, 1.0)
         horizon = materials.sky[job.world % materials.sky.shape[0]]
         zenith = effects.zenith[job.world % effects.zenith.shape[0]]
-        shade_sky(job, first, last, up, horizon, zenith)
+        spans.shade_sky(job, first, last, up, horizon, zenith)
     else:
         _color_geom(job, materials, effects, first, last, shown)
     what = job.view.what
     write_span(job, images, what & ~(structs.RGB | structs.GRAY), first, last, shown)
     if (what & structs.RGB) != 0:
-        copy(images.rgb[job.row], first, last, job.colors)
+        spans.copy(images.rgb[job.row], first, last, job.colors)
     if (what & structs.GRAY) != 0:
-        mix_gray(images.gray[job.row], first, last, job.colors, _RED, _GREEN, _BLUE)
+        spans.mix_gray(images.gray[job.row], first, last, job.colors, _RED, _GREEN, _BLUE)
 
 
 @wp.func
@@ -76,7 +68,7 @@ def _find_surface(
     shown.number = structs.NO_GEOM
     if owner == structs.NO_GEOM:
         if (job.view.what & structs.DISTANCES) != 0:
-            fill(job.nearest, first, last, 0.0)
+            spans.fill(job.nearest, first, last, 0.0)
     else:
         seen = job.geom_views[owner // structs.FACES]
         into = seen.into @ job.rays[first]
@@ -100,17 +92,17 @@ def write_span(
 ) -> None:
     """Write the modalities `what` of a span of pixels that show one surface."""
     if (what & structs.RGB) != 0:
-        fill(images.rgb[job.row], first, last, shown.color)
+        spans.fill(images.rgb[job.row], first, last, shown.color)
     if (what & structs.GRAY) != 0:
-        fill(images.gray[job.row], first, last, shown.gray)
+        spans.fill(images.gray[job.row], first, last, shown.gray)
     if (what & structs.DEPTH) != 0:
-        multiply(images.depth[job.row], first, last, job.nearest, job.cosines)
+        spans.multiply(images.depth[job.row], first, last, job.nearest, job.cosines)
     if (what & structs.DISTANCE) != 0:
-        copy(images.distance[job.row], first, last, job.nearest)
+        spans.copy(images.distance[job.row], first, last, job.nearest)
     if (what & structs.SEGMENTATION) != 0:
-        fill(images.segmentation[job.row], first, last, shown.number)
+        spans.fill(images.segmentation[job.row], first, last, shown.number)
     if (what & structs.NORMALS) != 0:
-        fill(images.normals[job.row], first, last, shown.normal)
+        spans.fill(images.normals[job.row], first, last, shown.normal)
 
 
 @wp.func
@@ -162,7 +154,7 @@ def _color_geom(
     row = world % effects.texture.shape[0]
     texture = effects.texture[row, geom]
     if texture < 0:
-        shade_plain(job, first, last, light)
+        spans.shade_plain(job, first, last, light)
     else:
         tiles, side = effects.tiles[row, geom], effects.sides[texture]
         geom_view = job.geom_views[job.owner[first] // structs.FACES]
@@ -171,7 +163,7 @@ def _color_geom(
         cover.side = side
         pixel = 2.0 * job.camera.half_height / float(job.view.height) * tiles * float(side)
         cover.area = pixel * pixel
-        shade_textured(job, first, last, light, cover, effects.texels)
+        spans.shade_textured(job, first, last, light, cover, effects.texels)
 
 
 @wp.func
