@@ -2,12 +2,12 @@
 
 import torch
 import warp as wp
+from torch import Tensor
 
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.control import Goals, Moves
 from drone_rl.sim.dynamics.flight_kernel import Command, make_command, run
 from drone_rl.sim.dynamics.quadrotor import Quadrotor
-from drone_rl.sim.dynamics.state import NUMBERS, FlightState
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -70,29 +70,17 @@ def is_lost(fleet: Fleet, world: int) -> bool:
     return fleet.numbers[world, fs.LOST] != wp.float64(0.0)
 
 
-class FlyingFleet:
-    """Arrays of drones for kernels, rewritten for each batch of episodes."""
-
-    def __init__(self, num_worlds: int, quadrotor: Quadrotor | None) -> None:
-        """Allocate the arrays of at most `num_worlds` drones; of none without a quadrotor."""
-        self.fleet = fleet = Fleet()
-        self._numbers = torch.zeros(num_worlds if quadrotor else 0, NUMBERS, dtype=torch.float64)
-        fleet.numbers = wp.from_torch(self._numbers)
-        if quadrotor is not None:
-            steering = quadrotor.steering
-            assert isinstance(steering, Moves)
-            zeros = torch.zeros(2, num_worlds, 4, dtype=torch.float64)
-            goals = Goals(steering.MODES, *zeros)
-            fleet.command = make_command(quadrotor.frame, goals, quadrotor.settings.control_ticks)
-            fleet.lead = steering.lead
-            fleet.is_gimballed = int(quadrotor.mount == "gimbal")
-            fleet.moves = wp.from_torch(steering.drifts.contiguous())
-
-    @classmethod
-    def knows(cls, quadrotor: Quadrotor) -> bool:
-        """Return whether kernels implement the drone's actions."""
-        return isinstance(quadrotor.steering, Moves)
-
-    def begin(self, state: FlightState) -> None:
-        """Copy drones at the start of episodes."""
-        self._numbers[: len(state)] = state.numbers
+def make_fleet(quadrotor: Quadrotor | None, numbers: Tensor) -> Fleet:
+    """Return drones whose `FlightState.numbers` are given; of no rows without a quadrotor."""
+    fleet = Fleet()
+    fleet.numbers = wp.from_torch(numbers)
+    if quadrotor is not None:
+        steering = quadrotor.steering
+        assert isinstance(steering, Moves)
+        zeros = torch.zeros(2, len(numbers), 4, dtype=torch.float64)
+        goals = Goals(steering.MODES, *zeros)
+        fleet.command = make_command(quadrotor.frame, goals, quadrotor.settings.control_ticks)
+        fleet.lead = steering.lead
+        fleet.is_gimballed = int(quadrotor.mount == "gimbal")
+        fleet.moves = wp.from_torch(steering.drifts.contiguous())
+    return fleet

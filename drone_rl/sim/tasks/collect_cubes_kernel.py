@@ -11,15 +11,16 @@ from torch import Tensor
 
 from drone_rl.config import TaskSettings
 from drone_rl.sim.dynamics import ComputerVision, Dynamics, FlightState, Quadrotor
+from drone_rl.sim.dynamics.control import Moves
 from drone_rl.sim.dynamics.moves_kernel import (
     Fleet,
-    FlyingFleet,
     camera_attitude,
     fly_move,
     is_flying,
     is_lost,
+    make_fleet,
 )
-from drone_rl.sim.dynamics.state import LEVEL
+from drone_rl.sim.dynamics.state import LEVEL, NUMBERS
 from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, Poses
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH, Side
@@ -280,8 +281,9 @@ class FlyingCubes:
         self.flights.end_reasons = wp.from_torch(self.end_reasons)
         if isinstance(dynamics, ComputerVision):
             self.flights.moves = wp.from_torch(dynamics.moves.contiguous(), dtype=wp.vec3d)
-        self._fleet = FlyingFleet(num_envs, dynamics if isinstance(dynamics, Quadrotor) else None)
-        self.flights.fleet = self._fleet.fleet
+        quadrotor = dynamics if isinstance(dynamics, Quadrotor) else None
+        self._numbers = torch.zeros(num_envs if quadrotor else 0, NUMBERS, dtype=torch.float64)
+        self.flights.fleet = make_fleet(quadrotor, self._numbers)
         places = torch.zeros(num_envs, 1 + DRONE_FRAME + settings.num_cubes, 3)
         self.poses.positions = wp.from_torch(places, dtype=wp.vec3)
         attitudes = torch.tensor(LEVEL).repeat(num_envs, 1)
@@ -290,9 +292,8 @@ class FlyingCubes:
     @staticmethod
     def supports(dynamics: Dynamics) -> bool:
         """Return whether the kernel implements these dynamics."""
-        return type(dynamics) is ComputerVision or (
-            type(dynamics) is Quadrotor and FlyingFleet.knows(dynamics)
-        )
+        is_flown = type(dynamics) is Quadrotor and isinstance(dynamics.steering, Moves)
+        return is_flown or type(dynamics) is ComputerVision
 
     def begin(self, state: Any) -> None:
         """Copy states at the start of episodes."""
@@ -301,6 +302,6 @@ class FlyingCubes:
         for name, values in vars(self.state).items():
             values[:count] = getattr(state, name)
         if isinstance(state.body, FlightState):
-            self._fleet.begin(state.body)
+            self._numbers[:count] = state.body.numbers
         for values in (self.steps, self.end_reasons):
             values[:count] = 0

@@ -8,11 +8,11 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.sim.dynamics.moves_kernel import (
     Fleet,
-    FlyingFleet,
     camera_attitude,
     fly_move,
     is_flying,
     is_lost,
+    make_fleet,
 )
 from drone_rl.sim.dynamics.state import heading_only
 from drone_rl.sim.rendering.devices import start_warp
@@ -41,17 +41,16 @@ def test_moves_equal_quadrotor_steps(mount):
     settings = DynamicsSettings(mode="simple_flight", camera_mount=mount, wind=(1.0, -2.0, 0.3))
     quadrotor = Quadrotor(settings)
     state = quadrotor.start(torch.tensor([[0.0, 0.0, 2.5], [9.0, -3.0, 4.0]], dtype=torch.float64))
-    fleet = FlyingFleet(2, quadrotor)
-    fleet.begin(state)
+    fleet = make_fleet(quadrotor, state.numbers.clone())
     places, turns = torch.zeros(2, 3, dtype=torch.float64), torch.zeros(2, 4)
     flags = torch.zeros(2, dtype=torch.int32)
     for action in (0, 0, 1, 2, 2, 1, 0):
         state = quadrotor.step(state, torch.full((2,), action))
         given = [wp.from_torch(places, dtype=wp.vec3d), wp.from_torch(turns, dtype=wp.vec4)]
-        inputs = [fleet.fleet, action, *given, wp.from_torch(flags)]
+        inputs = [fleet, action, *given, wp.from_torch(flags)]
         wp.launch(moved, 2, inputs=inputs, device="cpu")
         assert torch.equal(places, state.position)
-        assert torch.equal(wp.to_torch(fleet.fleet.numbers), state.numbers)
+        assert torch.equal(wp.to_torch(fleet.numbers), state.numbers)
         seen = state.attitude if mount == "body" else heading_only(state.attitude)
         assert torch.equal(turns, seen.float())
     assert not flags.any()
@@ -62,10 +61,9 @@ def test_lost_drone_is_flagged():
     quadrotor = Quadrotor(DynamicsSettings(mode="simple_flight"))
     state = quadrotor.start(torch.zeros(1, 3, dtype=torch.float64))
     state.velocity[:] = torch.nan
-    fleet = FlyingFleet(1, quadrotor)
-    fleet.begin(state)
+    fleet = make_fleet(quadrotor, state.numbers.clone())
     places, turns = torch.zeros(1, 3, dtype=torch.float64), torch.zeros(1, 4)
     flags = torch.zeros(1, dtype=torch.int32)
     given = [wp.from_torch(places, dtype=wp.vec3d), wp.from_torch(turns, dtype=wp.vec4)]
-    wp.launch(moved, 1, inputs=[fleet.fleet, 0, *given, wp.from_torch(flags)], device="cpu")
+    wp.launch(moved, 1, inputs=[fleet, 0, *given, wp.from_torch(flags)], device="cpu")
     assert flags.tolist() == [1] and places.tolist() == [[0.0, 0.0, 0.0]]

@@ -6,7 +6,7 @@ import warp as wp
 
 from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.sim.dynamics import Quadrotor
-from drone_rl.sim.dynamics.moves_kernel import FlyingFleet
+from drone_rl.sim.dynamics.moves_kernel import make_fleet
 from drone_rl.sim.rendering.devices import start_warp
 
 FLIGHT = DynamicsSettings(mode="simple_flight", camera_mount="body")
@@ -20,15 +20,12 @@ def warp():
 
 def test_fleet_copies_states():
     quadrotor = Quadrotor(FLIGHT, ActionSettings(move_lead=0.25))
-    fleet = FlyingFleet(3, quadrotor)
     state = quadrotor.start(torch.tensor([[0.0, 1.0, 2.5]] * 2, dtype=torch.float64))
-    fleet.begin(state)
-    numbers = wp.to_torch(fleet.fleet.numbers)
-    assert torch.equal(numbers[:2], state.numbers) and not numbers[2].any()
-    numbers.fill_(7.0)
-    assert state.position[0].tolist() == [0.0, 1.0, 2.5]
-    assert fleet.fleet.lead == 0.25 and fleet.fleet.is_gimballed == 0
-    assert fleet.fleet.command.ticks == 33
+    fleet = make_fleet(quadrotor, state.numbers)
+    wp.to_torch(fleet.numbers).fill_(7.0)
+    assert state.position[0].tolist() == [7.0] * 3
+    assert fleet.lead == 0.25 and fleet.is_gimballed == 0
+    assert fleet.command.ticks == 33
 
 
 def test_computer_vision_mode_has_no_fleet_states():

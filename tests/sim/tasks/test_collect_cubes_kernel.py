@@ -5,8 +5,8 @@ import torch
 import warp as wp
 from numpy.random import RandomState
 
-from drone_rl.config import TaskSettings
-from drone_rl.sim.dynamics import ComputerVision
+from drone_rl.config import ActionSettings, DynamicsSettings, TaskSettings
+from drone_rl.sim.dynamics import ComputerVision, Quadrotor
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import Poses
 from drone_rl.sim.tasks import CollectCubes, Pillars
@@ -107,5 +107,8 @@ def test_other_rules_and_moves_are_unsupported():
 
     assert CollectCubes().fused_rules(ComputerVision(), 1) is not None
     assert CollectCubes().fused_rules(Windy(), 1) is None
+    flight, velocities = DynamicsSettings(mode="simple_flight"), ActionSettings(kind="velocity")
+    assert CollectCubes().fused_rules(Quadrotor(flight), 1) is not None
+    assert CollectCubes().fused_rules(Quadrotor(flight, velocities), 1) is None
     assert Strict().fused_rules(ComputerVision(), 1) is None
     assert Pillars().fused_rules(ComputerVision(), 1) is None
