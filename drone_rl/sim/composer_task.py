@@ -81,7 +81,6 @@ class ComposerTask(composer.Task):
         model: Any = self._arena.mjcf_model
         model.option.gravity = (0, 0, 0)
         self.drone = Drone(size=self.rules.drone_size, camera=self.camera)
-        """The drone's entity."""
         self._arena.add_free_entity(self.drone)
         self._props = [*self.rules.make_props(), *make_distractors(distractors)]
         self._frames = [self._arena.attach(prop) for prop in self._props]

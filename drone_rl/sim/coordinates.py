@@ -57,14 +57,11 @@ _ECCENTRICITY_2 = FLATTENING * (2 - FLATTENING)
 
 
 class GeoPoint(NamedTuple):
-    """A place on Earth."""
+    """A place on Earth: degrees north and east, and metres above the sea."""
 
     latitude: float
-    """Degrees north."""
     longitude: float
-    """Degrees east."""
     altitude: float
-    """Metres above the sea."""
 
 
 HOME = GeoPoint(47.641468, -122.140165, 122.0)

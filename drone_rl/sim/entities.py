@@ -103,7 +103,6 @@ class VisualEntity(composer.Entity):
         self.geom: Any = self._mjcf_root.worldbody.add(
             "geom", name="geom", contype=0, conaffinity=0, **shape
         )
-        """The geom's `mjcf.Element`."""
 
     @property
     def mjcf_model(self) -> Any:
@@ -176,7 +175,6 @@ class Drone(composer.Entity):
         self.camera_settings = camera
         self._mjcf_root: Any = mjcf.RootElement(model=name)
         self.body: Any = self._mjcf_root.worldbody.add("body", name="body")
-        """The rigid body's `mjcf.Element`."""
         visual = {"group": BODY_GROUP, "contype": 0, "conaffinity": 0}
         hull = {"size": (size * 0.3, size * 0.18, size * 0.1), "mass": _MASS_KG, **visual}
         self.body.add("geom", name="hull", type="box", rgba=_LIGHT, **hull)

@@ -20,7 +20,6 @@ from drone_rl.utils.errors import InputError
 NUM_IDS = 256
 """Number of segmentation ids; the sky has 0."""
 _SEED = 42
-"""Seed of AirSim's colours."""
 
 
 @functools.cache
@@ -60,7 +59,6 @@ class ImageType(enum.IntEnum):
     """What a pixel holds, by AirSim's numbers."""
 
     SCENE = 0
-    """Colour."""
     DEPTH_PLANAR = 1
     """Distance along the camera's axis, metres."""
     DEPTH_PERSPECTIVE = 2
@@ -72,7 +70,6 @@ class ImageType(enum.IntEnum):
     SEGMENTATION = 5
     """Colour of the object's id, see `palette`."""
     SURFACE_NORMALS = 6
-    """Direction of the surface."""
 
     @property
     def modality(self) -> Modality:
@@ -92,7 +89,6 @@ class ImageRequest:
     camera: str | int = "front_center"
     """AirSim's name or number."""
     image_type: ImageType | int = ImageType.SCENE
-    """What its pixels hold."""
     as_float: bool = False
     """Whether pixels are numbers (`pixels_as_float`) instead of red, green and blue."""
 

@@ -13,7 +13,6 @@ from drone_rl.sim.dynamics.state import FlightState
 from drone_rl.utils.errors import InputError
 
 X, Y, HEADING, Z = range(4)
-"""The axes of goals."""
 
 
 class Mode(enum.IntEnum):
@@ -57,7 +56,6 @@ class Goals:
     modes: Modes
     """Of x (or roll), y (or pitch), heading and height."""
     values: Tensor  # (num_worlds, 4) float64
-    """In the units of the modes."""
     drift: Tensor | None = None  # (num_worlds, 4) float64
     """Rate of change of positions and headings, a second; 0 by default."""
 

@@ -20,7 +20,6 @@ class Dynamics(Protocol):
     """Functions that move drones. A subclass needs only `actions` and `step`."""
 
     actions: Actions
-    """The action set."""
     mount: str = "body"
     """Camera mount: "body", or "gimbal", which keeps cameras level."""
     is_random: bool = False

@@ -29,10 +29,8 @@ class Command:
     ticks: int
     modes: wp.vec4i
     goals: wp.array2d[wp.float64]
-    """See `Goals`."""
     drifts: wp.array2d[wp.float64]
     centers: wp.array2d[wp.vec3d]
-    """Of the obstacles of each environment."""
     half_sizes: wp.vec3
 
 

@@ -18,9 +18,7 @@ class Fleet:
 
     command: Command
     lead: wp.float64
-    """See `ActionSettings.move_lead`."""
     is_gimballed: int
-    """Whether cameras are kept level."""
     moves: wp.array2d[wp.float64]
     """Velocity of the target position, one row an action."""
     numbers: wp.array2d[wp.float64]

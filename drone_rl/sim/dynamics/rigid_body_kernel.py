@@ -18,13 +18,11 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class Airframe:
-    """The fields of `DynamicsSettings`, in single precision."""
+    """The fields of `DynamicsSettings`, in single precision and SI units."""
 
     tick: float
     weight: float
-    """Newtons."""
     per_mass: float
-    """One over the mass."""
     inertia: wp.vec3
     per_inertia: wp.vec3
     arm: float
@@ -72,12 +70,11 @@ def make_airframe(settings: DynamicsSettings) -> Airframe:
 
 @wp.struct
 class Motion:
-    """Of one drone."""
+    """Of one drone; the attitude is a quaternion (w, x, y, z)."""
 
     position: wp.vec3
     """From where the command began, metres: so that single precision loses nothing."""
     attitude: wp.vec4
-    """Quaternion (w, x, y, z)."""
     velocity: wp.vec3
     rates: wp.vec3
     """About the body's axes, radians a second."""

@@ -35,11 +35,9 @@ class BodyState(Batch):
     """The bodies of `num_worlds` drones. World frame (x forward, y left, z up), SI units."""
 
     position: Tensor  # (num_worlds, 3) float64
-    """Metres."""
     attitude: Tensor  # (num_worlds, 4) float64
     """Unit quaternion (w, x, y, z) that turns the body's frame into the world's."""
     velocity: Tensor  # (num_worlds, 3) float64
-    """Metres a second."""
     angular_velocity: Tensor  # (num_worlds, 3) float64
     """Radians a second; of drones in flight about the body's axes."""
 
@@ -69,7 +67,6 @@ class Obstacles:
     centers: Tensor  # (num_worlds, K, 3) float64
     """Their middles; far below the ground where one is absent."""
     half_sizes: tuple[float, float, float]
-    """Half their edges."""
 
 
 NOTHING, GROUND = -2, -1
@@ -81,7 +78,6 @@ CLIMB, GUST, SEED, TICKS, LOST, THING = 21, 22, 25, 26, 27, 28
 NORMAL, POINT, DEPTH, TIME = 29, 32, 35, 36
 """Index of the first number of each part of `FlightState.numbers`."""
 NUMBERS = 37
-"""Of a drone."""
 
 
 @dataclasses.dataclass
@@ -93,7 +89,6 @@ class Contact(Batch):
     normal: Tensor  # (num_worlds, 3) float64
     """Unit vector out of the thing."""
     point: Tensor  # (num_worlds, 3) float64
-    """Where, metres."""
     depth: Tensor  # (num_worlds,) float64
     """How far the ball around the drone reached into the thing, metres."""
     time: Tensor  # (num_worlds,) float64

@@ -123,9 +123,7 @@ class Appearance:
     colors: Mapping[SemanticClass, Colors] = dataclasses.field(default_factory=dict)
     """Of the geoms of a class, and of the sky."""
     ambient: Colors | None = None
-    """Ambient light."""
     sun: Colors | None = None
-    """Directional light."""
     sun_direction: Colors | None = None
     """Direction in which the sun's light travels, world frame; need not have length 1."""
     zenith: Colors | None = None

@@ -20,7 +20,6 @@ from drone_rl.utils.errors import InputError
 mujoco: Any = _mujoco
 """MuJoCo's bindings, which are untyped."""
 SUPPORTED = ("rgb", "gray", "depth", "segmentation")
-"""Modalities."""
 _BUILDING = threading.Lock()
 """Held while kernels are built: Warp builds one at a time."""
 _SKY_OPACITY = 0.0

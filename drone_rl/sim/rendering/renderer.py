@@ -20,14 +20,11 @@ from drone_rl.utils.errors import InputError
 
 @dataclasses.dataclass
 class Poses(Batch):
-    """Poses of everything that moves. Metres, world frame."""
+    """Poses of drones, quaternions (w, x, y, z), and positions of the task's props. Metres."""
 
     position: Tensor  # (num_worlds, 3)
-    """Of the drone."""
     attitude: Tensor  # (num_worlds, 4)
-    """Of the drone, unit quaternion (w, x, y, z)."""
     props: Tensor  # (num_worlds, num_props, 3)
-    """Positions of the task's props, in its order."""
 
 
 class Renderer(Protocol):

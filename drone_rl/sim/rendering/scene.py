@@ -31,7 +31,6 @@ class Scene:
     model: Any
     """A `mujoco.MjModel`, whose bindings are untyped."""
     semantic_classes: tuple[SemanticClass, ...]
-    """Of each geom."""
     props: tuple[int, ...]
     """Index of the task's prop that each geom belongs to; -1 for none."""
     sky: tuple[float, float, float]

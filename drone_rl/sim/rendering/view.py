@@ -19,7 +19,6 @@ _KINDS: dict[Modality, tuple[torch.dtype, tuple[int, ...]]] = {
     "segmentation": (torch.int32, ()),
     "normals": (torch.float32, (3,)),
 }
-"""Type and shape of a pixel."""
 LUMA = (0.299, 0.587, 0.114)
 """Weights of red, green and blue in a gray pixel (ITU-R BT.601), as in the original study."""
 WEIGHTS = tuple((torch.tensor(LUMA) / 255.0).tolist())

@@ -26,7 +26,6 @@ class Samples(Batch):
     times: Tensor  # (num_worlds, slots) float64
     """When each was taken, seconds; minus infinity for none."""
     rows: Tensor  # (num_worlds, slots, width) float64
-    """Values of each."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -35,7 +35,6 @@ class EndReason(enum.IntEnum):
     SIDE_BOUNDARY = 3
     STEP_LIMIT = 4
     LOST_CONTROL = 5
-    """The drone's motion diverged, see `BodyState.is_lost`: precedes all other reasons."""
 
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -215,7 +214,6 @@ class Flights:
     moves: wp.array[wp.vec3d]
     """One an action, in computer-vision mode."""
     fleet: Fleet
-    """The drones, where they fly."""
 
 
 @wp.func
@@ -262,9 +260,7 @@ class FlyingCubes:
         shape = (num_envs, settings.num_cubes)
         self._drones = torch.zeros(num_envs, 3, dtype=torch.float64)
         self.steps = torch.zeros(num_envs, dtype=torch.int32)
-        """Taken so far. Shape: (num_envs,)."""
         self.end_reasons = torch.zeros(num_envs, dtype=torch.int32)
-        """Shape: (num_envs,)."""
         cubes, self.flights, self.poses = Cubes(), Flights(), Poses()
         cubes.bounds = make_bounds(settings)
         self.state = SimpleNamespace(cubes=torch.zeros(*shape, 3, dtype=torch.float64))

@@ -36,7 +36,6 @@ class EndReason(enum.IntEnum):
     SIDE_BOUNDARY = 3
     STEP_LIMIT = 4
     LOST_CONTROL = 5
-    """The drone's motion diverged, see `BodyState.is_lost`: precedes all other reasons."""
 
 
 @dataclasses.dataclass
@@ -162,7 +161,8 @@ class Pillars(PropTask[FieldState]):
         """Apply the rules after a step.
 
         The distance to the line is worth 1, evenly; a touched pillar costs the penalty. Of several
-        end reasons a touched pillar comes first, then the side boundary, the line, the step limit.
+        end reasons a lost drone comes first, then a touched pillar, the side boundary, the line, the
+        step limit.
         """
         s, before, now = self.settings, state.drone, body.position
         hit = meets(s.touch_distance, before, now, state.pillars)

@@ -30,7 +30,6 @@ class State(Batch):
     """State of N environments; tasks add fields of their own."""
 
     body: BodyState
-    """The drones."""
     steps: Tensor  # (N,) int64
     """Steps taken in this episode."""
     end_reason: Tensor  # (N,) int64
@@ -93,7 +92,6 @@ class OracleRule(NamedTuple):
     act: Callable[..., Tensor]
     """Maps them, each of shape (N, *), to actions of shape (N,) and then the entry's."""
     actions: Actions
-    """The action set that it returns actions of."""
 
     def can_fly(self, actions: Actions) -> bool:
         """Return whether an action set has all parts that the oracle uses, by name."""

@@ -32,7 +32,6 @@ from drone_rl.sim.rendering.view import MODALITIES, Modality, View
 _BITS: Mapping[Modality, int] = MappingProxyType(
     {modality: getattr(structs, modality.upper()) for modality in MODALITIES}
 )
-"""The kernels' bit of each modality."""
 _VECTORS = MappingProxyType({"rgb": wp.vec3ub, "normals": wp.vec3})
 """Warp types of modalities with several numbers per pixel."""
 

@@ -12,7 +12,7 @@ DEPTH = wp.constant(4)
 DISTANCE = wp.constant(8)
 SEGMENTATION = wp.constant(16)
 NORMALS = wp.constant(32)
-"""Modalities, one bit each: their sum is rendered in one pass."""
+"""Modalities, one bit each: their sum, `View.what`, is rendered in one pass."""
 DISTANCES = wp.constant(4 | 8)
 """Modalities that are read from `Scratch.nearest`."""
 
@@ -31,15 +31,15 @@ def struct(cls: type[_Struct]) -> type[_Struct]:
 
 @struct
 class Camera:
-    """One camera of a view."""
+    """One camera of a view: its pose in its frame, and half sizes of its image plane at distance 1.
+
+    It looks along its own -z, with y up. Metres, quaternion (w, x, y, z).
+    """
 
     frame: int
     position: wp.vec3
-    """Metres, in its frame."""
     attitude: wp.vec4
-    """Quaternion (w, x, y, z) in its frame; the camera looks along its own -z, with y up."""
     half_width: float
-    """Of the image plane at distance 1."""
     half_height: float
 
 
@@ -60,7 +60,6 @@ class View:
     far: float
     """Metres along the axis beyond which nothing is rendered."""
     what: int
-    """Sum of modalities."""
 
 
 @struct
@@ -80,14 +79,13 @@ class Geoms:
 
 @struct
 class Poses:
-    """Poses of the frames."""
+    """Poses of the frames. Metres, quaternions (w, x, y, z). Shape: (num_worlds, num_frames)."""
 
     positions: wp.array2d[wp.vec3]
-    """Metres. Shape: (num_worlds, num_frames)."""
     attitudes: wp.array[wp.vec4]
-    """Unit quaternions (w, x, y, z) of the drones. Shape: (num_worlds,)."""
+    """Of the drones alone. Shape: (num_worlds,)."""
     scales: wp.array2d[float]
-    """Size of a frame's geoms relative to the model, or no array. Shape: as `positions`."""
+    """Size of a frame's geoms relative to the model, or no array."""
 
 
 @struct
@@ -154,43 +152,36 @@ class GeomView:
 
 @struct
 class PixelValue:
-    """Everything that a pixel shows except its distance."""
+    """Everything that a pixel shows except its distance; normals are 0 for the sky."""
 
     number: int
     """Geom index in the model; -1 for the sky."""
     face: int
     """See `intersection_kernel.ROUND`."""
     face_normal: wp.vec3
-    """In the geom's frame; zero for the sky."""
+    """In the geom's frame."""
     normal: wp.vec3
-    """World frame; zero for the sky."""
+    """World frame."""
     color: wp.vec3ub
     gray: float
-    """In [0, 1]."""
 
 
 @struct
 class SurfaceLight:
-    """Colours of a surface, 0 to 255 or more, and the fog before it."""
+    """Colours, 0 to 255 or more, of a surface in the sun and in shadow, and `Effects.fog`."""
 
     lit: wp.vec3
-    """In the sun."""
     shaded: wp.vec3
-    """In shadow."""
     fog: float
-    """See `Effects.fog`."""
     horizon: wp.vec3
-    """Of the sky."""
 
 
 @struct
 class TextureMap:
-    """A texture projected onto a face, for one camera."""
+    """A texture, see `Effects.starts` and `sides`, projected onto a face, for one camera."""
 
     start: int
-    """The first texel."""
     side: int
-    """Texels each way: a power of 2."""
     across: wp.vec3
     """Tiles across the texture per unit along a ray: dot product with the ray."""
     down: wp.vec3
@@ -222,7 +213,6 @@ class Job:
     """One image to render: the camera in its environment, and one worker's part of `Scratch`."""
 
     row: int
-    """Of the image in `Images`."""
     world: int
     view: View
     camera: Camera
