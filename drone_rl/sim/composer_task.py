@@ -209,10 +209,10 @@ class ComposerTask(composer.Task):
     def _found(self, physics: mjcf.Physics) -> BodyState:
         """Return the drone at MuJoCo's pose, which users may have set."""
         body = self.state.body
-        pose = [torch.from_numpy(np.array(p))[None] for p in self.drone.get_pose(physics)]
-        if torch.equal(pose[0], body.position) and _is_same_turn(pose[1], self._shown(body)):
-            return body
-        return body.moved(*pose)
+        place, turn = (torch.from_numpy(np.array(p))[None] for p in self.drone.get_pose(physics))
+        is_same_turn = 1.0 - float((turn * self._shown(body)).sum().abs()) < 1e-12  # up to sign
+        is_same = is_same_turn and torch.equal(place, body.position)
+        return body if is_same else body.moved(place, turn)
 
     def _shown(self, body: BodyState) -> torch.Tensor:
         """Return the cameras' attitude. Shape: (1, 4)."""
@@ -264,10 +264,6 @@ class ComposerTask(composer.Task):
 
     def _read(self, name: str) -> np.ndarray:
         return self.rules.info(self.state)[name][0].numpy()
-
-
-def _is_same_turn(one: torch.Tensor, other: torch.Tensor) -> bool:
-    return 1.0 - float((one * other).sum().abs()) < 1e-12
 
 
 def make_environment(

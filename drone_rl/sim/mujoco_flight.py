@@ -17,7 +17,7 @@ from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
-from drone_rl.sim.dynamics import BodyState, FlightState, Goals, Quadrotor
+from drone_rl.sim.dynamics import BodyState, FlightState, Quadrotor
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.forces_kernel import forces
 from drone_rl.sim.dynamics.state import heading_only
@@ -98,7 +98,11 @@ class MujocoFlight:
             self._mounted = places.copy(), turns.copy()
         self._state, self._goals, self._tick = body, None, 0
         self._is_grounded = False
-        self._put(physics)
+        numbers = body.numbers[0].numpy()
+        physics.data.qpos[self._pose] = numbers[fs.POSITION : fs.VELOCITY]
+        physics.data.qvel[self._motion] = numbers[fs.VELOCITY : fs.ROTORS]
+        physics.data.xfrc_applied[self._body] = 0.0
+        self._left = physics.data.qpos[self._pose].copy()
         self.level_cameras(physics)
 
     def found(self, physics: mjcf.Physics) -> FlightState:
@@ -112,14 +116,10 @@ class MujocoFlight:
 
     def command(self, physics: mjcf.Physics, action: Tensor) -> FlightState:
         """Begin an action, shape (1,), then the entry's; return the drone."""
-        body = self.found(physics)
-        self.tell(physics, body, self.quadrotor.steering.goals(body, action))
-        return body
-
-    def tell(self, physics: mjcf.Physics, body: FlightState, goals: Goals) -> None:
-        """Begin goals for a drone whose motion MuJoCo already has."""
-        self._state, self._goals, self._tick = body, goals, 0
+        self._state = body = self.found(physics)
+        self._goals, self._tick = self.quadrotor.steering.goals(body, action), 0
         self._left = physics.data.qpos[self._pose].copy()
+        return body
 
     def push(self, physics: mjcf.Physics) -> None:
         """Apply a tick's forces, before MuJoCo's step."""
@@ -133,9 +133,25 @@ class MujocoFlight:
         self._state, self._tick = body, self._tick + 1
 
     def moved(self, physics: mjcf.Physics) -> None:
-        """Record contacts, after MuJoCo's step."""
+        """Record contacts after MuJoCo's step; obstacles count more than the ground."""
         self._left = physics.data.qpos[self._pose].copy()
-        self._touch(physics)
+        data, row = physics.data, self._state.numbers[0]
+        self._is_grounded = False
+        for contact in data.contact[: data.ncon]:
+            things = [self._names.get(int(geom)) for geom in contact.geom]
+            known = [thing for thing in things if thing is not None]
+            if not known or contact.dist > 0.0:
+                continue
+            now = self._state.ticks.item() * self._settings.tick
+            self._is_grounded |= known[0] == fs.GROUND
+            if known[0] < 0 <= row[fs.THING] and row[fs.TIME] > now - self.timesteps[0]:
+                continue
+            sign = 1.0 if things[0] is not None else -1.0
+            row[fs.THING] = known[0]
+            row[fs.NORMAL : fs.NORMAL + 3] = torch.tensor(sign * contact.frame[:3])
+            row[fs.POINT : fs.POINT + 3] = torch.tensor(contact.pos)
+            row[fs.DEPTH] = -float(contact.dist)
+            row[fs.TIME] = now
 
     def finished(self, physics: mjcf.Physics) -> FlightState:
         """Return the drone at the end of a command."""
@@ -160,37 +176,10 @@ class MujocoFlight:
             mujoco.mju_mulQuat(quat, turn, turned)
             model.cam_pos[camera], model.cam_quat[camera] = place, quat
 
-    def _put(self, physics: mjcf.Physics) -> None:
-        numbers = self._state.numbers[0].numpy()
-        physics.data.qpos[self._pose] = numbers[fs.POSITION : fs.VELOCITY]
-        physics.data.qvel[self._motion] = numbers[fs.VELOCITY : fs.ROTORS]
-        physics.data.xfrc_applied[self._body] = 0.0
-        self._left = physics.data.qpos[self._pose].copy()
-
     def _rocking(self, physics: mjcf.Physics) -> NDArray:
         data, share = physics.data, _CALM / self._settings.tick
         turn = data.xmat[self._body].reshape(3, 3)
         return turn @ (share * np.array(self._settings.inertia) * data.qvel[self._motion][3:])
-
-    def _touch(self, physics: mjcf.Physics) -> None:
-        """Obstacles count more than the ground, as in `flight_kernel.touched`."""
-        data, row = physics.data, self._state.numbers[0]
-        self._is_grounded = False
-        for contact in data.contact[: data.ncon]:
-            things = [self._names.get(int(geom)) for geom in contact.geom]
-            known = [thing for thing in things if thing is not None]
-            if not known or contact.dist > 0.0:
-                continue
-            now = self._state.ticks.item() * self._settings.tick
-            self._is_grounded |= known[0] == fs.GROUND
-            if known[0] < 0 <= row[fs.THING] and row[fs.TIME] > now - self.timesteps[0]:
-                continue
-            sign = 1.0 if things[0] is not None else -1.0
-            row[fs.THING] = known[0]
-            row[fs.NORMAL : fs.NORMAL + 3] = torch.tensor(sign * contact.frame[:3])
-            row[fs.POINT : fs.POINT + 3] = torch.tensor(contact.pos)
-            row[fs.DEPTH] = -float(contact.dist)
-            row[fs.TIME] = now
 
 
 def _contact(settings: DynamicsSettings) -> dict[str, Any]:

@@ -137,8 +137,3 @@ class Velocities:
         """Return the goals until the next action. `action`: (num_worlds, 3)."""
         height = body.reference[:, 3:]
         return Goals(self.MODES, torch.cat([self.actions.to_rates(action), height], -1))
-
-
-def make_steering(settings: ActionSettings) -> Moves | Velocities:
-    """Return the steering of settings."""
-    return Moves(settings) if settings.kind == "moves" else Velocities(settings)

@@ -9,7 +9,7 @@ from torch import Tensor
 from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import flight_kernel
-from drone_rl.sim.dynamics.control import Goals, make_steering, rotor_goals
+from drone_rl.sim.dynamics.control import Goals, Moves, Velocities, rotor_goals
 from drone_rl.sim.dynamics.rigid_body_kernel import make_airframe
 from drone_rl.sim.dynamics.state import CLIMB, BodyState, FlightState, Obstacles
 from drone_rl.sim.rendering.devices import WorkerPool, on_torch_stream, start_warp
@@ -24,7 +24,8 @@ class Quadrotor:
     def __init__(self, settings: DynamicsSettings, actions: ActionSettings | None = None) -> None:
         """Take the drone's body, controller and air, and its actions (moves by default)."""
         self.settings = settings
-        self.steering = make_steering(actions or ActionSettings())
+        actions = actions or ActionSettings()
+        self.steering = Moves(actions) if actions.kind == "moves" else Velocities(actions)
         self.frame = make_airframe(settings)
         self.actions: Actions = self.steering.actions
         self.mount: str = settings.camera_mount

@@ -1,7 +1,7 @@
 """States of drones, at rest or in flight, and the obstacles around them."""
 
 import dataclasses
-from typing import Self
+from typing import Any, Self
 
 import torch
 from torch import Tensor
@@ -95,8 +95,25 @@ class Contact(Batch):
     """When, seconds of the episode."""
 
 
+def _columns(first: int, count: int) -> Any:
+    """Return a read-only property: some columns of `FlightState.numbers`, as a view."""
+    columns = slice(first, first + count)
+    return property(lambda state: state.numbers[:, columns])
+
+
 class FlightState(BodyState):
-    """`num_worlds` drones in flight: a row of numbers each, of which the properties are views."""
+    """`num_worlds` drones in flight: a row of numbers each, of which the attributes are views."""
+
+    position = _columns(POSITION, 3)
+    attitude = _columns(ATTITUDE, 4)
+    velocity = _columns(VELOCITY, 3)
+    angular_velocity = _columns(RATES, 3)
+    rotors: Tensor = _columns(ROTORS, 4)
+    """Fractions of full thrust: front right, rear left, front left, rear right. (N, 4)."""
+    reference: Tensor = _columns(REFERENCE, 4)
+    """Target of the controller: x, y, heading, z; metres and radians. Shape: (N, 4)."""
+    gust: Tensor = _columns(GUST, 3)
+    """Velocity of the air minus its mean, metres a second, world. Shape: (num_worlds, 3)."""
 
     def __init__(self, numbers: Tensor) -> None:
         """Take all numbers, see `POSITION` and following. Shape: (num_worlds, NUMBERS), float64."""
@@ -132,44 +149,9 @@ class FlightState(BodyState):
         return state.settled()
 
     @property
-    def position(self) -> Tensor:  # pyright: ignore[reportIncompatibleVariableOverride] (a view)
-        """Metres. Shape: (num_worlds, 3)."""
-        return self.numbers[:, POSITION : POSITION + 3]
-
-    @property
-    def attitude(self) -> Tensor:  # pyright: ignore[reportIncompatibleVariableOverride] (a view)
-        """Unit quaternion (w, x, y, z). Shape: (num_worlds, 4)."""
-        return self.numbers[:, ATTITUDE : ATTITUDE + 4]
-
-    @property
-    def velocity(self) -> Tensor:  # pyright: ignore[reportIncompatibleVariableOverride] (a view)
-        """Metres a second, world frame. Shape: (num_worlds, 3)."""
-        return self.numbers[:, VELOCITY : VELOCITY + 3]
-
-    @property
-    def angular_velocity(self) -> Tensor:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Radians a second about the body's axes. Shape: (num_worlds, 3)."""
-        return self.numbers[:, RATES : RATES + 3]
-
-    @property
     def heading(self) -> Tensor:
         """To the left of the world's x, radians. Shape: (num_worlds,)."""
         return heading_of(self.attitude)
-
-    @property
-    def rotors(self) -> Tensor:
-        """Fractions of full thrust: front right, rear left, front left, rear right. (N, 4)."""
-        return self.numbers[:, ROTORS : ROTORS + 4]
-
-    @property
-    def reference(self) -> Tensor:
-        """Target of the controller: x, y, heading, z; metres and radians. Shape: (N, 4)."""
-        return self.numbers[:, REFERENCE : REFERENCE + 4]
-
-    @property
-    def gust(self) -> Tensor:
-        """Velocity of the air minus its mean, metres a second, world. Shape: (num_worlds, 3)."""
-        return self.numbers[:, GUST : GUST + 3]
 
     @property
     def ticks(self) -> Tensor:

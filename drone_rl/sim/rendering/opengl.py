@@ -84,8 +84,10 @@ class OpenGlAppearance:
         changed = [self._write_sky(model, look, exposure)]
         changed += [self._write_class(model, c, look.textures.get(c)) for c in _TEXTURED]
         if upload:
-            for number in changed:
-                _upload(physics, number)
+            contexts: Any = physics.contexts
+            with contexts.gl.make_current() as call:
+                for number in changed:
+                    call.call(mujoco.mjr_uploadTexture, model.ptr, contexts.mujoco.ptr, number)
 
     def _light(self, model: Any, look: Appearance, exposure: float) -> None:
         lights = look.lights(1)
@@ -215,12 +217,6 @@ def _mip_level(image: NDArray[np.uint8], size: float) -> NDArray[np.uint8]:
     while side > 1 and 2.0 / side <= size:
         start, side = start + side * side, side // 2
     return rows[start : start + side * side].reshape(side, side, 3)
-
-
-def _upload(physics: mjcf.Physics, texture: int) -> None:
-    contexts: Any = physics.contexts
-    with contexts.gl.make_current() as call:
-        call.call(mujoco.mjr_uploadTexture, physics.model.ptr, contexts.mujoco.ptr, texture)
 
 
 def _row(value: Any) -> NDArray[np.float64]:

@@ -161,14 +161,16 @@ class Pillars(PropTask[FieldState]):
         """Apply the rules after a step.
 
         The distance to the line is worth 1, evenly; a touched pillar costs the penalty. Of several
-        end reasons a lost drone comes first, then a touched pillar, the side boundary, the line, the
-        step limit.
+        end reasons a lost drone precedes a touched pillar, the side boundary, line and step limit.
         """
         s, before, now = self.settings, state.drone, body.position
         hit = meets(s.touch_distance, before, now, state.pillars)
         touched = state.touched | (state.present & hit)
         new = dataclasses.replace(state, body=body, touched=touched, steps=state.steps + 1)
-        new.passed = state.passed | (now[:, :1] > self._passing(now))
+        passing = s.first_distance + s.spacing * torch.arange(s.num_rows, device=now.device)
+        passing = passing.to(now) + s.touch_distance
+        passing[-1] = s.finish - 1e-9  # the line
+        new.passed = state.passed | (now[:, :1] > passing)
         new.side, new.gap = self._sightings(new)
         new.end_reason = self._end_reason(new)
         progress = (now[:, 0].clamp(max=s.finish) - before[:, 0].clamp(max=s.finish)) / s.finish
@@ -187,14 +189,6 @@ class Pillars(PropTask[FieldState]):
         side[envs, rows] = side_of(turn, 0.5 * self.settings.step_length)
         gap[envs, rows] = width
         return side, gap
-
-    def _passing(self, like: Tensor) -> Tensor:
-        """Return the x beyond which each row is passed; of the last one, the line. (R,)."""
-        s = self.settings
-        x = s.first_distance + s.spacing * torch.arange(s.num_rows, device=like.device)
-        passing = x.to(like) + s.touch_distance
-        passing[-1] = s.finish - 1e-9
-        return passing
 
     def _end_reason(self, state: FieldState) -> Tensor:
         """Return the first reason that holds, from the last line of this upwards. (N,)."""

@@ -27,18 +27,14 @@ class Lanes:
 
         `PillarsSettings` refuses settings with which none is likely to be found.
         """
-        rows = self.draw_rows(random_state, self.settings.num_rows)
+        s = self.settings
+        rows, closed = np.empty((s.num_rows, s.row_size)), np.ones(s.num_rows, bool)
         for _ in range(MOST_TRIES):
+            rows[closed] = random_state.uniform(-s.spread, s.spread, (closed.sum(), s.row_size))
             closed = ~self.is_open(rows).any(-1)
             if not closed.any():
                 return rows
-            rows[closed] = self.draw_rows(random_state, int(closed.sum()))
         raise RuntimeError(f"no open field in {MOST_TRIES} drawings")
-
-    def draw_rows(self, random_state: np.random.RandomState, count: int) -> NDArray[np.float64]:
-        """Sample rows, open or not: the y of their pillars. Shape: (count, K)."""
-        spread = self.settings.spread
-        return random_state.uniform(-spread, spread, (count, self.settings.row_size))
 
     def within_field(self) -> NDArray[np.float64]:
         """Return the y of all lanes within the field, from right to left. Shape: (L,)."""

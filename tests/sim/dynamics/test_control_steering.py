@@ -5,10 +5,10 @@ import math
 import pytest
 import torch
 
-from drone_rl.config import ActionSettings
+from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.sim.actions import Move
-from drone_rl.sim.dynamics import FlightState, Mode
-from drone_rl.sim.dynamics.control import Moves, Velocities, make_steering
+from drone_rl.sim.dynamics import FlightState, Mode, Quadrotor
+from drone_rl.sim.dynamics.control import Moves, Velocities
 
 MOVES = ActionSettings(move_speed=4.0, move_lead=0.5)
 VELOCITY = ActionSettings(kind="velocity", forward_speed=4, sideways_speed=3, yaw_rate=90)

@@ -108,7 +108,9 @@ def test_sampled_fields_are_crossable():
 def test_open_rows_are_kept_and_fields_are_seeded():
     first, again = (NARROW_LANES.draw_field(np.random.RandomState(3)) for _ in range(2))
     np.testing.assert_array_equal(first, again)
-    drawn = NARROW_LANES.draw_rows(np.random.RandomState(3), NARROW.num_rows)
+    drawn = np.random.RandomState(3).uniform(
+        -NARROW.spread, NARROW.spread, (NARROW.num_rows, NARROW.row_size)
+    )
     is_open = NARROW_LANES.is_open(drawn).any(-1)
     assert is_open.any()
     np.testing.assert_array_equal(first[is_open], drawn[is_open])
