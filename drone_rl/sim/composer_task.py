@@ -66,9 +66,8 @@ class ComposerTask(composer.Task):
             distractors: Their number, if no appearance is given.
             appearance: Visual appearance, see `OpenGlAppearance`; the task's by default.
 
-        Raises:
-            InputError: A texture can't be read, camera or distractors do not fit, or dynamics with
-                actions of their own are given other ones.
+        Raises an `InputError` if a texture can't be read, camera or distractors do not fit, or
+        dynamics with actions of their own are given other ones.
         """
         self.rules = as_task(task)
         self.dynamics = make_dynamics(self.rules.make_dynamics, dynamics, actions)

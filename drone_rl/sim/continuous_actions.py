@@ -1,9 +1,8 @@
 """Continuous actions: speeds forward and sideways, and a yaw rate.
 
-An action is three numbers in [-1, 1]. Forward: 1 is full speed, -1 is none; there is no backward
-flight. Sideways: 1 is full speed to the left, -1 to the right. Yaw: 1 is the greatest rate to the
-left. A network's outputs are the means of three normal distributions, then their deviations, see
-`normal_of`; samples are squashed by tanh.
+An action is three numbers in [-1, 1]. Forward: 1 is full speed, -1 is none; sideways and yaw: 1 is
+the greatest speed or rate to the left, -1 to the right. Samples of normal distributions, see
+`normal_of`, are squashed by tanh.
 
 The parts of a wish are forward, left, right, and, where drones can turn, turn left and turn right.
 An action is left if it goes left at more than a third of full speed, and turns left at more than a

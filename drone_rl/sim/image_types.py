@@ -39,10 +39,7 @@ def palette() -> Tensor:
 
 
 def segmentation_ids(scene: Scene) -> Tensor:
-    """Return AirSim's ids of the geoms of a scene. Shape: (num_geoms,), int64.
-
-    An id follows from the letters of an object's name: "ground", "target_0", "obstacle_2".
-    """
+    """Return AirSim's ids of geoms, by the letters of their names. Shape: (num_geoms,), int64."""
     names = [semantic_class.name.lower() for semantic_class in scene.semantic_classes]
     return torch.tensor([(5 + sum(map(ord, name))) % NUM_IDS for name in names])
 
@@ -108,14 +105,11 @@ def images(
     height: int | None = None,
     width: int | None = None,
 ) -> list[Tensor]:
-    """Render several images of environments in a state, of one size, in one pass.
+    """Render several images of environments in a state, of one size, in one pass; see `pixels`.
 
     The default size, in pixels, is that of the policy's camera; cameras keep their vertical field
-    of view. Returns one tensor for each request; see `pixels` for types and shapes.
-
-    Raises:
-        InputError: There are no requests, a size is out of range, or the renderer does not support
-            a type.
+    of view. Raises an `InputError` if there are no requests, a size is out of range, or the
+    renderer does not support a type.
     """
     cameras = list(dict.fromkeys(str(request.camera) for request in requests))
     kinds = [ImageType(request.image_type) for request in requests]

@@ -45,10 +45,7 @@ class MujocoFlight:
         drone: Drone,
         obstacles: Sequence[mjcf.RootElement],
     ) -> None:
-        """Give a model mass, gravity and contacts, before it is compiled.
-
-        The drone is attached to the arena; obstacles are in the order of `Obstacles`.
-        """
+        """Give a model with an attached drone mass, gravity and contacts, before it is compiled."""
         self.quadrotor, self.drone = quadrotor, drone
         self._settings = settings = quadrotor.settings
         option = arena.mjcf_model.option

@@ -64,10 +64,7 @@ def stand(
 def draw_distractors(
     settings: AppearanceSettings, things: Things | None, source: np.random.RandomState | None
 ) -> list[float]:
-    """Sample `WIDTH` numbers of each distractor, alternately left and right on the ground.
-
-    Without a random stream, return the middles of all ranges.
-    """
+    """Sample `WIDTH` numbers of each distractor, left and right in turn; middles if not random."""
     most = most_distractors(settings)
     if not most or things is None:
         return []
@@ -150,10 +147,7 @@ class Appearances:
         self._now: Appearance | None = None
 
     def reset(self, worlds: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
-        """Sample new appearances of environments by indices, shape (k,).
-
-        Their random streams, before the task samples, are not advanced.
-        """
+        """Sample new appearances by indices, (k,); the given random streams are not advanced."""
         if not self.varies or not len(worlds):
             return
         rows = [self._draw(_distractors(state)) for state in random_states]
@@ -166,10 +160,7 @@ class Appearances:
         self.values, self._now = values.clone(), None
 
     def drawn(self, worlds: Tensor | None = None) -> Appearance | None:
-        """Return the sampled appearance, or None if it does not vary.
-
-        `worlds` are indices in order, all by default. Shape: (k,).
-        """
+        """Return appearances by ordered indices, (k,), all by default; None if they never vary."""
         if not self.varies:
             return None
         if worlds is not None and len(worlds) < len(self.values):

@@ -1,7 +1,4 @@
-"""Terms of reports: names of the goals, targets and actions of a task.
-
-`vocabulary.toml` has the terms of the built-in tasks.
-"""
+"""Terms of reports; `vocabulary.toml` has those of the built-in tasks."""
 
 import dataclasses
 import re
@@ -112,10 +109,7 @@ PILLARS = TaskVocabulary(**_BUILT_IN["pillars"])
 
 
 def terms_of(evidence: Mapping[str, Any]) -> TaskVocabulary:
-    """Return the terms of `verdict.json`, `explanation.json` or a card's evidence.
-
-    Raises an `InputError` if they are invalid.
-    """
+    """Return the terms of `verdict.json`, `explanation.json` or a card; raises `InputError`."""
     if "terms" not in evidence:
         return CUBES
     return TaskVocabulary(**_FIELDS.read(evidence["terms"], "terms"))
@@ -182,10 +176,7 @@ in Figs. 7 and 8."""
 
 
 def shown_actions(numbers: Mapping[str, Any]) -> ShownActions:
-    """Return the actions of `explanation.json`.
-
-    Raises an `InputError` if they are inconsistent or out of bounds.
-    """
+    """Return the actions of `explanation.json`; raises `InputError` if they are invalid."""
     if "actions" not in numbers:
         return SHOWN_MOVES
     given = _ACTION_FIELDS.read(numbers["actions"], "actions")

@@ -48,10 +48,7 @@ Modes = tuple[Mode, Mode, Mode, Mode]
 
 @dataclasses.dataclass(frozen=True)
 class Goals:
-    """Goals of the controllers of `num_worlds` drones, all in the same modes.
-
-    Raises an `InputError` if an axis has no such mode, or two that go together differ.
-    """
+    """Goals of drones' controllers, all in the same modes; invalid ones raise an `InputError`."""
 
     modes: Modes
     """Of x (or roll), y (or pitch), heading and height."""
@@ -86,10 +83,7 @@ class Goals:
         return torch.zeros_like(self.values) if self.drift is None else self.drift
 
     def reference_after(self, seconds: float, body: FlightState) -> Tensor:
-        """Return the references, see `FlightState`, of drones after a command of some seconds.
-
-        `body` is the command's result: its pose is the reference on axes without a target.
-        """
+        """Return `FlightState.reference` of drones, `body`, after a command of some seconds."""
         has_target = [mode is Mode.POSITION for mode in self.modes]
         has_target[HEADING] = self.modes[HEADING] is Mode.ANGLE
         there = self.values + seconds * self.drifts
@@ -102,10 +96,7 @@ def rotor_goals(rotors: Tensor) -> Goals:
 
 
 class Moves:
-    """The chapter's moves: each shifts the target position along one axis of the world.
-
-    The target is never farther from the drone, along either axis, than the lead.
-    """
+    """The chapter's moves: each shifts the target position, never farther away than the lead."""
 
     MODES = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
     actions = MOVES

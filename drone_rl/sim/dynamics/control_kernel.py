@@ -79,10 +79,9 @@ def rate_control(frame: Airframe, missing: wp.vec3) -> wp.vec3:
 
 @wp.func
 def mix(throttle: float, torque: wp.vec3) -> wp.vec4:
-    """Return each rotor's fraction of full thrust; torques take precedence over thrust.
+    """Return fractions of full thrust: front right, rear left, front left, rear right.
 
-    `throttle` is a fraction of all thrust, 0 to 1; `torque` is from `rate_control`. Rotors: front
-    right, rear left, front left, rear right.
+    `throttle` is a fraction of all thrust, 0 to 1; torques, see `rate_control`, take precedence.
     """
     front_right = throttle - torque[0] - torque[1] - torque[2]
     rear_left = throttle + torque[0] + torque[1] - torque[2]

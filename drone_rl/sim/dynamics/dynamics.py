@@ -39,12 +39,10 @@ class Dynamics(Protocol):
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> BodyState:
-        """Return the drones a control step later.
+        """Return the drones a control step later; `body` stays as it is.
 
-        Args:
-            body: The drones before.
-            action: One of `actions` for each. Shape: (num_worlds,), then that of `actions.entry`.
-            obstacles: Of each environment, if `needs_obstacles` and there are any.
+        `action` is one of `actions` for each, shape (num_worlds,), then that of `actions.entry`.
+        `obstacles` are given if `needs_obstacles` and there are any.
         """
         ...
 

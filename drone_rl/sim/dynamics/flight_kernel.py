@@ -244,10 +244,7 @@ def grounded(frame: rigid.Airframe, motion: rigid.Motion, lift: float) -> rigid.
 
 @wp.func
 def touched(frame: rigid.Airframe, flight: Flight, thing: int, overlap: rigid.Overlap) -> Touch:
-    """Return the contact to record of a drone that was pushed out of an overlap.
-
-    Obstacles take precedence over the ground, later contacts over earlier ones.
-    """
+    """Return the contact to record: obstacles precede the ground, later contacts earlier ones."""
     if flight.touch.thing >= 0 and thing < 0:
         return flight.touch
     now = Touch()

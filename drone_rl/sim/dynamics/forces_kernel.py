@@ -50,17 +50,10 @@ def push(
 def forces(
     frame: Airframe, body: FlightState, goals: Goals, tick: int
 ) -> tuple[FlightState, Tensor]:
-    """Return what moves drones in one tick, from the controllers of `Quadrotor.fly`.
+    """Return what moves drones in tick number `tick` of a command with some goals, on the CPU.
 
-    Args:
-        frame: The drones.
-        body: At the beginning of the tick, on the CPU.
-        goals: Since the command began.
-        tick: Number of this tick within the command.
-
-    Returns:
-        The drones with rotors, air and controllers a tick later, neither moved nor touched; and
-        force without weight and torque, world frame, shape (num_worlds, 6), float64.
+    These are the drones, with rotors, air and controllers a tick later, neither moved nor touched;
+    and force without weight and torque, world frame, shape (num_worlds, 6), float64.
     """
     start_warp("cpu")
     after = FlightState(torch.empty_like(body.numbers))

@@ -119,10 +119,7 @@ def thrust_of(frame: Airframe, rotors: wp.vec4) -> float:
 
 @wp.func
 def torque_of(frame: Airframe, rotors: wp.vec4) -> wp.vec3:
-    """Return the torque about the body's axes, newton metres.
-
-    Front right and rear left turn counterclockwise seen from above, and so push the body clockwise.
-    """
+    """Return the torque about the body's axes, newton metres, of rotors ordered as in `mix`."""
     lever = frame.arm * frame.rotor_thrust
     return wp.vec3(
         lever * (rotors[1] + rotors[2] - rotors[0] - rotors[3]),

@@ -13,10 +13,7 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 
 def heading_only(attitude: Tensor) -> Tensor:
-    """Return the nearest rotations about the world's z axis: attitudes without tilt.
-
-    Unit quaternions (w, x, y, z), (*, 4). A drone upside down has no heading and faces forward.
-    """
+    """Remove the tilt of unit quaternions (w, x, y, z), (*, 4); upside down becomes `LEVEL`."""
     w, z = attitude[..., 0], attitude[..., 3]
     length = (w * w + z * z).sqrt()
     zero, has_one = torch.zeros_like(length), length > 0.0

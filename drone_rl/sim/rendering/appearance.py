@@ -37,10 +37,7 @@ class Mounting:
 
 
 def moved(mounting: Mounting | None, offset: Tensor, turn: Tensor) -> Mounting:
-    """Translate a camera, then rotate it about itself, both in the frame it had before.
-
-    Shapes: (num_worlds, 3), metres, and quaternions (num_worlds, 4).
-    """
+    """Translate a camera, (num_worlds, 3), metres, then rotate it about itself, (num_worlds, 4)."""
     own = mounting or Mounting()
     before = torch.as_tensor(own.turn, dtype=offset.dtype).to(offset.device)
     there = torch.as_tensor(own.offset, dtype=offset.dtype).to(offset.device)

@@ -30,10 +30,7 @@ def check_device(device: str) -> None:
 
 @functools.cache
 def start_warp(device: str) -> None:
-    """Initialize Warp once; on a CPU, without its warnings about missing CUDA.
-
-    Raises an `InputError` if this machine has no such device.
-    """
+    """Initialize Warp once, on a CPU without warnings about CUDA; for errors see `check_device`."""
     check_device(device)
     quiet = wp.LOG_ERROR if device == "cpu" else wp.LOG_WARNING
     wp.config.log_level = max(wp.config.log_level, quiet)
@@ -77,10 +74,7 @@ class WorkerPool:
         self._executor = None if self.size == 1 else ThreadPoolExecutor(self.size, "render")
 
     def map_spans(self, first: int, last: int, work: Callable[[int, int, int], None]) -> None:
-        """Call `work(worker, begin, end)` for each worker's span of rows, and wait.
-
-        Rows from `first` up to, not including, `last` are split; ends of spans are exclusive, too.
-        """
+        """Call `work(worker, begin, end)` for each worker's span of [first, last), and wait."""
         length = -(-(last - first) // self.size)
         spans = [(i, min(i + length, last)) for i in range(first, last, max(length, 1))]
         if self._executor is None or len(spans) < 2:

@@ -66,10 +66,7 @@ class WarpRenderer:
     def render(
         self, view: View, poses: Poses, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
-        """Render environments, one pass per camera and modality; see `Renderer.render`.
-
-        Raises an `InputError` if the appearance has more than flat colours and light.
-        """
+        """See `Renderer.render`; appearances may have flat colours and light only."""
         if appearance is not None and not _is_supported(appearance):
             raise InputError(
                 "fog, shadows, textures, a sky of two colours, an exposure and other fields of "

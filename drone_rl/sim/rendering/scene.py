@@ -51,10 +51,7 @@ class Scene:
 
     @property
     def colors(self) -> NDArray[np.float32]:
-        """Red, green, blue and opacity of each geom, in [0, 1]. Shape: (num_geoms, 4).
-
-        As in MuJoCo, a geom with the default colour has its material's.
-        """
+        """Colours and opacity of geoms, or of their materials, in [0, 1]. Shape: (num_geoms, 4)."""
         model, colors = self.model, self.model.geom_rgba.copy()
         is_materials = (model.geom_matid >= 0) & (colors == _UNSET).all(1)
         colors[is_materials] = model.mat_rgba[model.geom_matid[is_materials]]

@@ -27,11 +27,7 @@ WEIGHTS = tuple((torch.tensor(LUMA) / 255.0).tolist())
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class View:
-    """Cameras that a renderer renders for each environment, all at one image size.
-
-    Raises an `InputError` if the size is out of range, nothing is requested, or a modality is
-    unknown.
-    """
+    """Cameras and modalities to render, all at one image size; invalid ones raise `InputError`."""
 
     cameras: tuple[str, ...]
     """Full names of cameras in the model, such as "drone/front_center"."""

@@ -186,10 +186,7 @@ class Magnetometer(Sensor[MagnetometerState, MagnetometerReading]):
 
 
 def dipole_field(place: Tensor) -> Tensor:
-    """Return the field of a dipole at Earth's centre, gauss along north, west and up.
-
-    A place is latitude and longitude in degrees, and altitude in metres. Shapes: (*, 3).
-    """
+    """Return the field of Earth's dipole, gauss, north, west, up, at `GeoPoint`s. (*, 3)."""
     latitude, longitude = torch.deg2rad(place[..., 0]), torch.deg2rad(place[..., 1])
     pole_latitude, pole_longitude = (math.radians(angle) for angle in POLE)
     apart = longitude - pole_longitude

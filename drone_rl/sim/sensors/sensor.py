@@ -69,10 +69,9 @@ class Sampling:
         )
 
     def read(self, samples: Samples, time: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the newest reading that is old enough to be delivered.
+        """Return the newest reading that is old enough to be delivered: its time and values.
 
-        When it was taken, seconds, minus infinity for none, shape (num_worlds,), and its values,
-        zeros for none, shape (num_worlds, width).
+        Times, (num_worlds,), are minus infinity and values, (num_worlds, width), zeros for none.
         """
         latest = (time - self.latency + _ROUNDING / self.rate)[:, None]
         newest = ((samples.times <= latest).sum(1) - 1).clamp(min=0)
@@ -137,10 +136,7 @@ def select(condition: Tensor, chosen: Tensor, other: Tensor) -> Tensor:
 
 
 def normal(like: Tensor, generator: Generator) -> Tensor:
-    """Sample standard normal numbers of the shape, type and device of a tensor.
-
-    A CPU generator gives the same numbers on every device.
-    """
+    """Sample standard normal numbers like a tensor; a CPU generator gives the same anywhere."""
     drawn = torch.randn(like.shape, dtype=like.dtype, generator=generator, device=generator.device)
     return drawn.to(like.device)
 

@@ -80,11 +80,7 @@ class SensorSuite:
         return SensorSuiteState(time=time, **states, collision=collision)
 
     def update(self, state: SensorSuiteState, body: BodyState, seconds: float) -> SensorSuiteState:
-        """Return the sensors some seconds after the last update, usually a tick.
-
-        Over a longer interval the accelerometer reports means, and of several due readings one is
-        taken.
-        """
+        """Return the sensors some seconds after the last update; call it once a tick."""
         time = state.time + seconds
         states = {
             name: getattr(self, name).update(getattr(state, name), body, time, stream)
@@ -111,10 +107,7 @@ def start_collisions(position: Tensor) -> CollisionState:
 
 
 def update_collisions(state: CollisionState, contact: Contact, position: Tensor) -> CollisionState:
-    """Record each drone's last contact, at a position in metres, world frame, if it is new.
-
-    It is new if its time or its object differs from the recorded one.
-    """
+    """Record contacts, at positions in metres, that differ from the last in time or object."""
     known = state.contact
     is_other = (contact.thing != known.thing) | (contact.time != known.time)
     is_new = (contact.thing != NOTHING) & is_other
@@ -127,10 +120,7 @@ def update_collisions(state: CollisionState, contact: Contact, position: Tensor)
 def read_collisions(
     state: CollisionState, worlds: Tensor | None = None
 ) -> tuple[CollisionState, CollisionState]:
-    """Return the last collisions, and the state with the flag cleared, as AirSim does on reading.
-
-    `worlds` are indices of the drones to read, all by default. Shape: (k,).
-    """
+    """Return the last collisions of drones by index, (k,), and the state with the flag cleared."""
     worlds = torch.arange(len(state), device=state.position.device) if worlds is None else worlds
     flag = state.has_collided.clone()
     flag[worlds] = False

@@ -183,10 +183,7 @@ def make_bounds(settings: TaskSettings) -> Bounds:
 
 
 def launch(kernel: Any, settings: TaskSettings, state: Any, *others: Tensor) -> None:
-    """Run `judge_all` or `start_all` over environments, with its `others`, shape (N,).
-
-    Writes "collected", "passed", "side" and "lateral" of a `WorldState`.
-    """
+    """Run `judge_all` or `start_all`, with its `others`, (N,), and write a `WorldState`."""
     device = state.cubes.device
     start_warp(str(device))
     vectors = [

@@ -107,10 +107,7 @@ class Pillars(PropTask[FieldState]):
 
     @property
     def entries(self) -> Mapping[str, Entry]:
-        """Rows passed, pillars touched, the fields `side` and `gap` of the state, and `rows`.
-
-        `rows` are the y of the pillars, metres, infinite where none stands.
-        """
+        """See `FieldState`; "rows" are the y of pillars, metres, infinite where none stands."""
         s = self.settings
         rows, pillars = s.num_rows, s.num_pillars
         return {

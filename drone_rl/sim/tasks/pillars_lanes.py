@@ -23,10 +23,7 @@ class Lanes:
         self.settings = settings
 
     def draw_field(self, random_state: np.random.RandomState) -> NDArray[np.float64]:
-        """Sample the y of all pillars of a field that can be crossed. Shape: (R, K).
-
-        `PillarsSettings` refuses settings with which none is likely to be found.
-        """
+        """Sample the y of all pillars of a field that can be crossed. Shape: (R, K)."""
         s = self.settings
         rows, closed = np.empty((s.num_rows, s.row_size)), np.ones(s.num_rows, bool)
         for _ in range(MOST_TRIES):

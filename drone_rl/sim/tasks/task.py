@@ -196,10 +196,7 @@ class Task(abc.ABC, Generic[S]):
         """
 
     def fused_rules(self, dynamics: Dynamics, num_envs: int) -> Any:
-        """Return the arrays on which the fused episode kernel runs the task, or None.
-
-        `collect_cubes_kernel.FlyingCubes` is an example with all attributes that the kernel needs.
-        """
+        """Return arrays for the fused episode kernel, such as `FlyingCubes`, or None."""
         del dynamics, num_envs
 
     def places(self, state: S) -> Tensor:
@@ -308,20 +305,14 @@ MAKERS: dict[type[BaseTaskSettings], Callable[[Any], Task[Any]]] = {}
 
 
 def register_task(settings: type[BaseTaskSettings], make: Callable[[Any], Task[Any]]) -> None:
-    """Register a task by the class of its settings and a function that takes such settings.
-
-    Raises an `InputError` if another task has its name.
-    """
+    """Register a task by its settings and what makes it; raises `InputError` for a taken name."""
     if TASKS.get(settings.name, settings) is not settings:
         raise InputError(f"there is a task called {settings.name}; give another name")
     TASKS[settings.name], MAKERS[settings] = settings, make
 
 
 def as_task(task: BaseTaskSettings | Task[Any] | str | None) -> Task[Any]:
-    """Return the task of settings or of a name such as "pillars"; cube collection by default.
-
-    Raises an `InputError` if the task is unknown.
-    """
+    """Return a task by settings or name, cube collection by default; raises `InputError`."""
     task = TaskSettings() if task is None else task
     if isinstance(task, str):
         task = settings_of(task, "task")()

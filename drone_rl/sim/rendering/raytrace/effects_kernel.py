@@ -84,10 +84,7 @@ def _cast_shadow(
 
 @wp.func
 def is_shadowed(geom_view: structs.GeomView, ray: wp.vec3, distance: float, sun: wp.vec3) -> bool:
-    """Return whether a geom shadows a point that is not on it, at a distance along a ray.
-
-    The ray is in the camera's frame, the direction of the sunlight in the geom's.
-    """
+    """Return whether a geom shadows a point of another at a distance along a ray, camera frame."""
     place = geom_view.eye + distance * (geom_view.into @ ray)
     along, _face = intersect_solid(geom_view.kind, geom_view.size, place, -sun)
     return along >= 0.0
