@@ -1,27 +1,14 @@
 """How a drone moves: the state of its body, and what an action makes of that."""
 
-from drone_rl.sim.dynamics.control import Goals, Mode
-from drone_rl.sim.dynamics.dynamics import (
-    ComputerVision,
-    Dynamics,
-    Kinematic,
-    draw_seeds,
-    make_dynamics,
-)
-from drone_rl.sim.dynamics.quadrotor import Quadrotor
-from drone_rl.sim.dynamics.state import BodyState, Contact, FlightState, Obstacles
-
-__all__ = [
-    "BodyState",
-    "ComputerVision",
-    "Contact",
-    "Dynamics",
-    "FlightState",
-    "Goals",
-    "Kinematic",
-    "Mode",
-    "Obstacles",
-    "Quadrotor",
-    "draw_seeds",
-    "make_dynamics",
-]
+from drone_rl.sim.dynamics.control import Goals as Goals
+from drone_rl.sim.dynamics.control import Mode as Mode
+from drone_rl.sim.dynamics.dynamics import ComputerVision as ComputerVision
+from drone_rl.sim.dynamics.dynamics import Dynamics as Dynamics
+from drone_rl.sim.dynamics.dynamics import Kinematic as Kinematic
+from drone_rl.sim.dynamics.dynamics import draw_seeds as draw_seeds
+from drone_rl.sim.dynamics.dynamics import make_dynamics as make_dynamics
+from drone_rl.sim.dynamics.quadrotor import Quadrotor as Quadrotor
+from drone_rl.sim.dynamics.state import BodyState as BodyState
+from drone_rl.sim.dynamics.state import Contact as Contact
+from drone_rl.sim.dynamics.state import FlightState as FlightState
+from drone_rl.sim.dynamics.state import Obstacles as Obstacles

@@ -1,20 +1,9 @@
 """Simulated sensors other than cameras: IMU, barometer, magnetometer, GPS and collisions."""
 
-from drone_rl.sim.sensors.instruments import (
-    BarometerReading,
-    Fix,
-    GpsReading,
-    ImuReading,
-    MagnetometerReading,
-)
-from drone_rl.sim.sensors.suite import CollisionState, SensorSuite
-
-__all__ = [
-    "BarometerReading",
-    "CollisionState",
-    "Fix",
-    "GpsReading",
-    "ImuReading",
-    "MagnetometerReading",
-    "SensorSuite",
-]
+from drone_rl.sim.sensors.instruments import BarometerReading as BarometerReading
+from drone_rl.sim.sensors.instruments import Fix as Fix
+from drone_rl.sim.sensors.instruments import GpsReading as GpsReading
+from drone_rl.sim.sensors.instruments import ImuReading as ImuReading
+from drone_rl.sim.sensors.instruments import MagnetometerReading as MagnetometerReading
+from drone_rl.sim.sensors.suite import CollisionState as CollisionState
+from drone_rl.sim.sensors.suite import SensorSuite as SensorSuite

@@ -1,32 +1,15 @@
 """Tasks: what stands in the scene, how an episode starts, its rules, and what counts as success."""
 
-from drone_rl.sim.tasks.collect_cubes import CollectCubes, FailureReplayTask
-from drone_rl.sim.tasks.pillars import Pillars
-from drone_rl.sim.tasks.task import (
-    DrawnState,
-    EndReason,
-    Goals,
-    Grid,
-    OracleRule,
-    Prop,
-    State,
-    Task,
-    as_task,
-    register_task,
-)
-
-__all__ = [
-    "CollectCubes",
-    "DrawnState",
-    "EndReason",
-    "FailureReplayTask",
-    "Goals",
-    "Grid",
-    "OracleRule",
-    "Pillars",
-    "Prop",
-    "State",
-    "Task",
-    "as_task",
-    "register_task",
-]
+from drone_rl.sim.tasks.collect_cubes import CollectCubes as CollectCubes
+from drone_rl.sim.tasks.collect_cubes import FailureReplayTask as FailureReplayTask
+from drone_rl.sim.tasks.pillars import Pillars as Pillars
+from drone_rl.sim.tasks.task import DrawnState as DrawnState
+from drone_rl.sim.tasks.task import EndReason as EndReason
+from drone_rl.sim.tasks.task import Goals as Goals
+from drone_rl.sim.tasks.task import Grid as Grid
+from drone_rl.sim.tasks.task import OracleRule as OracleRule
+from drone_rl.sim.tasks.task import Prop as Prop
+from drone_rl.sim.tasks.task import State as State
+from drone_rl.sim.tasks.task import Task as Task
+from drone_rl.sim.tasks.task import as_task as as_task
+from drone_rl.sim.tasks.task import register_task as register_task
