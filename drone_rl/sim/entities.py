@@ -149,11 +149,6 @@ class DroneObservables(composer.Observables):
     """What the drone can observe; a task enables what it needs."""
 
     @composer.observable
-    def position(self) -> observable.MJCFFeature:
-        """Position in metres, world frame. Shape: (3,)."""
-        return observable.MJCFFeature("xpos", self._entity.body)
-
-    @composer.observable
     def front_center(self) -> observable.MJCFCamera:
         """RGB image of the policy's camera. Shape: (height, width, 3), uint8."""
         camera = self._entity.camera_settings

@@ -97,8 +97,7 @@ def _color(
     if given is None:
         turn = number + number // len(PALETTE)  # otherwise all of a kind have one colour
         return torch.tensor(PALETTE[turn % len(PALETTE)], dtype=torch.float64)
-    ends = given if isinstance(given[0], tuple) else (given, given)
-    return torch.stack([_drawn(pair, source, ()) for pair in zip(*ends, strict=True)])
+    return torch.stack([_drawn(pair, source, ()) for pair in _pairs(given)])
 
 
 _OBJECTS = (SemanticClass.TARGET, SemanticClass.OBSTACLE)
@@ -171,8 +170,8 @@ class Appearances:
 
     def _draw(self, source: np.random.RandomState | None) -> list[float]:
         # New numbers are sampled last, so that earlier ones keep their values.
-        look, camera = _draw(self.settings, source), _draw_camera(self.settings, source)
-        return [*look, *camera, *draw_distractors(self.settings, self._things, source)]
+        look = _draw(self.settings, source)
+        return [*look, *draw_distractors(self.settings, self._things, source)]
 
     def _made(self, values: Tensor) -> Appearance:
         """Appearance of rows of `_draw`, or of one. Shape: (num_worlds, *) or (*)."""
@@ -259,13 +258,9 @@ def _draw(settings: AppearanceSettings, source: np.random.RandomState | None) ->
     drawn += [math.inf if fog is None else number(fog), *color(s.ground_color)]
     drawn += [*color(s.object_color or (0.0, 0.0, 0.0)), number(s.exposure)]
     drawn += [texture(s.ground_texture), number(s.ground_tile)]
-    return [*drawn, texture(s.object_texture), number(s.object_tile)]
-
-
-def _draw_camera(settings: AppearanceSettings, source: np.random.RandomState | None) -> list[float]:
-    ends = [*_pairs(settings.camera_offset), *_pairs(settings.camera_turn)]
-    ends.append(settings.camera_widening)
-    return [float(_drawn(pair, source, ())) for pair in ends]
+    drawn += [texture(s.object_texture), number(s.object_tile)]
+    camera = (*_pairs(s.camera_offset), *_pairs(s.camera_turn), s.camera_widening)
+    return [*drawn, *(float(_drawn(pair, source, ())) for pair in camera)]
 
 
 def _pairs(value: Any) -> list[Any]:
@@ -274,7 +269,7 @@ def _pairs(value: Any) -> list[Any]:
 
 
 def _distractors(random_state: np.random.RandomState) -> np.random.RandomState:
-    """A stream seeded by another one, which is not advanced."""
+    """Return a stream seeded by another one, which is not advanced."""
     ahead = copy.deepcopy(random_state)
     return np.random.RandomState([_APART, *ahead.randint(0, 2**32, 4, dtype=np.uint32)])
 

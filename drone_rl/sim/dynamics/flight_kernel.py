@@ -13,12 +13,8 @@ from drone_rl.sim.dynamics.control_kernel import Goal, climb_memory, climb_missi
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-_FASTEST = wp.constant(1000.0)
-"""Metres or radians a second beyond which a motion has diverged."""
-_FARTHEST = wp.constant(1.0e18)
-"""Square metres beyond which nothing is."""
-_WILDEST = wp.constant(10.0)
-"""Standard deviations that no gust is beyond."""
+_FASTEST, _FARTHEST, _WILDEST = wp.constant(1000.0), wp.constant(1.0e18), wp.constant(10.0)
+"""Metres or radians a second, square metres, and standard deviations of gusts that none exceeds."""
 
 
 @wp.struct

@@ -34,22 +34,14 @@ _DEGREES_PER_HOUR = math.radians(1.0) / 3600.0
 _DEGREES_PER_ROOT_HOUR = math.radians(1.0) / 60.0
 CONSTANT = (0.34252, -0.09805, -0.93438)
 """AirSim's magnetic field, that of Seattle, gauss, world frame: north, west, up."""
-EQUATOR_FIELD = 0.312
-"""The dipole's field at its equator, gauss."""
+EQUATOR_FIELD, EARTH_RADIUS = 0.312, 6371000.0
+"""Of the dipole: the field at its equator, gauss; the radius of Earth's sphere, metres."""
 POLE = (80.31, -72.62)
-"""Latitude and longitude of its northern pole, degrees."""
-EARTH_RADIUS = 6371000.0
-"""Of the sphere around the dipole, metres."""
-SEA_LEVEL_TEMPERATURE = 288.15
-"""Of the standard atmosphere, kelvin."""
-_LAPSE = 0.0065
-"""Kelvin per metre."""
-_EXPONENT = 5.255877
-"""Of pressure as a power of temperature: weight of air / (gas constant * lapse)."""
-_ATMOSPHERE_RADIUS = 6356766.0
-"""Metres, of the standard atmosphere, for heights under constant gravity."""
-_TOP = 11_000.0
-"""Height of the layer in which this holds, metres."""
+"""Latitude and longitude of the dipole's northern pole, degrees."""
+SEA_LEVEL_TEMPERATURE, _LAPSE, _TOP = 288.15, 0.0065, 11_000.0
+"""Of the standard atmosphere: kelvin, kelvin per metre, and the metres up to which this holds."""
+_EXPONENT, _ATMOSPHERE_RADIUS = 5.255877, 6356766.0
+"""Of pressure as a power of temperature; Earth's radius for heights under constant gravity."""
 
 
 @dataclasses.dataclass

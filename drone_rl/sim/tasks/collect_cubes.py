@@ -164,11 +164,10 @@ class CollectCubes(PropTask[WorldState]):
 
     def info(self, state: WorldState) -> dict[str, Tensor]:
         """See `entries`."""
+        same = {name: getattr(state, name).clone() for name in ("collected", "side", "lateral")}
         return {
             "cubes": state.collected.sum(-1, keepdim=True),
-            "collected": state.collected.clone(),
-            "side": state.side.clone(),
-            "lateral": state.lateral.clone(),
+            **same,
             "next_cube": state.next_cube[:, None],
             "end_reason": state.end_reason[:, None].clone(),
             "cube_positions": state.cubes.float(),
@@ -341,10 +340,8 @@ class FailureReplayTask(CollectCubes):
 
 def turn_towards(lateral: Tensor, tolerance: float) -> Tensor:
     """Return the move towards a cube so many metres to the left of the drone. Shape kept."""
-    move = torch.full_like(lateral, Move.FORWARD, dtype=torch.int64)
-    move[lateral > tolerance] = Move.LEFT
-    move[lateral < -tolerance] = Move.RIGHT
-    return move
+    moves = torch.tensor([Move.LEFT, Move.FORWARD, Move.RIGHT], device=lateral.device)
+    return moves[side_of(lateral, tolerance)]
 
 
 def inflated(boxes: NDArray[np.float64], metres: float, bound: float) -> NDArray[np.float64]:

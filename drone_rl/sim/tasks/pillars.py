@@ -206,11 +206,9 @@ class Pillars(PropTask[FieldState]):
 
     def info(self, state: FieldState) -> dict[str, Tensor]:
         """See `entries`."""
+        names = ("passed", "touched", "side", "gap")
         return {
-            "passed": state.passed.clone(),
-            "touched": state.touched.clone(),
-            "side": state.side.clone(),
-            "gap": state.gap.clone(),
+            **{name: getattr(state, name).clone() for name in names},
             "next_row": state.next_row[:, None],
             "end_reason": state.end_reason[:, None].clone(),
             "rows": state.rows.float(),
