@@ -113,7 +113,6 @@ class ComposerTask(composer.Task):
 
     def action_spec(self, physics: mjcf.Physics) -> specs.Array:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the spec of the dynamics' action."""
-        del physics
         entry = self.dynamics.actions.entry
         if entry.dtype == torch.int64 and entry.high is not None:
             return specs.DiscreteArray(int(entry.high) + 1, name="action")
@@ -148,7 +147,6 @@ class ComposerTask(composer.Task):
         self, physics: mjcf.Physics, action: np.ndarray, random_state: np.random.RandomState
     ) -> None:
         """Move the drone."""
-        del random_state
         given = torch.as_tensor(action).reshape(1, *self.dynamics.actions.entry.shape)
         given = given.to(self.dynamics.actions.entry.dtype)
         if self._flight is not None:
@@ -162,19 +160,16 @@ class ComposerTask(composer.Task):
         self, physics: mjcf.Physics, action: np.ndarray, random_state: np.random.RandomState
     ) -> None:
         """Apply the forces on a quadrotor."""
-        del action, random_state
         if self._flight is not None:
             self._flight.push(physics)
 
     def after_substep(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         """Record the contacts of a quadrotor."""
-        del random_state
         if self._flight is not None:
             self._flight.moved(physics)
 
     def after_step(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         """Apply the task's rules."""
-        del random_state
         flight = self._flight
         body = self._found(physics) if flight is None else flight.finished(physics)
         self.state, reward = self.rules.judge(self.state, body)
@@ -184,17 +179,14 @@ class ComposerTask(composer.Task):
 
     def get_reward(self, physics: mjcf.Physics) -> float:
         """Return the reward of the last step."""
-        del physics
         return self._reward
 
     def should_terminate_episode(self, physics: mjcf.Physics) -> bool:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return whether the episode has ended."""
-        del physics
         return int(self.state.end_reason) != 0
 
     def get_discount(self, physics: mjcf.Physics) -> float:
         """Return 0 if the episode terminated, else 1."""
-        del physics
         return 1.0 if int(self.state.end_reason) in (0, self.rules.truncation) else 0.0
 
     def _begin(self, random_state: np.random.RandomState) -> None:
@@ -250,7 +242,6 @@ class ComposerTask(composer.Task):
         self._physics = physics
 
     def _in_fog(self, picture: np.ndarray, random_state: np.random.RandomState) -> np.ndarray:
-        del random_state
         if self.look is None or self.look.fog is None:
             return picture
         model, camera = self._physics.model, self.drone.front_center.full_identifier

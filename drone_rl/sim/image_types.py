@@ -133,14 +133,10 @@ def pixels(
     focal: float = 1.0,
     ids: Tensor | None = None,
 ) -> Tensor:
-    """Convert a rendered image to an image type.
+    """Convert a rendered image of the type's modality, see `Renderer.render`, to an image type.
 
-    Args:
-        image_type: The type.
-        values: Image of its modality, see `Renderer.render`. Shape: (*, H, W) or (*, H, W, 3).
-        as_float: Whether to return numbers.
-        focal: Focal length in pixels, for disparity.
-        ids: Segmentation ids of the geoms; their indices by default. Shape: (num_geoms,).
+    `focal` is the focal length in pixels, for disparity. `ids` are the segmentation ids of the
+    geoms, (num_geoms,), by default their indices.
 
     Returns:
         As numbers, float32, shape (*, H, W): metres of depth, at most `FARTHEST`, also where

@@ -48,10 +48,7 @@ class Worlds:
         appearance: Appearance | None = None,
         distractors: int = 0,
     ) -> None:
-        """Create the environments; arguments and errors are as of `drone_rl.envs.DroneEnv`.
-
-        The default appearance is the task's; appearances position the distractors.
-        """
+        """Create the environments; arguments and errors are as of `drone_rl.envs.DroneEnv`."""
         self.appearance, self.distractors = appearance, distractors
         self._looked: tuple[Appearance, Appearance | None, Appearance] | None = None
         """The last appearance given, the default one, and both combined."""

@@ -33,7 +33,6 @@ class Dynamics(Protocol):
         Positions are metres, world frame, shape (num_worlds, 3), float64. Seeds, (num_worlds,),
         int64, are those of each episode's randomness; without them it has its mean.
         """
-        del seeds
         return BodyState.at_rest(position)
 
     def step(
@@ -62,7 +61,6 @@ class ComputerVision(Dynamics):
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> BodyState:
         """Return the drones after a move."""
-        del obstacles
         moves = self.moves.to(action.device)
         return body.moved(body.position + moves[action])
 
@@ -79,7 +77,6 @@ class Kinematic(Dynamics):
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> BodyState:
         """Return the drones a time step later; velocities are those of the step."""
-        del obstacles
         forward, left, rate = self._continuous.to_rates(action).unbind(-1)
         heading = heading_of(body.attitude)
         cos, sin, zero = heading.cos(), heading.sin(), torch.zeros_like(heading)
@@ -92,10 +89,6 @@ class Kinematic(Dynamics):
             velocity=velocity,
             angular_velocity=torch.stack([zero, zero, rate], -1),
         )
-
-
-_SEEDS = 2**31 - 1
-"""Number of seeds of random dynamics."""
 
 
 def make_dynamics(
@@ -125,4 +118,4 @@ def make_dynamics(
 
 def draw_seeds(random_states: Sequence[np.random.RandomState]) -> Tensor:
     """Sample a seed for each episode, after the task has sampled. Shape: (N,), int64."""
-    return torch.tensor([int(r.randint(_SEEDS)) for r in random_states], dtype=torch.int64)
+    return torch.tensor([int(r.randint(2**31 - 1)) for r in random_states], dtype=torch.int64)

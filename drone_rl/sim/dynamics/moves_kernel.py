@@ -6,7 +6,7 @@ from torch import Tensor
 
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.control import Goals, Moves
-from drone_rl.sim.dynamics.flight_kernel import Command, make_command, run
+from drone_rl.sim.dynamics.flight_kernel import Command, four, make_command, run
 from drone_rl.sim.dynamics.quadrotor import Quadrotor
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -49,17 +49,14 @@ def fly_move(fleet: Fleet, world: int, action: int) -> wp.vec3d:
 @wp.func
 def camera_attitude(fleet: Fleet, world: int) -> wp.vec4:
     """Return the attitude of a drone's cameras: of its body, or `heading_only` on a gimbal."""
-    numbers = fleet.numbers[world]
-    w = numbers[fs.ATTITUDE]
-    x = numbers[fs.ATTITUDE + 1]
-    y = numbers[fs.ATTITUDE + 2]
-    z = numbers[fs.ATTITUDE + 3]
     if fleet.is_gimballed == 1:
+        w = fleet.numbers[world, fs.ATTITUDE]
+        z = fleet.numbers[world, fs.ATTITUDE + 3]
         length = wp.sqrt(w * w + z * z)
         if length == wp.float64(0.0):
             return wp.vec4(1.0, 0.0, 0.0, 0.0)
         return wp.vec4(float(w / length), 0.0, 0.0, float(z / length))
-    return wp.vec4(float(w), float(x), float(y), float(z))
+    return four(fleet.numbers, world, fs.ATTITUDE)
 
 
 @wp.func

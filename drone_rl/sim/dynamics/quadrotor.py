@@ -68,7 +68,6 @@ class Quadrotor:
         arrays = [wp.from_torch(numbers.contiguous()) for numbers in (body.numbers, after)]
 
         def work(member: int, first: int, last: int) -> None:
-            del member
             inputs = [first, command, *arrays]
             wp.launch(flight_kernel.fly, last - first, inputs=inputs, device=str(device))
 

@@ -1,9 +1,8 @@
-"""A rigid body with rotors in moving air: forces, gusts, contacts, and a tick of motion.
+"""A rigid body with rotors in moving air, in SI units: forces, gusts, contacts, and its motion.
 
-SI units; world and body frame x forward, y left, z up. A tick is MuJoCo's semi-implicit Euler:
-velocities first, then the pose by the new velocities. Gusts have Dryden's longitudinal spectrum
-along each axis: white noise through a filter of first order whose time constant is the length scale
-over the airspeed (MIL-F-8785C). In contacts the drone is a ball, obstacles are boxes.
+World and body frame: x forward, y left, z up. A tick is MuJoCo's semi-implicit Euler: velocities
+first, then the pose. Gusts have Dryden's longitudinal spectrum along each axis: white noise through
+a filter of first order with time constant length scale over airspeed (MIL-F-8785C).
 """
 
 import math

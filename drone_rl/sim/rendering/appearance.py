@@ -30,8 +30,7 @@ class Mounting:
     offset: tuple[float, ...] | Tensor = (0.0, 0.0, 0.0)
     """Metres, drone frame. Shape: (3,) or (num_worlds, 3)."""
     turn: tuple[float, ...] | Tensor = (1.0, 0.0, 0.0, 0.0)
-    """Rotation about the camera's position, drone frame, quaternion (w, x, y, z). Shape: (4,) or
-    (num_worlds, 4)."""
+    """Rotation about the camera's position, as `offset`, quaternion (w, x, y, z). Shape: (*, 4)."""
     zoom: float | Tensor | None = None
     """Magnification at the centre of the image. Shape: () or (num_worlds,)."""
 
@@ -92,8 +91,7 @@ class Distractors:
     places: Tensor
     """Positions, metres, world frame. Shape: (num_worlds, count, 3) or (count, 3)."""
     sizes: Tensor
-    """Edges or diameters, metres; in the model they are 1 m. Shape: (num_worlds, count) or
-    (count,)."""
+    """Edges or diameters, metres; in the model 1 m. Shape: (num_worlds, count) or (count,)."""
     colors: Tensor
     """Shape: as that of `places`."""
 
@@ -124,8 +122,7 @@ class Appearance:
     sun_direction: Colors | None = None
     """Direction in which the sun's light travels, world frame; need not have length 1."""
     zenith: Colors | None = None
-    """Colour of the sky overhead. The sky's own colour is then that at the horizon, and the two are
-    blended by the sine of the elevation."""
+    """Colour of the sky overhead, blended with that of the horizon by the elevation's sine."""
     fog: Scalars | None = None
     """Visibility in metres: the distance at which 95% of the contrast to the horizon is lost
     (meteorological optical range, WMO-No. 8). Infinite for clear air."""
@@ -138,8 +135,7 @@ class Appearance:
     camera: Mounting | None = None
     """How a camera differs from the model's."""
     distractors: Distractors | None = None
-    """A renderer uses their colours and sizes; the caller appends their positions to those of the
-    task's props."""
+    """Their colours and sizes; the caller appends their positions to `Poses.props`."""
 
     @property
     def is_plain(self) -> bool:

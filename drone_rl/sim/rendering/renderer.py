@@ -36,12 +36,7 @@ class Renderer(Protocol):
     def render(
         self, view: View, poses: Poses, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
-        """Render any number of environments.
-
-        Args:
-            view: Cameras, image size and modalities.
-            poses: Where everything is.
-            appearance: Colours, light and effects; the model's own by default.
+        """Render any number of environments, in the model's own appearance by default.
 
         Returns:
             Images by modality. Shapes: (num_worlds, num_cameras, H, W, *). "rgb": uint8, 3 a pixel;

@@ -197,7 +197,6 @@ class Task(abc.ABC, Generic[S]):
 
     def fused_rules(self, dynamics: Dynamics, num_envs: int) -> Any:
         """Return arrays for the fused episode kernel, such as `FlyingCubes`, or None."""
-        del dynamics, num_envs
 
     def places(self, state: S) -> Tensor:
         """Return where the props are, metres; below the ground if absent. Shape: (N, P, 3)."""
@@ -205,7 +204,6 @@ class Task(abc.ABC, Generic[S]):
 
     def obstacles(self, state: S) -> Obstacles | None:
         """Return what the drones can collide with, for dynamics with contacts; None if nothing."""
-        del state
 
     def info(self, state: S) -> dict[str, Tensor]:
         """Return the true state of each environment, as `entries` describes. Shapes: (N, *)."""

@@ -1,8 +1,7 @@
 """The ray tracer on a CPU with effects: sky gradient, fog, shadows and textures.
 
-Solids cast shadows, each within the rectangle of pixels around it and its shadow; then each pixel
-is coloured. The sun is the scene's first light. Planes cast no shadows: they are visible from one
-side. Training without effects need not compile this module.
+Solids cast shadows of the sun, the scene's first light, each within the rectangle of pixels around
+it and its shadow; planes cast none. Training without effects need not compile this module.
 """
 
 import warp as wp
