@@ -15,16 +15,9 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
 )
+from drone_rl.sim import entities
 from drone_rl.sim.dynamics import BodyState, Dynamics, Quadrotor, draw_seeds, make_dynamics
 from drone_rl.sim.dynamics.state import heading_only
-from drone_rl.sim.entities import (
-    DRAW_DISTANCE,
-    SKY_COLOR,
-    Drone,
-    Field,
-    hide_drone,
-    make_distractors,
-)
 from drone_rl.sim.mujoco_flight import MujocoFlight
 from drone_rl.sim.rendering import Appearance, opengl
 from drone_rl.sim.rendering.opengl import OpenGlAppearance
@@ -32,7 +25,7 @@ from drone_rl.sim.rendering.scene import Scene, SemanticClass
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.visual_randomization import Appearances, things_of
 
-_SKY = 0.69 * DRAW_DISTANCE
+_SKY = 0.69 * entities.DRAW_DISTANCE
 """Metres behind which there is nothing: MuJoCo's sky is a ball of 0.7 of the drawing distance."""
 CONTROL_TIMESTEP_S = 0.1
 """Simulated time of one step, seconds. Computer-vision mode has no physics to depend on it."""
@@ -76,12 +69,12 @@ class ComposerTask(composer.Task):
         if appearance is not None and not appearance.is_minimal:
             self._looks = Appearances(appearance, 1, task=self.rules, camera=self.camera)
             distractors = self._looks.distractors
-        self._arena = Field()
+        self._arena = entities.Field()
         model: Any = self._arena.mjcf_model
         model.option.gravity = (0, 0, 0)
-        self.drone = Drone(size=self.rules.drone_size, camera=self.camera)
+        self.drone = entities.Drone(size=self.rules.drone_size, camera=self.camera)
         self._arena.add_free_entity(self.drone)
-        self._props = [*self.rules.make_props(), *make_distractors(distractors)]
+        self._props = [*self.rules.make_props(), *entities.make_distractors(distractors)]
         self._frames = [self._arena.attach(prop) for prop in self._props]
         for frame in self._frames:
             frame.mocap = True
@@ -102,7 +95,7 @@ class ComposerTask(composer.Task):
         self.set_timesteps(*(steps if self._flight is None else self._flight.timesteps))
 
     @property
-    def root_entity(self) -> Field:
+    def root_entity(self) -> entities.Field:
         """The arena."""
         return self._arena
 
@@ -127,7 +120,7 @@ class ComposerTask(composer.Task):
         for number, entity in [(-1, self.drone), *enumerate(self._props)]:
             for geom in physics.bind(entity.mjcf_model.find_all("geom")).element_id:
                 meanings[geom], props[geom] = entity.semantic_class, number
-        return Scene(model, tuple(meanings), tuple(props), SKY_COLOR)
+        return Scene(model, tuple(meanings), tuple(props), entities.SKY_COLOR)
 
     def initialize_episode(
         self, physics: mjcf.Physics, random_state: np.random.RandomState
@@ -247,7 +240,7 @@ class ComposerTask(composer.Task):
         model, camera = self._physics.model, self.drone.front_center.full_identifier
         number = model.name2id(camera, "camera")
         height, width = picture.shape[:2]
-        option = hide_drone()
+        option = entities.hide_drone()
         depth = self._physics.render(height, width, number, depth=True, scene_option=option)
         fovy = float(model.cam_fovy[number])
         return opengl.apply_fog(picture, depth, self.look, fovy, _SKY)

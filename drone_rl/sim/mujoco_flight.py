@@ -48,6 +48,8 @@ class MujocoFlight:
         """Give a model with an attached drone mass, gravity and contacts, before it is compiled."""
         self.quadrotor, self.drone = quadrotor, drone
         self._settings = settings = quadrotor.settings
+        self.timesteps = (settings.control_timestep, settings.tick)
+        """Seconds from action to action, and of a tick."""
         option = arena.mjcf_model.option
         option.set_attributes(gravity=(0.0, 0.0, -GRAVITY), integrator="Euler", cone="elliptic")
         option.flag.eulerdamp = "disable"
@@ -69,11 +71,6 @@ class MujocoFlight:
                 geom.set_attributes(contype=0, conaffinity=_OBSTACLE)
                 self._things[geom.full_identifier] = number
         self._mounted: tuple[NDArray, NDArray] | None = None
-
-    @property
-    def timesteps(self) -> tuple[float, float]:
-        """Seconds from action to action, and of a tick."""
-        return self._settings.control_timestep, self._settings.tick
 
     def begin(self, physics: mjcf.Physics, body: BodyState) -> None:
         """Set the drone's pose and motion at the start of an episode."""

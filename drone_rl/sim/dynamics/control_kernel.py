@@ -111,7 +111,7 @@ class Goal:
 
 
 @wp.func
-def angles_wanted(frame: Airframe, goal: Goal, motion: Motion, axes: Axes) -> wp.vec2:
+def _angles_wanted(frame: Airframe, goal: Goal, motion: Motion, axes: Axes) -> wp.vec2:
     """Return roll and pitch for goals of positions, velocities or angles."""
     if goal.modes[0] == Mode.ANGLE or goal.modes[0] == Mode.RATE:
         return wp.vec2(goal.values[0], goal.values[1])
@@ -155,9 +155,9 @@ def climb_missing(frame: Airframe, goal: Goal, motion: Motion) -> float:
 
 
 @wp.func
-def rates_wanted(frame: Airframe, goal: Goal, motion: Motion, axes: Axes) -> wp.vec3:
+def _rates_wanted(frame: Airframe, goal: Goal, motion: Motion, axes: Axes) -> wp.vec3:
     """Return rates about the body's axes for a goal."""
-    angles = angles_wanted(frame, goal, motion, axes)
+    angles = _angles_wanted(frame, goal, motion, axes)
     roll = wp.atan2(axes.left[2], axes.up[2])
     pitch = wp.asin(wp.clamp(-axes.forward[2], -1.0, 1.0))
     turn = 0.0
@@ -184,5 +184,5 @@ def rotors_wanted(frame: Airframe, goal: Goal, motion: Motion, axes: Axes, climb
     throttle = goal.values[3]
     if goal.modes[3] != Mode.THROTTLE:
         throttle = climb_control(frame, climb_missing(frame, goal, motion), climb)
-    rates = rates_wanted(frame, goal, motion, axes)
+    rates = _rates_wanted(frame, goal, motion, axes)
     return mix(wp.clamp(throttle, 0.0, 1.0), rate_control(frame, rates - motion.rates))

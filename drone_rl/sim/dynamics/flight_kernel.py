@@ -95,8 +95,7 @@ def is_finite(goal: Goal, start: wp.vec3d) -> bool:
 
 
 @wp.func
-def three(numbers: wp.array2d[wp.float64], world: int, first: int) -> wp.vec3:
-    """Return three of a drone's numbers."""
+def _three(numbers: wp.array2d[wp.float64], world: int, first: int) -> wp.vec3:
     return wp.vec3(
         float(numbers[world, first]),
         float(numbers[world, first + 1]),
@@ -125,11 +124,11 @@ def loaded(before: wp.array2d[wp.float64], world: int) -> Flight:
     flight.past = wp.int64(before[world, fs.TICKS])
     flight.motion = rigid.Motion()
     flight.motion.attitude = four(before, world, fs.ATTITUDE)
-    flight.motion.velocity = three(before, world, fs.VELOCITY)
-    flight.motion.rates = three(before, world, fs.RATES)
+    flight.motion.velocity = _three(before, world, fs.VELOCITY)
+    flight.motion.rates = _three(before, world, fs.RATES)
     flight.rotors = four(before, world, fs.ROTORS)
     flight.climb = float(before[world, fs.CLIMB])
-    flight.gust = three(before, world, fs.GUST)
+    flight.gust = _three(before, world, fs.GUST)
     flight.touch = Touch()
     flight.touch.thing = fs.NOTHING
     return flight
@@ -173,7 +172,7 @@ def force_on(frame: rigid.Airframe, flight: Flight, axes: rigid.Axes) -> wp.vec3
 
 
 @wp.func
-def ticked(frame: rigid.Airframe, goal: Goal, before: Flight) -> Flight:
+def _ticked(frame: rigid.Airframe, goal: Goal, before: Flight) -> Flight:
     """Return a flight a tick later, over bare ground."""
     axes = rigid.axes_of(before.motion.attitude)
     flight = driven(frame, goal, before, axes)
@@ -269,7 +268,7 @@ def write(after: wp.array2d[wp.float64], world: int, flight: Flight, ticks: int)
 
 
 @wp.func
-def write_touch(after: wp.array2d[wp.float64], world: int, flight: Flight, tick: float) -> None:
+def _write_touch(after: wp.array2d[wp.float64], world: int, flight: Flight, tick: float) -> None:
     """Write the last contact; a tick lasts so many seconds."""
     touch = flight.touch
     after[world, fs.THING] = wp.float64(touch.thing)
@@ -282,7 +281,7 @@ def write_touch(after: wp.array2d[wp.float64], world: int, flight: Flight, tick:
 
 
 @wp.func
-def write_reference(command: Command, after: wp.array2d[wp.float64], world: int) -> None:
+def _write_reference(command: Command, after: wp.array2d[wp.float64], world: int) -> None:
     """Write the reference after a command, see `Goals.reference_after`."""
     seconds = wp.float64(command.frame.tick) * wp.float64(command.ticks)
     for axis in range(4):
@@ -311,7 +310,7 @@ def run(
     for tick in range(command.ticks):
         flight.tick = tick
         goal.seconds = frame.tick * float(tick)
-        flight = ticked(frame, goal, flight)
+        flight = _ticked(frame, goal, flight)
         if near:
             flight = among(command, world, flight)
     for i in range(fs.NUMBERS):
@@ -322,9 +321,9 @@ def run(
             after[world, i] = wp.float64(0.0)
         return
     write(after, world, flight, command.ticks)
-    write_reference(command, after, world)
+    _write_reference(command, after, world)
     if flight.touch.thing != fs.NOTHING:
-        write_touch(after, world, flight, frame.tick)
+        _write_touch(after, world, flight, frame.tick)
 
 
 @wp.kernel

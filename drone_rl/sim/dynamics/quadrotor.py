@@ -56,11 +56,7 @@ class Quadrotor:
     def fly(
         self, body: FlightState, goals: Goals, ticks: int, obstacles: Obstacles | None = None
     ) -> FlightState:
-        """Return the drones after some ticks under their controllers; `body` stays as it is.
-
-        A tick lasts `DynamicsSettings.tick` seconds. `obstacles` are what the drones can collide
-        with besides the ground.
-        """
+        """Return the drones after ticks under their controllers; `body` stays as it is."""
         device, count = body.numbers.device, len(body)
         _load_kernels(str(device))
         after = torch.empty_like(body.numbers)

@@ -152,12 +152,12 @@ def advanced(frame: Airframe, motion: Motion, force: wp.vec3, torque: wp.vec3) -
     after.position = motion.position + tick * velocity
     after.velocity = velocity
     after.rates = rates
-    after.attitude = turned_by(motion.attitude, tick * rates)
+    after.attitude = _turned_by(motion.attitude, tick * rates)
     return after
 
 
 @wp.func
-def turned_by(attitude: wp.vec4, angle: wp.vec3) -> wp.vec4:
+def _turned_by(attitude: wp.vec4, angle: wp.vec3) -> wp.vec4:
     """Return an attitude of length 1 after a small rotation about the body's axes, radians."""
     square = wp.dot(angle, angle)
     c = 1.0 - square * (0.125 - square / 384.0)
@@ -245,7 +245,7 @@ def box_overlap(center: wp.vec3, radius: float, half: wp.vec3) -> Overlap:
 
 
 @wp.func
-def bounced(frame: Airframe, velocity: wp.vec3, normal: wp.vec3) -> wp.vec3:
+def _bounced(frame: Airframe, velocity: wp.vec3, normal: wp.vec3) -> wp.vec3:
     """Return the velocity after a contact: Newton's restitution and Coulomb's friction."""
     into = -wp.dot(velocity, normal)
     if into <= 0.0:
@@ -265,5 +265,5 @@ def pushed_out(frame: Airframe, motion: Motion, overlap: Overlap) -> Motion:
     """Return the motion of a drone that no longer overlaps a thing."""
     after = motion
     after.position = motion.position + overlap.depth * overlap.normal
-    after.velocity = bounced(frame, motion.velocity, overlap.normal)
+    after.velocity = _bounced(frame, motion.velocity, overlap.normal)
     return after

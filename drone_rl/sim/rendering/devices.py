@@ -39,11 +39,7 @@ def start_warp(device: str) -> None:
 
 
 def load_kernels(kernels: ModuleType | wp.Module) -> Future[None]:
-    """Compile a module's CPU kernels, or load them from Warp's cache, in a thread.
-
-    Compiling takes seconds: call this early, and wait for the result before the first launch. Later
-    calls return the same future.
-    """
+    """Compile or load CPU kernels in a thread, in seconds; later calls return the same future."""
     start_warp("cpu")
     with _LOADING:
         return _load_kernels(kernels, os.getpid())

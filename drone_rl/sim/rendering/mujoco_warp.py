@@ -44,11 +44,7 @@ class WarpRenderer:
     def __init__(
         self, scene: Scene, *, num_worlds: int, num_shards: int | None = None, device: str = "cpu"
     ) -> None:
-        """Start the renderer; the first image of a view allocates buffers and builds kernels.
-
-        See `RendererFactory`. Batches larger than `num_worlds` are rendered in turn; by default
-        there are as many shards as cores, and one on a GPU.
-        """
+        """See `RendererFactory`; batches larger than `num_worlds` are rendered in turn."""
         start_warp(device)
         self.scene = scene
         self.device = torch.device(device)

@@ -91,10 +91,7 @@ def load(name: str) -> NDArray[np.uint8]:
 
 
 def levels(texture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a texture, as `load` does, and its mip levels, each the 2 x 2 means of the one before.
-
-    All texels follow each other, from the finest level to a single one. Shape: (num_texels, 3).
-    """
+    """Return the texels of a texture and its mip levels, finest first. Shape: (num_texels, 3)."""
     level, rows = texture.astype(np.float32), [texture.reshape(-1, 3)]
     while len(level) > 1:
         half = len(level) // 2

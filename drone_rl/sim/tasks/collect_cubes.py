@@ -287,10 +287,7 @@ class CollectCubes(PropTask[WorldState]):
     def elsewhere(
         self, state: WorldState, camera: CameraSettings, generator: torch.Generator
     ) -> WorldState:
-        """Put all cubes at random positions in view, uniform over the image's columns.
-
-        Ahead up to the first cube at the start, sideways no farther than cubes ever are.
-        """
+        """Put all cubes at random positions in view, as far ahead and aside as cubes ever are."""
         s = self.settings
         draw = torch.rand(*state.cubes.shape, generator=generator, dtype=torch.float64)
         nearest, widest = s.touch_distance + s.cube_size, 2 * s.lateral_bound

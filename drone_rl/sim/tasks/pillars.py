@@ -13,14 +13,7 @@ from drone_rl.config import CameraSettings, PillarsSettings
 from drone_rl.sim.actions import MOVES, Entry, Move
 from drone_rl.sim.dynamics import BodyState, Obstacles
 from drone_rl.sim.entities import Pillar
-from drone_rl.sim.tasks.common import (
-    PropTask,
-    Side,
-    interval_classes,
-    number_classes,
-    place_in_view,
-    side_of,
-)
+from drone_rl.sim.tasks import common
 from drone_rl.sim.tasks.pillars_lanes import Lanes, meets, nearest_pillar
 from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State, register_task
 from drone_rl.sim.vocabulary import PILLARS
@@ -75,7 +68,7 @@ class RowGoals(Goals):
     """Metres between the pillars next to the nearest open lane; NaN if the row never came up."""
 
 
-class Pillars(PropTask[FieldState]):
+class Pillars(common.PropTask[FieldState]):
     """Get to the line and touch no pillar. The reward is progress, 1 for the whole way."""
 
     name = PillarsSettings.name
@@ -113,7 +106,7 @@ class Pillars(PropTask[FieldState]):
         return {
             "passed": Entry((rows,), torch.bool),
             "touched": Entry((pillars,), torch.bool),
-            "side": Entry((rows,), torch.int64, -1, len(Side) - 1),
+            "side": Entry((rows,), torch.int64, -1, len(common.Side) - 1),
             "gap": Entry((rows,), torch.float64),
             "next_row": Entry((1,), torch.int64, 0, rows),
             "end_reason": Entry((1,), torch.int64, 0, len(EndReason) - 1),
@@ -183,7 +176,7 @@ class Pillars(PropTask[FieldState]):
             return state.side, state.gap
         turn, width = self.lanes.nearest(state.rows[envs, rows], state.drone[envs, 1])
         side, gap = state.side.clone(), state.gap.clone()
-        side[envs, rows] = side_of(turn, 0.5 * self.settings.step_length)
+        side[envs, rows] = common.side_of(turn, 0.5 * self.settings.step_length)
         gap[envs, rows] = width
         return side, gap
 
@@ -223,9 +216,9 @@ class Pillars(PropTask[FieldState]):
 
     def classes(self, goals: RowGoals) -> Iterator[tuple[str, str, Tensor]]:
         """Yield classes by number of the row, side and width of the gap."""
-        yield from number_classes("row", goals)
+        yield from common.number_classes("row", goals)
         yield from super().classes(goals)
-        yield from interval_classes("gap", goals.gap, self.gap_edges())
+        yield from common.interval_classes("gap", goals.gap, self.gap_edges())
 
     def gap_edges(self) -> list[float]:
         """Return the bounds of the classes of gaps, metres, from the width of the drone upwards."""
@@ -280,7 +273,9 @@ class Pillars(PropTask[FieldState]):
 
     def stratum_at(self, offset: Tensor) -> Tensor:
         """Return the side of the way around it."""
-        sides = torch.tensor([Side.AHEAD, Side.LEFT, Side.RIGHT], device=offset.device)
+        sides = torch.tensor(
+            [common.Side.AHEAD, common.Side.LEFT, common.Side.RIGHT], device=offset.device
+        )
         return sides[self.needed(offset)]
 
     def grid(self, num_forward: int, num_lateral: int) -> Grid:
@@ -310,14 +305,11 @@ class Pillars(PropTask[FieldState]):
     def elsewhere(
         self, state: FieldState, camera: CameraSettings, generator: torch.Generator
     ) -> FieldState:
-        """Put all pillars at random positions in view, uniform over the image's columns.
-
-        Ahead up to the second row at the start, sideways up to two fields' width.
-        """
+        """Put all pillars at random positions in view, up to the second row, two fields wide."""
         s = self.settings
         draw = torch.rand(*state.pillars.shape[:2], 2, generator=generator, dtype=torch.float64)
         nearest, farthest = s.touch_distance + s.width, s.first_distance + s.spacing
-        away = place_in_view(draw, camera, nearest, farthest, 2 * s.spread).to(state.pillars)
+        away = common.place_in_view(draw, camera, nearest, farthest, 2 * s.spread).to(state.pillars)
         pillars = state.pillars.clone()
         pillars[..., :2] = state.drone[:, None, :2] + away
         return dataclasses.replace(state, pillars=pillars, present=torch.ones_like(state.present))

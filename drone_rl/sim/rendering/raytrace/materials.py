@@ -46,11 +46,7 @@ class MaterialsEncoder:
         self._last: tuple[Appearance | None, int, _Encoded] = (None, 1, (self._own, None))
 
     def encode(self, appearance: Appearance | None, num_worlds: int) -> _Encoded:
-        """Return materials, and effects if the appearance has any.
-
-        Raises:
-            InputError: A texture can't be read.
-        """
+        """Return materials, and effects if the appearance has any."""
         if appearance is None:
             return self._own, None
         if self._last[0] is not appearance or self._last[1] != num_worlds:

@@ -15,16 +15,9 @@ from torch import Tensor
 from drone_rl.sim.rendering.appearance import Appearance
 from drone_rl.sim.rendering.devices import WorkerPool, load_kernels, on_torch_stream, start_warp
 from drone_rl.sim.rendering.raytrace import effects_kernel, gpu_kernel, plain_kernel
+from drone_rl.sim.rendering.raytrace import scene as scenes
 from drone_rl.sim.rendering.raytrace import structs_kernel as structs
 from drone_rl.sim.rendering.raytrace.materials import MaterialsEncoder
-from drone_rl.sim.rendering.raytrace.scene import (
-    Cameras,
-    Frames,
-    PoseBuffers,
-    check_scene,
-    make_geoms,
-    make_view,
-)
 from drone_rl.sim.rendering.renderer import Poses
 from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import MODALITIES, Modality, View
@@ -67,19 +60,19 @@ class Raytracer:
         if the scene has unsupported geoms or lights, or there is no such device.
         """
         start_warp(device)
-        check_scene(scene)
+        scenes.check_scene(scene)
         self.scene, self.device = scene, torch.device(device)
         is_cpu = self.device.type == "cpu"
         self._launcher = CpuLauncher(num_worlds, num_shards) if is_cpu else GpuLauncher(device)
-        self._frames, self._materials = Frames(scene), MaterialsEncoder(scene, device)
-        self._views: dict[View, tuple[Cameras, structs.Geoms]] = {}
-        self._poses = PoseBuffers(self.device)
+        self._frames, self._materials = scenes.Frames(scene), MaterialsEncoder(scene, device)
+        self._views: dict[View, tuple[scenes.Cameras, structs.Geoms]] = {}
+        self._poses = scenes.PoseBuffers(self.device)
 
     def prepare(self, view: View) -> None:
         """Build the kernels' structs of a view; see `Renderer.prepare`."""
         if view not in self._views:
             encoded, geoms = self._encode(view)
-            self._views[view] = Cameras(view, encoded, self.device), geoms
+            self._views[view] = scenes.Cameras(view, encoded, self.device), geoms
 
     def render(
         self, view: View, poses: Poses, appearance: Appearance | None = None
@@ -117,8 +110,8 @@ class Raytracer:
         view.check_modalities(self, _BITS)
         device = str(self.device)
         with on_torch_stream(self.device):
-            encoded = make_view(self.scene, self._frames, view, device)
-            geoms = make_geoms(self.scene, self._frames, view.show_drone, device)
+            encoded = scenes.make_view(self.scene, self._frames, view, device)
+            geoms = scenes.make_geoms(self.scene, self._frames, view.show_drone, device)
         encoded.what = sum({_BITS[modality] for modality in view.modalities})
         return encoded, geoms
 
