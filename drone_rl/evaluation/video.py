@@ -102,7 +102,7 @@ def view(policy: Policy, *, greedy: bool = True, seed: int = 0, **how: Any) -> N
     def act(timestep: dm_env.TimeStep) -> int:
         del timestep
         state = shown.task.state.to(worlds.device)
-        pixels = worlds.render(state, appearance=shown.task.look)
+        pixels = worlds.render(state, appearance=shown.task.appearance)
         seen = env.transform(TensorDict({"pixels": pixels}, [1], device=worlds.device))
         with set_exploration_type(kind):
             return int(actor(seen)["action"])

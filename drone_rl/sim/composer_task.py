@@ -65,10 +65,10 @@ class ComposerTask(composer.Task):
         self.rules = as_task(task)
         self.dynamics = make_dynamics(self.rules.make_dynamics, dynamics, actions)
         self.camera = camera or CameraSettings()
-        self._looks = self._worn = None
+        self._sampler = self._opengl = None
         if appearance is not None and not appearance.is_minimal:
-            self._looks = Appearances(appearance, 1, task=self.rules, camera=self.camera)
-            distractors = self._looks.distractors
+            self._sampler = Appearances(appearance, 1, task=self.rules, camera=self.camera)
+            distractors = self._sampler.distractors
         self._arena = entities.Field()
         model: Any = self._arena.mjcf_model
         model.option.gravity = (0, 0, 0)
@@ -81,9 +81,9 @@ class ComposerTask(composer.Task):
         self._flight = self._make_flight()
         self._begin(np.random.RandomState(0))
         self._pixels = self.drone.observables.front_center.enabled = pixels  # pyright: ignore[reportAttributeAccessIssue]
-        self.look: Appearance | None = None
+        self.appearance: Appearance | None = None
         """Appearance of the running episode; None for the task's own."""
-        if self._looks is not None:
+        if self._sampler is not None:
             self._prepare()
         self._task_observables = {
             name: observable.Generic(lambda _, name=name: self._read(name))
@@ -126,14 +126,14 @@ class ComposerTask(composer.Task):
         self, physics: mjcf.Physics, random_state: np.random.RandomState
     ) -> None:
         """Put the drone at its origin and the props where they are sampled."""
-        if self._looks is not None:
-            self._looks.reset(torch.arange(1), [random_state])
-            self.look = self._looks.drawn() or self._looks.middle
+        if self._sampler is not None:
+            self._sampler.reset(torch.arange(1), [random_state])
+            self.appearance = self._sampler.drawn() or self._sampler.middle
         self._begin(random_state)
         if self._flight is not None:
             self._flight.begin(physics, self.state.body)
-        if self.look is not None:
-            self._wear(physics, self.look)
+        if self.appearance is not None:
+            self._apply(physics, self.appearance)
         self._show(physics)
 
     def before_step(
@@ -207,8 +207,8 @@ class ComposerTask(composer.Task):
         if self._flight is None:
             self.drone.set_pose(physics, body.position[0].numpy(), self._shown(body)[0].numpy())
         places = self.rules.places(self.state)[0]
-        if self.look is not None and self.look.distractors is not None:
-            places = torch.cat([places, self.look.distractors.expand(1).places[0]])
+        if self.appearance is not None and self.appearance.distractors is not None:
+            places = torch.cat([places, self.appearance.distractors.expand(1).places[0]])
         for frame, place in zip(self._frames, places, strict=True):
             physics.bind(frame).mocap_pos = place.numpy()
 
@@ -226,24 +226,24 @@ class ComposerTask(composer.Task):
         camera.render_flag_overrides = opengl.RENDER_FLAGS
         camera.corruptor = self._in_fog
 
-    def _wear(self, physics: mjcf.Physics, look: Appearance) -> None:
-        if self._worn is None:
+    def _apply(self, physics: mjcf.Physics, appearance: Appearance) -> None:
+        if self._opengl is None:
             things = things_of(self.rules)
             middle = 0.0 if things is None else (things.first + things.last) / 2
-            self._worn = OpenGlAppearance(self.compile(), middle)
-        self._worn.apply(physics, look, self._pixels)
+            self._opengl = OpenGlAppearance(self.compile(), middle)
+        self._opengl.apply(physics, appearance, self._pixels)
         self._physics = physics
 
-    def _in_fog(self, picture: np.ndarray, random_state: np.random.RandomState) -> np.ndarray:
-        if self.look is None or self.look.fog is None:
-            return picture
+    def _in_fog(self, image: np.ndarray, random_state: np.random.RandomState) -> np.ndarray:
+        if self.appearance is None or self.appearance.fog is None:
+            return image
         model, camera = self._physics.model, self.drone.front_center.full_identifier
         number = model.name2id(camera, "camera")
-        height, width = picture.shape[:2]
+        height, width = image.shape[:2]
         option = entities.hide_drone()
         depth = self._physics.render(height, width, number, depth=True, scene_option=option)
         fovy = float(model.cam_fovy[number])
-        return opengl.apply_fog(picture, depth, self.look, fovy, _SKY)
+        return opengl.apply_fog(image, depth, self.appearance, fovy, _SKY)
 
     def _read(self, name: str) -> np.ndarray:
         return self.rules.info(self.state)[name][0].numpy()

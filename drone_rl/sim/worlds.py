@@ -50,7 +50,7 @@ class Worlds:
     ) -> None:
         """Create the environments; arguments and errors are as of `drone_rl.envs.DroneEnv`."""
         self.appearance, self.distractors = appearance, distractors
-        self._looked: tuple[Appearance, Appearance | None, Appearance] | None = None
+        self._combined: tuple[Appearance, Appearance | None, Appearance] | None = None
         """The last appearance given, the default one, and both combined."""
         self.num_worlds = num_worlds
         self.task = as_task(task)
@@ -164,17 +164,17 @@ class Worlds:
         self, state: State, view: View, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
         """Render several cameras and modalities in one pass; see `Renderer.render`."""
-        look = self._look(appearance)
-        return self.renderer.render(view, self.poses(state, look), look)
+        combined = self._combine(appearance)
+        return self.renderer.render(view, self.poses(state, combined), combined)
 
-    def _look(self, appearance: Appearance | None) -> Appearance | None:
+    def _combine(self, appearance: Appearance | None) -> Appearance | None:
         """Return the combined appearance; the same object as before if nothing has changed."""
         if appearance is None:
             return self.appearance
-        known = self._looked
+        known = self._combined
         if known is None or known[0] is not appearance or known[1] is not self.appearance:
             whole = appearance.over(self.appearance)
-            self._looked = known = (appearance, self.appearance, whole)
+            self._combined = known = (appearance, self.appearance, whole)
         return known[2]
 
     def poses(self, state: State, appearance: Appearance | None = None) -> Poses:

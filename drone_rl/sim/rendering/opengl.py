@@ -70,27 +70,27 @@ class OpenGlAppearance:
         self._cameras = model.cam_pos.copy(), model.cam_quat.copy(), model.cam_fovy.copy()
         self._sizes = model.geom_size.copy()
 
-    def apply(self, physics: mjcf.Physics, look: Appearance, upload: bool) -> None:
+    def apply(self, physics: mjcf.Physics, appearance: Appearance, upload: bool) -> None:
         """Write the appearance of one environment; `upload` sends new textures to OpenGL."""
         model: Any = physics.model
-        exposure = 1.0 if look.exposure is None else float(look.exposure)
-        self._light(model, look, exposure)
-        for semantic_class, color in look.colors.items():
+        exposure = 1.0 if appearance.exposure is None else float(appearance.exposure)
+        self._light(model, appearance, exposure)
+        for semantic_class, color in appearance.colors.items():
             if semantic_class is not SemanticClass.SKY:
                 model.geom_rgba[self._scene.geoms(semantic_class), :3] = _row(color)
-        self._write_distractors(model, look)
-        if look.camera is not None:
-            self._mount(model, look.camera)
-        changed = [self._write_sky(model, look, exposure)]
-        changed += [self._write_class(model, c, look.textures.get(c)) for c in _TEXTURED]
+        self._write_distractors(model, appearance)
+        if appearance.camera is not None:
+            self._mount(model, appearance.camera)
+        changed = [self._write_sky(model, appearance, exposure)]
+        changed += [self._write_class(model, c, appearance.textures.get(c)) for c in _TEXTURED]
         if upload:
             contexts: Any = physics.contexts
             with contexts.gl.make_current() as call:
                 for number in changed:
                     call.call(mujoco.mjr_uploadTexture, model.ptr, contexts.mujoco.ptr, number)
 
-    def _light(self, model: Any, look: Appearance, exposure: float) -> None:
-        lights = look.lights(1)
+    def _light(self, model: Any, appearance: Appearance, exposure: float) -> None:
+        lights = appearance.lights(1)
         model.light_ambient[0] = 0.0  # or shadows would be black
         model.vis.headlight.active = 1
         model.vis.headlight.ambient = _row(lights["ambient"]) * exposure
@@ -99,12 +99,12 @@ class OpenGlAppearance:
         direction = _row(lights["sun_direction"])
         model.light_dir[0] = direction
         model.light_pos[0] = np.array([self._middle, 0.0, 0.0]) - _SHADOWS * direction
-        model.light_castshadow[0] = look.shadows is not None and bool(look.shadows)
+        model.light_castshadow[0] = appearance.shadows is not None and bool(appearance.shadows)
 
-    def _write_distractors(self, model: Any, look: Appearance) -> None:
+    def _write_distractors(self, model: Any, appearance: Appearance) -> None:
         geoms = self._scene.geoms(SemanticClass.DISTRACTOR)
-        if look.distractors is not None and geoms:
-            distractors = look.distractors.expand(1)
+        if appearance.distractors is not None and geoms:
+            distractors = appearance.distractors.expand(1)
             model.geom_rgba[geoms, :3] = distractors.colors[0].numpy()
             model.geom_size[geoms] = distractors.sizes[0, :, None].numpy() * self._sizes[geoms]
 
@@ -118,9 +118,9 @@ class OpenGlAppearance:
             half = np.tan(np.radians(angle[camera]) / 2) / float(mounting.zoom)
             model.cam_fovy[camera] = np.degrees(2 * np.arctan(half))
 
-    def _write_sky(self, model: Any, look: Appearance, exposure: float) -> int:
-        sky = look.colors[SemanticClass.SKY]
-        horizon, zenith = _row(sky), _row(sky if look.zenith is None else look.zenith)
+    def _write_sky(self, model: Any, appearance: Appearance, exposure: float) -> int:
+        sky = appearance.colors[SemanticClass.SKY]
+        horizon, zenith = _row(sky), _row(sky if appearance.zenith is None else appearance.zenith)
         colors = (np.clip(color * exposure, 0.0, 1.0) for color in (horizon, zenith))
         return self._write(model, "sky", sky_sides(_SIDE, *colors))
 
@@ -146,14 +146,14 @@ class OpenGlAppearance:
 
 
 def apply_fog(
-    image: NDArray[np.uint8], depth: NDArray, look: Appearance, fovy: float, sky: float
+    image: NDArray[np.uint8], depth: NDArray, appearance: Appearance, fovy: float, sky: float
 ) -> NDArray[np.uint8]:
     """Blend an image in clear air, shape (height, width, 3), with fog; the sky stays clear.
 
     Depth is in metres along the camera's axis, shape (height, width). `fovy` is the vertical field
     of view in degrees, `sky` the distance in metres at which the sky begins.
     """
-    visibility = np.inf if look.fog is None else float(look.fog)
+    visibility = np.inf if appearance.fog is None else float(appearance.fog)
     if visibility == np.inf:
         return image
     height, width = depth.shape
@@ -162,8 +162,8 @@ def apply_fog(
     across = ((np.arange(width) + 0.5) / width * 2 - 1) * half * width / height
     distance = depth * np.sqrt(1 + across[None, :] ** 2 + down[:, None] ** 2)
     clear = np.where(distance < sky, 0.05 ** (distance / visibility), 1.0)[..., None]
-    exposure = 1.0 if look.exposure is None else float(look.exposure)
-    horizon = 255.0 * np.clip(_row(look.colors[SemanticClass.SKY]) * exposure, 0.0, 1.0)
+    exposure = 1.0 if appearance.exposure is None else float(appearance.exposure)
+    horizon = 255.0 * np.clip(_row(appearance.colors[SemanticClass.SKY]) * exposure, 0.0, 1.0)
     return (clear * image + (1 - clear) * horizon).astype(np.uint8)
 
 
