@@ -181,17 +181,14 @@ class Worlds:
         """Return the poses to render, level on a gimbal; `appearance` positions distractors."""
         props = self.task.places(state)
         if self.distractors:
-            props = torch.cat([props, self._distractors(appearance, len(props)).to(props)], 1)
+            shown = None if appearance is None else appearance.distractors
+            hidden = torch.tensor([0.0, 0.0, -HIDDEN_DEPTH]).expand(len(props), self.distractors, 3)
+            places = hidden if shown is None else shown.expand(len(props)).places
+            props = torch.cat([props, places.to(props)], 1)
         attitude = state.body.attitude
         if self.dynamics.mount == "gimbal":
             attitude = heading_only(attitude)
         return Poses(state.body.position, attitude, props)
-
-    def _distractors(self, appearance: Appearance | None, count: int) -> Tensor:
-        beside = None if appearance is None else appearance.distractors
-        if beside is not None:
-            return beside.expand(count).places
-        return torch.tensor([0.0, 0.0, -HIDDEN_DEPTH]).expand(count, self.distractors, 3)
 
     def prepare(self, view: View | None = None) -> None:
         """Prepare the renderer for a view before the first image."""

@@ -218,12 +218,9 @@ class Pillars(common.PropTask[FieldState]):
         """Yield classes by number of the row, side and width of the gap."""
         yield from common.number_classes("row", goals)
         yield from super().classes(goals)
-        yield from common.interval_classes("gap", goals.gap, self.gap_edges())
-
-    def gap_edges(self) -> list[float]:
-        """Return the bounds of the classes of gaps, metres, from the width of the drone upwards."""
         narrow, step = self.settings.drone_size, self.settings.step_length
-        return [narrow, narrow + step, narrow + 3 * step]
+        edges = [narrow, narrow + step, narrow + 3 * step]
+        yield from common.interval_classes("gap", goals.gap, edges)
 
     # Explanations
 

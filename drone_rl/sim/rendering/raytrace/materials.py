@@ -6,7 +6,6 @@ from typing import Any, TypeAlias
 import numpy as np
 import torch
 import warp as wp
-from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.sim.rendering import textures
@@ -20,6 +19,8 @@ _EXTINCTION = math.log(20.0)
 """Optical depth of air in which 5% of a contrast is left."""
 _NO_TEXTURE = np.zeros((1, 3), np.uint8)
 """Keeps the array of texels from being empty."""
+_SHIFTS = np.array([1, 1 << 8, 1 << 16], np.uint32)
+"""Of red, green and blue bytes in one number."""
 
 _Encoded: TypeAlias = "tuple[structs.Materials, structs.Effects | None]"
 
@@ -120,18 +121,13 @@ class MaterialsEncoder:
         if names not in self._textures:
             images = [textures.load(name) for name in names]
             rows = [textures.levels(image) for image in images]
-            texels = _packed(np.concatenate([*rows, _NO_TEXTURE]))
+            texels = np.concatenate([*rows, _NO_TEXTURE]).astype(np.uint32)
             self._textures[names] = {
                 "sides": self._array([len(image) for image in images], int),
                 "starts": self._array(np.cumsum([0, *map(len, rows)])[:-1], int),
-                "texels": self._array(texels, wp.uint32),
+                "texels": self._array(texels @ _SHIFTS, wp.uint32),
             }
         return self._textures[names]
 
     def _array(self, values: object, dtype: type) -> Any:
         return wp.array(np.array(values), dtype=dtype, device=self._device)
-
-
-def _packed(colors: NDArray[np.uint8]) -> NDArray[np.uint32]:
-    """Red, green and blue bytes in one number each."""
-    return colors.astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], np.uint32)

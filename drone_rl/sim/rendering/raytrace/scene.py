@@ -185,7 +185,10 @@ class Cameras:
         attitude = torch.tensor(one["attitude"]).double()
         turn = torch.as_tensor(mounting.turn, dtype=torch.float64).cpu()
         one["attitude"] = product(turn, attitude).numpy()
-        rays, cosines = (_repeated(values, num_worlds) for values in (self._rays, self._cosines))
+        rays, cosines = (
+            v.expand(num_worlds, *v.shape[1:]) if len(v) == 1 else torch.cat([v] * num_worlds)
+            for v in (self._rays, self._cosines)
+        )
         if mounting.zoom is not None:
             for name in ("half_width", "half_height"):
                 one[name] /= _array(mounting.zoom)
@@ -216,11 +219,7 @@ class PoseBuffers:
 
     def __init__(self, device: torch.device) -> None:
         self._device = device
-        self._positions: Tensor = torch.empty(0, 0, 3)
-        self._attitudes: Tensor = torch.empty(0, 4)
-        self._scales: Tensor = torch.empty(0, 0)
-        self._encoded: Any = structs.Poses()
-        self._encoded_scales: Any = None
+        self._allocate(0, 0)
 
     def write(self, poses: Poses, distractors: Distractors | None = None) -> structs.Poses:
         """Return poses for the kernels; the next call overwrites them.
@@ -243,19 +242,11 @@ class PoseBuffers:
         self._positions = torch.zeros(count, frames, 3, device=self._device)
         self._attitudes = torch.zeros(count, 4, device=self._device)
         self._scales = torch.ones(count, frames, device=self._device)
-        self._encoded_scales = wp.from_torch(self._scales)
-        self._encoded = structs.Poses()
+        self._encoded_scales: Any = wp.from_torch(self._scales)
+        self._encoded: Any = structs.Poses()
         self._encoded.positions = wp.from_torch(self._positions, dtype=wp.vec3)
         self._encoded.attitudes = wp.from_torch(self._attitudes, dtype=wp.vec4)
 
 
 def _array(value: object) -> np.ndarray:
     return torch.as_tensor(value).cpu().numpy()
-
-
-def _repeated(values: Tensor, num_worlds: int) -> Tensor:
-    """Repeat the cameras' values for each environment, without a copy if there is one camera."""
-    rest = values.shape[1:]
-    if len(values) == 1:
-        return values.expand(num_worlds, *rest)
-    return values.repeat(num_worlds, *[1] * len(rest))
