@@ -1,7 +1,4 @@
-"""Entities of a scene, for dm_control: arena, cube, pillar, distractors, drone and cameras.
-
-Only the drone moves by physics; the others are visual, because touching them is a rule of the task.
-"""
+"""Entities of a scene, for dm_control; only the drone moves by physics, touching is a rule."""
 
 from typing import Any, NamedTuple
 

@@ -1,7 +1,6 @@
 """Visual randomization: sample the appearance of each environment when its episode begins.
 
-Each environment samples from a random stream of its own, so that episodes are the same for any
-appearance. Distractors stand on both sides of the path, as far ahead as the task's own props.
+Each environment samples from a stream of its own: episodes are the same for any appearance.
 """
 
 import copy
@@ -64,7 +63,10 @@ def stand(
 def draw_distractors(
     settings: AppearanceSettings, things: Things | None, source: np.random.RandomState | None
 ) -> list[float]:
-    """Sample `WIDTH` numbers of each distractor, left and right in turn; middles if not random."""
+    """Sample `WIDTH` numbers of each distractor, left and right of the path of the task's props.
+
+    Without a random stream, return the middles of all ranges.
+    """
     most = most_distractors(settings)
     if not most or things is None:
         return []

@@ -206,10 +206,7 @@ def among(command: Command, world: int, before: Flight) -> Flight:
 
 @wp.func
 def is_near(command: Command, world: int, flight: Flight) -> bool:
-    """Return whether the drone may touch any obstacle during the command, see `among`.
-
-    Rotors and weight gain no more speed than without air, and air no more than its own twice over.
-    """
+    """Return whether the drone, at its greatest speed, may touch any obstacle in the command."""
     frame = command.frame
     seconds = frame.tick * float(command.ticks)
     air = wp.length(frame.wind) + wp.length(flight.gust) + _WILDEST * frame.gusts

@@ -42,12 +42,8 @@ class Scene:
 
     def seen(self, show_drone: bool) -> list[int]:
         """Return the indices of the geoms that a view shows; invisible geoms are left out."""
-        geoms = zip(self.semantic_classes, self.colors[:, 3], strict=True)
-        return [
-            i
-            for i, (semantic_class, opacity) in enumerate(geoms)
-            if opacity > 0 and (show_drone or semantic_class is not SemanticClass.DRONE)
-        ]
+        hidden = [] if show_drone else self.geoms(SemanticClass.DRONE)
+        return [i for i in np.flatnonzero(self.colors[:, 3] > 0).tolist() if i not in hidden]
 
     @property
     def colors(self) -> NDArray[np.float32]:

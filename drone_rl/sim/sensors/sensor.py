@@ -97,11 +97,7 @@ Reading = TypeVar("Reading")
 
 
 class Sensor(abc.ABC, Generic[State, Reading]):
-    """A sensor of a batch of drones; its settings are AirSim's by default.
-
-    States are immutable. Noise comes from the caller's generator; it is drawn for all drones where
-    a reading of any is due.
-    """
+    """A sensor of a batch of drones; states are immutable, and noise is sampled for all at once."""
 
     sampling: Sampling
 

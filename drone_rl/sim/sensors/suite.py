@@ -40,10 +40,7 @@ class SensorSuiteState(Batch):
 
 
 class SensorSuite:
-    """All sensors of drones; each has its own random stream.
-
-    `suite.imu.read(state.imu, state.time)` returns readings; so do the other sensors.
-    """
+    """All sensors of drones, each with a random stream: `suite.imu.read(state.imu, state.time)`."""
 
     def __init__(
         self,

@@ -244,10 +244,7 @@ def move(flights: Flights, world: int, action: int) -> float:
 
 
 class FlyingCubes:
-    """Arrays of environments, rewritten for each batch of episodes; see `Task.fused_rules`.
-
-    The fused kernel reads `flights` (the states), `poses` (to render), `steps` and `end_reasons`.
-    """
+    """Arrays that the fused kernel reads: `flights`, `poses`, `steps` and `end_reasons`."""
 
     functions = (Flights, place, move)
     """Warp structure of the states; functions that write poses and that step an environment."""

@@ -98,9 +98,9 @@ class OracleRule(NamedTuple):
         return set(self.actions.names) <= set(actions.names)
 
     def decide(self, known: Sequence[Tensor], actions: Actions) -> Tensor:
-        """Return actions, (N,) and then the entry's, of a set that `can_fly` accepts.
+        """Return full-speed actions, (N,) and then the entry's, of a set that `can_fly` accepts.
 
-        They are found by name and have full speed. `known`: what it reads, each of shape (N, *).
+        `known` is what it reads, each of shape (N, *).
         """
         own = self.act(*known)
         if actions == self.actions:

@@ -1,7 +1,4 @@
-"""Geometry for the ray tracer's kernels: cameras, rays and geoms, each in its frame, and poses.
-
-Frame 0 is the world, frame 1 the drone, and each of the task's props has one from frame 2.
-"""
+"""The ray tracer's cameras, rays, geoms and poses, in frames: world 0, drone 1, props from 2."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
