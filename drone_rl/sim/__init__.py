@@ -1,1 +1,1 @@
-"""The world: what the drone and the cubes are, and the rules that hold between them."""
+"""The simulator: tasks, vehicle dynamics, rendering, sensors, and the dm_control task."""

@@ -1,4 +1,4 @@
-"""How a drone moves: the state of its body, and what an action makes of that."""
+"""Vehicle dynamics: states of drones, and the next state after an action."""
 
 from drone_rl.sim.dynamics.control import Goals as Goals
 from drone_rl.sim.dynamics.control import Mode as Mode

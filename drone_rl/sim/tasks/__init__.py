@@ -1,4 +1,4 @@
-"""Tasks: what stands in the scene, how an episode starts, its rules, and what counts as success."""
+"""Tasks: scenes, resets, rules, goals, and the changes that explanations make."""
 
 from drone_rl.sim.tasks.collect_cubes import CollectCubes as CollectCubes
 from drone_rl.sim.tasks.collect_cubes import FailureReplayTask as FailureReplayTask
