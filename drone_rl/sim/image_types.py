@@ -115,7 +115,8 @@ def images(
     kinds = [ImageType(request.image_type) for request in requests]
     wanted: list[Modality] = list(dict.fromkeys(kind.modality for kind in kinds))
     view, scene = worlds.view(cameras, wanted, height, width), worlds.scene
-    ids, rendered, found = segmentation_ids(scene), worlds.render_all(state, view), []
+    ids, rendered = segmentation_ids(scene), worlds.render_all(state, view)
+    found: list[Tensor] = []
     for request, kind in zip(requests, kinds, strict=True):
         number = cameras.index(str(request.camera))
         fov = float(scene.model.cam_fovy[scene.camera(view.cameras[number])])
