@@ -17,7 +17,7 @@ from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
-from drone_rl.sim.dynamics import BodyState, FlightState, Quadrotor
+from drone_rl.sim.dynamics import BodyState, FlightState, Goals, Quadrotor
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.forces_kernel import forces
 from drone_rl.sim.dynamics.state import heading_only
@@ -110,10 +110,14 @@ class MujocoFlight:
 
     def command(self, physics: mjcf.Physics, action: Tensor) -> FlightState:
         """Begin an action, shape (1,), then the entry's; return the drone."""
-        self._state = body = self.found(physics)
-        self._goals, self._tick = self.quadrotor.steering.goals(body, action), 0
-        self._left = physics.data.qpos[self._pose].copy()
+        body = self.found(physics)
+        self.set_goals(physics, body, self.quadrotor.steering.goals(body, action))
         return body
+
+    def set_goals(self, physics: mjcf.Physics, body: FlightState, goals: Goals) -> None:
+        """Begin goals for a drone whose motion MuJoCo already has."""
+        self._state, self._goals, self._tick = body, goals, 0
+        self._left = physics.data.qpos[self._pose].copy()
 
     def push(self, physics: mjcf.Physics) -> None:
         """Apply a tick's forces, before MuJoCo's step."""

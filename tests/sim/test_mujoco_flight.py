@@ -57,7 +57,7 @@ class Both:
     def fly(self, goals, ticks):
         for first in range(0, ticks, 33):
             self.here = self.drone.fly(self.here, goals, min(33, ticks - first), self.obstacles)
-        self.flight.tell(self.physics, self.there, goals)
+        self.flight.set_goals(self.physics, self.there, goals)
         for _ in range(ticks):
             self.flight.push(self.physics)
             self.physics.step()
