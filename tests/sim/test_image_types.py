@@ -122,11 +122,11 @@ def test_disparity_is_the_offset_between_two_cameras(worlds):
     state = worlds.state[torch.tensor([0])]
     cube = worlds.task.places(state)[0, 0]
     state.body.position[0] = cube - torch.tensor([5.0, 0.0, 0.0])
-    names = object_names(worlds.scene)
-    ids = torch.tensor([255 if name == "target_0" else 0 for name in names])
-    kinds = ImageType.SEGMENTATION, ImageType.DISPARITY_NORMALIZED
-    requests = [ImageRequest(camera, kind, as_float=True) for camera in "01" for kind in kinds]
-    seen, share, aside, _ = images(worlds, state, requests, height=90, width=150, ids=ids)
+    size = {"height": 90, "width": 150}
+    share = image(worlds, state, "0", ImageType.DISPARITY_NORMALIZED, as_float=True, **size)
+    views = [worlds.view(name, "segmentation", **size) for name in ("front_center", "front_right")]
+    geom = worlds.scene.props.index(0)
+    seen, aside = (worlds.render(state, view) == geom for view in views)
     middle, other = (frame[0, 45].nonzero().float().mean() for frame in (seen, aside))
     face = 5.0 - 0.4 - 1.25
     assert share[0, 45, 75].item() == pytest.approx(75 * 0.25 / face / 150, rel=1e-4)

@@ -53,5 +53,6 @@ def test_velocity_actions_use_the_heading_frame_and_keep_height():
 
 
 def test_settings_select_the_steering():
-    assert isinstance(make_steering(MOVES), Moves)
-    assert make_steering(VELOCITY).actions.names[3] == "turn left"
+    flight = DynamicsSettings(mode="simple_flight")
+    assert isinstance(Quadrotor(flight, MOVES).steering, Moves)
+    assert Quadrotor(flight, VELOCITY).actions.names[3] == "turn left"

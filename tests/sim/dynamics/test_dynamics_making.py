@@ -25,7 +25,7 @@ VELOCITY = ActionSettings(kind="velocity")
 @pytest.mark.parametrize("dynamics", [None, COMPUTER_VISION, DynamicsSettings(mass=0.5)])
 @pytest.mark.parametrize("actions", [None, MOVES_SETTINGS, ActionSettings(move_speed=1.0)])
 def test_computer_vision_moves_use_the_tasks_step(dynamics, actions):
-    made = make_dynamics(TASK, dynamics, actions)
+    made = make_dynamics(TASK.make_dynamics, dynamics, actions)
     assert type(made) is ComputerVision and made.step_length == 0.5
     assert (made.mount, made.is_random, made.needs_obstacles) == ("body", False, False)
 
@@ -33,19 +33,19 @@ def test_computer_vision_moves_use_the_tasks_step(dynamics, actions):
 def test_quadrotor_uses_dynamics_and_action_settings(monkeypatch):
     floating(monkeypatch)
     slow = ActionSettings(move_speed=1.0)
-    made = make_dynamics(TASK, FLIGHT, slow)
+    made = make_dynamics(TASK.make_dynamics, FLIGHT, slow)
     assert isinstance(made, Floating) and (made.settings, made.action_settings) == (FLIGHT, slow)
-    assert make_dynamics(TASK, FLIGHT).action_settings == MOVES_SETTINGS
+    assert make_dynamics(TASK.make_dynamics, FLIGHT).action_settings == MOVES_SETTINGS
 
 
 def test_computer_vision_velocities_last_one_control_step():
-    made = make_dynamics(TASK, COMPUTER_VISION, VELOCITY)
+    made = make_dynamics(TASK.make_dynamics, COMPUTER_VISION, VELOCITY)
     assert type(made) is Kinematic and made.timestep == COMPUTER_VISION.control_timestep
     assert made.actions == ContinuousActions.of(VELOCITY)
 
 
 def test_velocities_are_supported_by_the_quadrotor():
-    made = make_dynamics(TASK, FLIGHT, VELOCITY)
+    made = make_dynamics(TASK.make_dynamics, FLIGHT, VELOCITY)
     assert type(made) is Quadrotor and made.actions == ContinuousActions.of(VELOCITY)
 
 

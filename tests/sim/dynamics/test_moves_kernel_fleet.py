@@ -29,9 +29,4 @@ def test_fleet_copies_states():
 
 
 def test_computer_vision_mode_has_no_fleet_states():
-    assert FlyingFleet(3, None).fleet.numbers.shape == (0, 37)
-
-
-def test_velocity_actions_are_not_supported():
-    assert FlyingFleet.knows(Quadrotor(FLIGHT))
-    assert not FlyingFleet.knows(Quadrotor(FLIGHT, ActionSettings(kind="velocity")))
+    assert make_fleet(None, torch.zeros(0, 37).double()).numbers.shape == (0, 37)

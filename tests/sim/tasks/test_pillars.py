@@ -312,10 +312,6 @@ def test_next_target_without_present_pillars_is_their_number(settings, field):
     assert task.remember(info)["next_target"] == 4
 
 
-def test_gap_classes_start_at_the_drone_size():
-    assert Pillars().gap_edges() == [0.8, 1.8, 3.8]
-
-
 def test_classes_of_rows(settings):
     goals = RowGoals(
         reached=torch.tensor([[True, False]]),
