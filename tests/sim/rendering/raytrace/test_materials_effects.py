@@ -27,14 +27,14 @@ def sceneries():
 
 
 def test_effects_default_to_none(sceneries):
-    encoded = sceneries.encode(Appearance(), ZENITH)
+    encoded = sceneries.encode_effects(Appearance(), ZENITH)
     assert encoded.zenith.numpy().tolist() == [[51, 127, 255], [0, 0, 0]]
     assert encoded.fog.numpy().tolist() == [0, 0] and encoded.shadows.numpy().tolist() == [0, 0]
     assert (encoded.texture.numpy() == -1).all() and len(encoded.sides) == 0
 
 
 def test_fog_is_encoded_as_extinction_per_meter(sceneries):
-    encoded = sceneries.encode(Appearance(fog=torch.tensor([100.0, math.inf])), ZENITH)
+    encoded = sceneries.encode_effects(Appearance(fog=torch.tensor([100.0, math.inf])), ZENITH)
     assert encoded.fog.numpy().tolist() == pytest.approx([math.log(20) / 100, 0.0])
 
 
@@ -42,7 +42,7 @@ def test_textures_are_stored_once(sceneries):
     ground = Texture(images=("grid", "bricks"), size=4.0, choice=torch.tensor([1, -1]))
     target = Texture(images=("bricks",), size=torch.tensor([0.5, 2.0]))
     appearance = Appearance(textures={SemanticClass.GROUND: ground, SemanticClass.TARGET: target})
-    encoded = sceneries.encode(appearance, ZENITH)
+    encoded = sceneries.encode_effects(appearance, ZENITH)
     assert encoded.texture.numpy().tolist() == [[1, 1, -1], [-1, 1, -1]]
     assert encoded.tiles.numpy().tolist() == [[0.25, 2.0, 0.0], [0.25, 0.5, 0.0]]
     assert encoded.sides.numpy().tolist() == [256, 256]
