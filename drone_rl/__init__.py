@@ -4,6 +4,8 @@ Public names are imported when they are first used, so that `import drone_rl` is
 """
 
 import importlib
+import re
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drone_rl.utils.imports import import_quietly, register, when_imported
@@ -84,61 +86,9 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_PLACES = {
-    "verdicts.dynamics_sweep": ("Bodies", "bodies"),
-    "verification.chances": ("Chances", "chances"),
-    "verification.check": ("Check", "check"),
-    "verdicts.coverage": ("Coverage",),
-    "policies.environment": ("make_env",),
-    "evaluation.evaluate": ("Evaluation", "evaluate"),
-    "explanations.explain": ("Explanations", "explain"),
-    "verdicts.onnx_export": ("export_onnx",),
-    "policies.external_policy": ("ForeignPolicy", "policy_from"),
-    "verdicts.judge": ("Judgement", "Judgements", "judge"),
-    "verification.places": ("Places", "places"),
-    "policies.policy": ("Policy", "load_policy"),
-    "verification.provable": ("train_until_proved",),
-    "verification.prove": ("Proof", "load_proof", "prove"),
-    "robustness.shifts": ("Shifts", "shifts"),
-    "training.run_folder": ("Training",),
-    "training.train": ("train",),
-    "envs.gymnasium.environments": ("DroneWorld", "DroneWorlds"),
-    "envs.sb3.worlds": ("Sb3Worlds",),
-    "explanations.settings": ("ExplainSettings",),
-    "flight.commands.command": ("FlightFuture", "PilotError"),
-    "flight.commands.pilot": ("Pilot", "Sticks"),
-    "flight.commands.state": ("PilotState", "Sensors", "Trajectory"),
-    "flight.commands.path_following": ("Drivetrain", "YawMode"),
-    "policies.sb3": ("Sb3Logits", "Sb3Trunk"),
-    "config.commands": ("BodiesSettings", "EvaluateSettings", "JudgeSettings", "ShiftSettings"),
-    "config.verification": (
-        "ChanceSettings",
-        "CheckSettings",
-        "PlacesSettings",
-        "ProvableSettings",
-        "ProveSettings",
-    ),
-    "config.registry": (
-        "register_collector",
-        "register_learner",
-        "register_network",
-        "register_returns",
-        "register_transform",
-    ),
-    "sim.tasks": ("register_task",),
-    "config.training": ("TrainSettings", "TrainerSettings"),
-    "sim.image_types": ("ImageRequest", "ImageType"),
-    "config": (
-        "ActionSettings",
-        "CameraSettings",
-        "DynamicsSettings",
-        "PillarsSettings",
-        "TaskSettings",
-    ),
-    "config.sensors": ("SensorSettings",),
-    "utils.errors": ("InputError",),
-}
-_HOMES = {name: f"drone_rl.{module}" for module, names in _PLACES.items() for name in names}
+# the imports above are for type checkers, and the list of public names
+_FOUND = re.findall(r"^    from (\S+) import (\w+) as \2$", Path(__file__).read_text(), re.M)
+_HOMES = {name: module for module, name in _FOUND}
 
 __all__ = [*_HOMES]  # pyright: ignore[reportUnsupportedDunderAll] (aliases above are public)
 
