@@ -4,16 +4,9 @@ Without it everything works, only slower. `drone_rl.collectors.speedups` is the 
 imports it. Each `try_create` returns an implementation, or the reasons why there is none.
 """
 
-from drone_rl.acceleration.direct_collector import DirectCollector, DirectStream
-from drone_rl.acceleration.fused_collector import FusedCollector
-from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
-from drone_rl.acceleration.inference_kernel import BatchedInference
-
-__all__ = [
-    "ActivationCache",
-    "BatchedInference",
-    "DirectCollector",
-    "DirectStream",
-    "FusedCollector",
-    "FusedNetwork",
-]
+from drone_rl.acceleration.direct_collector import DirectCollector as DirectCollector
+from drone_rl.acceleration.direct_collector import DirectStream as DirectStream
+from drone_rl.acceleration.fused_collector import FusedCollector as FusedCollector
+from drone_rl.acceleration.fused_network import ActivationCache as ActivationCache
+from drone_rl.acceleration.fused_network import FusedNetwork as FusedNetwork
+from drone_rl.acceleration.inference_kernel import BatchedInference as BatchedInference

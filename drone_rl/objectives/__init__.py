@@ -1,29 +1,13 @@
 """Returns, their estimators, and the loss that learns from them."""
 
-from drone_rl.objectives.estimators import (
-    Advantages,
-    BatchNormalised,
-    LeaveOneOut,
-    LinearRamp,
-    RewardToGo,
-    Standardised,
-    SuccessScaled,
-    TimeBaseline,
-    TotalReward,
-)
-from drone_rl.objectives.reinforce import ReinforceLoss
-from drone_rl.objectives.return_estimator import ReturnEstimator
-
-__all__ = [
-    "Advantages",
-    "BatchNormalised",
-    "LeaveOneOut",
-    "LinearRamp",
-    "ReinforceLoss",
-    "ReturnEstimator",
-    "RewardToGo",
-    "Standardised",
-    "SuccessScaled",
-    "TimeBaseline",
-    "TotalReward",
-]
+from drone_rl.objectives.estimators import Advantages as Advantages
+from drone_rl.objectives.estimators import BatchNormalised as BatchNormalised
+from drone_rl.objectives.estimators import LeaveOneOut as LeaveOneOut
+from drone_rl.objectives.estimators import LinearRamp as LinearRamp
+from drone_rl.objectives.estimators import RewardToGo as RewardToGo
+from drone_rl.objectives.estimators import Standardised as Standardised
+from drone_rl.objectives.estimators import SuccessScaled as SuccessScaled
+from drone_rl.objectives.estimators import TimeBaseline as TimeBaseline
+from drone_rl.objectives.estimators import TotalReward as TotalReward
+from drone_rl.objectives.reinforce import ReinforceLoss as ReinforceLoss
+from drone_rl.objectives.return_estimator import ReturnEstimator as ReturnEstimator

@@ -1,38 +1,15 @@
 """Training: the loop, its components and callbacks, and the folder of a run."""
 
-from drone_rl.training import actor_critic, ray_workers  # they connect parts with their settings
-from drone_rl.training.callbacks import (
-    Callback,
-    CheckpointCallback,
-    CsvCallback,
-    LoggerCallback,
-    Progress,
-    ProgressCallback,
-)
-from drone_rl.training.learners import (
-    ActorCriticLearner,
-    Learner,
-    NotANumberError,
-    ReinforceLearner,
-)
-from drone_rl.training.trainer import Trainer
-from drone_rl.utils.checkpoint import check_weights, load_checkpoint, save_checkpoint
-
-__all__ = [
-    "ActorCriticLearner",
-    "Callback",
-    "CheckpointCallback",
-    "CsvCallback",
-    "Learner",
-    "LoggerCallback",
-    "NotANumberError",
-    "Progress",
-    "ProgressCallback",
-    "ReinforceLearner",
-    "Trainer",
-    "actor_critic",
-    "check_weights",
-    "load_checkpoint",
-    "ray_workers",
-    "save_checkpoint",
-]
+from drone_rl.training import actor_critic as actor_critic
+from drone_rl.training import ray_workers as ray_workers
+from drone_rl.training.callbacks import Callback as Callback
+from drone_rl.training.callbacks import CheckpointCallback as CheckpointCallback
+from drone_rl.training.callbacks import CsvCallback as CsvCallback
+from drone_rl.training.callbacks import LoggerCallback as LoggerCallback
+from drone_rl.training.callbacks import Progress as Progress
+from drone_rl.training.callbacks import ProgressCallback as ProgressCallback
+from drone_rl.training.learners import ActorCriticLearner as ActorCriticLearner
+from drone_rl.training.learners import Learner as Learner
+from drone_rl.training.learners import NotANumberError as NotANumberError
+from drone_rl.training.learners import ReinforceLearner as ReinforceLearner
+from drone_rl.training.trainer import Trainer as Trainer

@@ -3,6 +3,7 @@ import torch
 from tensordict import TensorDict
 
 from drone_rl import objectives
+from drone_rl.config.learning import Gae, Returns
 from drone_rl.objectives import LeaveOneOut, RewardToGo, TimeBaseline, returns
 from drone_rl.utils.errors import InputError
 
@@ -13,8 +14,8 @@ def batch(rewards, ends):
     return TensorDict({"next": {"reward": reward, "done": done}}, [len(rewards)])
 
 
-OTHERS = ("Advantages", "ReinforceLoss", "ReturnEstimator")
-NAMES = [n for n in objectives.__all__ if n not in OTHERS]
+BUILT_IN = (v for v in Returns.variants() if v.__module__ == Returns.__module__)
+NAMES = [variant.factory.__name__ for variant in BUILT_IN if variant is not Gae]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -9,12 +9,13 @@ from torchrl.envs import Compose, Reward2GoTransform, TransformedEnv
 from torchrl.modules import RandomPolicy
 
 from drone_rl import objectives
+from drone_rl.config.learning import Gae, Returns
 from drone_rl.objectives import BatchNormalised, RewardToGo, TimeBaseline, TotalReward
 from drone_rl.utils.errors import InputError
 from tests.three_state import ThreeStateEnv
 
-OTHERS = ("Advantages", "ReinforceLoss", "ReturnEstimator")
-NAMES = [n for n in objectives.__all__ if n not in OTHERS]
+BUILT_IN = (v for v in Returns.variants() if v.__module__ == Returns.__module__)
+NAMES = [variant.factory.__name__ for variant in BUILT_IN if variant is not Gae]
 
 
 def rows(rewards, ends):

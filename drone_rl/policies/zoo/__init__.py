@@ -1,30 +1,15 @@
 """Descriptions and files of policies; the package contains some, each with a model card."""
 
-from drone_rl.policies.zoo.description import PolicyDescription, describe, parse
-from drone_rl.policies.zoo.files import (
-    card_path,
-    certificate_path,
-    load_exported,
-    policy_names,
-    policy_path,
-    read_checkpoint,
-    read_policy,
-    shifts_path,
-)
-from drone_rl.policies.zoo.onnx_model import make_onnx, open_onnx
-
-__all__ = [
-    "PolicyDescription",
-    "card_path",
-    "certificate_path",
-    "describe",
-    "load_exported",
-    "make_onnx",
-    "open_onnx",
-    "parse",
-    "policy_names",
-    "policy_path",
-    "read_checkpoint",
-    "read_policy",
-    "shifts_path",
-]
+from drone_rl.policies.zoo.description import PolicyDescription as PolicyDescription
+from drone_rl.policies.zoo.description import describe as describe
+from drone_rl.policies.zoo.description import parse as parse
+from drone_rl.policies.zoo.files import card_path as card_path
+from drone_rl.policies.zoo.files import certificate_path as certificate_path
+from drone_rl.policies.zoo.files import load_exported as load_exported
+from drone_rl.policies.zoo.files import policy_names as policy_names
+from drone_rl.policies.zoo.files import policy_path as policy_path
+from drone_rl.policies.zoo.files import read_checkpoint as read_checkpoint
+from drone_rl.policies.zoo.files import read_policy as read_policy
+from drone_rl.policies.zoo.files import shifts_path as shifts_path
+from drone_rl.policies.zoo.onnx_model import make_onnx as make_onnx
+from drone_rl.policies.zoo.onnx_model import open_onnx as open_onnx
