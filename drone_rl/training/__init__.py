@@ -13,3 +13,5 @@ from drone_rl.training.learners import Learner as Learner
 from drone_rl.training.learners import NotANumberError as NotANumberError
 from drone_rl.training.learners import ReinforceLearner as ReinforceLearner
 from drone_rl.training.trainer import Trainer as Trainer
+from drone_rl.utils.checkpoint import load_checkpoint as load_checkpoint
+from drone_rl.utils.checkpoint import save_checkpoint as save_checkpoint
