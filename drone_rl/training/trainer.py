@@ -188,7 +188,7 @@ class Trainer:
         }
 
     def _learn(self, batch: TensorDictBase) -> dict[str, float]:
-        check_batch(batch, self.learner)
+        check_batch(batch, self.learner.in_keys, type(self.learner).__name__)
         try:
             return self.learner.update(batch)
         except NotANumberError as error:

@@ -126,11 +126,11 @@ def test_training_ends_with_the_collector(trainer):
 
 def test_batch_without_learner_inputs_raises(trainer):
     batch = next(iter(trainer.collector))
-    check_batch(batch, trainer.learner)
+    check_batch(batch, trainer.learner.in_keys, "CriticLearner")
     del batch["next", "observation"]
     message = r"no entry \('next', 'observation'\), which CriticLearner learns from"
     with pytest.raises(InputError, match=message):
-        check_batch(batch, trainer.learner)
+        check_batch(batch, trainer.learner.in_keys, "CriticLearner")
 
 
 def test_partial_episodes_need_reward_sums(trainer):

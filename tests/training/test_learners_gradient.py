@@ -5,7 +5,7 @@ import torch
 from tensordict import TensorDict
 from torch import nn
 
-from drone_rl.training.learners.learner import NotANumberError, accumulate, descend
+from drone_rl.training.learners import NotANumberError, accumulate, descend
 
 X = torch.tensor([[1.0], [2.0], [6.0]])
 

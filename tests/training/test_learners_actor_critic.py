@@ -209,7 +209,7 @@ def test_learns_policy_and_value(make_learner, kind, own):
     for _ in range(60):
         learner.update(learner.estimate(batch))
     assert (learner.network(look).softmax(-1)[..., 2] > 0.9).all()
-    value = learner._look(look[:, 0])["state_value"].detach()
+    value = learner._evaluate(look[:, 0])["state_value"].detach()
     assert float(value.mean()) == pytest.approx(1 / 3, abs=0.1)  # mean reward of the batch
 
 
@@ -284,8 +284,8 @@ def test_state_of_another_learner_raises(make_learner, part, value, message):
 def test_missing_entries_raise(make_learner, batch):
     learner = make_learner()
     with pytest.raises(InputError, match="no entry 'action_log_prob'"):
-        check_batch(batch, learner)
-    check_batch(learner.estimate(batch), learner)
+        check_batch(batch, learner.in_keys, "ActorCriticLearner")
+    check_batch(learner.estimate(batch), learner.in_keys, "ActorCriticLearner")
     del batch["next", "pixels"]
     message = r"no entry \('next', 'pixels'\), .* such as collector=rollouts$"
     with pytest.raises(InputError, match=message):

@@ -1,0 +1,353 @@
+"""Learners: what a trainer expects of them, REINFORCE, and learning with a critic."""
+
+import copy
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, ClassVar, Protocol
+
+import torch
+from tensordict import TensorDict, TensorDictBase
+from tensordict.utils import NestedKey
+from torch import Tensor, nn
+from torch.nn.utils import clip_grads_with_norm_, get_total_norm
+from torchrl.objectives import A2CLoss, ClipPPOLoss
+
+from drone_rl.collectors import take_rows
+from drone_rl.objectives import Advantages, ReinforceLoss
+from drone_rl.policies import ActorCritic
+from drone_rl.policies.critic import LOG_PROB, PIXELS, VALUE
+from drone_rl.training.restore import check_fits, check_optimiser
+from drone_rl.utils.errors import InputError
+
+ADVANTAGE, TARGET, ENTROPY = "advantage", "value_target", "entropy"
+
+
+class NotANumberError(RuntimeError):
+    """A loss or gradient was NaN or infinite; the parameters were left as they were."""
+
+
+class Learner(Protocol):
+    """One update from one batch.
+
+    A learner holds networks, losses and optimizers, and decides how often to pass over a batch and
+    in which minibatches. A batch is what the collector yields: complete episodes one after the
+    other, shape (T_total,), or rows of fixed length, shape (num_envs, T).
+    """
+
+    @property
+    def in_keys(self) -> Sequence[NestedKey]:
+        """Entries that a batch must have."""
+        ...
+
+    def update(self, batch: TensorDictBase) -> dict[str, float]:
+        """Learn from a batch.
+
+        Returns:
+            Metrics by name, the same names at every update.
+
+        Raises:
+            NotANumberError: The parameters would become NaN or infinite; they are unchanged.
+            InputError: The batch lacks something.
+        """
+        ...
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return all that the next update depends on; "policy" is the policy's `state_dict`."""
+        ...
+
+    def check_state(self, state: Mapping[str, Any]) -> None:
+        """Check a state before any of it is loaded.
+
+        Args:
+            state: Has the keys of `state_dict`; its values are not trusted.
+
+        Raises:
+            InputError: It is not a state of this learner; the first difference is named.
+        """
+        ...
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Resume from a state."""
+        ...
+
+
+@dataclasses.dataclass(kw_only=True, eq=False, repr=False)
+class GradientLearner:
+    """Base of learners with one optimizer: their state, and the step of the scheduler."""
+
+    network: nn.Module
+    """The policy's."""
+    optimiser: torch.optim.Optimizer
+    """Over the parameters that learn."""
+    scheduler: torch.optim.lr_scheduler.LRScheduler | None = None
+    """Stepped after each update."""
+    max_grad_norm: float | None = None
+    """Clip the gradient to this norm; None for no clipping."""
+
+    def _next_rate(self) -> float:
+        """Step the scheduler; return the learning rate of the next update."""
+        if self.scheduler is not None:
+            self.scheduler.step()
+        return self.optimiser.param_groups[0]["lr"]
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return the weights and the states of optimizer and scheduler."""
+        return {
+            "policy": self.network.state_dict(),
+            "optimiser": self.optimiser.state_dict(),
+            "scheduler": None if self.scheduler is None else self.scheduler.state_dict(),
+        }
+
+    def check_state(self, state: Mapping[str, Any]) -> None:
+        """See `Learner.check_state`."""
+        for key, value in self.state_dict().items():
+            if key != "optimiser":
+                check_fits(state[key], value, key)
+        check_optimiser(state["optimiser"], self.optimiser)
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Resume from a state."""
+        self.network.load_state_dict(state["policy"])
+        self.optimiser.load_state_dict(state["optimiser"])
+        if self.scheduler is not None:
+            self.scheduler.load_state_dict(state["scheduler"])
+
+
+@dataclasses.dataclass(kw_only=True, eq=False, repr=False)
+class ReinforceLearner(GradientLearner):
+    """REINFORCE (Algorithm 4): one optimizer step for each batch of episodes with returns."""
+
+    loss: ReinforceLoss
+    """Gives the `loss_*` terms of a batch, as a mean over its steps or a sum."""
+    minibatch_frames: int = 512
+    """Gradients are accumulated over chunks of this size, which bounds memory; sums are rounded by
+    it in their last places."""
+
+    @property
+    def in_keys(self) -> Sequence[NestedKey]:
+        """See `Learner`."""
+        return self.loss.in_keys
+
+    def update(self, batch: TensorDictBase) -> dict[str, float]:
+        """Take one optimizer step.
+
+        Args:
+            batch: With returns, see `ReturnEstimator`. Shape: (T_total,) or (num_envs, T); steps
+                outside ("collector", "mask"), whose return is unknown, are left out.
+
+        Returns:
+            The terms of the loss, the gradient's norm and the learning rate of the next step.
+
+        Raises:
+            NotANumberError: A loss or gradient is NaN or infinite.
+        """
+        mask = batch.get(("collector", "mask"), None)
+        steps = batch.reshape(-1) if mask is None else batch[mask]
+        is_sum = self.loss.reduction == "sum"
+        self.optimiser.zero_grad()
+        try:
+            terms = accumulate(steps, self.loss, self.minibatch_frames, is_sum=is_sum)
+            norm = descend(self.optimiser, self.network.named_parameters(), self.max_grad_norm)
+        except NotANumberError:
+            self.optimiser.zero_grad()
+            raise
+        losses = {f"loss/{name}": value for name, value in {**terms, "grad_norm": norm}.items()}
+        return {**losses, "train/learning_rate": self._next_rate()}
+
+
+@dataclasses.dataclass(kw_only=True, eq=False, repr=False)
+class ActorCriticLearner(GradientLearner):
+    """Values, advantages, then passes over minibatches, each a step of the optimizer.
+
+    Values and log-probabilities are those of the policy and critic that an update begins with,
+    and are computed once. What follows a step is taken to be the next one of its row, unless the
+    row is cut there.
+    """
+
+    model: ActorCritic
+    """The network with its critic."""
+    estimator: Advantages
+    """Computes advantages from values."""
+    loss: A2CLoss | ClipPPOLoss
+    """Of the model's actor and critic; a mean over steps."""
+    generator: torch.Generator
+    """Shuffles the steps, on the CPU."""
+    epochs: int = 1
+    """Passes over a batch."""
+    minibatch_size: int | None = None
+    """Approximate number of steps for one step of the optimizer; None for all."""
+    chunk_frames: int = 512
+    """Steps in one forward and backward pass; changes nothing but memory."""
+    in_keys: ClassVar[Sequence[NestedKey]] = (
+        *(PIXELS, "action", LOG_PROB, VALUE),
+        *(ADVANTAGE, TARGET, ENTROPY),
+    )
+
+    def update(self, batch: TensorDictBase) -> dict[str, float]:
+        """Learn from a rollout of shape (num_envs, T), as returned by `estimate`.
+
+        Returns:
+            Means over the minibatches of the terms of the loss, the divergence from the policy that
+            collected, and the gradient's norm; that policy's entropy, and the next learning rate.
+
+        Raises:
+            NotANumberError: A loss or gradient is NaN or infinite.
+        """
+        before = copy.deepcopy(self.state_dict())
+        try:
+            steps = batch.select(*self.in_keys).reshape(-1)
+            entropy = float(steps.pop(ENTROPY).mean())
+            metrics = list(self._descend(steps))
+        except NotANumberError:
+            self.load_state_dict(before)
+            self.optimiser.zero_grad()
+            raise
+        means = {f"loss/{k}": sum(m[k] for m in metrics) / len(metrics) for k in metrics[0]}
+        return {**means, "loss/entropy": entropy, "train/learning_rate": self._next_rate()}
+
+    @torch.no_grad()
+    def estimate(self, batch: TensorDictBase) -> TensorDictBase:
+        """Add the entries that the loss reads; the collector's `postproc`.
+
+        They are log-probability, entropy and value of the policy that collected, "advantage" and
+        "value_target".
+
+        Raises:
+            InputError: An entry of the batch, of shape (num_envs, T), is missing.
+        """
+        following = [("next", key) for key in (PIXELS, "reward", "done", "terminated")]
+        check_batch(batch, [PIXELS, "action", *following], type(self).__name__)
+        seen = self._evaluate(batch.get(PIXELS).flatten(0, batch.ndim - 1))
+        policy = self.model.actor.get_dist(seen)
+        value = seen.get(VALUE).reshape(*batch.shape, 1)
+        after = batch.get("next").select("reward", "done", "terminated")
+        after.set(VALUE, self._after(batch, value))
+        estimated = self.estimator(TensorDict({VALUE: value, "next": after}, batch.shape))
+        for key in (VALUE, ADVANTAGE, TARGET):
+            batch.set(key, estimated.get(key))
+        log_prob = policy.log_prob(batch.get("action").flatten(0, batch.ndim - 1))
+        batch.set(LOG_PROB, log_prob.reshape(batch.shape))
+        return batch.set(ENTROPY, policy.entropy().reshape(batch.shape))
+
+    def _after(self, batch: TensorDictBase, value: Tensor) -> Tensor:
+        """Return the value after each step; arbitrary after a terminal one. Shape: as `value`."""
+        after = torch.cat([value[..., 1:, :], value[..., -1:, :]], -2)
+        cut = batch.get(("next", "done")).clone()
+        cut[..., -1, :] = True
+        cut = (cut & ~batch.get(("next", "terminated")))[..., 0]
+        after[cut] = self._evaluate(batch.get(("next", PIXELS))[cut]).get(VALUE)
+        return after
+
+    def _evaluate(self, pixels: Tensor) -> TensorDictBase:
+        """Return features and values of frames, without the frames. Shape: (num_frames,)."""
+        chunks = (TensorDict({PIXELS: c}, [len(c)]) for c in pixels.split(self.chunk_frames))
+        seen = [self.model.critic(self.model.trunk(chunk)).exclude(PIXELS) for chunk in chunks]
+        # it takes TensorDicts, too, which its annotation lacks
+        return torch.cat(seen)  # pyright: ignore[reportReturnType]
+
+    def _descend(self, steps: TensorDictBase) -> Iterator[dict[str, float]]:
+        """Take the steps of the optimizer; yield the metrics of each."""
+        # as far as the loss has them
+        logged = ("loss_objective", "loss_critic", "loss_entropy", "clip_fraction", "kl_approx")
+        pieces = max(1, round(len(steps) / (self.minibatch_size or len(steps))))
+        for _ in range(self.epochs):
+            order = torch.randperm(len(steps), generator=self.generator).to(steps.device)
+            for rows in order.chunk(pieces):
+                self.optimiser.zero_grad()
+                minibatch = take_rows(steps, rows)
+                terms = accumulate(minibatch, self._losses, self.chunk_frames)
+                norm = descend(self.optimiser, self.model.named_parameters(), self.max_grad_norm)
+                yield {**{k: terms[k] for k in logged if k in terms}, "grad_norm": norm}
+
+    def _losses(self, chunk: TensorDictBase) -> TensorDictBase:
+        return self.loss(self.model.trunk(chunk))
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return the weights of both and the states of optimizer, scheduler and shuffling."""
+        state = {**super().state_dict(), "critic": self.model.critic.state_dict()}
+        return {**state, "minibatches": self.generator.get_state()}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Resume from a state."""
+        super().load_state_dict(state)
+        self.model.critic.load_state_dict(state["critic"])
+        self.generator.set_state(state["minibatches"])
+
+
+def check_batch(batch: TensorDictBase, keys: Sequence[NestedKey], reader: str) -> None:
+    """Raise an `InputError` if a batch lacks one of the entries that `reader` learns from."""
+    held = batch.keys(include_nested=True)
+    for key in keys:
+        if key not in held:
+            is_return = key == "return_to_go"
+            remedy = (
+                "give the collector a return estimator, as in postproc=RewardToGo()"
+                if is_return
+                else "use a collector that keeps it, such as collector=rollouts"
+            )
+            raise InputError(f"a batch has no entry {key!r}, which {reader} learns from; {remedy}")
+
+
+def check_finite(value: Tensor, name: str) -> None:
+    """Raise `NotANumberError` if a loss or gradient is NaN or infinite."""
+    if not bool(torch.isfinite(value).all()):
+        raise NotANumberError(f"{name} is NaN or infinite")
+
+
+def accumulate(
+    batch: TensorDictBase,
+    losses: Callable[[TensorDictBase], TensorDictBase],
+    chunk_frames: int,
+    *,
+    is_sum: bool = False,
+) -> dict[str, float]:
+    """Add the gradient of steps (num_steps,) to the parameters, chunk by chunk.
+
+    Args:
+        batch: The steps.
+        losses: Returns the terms of the loss, `loss_*`, and other metrics.
+        chunk_frames: Steps in one forward and backward pass; bounds memory and affects rounding.
+        is_sum: Whether the terms are sums over steps; means otherwise.
+
+    Returns:
+        Terms and metrics of the whole batch, by name.
+
+    Raises:
+        NotANumberError: A term is NaN or infinite.
+    """
+    totals: dict[str, float] = {}
+    for chunk in batch.split(chunk_frames):
+        share = len(chunk) / len(batch)
+        weight = 1.0 if is_sum else share
+        metrics = losses(chunk)
+        terms = {k: v for k, v in metrics.items() if k.startswith("loss_")}
+        for name, value in terms.items():
+            check_finite(value, name)
+        total: Any = sum(terms.values())  # not the 0 that it begins with
+        (total * weight).backward()
+        for name, value in metrics.items():
+            part = float(value.detach()) * (weight if name in terms else share)
+            totals[name] = totals.get(name, 0.0) + part
+    return totals
+
+
+def descend(
+    optimiser: torch.optim.Optimizer,
+    parameters: Iterable[tuple[str, nn.Parameter]],
+    max_norm: float | None,
+) -> float:
+    """Step the optimizer; return the gradient's norm before it was clipped to `max_norm`.
+
+    Raises:
+        NotANumberError: The gradient is NaN or infinite; no parameter was changed.
+    """
+    known = {name: p for name, p in parameters if p.grad is not None}
+    gradients = {name: p.grad for name, p in known.items() if p.grad is not None}
+    norm = get_total_norm(gradients.values())
+    if not bool(torch.isfinite(norm)):  # or finite numbers whose squares are not
+        for name, gradient in gradients.items():
+            check_finite(gradient, f"the gradient of {name}")
+    if max_norm is not None:
+        clip_grads_with_norm_(known.values(), max_norm, norm)
+    optimiser.step()
+    return float(norm)
