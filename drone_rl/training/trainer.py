@@ -78,57 +78,40 @@ TRIMMED_EVERY = 16
 """Updates between releases of memory, which make the next update a tenth slower."""
 
 
+@dataclasses.dataclass(kw_only=True, eq=False, repr=False)
 class Trainer:
-    """Collects batches and hands them to a learner, until the task is solved or the budget spent.
+    """Collect batches and pass them to a learner until the task is solved or the budget spent.
 
-    The state that `state_dict` returns between two updates is all there is: training on from it
-    gives, on a CPU, the same parameters bit for bit as never having stopped.
+    `state_dict` returns the full state between two updates. On a CPU, a training that resumes from
+    it ends with the same parameters, bit for bit, as one that never stopped.
     """
 
-    def __init__(
-        self,
-        *,
-        collector: Any,
-        learner: Learner,
-        callbacks: Sequence[Callback] = (),
-        generators: Mapping[str, torch.Generator] | None = None,
-        total_frames: int = 2_000_000,
-        total_episodes: int | None = None,
-        target: float | None = 2.97,
-        confirm: Callable[[int], bool] | None = None,
-        running_decay: float = 0.99,
-        ends: Iterable[enum.IntEnum] = (),
-    ) -> None:
-        """Connects the parts.
-
-        Args:
-            collector: Iterates over batches; has `state_dict` and `load_state_dict`. TorchRL's
-                collectors do. Its maker shuts it down.
-            learner: Learns from them.
-            callbacks: Called after every update, in order.
-            generators: Random streams to save and restore, by name.
-            total_frames: Stop once this many were collected.
-            total_episodes: Stop once this many were collected; None for no limit.
-            target: Stop once the running mean of the episodes' rewards reaches it; None for never.
-            confirm: Called with the number of updates when the target is reached; returns whether
-                the policy has solved its task. By default the target is enough.
-            running_decay: Weight of the old value in the running mean, per episode.
-            ends: Why an episode may end (`Task.ends`), for the metrics.
-        """
-        self.collector = collector
-        self.learner = learner
-        self.callbacks = list(callbacks)
-        self.generators = dict(generators or {})
-        self.total_frames = total_frames
-        self.total_episodes = total_episodes
-        self.target = target
-        self.confirm = confirm
-        self.running_decay = running_decay
-        self.ends = tuple(ends)
-        self.progress = Progress()
-        self.stop_signal: signal.Signals | None = None
-        self.stop_request = ""
-        """Why a callback wants training to stop after this update; empty to go on."""
+    collector: Any
+    """Iterates over batches, as TorchRL's collectors do; has `state_dict` and `load_state_dict`.
+    The caller shuts it down."""
+    learner: Learner
+    """Learns from the batches."""
+    callbacks: Sequence[Callback] = dataclasses.field(default_factory=list)
+    """Called after every update, in order."""
+    generators: Mapping[str, torch.Generator] = dataclasses.field(default_factory=dict)
+    """Random streams to save and restore, by name."""
+    total_frames: int = 2_000_000
+    """Stop once this many frames were collected."""
+    total_episodes: int | None = None
+    """Stop once this many episodes were collected; None for no limit."""
+    target: float | None = 2.97
+    """Stop once the running mean of the episodes' rewards reaches it; None for never."""
+    confirm: Callable[[int], bool] | None = None
+    """Called with the number of updates when the target is reached; returns whether the policy has
+    solved its task. By default the target is enough."""
+    running_decay: float = 0.99
+    """Weight of the old value in the running mean, per episode."""
+    ends: Iterable[enum.IntEnum] = ()
+    """Why an episode may end (`Task.ends`), for the metrics."""
+    progress: Progress = dataclasses.field(default_factory=Progress, init=False)
+    stop_signal: signal.Signals | None = dataclasses.field(default=None, init=False)
+    stop_request: str = dataclasses.field(default="", init=False)
+    """Why a callback wants training to stop after this update; empty to go on."""
 
     def run(self) -> str:
         """Train until solved, out of budget or stopped.
@@ -138,12 +121,12 @@ class Trainer:
 
         Returns:
             Why it stopped: "solved", "frames" (also if the collector has no more), "episodes", a
-            signal's name or what a callback gave as `stop_request`. A signal that arrives while
-            the training ends for another reason is returned too: the caller must hand it on.
+            signal's name or a callback's `stop_request`. A signal takes precedence over any other
+            reason, also if it arrives at the end: the caller must raise it again.
 
         Raises:
             NotANumberError: A loss or gradient was NaN or infinite.
-            InputError: The learner can't learn from what the collector gives.
+            InputError: A batch lacks an entry that the learner reads.
         """
         with self._signals():
             self._notify("on_start")
@@ -164,7 +147,7 @@ class Trainer:
         return reason if self.stop_signal is None else self.stop_signal.name
 
     def _update(self, batches: Iterator[TensorDictBase]) -> dict[str, float] | None:
-        """Collect and learn. Returns the metrics, or None if there is no batch left."""
+        """Collect and learn; return the metrics, or None if there is no batch left."""
         begin = time.perf_counter()
         batch = next(batches, None)
         if batch is None:
@@ -258,7 +241,7 @@ class Trainer:
             restore()
 
     def state_dict(self) -> dict[str, Any]:
-        """Everything that the next update depends on."""
+        """Return everything that the next update depends on."""
         estimator = self._estimator
         return {
             **self.learner.state_dict(),
@@ -273,7 +256,7 @@ class Trainer:
         """Resume from a `state_dict`, which may come from an untrusted file.
 
         Raises:
-            InputError: It is not one of such a training.
+            InputError: It is not the state of such a training.
         """
         own = self.state_dict()
         for key in own:
@@ -284,20 +267,17 @@ class Trainer:
             if key in own:
                 check_fits(state[key], own[key], key)
         try:
-            self._take_over(state)
+            self.learner.load_state_dict(state)
+            self.collector.load_state_dict(state["collector"])
+            if self._estimator is not None:
+                self._estimator.load_state_dict(state["estimator"])
+            for name, generator in self.generators.items():
+                generator.set_state(state["generators"][name])
+            torch.set_rng_state(state["torch_rng"])
+            self.progress = Progress(**state["progress"])
         except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise InputError(
                 f"the checkpoint does not fit this training ({reason}); go on from one of a run "
                 "with these settings, or start a new run"
             ) from None
-
-    def _take_over(self, state: Mapping[str, Any]) -> None:
-        self.learner.load_state_dict(state)
-        self.collector.load_state_dict(state["collector"])
-        if self._estimator is not None:
-            self._estimator.load_state_dict(state["estimator"])
-        for name, generator in self.generators.items():
-            generator.set_state(state["generators"][name])
-        torch.set_rng_state(state["torch_rng"])
-        self.progress = Progress(**state["progress"])
