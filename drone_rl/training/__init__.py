@@ -1,7 +1,6 @@
 """Training: the loop, its components and callbacks, and the folder of a run."""
 
-from drone_rl.training import actor_critic as actor_critic
-from drone_rl.training import ray_workers as ray_workers
+from drone_rl.training import variants as variants  # connects parts with their settings
 from drone_rl.training.callbacks import Callback as Callback
 from drone_rl.training.callbacks import CheckpointCallback as CheckpointCallback
 from drone_rl.training.callbacks import CsvCallback as CsvCallback

@@ -1,7 +1,8 @@
 """The whole training: environment, policy, collector, returns, loss, optimizer, loop.
 
 `drone-rl train` and `drone_rl.train` run this file; `examples/train_with_torchrl.py` is a plain
-script of the same components. A critic's parts are in `actor_critic.py`, files in `run_folder.py`.
+script of the same components. A critic and Ray workers are in `variants.py`, files in
+`run_folder.py`.
 """
 
 import logging
@@ -153,7 +154,7 @@ def make_groups(
     """Make the environments of threads or workers, and the policy that acts in them.
 
     Args:
-        settings: The training's.
+        settings: Of the training.
         sizes: Environments of each group.
         replay: See `learn`.
         numbers: Which groups to make; all by default.

@@ -1,0 +1,101 @@
+"""Variants of the pipeline in `train.py`: a critic (PPO, A2C), workers of a Ray cluster."""
+
+import functools
+import logging
+from typing import Any
+
+import torch
+
+from drone_rl.collectors import EpisodeCollector, RolloutCollector, ThreadedCollector
+from drone_rl.config.configuration import as_config, from_config
+from drone_rl.config.learning import A2c, Ppo, Ray, Rollouts, WithCritic
+from drone_rl.config.registry import implements, learns
+from drone_rl.config.training import TrainSettings
+from drone_rl.policies import ActorCritic, PolicyNetwork
+from drone_rl.policies.zoo import describe
+from drone_rl.sim.tasks import FailureReplayTask
+from drone_rl.training.components import Components, episode_options, group_sizes, joined
+from drone_rl.training.learners import ActorCriticLearner
+from drone_rl.training.train import make_groups
+from drone_rl.utils.seeding import Stream, torch_generator
+
+_log = logging.getLogger(__name__)
+
+
+@implements(Rollouts)
+def rollout_collector(
+    settings: TrainSettings, replay: FailureReplayTask | None = None
+) -> Components:
+    """Make `collector=rollouts`: the next steps of each environment, from threads.
+
+    The learner's `estimate` is the collector's `postproc`, see `actor_critic_learner`.
+    """
+    objective = settings.objective
+    assert isinstance(objective, WithCritic)
+    groups = make_groups(settings, group_sizes(settings), replay)
+    collectors = [RolloutCollector(g.env, g.actor, objective.num_steps) for g in groups]
+    _log.info("%s", collectors[0].name)
+    return joined(ThreadedCollector(collectors), groups)
+
+
+@learns(A2c, Ppo)
+def actor_critic_learner(settings: TrainSettings, parts: Components) -> ActorCriticLearner:
+    """Make the learner with a critic, on the policy's features or with its own network."""
+    objective = settings.objective
+    assert isinstance(objective, WithCritic)
+    weights = torch_generator(settings.seed, Stream.CRITIC_INIT)
+    own = None if objective.shares_trunk else describe(settings).build_critic(weights)
+    model = ActorCritic(parts.network, own, weights).to(settings.device)
+    optimizer = settings.optimiser.make(model.parameters())
+    learner = ActorCriticLearner(
+        network=parts.network,
+        model=model,
+        estimator=settings.returns.make().to(settings.device),
+        loss=objective.make(model.actor, model.critic).to(settings.device),
+        optimiser=optimizer,
+        generator=torch_generator(settings.seed, Stream.MINIBATCHES),
+        scheduler=settings.scheduler.make(optimizer),
+        max_grad_norm=settings.trainer.max_grad_norm,
+        chunk_frames=settings.trainer.minibatch_frames,
+        **objective.passes,
+    )
+    parts.collector.postproc = learner.estimate
+    return learner
+
+
+@implements(Ray)
+def ray_collector(settings: TrainSettings, replay: FailureReplayTask | None = None) -> Components:
+    """Make `collector=ray`: complete episodes, with returns, from workers on a Ray cluster."""
+    from drone_rl.collectors.ray import RayEpisodeCollector  # slow to import, seldom needed
+
+    chosen = settings.collector
+    assert isinstance(chosen, Ray)
+    sizes = group_sizes(settings)
+    (local,) = make_groups(settings, [1])
+    local.env.close()
+    config = as_config(settings)
+    workers = range(len(sizes))
+    makers = [functools.partial(_remote_collector, config, sizes, i, replay) for i in workers]
+    collector = RayEpisodeCollector(
+        makers,
+        local.actor,
+        local.network,
+        address=chosen.address,
+        num_cpus=chosen.num_cpus,
+        max_lost_workers=chosen.max_lost_workers,
+        device=settings.device,
+        postproc=settings.returns.make().to(settings.device),
+    )
+    return Components(collector, local.network, {})
+
+
+def _remote_collector(
+    config: dict[str, Any], sizes: list[int], number: int, replay: FailureReplayTask | None
+) -> tuple[EpisodeCollector, PolicyNetwork, torch.Generator]:
+    """Make a worker's collector, from arguments that can be sent."""
+    settings = from_config(TrainSettings, config)
+    assert isinstance(settings.collector, Ray)
+    (group,) = make_groups(settings, sizes, replay, [number])
+    options = episode_options(settings, max(1, int(settings.collector.num_cpus)))
+    collector = EpisodeCollector(group.env, group.actor, **options)
+    return collector, group.network, group.generator
