@@ -5,7 +5,7 @@ import torch
 import warp as wp
 from torch.nn import functional
 
-from drone_rl.acceleration.layers_backward_kernel import accumulate, fold, rectify
+from drone_rl.acceleration.gradients_kernel import accumulate, fold, rectify
 from drone_rl.acceleration.layers_kernel import Product
 from drone_rl.acceleration.packed_layers import as_products, in_panels
 from drone_rl.sim.rendering.devices import start_warp
