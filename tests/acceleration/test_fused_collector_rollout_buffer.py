@@ -7,7 +7,7 @@ import torch
 import warp as wp
 from tensordict import TensorDict
 
-from drone_rl.acceleration.rollout_buffer import RolloutBuffer, is_free
+from drone_rl.acceleration.fused_collector import RolloutBuffer, is_free
 from drone_rl.sim.rendering.devices import start_warp
 
 start_warp("cpu")
