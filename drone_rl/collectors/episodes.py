@@ -7,11 +7,13 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from tensordict.utils import NestedKey
-from torchrl.envs import EnvBase
+from torch import Tensor
+from torchrl.collectors import Collector
+from torchrl.envs import Compose, EnvBase, TransformedEnv
+from torchrl.envs.utils import ExplorationType, exploration_type, set_exploration_type
 
-from drone_rl.collectors.batched_collector import BatchedCollector
+from drone_rl.collectors.batched_collector import BatchedCollector, take_rows
 from drone_rl.collectors.speedups import Acceleration, accelerated_collector
-from drone_rl.collectors.stepping import SteppingCollector
 from drone_rl.envs.direct_renderer import Reasons
 
 if TYPE_CHECKING:
@@ -91,3 +93,137 @@ class EpisodeCollector(BatchedCollector):
         """Resumes from a `state_dict`."""
         self.frames, self.episodes = state_dict["frames"], state_dict["episodes"]
         self.base_env.load_state_dict(state_dict["worlds"])
+
+
+_STEPS = 8
+"""Of one rollout; an episode ends within one of several."""
+
+
+class SteppingCollector:
+    """Collects one complete episode of each environment with TorchRL's `Collector`.
+
+    TorchRL's `trajs_per_batch` takes the episodes that end first, which biases a batch towards
+    short ones. Here an environment whose episode has ended is neither stepped nor acted upon, and
+    its steps are masked, until all episodes have ended.
+    """
+
+    implementation = "PyTorch"
+
+    def __init__(
+        self,
+        env: EnvBase,
+        actor: TensorDictModuleBase,
+        reasons: Reasons,
+        *,
+        kept: Iterable[NestedKey],
+        extra: Iterable[NestedKey] = (),
+        keep_observations: bool = True,
+    ) -> None:
+        """See `accelerated_collector`; the reasons are why there is no faster collector."""
+        self.reasons = reasons
+        self._env = _OneEpisode(env)
+        self._actor = _ActiveOnly(actor, self._env)
+        self._kept = (env.action_key, *kept, *extra)
+        self._keep_observations = keep_observations
+        self._collector = Collector(
+            self._env,
+            self._actor,
+            frames_per_batch=env.batch_size[0] * _STEPS,
+            use_buffers=False,
+            track_traj_ids=False,
+            trust_policy=True,
+            auto_register_policy_transforms=False,
+        )
+
+    @property
+    def name(self) -> str:
+        """For the log."""
+        return f"stepping collector: {self.reasons}"
+
+    def cache_activations(self) -> None:
+        """Return None: torch keeps no activations of acting."""
+
+    def collect(self, num_envs: int) -> TensorDictBase:
+        """Run an episode in each of the first environments; trajectories count from 0."""
+        self._env.num_envs = num_envs
+        self._actor.exploration = exploration_type()
+        self._collector.reset_at_each_iter = True
+        rollouts = []
+        while self._collector.reset_at_each_iter or bool(self._env.active.any()):
+            rollout = self._collector.rollout()
+            self._collector.reset_at_each_iter = False
+            keys = {*self._kept, *(self._actor.keys if self._keep_observations else ())}
+            rollouts.append(rollout.select(*keys))
+        steps: Any = torch.cat(rollouts, 1)  # (num_envs, T)
+        mask = torch.stack(self._env.masks, 1)
+        batch = steps[mask]  # row-major: environment after environment, step after step
+        return batch.set(("collector", "traj_ids"), mask.nonzero()[:, 0])
+
+    def close(self) -> None:
+        """Does nothing: who made the environment closes it."""
+
+
+class _OneEpisode(TransformedEnv):
+    """Runs one episode after each reset; an environment whose episode has ended is frozen."""
+
+    def __init__(self, env: EnvBase) -> None:
+        super().__init__(env, Compose(), auto_unwrap=False)  # pyright: ignore[reportCallIssue]
+        self.num_envs = 0
+        """The first environments, which run; 0 until there is something to collect."""
+        self.active = torch.zeros(env.batch_size, dtype=torch.bool, device=env.device)
+        """Whether an environment's episode is under way. Shape: (batch_size,)."""
+        self.masks: list[Tensor] = []
+        """Which environments took each step since the last reset. Shapes: (batch_size,)."""
+
+    def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: Any) -> TensorDictBase:
+        self.active = torch.arange(len(self.active), device=self.active.device) < self.num_envs
+        self.masks = []
+        if not self.num_envs:  # TorchRL's collector resets when it is made; that draws no episode
+            return self.fake_tensordict().exclude("next", *self.action_keys)
+        return super()._reset(tensordict, **kwargs)
+
+    def close(self, *, raise_if_closed: bool = True) -> None:
+        """Leaves the environment open: TorchRL's collector closes its own when it is deleted."""
+
+    def step_and_maybe_reset(
+        self, tensordict: TensorDictBase
+    ) -> tuple[TensorDictBase, TensorDictBase]:
+        """Steps the environments whose episodes are under way; resets none."""
+        self.masks.append(self.active)
+        if not bool(self.active.all()):
+            tensordict.set("_step", self.active)
+        tensordict = self.step(tensordict)
+        following = self.step_mdp(tensordict)
+        self.active = self.active & ~tensordict.get(("next", "done")).flatten()
+        return tensordict, following
+
+
+class _ActiveOnly(TensorDictModuleBase):
+    """Evaluates an actor on the environments whose episodes are under way."""
+
+    def __init__(self, actor: Any, env: _OneEpisode) -> None:
+        super().__init__()
+        self.in_keys, self.out_keys = actor.in_keys, actor.out_keys
+        self.exploration: ExplorationType | None = None
+        """How actions are chosen."""
+        self.keys: set[NestedKey] = set()
+        """Entries that the actor reads and writes."""
+        self._actor = [actor]  # in a list: its parameters are not this module's
+        self._env = [env]
+        self._blank: dict[NestedKey, Tensor] = {}
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Writes what the actor writes, and 0 for the other environments."""
+        active = self._env[0].active
+        rows = active.nonzero()[:, 0]
+        if not len(rows):
+            return tensordict.update(self._blank)
+        observed = tensordict.select(*self.in_keys)
+        with set_exploration_type(self.exploration):
+            acted = self._actor[0](take_rows(observed, rows))
+        self.keys = set(acted.keys(True, True))
+        for key in self.keys - set(observed.keys(True, True)):
+            value = acted.get(key)
+            self._blank[key] = value.new_zeros(len(active), *value.shape[1:])
+            tensordict.set(key, self._blank[key].index_copy(0, rows, value))
+        return tensordict

@@ -6,7 +6,7 @@ from torchrl.envs import CatFrames, RewardSum
 
 from drone_rl.acceleration.direct_collector import DirectCollector
 from drone_rl.collectors import EpisodeCollector
-from drone_rl.collectors.stepping import SteppingCollector
+from drone_rl.collectors.episodes import SteppingCollector
 from drone_rl.config import AppearanceSettings, PillarsSettings, TaskSettings
 from drone_rl.envs import (
     Blur,

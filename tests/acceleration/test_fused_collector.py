@@ -12,7 +12,7 @@ from drone_rl.acceleration.direct_collector import DirectCollector
 from drone_rl.acceleration.fused_collector import FusedCollector
 from drone_rl.acceleration.fused_network import FusedNetwork
 from drone_rl.collectors import EpisodeCollector
-from drone_rl.collectors.stepping import SteppingCollector
+from drone_rl.collectors.episodes import SteppingCollector
 from drone_rl.config import AppearanceSettings, DynamicsSettings, PillarsSettings, TaskSettings
 from drone_rl.envs import (
     CropRows,

@@ -9,8 +9,8 @@ from torchrl.envs import RewardSum, SerialEnv, StepCounter, TransformedEnv
 from torchrl.envs.utils import check_env_specs
 
 from drone_rl.collectors import EpisodeCollector, RolloutCollector
+from drone_rl.collectors.episodes import SteppingCollector
 from drone_rl.collectors.rollouts import TorchrlStream
-from drone_rl.collectors.stepping import SteppingCollector
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.envs import (
     Blur,

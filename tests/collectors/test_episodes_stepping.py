@@ -7,7 +7,7 @@ import torch
 from torchrl.collectors import Collector
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from drone_rl.collectors.stepping import SteppingCollector
+from drone_rl.collectors.episodes import SteppingCollector
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
 from drone_rl.envs.direct_renderer import Reasons
