@@ -10,8 +10,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from torchrl.modules import ProbabilisticActor
 
 from drone_rl.policies import make_actor
-from drone_rl.policies.actor import SeededCategorical, distribution_of
-from drone_rl.policies.distributions import RandomSource, SquashedNormal
+from drone_rl.policies.actor import RandomSource, SeededCategorical, SquashedNormal, distribution_of
 
 
 class Fixed(nn.Module):

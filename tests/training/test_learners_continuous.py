@@ -12,7 +12,7 @@ from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.objectives import Advantages, ReinforceLoss
 from drone_rl.objectives.estimators import LeaveOneOut
 from drone_rl.policies import MLP, ActorCritic, make_actor
-from drone_rl.policies.distributions import SquashedNormal
+from drone_rl.policies.actor import SquashedNormal
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.training import ActorCriticLearner, ReinforceLearner
 from tests.continuous import SETTINGS, make_env, make_policy

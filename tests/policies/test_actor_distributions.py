@@ -6,7 +6,7 @@ import torch
 from torch.distributions import Independent, Normal, TransformedDistribution
 from torch.distributions.transforms import TanhTransform
 
-from drone_rl.policies.distributions import MOST, RandomSource, SquashedNormal
+from drone_rl.policies.actor import MOST, RandomSource, SquashedNormal
 from drone_rl.sim.continuous_actions import normal_of
 
 OUTPUTS = torch.tensor(

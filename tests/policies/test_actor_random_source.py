@@ -3,7 +3,7 @@ import copy
 import torch
 from torch import nn
 
-from drone_rl.policies.distributions import RandomSource
+from drone_rl.policies.actor import RandomSource
 
 
 def test_copy_shares_the_stream():
