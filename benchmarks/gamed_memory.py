@@ -24,10 +24,9 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.evaluation.evaluate import evaluate
 from drone_rl.evaluation.judge import judge_for_selection
 from drone_rl.policies import MLP
-from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import ForeignPolicy, policy_from
-from drone_rl.policies.policy import load_policy
+from drone_rl.policies.policy import Pilot, load_policy
 from drone_rl.policies.zoo import describe, read_policy
 from drone_rl.policies.zoo.files import exported_bytes
 from drone_rl.robustness.shifts import shifts

@@ -14,9 +14,9 @@ from drone_rl.evaluation.metrics import summarise
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.evaluation.rounding_sensitivity import run_compared
 from drone_rl.evaluation.verdict_text import unlike as unlike_text
-from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
+from drone_rl.policies.policy import Pilot
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.display import aligned, interval, paragraph, table
 from drone_rl.utils.progress import Bar, Progress

@@ -31,9 +31,9 @@ from drone_rl.evaluation.rollouts import (
     run_episodes,
 )
 from drone_rl.policies import PictureNetwork, make_actor
-from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_policy import ForeignPolicy
 from drone_rl.policies.networks import require_finite
+from drone_rl.policies.policy import Pilot
 from drone_rl.policies.rounding import (
     REMEDY,
     Decide,

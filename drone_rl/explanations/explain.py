@@ -21,9 +21,9 @@ from drone_rl.explanations.report import write_report
 from drone_rl.explanations.report.explanation import FORMAT, FORMAT_VERSION
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import PictureNetwork
-from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
+from drone_rl.policies.policy import Pilot
 from drone_rl.utils.display import page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name

@@ -21,10 +21,9 @@ from drone_rl.config import (
 from drone_rl.config.configuration import Changes
 from drone_rl.config.transforms import Frame, Gray, Rgb, Standardize, Transform
 from drone_rl.policies import ForeignNetwork
-from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.environment import make_env
 from drone_rl.policies.external_network import Logits
-from drone_rl.policies.policy import load_policy
+from drone_rl.policies.policy import Pilot, load_policy
 from drone_rl.policies.zoo.description import output_of
 from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import Task, as_task

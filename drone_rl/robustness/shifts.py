@@ -17,10 +17,9 @@ from drone_rl.config.commands import ShiftSettings
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.rounding_sensitivity import require_function
 from drone_rl.evaluation.verdict_text import unlike as say_unlike
-from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
-from drone_rl.policies.policy import Policy
+from drone_rl.policies.policy import Pilot, Policy
 from drone_rl.robustness.agents import OracleAgent
 from drone_rl.robustness.axes import AXES, Axis, check_axes, find_axes
 from drone_rl.robustness.charts import chart, strips

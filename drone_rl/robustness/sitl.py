@@ -16,9 +16,9 @@ from drone_rl.flight.betaflight.build import find_firmware
 from drone_rl.flight.betaflight.sitl import Betaflight, betaflight_drone
 from drone_rl.flight.in_the_loop.drone import NotReadyError
 from drone_rl.flight.in_the_loop.dynamics import InTheLoopDynamics
-from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
+from drone_rl.policies.policy import Pilot
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.seeding import RootSeed, root_seed

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from drone_rl.config.commands import JudgeSettings
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.outcomes import Rounding
-from drone_rl.policies.base_policy import Pilot
-from drone_rl.policies.policy import Policy
+from drone_rl.policies.policy import Pilot, Policy
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError

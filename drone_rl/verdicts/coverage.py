@@ -11,8 +11,7 @@ import numpy as np
 
 from drone_rl.config.commands import JudgeSettings, ShiftSettings
 from drone_rl.evaluation.rule import Rule
-from drone_rl.policies.base_policy import Pilot
-from drone_rl.policies.policy import Policy
+from drone_rl.policies.policy import Pilot, Policy
 from drone_rl.policies.zoo import shifts_path
 from drone_rl.robustness.agents import OracleAgent
 from drone_rl.robustness.axes import AXES, Axis, find_axes

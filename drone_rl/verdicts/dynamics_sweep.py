@@ -13,8 +13,8 @@ from matplotlib.patches import Rectangle
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.commands import BodiesSettings, JudgeSettings
 from drone_rl.flight.in_the_loop.drone import FlightControllerError
-from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_policy import as_pilot
+from drone_rl.policies.policy import Pilot
 from drone_rl.sim.vocabulary import terms_of
 from drone_rl.utils.display import aligned, paragraph, picture, table
 from drone_rl.utils.errors import InputError

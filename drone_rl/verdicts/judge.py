@@ -19,9 +19,9 @@ from drone_rl.evaluation.evaluate import held_out_environments
 from drone_rl.evaluation.judge import Verdict, judge_policy
 from drone_rl.evaluation.rule import NOT_COVERED, NOT_PROVED, Rule
 from drone_rl.evaluation.verdict_text import quantity_label
-from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
+from drone_rl.policies.policy import Pilot
 from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.robustness.shifts_text import QUOTED, why_not
 from drone_rl.utils.display import aligned, interval, paragraph, table

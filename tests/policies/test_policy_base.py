@@ -3,7 +3,7 @@
 import pytest
 
 import drone_rl
-from drone_rl.policies.base_policy import Pilot
+from drone_rl.policies.policy import Pilot
 
 
 def straight_on(images):
