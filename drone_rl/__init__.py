@@ -18,8 +18,13 @@ if TYPE_CHECKING:
     from drone_rl.config import PillarsSettings as PillarsSettings
     from drone_rl.config import TaskSettings as TaskSettings
     from drone_rl.config.commands import BodiesSettings as BodiesSettings
+    from drone_rl.config.commands import ChanceSettings as ChanceSettings
+    from drone_rl.config.commands import CheckSettings as CheckSettings
     from drone_rl.config.commands import EvaluateSettings as EvaluateSettings
     from drone_rl.config.commands import JudgeSettings as JudgeSettings
+    from drone_rl.config.commands import PlacesSettings as PlacesSettings
+    from drone_rl.config.commands import ProvableSettings as ProvableSettings
+    from drone_rl.config.commands import ProveSettings as ProveSettings
     from drone_rl.config.commands import ShiftSettings as ShiftSettings
     from drone_rl.config.registry import register_collector as register_collector
     from drone_rl.config.registry import register_learner as register_learner
@@ -29,11 +34,6 @@ if TYPE_CHECKING:
     from drone_rl.config.sensors import SensorSettings as SensorSettings
     from drone_rl.config.training import TrainerSettings as TrainerSettings
     from drone_rl.config.training import TrainSettings as TrainSettings
-    from drone_rl.config.verification import ChanceSettings as ChanceSettings
-    from drone_rl.config.verification import CheckSettings as CheckSettings
-    from drone_rl.config.verification import PlacesSettings as PlacesSettings
-    from drone_rl.config.verification import ProvableSettings as ProvableSettings
-    from drone_rl.config.verification import ProveSettings as ProveSettings
     from drone_rl.envs.gymnasium.environments import DroneWorld as DroneWorld
     from drone_rl.envs.gymnasium.environments import DroneWorlds as DroneWorlds
     from drone_rl.envs.sb3.worlds import Sb3Worlds as Sb3Worlds

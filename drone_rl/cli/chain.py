@@ -5,7 +5,7 @@ from typing import Annotated
 
 import drone_rl
 from drone_rl.cli.settings import PolicyCommandSettings, finish
-from drone_rl.config.verification import ChanceSettings
+from drone_rl.config.commands import ChanceSettings
 from drone_rl.utils.progress import silent
 from drone_rl.utils.schema import Real, Several
 

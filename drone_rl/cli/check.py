@@ -4,8 +4,8 @@ from pathlib import Path
 
 import drone_rl
 from drone_rl.cli.settings import CommandSettings, finish
+from drone_rl.config.commands import CheckSettings
 from drone_rl.config.configuration import TaskChanges, no_changes
-from drone_rl.config.verification import CheckSettings
 from drone_rl.utils.progress import silent
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import drone_rl
 from drone_rl.cli.settings import PolicyCommandSettings, finish
-from drone_rl.config.verification import PlacesSettings
+from drone_rl.config.commands import PlacesSettings
 from drone_rl.utils.progress import silent
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import drone_rl
 from drone_rl.cli.settings import PolicyCommandSettings
-from drone_rl.config.verification import ProveSettings
+from drone_rl.config.commands import ProveSettings
 
 NOT_PROVED = 15
 """Exit status if some placements fail or are undecided."""

@@ -16,8 +16,8 @@ from drone_rl.cli.hydra.launchers import (
     register_plugins,
 )
 from drone_rl.cli.settings import CommandSettings
+from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.training import Logger, Tensorboard, TrainSettings
-from drone_rl.config.verification import ProvableSettings
 from drone_rl.utils.progress import silent
 from drone_rl.utils.schema import Instance, Several, Whole
 from drone_rl.verification.text import found

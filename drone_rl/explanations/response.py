@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.verification import PlacesSettings
+from drone_rl.config.commands import PlacesSettings
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.rollouts import run_to_end

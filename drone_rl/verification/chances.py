@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.verification import ChanceSettings, ProveSettings
+from drone_rl.config.commands import ChanceSettings, ProveSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason
 from drone_rl.utils.display import aligned, paragraph, table

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.config import TaskSettings
+from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.configuration import as_config, check_same_config
 from drone_rl.config.training import TrainSettings
-from drone_rl.config.verification import ProvableSettings
 from drone_rl.evaluation.rollouts import find_failures
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import describe, read_checkpoint

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from drone_rl.config.verification import ProveSettings
+from drone_rl.config.commands import ProveSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.display import aligned, paragraph, table
 from drone_rl.utils.errors import InputError

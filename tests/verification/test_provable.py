@@ -10,9 +10,9 @@ import torch
 
 import drone_rl
 from drone_rl.config import TaskSettings
+from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.learning import Threads
 from drone_rl.config.training import TrainerSettings, TrainSettings
-from drone_rl.config.verification import ProvableSettings
 from drone_rl.training import Callback
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent

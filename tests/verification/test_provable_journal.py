@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from drone_rl.config import ActionSettings
+from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainerSettings, TrainSettings
-from drone_rl.config.verification import ProvableSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.provable import Journal, Round
 from tests.fake_flight import FLIGHT

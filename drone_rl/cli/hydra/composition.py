@@ -33,13 +33,12 @@ from drone_rl.config import (
     DynamicsSettings,
     TaskSettings,
 )
-from drone_rl.config.commands import PathsSettings
+from drone_rl.config.commands import PathsSettings, ProvableSettings
 from drone_rl.config.configuration import Changes, Variant, from_config
 from drone_rl.config.learning import Collector, Objective, Optimiser, Returns, Scheduler
 from drone_rl.config.networks import Network
 from drone_rl.config.training import Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
-from drone_rl.config.verification import ProvableSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Kind
 from drone_rl.utils.settings import Settings, kinds_of, plain, types_of

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drone_rl.config.verification import ProvableSettings
+from drone_rl.config.commands import ProvableSettings
 from drone_rl.utils.errors import InputError
 
 
