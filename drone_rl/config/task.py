@@ -92,7 +92,9 @@ def read_task(data: Any, where: str) -> BaseTaskSettings:
 class TaskSettings(BaseTaskSettings):
     """The cubes, the drone's moves and the boundaries. Lengths in metres, world frame.
 
-    The world frame has x forward, y left and z up; the drone starts at x = y = 0.
+    The world frame has x forward, y left and z up; the drone starts at x = y = 0. The defaults are
+    the original study's. It does not state the sizes of cube and drone: with these a uniformly
+    random policy collects about as much as it did there (0.84 cubes).
     """
 
     name: ClassVar[str] = FIRST
@@ -146,17 +148,12 @@ class TaskSettings(BaseTaskSettings):
     @property
     def things(self) -> Things:
         """The cubes."""
-        return Things(
-            self.cube_size,
-            self.cube_color,
-            self.lateral_bound,
-            self.first_distance,
-            self.last_distance,
-            self.altitude,
-        )
+        first, last = self.first_distance, self.last_distance
+        color, bound = self.cube_color, self.lateral_bound
+        return Things(self.cube_size, color, bound, first, last, self.altitude)
 
     def check(self) -> None:
-        """Refuse tasks that can't be simulated or solved."""
+        """Reject tasks that can't be simulated or solved."""
         if self.vertical_bound > self.touch_distance:
             raise InputError(
                 f"vertical_bound={self.vertical_bound} puts cubes where a drone that keeps "
@@ -255,17 +252,12 @@ class PillarsSettings(BaseTaskSettings):
     @property
     def things(self) -> Things:
         """The pillars."""
-        return Things(
-            self.width,
-            self.pillar_color,
-            self.spread,
-            self.first_distance,
-            self.last_distance,
-            self.altitude,
-        )
+        first, last = self.first_distance, self.last_distance
+        color, bound = self.pillar_color, self.spread
+        return Things(self.width, color, bound, first, last, self.altitude)
 
     def check(self) -> None:
-        """Refuse fields that can't be simulated or crossed."""
+        """Reject fields that can't be simulated or crossed."""
         needed = 2.0 * (self.touch_distance + self.step_length)
         for name, least in (
             ("spacing", needed),
