@@ -58,7 +58,7 @@ class DamagedError(ValueError):
 
 
 class ForeignError(ValueError):
-    """The file holds more than tensors and plain values."""
+    """The file contains more than tensors and plain values."""
 
 
 def unpickle(content: bytes, where: str) -> Any:
@@ -67,7 +67,7 @@ def unpickle(content: bytes, where: str) -> Any:
     Raises:
         InputError: It is no archive, or too large.
         DamagedError: It is damaged.
-        ForeignError: It holds something else.
+        ForeignError: It contains something else.
     """
     members: dict[str, bytes] = {}
     for name, data in read_members(content, where, most=CHECKPOINT_BYTES):
@@ -96,29 +96,16 @@ _DAMAGE = (
 """Errors of damaged instructions."""
 
 
-class _Rebuild:
-    """Replacement of the function that builds a tensor from a storage."""
-
-    __slots__ = ()
-
-    def __call__(self, storage: Any, offset: Any, size: Any, stride: Any, *_: Any) -> Tensor:
-        numbers = (offset, *size, *stride)
-        if not isinstance(storage, Tensor) or any(type(n) is not int or n < 0 for n in numbers):
-            raise DamagedError("a tensor without a storage")
-        extent = offset + sum((n - 1) * step for n, step in zip(size, stride, strict=True)) + 1
-        count = math.prod(size)
-        if len(size) > DIMENSIONS or count > len(storage) or (count and extent > len(storage)):
-            raise DamagedError("a tensor is larger than its storage")
-        return storage.as_strided(size, stride, offset)
-
-
-class _NewMapping:
-    """Replacement of the class of ordered mappings."""
-
-    __slots__ = ()
-
-    def __call__(self) -> dict:
-        return collections.OrderedDict()
+def _build(storage: Any, offset: Any, size: Any, stride: Any, *_: Any) -> Tensor:
+    """Build a tensor from a storage, in place of torch's function."""
+    numbers = (offset, *size, *stride)
+    if not isinstance(storage, Tensor) or any(type(n) is not int or n < 0 for n in numbers):
+        raise DamagedError("a tensor without a storage")
+    extent = offset + sum((n - 1) * step for n, step in zip(size, stride, strict=True)) + 1
+    count = math.prod(size)
+    if len(size) > DIMENSIONS or count > len(storage) or (count and extent > len(storage)):
+        raise DamagedError("a tensor is larger than its storage")
+    return storage.as_strided(size, stride, offset)
 
 
 class _Unpickler(pickle._Unpickler):
@@ -142,9 +129,9 @@ class _Unpickler(pickle._Unpickler):
     def find_class(self, module: str, name: str) -> Any:
         """Return one of the three globals of a checkpoint."""
         if (module, name) == ("torch._utils", "_rebuild_tensor_v2"):
-            return _Rebuild()
+            return _build
         if (module, name) == ("collections", "OrderedDict"):
-            return _NewMapping()
+            return lambda: collections.OrderedDict()  # it has no attributes of the class
         if module == "torch" and name in _DTYPES:
             return _DTYPES[name]
         raise ForeignError(f"{module}.{name}"[:80])
@@ -158,7 +145,9 @@ class _Unpickler(pickle._Unpickler):
             content = self._members.pop(f"data/{key}")
             if length * dtype.itemsize != len(content):
                 raise DamagedError("a storage is not as long as it says")
-            self._storages[key] = _tensor(content, dtype)
+            empty = torch.empty(0, dtype=dtype)
+            numbers = torch.frombuffer(bytearray(content), dtype=dtype) if content else empty
+            self._storages[key] = numbers
         storage = self._storages[key]
         if storage.dtype != dtype or length != len(storage):
             raise DamagedError("one storage is named with two types or lengths")
@@ -176,13 +165,6 @@ class _Watched(dict):
 
     def __missing__(self, code: int) -> NoReturn:
         raise ForeignError(f"instruction {code}")
-
-
-def _tensor(content: bytes, dtype: torch.dtype) -> Tensor:
-    """A tensor with its own memory. Shape: (n,)."""
-    if not content:
-        return torch.empty(0, dtype=dtype)
-    return torch.frombuffer(bytearray(content), dtype=dtype)
 
 
 FORMAT = "drone_rl checkpoint"
@@ -270,22 +252,19 @@ def check_weights(weights: Any, expected: Mapping[str, Tensor]) -> dict[str, Ten
     """
     found = dict(as_mapping(weights, "the policy's weights"))
     for name in [*expected, *(name for name in found if name not in expected)]:
-        _check_shape(name, found.get(name), expected.get(name))
+        there, here = _kind(found.get(name)), _kind(expected.get(name))
+        if there != here:
+            raise InputError(
+                "the saved weights are not those of the described policy: "
+                f"{shown(name)} is {there} in the file and {here} by the description; choose the "
+                "policy and camera of the training"
+            )
     for name, value in found.items():
         if value.is_floating_point() and not bool(torch.isfinite(value).all()):
             raise InputError(
                 f"the weights {name} hold NaN or infinity; use a checkpoint from before that"
             )
     return found
-
-
-def _check_shape(name: str, found: Any, expected: Tensor | None) -> None:
-    there, here = _kind(found), _kind(expected)
-    if there != here:
-        raise InputError(
-            f"the saved weights are not those of the described policy: {shown(name)} is {there} in "
-            f"the file and {here} by the description; choose the policy and camera of the training"
-        )
 
 
 def _kind(value: Any) -> str:

@@ -11,7 +11,7 @@ import stat
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.limits import (
@@ -43,17 +43,8 @@ def read_bytes(path: Path, most: int) -> bytes:
     Raises:
         InputError: It can't be read, is no plain file, is empty or too large.
     """
-    try:
-        with open(path, "rb", opener=_open_at_once) as file:
-            about = os.fstat(file.fileno())
-            if not stat.S_ISREG(about.st_mode):
-                raise InputError(f"{path} is no plain file; give the path of a file")
-            content = file.read(most + 1) if about.st_size <= most else None
-    except InputError:
-        raise
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{path} can't be read ({reason}); give another file") from None
+    with _open_plain(path) as (file, size):
+        content = file.read(most + 1) if size <= most else None
     if content is None or len(content) > most:
         raise InputError(f"{path} is too large; files of its kind have at most {most} bytes")
     if not content:
@@ -62,20 +53,26 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 
 def read_tail(path: Path, most: int) -> bytes:
-    """Return the last `most` bytes of a plain file, such as a log.
+    """Return the last `most` bytes of a plain file, such as a log; see `read_bytes` for errors."""
+    with _open_plain(path) as (file, size):
+        file.seek(max(0, size - most))
+        return file.read(most)
 
-    Raises:
-        InputError: It can't be read or is no plain file.
-    """
+
+@contextlib.contextmanager
+def _open_plain(path: Path) -> Iterator[tuple[BinaryIO, int]]:
+    """Open a plain file, without waiting for the writer of a pipe; yield the file and its size."""
     try:
-        with open(path, "rb", opener=_open_at_once) as file:
+        with open(path, "rb", opener=lambda p, flags: os.open(p, flags | os.O_NONBLOCK)) as file:
             about = os.fstat(file.fileno())
             if not stat.S_ISREG(about.st_mode):
-                raise InputError(f"{path} is no plain file; move it away")
-            file.seek(max(0, about.st_size - most))
-            return file.read(most)
-    except OSError as error:
-        raise InputError(f"{path} can't be read ({error.strerror}); move it away") from None
+                raise InputError(f"{path} is no plain file; give the path of a file")
+            yield file, about.st_size
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{path} can't be read ({reason}); give another file") from None
 
 
 def newest(paths: Iterable[Path]) -> Path | None:
@@ -141,7 +138,7 @@ _NUMBERS: dict[bool, dict[str, Any]] = {
 
 
 def refuse_links(folder: Path, depth: int = 3, left: Allowance | None = None) -> None:
-    """Refuse a folder with links, so that reading and writing below it stays in it.
+    """Check that a folder has no links, so that reading and writing below it stays in it.
 
     Args:
         folder: A folder of unknown origin.
@@ -169,11 +166,7 @@ def to_file_name(name: str) -> str:
 
 
 def write_atomically(path: Path, content: str | bytes) -> None:
-    """Write a small file so that readers get the old or the new content.
-
-    Raises:
-        OSError: It can't be written; its `filename` is the path.
-    """
+    """Write a small file as `write_all_atomically` does: readers get old or new content."""
     write_all_atomically({path: content})
 
 
@@ -220,16 +213,14 @@ def remove_leftovers(folder: Path, *names: str) -> None:
 
 
 def _is_alive(process: int) -> bool:
-    """Whether another process has this id."""
-    if process == os.getpid():
-        return False
+    """Return whether another process has this id."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except (OSError, OverflowError):
+    except (OSError, OverflowError):  # a process of another user
         return True
-    return True
+    return process != os.getpid()
 
 
 @contextlib.contextmanager
@@ -270,11 +261,6 @@ def _open_lock(folder: Path) -> Any:
         "ab",
         opener=lambda path, flags: os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o644),
     )
-
-
-def _open_at_once(path: str, flags: int) -> int:
-    """Open without waiting for the writer of a pipe."""
-    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def _try_lock(descriptor: int) -> bool:
