@@ -21,13 +21,13 @@ from drone_rl.sim.continuous_actions import normal_of
 
 
 class RandomSource:
-    """A torch generator that copies of a module share, so that no draw is made twice."""
+    """A torch generator that copies of a module share, so that no sample is drawn twice."""
 
     def __init__(self, generator: torch.Generator) -> None:
         self.generator = generator
 
     def __deepcopy__(self, memo: dict) -> "RandomSource":
-        """Returns itself: the stream is one, however many copies draw from it."""
+        """Return itself."""
         return self
 
 
@@ -37,12 +37,12 @@ _NODES = 32
 
 
 class SquashedNormal(Distribution):
-    """tanh of independent normal numbers, drawn from a generator of its own, not the global one."""
+    """tanh of independent normal numbers, sampled from its own generator, not the global one."""
 
     has_rsample = False
 
     def __init__(self, logits: Tensor, source: RandomSource | None = None) -> None:
-        """Takes outputs of a network, n means and n deviations, see `normal_of`: (*batch, 2 n)."""
+        """Set n means and n deviations from outputs of a network (*batch, 2 n), see `normal_of`."""
         self.loc, self.scale = normal_of(logits)
         self._source = source
         shape = self.loc.shape
@@ -84,7 +84,8 @@ class SquashedNormal(Distribution):
         That of the normal numbers, whose bonus would increase deviations for ever, plus the mean
         of log(1 - tanh^2), by Gauss-Hermite quadrature, without sampling. Shape: batch.
         """
-        places, weights = (self.loc.new_tensor(part) for part in _quadrature())
+        nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
+        places, weights = map(self.loc.new_tensor, (nodes, weights / weights.sum()))
         numbers = self.loc[..., None] + self.scale[..., None] * places
         bend = (_log_slope(numbers) * weights).sum(-1)
         return (0.5 + 0.5 * math.log(2 * math.pi) + self.scale.log() + bend).sum(-1)
@@ -95,13 +96,8 @@ def _log_slope(number: Tensor) -> Tensor:
     return 2 * (math.log(2) - number - functional.softplus(-2 * number))
 
 
-def _quadrature() -> tuple[list[float], list[float]]:
-    places, weights = np.polynomial.hermite_e.hermegauss(_NODES)
-    return places.tolist(), (weights / weights.sum()).tolist()
-
-
 class SeededCategorical(Categorical):
-    """A categorical distribution that draws from a generator of its own, not the global one."""
+    """A categorical distribution that samples from its own generator, not the global one."""
 
     def __init__(self, logits: Tensor, source: RandomSource | None = None) -> None:
         super().__init__(logits=logits, validate_args=False)
@@ -130,7 +126,7 @@ class StraightActor(ProbabilisticActor):
 
     @property
     def network(self) -> nn.Module:
-        """Frames to outputs."""
+        """The network."""
         return self._parts[0].module
 
     @property
@@ -155,11 +151,11 @@ class StraightActor(ProbabilisticActor):
         tensordict_out: TensorDictBase | None = None,
         **kwargs: object,
     ) -> TensorDictBase:
-        """Writes "logits", a network's outputs, and actions."""
+        """Write "logits", the network's outputs, and actions."""
         network, head = self._parts
         how = self.exploration
-        straight = how in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
-        if tensordict_out is not None or kwargs or not straight:
+        is_known = how in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
+        if tensordict_out is not None or kwargs or not is_known:
             return super().forward(tensordict, tensordict_out, **kwargs)
         logits = network.module(*(tensordict.get(key) for key in network.in_keys))
         distribution = head.distribution_class(logits=logits, **head.distribution_kwargs)
@@ -181,7 +177,7 @@ def distribution_of(dtype: torch.dtype) -> type[SeededCategorical | SquashedNorm
 def make_actor(
     network: nn.Module, action_spec: TensorSpec, generator: torch.Generator | None = None
 ) -> StraightActor:
-    """A stochastic policy: "pixels" to "logits" to "action" (chapter, Eq. 9).
+    """Return a stochastic policy: "pixels" to "logits" to "action" (chapter, Eq. 9).
 
     It samples by default and takes the most probable action, or of continuous ones the median,
     under `set_exploration_type(ExplorationType.DETERMINISTIC)`.

@@ -31,11 +31,11 @@ class ActorCritic(nn.Module):
         own: PolicyNetwork | None = None,
         generator: torch.Generator | None = None,
     ) -> None:
-        """Adds a critic to a policy.
+        """Add a critic to a policy.
 
         Args:
-            network: The policy's.
-            own: The critic's, with one output; None makes a linear layer on the policy's features.
+            network: Of the policy.
+            own: Of the critic, with one output; None for a linear layer on the policy's features.
             generator: Source of that layer's initial weights.
 
         Raises:

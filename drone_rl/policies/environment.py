@@ -31,18 +31,18 @@ def make_env(
     device: str = "cpu",
     **kwargs: Any,
 ) -> TransformedEnv:
-    """Worlds to train in, as one TorchRL environment.
+    """Return environments to train in, as one batched TorchRL environment.
 
     Args:
-        num_envs: How many.
-        task: What the drone has to do: settings, or a name such as "pillars" for its defaults.
-        camera: The frame that it takes.
-        dynamics: How it moves; in computer-vision mode by default.
-        actions: What it can be asked for, where dynamics are settings; moves by default.
-        transforms: What becomes of the frame, in this order.
+        num_envs: Batch size.
+        task: Settings of the task, or a name such as "pillars" for its defaults.
+        camera: The policy's camera.
+        dynamics: Vehicle dynamics; computer-vision mode by default.
+        actions: Action space, if `dynamics` are settings; the moves by default.
+        transforms: Transforms of the image, in this order.
         seed: Root of the environments' random streams.
-        device: Where they are drawn: "cpu", "cuda" or "cuda:N".
-        kwargs: See `drone_rl.envs.DroneEnv`; renderer="mujoco_warp" draws by MuJoCo Warp.
+        device: Device of the renderer: "cpu", "cuda" or "cuda:N".
+        kwargs: See `drone_rl.envs.DroneEnv`, such as renderer="mujoco_warp".
 
     Raises:
         InputError: A setting is out of range; the message begins with its name.

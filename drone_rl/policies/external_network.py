@@ -15,15 +15,15 @@ from drone_rl.utils.errors import InputError
 Logits = Callable[[Any], Any]
 """From a batch of frames to logits (N, number of actions), a tensor or an array."""
 _REPEATS = 1e-5
-"""Logits of the same frame that differ by more are drawn, not computed."""
+"""Logits of the same frame that differ by more are random."""
 
 
 class ForeignNetwork(PictureNetwork):
-    """A copy of a torch module that computes and does not learn, or a callable as it is.
+    """A copy of a torch module in evaluation mode, or a callable as it is.
 
     Raises:
-        InputError: It takes no such frames, its logits are not one an action, or it doesn't give
-            the same twice.
+        InputError: It does not accept such frames, does not return one logit for each action, or
+            returns different logits for the same frame.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class ForeignNetwork(PictureNetwork):
         takes_bytes: bool = False,
         device: torch.device | str = "cpu",
     ) -> None:
-        """Evaluates it on one frame.
+        """Evaluate it on one frame.
 
         Args:
             logits: The callable.
@@ -70,15 +70,11 @@ class ForeignNetwork(PictureNetwork):
 
     @property
     def parts(self) -> nn.Module:
-        """The module; one without any parts of a callable that is none."""
+        """The module; an empty one for another callable."""
         return self._logits if isinstance(self._logits, nn.Module) else nn.Module()
 
     def forward(self, pixels: Tensor) -> Tensor:
-        """See `PictureNetwork`.
-
-        Raises:
-            InputError: What is given back are no logits.
-        """
+        """See `PictureNetwork`; raise an `InputError` if the result is not finite logits."""
         flat = pixels.reshape(-1, *self.in_shape)
         made = self._logits(self._given(flat))
         wanted, names = (len(flat), self.num_actions), ", ".join(self.actions.output_names)
@@ -99,7 +95,7 @@ class ForeignNetwork(PictureNetwork):
         return logits.reshape(*pixels.shape[:-3], self.num_actions)
 
     def rescale(self, factor: Tensor, shift: Tensor) -> None:
-        """See `PictureNetwork`; what is given back is computed with."""
+        """See `PictureNetwork`; the callable itself does not change."""
         self._factor, self._shift = self._factor * factor, self._shift * factor + shift
 
     def _given(self, flat: Tensor) -> Tensor:
@@ -109,7 +105,7 @@ class ForeignNetwork(PictureNetwork):
 
 
 def _copied(module: nn.Module) -> nn.Module:
-    """Return a copy, which does not change when the module is trained further."""
+    """Return a copy in evaluation mode."""
     try:
         own = copy.deepcopy(module).eval()
     except Exception as error:

@@ -44,22 +44,22 @@ class ForeignPolicy(Pilot):
     own_task: BaseTaskSettings | Task[Any]
     camera: CameraSettings
     transforms: tuple[Transform, ...]
-    """None: the camera's RGB bytes."""
+    """Without any, the callable gets the camera's RGB bytes."""
     own_dynamics: DynamicsSettings = COMPUTER_VISION  # pyright: ignore[reportIncompatibleMethodOverride] (a field)
-    """How its drone moved when it was made."""
+    """The vehicle dynamics of the training."""
     actions: ActionSettings = MOVES_SETTINGS  # pyright: ignore[reportIncompatibleMethodOverride] (a field)
-    """What its logits ask for."""
+    """One action for each logit."""
     flown: DynamicsSettings | None = None
-    """How its drone moves now; as before by default."""
+    """The vehicle dynamics; those of the training by default."""
 
     @property
     def dynamics(self) -> DynamicsSettings:
-        """See `Pilot`."""
+        """The vehicle dynamics."""
         return self.flown or self.own_dynamics
 
     @property
     def task(self) -> BaseTaskSettings | Task[Any]:
-        """What it flies in."""
+        """The task."""
         return self.own_task
 
     @property
@@ -68,17 +68,17 @@ class ForeignPolicy(Pilot):
         return {"policy": self.name, "trained": None}
 
     def in_task(self, **changes: Any) -> "ForeignPolicy":
-        """See `Pilot`."""
-        if not isinstance(self.own_task, Settings):
+        """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""
+        if not isinstance(self.task, Settings):
             if changes:
                 raise InputError(f"task.{min(changes)} is unknown; the task has no settings")
             return self
-        changed = Changes(type(self.own_task)).read(changes, "task")
+        changed = Changes(type(self.task)).read(changes, "task")
         with below("task"):
-            return dataclasses.replace(self, own_task=self.own_task.replace(**changed))
+            return dataclasses.replace(self, own_task=self.task.replace(**changed))
 
     def in_dynamics(self, **changes: Any) -> "ForeignPolicy":
-        """See `Pilot`."""
+        """Return the same policy with other dynamics, such as `in_dynamics(wind=(5, 0, 0))`."""
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
         with below("dynamics"):
             flown = self.dynamics.replace(**changed)
@@ -86,7 +86,7 @@ class ForeignPolicy(Pilot):
         return dataclasses.replace(self, flown=flown)
 
     def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv:
-        task: Any = self.own_task
+        task: Any = self.task
         dynamics = options.pop("dynamics", None) or self.dynamics
         if isinstance(dynamics, DynamicsSettings):
             options.setdefault("actions", self.actions)
@@ -94,20 +94,14 @@ class ForeignPolicy(Pilot):
         return make_env(num_envs, camera=self.camera, **parts, **options)
 
     def make_network(self, device: str | torch.device = "cpu") -> ForeignNetwork:
-        """See `Pilot`.
-
-        Raises:
-            InputError: It takes no such frames, or its logits are not one an action.
-        """
+        """Return its network; raise an `InputError` as `ForeignNetwork` does."""
         frame = Frame((self.camera.height, self.camera.width, 3))
         for transform in self.transforms or (Rgb(),):
             frame = output_of(transform, frame)
         network = ForeignNetwork(
             self.logits,
             frame.shape,
-            make_dynamics(
-                as_task(self.own_task).make_dynamics, self.dynamics, self.actions
-            ).actions,
+            make_dynamics(as_task(self.task).make_dynamics, self.dynamics, self.actions).actions,
             takes_bytes=not self.transforms,
             device=device,
         )
@@ -115,7 +109,7 @@ class ForeignPolicy(Pilot):
         return network
 
     def _repr_html_(self) -> str:
-        """Shows itself in a notebook."""
+        """Return a table for notebooks."""
         sees = " > ".join(transform.name for transform in self.transforms) or "RGB bytes"
         rows = [["network", type(self.logits).__name__], ["sees", sees], ["file", "none"]]
         return table(["policy", self.name], rows)
@@ -131,26 +125,26 @@ def policy_from(
     transforms: Sequence[Transform] | None = None,
     name: str | None = None,
 ) -> ForeignPolicy:
-    """A policy that was made elsewhere, to be judged, evaluated and explained.
+    """Return a third-party policy to judge, evaluate and explain.
 
-    Of a torch module a copy is taken when it is asked, in evaluation mode, and all can be explained
-    of it. Of another torch function some explanations are left out, of any other callable more.
+    A torch module is copied in evaluation mode, and every explanation is available. Other torch
+    functions have fewer explanations, other callables still fewer.
 
     Args:
         logits: From a batch of frames, floats (N, C, H, W) after the transforms, to a logit for
             each action (N, number of actions), as a tensor or an array.
-        task: What it flies in.
-        camera: The frame that the drone takes; by default as large as the frames that `logits`
-            was trained on, if it says so (`observation_shape`, as `Sb3Logits` does).
-        dynamics: How it moves.
-        actions: What the logits ask for.
-        transforms: What becomes of the frame before it gets it; with an empty list it gets the
-            camera's own, RGB bytes (N, H, W, 3). By default `Gray` and `Standardize`, or `Rgb` if
-            `logits` was trained on colour frames.
-        name: For people; that of the callable by default.
+        task: The task.
+        camera: The policy's camera; by default its images have the shape `observation_shape` of
+            `logits`, which `Sb3Logits` has.
+        dynamics: Vehicle dynamics.
+        actions: The action space.
+        transforms: Transforms of the image, in order; an empty list for the camera's RGB bytes
+            (N, H, W, 3). By default `Gray` and `Standardize`, or `Rgb` if `logits` was trained on
+            colour frames.
+        name: Name in reports; that of the callable by default.
 
     Raises:
-        InputError: It takes no such frames, or its logits are not one an action.
+        InputError: It does not accept such frames, or does not return one logit for each action.
     """
     if not callable(logits):
         raise InputError(
@@ -165,7 +159,7 @@ def policy_from(
         own_dynamics=dynamics,
         actions=actions,
     )
-    policy.make_network()  # refuses now what could not be asked later
+    policy.make_network()  # raises errors early
     return policy
 
 
@@ -181,21 +175,18 @@ def _transforms_of(logits: Logits) -> tuple[Transform, ...]:
 
 
 def _is_sb3_model(which: Any) -> bool:
-    """Whether this is an algorithm of Stable-Baselines3, which is not imported to find out."""
+    """Return whether this is an algorithm of Stable-Baselines3, without importing that."""
     module = sys.modules.get("stable_baselines3.common.base_class")
     return module is not None and isinstance(which, module.BaseAlgorithm)
 
 
 def as_pilot(which: str | Path | Pilot | Logits, outputs: str | Path = "outputs") -> Pilot:
-    """Return a policy as it is, or make one of a callable or a file.
+    """Return a policy from a callable as for `policy_from`, a model of Stable-Baselines3 or a file.
 
-    Args:
-        which: The policy, a callable as for `policy_from`, a model of Stable-Baselines3, or
-            what `load_policy` takes.
-        outputs: Folder of the runs.
+    `outputs` is the folder of the runs, see `load_policy`; a `Pilot` is returned as it is.
 
     Raises:
-        InputError: There is none, or it is unusable.
+        InputError: There is no such policy, or it is unusable.
     """
     if isinstance(which, Pilot):
         return which

@@ -27,7 +27,7 @@ class Pilot(abc.ABC):
     """A policy with its observations, task and dynamics."""
 
     name: str
-    """For people."""
+    """Name in reports."""
 
     @property
     @abc.abstractmethod
@@ -37,17 +37,17 @@ class Pilot(abc.ABC):
     @property
     @abc.abstractmethod
     def dynamics(self) -> DynamicsSettings:
-        """How its drone moves."""
+        """The vehicle dynamics."""
 
     @property
     @abc.abstractmethod
     def actions(self) -> ActionSettings:
-        """What its outputs mean."""
+        """The action space."""
 
     @property
     @abc.abstractmethod
     def own_dynamics(self) -> DynamicsSettings:
-        """Dynamics of its training."""
+        """The vehicle dynamics of the training."""
 
     @property
     def unlike(self) -> dict[str, dict[str, Any]]:
@@ -60,14 +60,14 @@ class Pilot(abc.ABC):
     @property
     @abc.abstractmethod
     def origin(self) -> dict[str, Any]:
-        """Its origin, as plain values: "policy", and how it was "trained", if known."""
+        """Plain values: "policy", its file or name, and how it was "trained"; None if unknown."""
 
     @abc.abstractmethod
     def in_task(self, **changes: Any) -> Self:
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`.
 
         Raises:
-            InputError: A setting is unknown or out of range; the message begins with "task.".
+            InputError: A setting is unknown or out of range.
         """
 
     @abc.abstractmethod
@@ -75,7 +75,7 @@ class Pilot(abc.ABC):
         """Return the same policy with other dynamics: `policy.in_dynamics(mode="simple_flight")`.
 
         Raises:
-            InputError: A setting is unknown or out of range; the message begins with "dynamics.".
+            InputError: A setting is unknown or out of range.
         """
 
     def make_env(
@@ -89,12 +89,8 @@ class Pilot(abc.ABC):
     ) -> TransformedEnv:
         """Return environments like those of its training, with its camera and transforms.
 
-        Args:
-            num_envs: How many.
-            seed: Root of their random streams.
-            stream: Which environments: by default those to report on, which training never sees.
-            device: Where they are rendered.
-            kwargs: See `drone_rl.envs.DroneEnv`.
+        The default `stream` has the environments to report on, which training never sees. The
+        other arguments are those of `drone_rl.envs.DroneEnv`.
         """
         options = {"seed": seed, "stream": stream, "device": device, **kwargs}
         return self._make_env(num_envs, options)
@@ -109,12 +105,9 @@ class Pilot(abc.ABC):
     def make_actor(
         self, env: EnvBase | None = None, *, seed: int = 0, stream: Stream = Stream.REPORT
     ) -> TensorDictModuleBase:
-        """Return a TorchRL actor, which samples its actions from a stream of its own.
+        """Return a TorchRL actor, which samples its actions from the stream of `seed` and `stream`.
 
-        Args:
-            env: From `make_env`: its device and actions are used; those of a CPU by default.
-            seed: Root of the stream.
-            stream: Purpose of the stream.
+        It has the device and action space of `env`, from `make_env`; by default those of a CPU.
 
         Raises:
             InputError: The environment is not one of TorchRL's.
@@ -131,16 +124,10 @@ class Pilot(abc.ABC):
 
     @contextlib.contextmanager
     def flying(
-        self,
-        num_envs: int,
-        *,
-        seed: int = 0,
-        stream: Stream = Stream.REPORT,
-        device: str = "cpu",
-        **kwargs: Any,
+        self, num_envs: int, *, seed: int = 0, stream: Stream = Stream.REPORT, **kwargs: Any
     ) -> Iterator[tuple[TransformedEnv, TensorDictModuleBase]]:
         """Yield environments and its actor; close them afterwards. See `make_env`."""
-        env = self.make_env(num_envs, seed=seed, stream=stream, device=device, **kwargs)
+        env = self.make_env(num_envs, seed=seed, stream=stream, **kwargs)
         try:
             yield env, self.make_actor(env, seed=seed, stream=stream)
         finally:
@@ -152,13 +139,13 @@ class Policy(Pilot):
     """A trained policy: its task, camera and transforms, network and provenance."""
 
     name: str
-    """For people: a name in the zoo, or that of the run's folder."""
+    """Name in the zoo, or of the run's folder."""
     path: Path
     """Its file."""
     description: PolicyDescription = dataclasses.field(repr=False)
     """Task, camera, transforms and network."""
     state: dict[str, Any] = dataclasses.field(repr=False)
-    """All that its file says, see `drone_rl.policies.zoo.read_policy`."""
+    """Content of its file, see `drone_rl.policies.zoo.read_policy`."""
 
     @property
     def task(self) -> BaseTaskSettings:
@@ -167,35 +154,35 @@ class Policy(Pilot):
 
     @property
     def dynamics(self) -> DynamicsSettings:
-        """See `Pilot`."""
+        """The vehicle dynamics."""
         return self.description.dynamics
 
     @property
     def actions(self) -> ActionSettings:
-        """See `Pilot`."""
+        """The action space."""
         return self.description.actions
 
     @property
     def own_dynamics(self) -> DynamicsSettings:
-        """See `Pilot`."""
+        """The vehicle dynamics of the training."""
         return parse(self.state["description"]).dynamics
 
     @property
     def origin(self) -> dict[str, Any]:
-        """See `Pilot`; of the training "description", "progress", "provenance" and "command"."""
-        told = ("description", "progress", "provenance")
-        trained = {**{key: self.state[key] for key in told}, "command": self.state.get("command")}
+        """The file, and "description", "progress", "provenance" and "command" of the training."""
+        keys = ("description", "progress", "provenance")
+        trained = {**{key: self.state[key] for key in keys}, "command": self.state.get("command")}
         return {"policy": str(self.path), "trained": trained}
 
     def in_task(self, **changes: Any) -> "Policy":
-        """See `Pilot`."""
+        """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""
         changed = Changes(type(self.task)).read(changes, "task")
         described = self.description.as_dict()
         described["task"] |= changed
         return dataclasses.replace(self, description=parse(described))
 
     def in_dynamics(self, **changes: Any) -> "Policy":
-        """See `Pilot`."""
+        """Return the same policy with other dynamics, such as `in_dynamics(wind=(5, 0, 0))`."""
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
         described = self.description.as_dict()
         described["dynamics"] = {**self.dynamics.values(), **changed}
@@ -205,7 +192,7 @@ class Policy(Pilot):
         return self.description.build_env(num_envs, **options)
 
     def make_network(self, device: str | torch.device = "cpu") -> PolicyNetwork:
-        """Its network."""
+        """Return its network."""
         network = self.description.load_network(self.state["policy"]).to(device)
         network.owner = f"policy={self.name}"
         return network
@@ -215,10 +202,9 @@ class Policy(Pilot):
         rows = {
             "network": ", ".join(f"{k}={v}" for k, v in described["network"].items()),
             "sees": " > ".join(step["name"] for step in described["transforms"]),
-            "task": ", ".join(f"{k}={v}" for k, v in described["task"].items()),
             **{
                 part: ", ".join(f"{k}={v}" for k, v in described[part].items())
-                for part in ("dynamics", "actions")
+                for part in ("task", "dynamics", "actions")
                 if part in described
             },
             "trained": f"{progress['frames']:,} frames, {progress['episodes']:,} episodes",
@@ -252,11 +238,7 @@ def load_policy(which: str | Path, *, outputs: str | Path = "outputs") -> Policy
 
 
 def find_policy(which: str | Path, outputs: str | Path = "outputs") -> Path:
-    """The file of a policy, see `load_policy`.
-
-    Raises:
-        InputError: There is none.
-    """
+    """Return the file of a policy, see `load_policy`; raise an `InputError` if there is none."""
     if which == "latest":
         last = newest(Path(outputs).glob("train/**/checkpoints/last.pt"))
         if last is None:
