@@ -5,7 +5,6 @@ In the files of groups' defaults all settings are generated; in files of command
 loggers the comment above each setting. Files of a group with other values are written by hand.
 """
 
-import importlib
 import re
 import sys
 import textwrap
@@ -16,7 +15,7 @@ from typing import Any
 import yaml
 
 from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL, conf_dir
-from drone_rl.cli.main import COMMANDS
+from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.config import TASKS
 from drone_rl.utils.settings import Settings
 from tools.readme.settings import about, meanings
@@ -57,8 +56,7 @@ def described_files(conf: Path) -> Iterator[tuple[Path, dict[str, str]]]:
         conf: The folder conf/.
     """
     for name in COMMANDS:
-        module = importlib.import_module(f"drone_rl.cli.{name.replace('-', '_')}")
-        yield conf / f"{name.replace('-', '_')}.yaml", {**meanings(module.Command)}
+        yield conf / f"{name.replace('-', '_')}.yaml", {**meanings(find_command(name))}
     for group, part in SEVERAL.items():
         words = {}
         for variant in part.variants():

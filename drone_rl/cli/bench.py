@@ -14,8 +14,48 @@ from drone_rl.utils.errors import InputError
 _log = logging.getLogger(__name__)
 
 
-class Command(CommandSettings, BenchSettings):
+class BenchCommand(CommandSettings, BenchSettings):
     """Settings of `drone-rl bench`."""
+
+    @classmethod
+    def prepare(cls, overrides: Sequence[str]) -> list[str]:
+        """Translate `drone-rl bench collector --quick` to `only=[collector] quick=true`."""
+        find_benchmarks = _benchmarks().find_benchmarks
+        words = [o for o in overrides if "=" not in o and not o.startswith("-")]
+        names = find_benchmarks(words)
+        kept = [o for o in overrides if o not in (*words, "--quick")]
+        quick = "--quick" in overrides
+        if quick and not names and not any(o.startswith("only=") for o in kept):
+            names = find_benchmarks(["main"])
+        if names:
+            kept.append(f"only=[{','.join(names)}]")
+        return [*kept, "quick=true"] if quick else kept
+
+    def run(self, folder: Path) -> tuple[int, None]:
+        """Run benchmarks; each adds its results to results.json.
+
+        Raises:
+            InputError: Some failed; the others were run all the same.
+        """
+        registry = _benchmarks()
+        from benchmarks.benchmark import Setup
+        from benchmarks.ledger import Ledger
+        from benchmarks.run import run_benchmarks
+
+        results = Path(self.folder) / "quick" if self.quick else Path(self.folder)
+        results.mkdir(parents=True, exist_ok=True)
+        setup = Setup.from_settings(self, results)
+        ledger = Ledger(results / "results.json")
+        names = (
+            list(registry.BENCHMARKS) if self.only is None else registry.find_benchmarks(self.only)
+        )
+        failures = run_benchmarks(names, setup, ledger, again=self.only is not None)
+        print(json.dumps({name: ledger.of(name) for name in names}, indent=2))
+        _log.info("results: %s", ledger.path)
+        if failures:
+            reasons = "; ".join(f"{name}: {why}" for name, why in failures.items())
+            raise InputError(f"benchmarks failed: {reasons}")
+        return 0, None
 
 
 def _benchmarks() -> ModuleType:
@@ -33,47 +73,3 @@ def _benchmarks() -> ModuleType:
             "drone-rl bench needs a checkout of the project (the package benchmarks is not "
             "installed); clone the repository and run make demo, then drone-rl bench, in it"
         ) from error
-
-
-def prepare(overrides: Sequence[str]) -> list[str]:
-    """Translate `drone-rl bench collector --quick` to `only=[collector] quick=true`."""
-    find_benchmarks = _benchmarks().find_benchmarks
-    words = [o for o in overrides if "=" not in o and not o.startswith("-")]
-    names = find_benchmarks(words)
-    kept = [o for o in overrides if o not in (*words, "--quick")]
-    quick = "--quick" in overrides
-    if quick and not names and not any(o.startswith("only=") for o in kept):
-        names = find_benchmarks(["main"])
-    if names:
-        kept.append(f"only=[{','.join(names)}]")
-    return [*kept, "quick=true"] if quick else kept
-
-
-def run(settings: Command, output_dir: Path) -> tuple[int, None]:
-    """Run benchmarks; each adds its results to results.json.
-
-    Raises:
-        InputError: Some failed; the others were run all the same.
-    """
-    del output_dir
-    registry = _benchmarks()
-    from benchmarks.benchmark import Setup
-    from benchmarks.ledger import Ledger
-    from benchmarks.run import run_benchmarks
-
-    folder = Path(settings.folder) / "quick" if settings.quick else Path(settings.folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    setup = Setup.from_settings(settings, folder)
-    ledger = Ledger(folder / "results.json")
-    names = (
-        list(registry.BENCHMARKS)
-        if settings.only is None
-        else registry.find_benchmarks(settings.only)
-    )
-    failures = run_benchmarks(names, setup, ledger, again=settings.only is not None)
-    print(json.dumps({name: ledger.of(name) for name in names}, indent=2))
-    _log.info("results: %s", ledger.path)
-    if failures:
-        reasons = "; ".join(f"{name}: {why}" for name, why in failures.items())
-        raise InputError(f"benchmarks failed: {reasons}")
-    return 0, None

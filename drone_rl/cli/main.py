@@ -3,7 +3,7 @@
 import importlib
 import os
 import sys
-from typing import cast
+from typing import Any
 
 import drone_rl
 from drone_rl.utils.imports import leave_compiler_unloaded
@@ -52,12 +52,19 @@ Runs three commands, each into a folder of its own under outputs/:
 
 The settings are those of drone-rl train; drone-rl train --help lists them.
 """
-COMMANDS = (
-    *("train", "evaluate", "play", "explain", "report", "verdict"),
-    *("prove", "check", "places", "shifts", "bodies", "chain", "export", "sweep-report", "bench"),
-)
-"""Commands with a module in `drone_rl.cli` and a file in conf/; `demo` runs three of them."""
-
+COMMANDS = {
+    "train": "train",
+    **dict.fromkeys(("evaluate", "play"), "evaluation"),
+    **dict.fromkeys(("explain", "report"), "explanation"),
+    "verdict": "evaluation",
+    **dict.fromkeys(("prove", "check", "places"), "verification"),
+    **dict.fromkeys(("shifts", "bodies"), "evaluation"),
+    "chain": "verification",
+    "export": "evaluation",
+    "sweep-report": "sweep_report",
+    "bench": "bench",
+}
+"""Module in `drone_rl.cli` of each command; `demo` runs three of them."""
 
 CLOSED = 128 + 13
 """Exit status when standard output is closed, as of a program that SIGPIPE ends."""
@@ -107,14 +114,18 @@ def _main(args: list[str]) -> int:
 
 def _run_all(steps: list[tuple[str, list[str]]]) -> int:
     """Run commands one after the other until one fails."""
-    from drone_rl.cli.hydra.composition import Command, run_command
+    from drone_rl.cli.hydra.composition import run_command
 
     for name, overrides in steps:
-        file = name.replace("-", "_")
-        command = cast(Command, importlib.import_module(f"drone_rl.cli.{file}"))
-        if status := run_command(file, command, overrides):
+        if status := run_command(name.replace("-", "_"), find_command(name), overrides):
             return status
     return 0
+
+
+def find_command(name: str) -> Any:
+    """Return the settings class of a command, such as `SweepReportCommand`."""
+    module = importlib.import_module(f"drone_rl.cli.{COMMANDS[name]}")
+    return getattr(module, f"{name.title().replace('-', '')}Command")
 
 
 if __name__ == "__main__":

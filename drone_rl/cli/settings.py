@@ -1,9 +1,12 @@
-"""Settings and results that several commands share."""
+"""Base classes of commands: what each can be told, and what running it means."""
 
 import logging
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import drone_rl
 from drone_rl.config.commands import PathsSettings
 from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.utils.settings import Settings
@@ -12,10 +15,19 @@ _log = logging.getLogger(__name__)
 
 
 class CommandSettings(Settings):
-    """Settings of every command."""
+    """Settings of a command, such as `drone-rl train`."""
 
     paths: PathsSettings = PathsSettings()
     """Folders."""
+
+    @classmethod
+    def prepare(cls, overrides: Sequence[str]) -> list[str]:
+        """Translate a command line before Hydra composes it, here `checkpoint=` to `policy=`."""
+        return [re.sub(r"^checkpoint=", "policy=", override) for override in overrides]
+
+    def run(self, folder: Path) -> tuple[int, object]:
+        """Run the command; return the exit status and the value that a sweep maximises."""
+        raise NotImplementedError
 
 
 class PolicyCommandSettings(CommandSettings):
@@ -27,6 +39,10 @@ class PolicyCommandSettings(CommandSettings):
     task: TaskChanges = no_changes()
     """Changes of the policy's task settings (see conf/task), as in task.num_cubes=5."""
 
+    def shared(self) -> dict[str, Any]:
+        """Return the arguments that the functions of all such commands have."""
+        return {"task": self.task, "outputs": self.paths.outputs}
+
 
 class RolloutCommandSettings(PolicyCommandSettings):
     """Settings of a command that rolls out one policy."""
@@ -34,14 +50,17 @@ class RolloutCommandSettings(PolicyCommandSettings):
     dynamics: DynamicsChanges = no_changes()
     """Changes of the vehicle dynamics (see conf/dynamics), as in dynamics=quadrotor."""
 
+    def load_policy(self) -> Any:
+        """Return the policy with the changes of its task and dynamics."""
+        policy = drone_rl.load_policy(self.policy, outputs=self.paths.outputs)
+        policy = policy.in_task(**self.task)
+        return policy.in_dynamics(**self.dynamics) if self.dynamics else policy
+
 
 def finish(result: Any, path: Path, files: str = "") -> None:
-    """Save a result, print it, and log where it is.
+    """Save a result by its method `save`, print it, and log where it is.
 
-    Args:
-        result: It has a method `save`.
-        path: Argument of `save`.
-        files: Names of the files if the path is their folder.
+    `files` are the names of the written files if the path is their folder.
     """
     result.save(path)
     print(result)

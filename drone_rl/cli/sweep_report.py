@@ -11,7 +11,7 @@ from drone_rl.utils.schema import Whole
 _log = logging.getLogger(__name__)
 
 
-class Command(CommandSettings):
+class SweepReportCommand(CommandSettings):
     """Settings of `drone-rl sweep-report`."""
 
     folder: str = "latest"
@@ -25,35 +25,27 @@ class Command(CommandSettings):
     device: str = "cpu"
     """Device of these episodes: cpu, cuda or cuda:N."""
 
+    @classmethod
+    def prepare(cls, overrides: Sequence[str]) -> list[str]:
+        """Translate `drone-rl sweep-report FOLDER` to `folder=FOLDER`."""
+        from drone_rl.sweeps.manifest import quoted
 
-def prepare(overrides: Sequence[str]) -> list[str]:
-    """Translate `drone-rl sweep-report FOLDER` to `folder=FOLDER`."""
-    from drone_rl.sweeps.manifest import quoted
+        return [
+            o if "=" in o.split("/")[0] or o.startswith("-") else f"folder={quoted(o)}"
+            for o in overrides
+        ]
 
-    return [
-        o if "=" in o.split("/")[0] or o.startswith("-") else f"folder={quoted(o)}"
-        for o in overrides
-    ]
+    def run(self, folder: Path) -> tuple[int, None]:
+        """Report on a sweep, finished or not; return the exit status."""
+        from drone_rl.sweeps import report  # slow to import
 
-
-def run(settings: Command, folder: Path) -> tuple[int, None]:
-    """Report on a sweep, finished or not; return the exit status."""
-    from drone_rl.sweeps.report import (
-        find_sweep,
-        judge_sweep,
-        terminal_lines,
-        write_picture,
-        write_sweep_report,
-    )
-
-    del folder
-    sweep = find_sweep(settings.folder, settings.paths.outputs)
-    if settings.judge:
-        judge_sweep(sweep, settings.episodes, settings.device)
-    page, summary = write_sweep_report(sweep)
-    print(terminal_lines(summary))
-    if settings.picture is not None:
-        write_picture(sweep, Path(settings.picture))
-        _log.info("picture: %s", settings.picture)
-    _log.info("written: %s", page)
-    return 0, None
+        sweep = report.find_sweep(self.folder, self.paths.outputs)
+        if self.judge:
+            report.judge_sweep(sweep, self.episodes, self.device)
+        page, summary = report.write_sweep_report(sweep)
+        print(report.terminal_lines(summary))
+        if self.picture is not None:
+            report.write_picture(sweep, Path(self.picture))
+            _log.info("picture: %s", self.picture)
+        _log.info("written: %s", page)
+        return 0, None

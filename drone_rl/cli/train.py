@@ -3,6 +3,7 @@
 import functools
 import logging
 import signal
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,11 +27,9 @@ if TYPE_CHECKING:
     from drone_rl.training import Callback
 
 _log = logging.getLogger(__name__)
-prepare = resuming.complete
-"""Preprocessing of the command line, see `drone_rl.cli.hydra.composition`."""
 
 
-class Command(CommandSettings, TrainSettings):
+class TrainCommand(CommandSettings, TrainSettings):
     """Settings of `drone-rl train`."""
 
     logger: Annotated[tuple[Logger, ...], Several(Instance(Logger), 0, 16)] = (Tensorboard(),)
@@ -42,46 +41,44 @@ class Command(CommandSettings, TrainSettings):
     trial: Annotated[int, Whole(0)] | None = None
     """Number of this run in a search, which hydra/sweeper=optuna sets; none for no search."""
 
+    @classmethod
+    def prepare(cls, overrides: Sequence[str]) -> list[str]:
+        """Register launchers and sweeper with Hydra; return the complete command line."""
+        register_plugins(LocalLauncher, SlurmLauncher, RayLauncher, OptunaSweeper)
+        return resuming.complete(overrides)
 
-def register() -> None:
-    """Register the launchers and the sweeper with Hydra."""
-    register_plugins(LocalLauncher, SlurmLauncher, RayLauncher, OptunaSweeper)
+    def run(self, folder: Path) -> tuple[int, float]:
+        """Train one policy; return the exit status and the running mean of rewards."""
+        train = drone_rl.train  # slow to import; not needed by a sweep
+        if self.provable.rounds:
+            train = functools.partial(drone_rl.train_until_proved, how=self.provable)
+        try:
+            done = train(
+                self.narrowed(TrainSettings),
+                folder=folder,
+                resume=self.resume is not None,
+                callbacks=_callbacks(self, folder),
+                progress=silent,
+            )
+        except (KeyboardInterrupt, SystemExit) as stop:
+            if "training" not in vars(stop):  # nothing was saved since the last checkpoint
+                raise
+            done = vars(stop)["training"]
+        _log.info("run folder: %s", folder)
+        for row in done.result.get("rounds", ()):
+            _log.info(found(row))
+        if not done.reason.startswith("SIG"):
+            return 0, done.running_reward
+        _log.info("resume with: %s", resuming.resume_command(folder))
+        return 128 + signal.Signals[done.reason].value, done.running_reward
 
 
-def run(settings: Command, folder: Path) -> tuple[int, float]:
-    """Train one policy; return the exit status and the running mean of rewards."""
-    train = drone_rl.train  # slow to import; not needed by a sweep
-    if settings.provable.rounds:
-        train = functools.partial(drone_rl.train_until_proved, how=settings.provable)
-    try:
-        done = train(
-            settings.narrowed(TrainSettings),
-            folder=folder,
-            resume=settings.resume is not None,
-            callbacks=_callbacks(settings, folder),
-            progress=silent,
-        )
-    except (KeyboardInterrupt, SystemExit) as stop:
-        if "training" not in vars(stop):  # nothing was saved since the last checkpoint
-            raise
-        done = vars(stop)["training"]
-    _log.info("run folder: %s", folder)
-    for row in done.result.get("rounds", ()):
-        _log.info(found(row))
-    if not done.reason.startswith("SIG"):
-        return 0, done.running_reward
-    _log.info("resume with: %s", resuming.resume_command(folder))
-    return 128 + signal.Signals[done.reason].value, done.running_reward
-
-
-def _callbacks(settings: Command, folder: Path) -> list["Callback"]:
+def _callbacks(settings: TrainCommand, folder: Path) -> list["Callback"]:
     """Return the callbacks. A resumed run's files stay unchanged until its state is accepted."""
     from drone_rl.sweeps.pruning import PruneCallback
     from drone_rl.training import Callback, LoggerCallback, ProgressCallback
 
-    class Note(Callback):
-        """Writes the settings of a resumed run once its state has been accepted."""
-
+    class WriteSettings(Callback):
         def on_start(self, training: object) -> None:
             resuming.note_settings(folder)
 
@@ -92,4 +89,4 @@ def _callbacks(settings: Command, folder: Path) -> list["Callback"]:
     if settings.resume is None:
         return [LoggerCallback(make()), ProgressCallback(), *searching]
     resuming.check_folder(settings.resume, folder)
-    return [LoggerCallback(make), Note(), ProgressCallback(), *searching]
+    return [LoggerCallback(make), WriteSettings(), ProgressCallback(), *searching]

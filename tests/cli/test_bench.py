@@ -1,6 +1,6 @@
 import pytest
 
-from drone_rl.cli.bench import prepare
+from drone_rl.cli.bench import BenchCommand
 
 
 @pytest.mark.parametrize(
@@ -19,4 +19,4 @@ from drone_rl.cli.bench import prepare
     ],
 )
 def test_names_and_quick_stand_for_settings(words, overrides):
-    assert prepare(words) == overrides
+    assert BenchCommand.prepare(words) == overrides

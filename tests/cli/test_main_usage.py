@@ -1,12 +1,10 @@
-import importlib
-
 from drone_rl.cli.hydra.composition import conf_dir
-from drone_rl.cli.main import COMMANDS, USAGE
+from drone_rl.cli.main import COMMANDS, USAGE, find_command
 
 
 def test_every_command_is_told_of_has_a_module_and_a_file():
     for command in COMMANDS:
         name = command.replace("-", "_")
         assert f"\n  {command} " in USAGE
-        assert callable(importlib.import_module(f"drone_rl.cli.{name}").run)
+        assert callable(find_command(command).run)
         assert (conf_dir() / f"{name}.yaml").is_file()

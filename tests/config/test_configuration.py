@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from drone_rl.cli.play import Command
+from drone_rl.cli.evaluation import PlayCommand
 from drone_rl.config import AppearanceSettings, TaskSettings
 from drone_rl.config.configuration import as_config, from_config, variant_of
 from drone_rl.config.learning import Adam, Optimiser
@@ -82,10 +82,10 @@ def test_the_other_renderer_draws_the_minimal_look_alone():
 
 def test_settings_that_may_be_none_are_made_of_mappings_too():
     given = {"appearance": {"exposure": 2.0}}
-    assert from_config(Command, given).appearance == AppearanceSettings(exposure=2.0)
-    assert from_config(Command, {"appearance": None}).appearance is None
+    assert from_config(PlayCommand, given).appearance == AppearanceSettings(exposure=2.0)
+    assert from_config(PlayCommand, {"appearance": None}).appearance is None
     with pytest.raises(InputError, match=r"^appearance\.exposure=0 is out of range"):
-        from_config(Command, {"appearance": {"exposure": 0}})
+        from_config(PlayCommand, {"appearance": {"exposure": 0}})
 
 
 def test_an_appearance_without_room_is_refused_with_the_training():

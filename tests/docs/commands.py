@@ -1,6 +1,5 @@
 """Command lines of a page, composed as the program would, but not run."""
 
-import importlib
 import re
 import shlex
 
@@ -13,7 +12,7 @@ from drone_rl.cli.hydra.composition import (
     read_settings,
     register_schemas,
 )
-from drone_rl.cli.main import COMMANDS
+from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.utils.errors import InputError
 
 COMMAND = re.compile(r"^(?:[A-Z]+=\S+ )?drone-rl ([a-z-]+)(.*)$", re.MULTILINE)
@@ -32,23 +31,22 @@ def check_commands(text):
 def check_command(name, words):
     """Makes sure that a command knows all it is told; of a sweep's values the first."""
     assert name in COMMANDS, name
-    module = importlib.import_module(f"drone_rl.cli.{name.replace('-', '_')}")
+    command = find_command(name)
     told = [word for word in words if word not in ("-m", "--help") and "resume=" not in word]
     told = [re.sub("[<>]", "", _SWEPT.sub(lambda m: f"={m[2] or 0}", word)) for word in told]
     file = name.replace("-", "_")
     no_logger = ["logger=csv"] if name == "train" else []  # whose folder only a run knows
-    told = [*no_logger, *getattr(module, "prepare", list)(told)]
+    told = [*no_logger, *command.prepare(told)]
     if any(word.startswith("plugins=") for word in told):
         try:
             import_plugins(told)
         except InputError:
             return  # of a tutorial, whose own test has the module
-    register_schemas(**{file: module.Command})
-    getattr(module, "register", lambda: None)()
+    register_schemas(**{file: command})
     GlobalHydra.instance().clear()
     with initialize_config_dir(str(conf_dir()), version_base="1.3"):
         config = compose(file, told, return_hydra_config=True)
     del config.hydra
     if "sweep" in config:
         del config.sweep
-    read_settings(module.Command, config)
+    read_settings(command, config)

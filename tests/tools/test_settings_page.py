@@ -1,12 +1,11 @@
 """The page of settings shows the docstrings of the settings classes."""
 
-import importlib
 from typing import Annotated, ClassVar
 
 import pytest
 
 from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL
-from drone_rl.cli.main import COMMANDS
+from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.networks import SmallCnn
 from drone_rl.config.transforms import Crop
@@ -67,9 +66,7 @@ def test_a_subclass_overrides_meanings():
 
 
 def commands():
-    return [
-        importlib.import_module(f"drone_rl.cli.{c.replace('-', '_')}").Command for c in COMMANDS
-    ]
+    return [find_command(command) for command in COMMANDS]
 
 
 @pytest.mark.parametrize(

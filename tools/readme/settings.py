@@ -3,7 +3,6 @@
 import ast
 import dataclasses
 import functools
-import importlib
 import inspect
 import textwrap
 from collections.abc import Iterator, Mapping
@@ -13,7 +12,7 @@ from typing import Any
 import yaml
 
 from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL
-from drone_rl.cli.main import COMMANDS
+from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.config import TASKS, BaseTaskSettings
 from drone_rl.config.configuration import Changes, Variant
 from drone_rl.utils.schema import Flag, Instance, Kind, Listed, Maybe, OneOf, Several, Span
@@ -50,8 +49,7 @@ def list_commands() -> str:
     """Return a table of the settings of each command."""
     lines = []
     for name in COMMANDS:
-        module = importlib.import_module(f"drone_rl.cli.{name.replace('-', '_')}")
-        lines += [f"### drone-rl {name}", make_table(module.Command)]
+        lines += [f"### drone-rl {name}", make_table(find_command(name))]
     return "\n\n".join(lines)
 
 

@@ -11,7 +11,7 @@ import types
 import typing
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import hydra
 from hydra._internal.hydra import Hydra
@@ -23,7 +23,7 @@ from omegaconf import MISSING, DictConfig, OmegaConf
 
 from drone_rl.cli.hydra.help import check_choices, show_help
 from drone_rl.cli.hydra.messages import is_output_closed, one_line
-from drone_rl.cli.hydra.resuming import policies
+from drone_rl.cli.settings import CommandSettings
 from drone_rl.config import (
     TASKS,
     ActionSettings,
@@ -194,17 +194,6 @@ _MULTIRUN_TEXT = re.compile(r"mode:|sweep: (?!null)")
 _save_config = hydra_utils._save_config
 
 
-class Command(Protocol):
-    """A module of `drone_rl.cli`."""
-
-    __name__: str
-    Command: type[Settings]
-
-    def run(self, settings: Any, folder: Path) -> tuple[int, object]:
-        """Run it; return the exit status and the value that a sweep maximises."""
-        ...
-
-
 def conf_dir() -> Path:
     """Return the folder conf/ of the checkout, or its copy inside an installed wheel."""
     package = Path(__file__).resolve().parents[2]
@@ -212,24 +201,23 @@ def conf_dir() -> Path:
     return checkout if (checkout / "train.yaml").is_file() else package / "conf"
 
 
-def run_command(name: str, command: Command, overrides: Sequence[str]) -> int:
+def run_command(name: str, command: type[CommandSettings], overrides: Sequence[str]) -> int:
     """Compose the settings of one command and run it; return the exit status.
 
     Args:
         name: Of its file in conf/.
-        command: Its module.
-        overrides: As on the command line; `prepare` of the module may translate them first.
+        command: Its settings.
+        overrides: As on the command line; `command.prepare` translates them first.
     """
-    overrides = getattr(command, "prepare", policies)(overrides)
+    overrides = command.prepare(overrides)
     check_choices(overrides, conf_dir())
     import_plugins(overrides)
-    register_schemas(**{name: command.Command})
-    getattr(command, "register", lambda: None)()
+    register_schemas(**{name: command})
     if {"--help", "-h"} & set(overrides):
         show_help(name, conf_dir(), overrides)
         return 0
     statuses: list[int] = []
-    job = _job(command, statuses)
+    job = _job(name, command, statuses)
     wrapped = hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name=name)(job)
     argv = sys.argv
     sys.argv = [f"drone-rl {name.replace('_', '-')}", *overrides]
@@ -281,13 +269,15 @@ def read_settings(cls: type[Settings], config: DictConfig) -> Any:
     return from_config(cls, values)
 
 
-def _job(command: Command, statuses: list[int]) -> Callable[[DictConfig], object]:
+def _job(
+    name: str, command: type[CommandSettings], statuses: list[int]
+) -> Callable[[DictConfig], object]:
     """Return the function that Hydra calls for each run."""
 
     def job(config: DictConfig) -> object:
         try:
-            settings = read_settings(command.Command, config)
-            status, value = command.run(settings, Path(HydraConfig.get().runtime.output_dir))
+            settings = read_settings(command, config)
+            status, value = settings.run(Path(HydraConfig.get().runtime.output_dir))
         except (InputError, OSError) as error:  # one bad run of a sweep leaves the others alone
             if isinstance(error, BrokenPipeError) and is_output_closed():
                 raise
@@ -298,6 +288,6 @@ def _job(command: Command, statuses: list[int]) -> Callable[[DictConfig], object
             sys.exit(status)
         return value
 
-    job.__module__ = command.__name__
+    job.__module__ = f"drone_rl.cli.{name}"  # Hydra names the job by it
     vars(job)["statuses"] = statuses  # launchers append the statuses of other processes
     return job

@@ -16,11 +16,6 @@ from drone_rl.utils.files import refuse_links, write_atomically
 from drone_rl.utils.overrides import must_be_typed, taken_over
 
 
-def policies(overrides: Sequence[str]) -> list[str]:
-    """Translate `checkpoint=good` to `policy=good`, in commands on trained policies."""
-    return [re.sub(r"^checkpoint=", "policy=", override) for override in overrides]
-
-
 def networks(overrides: Sequence[str]) -> list[str]:
     """Translate `policy=mlp` to `network=mlp`, `policy.hidden=[64]` alike, in trainings."""
     return [re.sub(r"^(\+{0,2}|~)policy(?=[.=])", r"\1network", o) for o in overrides]

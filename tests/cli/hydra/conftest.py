@@ -1,19 +1,17 @@
 """Composes as the command line does."""
 
-import importlib
-
 import pytest
 from hydra import compose, initialize_config_dir
 
 from drone_rl.cli.hydra.composition import conf_dir, read_settings, register_schemas
-from drone_rl.cli.main import COMMANDS
+from drone_rl.cli.main import COMMANDS, find_command
 
-MODULES = {c.replace("-", "_"): None for c in COMMANDS}
+FILES = {c.replace("-", "_"): c for c in COMMANDS}
 
 
 def commands():
     """The settings of each command, by the name of its file."""
-    return {name: importlib.import_module(f"drone_rl.cli.{name}").Command for name in MODULES}
+    return {file: find_command(name) for file, name in FILES.items()}
 
 
 @pytest.fixture(scope="session")

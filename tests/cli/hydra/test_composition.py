@@ -5,7 +5,6 @@ import types
 import pytest
 from omegaconf import OmegaConf
 
-from drone_rl.cli import train
 from drone_rl.cli.hydra import composition
 from drone_rl.cli.hydra.composition import (
     Hydra,
@@ -15,11 +14,12 @@ from drone_rl.cli.hydra.composition import (
     conf_dir,
     read_settings,
 )
+from drone_rl.cli.settings import CommandSettings
+from drone_rl.cli.train import TrainCommand
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.settings import Settings
 
 
-class Command(Settings):
+class Command(CommandSettings):
     name: str = "x"
 
 
@@ -31,8 +31,8 @@ def job(monkeypatch, tmp_path):
 
     def make(run):
         statuses = []
-        module = types.SimpleNamespace(__name__="mine", Command=Command, run=run)
-        return _job(module, statuses), statuses
+        monkeypatch.setattr(Command, "run", run)
+        return _job("mine", Command, statuses), statuses
 
     return make
 
@@ -105,10 +105,10 @@ def test_settings_are_composed_once(monkeypatch, tmp_path):
         done.append((settings.seed, folder))
         return 3, None
 
-    monkeypatch.setattr(train, "run", run)
+    monkeypatch.setattr(TrainCommand, "run", run)
     overrides = ["seed=3", f"hydra.run.dir={tmp_path}"]
-    assert composition.run_command("train", train, overrides) == 3
+    assert composition.run_command("train", TrainCommand, overrides) == 3
     assert (composed, done) == (["RUN"], [(3, tmp_path)])
     assert Hydra.get_mode is get_mode
-    assert composition.run_command("train", train, [*overrides, "hydra.mode=RUN"]) == 3
+    assert composition.run_command("train", TrainCommand, [*overrides, "hydra.mode=RUN"]) == 3
     assert composed[1:] == ["MULTIRUN", "RUN"]

@@ -1,7 +1,9 @@
-from drone_rl.cli.hydra.resuming import networks, policies
+from drone_rl.cli.hydra.resuming import networks
+from drone_rl.cli.settings import PolicyCommandSettings
 
 
 def test_a_trained_policy_was_once_called_checkpoint():
+    policies = PolicyCommandSettings.prepare
     assert policies(["checkpoint=good", "seed=1"]) == ["policy=good", "seed=1"]
     assert policies(["policy=good", "hydra.checkpoint=x"]) == ["policy=good", "hydra.checkpoint=x"]
 

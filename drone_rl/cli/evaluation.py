@@ -1,0 +1,188 @@
+"""`drone-rl evaluate`, `play`, `verdict`, `shifts`, `bodies` and `export`."""
+
+import json
+import logging
+from pathlib import Path
+from typing import Annotated
+
+import drone_rl
+from drone_rl.cli.settings import CommandSettings, RolloutCommandSettings, finish
+from drone_rl.config import AppearanceSettings, RendererName
+from drone_rl.config.commands import (
+    BodiesSettings,
+    EvaluateSettings,
+    FlightSettings,
+    JudgeSettings,
+    ShiftSettings,
+)
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.overrides import COMMAND
+from drone_rl.utils.progress import log, silent
+from drone_rl.utils.schema import FileName, OneOf, Whole
+from drone_rl.utils.text import seed_line
+
+_log = logging.getLogger(__name__)
+
+
+class EvaluateCommand(RolloutCommandSettings, EvaluateSettings):
+    """Settings of `drone-rl evaluate`."""
+
+    videos: Annotated[int, Whole(0, unit="episodes")] = 2
+    """Episodes recorded as MP4 and GIF; 0 for none."""
+    greedy: bool = True
+    """Whether the videos show the most probable actions instead of sampled ones."""
+
+    def run(self, folder: Path) -> tuple[int, float]:
+        """Evaluate one policy; return the exit status and the success rate."""
+        policy = self.load_policy()
+        done = drone_rl.evaluate(policy, self, progress=log)
+        (folder / "evaluation.json").write_text(json.dumps(done.as_dict(), indent=2))
+        print(done)
+        _log.info("policy: %s", policy.path)
+        _log.info("written: %s", folder / "evaluation.json")
+        if self.videos:
+            from drone_rl.evaluation.video import film
+
+            film(
+                policy,
+                folder / "videos",
+                self.videos,
+                greedy=self.greedy,
+                seed=done.seed.value,
+                device=self.device,
+                renderer=self.renderer,
+            )
+        return 0, done.success
+
+
+class PlayCommand(RolloutCommandSettings):
+    """Settings of `drone-rl play`."""
+
+    episodes: Annotated[int, Whole(1, unit="episodes")] = 3
+    """Episodes to record, one file each."""
+    greedy: bool = True
+    """Whether to take the most probable action instead of sampling."""
+    seed: Annotated[int, Whole(0)] = 0
+    """Root of the environments' random streams."""
+    viewer: bool = False
+    """Whether to open dm_control's viewer, which needs a display, instead of recording."""
+    device: str = "cpu"
+    """Device of renderer and policy: cpu, cuda or cuda:N."""
+    renderer: RendererName = "raytrace"
+    """Renderer: raytrace, this package's ray tracer, or mujoco_warp, MuJoCo Warp's."""
+    appearance: AppearanceSettings | None = None
+    """Appearance of the scenes (see conf/appearance); none for that of the policy's training."""
+
+    def run(self, folder: Path) -> tuple[int, None]:
+        """Record videos of a policy; return the exit status."""
+        policy = self.load_policy()
+        from drone_rl.evaluation.video import film, view  # slow to import
+
+        names = ("greedy", "seed", "device", "renderer", "appearance")
+        chosen = {k: getattr(self, k) for k in names if getattr(self, k) is not None}
+        if self.viewer:
+            view(policy, **chosen)
+        else:
+            film(policy, folder, self.episodes, **chosen)
+        return 0, None
+
+
+class VerdictCommand(RolloutCommandSettings, JudgeSettings):
+    """Settings of `drone-rl verdict`."""
+
+    certificate: str | None = None
+    """Certificate file to quote; none takes the one next to the policy, if it matches:
+    certificate.json in the folder of a run, NAME.certificate.json next to NAME.safetensors."""
+    require: Annotated[str, OneOf(("good", "proved"))] | None = None
+    """Requirement for exit status 0: good, the policy is certainly good; proved, a certificate
+    proves success from every placement and rollouts re-checked it, otherwise 16; null, any certain
+    kind has its own exit status."""
+    shifts: str | None = None
+    """File shifts.json to quote; none takes the one next to the policy, otherwise the newest under
+    outputs/shifts of this network and task."""
+    require_domain: str | None = None
+    """Operating domain in which the policy must be good, otherwise exit status 17: a YAML or JSON
+    file with a range for each axis, such as domain.yaml of drone-rl shifts; null requires none."""
+
+    def run(self, folder: Path) -> tuple[int, str]:
+        """Judge one policy; return the exit status and the kind's name."""
+        names = ("dynamics", "certificate", "shifts", "require_domain")
+        given = {name: getattr(self, name) for name in names}
+        done = drone_rl.judge(self.policy, self, **given, **self.shared(), progress=silent)
+        finish(done, folder / "verdict.json")
+        if self.require == "proved" and done.verdict.evidence["proof"] is None:
+            _log.info(
+                "the policy has no certificate; make one with drone-rl prove, or give certificate="
+            )
+        return done.status(self.require), done.verdict.kind.value
+
+
+class ShiftsCommand(RolloutCommandSettings, ShiftSettings):
+    """Settings of `drone-rl shifts`."""
+
+    def run(self, folder: Path) -> tuple[int, float]:
+        """Measure robustness; return the exit status and the mean success over strengths."""
+        chosen, given = self.narrowed(ShiftSettings), self.shared()
+        done = drone_rl.shifts(self.policy, chosen, dynamics=self.dynamics, **given, progress=log)
+        finish(done, folder, "shifts.json, shifts.png and strips.png")
+        return 0, done.area
+
+
+class BodiesCommand(CommandSettings, BodiesSettings):
+    """Settings of `drone-rl bodies`."""
+
+    def run(self, folder: Path) -> tuple[int, int]:
+        """Judge policies with several vehicles; return the exit status and the verdicts' number."""
+        chosen = self.narrowed(BodiesSettings)
+        done = drone_rl.bodies(settings=chosen, outputs=self.paths.outputs, progress=silent)
+        finish(done, folder, "bodies.json, bodies.png and bodies.svg")
+        return 0, sum(map(len, done.numbers["policies"].values()))
+
+
+class ExportCommand(CommandSettings, FlightSettings):
+    """Settings of `drone-rl export`."""
+
+    policy: str = "latest"
+    """Policy: a .pt file, the folder of a run, or latest."""
+    name: Annotated[str, FileName()] = "policy"
+    """Name of the files, without extension."""
+    format: Annotated[str, OneOf(("safetensors", "onnx"))] = "safetensors"
+    """safetensors with a model card, or onnx, an ONNX model of RGB image to action
+    probabilities."""
+    command: Annotated[str, COMMAND] | None = None
+    """Training command for the card; none takes the run's own settings."""
+    certificate: str | None = None
+    """Certificate file for the card; none takes the one next to the policy, if it matches."""
+    shifts: str | None = None
+    """File shifts.json for the card; none takes the one next to the policy, otherwise the newest
+    under outputs/shifts of this network and task."""
+
+    def check(self) -> None:
+        """Reject results for the card with an ONNX model, which has no card."""
+        for name in ("certificate", "shifts"):
+            if self.format == "onnx" and getattr(self, name) is not None:
+                raise InputError(
+                    f"{name} is for the card, which format=onnx has not; leave it out or use "
+                    "format=safetensors"
+                )
+
+    def run(self, folder: Path) -> tuple[int, str]:
+        """Export one policy; return the exit status and the file's path."""
+        from drone_rl.utils.seeding import root_seed  # imports torch
+        from drone_rl.verdicts.export import export
+        from drone_rl.verdicts.onnx_export import export_onnx
+
+        policy = drone_rl.load_policy(self.policy, outputs=self.paths.outputs)
+        target = folder / f"{self.name}.{self.format}"
+        if self.format == "onnx":
+            seed = root_seed(self.seed)
+            found = export_onnx(policy, target, command=self.command, seed=seed.value)
+            difference = f"{found.difference:.1e} in {found.frames:,} images"
+            _log.info("written: %s, which differs from PyTorch by at most %s", target, difference)
+        else:
+            names = ("command", "certificate", "shifts")
+            given = {name: getattr(self, name) for name in names}
+            seed = export(policy, target, self, **given, outputs=self.paths.outputs)
+            _log.info("written: %s and %s", target, target.with_suffix(".md").name)
+        _log.info("%s", seed_line(seed.as_dict()))
+        return 0, str(target)

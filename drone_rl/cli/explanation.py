@@ -1,0 +1,66 @@
+"""`drone-rl explain` and `drone-rl report`."""
+
+import logging
+from pathlib import Path
+from typing import Annotated, Any
+
+import drone_rl
+from drone_rl.cli.settings import CommandSettings
+from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
+from drone_rl.evaluation.rule import Kind
+from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.utils.progress import log
+from drone_rl.utils.schema import Listed, OneOf, Whole
+
+_log = logging.getLogger(__name__)
+
+
+class ExplainCommand(CommandSettings, ExplainSettings):
+    """Settings of `drone-rl explain`."""
+
+    policy: Annotated[Any, Listed("policy")] = ("latest",)
+    """Policy, or a list of policies that one report compares, as in policy=[good,poor]: files,
+    folders of runs, latest, or names of shipped policies."""
+    num_envs: Annotated[int, Whole(1, unit="environments")] = 128
+    """Environments in a batch; bounds memory."""
+    require: Annotated[str, OneOf(tuple(Kind))] | None = None
+    """Kind of verdict to require, such as good; other kinds end with exit status 10 to 13 or 18.
+    none accepts all kinds."""
+    task: TaskChanges = no_changes()
+    """Changes of the policy's task settings (see conf/task), as in task.num_cubes=5."""
+    dynamics: DynamicsChanges = no_changes()
+    """Changes of the vehicle dynamics (see conf/dynamics), as in dynamics=quadrotor."""
+
+    def run(self, folder: Path) -> tuple[int, str]:
+        """Explain policies in a report; return the exit status and the report's path."""
+        loaded = [drone_rl.load_policy(p, outputs=self.paths.outputs) for p in self.policy]
+        done = drone_rl.explain(
+            [p.in_task(**self.task).in_dynamics(**self.dynamics) for p in loaded],
+            self.narrowed(ExplainSettings),
+            folder=folder,
+            num_envs=self.num_envs,
+            outputs=self.paths.outputs,
+            progress=log,
+        )
+        print(done)
+        _log.info("report: %s", done.report)
+        verdicts = [numbers["verdict"] for numbers in done.numbers.values()]
+        refused = [v for v in verdicts if not (v["certain"] and v["kind"] == self.require)]
+        statuses = [verdict["exit_code"] or Kind.NONE.exit_code for verdict in refused]
+        return max(statuses if self.require else (), default=0), str(done.report)
+
+
+class ReportCommand(CommandSettings):
+    """Settings of `drone-rl report`."""
+
+    explanations: Annotated[Any, Listed("folder")] = ("latest",)
+    """Folder with an explanation.json, or a list of folders that one report compares; latest for
+    those of the newest explanation."""
+
+    def run(self, folder: Path) -> tuple[int, str]:
+        """Write a report from explanations; return the exit status and the report's path."""
+        from drone_rl.explanations.report.page import find_explanations, report
+
+        made = report(find_explanations(self.explanations, self.paths.outputs), folder)
+        _log.info("report: %s", made)
+        return 0, str(made)

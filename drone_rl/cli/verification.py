@@ -1,0 +1,82 @@
+"""`drone-rl prove`, `check`, `places` and `chain`."""
+
+import logging
+from pathlib import Path
+from typing import Annotated
+
+import drone_rl
+from drone_rl.cli.settings import CommandSettings, PolicyCommandSettings, finish
+from drone_rl.config.commands import ChanceSettings, CheckSettings, PlacesSettings, ProveSettings
+from drone_rl.config.configuration import TaskChanges, no_changes
+from drone_rl.utils.progress import silent
+from drone_rl.utils.schema import Real, Several
+
+NOT_PROVED = 15
+"""Exit status of `prove` if some placements fail or are undecided."""
+
+_log = logging.getLogger(__name__)
+
+
+class ProveCommand(PolicyCommandSettings, ProveSettings):
+    """Settings of `drone-rl prove`."""
+
+    def run(self, folder: Path) -> tuple[int, float]:
+        """Verify a policy; return the exit status and the fraction of placements with success."""
+        chosen = self.narrowed(ProveSettings)
+        proof = drone_rl.prove(self.policy, chosen, folder=folder, **self.shared())
+        print(proof)
+        _log.info("written: %s", folder / "certificate.json")
+        if proof.certificate["found"]["stopped_by"] == "limit_s":
+            _log.info("resume with the same command and hydra.run.dir=%s", folder)
+        return 0 if proof.is_proved else NOT_PROVED, proof.success
+
+
+class CheckCommand(CommandSettings, CheckSettings):
+    """Settings of `drone-rl check`."""
+
+    certificate: str = "latest"
+    """Certificate: a file of drone-rl prove, or latest for the newest one."""
+    policy: str | None = None
+    """Policy of the certificate, as a file, the folder of a run, latest, or a shipped policy's
+    name; none takes the shipped policy that the certificate names."""
+    task: TaskChanges = no_changes()
+    """Settings that the certificate's task must have, as in task.num_cubes=5; none accepts any."""
+
+    def run(self, folder: Path) -> tuple[int, bool]:
+        """Check a certificate; return the exit status and whether it is accepted."""
+        done = drone_rl.check(
+            self.certificate,
+            self.policy,
+            self.narrowed(CheckSettings),
+            task=self.task,
+            outputs=self.paths.outputs,
+            progress=silent,
+        )
+        finish(done, folder / "check.json")
+        return done.exit_code, done.accepted
+
+
+class PlacesCommand(PolicyCommandSettings, PlacesSettings):
+    """Settings of `drone-rl places`."""
+
+    def run(self, folder: Path) -> tuple[int, float]:
+        """Map the outcome by cube position; return the exit status and the blind fraction."""
+        chosen = self.narrowed(PlacesSettings)
+        done = drone_rl.places(self.policy, chosen, **self.shared(), progress=silent)
+        finish(done, folder, "places.json, places.png and places.svg")
+        return 0, done.numbers["blind"]
+
+
+class ChainCommand(PolicyCommandSettings, ChanceSettings):
+    """Settings of `drone-rl chain`."""
+
+    cubes: Annotated[tuple[float, ...], Several(Real(-10_000.0, 10_000.0, unit="m"), 0, 100)] = ()
+    """Lateral positions of the cubes of one placement, metres to the left, nearest first; none:
+    held-out placements."""
+
+    def run(self, folder: Path) -> tuple[int, float]:
+        """Compute outcome probabilities; return the exit status and the success probability."""
+        chosen, cubes = self.narrowed(ChanceSettings), self.cubes or None
+        done = drone_rl.chances(self.policy, cubes, chosen, **self.shared(), progress=silent)
+        finish(done, folder / "chances.json")
+        return 0, done.success
