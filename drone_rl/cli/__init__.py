@@ -1,1 +1,1 @@
-"""The command line: what each command can be told, and which function of `drone_rl` does it."""
+"""The command line: the settings of each command and the function of `drone_rl` that it calls."""

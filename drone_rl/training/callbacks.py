@@ -36,7 +36,7 @@ class Progress:
 
 
 class OngoingTraining(Protocol):
-    """A training as callbacks see it."""
+    """The part of `Trainer` that callbacks use."""
 
     progress: Progress
     total_frames: int
@@ -62,14 +62,14 @@ class Callback:
         """After each update."""
 
     def on_end(self, training: OngoingTraining, reason: str) -> None:
-        """After the last update, whyever it was the last."""
+        """After the last update."""
 
     def on_failure(self, training: OngoingTraining) -> None:
         """When an update failed; the parameters are those before it."""
 
 
 class CheckpointCallback(Callback):
-    """Keeps the newest state (`last.pt`) and the one with the best running mean (`best.pt`)."""
+    """Write the newest state (`last.pt`) and the one with the best running mean (`best.pt`)."""
 
     def __init__(
         self,
@@ -78,7 +78,7 @@ class CheckpointCallback(Callback):
         interval_s: float = 15.0,
         extra: Mapping[str, Any] | None = None,
     ) -> None:
-        """Sets the folder, the seconds between two checkpoints, and entries to add to each."""
+        """Set the folder, the seconds between two checkpoints, and entries to add to each."""
         self.folder = Path(folder)
         self.last_path, self.best_path = self.folder / "last.pt", self.folder / "best.pt"
         self.interval_s = interval_s
@@ -109,7 +109,7 @@ class CheckpointCallback(Callback):
             self._save(training)
 
     def on_end(self, training: OngoingTraining, reason: str) -> None:
-        """Saves the final state."""
+        """Save the final state."""
         self._save(training)
 
     def _save(self, training: OngoingTraining) -> None:
@@ -123,7 +123,7 @@ class CheckpointCallback(Callback):
 
 
 class CsvCallback(Callback):
-    """One row of `metrics.csv` an update; a resumed run drops the rows that it will repeat."""
+    """Write a row of `metrics.csv` for each update; drop rows that a resumed run will repeat."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
@@ -148,14 +148,10 @@ class CsvCallback(Callback):
         return int(row[0])
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
-        """Appends a row."""
-        progress = training.progress
-        counters = {
-            "update": progress.updates,
-            "frames": progress.frames,
-            "episodes": progress.episodes,
-            "seconds": round(progress.seconds, 3),
-        }
+        """Append a row."""
+        done = training.progress
+        counters = {"update": done.updates, "frames": done.frames, "episodes": done.episodes}
+        counters["seconds"] = round(done.seconds, 3)
         is_new = not self.path.exists() or self.path.stat().st_size == 0
         with self.path.open("a", newline="") as file:
             writer = csv.writer(file)
@@ -165,23 +161,20 @@ class CsvCallback(Callback):
 
 
 class LoggerCallback(Callback):
-    """Passes the metrics, by frames, to any of TorchRL's loggers."""
+    """Pass the metrics, by frames, to TorchRL's loggers."""
 
     def __init__(self, loggers: Sequence[Logger] | Callable[[], Sequence[Logger]]) -> None:
-        """Sets the loggers, or a function that makes them when training starts.
-
-        A logger may write as soon as it is made, which must wait until a resumed run is accepted.
-        """
+        """Set the loggers, or a function that makes them once a resumed run is accepted."""
         self._make = loggers if callable(loggers) else None
         self.loggers = [] if callable(loggers) else list(loggers)
 
     def on_start(self, training: OngoingTraining) -> None:
-        """Makes the loggers, if that is left to do."""
+        """Make the loggers."""
         if self._make is not None:
             self.loggers, self._make = list(self._make()), None
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
-        """Logs each metric."""
+        """Log each metric."""
         for logger in self.loggers:
             for name, value in metrics.items():
                 logger.log_scalar(name, value, step=training.progress.frames)
@@ -196,14 +189,14 @@ class ProgressCallback(Callback):
         self._said_at = 0.0
 
     def on_start(self, training: OngoingTraining) -> None:
-        """Opens the bar at the frames already done."""
+        """Open the bar at the frames already done."""
         self._said_at = time.monotonic()
         if sys.stderr.isatty():
             total, done = training.total_frames, training.progress.frames
             self._bar = tqdm(total=total, initial=done, unit="frame", unit_scale=True)
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
-        """Moves the bar."""
+        """Move the bar."""
         progress = training.progress
         text = f"episodes {progress.episodes}, running reward {progress.running_reward:.2f}"
         if self._bar is not None:
@@ -217,35 +210,32 @@ class ProgressCallback(Callback):
             _log.info(shape, progress.frames, text, rate, left)
 
     def on_end(self, training: OngoingTraining, reason: str) -> None:
-        """Closes the bar and says how it ended."""
-        self._close()
+        """Close the bar and log the result."""
+        self.on_failure(training)
         progress = training.progress
         counters = (progress.frames, progress.episodes, progress.seconds, progress.running_reward)
         shape = "stopped (%s) after %d frames, %d episodes, %.1f s: running reward %.3f"
         _log.info(shape, reason, *counters)
 
     def on_failure(self, training: OngoingTraining) -> None:
-        """Closes the bar."""
-        self._close()
-
-    def _close(self) -> None:
+        """Close the bar."""
         if self._bar is not None:
             self._bar.close()
 
 
 class ForwardProgress(Callback):
-    """Forwards the progress of a training to a `drone_rl.utils.progress.Progress`."""
+    """Forward the progress of a training to a `drone_rl.utils.progress.Progress`."""
 
     def __init__(self, progress: Report) -> None:
         self.progress = progress
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
-        """Forwards the running mean and the frames."""
+        """Forward the running mean and the frames."""
         done = training.progress
         text = f"running reward {done.running_reward:.2f}, {done.episodes} episodes"
         self.progress(text, done.frames, training.total_frames)
 
     def on_end(self, training: OngoingTraining, reason: str) -> None:
-        """Forwards the reason why it stopped."""
+        """Forward the reason why it stopped."""
         frames = training.progress.frames
         self.progress(f"stopped: {reason}", frames, frames)

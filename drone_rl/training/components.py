@@ -26,10 +26,10 @@ class Group(NamedTuple):
 
 
 class Components(NamedTuple):
-    """What collects batches with returns, and the network that learns from them."""
+    """The collector of batches with returns, and the network that learns from them."""
 
     collector: Any
-    """Has `actor`, `postproc` and `cache_activations`, besides what a trainer needs."""
+    """Has `actor`, `postproc` and `cache_activations`, in addition to what `Trainer` needs."""
     network: PolicyNetwork
     generators: dict[str, torch.Generator]
     """Random streams of this process, by name."""
@@ -42,10 +42,7 @@ def joined(collector: Any, groups: Sequence[Group]) -> Components:
 
 
 def group_sizes(settings: TrainSettings) -> list[int]:
-    """Return the number of environments of each thread or worker.
-
-    On a GPU there is one group: several threads would only wait for each other.
-    """
+    """Return the number of environments of each thread or worker; on a GPU there is one thread."""
     chosen = settings.collector
     is_one = settings.device.startswith("cuda") and not isinstance(chosen, Ray)
     groups = 1 if is_one else min(chosen.num_envs, chosen.num_threads)
@@ -60,7 +57,7 @@ def episode_options(settings: TrainSettings, num_threads: int) -> dict[str, Any]
 
 
 def make_collector(settings: TrainSettings, replay: FailureReplayTask | None = None) -> Components:
-    """Make the collector that the settings choose, with environments and an untrained network.
+    """Make the collector of the settings, with environments and an untrained network.
 
     Raises:
         InputError: There is no such device, or an extra isn't installed.
@@ -70,7 +67,7 @@ def make_collector(settings: TrainSettings, replay: FailureReplayTask | None = N
 
 
 def learning_actor(settings: TrainSettings, parts: Components) -> Any:
-    """Return the actor that the loss evaluates: with a fused network, if that is possible."""
+    """Return the actor that the loss evaluates, with a fused network if it is supported."""
     actor, threads = parts.collector.actor, settings.trainer.num_threads
     if not settings.trainer.compiled:
         return actor

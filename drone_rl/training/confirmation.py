@@ -1,4 +1,4 @@
-"""Confirms by its most probable actions that a policy has solved its task."""
+"""Confirm by greedy episodes that a policy has solved its task."""
 
 import functools
 from collections.abc import Mapping
@@ -17,10 +17,10 @@ _NUM_ENVS = 250
 
 
 class Confirmation:
-    """Evaluates the policy of a training greedily, in environments that it never learns from.
+    """Evaluate the policy of a training greedily, in environments that it never learns from.
 
-    Sampled actions lead out of loops in which the most probable actions are caught for ever, so
-    that a policy which collects everything while it learns may fail most episodes afterwards.
+    A policy with sampled actions may leave loops that its most probable actions never leave. So it
+    may solve its task in training and fail most episodes afterwards.
     """
 
     def __init__(self, settings: TrainSettings, network: nn.Module) -> None:
@@ -32,7 +32,7 @@ class Confirmation:
         """Of the last `trainer.confirm_episodes` episodes."""
 
     def __call__(self, update: int) -> bool:
-        """Return whether enough episodes succeed; each update has environments of its own."""
+        """Return whether enough episodes succeed; each update has its own environments."""
         settings, episodes = self._settings, self._settings.trainer.confirm_episodes
         env = self._env
         worlds: Any = env.base_env
@@ -61,6 +61,6 @@ class Confirmation:
             self._env.close()
 
     @property
-    def told(self) -> Mapping[str, Any]:
-        """For `result.json`."""
+    def result(self) -> Mapping[str, Any]:
+        """Entries of `result.json`."""
         return {"confirming_flights": self.flights, "confirming_flights_succeeded": self.succeeded}

@@ -36,11 +36,7 @@ def check_fits(saved: Any, own: Any, where: str) -> None:
 
 
 def check_optimiser(saved: Any, optimiser: torch.optim.Optimizer) -> None:
-    """Check that an optimizer's state fits this optimizer, before or after its first step.
-
-    Raises:
-        InputError: See `check_fits`; also if a hyperparameter is another.
-    """
+    """Check a state of an optimizer as `check_fits` does, and its hyperparameters."""
     own = _after_a_step(optimiser)
     if isinstance(saved, Mapping) and saved.get("state") == {}:
         own["state"] = {}
@@ -86,7 +82,7 @@ def _check_tensor(saved: Any, own: Tensor, where: str) -> None:
     if not isinstance(saved, Tensor) or (saved.shape, saved.dtype) != (own.shape, own.dtype):
         raise _misfit(where, f"is not of shape {tuple(own.shape)} and {own.dtype}")
     if saved.is_floating_point():
-        unknown = torch.isnan(saved) & torch.isnan(own).any()  # so a world notes what is not yet so
+        unknown = torch.isnan(saved) & torch.isnan(own).any()  # environments store unknowns as NaN
         if not bool((torch.isfinite(saved) | unknown).all()):
             raise _misfit(where, "holds NaN or infinity")
 

@@ -52,7 +52,7 @@ class Training:
     reason: str
     """Why it stopped: "solved", "frames", "episodes" or a signal's name."""
     result: dict[str, Any]
-    """Plain values, as in `result.json`."""
+    """Content of `result.json`."""
 
     @property
     def running_reward(self) -> float:
@@ -96,11 +96,7 @@ class RunFolder:
         return cls(folder), state
 
     def prepare(self, settings: TrainSettings, state: Mapping[str, Any] | None) -> None:
-        """Delete half-written files.
-
-        Raises:
-            InputError: The checkpoint was made with other settings.
-        """
+        """Delete half-written files; raise an `InputError` if the checkpoint has other settings."""
         if state is not None:
             check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
         remove_leftovers(self.path, *_WRITTEN)
@@ -118,11 +114,7 @@ class RunFolder:
     def resume(
         self, trainer: Trainer, checkpoints: CheckpointCallback, state: Mapping[str, Any] | None
     ) -> None:
-        """Load the state, if there is one, and write `run.yaml`.
-
-        Raises:
-            InputError: The checkpoint does not fit.
-        """
+        """Load the state, if any, and write `run.yaml`; see `Trainer.load_state_dict` for errors."""
         if state is not None:
             trainer.load_state_dict(state)
             checkpoints.best = _read_best(state.get("best"))
@@ -143,7 +135,7 @@ def result_of(
     reason: str, trainer: Trainer, largest_reward: float, confirmation: Confirmation | None
 ) -> dict[str, Any]:
     """Return the values of `result.json`."""
-    confirmed = {} if confirmation is None else confirmation.told
+    confirmed = {} if confirmation is None else confirmation.result
     progress = dataclasses.asdict(trainer.progress)
     return {"reason": reason, **progress, "largest_reward": largest_reward, **confirmed}
 
@@ -161,13 +153,13 @@ def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Tra
 
 
 def hand_on_signal(training: Training) -> Training:
-    """Let a signal that stopped a training act, now that its state is saved.
+    """Raise the signal that stopped a training again, now that its state is saved.
 
     Returns `training` if there was no signal, or if the caller's own handler returns.
 
     Raises:
-        KeyboardInterrupt: Ctrl-C stopped it. Not a subclass: Python ends itself by SIGINT, which
-            shells want to see, only for this very class.
+        KeyboardInterrupt: Ctrl-C stopped it. Not a subclass: Python exits by SIGINT, as shells
+            expect, for this class only.
         SystemExit: SIGTERM stopped it.
     """
     if not training.reason.startswith("SIG"):
@@ -188,16 +180,12 @@ def hand_on_signal(training: Training) -> Training:
 
 
 def _own(config: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a checkpoint's training settings under today's names."""
+    """Return the training settings of a checkpoint."""
     return {k: v for k, v in config.items() if k in kinds_of(TrainSettings)}
 
 
 def settings_of(config: Mapping[str, Any]) -> TrainSettings:
-    """Return the settings of a checkpoint.
-
-    Raises:
-        InputError: It names a part that is not built in.
-    """
+    """Return a checkpoint's settings; raise an `InputError` if they name an unregistered part."""
     settings = from_config(TrainSettings, _own(config))
     parts = (settings.network, settings.returns, settings.objective, settings.optimiser)
     for part in (*parts, settings.scheduler, settings.collector, *settings.transforms):

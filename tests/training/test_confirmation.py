@@ -31,10 +31,10 @@ def test_confirmation_uses_the_most_probable_action():
     ahead = SETTINGS.replace(task=SETTINGS.task.replace(lateral_bound=0.5))
     straight = Confirmation(ahead, always(0.02, 0.01, 0.0))
     assert straight(1)
-    assert straight.told == {"confirming_flights": 40, "confirming_flights_succeeded": 40}
+    assert straight.result == {"confirming_flights": 40, "confirming_flights_succeeded": 40}
     confirmation = Confirmation(ahead, always(0.01, 0.02, 0.0))  # samples may reach it
     assert not confirmation(1) and not confirmation(2)
-    assert confirmation.told == {"confirming_flights": 80, "confirming_flights_succeeded": 0}
+    assert confirmation.result == {"confirming_flights": 80, "confirming_flights_succeeded": 0}
 
 
 def test_success_rate_is_that_of_complete_episodes():
