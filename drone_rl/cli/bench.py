@@ -32,11 +32,7 @@ class BenchCommand(CommandSettings, BenchSettings):
         return [*kept, "quick=true"] if quick else kept
 
     def run(self, folder: Path) -> tuple[int, None]:
-        """Run benchmarks; each adds its results to results.json.
-
-        Raises:
-            InputError: Some failed; the others were run all the same.
-        """
+        """Run benchmarks and write results.json; raise an `InputError` at the end if one failed."""
         registry = _benchmarks()
         from benchmarks.benchmark import Setup
         from benchmarks.ledger import Ledger
@@ -59,11 +55,7 @@ class BenchCommand(CommandSettings, BenchSettings):
 
 
 def _benchmarks() -> ModuleType:
-    """Import the registry of benchmarks, which is in a checkout but not in an installed wheel.
-
-    Raises:
-        InputError: It is missing.
-    """
+    """Import the registry of benchmarks, which is in a checkout but not in an installed wheel."""
     try:
         return importlib.import_module("benchmarks.registry")
     except ModuleNotFoundError as error:

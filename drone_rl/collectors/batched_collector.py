@@ -26,18 +26,15 @@ class BatchedCollector(BaseCollector):
         keep: Iterable[NestedKey] = (("next", "info", "end_reason"),),
         postproc: Callable[[TensorDictBase], TensorDictBase] | None = None,
     ) -> None:
-        """Connects an environment and a policy.
+        """Connect an environment and a policy.
 
         Args:
-            env: A batch of environments.
+            env: A batch of environments; an `InputError` for any other.
             actor: Writes the action.
             total_frames: Stop before a batch once this many frames were collected; -1 for never.
             keep: Entries kept in addition to observations, what the actor writes, reward and end
                 flags, as far as the environment has them.
             postproc: Applied to each batch, such as a return estimator.
-
-        Raises:
-            InputError: The environment is not a batch of environments.
         """
         if len(env.batch_size) != 1:
             raise InputError(
@@ -68,35 +65,35 @@ class BatchedCollector(BaseCollector):
         """Return the next batch."""
 
     def iterator(self) -> Iterator[TensorDictBase]:
-        """Yields batches until `total_frames`; a `for` over the collector calls it."""
+        """Yield batches until `total_frames`; a `for` over the collector calls it."""
         while self.total_frames < 0 or self.frames < self.total_frames:
             yield self.collect()
 
     def _finish(self, batch: TensorDictBase, episodes: int) -> TensorDictBase:
-        """Counts a batch and applies `postproc`."""
+        """Count a batch and apply `postproc`."""
         self.frames += batch.numel()
         self.episodes += episodes
         return batch if self.postproc is None else self.postproc(batch)
 
     def set_seed(self, seed: int, static_seed: bool = False) -> int:
-        """Seeds the environments, not the actor's generator. Returns the next seed."""
+        """Seed the environments, not the actor's generator; return the next seed."""
         return cast(int, self.env.set_seed(seed, static_seed=static_seed))
 
     def shutdown(
         self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True
     ) -> None:
-        """Closes the environment, unless it is to stay open."""
+        """Close the environment, unless it is to stay open."""
         if close_env and not self.env.is_closed:
             self.env.close()
 
     def __len__(self) -> int:
-        """Raises TypeError: the number of batches is not known."""
+        """Raise a TypeError: the number of batches is not known."""
         raise TypeError(f"the number of batches of {type(self).__name__} is not known beforehand")
 
     def _maybe_fallback_update(
         self, policy_or_weights: Any = None, *, model_id: str | None = None
     ) -> None:
-        """Implements `update_policy_weights_`, for another such actor or its weights."""
+        """Implement `update_policy_weights_`, for another such actor or its weights."""
         if policy_or_weights is None:
             return
         if isinstance(policy_or_weights, TensorDictBase):

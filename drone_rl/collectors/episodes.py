@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class EpisodeCollector(BatchedCollector):
-    """Iterates over batches of `env.batch_size[0]` complete episodes, one an environment.
+    """Iterate over batches of `env.batch_size[0]` complete episodes, one for each environment.
 
     A batch is in the "cat" format of TorchRL's `Collector(trajs_per_batch=...)`: a flat TensorDict
     of shape (T_total,), episode after episode without padding, numbered by ("collector",
@@ -30,8 +30,7 @@ class EpisodeCollector(BatchedCollector):
 
     All environments reset at the start of a batch. An environment whose episode has ended is masked
     until the batch ends and is not rendered. So a batch is on-policy and not biased towards short
-    episodes, no frame is dropped or used twice, and no episode is under way between two batches:
-    the state to resume from is the environments' random streams.
+    episodes, and between batches the environments' random streams are the whole state.
     """
 
     def __init__(
@@ -45,20 +44,16 @@ class EpisodeCollector(BatchedCollector):
         num_threads: int = 1,
         **kwargs: Any,
     ) -> None:
-        """Connects an environment and a policy.
+        """Connect an environment and a policy.
 
         Args:
-            env: A batched environment that honours TorchRL's "_step" masks.
+            env: A batch of environments that honours TorchRL's "_step" masks.
             actor: Writes the action.
             keep_observations: Whether to keep what the actor reads and writes.
             noted: Entries that the actor writes, kept even without observations.
-            acceleration: The fastest implementation that may be used, if it supports environment
-                and actor.
+            acceleration: The fastest implementation that may be used, if it is supported.
             num_threads: Of the fused kernel; no result depends on it.
-            kwargs: See `BatchedCollector`.
-
-        Raises:
-            InputError: The environment is not a batch of environments.
+            kwargs: See `BatchedCollector`, also for errors.
         """
         super().__init__(env, actor, **kwargs)
         what = {"kept": self._kept, "extra": noted, "keep_observations": keep_observations}
@@ -85,12 +80,12 @@ class EpisodeCollector(BatchedCollector):
         super().shutdown(timeout, close_env, raise_on_error)
 
     def state_dict(self) -> dict[str, Any]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Counters and the environments' random streams between two batches."""
+        """Return counters and the environments' random streams between two batches."""
         worlds = self.base_env.state_dict()
         return {"frames": self.frames, "episodes": self.episodes, "worlds": worlds}
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
-        """Resumes from a `state_dict`."""
+        """Resume from a `state_dict`."""
         self.frames, self.episodes = state_dict["frames"], state_dict["episodes"]
         self.base_env.load_state_dict(state_dict["worlds"])
 
@@ -100,11 +95,10 @@ _STEPS = 8
 
 
 class SteppingCollector:
-    """Collects one complete episode of each environment with TorchRL's `Collector`.
+    """Collect one complete episode of each environment with TorchRL's `Collector`.
 
     TorchRL's `trajs_per_batch` takes the episodes that end first, which biases a batch towards
-    short ones. Here an environment whose episode has ended is neither stepped nor acted upon, and
-    its steps are masked, until all episodes have ended.
+    short ones. Here an environment whose episode has ended is masked until all have ended.
     """
 
     implementation = "PyTorch"
@@ -160,7 +154,7 @@ class SteppingCollector:
         return batch.set(("collector", "traj_ids"), mask.nonzero()[:, 0])
 
     def close(self) -> None:
-        """Does nothing: who made the environment closes it."""
+        """Do nothing: the caller closes the environment."""
 
 
 class _OneEpisode(TransformedEnv):
@@ -183,12 +177,12 @@ class _OneEpisode(TransformedEnv):
         return super()._reset(tensordict, **kwargs)
 
     def close(self, *, raise_if_closed: bool = True) -> None:
-        """Leaves the environment open: TorchRL's collector closes its own when it is deleted."""
+        """Leave the environment open: TorchRL's collector closes its own when it is deleted."""
 
     def step_and_maybe_reset(
         self, tensordict: TensorDictBase
     ) -> tuple[TensorDictBase, TensorDictBase]:
-        """Steps the environments whose episodes are under way; resets none."""
+        """Step the environments whose episodes are under way; reset none."""
         self.masks.append(self.active)
         if not bool(self.active.all()):
             tensordict.set("_step", self.active)
@@ -213,7 +207,7 @@ class _ActiveOnly(TensorDictModuleBase):
         self._blank: dict[NestedKey, Tensor] = {}
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Writes what the actor writes, and 0 for the other environments."""
+        """Write what the actor writes, and 0 for the other environments."""
         active = self._env[0].active
         rows = active.nonzero()[:, 0]
         if not len(rows):

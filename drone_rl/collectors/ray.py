@@ -40,8 +40,7 @@ class RemoteEpisodes(BaseCollector):
     ) -> tuple[dict[str, Any], dict]:
         """Run one episode in every environment, with these weights, from this state or the start.
 
-        Returns:
-            The batch as numpy arrays, which Ray transfers without copies, and the state after it.
+        Returns the batch as NumPy arrays, which Ray transfers without copies, and the new state.
         """
         self._network.load_state_dict(weights)
         if state is not None:
@@ -65,19 +64,18 @@ class RemoteEpisodes(BaseCollector):
             yield self._episodes.collect()
 
     def set_seed(self, seed: int, static_seed: bool = False) -> int:
-        """Not here: the seed is part of the settings."""
+        """Raise an error: the seed is part of the settings."""
         raise NotImplementedError
 
     def shutdown(self, *args: object, **kwargs: object) -> None:
-        """Closes the environment."""
+        """Close the environment."""
         self._episodes.shutdown()
 
 
 class RayEpisodeCollector:
-    """Joins the batches of collectors that run in workers of a Ray cluster.
+    """Join the batches of collectors that run in workers of a Ray cluster.
 
-    Environments, random streams and the order of batches are those of a `ThreadedCollector` with
-    as many threads as there are workers, and so is the result.
+    The result is the same as of a `ThreadedCollector` with as many threads as workers.
     """
 
     def __init__(
@@ -92,16 +90,16 @@ class RayEpisodeCollector:
         device: torch.device | str = "cpu",
         postproc: Callable[[TensorDictBase], TensorDictBase] | None = None,
     ) -> None:
-        """Starts the workers.
+        """Start the workers.
 
         Args:
-            makers: One a worker, over disjoint environments; sent to it.
-            actor: The policy that learns, here.
+            makers: Each makes one worker's collector, over disjoint environments; sent to it.
+            actor: The policy that learns, in this process.
             network: Its network.
             address: Of the cluster; None starts one on this machine.
             num_cpus: Cores of a worker.
             max_lost_workers: How many may be replaced before the training stops.
-            device: Where the batches go.
+            device: Device of the batches.
             postproc: Applied to each joined batch, such as a return estimator.
 
         Raises:
@@ -123,7 +121,7 @@ class RayEpisodeCollector:
         """Return None: activations do not travel between processes."""
 
     def __iter__(self) -> Iterator[TensorDictBase]:
-        """Yields batches without end."""
+        """Yield batches without end."""
         while True:
             yield self.collect()
 
@@ -144,7 +142,7 @@ class RayEpisodeCollector:
         return batch if self.postproc is None else self.postproc(batch)  # pyright: ignore[reportArgumentType]
 
     def state_dict(self) -> dict:
-        """The workers' states, as they stand between two batches."""
+        """Return the workers' states between two batches."""
         return {"workers": self._states}
 
     def load_state_dict(self, state_dict: dict) -> None:
@@ -152,7 +150,7 @@ class RayEpisodeCollector:
         self._states = list(state_dict["workers"])
 
     def shutdown(self) -> None:
-        """Ends the workers; a cluster that was started here ends with this process."""
+        """End the workers; a cluster that was started here ends with this process."""
         self._pool.shutdown()
 
     def _answer(self, number: int, task: Any, weights: Any) -> tuple[dict[str, Any], dict]:

@@ -20,23 +20,18 @@ if TYPE_CHECKING:
 
 
 class RolloutCollector(BatchedCollector):
-    """Iterates over batches of the next `num_steps` steps of every environment: (num_envs, T).
+    """Iterate over batches of the next `num_steps` steps of every environment: (num_envs, T).
 
     An environment whose episode ends starts another at once. Its row continues with that one, while
     ("next", ...) holds the last observation of the old one, so that a critic can bootstrap where a
-    row is cut by the time limit or by the end of the batch. ("next", "episode_reward") and
-    ("next", "step_count"), as TorchRL's `RewardSum` and `StepCounter` write them, count from the
-    start of an episode, even if that was in an earlier batch. A batch is on-policy.
+    row is cut. ("next", "episode_reward") and ("next", "step_count"), as TorchRL's `RewardSum` and
+    `StepCounter` write them, count from the start of an episode, even in an earlier batch.
     """
 
     def __init__(
         self, env: EnvBase, actor: TensorDictModuleBase, num_steps: int, **kwargs: Any
     ) -> None:
-        """Connects an environment and a policy; `kwargs` as for `BatchedCollector`.
-
-        Raises:
-            InputError: The environment is not a batch of environments, or there are no steps.
-        """
+        """Connect an environment and a policy; `kwargs` and errors as in `BatchedCollector`."""
         if num_steps < 1:
             raise InputError(f"num_steps={num_steps} is out of range; give 1 or more")
         super().__init__(env, actor, **kwargs)
@@ -76,7 +71,7 @@ class RolloutCollector(BatchedCollector):
         return self._finish(batch, episodes)
 
     def _step(self) -> Entries:
-        """Take one step. Returns the kept entries."""
+        """Take one step; return the kept entries."""
         acted = self.actor(self._stream.observe())
         step: Entries = {key: acted.get(key) for key in acted.keys(True, True)}
         step |= self._stream.step(acted.get(self.env.action_key))
@@ -142,11 +137,7 @@ class TorchrlStream:
         return self._state
 
     def step(self, action: Tensor) -> Entries:
-        """Step every environment with actions (num_envs, *).
-
-        Returns:
-            The kept entries of the step, and the ("next", ...) observations.
-        """
+        """Step every environment with actions (num_envs, *); return the kept entries and observations."""
         after = self._env.step(self._begin().set(self._env.action_key, action))
         following = after.get("next")
         entries: Entries = {key: after.get(key) for key in self._kept}

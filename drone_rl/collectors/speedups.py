@@ -82,7 +82,7 @@ def accelerated_collector(
 def accelerated_stream(
     env: EnvBase, observed: Sequence[NestedKey], kept: Iterable[NestedKey]
 ) -> "DirectStream | Reasons":
-    """Return what steps environments on and on without TorchRL, or the reasons why not.
+    """Return an object that steps environments without TorchRL, or the reasons why there is none.
 
     `observed` are the entries that the actor reads, `kept` the ("next", ...) entries of each step.
     """
@@ -102,13 +102,9 @@ def accelerated_gradients(
     of: Literal["weights", "pixels"] = "weights",
     cache: "Callable[[], ActivationCache | None]" = lambda: None,
 ) -> nn.Module:
-    """Return the network with fused forward and backward pass if that is possible, else itself.
+    """Return the network with fused forward and backward pass if that is supported, else itself.
 
-    Args:
-        network: From pixels to logits.
-        num_threads: Of the kernel; sums over observations depend on it.
-        of: What has gradients. Gradients of pixels take the weights as they are now.
-        cache: Makes the collector keep its activations, see `FusedCollector.cache_activations`.
+    See `FusedNetwork.try_create` for the arguments.
     """
     package = _package()
     if package is None:

@@ -17,11 +17,10 @@ if TYPE_CHECKING:
 
 
 class ThreadedCollector(BaseCollector):
-    """Joins the batches of collectors that run at the same time, each on a thread of its own.
+    """Join the batches of collectors that run in parallel, each in its own thread.
 
     Rendering releases the interpreter's lock, so that one collector renders while the policy of
-    another acts. Each collector has its own environments and stream of actions, and batches are
-    joined in order, so the result does not depend on which thread is faster.
+    another acts. Batches are joined in order, so the result does not depend on the threads' speed.
     """
 
     def __init__(
@@ -30,11 +29,9 @@ class ThreadedCollector(BaseCollector):
         *,
         postproc: Callable[[TensorDictBase], TensorDictBase] | None = None,
     ) -> None:
-        """Takes over the collectors.
+        """Take over collectors of disjoint environments, each rendered by a single shard.
 
-        Args:
-            collectors: Over disjoint environments, each rendered by a single shard.
-            postproc: Applied to each joined batch, such as a return estimator.
+        `postproc` is applied to each joined batch, such as a return estimator.
         """
         super().__init__()
         self.postproc = postproc
@@ -57,7 +54,7 @@ class ThreadedCollector(BaseCollector):
         return first.source.cache_activations()
 
     def iterator(self) -> Iterator[TensorDictBase]:
-        """Yields batches without end; a `for` over the collector calls it."""
+        """Yield batches without end; a `for` over the collector calls it."""
         while True:
             yield self.collect()
 
@@ -73,29 +70,29 @@ class ThreadedCollector(BaseCollector):
         return {"collectors": [collector.state_dict() for collector in self.collectors]}
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
-        """Resumes from a `state_dict`."""
+        """Resume from a `state_dict`."""
         for collector, part in zip(self.collectors, state_dict["collectors"], strict=True):
             collector.load_state_dict(part)
 
     def set_seed(self, seed: int, static_seed: bool = False) -> int:
-        """Seeds all environments. Returns a seed for the next collector."""
+        """Seed all environments; return a seed for the next collector."""
         return [c.set_seed(seed, static_seed=static_seed) for c in self.collectors][-1]
 
     def shutdown(
         self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True
     ) -> None:
-        """Ends the threads and closes the environments, unless they are to stay open."""
+        """End the threads and close the environments, unless they are to stay open."""
         self._pool.shutdown()
         for collector in self.collectors:
             collector.shutdown(close_env=close_env)
 
     def __len__(self) -> int:
-        """Raises TypeError: there is no end of batches."""
+        """Raise a TypeError: there is no end of batches."""
         raise TypeError("a ThreadedCollector has batches without end")
 
     def _maybe_fallback_update(
         self, policy_or_weights: Any = None, *, model_id: str | None = None
     ) -> None:
-        """Implements `update_policy_weights_`, see `BatchedCollector`."""
+        """Implement `update_policy_weights_`, see `BatchedCollector`."""
         for collector in self.collectors:
             collector.update_policy_weights_(policy_or_weights)

@@ -55,11 +55,7 @@ class Variant(Settings):
         super().__init_subclass__(**kwargs)
 
     def make(self, *args: Any, **kwargs: Any) -> Any:
-        """Build the part from objects, such as parameters, and the settings.
-
-        Raises:
-            InputError: The class can't be imported, or does not accept these settings.
-        """
+        """Build the part from objects, such as parameters, and the settings; see `locate`."""
         factory = type(self).factory or locate(self.target)
         return factory(*args, **self.arguments(), **kwargs)
 
@@ -89,11 +85,7 @@ class Variant(Settings):
 
     @classmethod
     def named(cls, name: object, where: str) -> type[Self]:
-        """Return the variant with a registered name.
-
-        Raises:
-            InputError: No part of that name is registered; `where` is the setting's name.
-        """
+        """Return the variant with a registered name; `where` is the setting's name for messages."""
         for load in (lambda: None, load_entry_points):
             load()
             variants = {variant.registered_name(): variant for variant in cls.variants()}
@@ -129,8 +121,8 @@ def locate(target: str) -> Any:
 def as_config(settings: Settings) -> dict[str, Any]:
     """Return settings as plain data.
 
-    A variant has its target as "_target_", several variants are named, and a task other than the
-    first has its name, see `BaseTaskSettings.values`.
+    A variant has its target as "_target_", several variants are named, and so is a task other than
+    the first, see `BaseTaskSettings.values`.
     """
     if isinstance(settings, BaseTaskSettings):
         return settings.values()
@@ -163,19 +155,11 @@ def from_config(cls: type[S], config: Any, where: str = "") -> S:
 
 
 def variant_of(part: type[Variant], config: Any, where: str) -> Variant:
-    """Read a variant of a part from plain data; nothing is imported before it is built.
-
-    Args:
-        part: Class of the part.
-        config: "_target_" and values.
-        where: Its name, for messages.
+    """Read a variant of a part from "_target_" and values; nothing is imported before it is built.
 
     Returns:
         A registered variant. For the dotted name of another class, or for further values, a variant
         that checks the fields of the part and passes all values on.
-
-    Raises:
-        InputError: A value is invalid.
     """
     values = dict(as_mapping(config, where))
     target = values.pop("_target_", None)
@@ -191,7 +175,6 @@ def variant_of(part: type[Variant], config: Any, where: str) -> Variant:
 
 
 def _plain(value: Any, is_several: bool) -> Any:
-    """A value as plain data; several variants in order, each under a unique name."""
     if isinstance(value, Settings):
         return as_config(value)
     if not is_several:
@@ -204,7 +187,7 @@ def _plain(value: Any, is_several: bool) -> Any:
 
 
 def _several(hint: Any) -> type[Variant] | None:
-    """The part of which a field holds several variants, as `tuple[Transform, ...]` does."""
+    """Return the part of which a field holds several variants, as `tuple[Transform, ...]` does."""
     if typing.get_origin(hint) is not tuple:
         return None
     part = typing.get_args(hint)[0]
@@ -235,7 +218,7 @@ def _read(hint: Any, value: Any, where: str) -> Any:
 
 
 def _with_target(part: type[Variant], name: str, value: Any) -> Any:
-    """The values of a step; a step named like a registered part needs no "_target_"."""
+    """Return the values of a step; one named like a registered part needs no "_target_"."""
     if not isinstance(value, Mapping) or "_target_" in value:
         return value
     known = next((v for v in part.variants() if v.registered_name() == name), None)
@@ -297,10 +280,7 @@ def check_same_config(
 ) -> None:
     """Raise an `InputError` if a resumed run or sweep has other settings than at its start.
 
-    Args:
-        saved: Configuration at the start.
-        now: Configuration of this command.
-        may_change: Dotted keys, and groups of them, that don't change what is learned.
+    `may_change` are dotted keys, and groups of them, that don't change what is learned.
     """
     allowed = tuple(may_change)
     before, after = _flatten(saved), _flatten(now)

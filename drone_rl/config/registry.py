@@ -81,13 +81,8 @@ def register_transform(
 ) -> Callable[[F], F]:
     """Register a transform of images; a decorator of a class derived from TorchRL's `Transform`.
 
-    Args:
-        name: Name in settings and policy files.
-        output: Returns the shape of the transformed image from that of its input and the settings.
-            By default the transform is called with zeros.
-
-    Raises:
-        InputError: See `register_network`.
+    `output` returns the shape of the transformed image from that of its input and the settings; by
+    default the transform is called with zeros. See `register_network` for errors.
     """
     own = {"output": lambda self, frame: output(frame, self) if output else None}
     return lambda factory: _register(Transform, name, factory, 0, _KEYS, own)
@@ -171,7 +166,7 @@ def _register(
 def _fields(
     name: str, factory: Callable[..., Any], positional: int, skipped: Set[str]
 ) -> list[tuple[str, Any, Any]]:
-    """Name, annotation and default of each setting, from a signature."""
+    """Return name, annotation and default of each setting, from a signature."""
     source: Any = factory.__init__ if isinstance(factory, type) else factory
     hints = typing.get_type_hints(source, include_extras=True)
     parameters = list(inspect.signature(factory).parameters.values())[positional:]
@@ -192,7 +187,7 @@ def _fields(
 
 
 def _annotated(hint: Any, where: str) -> Any:
-    """The type of a parameter with the kind of its values."""
+    """Return the type of a parameter with the kind of its values."""
     if typing.get_origin(hint) is Annotated:
         return hint
     if typing.get_origin(hint) is typing.Literal:

@@ -63,11 +63,7 @@ def add_task(settings: S) -> S:
 
 
 def settings_of(name: object, where: str = "task.name") -> type[BaseTaskSettings]:
-    """Return the class of a task's settings; `where` is the setting's name for messages.
-
-    Raises:
-        InputError: There is no such task.
-    """
+    """Return the class of a task's settings; `where` is the setting's name for messages."""
     if not isinstance(name, str) or name not in TASKS:
         raise InputError(f"{where}={shown(name)} is unknown; there are: {', '.join(TASKS)}")
     return TASKS[name]
@@ -90,11 +86,11 @@ def read_task(data: Any, where: str) -> BaseTaskSettings:
 
 @add_task
 class TaskSettings(BaseTaskSettings):
-    """The cubes, the drone's moves and the boundaries. Lengths in metres, world frame.
+    """The cubes, the drone's moves and the boundaries. Lengths in metres.
 
-    The world frame has x forward, y left and z up; the drone starts at x = y = 0. The defaults are
-    the original study's. It does not state the sizes of cube and drone: with these a uniformly
-    random policy collects about as much as it did there (0.84 cubes).
+    World frame: x forward, y left, z up; the drone starts at x = y = 0. The defaults are the
+    original study's. It does not state the sizes of cube and drone: with these a uniformly random
+    policy collects about as much as it did there (0.84 cubes).
     """
 
     name: ClassVar[str] = FIRST
@@ -189,9 +185,9 @@ _TRIED, _LEAST_OPEN = 400, 20
 
 @add_task
 class PillarsSettings(BaseTaskSettings):
-    """Rows of pillars, the line beyond them, and the drone's moves. Metres, world frame.
+    """Rows of pillars, the line beyond them, and the drone's moves. Lengths in metres.
 
-    The world frame has x forward, y left and z up; the drone starts at x = y = 0.
+    World frame: x forward, y left, z up; the drone starts at x = y = 0.
     """
 
     name: ClassVar[str] = "pillars"

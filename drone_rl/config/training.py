@@ -149,11 +149,7 @@ class Logger(Variant):
     """Settings of a TorchRL logger."""
 
     def make(self, *args: Any, **kwargs: Any) -> Any:
-        """Make the logger.
-
-        Raises:
-            InputError: It doesn't exist, or the package that it needs is not installed.
-        """
+        """Make the logger; raise an `InputError` if it or the package that it needs is missing."""
         try:
             return super().make(*args, **kwargs)
         except ImportError as error:  # TorchRL raises it without the name of the package

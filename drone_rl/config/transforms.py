@@ -26,11 +26,8 @@ class Transform(Variant):
     def output(self, frame: Frame) -> Frame | None:
         """Return shape and type of the transformed image; None if only a call can tell.
 
-        Args:
-            frame: Shape and type of the input.
-
         Raises:
-            InputError: The transform can't process such images.
+            InputError: The transform can't process images of this shape and type.
         """
         if self.needs == "bytes" and (frame.is_float or frame.shape[-1] != 3):
             raise InputError(
@@ -177,7 +174,7 @@ class DeadRows(Fault, target="dead_rows"):
     """Their level; 0 is black, 1 white."""
 
     def check(self) -> None:
-        """Refuse duplicate rows."""
+        """Reject duplicate rows."""
         if len(set(self.rows)) < len(self.rows):
             raise InputError(f"rows={list(self.rows)} names a row twice; name each once")
 
@@ -187,11 +184,7 @@ class DeadRows(Fault, target="dead_rows"):
         return frame
 
     def check_height(self, height: int) -> None:
-        """Refuse more rows than images have.
-
-        Raises:
-            InputError: There are not as many.
-        """
+        """Raise an `InputError` for more rows than images have."""
         if max(self.rows, default=0) >= height:
             raise InputError(
                 f"rows={list(self.rows)} of an image of {height} rows; give at most {height - 1}"

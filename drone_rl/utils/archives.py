@@ -51,13 +51,9 @@ _ENTRY = b"PK\x01\x02"
 def read_members(
     content: bytes, where: str, *, most: int, methods: Collection[int] = (zipfile.ZIP_STORED,)
 ) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of each file in an archive.
+    """Yield name and content of each file in an archive; `where` is its name for messages.
 
-    Args:
-        content: Of the archive.
-        where: Its name, for messages.
-        most: Largest number of bytes of all files together, unpacked.
-        methods: Accepted methods of compression.
+    `most` is the largest size of all files together, in bytes; `methods` are those of compression.
 
     Raises:
         InputError: The archive is damaged, or its directory exceeds a limit.
@@ -70,10 +66,8 @@ def read_arrays(
 ) -> dict[str, NDArray]:
     """Return the arrays of numbers and texts in an .npz file.
 
-    Args:
-        path: Of the file.
-        most: Largest number of bytes of all arrays together.
-        allowance: Bytes of the arrays in this file and others, instead of `most`.
+    `most` is the largest size of all arrays together, in bytes; `allowance` is shared with further
+    files and replaces it.
 
     Raises:
         InputError: The file is unusable, or an array holds objects.

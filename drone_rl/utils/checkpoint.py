@@ -62,13 +62,7 @@ class ForeignError(ValueError):
 
 
 def unpickle(content: bytes, where: str) -> Any:
-    """Return the saved object, on the CPU; `where` is the file's name for messages.
-
-    Raises:
-        InputError: It is no archive, or too large.
-        DamagedError: It is damaged.
-        ForeignError: It contains something else.
-    """
+    """Return the saved object, on the CPU, or raise an error; `where` is the file's name."""
     members: dict[str, bytes] = {}
     for name, data in read_members(content, where, most=CHECKPOINT_BYTES):
         if not _MEMBER.fullmatch(name):
@@ -198,7 +192,7 @@ def save_checkpoint(path: str | Path, state: Mapping[str, Any]) -> None:
 
 
 def _reason(error: BaseException) -> str:
-    """The system's reason, which PyTorch hides behind its own error."""
+    """Return the system's reason, which PyTorch hides behind its own error."""
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, OSError) and cause.strerror:
@@ -243,9 +237,7 @@ def load_checkpoint(path: str | Path) -> dict[str, Any]:
 def check_weights(weights: Any, expected: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """Return the weights of a file if they are finite and match the expected names and shapes.
 
-    Args:
-        weights: From a file.
-        expected: The network's `state_dict`, which may be on the meta device.
+    `expected` is the network's `state_dict`, which may be on the meta device.
 
     Raises:
         InputError: They differ; the message names the first difference.

@@ -53,12 +53,9 @@ def _check_entries(given: Mapping[str, Any], where: str) -> None:
 
 
 def check_proportion(given: Any, where: str, trials: int | None = None) -> int:
-    """Check a rate from `utils.intervals.proportion` and return the successes.
+    """Check a rate and its interval from `utils.intervals.proportion`; return the successes.
 
-    Args:
-        given: The rate with its interval of at least 95%.
-        where: Its name.
-        trials: Required number of trials; None for any.
+    `trials` is the required number of trials; None for any.
 
     Raises:
         InputError: The rate or its interval does not follow from its counts.
@@ -80,13 +77,9 @@ def check_proportion(given: Any, where: str, trials: int | None = None) -> int:
 def check_mean(
     given: Any, where: str, bounds: tuple[float, float] = (0.0, 1.0), count: int | None = None
 ) -> float | None:
-    """Check a mean from `utils.intervals.mean_bounds` and return it.
+    """Check a mean and its interval from `utils.intervals.mean_bounds`; return the mean.
 
-    Args:
-        given: The mean with its interval of at least 95%.
-        where: Its name.
-        bounds: Least and greatest possible value.
-        count: Required number of values; None for any.
+    `bounds` are the least and greatest possible value, `count` the required number of values.
 
     Raises:
         InputError: It is out of bounds, or its interval is narrower than the count allows.
@@ -135,13 +128,8 @@ def check_mean_width(
 ) -> None:
     """Raise an `InputError` if the interval of a mean is narrower than any valid one.
 
-    Args:
-        interval: Lower and upper end.
-        mean: Mean; None of no values.
-        count: Number of values.
-        bounds: Least and greatest possible value.
-        confidence: Coverage that the interval claims.
-        where: Its name.
+    `mean` is None of no values, `bounds` the least and greatest possible value, `confidence` the
+    coverage that the interval claims.
     """
     lower, upper = interval
     if mean is None:

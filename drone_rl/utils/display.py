@@ -22,9 +22,7 @@ if TYPE_CHECKING:
 def aligned(rows: Sequence[Sequence[str]], *, are_numbers: bool = False) -> str:
     """Return rows of texts as a table with aligned columns.
 
-    Args:
-        rows: Texts, one for each column.
-        are_numbers: Whether to right-align all columns but the first.
+    `are_numbers` aligns all columns but the first to the right.
     """
     rest = str.rjust if are_numbers else str.ljust
     first, *others = (2 + max(map(len, column)) for column in zip(*rows, strict=True))
@@ -64,9 +62,7 @@ def page(document: str, height: int = 800) -> str:
 def interval(figure: Mapping[str, Any], key: str) -> str:
     """Return a rate and its 95% interval in percent.
 
-    Args:
-        figure: The rate (None if there is none), "lower95" and "upper95".
-        key: Of the rate.
+    `figure` has the rate (None if there is none) under `key`, "lower95" and "upper95".
     """
     if figure[key] is None:
         return "not offered"
@@ -88,13 +84,10 @@ _TYPES = ("require-trusted-types-for 'script'", "trusted-types 'none'")
 
 
 def page_environment(*packages: str) -> "jinja2.Environment":
-    """Return an environment for the templates of a page; every value is escaped.
+    """Return an environment for the templates in packages, earlier ones first; values are escaped.
 
     It has the filters `folder_link`, a relative link to a folder by its name, and jinja's `tojson`,
     whose result can stand in a script element: no character of it ends that element.
-
-    Args:
-        packages: Each has a folder `templates`; earlier ones come first.
     """
     import jinja2  # most users of this module need no template
 
@@ -112,10 +105,6 @@ def page_environment(*packages: str) -> "jinja2.Environment":
 def static_text(environment: "jinja2.Environment", names: Sequence[str]) -> "Markup":
     """Return files of a page's style or script, joined, without any value put into them.
 
-    Args:
-        environment: From `page_environment`.
-        names: Of files in a folder of templates.
-
     Raises:
         ValueError: A file would end the element that it stands in.
     """
@@ -130,11 +119,9 @@ def static_text(environment: "jinja2.Environment", names: Sequence[str]) -> "Mar
 
 
 def content_security_policy(style: str, script: str = "") -> str:
-    """Return the policy of a page with one style element and at most one script element.
+    """Return the policy of a page with one style element and one script element.
 
-    Args:
-        style: Text of the style element.
-        script: Text of the script element; none is allowed if it is empty.
+    No script is allowed if the text of the script is empty.
     """
     scripts = f"script-src {_hash(script)}" if script else "script-src 'none'"
     return "; ".join((*_SOURCES, f"style-src {_hash(style)}", scripts, *_TYPES))
@@ -146,6 +133,6 @@ def folder_link(name: str) -> str:
 
 
 def _hash(text: str) -> str:
-    """The source expression that allows an inline element with exactly this text."""
+    """Return the source expression that allows an inline element with exactly this text."""
     digest = hashlib.sha256(text.encode()).digest()
     return f"'sha256-{base64.b64encode(digest).decode()}'"

@@ -34,11 +34,7 @@ _LONGEST_NUMBER = 19
 
 
 def read_bytes(path: Path, most: int) -> bytes:
-    """Return the content of a plain file, which is opened once and without waiting.
-
-    Args:
-        path: Of the file.
-        most: Largest number of bytes.
+    """Return the content of a plain file of at most `most` bytes, opened once and without waiting.
 
     Raises:
         InputError: It can't be read, is no plain file, is empty or too large.
@@ -90,11 +86,7 @@ def parse_json(
 ) -> Any:
     """Return plain data from JSON with unique names, finite numbers and bounded integers.
 
-    Args:
-        content: The JSON.
-        where: Its name, for messages.
-        allow_nan: Whether NaN and infinity are accepted.
-        most_values: Largest number of values and names.
+    `where` is its name for messages, `most_values` the largest number of values and names.
 
     Raises:
         InputError: It is no such JSON.
@@ -140,10 +132,7 @@ _NUMBERS: dict[bool, dict[str, Any]] = {
 def refuse_links(folder: Path, depth: int = 3, left: Allowance | None = None) -> None:
     """Check that a folder has no links, so that reading and writing below it stays in it.
 
-    Args:
-        folder: A folder of unknown origin.
-        depth: Levels of folders to search.
-        left: Number of files and folders that it may contain.
+    `depth` levels of folders are searched; `left` limits the number of files and folders.
 
     Raises:
         InputError: It contains a link or a device, or too many files.
@@ -171,7 +160,7 @@ def write_atomically(path: Path, content: str | bytes) -> None:
 
 
 def write_all_atomically(contents: Mapping[Path, str | bytes]) -> None:
-    """Write the contents of several files, or none if one can't be written.
+    """Write the contents of several files, or none.
 
     Raises:
         OSError: One can't be written; the error's `filename` is its path.
@@ -227,9 +216,7 @@ def _is_alive(process: int) -> bool:
 def folder_lock(folder: Path, *, patience_s: float = 1.0) -> Iterator[None]:
     """Lock an existing folder; the system releases the lock when the process ends.
 
-    Args:
-        folder: The folder.
-        patience_s: Seconds to try, longer than `is_locked` takes.
+    `patience_s` are the seconds to try, longer than `is_locked` takes.
 
     Raises:
         InputError: Another process holds the lock.

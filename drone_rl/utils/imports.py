@@ -34,10 +34,8 @@ def when_imported(name: str, do: Callable[[], None]) -> None:
 def import_quietly(name: str, category: str, words: str) -> None:
     """Hide a warning that a module of another package issues while it is imported.
 
-    Args:
-        name: Dotted name of the module.
-        category: Name of the warning's class, which a package may define that is not imported yet.
-        words: Text that the warning contains.
+    `name` is the module's dotted name, `category` the name of the warning's class, which may not
+    be imported yet, and `words` a part of the warning.
     """
 
     def execute_quietly(module: ModuleType, execute: Callable[[ModuleType], None]) -> None:

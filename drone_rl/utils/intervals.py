@@ -44,8 +44,7 @@ def mean_bounds(
         confidence: Coverage of the interval.
 
     Returns:
-        "mean" (None of no values), "lower95" and "upper95" (the whole range of no values) and
-        "count".
+        "mean" (None of no values), "lower95", "upper95" (the whole range of no values), "count".
 
     Raises:
         ValueError: A value is not finite or out of range.
@@ -73,13 +72,11 @@ def may_bound_mean(
     high: float = 1.0,
     confidence: float = 0.95,
 ) -> bool:
-    """Return whether `mean_bounds` can give this interval to so many values with this mean.
+    """Return whether `mean_bounds` can return this interval for so many values with this mean.
 
     It can't if the interval is too narrow. The narrowest one is that of values which all equal the
     mean: the capital of a bet grows by a concave function of each value, and so by Jensen's
     inequality most where the values are alike.
-
-    The arguments are those of `mean_bounds`, and the interval's ends.
     """
     z, lower, upper = ((value - low) / (high - low) for value in (mean, *interval))
     stakes, needed = _bets(count, (1.0 - confidence) / 2)
@@ -94,7 +91,7 @@ _ROUNDING = 1e-6
 
 
 def _refuted_below(z: NDArray, tail: float) -> float:
-    """The mean up to which every mean is refuted at level `tail`; values in [0, 1]."""
+    """Return the mean up to which every mean is refuted at level `tail`; values in [0, 1]."""
     distinct, counts = np.unique(z, return_counts=True)
     stakes, needed = _bets(len(z), tail)
     below, above = 0.0, 1.0
@@ -106,14 +103,14 @@ def _refuted_below(z: NDArray, tail: float) -> float:
 
 
 def _bets(count: int, tail: float) -> tuple[NDArray, float]:
-    """Shares of the capital that are staked, and the log of the wealth that refutes a mean."""
+    """Return the fractions of the capital that are staked, and the log of the refuting wealth."""
     # from about 1 / sqrt(n) to everything
     stakes = 2.0 ** -np.arange(max(1, math.ceil(math.log2(math.sqrt(count)))) + 1)
     return stakes, math.log(len(stakes) / tail)
 
 
 def _wealth(distinct: NDArray, counts: NDArray, stakes: NDArray, mean: float) -> float:
-    """The log of what all bets against a mean have won together; values in [0, 1]."""
+    """Return the log of what all bets against a mean have won together; values in [0, 1]."""
     with np.errstate(divide="ignore"):
         growth = np.log1p(stakes[:, None] * (distinct / mean - 1.0)) @ counts
     return float(np.logaddexp.reduce(growth))
@@ -122,12 +119,8 @@ def _wealth(distinct: NDArray, counts: NDArray, stakes: NDArray, mean: float) ->
 def median_bounds(values: ArrayLike, confidence: float = 0.95) -> tuple[float, float] | None:
     """Return an interval of the median by order statistics, exact for any distribution.
 
-    Args:
-        values: Independent; infinite ones (censored times) are allowed. Shape: (n,).
-        confidence: Least coverage.
-
-    Returns:
-        Two of the values; None of too few (fewer than six at 95%).
+    Its ends are two of the independent values (n,), which may be infinite (censored times). None of
+    too few values (fewer than six at 95%).
     """
     from scipy.special import bdtr  # see `proportion`
 
@@ -140,14 +133,9 @@ def median_bounds(values: ArrayLike, confidence: float = 0.95) -> tuple[float, f
 
 
 def episode_means(values: NDArray, episode: NDArray) -> NDArray:
-    """Return the mean of each episode over its frames with values.
+    """Return the mean of each episode over its frames with values; NaN stands for none.
 
-    Args:
-        values: One for each frame; NaN for none. Shape: (T,).
-        episode: The episode of each frame. Shape: (T,).
-
-    Returns:
-        Shape: (E,), one for each episode with values.
+    Shapes: (T,), and the episode of each frame, (T,), to (E,), one for each episode with values.
     """
     known = np.isfinite(values)
     _, number = np.unique(episode[known], return_inverse=True)
@@ -161,12 +149,7 @@ def mean_interval(
     """Return the mean over episodes of their means, with a 95% interval that counts episodes.
 
     Frames of one episode are alike, so that an interval for independent frames would be too narrow.
-
-    Args:
-        values: One for each frame, from `low` to `high`; NaN for none. Shape: (T,).
-        episode: The episode of each frame. Shape: (T,).
-        low: Least possible value.
-        high: Greatest possible value.
+    `values` and `episode` are as for `episode_means`, from `low` to `high`.
 
     Returns:
         "mean", "lower95", "upper95" (None without frames), "frames" and "episodes".

@@ -97,15 +97,10 @@ def _containers(value: Any) -> Iterator[Any]:
 
 
 def check_shape(shape: Sequence[int], itemsize: int, most: int, where: str) -> int:
-    """Check the shape that a file states for an array and return the number of elements.
+    """Return the number of elements of an array whose shape a file states.
 
-    A dimension of 0 counts as 1, so that no array without elements has a huge shape.
-
-    Args:
-        shape: The shape.
-        itemsize: Bytes of one element.
-        most: Bytes that the array may have.
-        where: Its name.
+    A dimension of 0 counts as 1, so that no array without elements has a huge shape. An element has
+    `itemsize` bytes, and the array may have `most`.
 
     Raises:
         InputError: It is too large, has too many dimensions, or elements of no size.

@@ -76,11 +76,7 @@ def check_harmless(override: str, where: str) -> str:
 
 
 def read_overrides(folder: Path) -> list[str]:
-    """Return the overrides that Hydra recorded in a run's folder, if any.
-
-    Raises:
-        InputError: The file is damaged or an override is not harmless.
-    """
+    """Return the overrides in a run's folder, if any; see `read_yaml` and `check_harmless`."""
     path = folder / ".hydra" / "overrides.yaml"
     if not path.exists():
         return []
@@ -90,11 +86,7 @@ def read_overrides(folder: Path) -> list[str]:
 
 
 def taken_over(folder: Path, typed: Collection[str]) -> list[str]:
-    """Return the recorded overrides of a resumed run, except those on the command line.
-
-    Args:
-        folder: Of the run.
-        typed: Overrides on the command line, which are not restricted.
+    """Return the recorded overrides of a resumed run, except those on the command line (`typed`).
 
     Raises:
         InputError: An override may not be taken from a file.

@@ -113,9 +113,7 @@ class TablesAllowance:
 def read_table(path: Path, allowance: TablesAllowance | None = None) -> Iterator[list[str]]:
     """Yield the rows of a CSV file, its header first, without empty rows.
 
-    Args:
-        path: Of the file.
-        allowance: Limits on this file and others together.
+    `allowance` limits this file and others together.
 
     Raises:
         InputError: The file can't be read, is too large, or is no CSV.

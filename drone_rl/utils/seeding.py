@@ -85,16 +85,10 @@ def root_seed(given: int | None) -> RootSeed:
 
 
 def with_seed(settings: T, drawn: RootSeed | None = None) -> tuple[T, RootSeed]:
-    """Make the seed of settings concrete.
+    """Return settings with a concrete seed, and that seed; call it once, where an analysis begins.
 
-    Call it once, where an analysis begins; what it calls gets the returned settings.
-
-    Args:
-        settings: Of an analysis; a seed of None takes a fresh one.
-        drawn: Root seed of the analysis that this one is part of; takes precedence.
-
-    Returns:
-        The settings with a seed, and that seed.
+    A seed of None takes a fresh one. `drawn` is the root seed of the analysis that this one is part
+    of, and takes precedence.
     """
     drawn = drawn or root_seed(settings.seed)
     return settings.replace(seed=drawn.value), drawn

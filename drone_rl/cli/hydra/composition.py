@@ -73,12 +73,9 @@ _PLUGINS = (("plugins", list[str], dataclasses.field(default_factory=list)),)
 
 
 def register_schemas(**commands: type[Settings]) -> None:
-    """Register the schemas with Hydra; called before it composes.
+    """Register the schemas of commands, by the names of their files, before Hydra composes.
 
     Parts and tasks of plug-ins, which have no file in conf/, become choices of their groups.
-
-    Args:
-        commands: The settings of each command, by the name of its file.
     """
     store = ConfigStore.instance()
     for task in TASKS.values():
@@ -115,12 +112,7 @@ def _choice_of(cls: type[Settings]) -> type:
 
 
 def import_plugins(overrides: Sequence[str]) -> None:
-    """Import the modules that `plugins=[MODULE, ...]` names on a command line.
-
-    Only what a user types is imported, nothing that a file contains.
-
-    Args:
-        overrides: The command line.
+    """Import the modules that `plugins=[MODULE, ...]` names on a command line, and none from files.
 
     Raises:
         InputError: There is no such module.
@@ -142,9 +134,7 @@ def import_plugins(overrides: Sequence[str]) -> None:
 def schema_of(cls: type[Settings], further: Sequence[tuple[str, Any, Any]] = ()) -> type:
     """Return a dataclass with the same fields but no defaults, which are in conf/.
 
-    Args:
-        cls: The settings.
-        further: Name, type and default of further fields.
+    `further` are name, type and default of further fields.
     """
     types = types_of(cls)
     fields = [(name, *_field(kind, types[name])) for name, kind in kinds_of(cls).items()]
@@ -204,10 +194,7 @@ def conf_dir() -> Path:
 def run_command(name: str, command: type[CommandSettings], overrides: Sequence[str]) -> int:
     """Compose the settings of one command and run it; return the exit status.
 
-    Args:
-        name: Of its file in conf/.
-        command: Its settings.
-        overrides: As on the command line; `command.prepare` translates them first.
+    `name` is that of its file in conf/. `command.prepare` translates the overrides first.
     """
     overrides = command.prepare(overrides)
     check_choices(overrides, conf_dir())

@@ -24,13 +24,7 @@ examples
 
 
 def show_help(command: str, conf: Path, overrides: Sequence[str]) -> None:
-    """Print the settings of a command with their values.
-
-    Args:
-        command: Name of its file in conf/.
-        conf: That folder.
-        overrides: As on the command line; flags are ignored.
-    """
+    """Print the settings of a command, the name of a file in `conf`, with their values."""
     typed = [o for o in overrides if not o.startswith("-")]
     GlobalHydra.instance().clear()
     with initialize_config_dir(str(conf), version_base="1.3"):
@@ -71,10 +65,7 @@ def explained(values: Any, meanings: dict[str, str], prefix: str = "") -> Iterat
 def comments(command: str, conf: Path, chosen: dict[str, str | None]) -> dict[str, str]:
     """Return the comment of each setting of a command by its dotted name.
 
-    Args:
-        command: Name of its file in conf/.
-        conf: That folder.
-        chosen: The file of each group.
+    `command` is the name of its file in `conf`, `chosen` the file of each group.
     """
     found = {"plugins": "Modules that register parts of your own: networks, transforms and so on."}
     moved = read_comments(conf / "dynamics" / "computer_vision.yaml")
@@ -126,11 +117,7 @@ _OWN_FOLDERS = ("--config-dir", "-cd", "hydra.searchpath")
 
 
 def check_choices(overrides: Sequence[str], conf: Path) -> None:
-    """Refuse command lines that choose a schema or an unknown sweep, both of which Hydra accepts.
-
-    Raises:
-        InputError: The message lists the choices.
-    """
+    """Raise an `InputError` for a schema or unknown sweep as a choice, which Hydra accepts."""
     has_own = any(override.startswith(_OWN_FOLDERS) for override in overrides)
     for override in overrides:
         key, _, value = override.partition("=")

@@ -147,7 +147,7 @@ class RayLauncher(SweepLauncher):
 
 
 def register_plugins(*plugins: type[Plugin]) -> None:
-    """Register plugins with Hydra; the command line calls it before it composes.
+    """Register plugins with Hydra, before it composes.
 
     Hydra instantiates plugins from the namespace package `hydra_plugins` only. These get a module
     in it, so that this package does not install a second one.
@@ -287,11 +287,7 @@ class OptunaSweeper(Sweeper):
 
 
 def check_params(params: Mapping[str, Any], space: Mapping[str, Any]) -> None:
-    """Refuse parameters of a journal that this search can't have sampled.
-
-    Raises:
-        InputError: A setting is not searched, or its value is out of range.
-    """
+    """Raise an `InputError` for parameters of a journal that this search can't have sampled."""
     for name, value in params.items():
         if name not in space or not space[name]._contains(space[name].to_internal_repr(value)):
             raise InputError(

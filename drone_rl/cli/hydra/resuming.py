@@ -29,10 +29,10 @@ _PLAIN = re.compile(r"[\w./+-]*")
 
 
 def complete(overrides: Sequence[str]) -> list[str]:
-    """Add the settings and the folder of the run that `resume=FOLDER` names; name a sweep's folder.
+    """Complete the command line of a training by settings and folder of a run or sweep.
 
     Raises:
-        InputError: There is no such run, or its settings are unclear.
+        InputError: There is no run at `resume=FOLDER`, or its settings are unclear.
     """
     typed = networks(overrides)
     if is_sweep(typed):
@@ -55,11 +55,7 @@ def complete(overrides: Sequence[str]) -> list[str]:
 
 
 def check_folder(resume: str, folder: Path) -> None:
-    """Refuse to resume the run `resume` in another folder, given as hydra.run.dir.
-
-    Raises:
-        InputError: The folders differ.
-    """
+    """Raise an `InputError` if hydra.run.dir, `folder`, is not the folder of the resumed run."""
     if Path(resume).resolve() != folder.resolve():
         raise InputError(
             f"resume={resume} goes on in that folder, but hydra.run.dir={folder} is another; "
