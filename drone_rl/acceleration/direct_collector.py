@@ -14,7 +14,7 @@ from drone_rl.envs.direct_renderer import DirectRenderer, Entries, Reasons
 
 
 class DirectCollector:
-    """Collects complete episodes; gives the same as stepping by TorchRL, bit for bit.
+    """Collect complete episodes with the same result as stepping by TorchRL, bit for bit.
 
     An environment whose episode has ended is neither stepped nor rendered. The state that the
     environment itself holds stays as it is at the start of the episodes.
@@ -69,7 +69,7 @@ class DirectCollector:
         return _join(steps, rows, num_envs)
 
     def close(self) -> None:
-        """Does nothing: there are no threads."""
+        """Do nothing: there are no threads."""
 
 
 def _join(steps: list[Entries], rows: list[Tensor], num_envs: int) -> TensorDictBase:
@@ -90,7 +90,7 @@ def _join(steps: list[Entries], rows: list[Tensor], num_envs: int) -> TensorDict
 
 
 class DirectStream:
-    """Steps all environments on and on; gives the same as `TorchrlStream`, bit for bit."""
+    """Step all environments continually, with the same result as `TorchrlStream`, bit for bit."""
 
     name = "direct collector"
 

@@ -35,7 +35,7 @@ _MAX_ACTIVATIONS = 2**24
 
 
 class FusedCollector:
-    """Collects complete episodes; renderer, network and task run in one kernel.
+    """Collect complete episodes; renderer, network and task run in one kernel.
 
     The state that the environment itself holds stays as it is at the start of the episodes.
     """
@@ -88,10 +88,7 @@ class FusedCollector:
 
     @classmethod
     def try_create(cls, direct: DirectCollector, num_threads: int) -> Self | Reasons:
-        """Return the fused form of a collector, or the reasons why the kernel does not support it.
-
-        No result depends on the number of threads.
-        """
+        """Return the fused form of a collector, or the reasons why it is not supported."""
         reasons = [*_not_fused(direct.renderer), *_not_fused_policy(direct)]
         worlds = direct.renderer.worlds
         flown = worlds.task.fused_rules(worlds.dynamics, worlds.num_worlds)
@@ -141,11 +138,11 @@ class FusedCollector:
         return batch.set(("collector", "traj_ids"), env_of_step)
 
     def close(self) -> None:
-        """Ends the threads."""
+        """End the threads."""
         self._workers.close()
 
     def _run(self, num_envs: int) -> tuple[Tensor, dict[str, Tensor]]:
-        """Environments of the steps, episode after episode, and what the kernel wrote of each."""
+        """Return environments of the steps, episode after episode, and what the kernel wrote of each."""
         taken, reasons = self._worlds.steps[:num_envs], self._worlds.end_reasons[:num_envs]
         is_observed = self._direct.keep_observations
         seen = ("pixels", "logits") if is_observed else ()
@@ -227,7 +224,7 @@ def _mean_and_deviation(renderer: DirectRenderer) -> tuple[float, float]:
 
 
 def _not_fused(renderer: DirectRenderer) -> list[str]:
-    """Reasons against fusing the renderer, the appearance or the transforms."""
+    """Return reasons against fusing the renderer, the appearance or the transforms."""
     worlds, reasons = renderer.worlds, []
     if type(worlds.renderer) is not Raytracer or worlds.renderer.device.type != "cpu":
         device = worlds.state.end_reason.device.type
@@ -244,17 +241,17 @@ def _not_fused(renderer: DirectRenderer) -> list[str]:
 
 
 def _not_fused_policy(direct: DirectCollector) -> list[str]:
-    """Reasons against fusing the actor."""
+    """Return reasons against fusing the actor."""
     if type(direct.actor) is not CategoricalActor:
         return [f"policy {type(direct.actor).__name__} is not fused"]
     return unsupported(direct.actor.network)
 
 
 class RolloutBuffer:
-    """Rows of steps, part after part, as many parts as the longest episode needs.
+    """Memory for the steps of episodes, part after part, as many parts as the longest episode needs.
 
-    Its memory is reused, and so is that of earlier results once nothing refers to them: allocating
-    memory for as many frames takes longer than filling it.
+    Memory is reused, also that of earlier results once nothing refers to them: allocating memory
+    for as many frames takes longer than filling it.
     """
 
     def __init__(self, part: Mapping[str, Tensor]) -> None:

@@ -42,7 +42,7 @@ class ActivationCache:
     """
 
     def __init__(self, num_rows: int, num_outputs: int) -> None:
-        """Allocates memory for observations of one batch, of `num_outputs` numbers each."""
+        """Allocate memory for observations of one batch, of `num_outputs` numbers each."""
         self.outputs = torch.empty(num_rows, num_outputs)
         """Written by the collector between `clear` and `add`."""
         self.generation = 0
@@ -57,10 +57,7 @@ class ActivationCache:
     def add(self, rows: Tensor, weights: Tensor, observations: Tensor) -> Tensor:
         """Return handles of activations (k,): -1 for each if there was not enough memory for all.
 
-        Args:
-            rows: Of `outputs`. Shape: (k,), int64.
-            weights: Packed weights that the activations were computed with.
-            observations: Shape: (k, *).
+        `rows` (k,) are those of `outputs`, `weights` the packed weights of the activations.
         """
         self._weights = weights
         if int(rows.max()) >= len(self.outputs):
@@ -72,12 +69,9 @@ class ActivationCache:
         return rows + self.generation * len(self.outputs)
 
     def find(self, handles: Tensor, weights: Tensor, observations: Tensor) -> Tensor | None:
-        """Return the rows of activations, or None unless all are valid.
+        """Return the rows of activations by their handles (k,), or None unless all are valid.
 
-        Args:
-            handles: As returned by `add`. Shape: (k,).
-            weights: Packed weights, which may have changed.
-            observations: They may have changed, too. Shape: (k, *).
+        The packed weights and the observations (k, *) may have changed.
         """
         rows = handles - self.generation * len(self.outputs)
         is_valid = (rows >= 0) & (rows < len(self.outputs))
@@ -96,7 +90,7 @@ def _sample_pixels(observations: Tensor) -> Tensor:
 
 
 class FusedNetwork(PictureNetwork):
-    """Computes the same logits and gradients as a network, faster than torch.
+    """Compute the same logits and gradients as a network, faster than torch.
 
     On a small network torch spends a third of its time between matrix products. The fused kernel
     passes blocks of observations through all layers, so that their numbers stay in cache.
@@ -148,9 +142,7 @@ class FusedNetwork(PictureNetwork):
     def forward(self, pixels: Tensor, activations: Tensor | None = None) -> Tensor:
         """Return the logits of pixels (*, C, H, W).
 
-        Args:
-            pixels: Observations.
-            activations: Handle of each observation's activations in the cache. Shape: (*,).
+        `activations` are handles of the observations' activations in the cache. Shape: (*,).
         """
         if self._work is None:
             layers = packed_layers(self.network)
@@ -268,10 +260,7 @@ class _Work:
         return made.outputs.take(made.rows[:, None].long() * self._size + last)
 
     def gradients(self, pixels: Tensor, made: _Activations, grad_output: Tensor) -> list[Tensor]:
-        """Return the gradient of each parameter, or of the pixels.
-
-        `made` may be overwritten afterwards.
-        """
+        """Return the gradient of each parameter, or of the pixels; `made` may be overwritten."""
         if self._cache is not None and made.generation not in (None, self._cache.generation):
             raise RuntimeError("a batch was collected between the forward and the backward pass")
         self._gradients.zero_()

@@ -71,10 +71,7 @@ for (int line = 0; line < lines; ++line) {
 def accumulate(
     given: wp.array[float], deltas: wp.array[float], gradients: wp.array[float], g: Product
 ) -> None:
-    """Add to the gradient of a layer's weights.
-
-    `given` are its inputs, `deltas` the gradient of its outputs, `g` its geometry.
-    """
+    """Add to the gradient of the weights, from inputs `given`, gradients `deltas` of outputs."""
     ...
 
 
@@ -164,10 +161,7 @@ class Workspace:
 
 @wp.kernel
 def forward(first: int, last: int, params: PackedParams, batch: Batch) -> None:
-    """Compute the outputs of all layers of frames `first` to `last` - 1.
-
-    Launch it with a dimension of 1.
-    """
+    """Compute the outputs of all layers of frames `first` to `last` - 1; launch dimension 1."""
     size = _size(params)
     for block in range(first, last, BLOCK):
         for frame in range(block, wp.min(block + BLOCK, last)):
@@ -205,10 +199,7 @@ def _stride(params: PackedParams, layer: int) -> int:
 def backward(
     first: int, last: int, params: PackedParams, batch: Batch, workspace: Workspace
 ) -> None:
-    """Compute gradients of frames `first` to `last` - 1, or of the weights from these.
-
-    Launch it with a dimension of 1.
-    """
+    """Compute gradients of frames `first` to `last` - 1, or of the weights; launch dimension 1."""
     for block in range(first, last, BLOCK):
         end = wp.min(block + BLOCK, last)
         for frame in range(block, end):

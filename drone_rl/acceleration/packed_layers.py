@@ -154,8 +154,7 @@ def as_products(rows: Iterable[Iterable[int]]) -> Any:
 def unsupported(network: nn.Module) -> list[str]:
     """Return why kernels do not support a network; empty if they do.
 
-    They support convolutions of gray frames, then linear layers, with ReLU in between, in float32
-    on the CPU.
+    They support convolutions of gray frames, then linear layers, with ReLU, in float32 on a CPU.
     """
     name = type(network).__name__
     if not isinstance(network, PolicyNetwork):
@@ -209,12 +208,7 @@ class PackedNetwork:
     """A network that kernels support, with its weights laid out for them."""
 
     def __init__(self, network: nn.Module, num_frames: int) -> None:
-        """Packs a network, see `unsupported`.
-
-        Args:
-            network: From frames to logits.
-            num_frames: Frames whose linear layers are computed together.
-        """
+        """Pack a network, see `unsupported`, for linear layers of `num_frames` frames at once."""
         packed = packed_layers(network)
         self._order = Order(packed)
         self.weights = torch.zeros(self._order.weights_at[-1])

@@ -73,10 +73,7 @@ def standardise(values: wp.array[float], count: int, mean: float, deviation: flo
 
 @wp.func
 def choose(logits: wp.array[float], at: int, count: int, draw: float) -> int:
-    """Return the action that a uniform sample `draw` selects, or the most probable one below 0.
-
-    `count` logits begin at `at`.
-    """
+    """Return the action of a uniform sample, or the most probable one below 0; logits at `at`."""
     best = int(0)
     for action in range(1, count):
         if logits[at + action] > logits[at + best]:
@@ -164,14 +161,9 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
 
     @wp.kernel(module="unique", module_options=_OPTIONS)
     def run_episodes(first: int, last: int, worker: int, rollout: Rollout, envs: states) -> None:
-        """Run environments to the ends of their episodes, or for as many steps as there are draws.
+        """Run environments `first` to `last` - 1 until their episodes or the samples of actions end.
 
-        Args:
-            first: The first environment.
-            last: The one after the last.
-            worker: Which buffers to use: launch with a dimension of 1.
-            rollout: Inputs and outputs.
-            envs: States of the environments.
+        `worker` selects the buffers: launch with a dimension of 1.
         """
         for group in range(first, last, TOGETHER):
             end = wp.min(group + TOGETHER, last)

@@ -137,7 +137,7 @@ class TorchrlStream:
         return self._state
 
     def step(self, action: Tensor) -> Entries:
-        """Step every environment with actions (num_envs, *); return the kept entries and observations."""
+        """Step every environment, actions (num_envs, *); return kept entries and observations."""
         after = self._env.step(self._begin().set(self._env.action_key, action))
         following = after.get("next")
         entries: Entries = {key: after.get(key) for key in self._kept}

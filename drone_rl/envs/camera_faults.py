@@ -30,7 +30,7 @@ from drone_rl.utils.settings import Settings, kinds_of
 
 
 class CameraFault(ObservationTransform):
-    """Applies a fault model to the cameras of a `DroneEnv`, independently in each environment.
+    """Apply a fault model to the cameras of a `DroneEnv`, independently in each environment.
 
     Put it where "pixels" are floats from 0 to 1: after `GrayPixels` or `RgbPixels`, before
     `StandardizePixels`. Without an environment, on single images, it has no effect.
@@ -131,11 +131,7 @@ class CameraFault(ObservationTransform):
         return {"memory": self._memory, "streams": states}
 
     def set_extra_state(self, state: Any) -> None:
-        """Resume from `get_extra_state`.
-
-        Raises:
-            InputError: It is from another number of environments.
-        """
+        """Resume from `get_extra_state` of as many environments, else raise an `InputError`."""
         memory, saved = state["memory"], state["streams"]
         expected = len(self._streams)
         if expected and len(saved) != expected:
@@ -169,7 +165,7 @@ class _BuiltInFault(CameraFault):
 
 @implements(settings.Noise)
 class Noise(_BuiltInFault):
-    """Adds noise to each pixel; see `drone_rl.config.transforms.Noise`."""
+    """Add noise to each pixel; see `drone_rl.config.transforms.Noise`."""
 
     def _model(self, own: settings.Noise) -> FaultModel:
         return noise(own.strength, own.correlation_time)
@@ -177,7 +173,7 @@ class Noise(_BuiltInFault):
 
 @implements(settings.DeadRows)
 class DeadRows(_BuiltInFault):
-    """Blanks rows: fixed ones, or of each episode; see `drone_rl.config.transforms.DeadRows`."""
+    """Blank rows: fixed ones, or of each episode; see `drone_rl.config.transforms.DeadRows`."""
 
     def _model(self, own: settings.DeadRows) -> FaultModel:
         model = dead_rows(own.count, own.rows, own.level)
@@ -191,7 +187,7 @@ class DeadRows(_BuiltInFault):
 
 @implements(settings.FrozenFrames)
 class FrozenFrames(_BuiltInFault):
-    """Repeats the previous frame at random; see `drone_rl.config.transforms.FrozenFrames`."""
+    """Repeat the previous frame at random; see `drone_rl.config.transforms.FrozenFrames`."""
 
     def _model(self, own: settings.FrozenFrames) -> FaultModel:
         return frozen_frames(own.share)
@@ -199,7 +195,7 @@ class FrozenFrames(_BuiltInFault):
 
 @implements(settings.LateFrames)
 class LateFrames(_BuiltInFault):
-    """Delays frames; see `drone_rl.config.transforms.LateFrames`."""
+    """Delay frames; see `drone_rl.config.transforms.LateFrames`."""
 
     def _model(self, own: settings.LateFrames) -> FaultModel:
         return late_frames(own.frames)
@@ -207,7 +203,7 @@ class LateFrames(_BuiltInFault):
 
 @implements(settings.Shift)
 class Shift(_BuiltInFault):
-    """Shifts the frames of an episode; see `drone_rl.config.transforms.Shift`."""
+    """Shift the frames of an episode; see `drone_rl.config.transforms.Shift`."""
 
     def _model(self, own: settings.Shift) -> FaultModel:
         return random_shift(own.down, own.across)
@@ -215,7 +211,7 @@ class Shift(_BuiltInFault):
 
 @implements(settings.Blur)
 class Blur(PixelTransform):
-    """Blurs images (*, C, H, W) by a Gaussian; it has no memory and samples nothing."""
+    """Blur images (*, C, H, W) by a Gaussian; it has no memory and samples nothing."""
 
     def __init__(self, width: float = settings.Blur.width) -> None:
         """See `drone_rl.config.transforms.Blur`."""

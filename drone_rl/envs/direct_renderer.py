@@ -30,7 +30,7 @@ class Reasons(tuple[str, ...]):
 
 
 class DirectRenderer:
-    """Renders what an actor observes of states, and computes the entries of a step.
+    """Render what an actor observes of states, and compute the entries of a step.
 
     If the first transform is `GrayPixels`, the renderer renders gray frames.
     """

@@ -113,11 +113,7 @@ class DroneEnv(EnvBase):
     def load_state_dict(  # pyright: ignore[reportIncompatibleMethodOverride] (as EnvBase)
         self, state_dict: dict, strict: bool = True, assign: bool = False
     ) -> None:
-        """Restore a `state_dict`.
-
-        Raises:
-            InputError: It is from another number of environments.
-        """
+        """Restore a `state_dict` of as many environments, else raise an `InputError`."""
         states = state_dict["random_states"]
         if len(states) != len(self._random_states):
             raise InputError(
@@ -133,11 +129,7 @@ class DroneEnv(EnvBase):
         return {**self.state_dict(), "worlds": self.worlds.state.tensors(), **looks}
 
     def load_running_state(self, state: Mapping[str, Any]) -> None:
-        """Restore a `running_state` and render it.
-
-        Raises:
-            InputError: See `load_state_dict`.
-        """
+        """Restore a `running_state` and render it; see `load_state_dict` for errors."""
         self.load_state_dict(dict(state))
         self.worlds.state = self.worlds.state.with_tensors(state["worlds"])
         if self.looks.varies:

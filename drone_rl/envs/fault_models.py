@@ -105,12 +105,8 @@ def random_shift(down: int, across: int) -> FaultModel:
 def correlate(noise: Tensor, fresh: Tensor, correlation_time: float) -> Tensor:
     """Return the next noise of a first-order autoregressive process, AR(1), in each pixel.
 
-    Frames that are k apart have correlation exp(-k / correlation_time).
-
-    Args:
-        noise: The present noise, of mean 0 and variance 1, which the result has too.
-        fresh: Independent numbers of the same distribution and shape.
-        correlation_time: Frames; white noise at 0.
+    Frames that are k apart have correlation exp(-k / correlation_time); white noise at 0. `noise`,
+    `fresh` and the result have mean 0 and variance 1; `fresh` is independent.
     """
     kept = math.exp(-1.0 / correlation_time) if correlation_time > 0 else 0.0
     return kept * noise + math.sqrt(1.0 - kept**2) * fresh

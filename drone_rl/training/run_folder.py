@@ -114,7 +114,7 @@ class RunFolder:
     def resume(
         self, trainer: Trainer, checkpoints: CheckpointCallback, state: Mapping[str, Any] | None
     ) -> None:
-        """Load the state, if any, and write `run.yaml`; see `Trainer.load_state_dict` for errors."""
+        """Load the state, if any, and write `run.yaml`; see `Trainer.load_state_dict`."""
         if state is not None:
             trainer.load_state_dict(state)
             checkpoints.best = _read_best(state.get("best"))
@@ -155,12 +155,9 @@ def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Tra
 def hand_on_signal(training: Training) -> Training:
     """Raise the signal that stopped a training again, now that its state is saved.
 
-    Returns `training` if there was no signal, or if the caller's own handler returns.
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C stopped it. Not a subclass: Python exits by SIGINT, as shells
-            expect, for this class only.
-        SystemExit: SIGTERM stopped it.
+    Returns `training` if there was no signal, or if the caller's own handler returns. Ctrl-C raises
+    a KeyboardInterrupt and no subclass: Python exits by SIGINT, as shells expect, for it alone.
+    SIGTERM raises a SystemExit.
     """
     if not training.reason.startswith("SIG"):
         return training

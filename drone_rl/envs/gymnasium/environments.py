@@ -98,10 +98,7 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         return self.batch.observe(), _masked(self.batch.info(), mask)
 
     def step(self, actions: Any) -> tuple[NDArray[Any], NDArray[Any], Mask, Mask, Info]:
-        """Step the environments; reset those that finished in the previous step.
-
-        Args:
-            actions: One of `single_action_space` for each environment.
+        """Step the environments, each by one of `single_action_space`; reset those that had finished.
 
         Raises:
             InputError: An action is invalid, or environments must be reset first.
@@ -216,9 +213,7 @@ class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
     def __init__(self, task: Chosen = None, **options: Any) -> None:
         """Create the environment.
 
-        Args:
-            task: The task.
-            options: `drone_rl.config.commands.GymnasiumSettings`, and settings of the task.
+        `options` are `drone_rl.config.commands.GymnasiumSettings` and settings of the task.
 
         Raises:
             InputError: An option is unknown or out of range.
@@ -234,9 +229,7 @@ class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
     ) -> tuple[NDArray[Any], dict[str, Any]]:
         """Start an episode.
 
-        Args:
-            seed: Seed of this episode and the following ones; None continues the random stream.
-            options: Must be empty.
+        A seed is that of this episode and the following ones; None continues the random stream.
 
         Raises:
             InputError: There are options.
@@ -249,10 +242,7 @@ class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
         return self.batch.observe()[0], self._info()
 
     def step(self, action: Any) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
-        """Step the environment.
-
-        Args:
-            action: One of `action_space`.
+        """Step the environment by one of `action_space`.
 
         Raises:
             InputError: The action is invalid, or no episode is running.
