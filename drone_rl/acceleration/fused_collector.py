@@ -142,7 +142,7 @@ class FusedCollector:
         self._workers.close()
 
     def _run(self, num_envs: int) -> tuple[Tensor, dict[str, Tensor]]:
-        """Return environments of the steps, episode after episode, and what the kernel wrote of each."""
+        """Return the environment of each step, episode after episode, and what the kernel wrote."""
         taken, reasons = self._worlds.steps[:num_envs], self._worlds.end_reasons[:num_envs]
         is_observed = self._direct.keep_observations
         seen = ("pixels", "logits") if is_observed else ()
@@ -248,7 +248,7 @@ def _not_fused_policy(direct: DirectCollector) -> list[str]:
 
 
 class RolloutBuffer:
-    """Memory for the steps of episodes, part after part, as many parts as the longest episode needs.
+    """Memory for the steps of episodes, in as many parts as the longest episode needs.
 
     Memory is reused, also that of earlier results once nothing refers to them: allocating memory
     for as many frames takes longer than filling it.

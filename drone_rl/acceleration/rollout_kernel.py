@@ -161,7 +161,7 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
 
     @wp.kernel(module="unique", module_options=_OPTIONS)
     def run_episodes(first: int, last: int, worker: int, rollout: Rollout, envs: states) -> None:
-        """Run environments `first` to `last` - 1 until their episodes or the samples of actions end.
+        """Run environments `first` to `last` - 1 until their episodes or their random samples end.
 
         `worker` selects the buffers: launch with a dimension of 1.
         """

@@ -21,7 +21,11 @@ Keys = list[NestedKey] | None
 
 
 class PixelTransform(ObservationTransform):
-    """A stateless transform of images, applied at reset and at every step."""
+    """A stateless transform of images, applied at reset and at every step.
+
+    Raises:
+        InputError: A setting is out of range, or images have another type or shape than it needs.
+    """
 
     values: Settings | None = None
     """Its settings, for `repr`."""
@@ -56,12 +60,9 @@ class PixelTransform(ObservationTransform):
 
 @implements(settings.Gray)
 class GrayPixels(PixelTransform):
-    """RGB bytes (*, H, W, 3) to gray (*, 1, H, W), float32 in [0, 1], in one pass.
+    """Convert RGB bytes (*, H, W, 3) to gray (*, 1, H, W), float32 in [0, 1], in one pass.
 
     The same as TorchRL's `ToTensorImage` and `GrayScale`, several times faster on a CPU.
-
-    Raises:
-        InputError: The frames are not RGB bytes with the colour last.
     """
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
@@ -71,11 +72,7 @@ class GrayPixels(PixelTransform):
 
 @implements(settings.Rgb)
 class RgbPixels(PixelTransform):
-    """RGB bytes (*, H, W, 3) to floats (*, 3, H, W), float32 in [0, 1].
-
-    Raises:
-        InputError: The frames are not RGB bytes with the colour last.
-    """
+    """Convert RGB bytes (*, H, W, 3) to floats (*, 3, H, W), float32 in [0, 1]."""
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
         _check_bytes(self, obs)
@@ -84,14 +81,11 @@ class RgbPixels(PixelTransform):
 
 @implements(settings.Chromaticity)
 class ChromaticityPixels(PixelTransform):
-    """RGB floats (*, 3, H, W) to chromaticities of red and blue (*, 2, H, W), minus a third.
+    """Convert RGB floats (*, 3, H, W) to chromaticities of red and blue (*, 2, H, W).
 
-    Lighting, shadows and exposure change the brightness, not the chromaticity; every gray becomes
-    0. Red and blue are divided by the sum of the channels and `floor`, which suppresses the color
-    noise of dark pixels. Range: -1/3 to 2/3.
-
-    Raises:
-        InputError: There are not three channels, or the floor is out of range.
+    The red and blue fractions, minus a third: every gray becomes 0. Lighting, shadows and exposure
+    change the brightness, not the chromaticity. Red and blue are divided by the sum of the channels
+    and `floor`, which suppresses the color noise of dark pixels. Range: -1/3 to 2/3.
     """
 
     def __init__(self, floor: float = settings.Chromaticity.floor, **keys: Keys) -> None:
@@ -111,11 +105,7 @@ class ChromaticityPixels(PixelTransform):
 
 @implements(settings.Crop)
 class CropRows(PixelTransform):
-    """Keeps the rows `top` to `bottom` (exclusive) of frames (*, C, H, W).
-
-    Raises:
-        InputError: The rows are not in the frame.
-    """
+    """Keep the rows `top` to `bottom` (exclusive) of frames (*, C, H, W)."""
 
     def __init__(self, top: int, bottom: int, **keys: Keys) -> None:
         super().__init__(**keys)
@@ -135,11 +125,7 @@ class CropRows(PixelTransform):
 
 @implements(settings.Resize)
 class Resize(PixelTransform):
-    """Resizes frames (*, C, H, W) by averaging over areas; those of the size stay as they are.
-
-    Raises:
-        InputError: A size is out of range.
-    """
+    """Resize frames (*, C, H, W) by averaging over areas; those of the size stay as they are."""
 
     def __init__(self, *, height: int, width: int, **keys: Keys) -> None:
         super().__init__(**keys)
@@ -157,11 +143,7 @@ class Resize(PixelTransform):
 
 @implements(settings.Standardize)
 class StandardizePixels(PixelTransform):
-    """Standardizes pixels: (x - mean) / std. The defaults are the original study's.
-
-    Raises:
-        InputError: A number is out of range.
-    """
+    """Standardize pixels: (x - mean) / std. The defaults are the original study's."""
 
     def __init__(
         self,

@@ -24,7 +24,7 @@ _MASK = ("collector", "mask")
 
 
 class ReturnEstimator(Transform, abc.ABC):
-    """Reads rewards and end flags of shape (*batch, T, 1), writes returns of the same shape.
+    """Read rewards and end flags of shape (*batch, T, 1), write returns of the same shape.
 
     A return is known once its episode has ended, so this is no transform of an environment. Like
     TorchRL's `Reward2GoTransform` it is for complete episodes: the `postproc` of a collector (of a
@@ -52,7 +52,7 @@ class ReturnEstimator(Transform, abc.ABC):
         done_key: NestedKey = ("next", "done"),
         out_key: NestedKey = "return_to_go",
     ) -> None:
-        """Names the entries.
+        """Name the entries.
 
         Args:
             scale: Whether to divide the batch's returns by their root mean square; biased, see
@@ -90,11 +90,7 @@ class ReturnEstimator(Transform, abc.ABC):
         return returns.scale_to_unit(values) if self.scale else values
 
     def set_container(self, container: Transform | EnvBase) -> None:
-        """Join a chain of transforms.
-
-        Raises:
-            InputError: It is an environment's.
-        """
+        """Join a chain of transforms; raise an `InputError` if it belongs to an environment."""
         if isinstance(container, EnvBase) or container.parent is not None:
             raise InputError(
                 f"{type(self).__name__} needs whole episodes, an environment has one step at a "
@@ -198,16 +194,9 @@ class TimeBaseline(_Discounted):
         max_steps: int = settings.TimeBaseline.max_steps,
         **kwargs: Any,
     ) -> None:
-        """Sets the memory.
+        """Allocate the means of `max_steps` time steps.
 
-        Args:
-            gamma: Discount rate.
-            decay: Share of the old mean that is kept at each batch.
-            max_steps: Time steps that have a mean of their own.
-            kwargs: See `ReturnEstimator`.
-
-        Raises:
-            InputError: decay is out of range.
+        `decay`, 0 or more and below 1, is the weight of the old mean at each batch.
         """
         super().__init__(gamma, **kwargs)
         if not 0.0 <= decay < 1.0:
@@ -258,5 +247,5 @@ class Advantages(GAE):
     def __init__(
         self, gamma: float = Gae.gamma, lmbda: float = Gae.lmbda, scale: bool = Gae.scale
     ) -> None:
-        """Sets discount rate, weight of later estimates, and whether to standardize a batch."""
+        """Set discount rate, weight of later estimates, and whether to standardize a batch."""
         super().__init__(gamma=gamma, lmbda=lmbda, value_network=None, average_gae=scale)

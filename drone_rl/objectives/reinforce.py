@@ -57,12 +57,9 @@ class ReinforceLoss(LossModule):
         entropy_coeff: float = Reinforce.entropy_coeff,
         reduction: str = Reinforce.reduction,
     ) -> None:
-        """Wraps the policy.
+        """Wrap the policy that collected the batch.
 
-        Args:
-            actor_network: The policy that collected the batch.
-            entropy_coeff: Weight of the entropy bonus; 0 for none.
-            reduction: "mean", "sum" or "none".
+        `entropy_coeff` is the weight of the entropy bonus, `reduction` "mean", "sum" or "none".
 
         Raises:
             InputError: The reduction is unknown or the weight negative.
@@ -87,20 +84,13 @@ class ReinforceLoss(LossModule):
         raise RuntimeError("in_keys follows from set_keys(...) and the actor; change those")
 
     def _forward_value_estimator_keys(self, **kwargs: NestedKey) -> None:
-        """There is no value estimator to tell."""
+        """Do nothing: there is no value estimator."""
 
     @dispatch  # pyright: ignore[reportArgumentType]
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Computes the loss of a batch.
+        """Compute "loss_actor", "loss_entropy" and the detached "entropy" of a batch.
 
-        Args:
-            tensordict: Steps with what the policy saw, the action and the return.
-
-        Returns:
-            "loss_actor", "loss_entropy" and the detached "entropy".
-
-        Raises:
-            InputError: The returns are missing.
+        It has observations, actions and returns; raise an `InputError` without returns.
         """
         returns = tensordict.get(self.tensor_keys.return_to_go, None)
         if returns is None:

@@ -27,10 +27,7 @@ ROUNDING = 1e-6
 
 
 def episode_lengths(done: Tensor) -> list[int]:
-    """Lengths of the episodes, row after row.
-
-    Args:
-        done: End flags. Shape: (*batch, T, 1).
+    """Return the lengths of the episodes, row after row, from end flags (*batch, T, 1).
 
     Raises:
         InputError: A row does not end with its last episode.
@@ -45,10 +42,7 @@ def episode_lengths(done: Tensor) -> list[int]:
 
 
 def total_reward(reward: Tensor, done: Tensor) -> Tensor:
-    """Every step gets its whole episode's reward, r(tau) of Eq. 12; unbiased.
-
-    Shape: (*batch, T, 1).
-    """
+    """Return the whole episode's reward at every step, r(tau) of Eq. 12; unbiased."""
     padded, lengths = _pad(reward, done)
     return _unpad(padded.sum(0).expand_as(padded), lengths, reward)
 
@@ -98,13 +92,9 @@ def success_scaled(reward: Tensor, done: Tensor, gamma: float, max_reward: float
 
 
 def time_baseline(reward: Tensor, done: Tensor, gamma: float, baseline: Tensor) -> Tensor:
-    """Discounted return minus a baseline for each time step of an episode; unbiased.
+    """Return the discounted return minus a baseline for each time step of an episode; unbiased.
 
-    Args:
-        reward: Shape: (*batch, T, 1).
-        done: Shape: (*batch, T, 1).
-        gamma: Discount rate.
-        baseline: From earlier episodes; times beyond its end have baseline 0. Shape: (steps,).
+    The baseline (steps,) is from earlier episodes; times beyond its end have baseline 0.
     """
     padded, lengths = _pad(reward, done)
     known = min(len(baseline), len(padded))
@@ -151,11 +141,7 @@ def scale_to_unit(returns: Tensor) -> Tensor:
 
 
 def mean_by_time(returns: Tensor, done: Tensor) -> tuple[Tensor, Tensor]:
-    """Mean return of the episodes still going at each time step, and how many there are.
-
-    Returns:
-        Two tensors of shape (longest episode,).
-    """
+    """Return mean and number of the episodes still going at each time step, (longest,)."""
     padded, lengths = _pad(returns, done)
     count = _alive(lengths, padded).sum(1)
     return padded.sum(1) / count, count

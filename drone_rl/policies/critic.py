@@ -34,12 +34,9 @@ class ActorCritic(nn.Module):
         """Add a critic to a policy.
 
         Args:
-            network: Of the policy.
+            network: Of the policy; an `InputError` for other networks than a `PolicyNetwork`.
             own: Of the critic, with one output; None for a linear layer on the policy's features.
             generator: Source of that layer's initial weights.
-
-        Raises:
-            InputError: The policy's network is not a `PolicyNetwork`.
         """
         super().__init__()
         if not isinstance(network, PolicyNetwork):

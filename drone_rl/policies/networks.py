@@ -76,12 +76,9 @@ class PolicyNetwork(PictureNetwork):
         layers: "OrderedDict[str, nn.Module]",
         initialise: Callable[[Weighted, bool], None],
     ) -> None:
-        """Initialises the layers.
+        """Initialise layers by name, in order, for frames of shape (C, H, W).
 
-        Args:
-            in_shape: Shape (C, H, W) of one frame.
-            layers: By name, in order.
-            initialise: Called with each convolution and linear layer, and whether it is the last.
+        `initialise` is called with each convolution and linear layer, and whether it is the last.
         """
         super().__init__()
         self.in_shape = tuple(in_shape)
@@ -110,11 +107,7 @@ class PolicyNetwork(PictureNetwork):
         bias.mul_(factor).add_(shift)
 
     def check(self, pixels: Tensor) -> None:
-        """Check the shape of frames.
-
-        Raises:
-            InputError: It differs from that of the network.
-        """
+        """Raise an `InputError` for frames of another shape than the network's."""
         if tuple(pixels.shape[-3:]) != self.in_shape:
             raise InputError(
                 f"the policy was built for pictures of shape {self.in_shape}, not "
@@ -125,8 +118,7 @@ class PolicyNetwork(PictureNetwork):
         """See `PictureNetwork`.
 
         Raises:
-            InputError: The frames have another shape or, unless gradients are recorded, an
-                output is not finite.
+            InputError: The shape of frames differs or, without gradients, an output is not finite.
         """
         self.check(pixels)
         logits = self.layers(pixels.reshape(-1, *self.in_shape))
@@ -271,11 +263,7 @@ class MLP(PolicyNetwork):
 
 
 def require_finite(outputs: Tensor, owner: str = "the policy") -> None:
-    """Check that outputs are finite; `owner` is the policy's name for the message.
-
-    Raises:
-        InputError: An output is infinite or NaN.
-    """
+    """Raise an `InputError` about `owner`, a policy, if an output is infinite or NaN."""
     is_finite = outputs.isfinite()
     if bool(is_finite.all()):
         return

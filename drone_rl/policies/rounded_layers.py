@@ -42,17 +42,12 @@ class Layer(abc.ABC):
     def bound(self, largest: Tensor, error: Tensor) -> Tensor:
         """Return a bound on the errors of outputs for inputs up to a size. Shapes: (1, *), float64.
 
-        Args:
-            largest: Size of the largest input in one float32 evaluation.
-            error: Of the inputs.
+        `largest` is the size of the largest input in one float32 evaluation, `error` of the inputs.
         """
 
     @abc.abstractmethod
     def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
-        """Return the exact outputs, their errors and a note, from exact inputs and their errors.
-
-        Shapes: (N, *), float64.
-        """
+        """Return exact outputs, their errors and a note, from those of inputs (N, *), float64."""
 
     @abc.abstractmethod
     def back(self, slope: Tensor, note: Note) -> Tensor:

@@ -100,9 +100,8 @@ class RoundingBound:
     def together(self, pixels: Tensor) -> tuple[Tensor, Tensor]:
         """Return the outputs for frames (N, C, H, W), float32, and one bound for all frames.
 
-        Returns:
-            The outputs (N, outputs) in float32, and the largest error of each (outputs,), float64;
-            infinite where a sum may overflow.
+        The bound is the largest error of each output, (outputs,), float64; infinite where a sum may
+        overflow.
         """
         largest = pixels.abs().amax(0, keepdim=True).double()
         error = _pixel_error(largest.amax().clamp(min=UNIT)).expand_as(largest)
@@ -127,9 +126,7 @@ class RoundingBound:
     def possible(self, pixels: Tensor) -> Tensor:
         """Return which actions are possible for each of the frames (N, C, H, W), float32.
 
-        Returns:
-            Whether the exact logit is lower than the best one by no more than the error of their
-            difference. Shape: (N, outputs), bool.
+        The exact logit is lower than the best one by no more than the error of their difference.
         """
 
         def leads(value: Tensor) -> Tensor:
@@ -237,13 +234,10 @@ class Regrouped(PictureNetwork):
     """Evaluates a network on each frame in another batch; a function of the frame is unchanged."""
 
     def __init__(self, network: PictureNetwork, groups: str, seed: int = 0) -> None:
-        """Wraps a network.
+        """Wrap a network.
 
-        Args:
-            network: Any.
-            groups: "single": one frame a call. "mixed": random order and sizes of batches, each
-                with some of its frames twice.
-            seed: Of order and sizes.
+        `groups` is "single", one frame a call, or "mixed": batches of random order and size, each
+        with some of its frames twice.
         """
         super().__init__()
         self.network, self.groups = network, groups
@@ -276,10 +270,9 @@ class Regrouped(PictureNetwork):
 
 @torch.no_grad()
 def require_same_in_any_batch(network: PictureNetwork, frames: Tensor, largest: int) -> None:
-    """Check that outputs for frames (N, C, H, W) do not depend on the size of the batch.
+    """Raise an `InputError` if outputs for frames (N, C, H, W) depend on the size of the batch.
 
-    Raises:
-        InputError: They do in one of many sizes, `largest` among them.
+    Many sizes are tried, `largest` among them.
     """
     rows = torch.linspace(0, len(frames) - 1, min(len(frames), 64)).long().to(frames.device)
     frames = frames[rows]

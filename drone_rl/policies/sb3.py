@@ -31,7 +31,7 @@ class Sb3Logits(nn.Module):
     """
 
     def __init__(self, model: BaseAlgorithm) -> None:
-        """Takes the modules between frame and logits, which it shares with the model."""
+        """Take the modules between frame and logits, which it shares with the model."""
         super().__init__()
         policy = model.policy
         if not isinstance(policy, ActorCriticPolicy) or not hasattr(policy.action_space, "n"):
@@ -87,7 +87,7 @@ class Sb3Trunk(BaseFeaturesExtractor):
     """
 
     def __init__(self, observation_space: spaces.Box, network: Network | None = None) -> None:
-        """Builds it for frames (C, H, W); Stable-Baselines3 initialises it orthogonally."""
+        """Build it for frames (C, H, W); Stable-Baselines3 initialises it orthogonally."""
         shape = observation_space.shape
         if len(shape) != 3:
             raise InputError(f"Sb3Trunk got observations of shape {shape}; give pictures (C, H, W)")

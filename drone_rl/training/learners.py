@@ -210,10 +210,7 @@ class ActorCriticLearner(GradientLearner):
         """Add the entries that the loss reads; the collector's `postproc`.
 
         They are log-probability, entropy and value of the policy that collected, "advantage" and
-        "value_target".
-
-        Raises:
-            InputError: An entry of the batch, of shape (num_envs, T), is missing.
+        "value_target". See `check_batch` for errors.
         """
         following = [("next", key) for key in (PIXELS, "reward", "done", "terminated")]
         check_batch(batch, [PIXELS, "action", *following], type(self).__name__)

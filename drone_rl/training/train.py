@@ -153,11 +153,7 @@ def make_groups(
 ) -> list[Group]:
     """Make the environments of threads or workers, and the policy that acts in them.
 
-    Args:
-        settings: Of the training.
-        sizes: Environments of each group.
-        replay: See `learn`.
-        numbers: Which groups to make; all by default.
+    `sizes` are the environments of each group, `numbers` the groups to make; all by default.
     """
     description, seed, device = describe(settings), settings.seed, settings.device
     network = description.build_network(torch_generator(seed, Stream.POLICY_INIT)).to(device)

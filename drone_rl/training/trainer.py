@@ -25,12 +25,8 @@ from drone_rl.utils.memory import return_freed_memory
 def episode_rewards(batch: TensorDictBase) -> Tensor:
     """Return the rewards of the episodes that end in a batch, in order. Shape: (num_episodes,).
 
-    Args:
-        batch: Rows of complete episodes; or rows of fixed length with ("next", "episode_reward"),
-            which `RolloutCollector` and TorchRL's `RewardSum` write. Shape: (*batch, T).
-
-    Raises:
-        InputError: An episode is not complete and its reward so far not known.
+    The rows (*batch, T) are complete episodes, or have ("next", "episode_reward"), which
+    `RolloutCollector` and TorchRL's `RewardSum` write; otherwise raise an `InputError`.
     """
     done, reward = (cast(Tensor, batch["next", name]) for name in ("done", "reward"))
     totals = batch.get(("next", "episode_reward"), None)

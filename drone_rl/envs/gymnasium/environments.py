@@ -98,7 +98,7 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         return self.batch.observe(), _masked(self.batch.info(), mask)
 
     def step(self, actions: Any) -> tuple[NDArray[Any], NDArray[Any], Mask, Mask, Info]:
-        """Step the environments, each by one of `single_action_space`; reset those that had finished.
+        """Step each environment by one of `single_action_space`; reset those that had finished.
 
         Raises:
             InputError: An action is invalid, or environments must be reset first.

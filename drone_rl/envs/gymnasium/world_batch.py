@@ -105,15 +105,12 @@ Chosen = str | BaseTaskSettings | Task[Any] | None
 
 
 class WorldBatch:
-    """Worlds, their observations and their spaces."""
+    """A batch of environments, their observations and their spaces."""
 
     def __init__(self, num_worlds: int, task: Chosen, given: Mapping[str, Any]) -> None:
         """Create the environments.
 
-        Args:
-            num_worlds: Batch size.
-            task: The task.
-            given: `GymnasiumSettings`, whose parts may be mappings, and settings of the task.
+        `given` are `GymnasiumSettings`, whose parts may be mappings, and settings of the task.
 
         Raises:
             InputError: An option or setting is unknown or out of range.
@@ -155,12 +152,12 @@ class WorldBatch:
         self.worlds.reset(worlds, streams)
 
     def step(self, actions: Tensor) -> NDArray[np.float64]:
-        """Step all worlds; return their rewards. Shapes: (num_worlds, *) to (num_worlds,)."""
+        """Step all environments; return their rewards. Shapes: (num_worlds, *) to (num_worlds,)."""
         actions = actions.to(self.worlds.device)
         return self.worlds.step(self._every, actions).cpu().numpy()
 
     def observe(self, state: State | None = None) -> NDArray[Any]:
-        """Return the observations of all worlds, or of those in `state`, as a new array."""
+        """Return the observations of all environments, or of those in `state`, as a new array."""
         state = self.worlds.state if state is None else state
         if self.has_images:
             return self.worlds.render(state).cpu().numpy()

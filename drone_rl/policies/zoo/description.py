@@ -119,7 +119,7 @@ class PolicyDescription:
         return dataclasses.replace(self, transforms=sound)
 
     def as_dict(self) -> dict[str, Any]:
-        """As in files; `parse` undoes it."""
+        """Return plain data as in files; `parse` is the inverse."""
         chosen = {name: getattr(self, name) for name in _OPTIONAL}
         special = {n: s.values() for n, s in chosen.items() if s != _OPTIONAL[n][1]}
         return {
@@ -142,15 +142,10 @@ class PolicyDescription:
         task: Task[Any] | None = None,
         **kwargs: Any,
     ) -> TransformedEnv:
-        """Build environments with the described camera and transforms.
+        """Build environments with the described camera and transforms; see `DroneEnv`.
 
-        Args:
-            num_envs: How many.
-            seed: Root of their random streams.
-            device: Where they are rendered.
-            pixels: Whether they are rendered at all.
-            task: The same task with other starts of episodes.
-            kwargs: See `DroneEnv`.
+        `task` is the same task with other starts of episodes. Without `pixels`, transforms are left
+        out.
         """
         env = DroneEnv(
             num_envs,
@@ -171,7 +166,7 @@ class PolicyDescription:
         return {}
 
     def make_dynamics(self) -> Dynamics:
-        """How the drone moves."""
+        """Return the vehicle dynamics."""
         return make_dynamics(as_task(self.task).make_dynamics, self.dynamics, self.actions)
 
     def make_transforms(self) -> list[TorchrlTransform]:
@@ -211,11 +206,7 @@ class PolicyDescription:
 
 
 def describe(settings: TrainSettings) -> PolicyDescription:
-    """Return the description of the policy that a training creates.
-
-    Raises:
-        InputError: A part isn't registered, or a value is out of bounds.
-    """
+    """Return the description of the policy of a training; `InputError` for unregistered parts."""
     for part in (settings.network, *settings.transforms):
         if not part.is_known:
             kind = "network" if part is settings.network else "transform"
@@ -234,11 +225,7 @@ def describe(settings: TrainSettings) -> PolicyDescription:
 
 
 def output_of(transform: Transform, frame: Frame) -> Frame:
-    """Return shape and type of an image after a transform.
-
-    Raises:
-        InputError: The transform can't process such images.
-    """
+    """Return shape and type of an image after a transform; see `Transform.output` for errors."""
     stated = transform.output(frame)
     if stated is not None:
         return stated

@@ -98,10 +98,7 @@ def _companion(policy: Path, name: str) -> Path:
 
 
 def read_policy(path: Path) -> dict[str, Any]:
-    """Read a policy: its description, weights that fit it, and its provenance.
-
-    Args:
-        path: Of a checkpoint, or of an exported file (.safetensors).
+    """Read a policy from a checkpoint or an exported file (.safetensors).
 
     Returns:
         "description" (see `drone_rl.policies.zoo.parse`), "policy" (the weights), "progress" and
@@ -115,11 +112,7 @@ def read_policy(path: Path) -> dict[str, Any]:
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
-    """A checkpoint of `drone-rl train`, see `read_policy`; its "config" is plain data alone.
-
-    Raises:
-        InputError: The file is missing, damaged or something else.
-    """
+    """Read a checkpoint, see `read_policy`; its "config" is plain data alone."""
     state = load_checkpoint(path)
     try:
         for key in ("policy", "progress", "provenance", "config"):
@@ -148,11 +141,7 @@ def exported_bytes(
 
 
 def load_exported(path: Path) -> dict[str, Any]:
-    """An exported policy, see `read_policy`.
-
-    Raises:
-        InputError: The file is missing, damaged or something else.
-    """
+    """Read an exported policy, see `read_policy`."""
     content = read_bytes(path, 8 + MOST_HEADER + 4 * MOST_PARAMETERS)
     try:
         return _exported(content)

@@ -85,11 +85,7 @@ def make_onnx(
 
 
 def open_onnx(content: bytes) -> Callable[[Tensor], Tensor]:
-    """Return a model of `make_onnx` as a function of frames, computed by onnxruntime.
-
-    Raises:
-        InputError: The package is missing.
-    """
+    """Return a model of `make_onnx` as a function of frames; it needs onnxruntime."""
     runtime = extra("onnxruntime", "onnx", _ASKED_BY)
     options = runtime.SessionOptions()
     options.intra_op_num_threads = 1  # more would only wait for torch's, and sums depend on them
