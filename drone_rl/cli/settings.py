@@ -1,4 +1,4 @@
-"""Base classes of commands: what each can be told, and what running it means."""
+"""Base classes of the commands and their settings."""
 
 import logging
 import re

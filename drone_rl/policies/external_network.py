@@ -50,23 +50,23 @@ class ForeignNetwork(PictureNetwork):
         self._logits = _copied(logits).to(device) if isinstance(logits, nn.Module) else logits
         self._factor = torch.ones(self.num_actions, device=device)
         self._shift = torch.zeros(self.num_actions, device=device)
-        picture = torch.full((1, *self.in_shape), 0.5, device=device, requires_grad=True)
+        image = torch.full((1, *self.in_shape), 0.5, device=device, requires_grad=True)
         try:
-            found = self(picture)
+            found = self(image)
         except InputError:
             raise
         except Exception as error:
             what = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-            shown = tuple(self._given(picture.detach()).shape)
+            shown = tuple(self._given(image.detach()).shape)
             raise InputError(
-                f"the network can't take pictures of shape {shown} ({what}); give the camera and "
+                f"the network can't take images of shape {shown} ({what}); give the camera and "
                 "transforms that it was trained with"
             ) from error
-        if not torch.allclose(found, self(picture), atol=_REPEATS):
+        if not torch.allclose(found, self(image), atol=_REPEATS):
             raise InputError(
-                "the network gives other logits for the same picture; give one that draws nothing"
+                "the network gives other logits for the same image; give one without random numbers"
             )
-        self.is_differentiable = _depends(found, picture)
+        self.is_differentiable = _depends(found, image)
 
     @property
     def parts(self) -> nn.Module:
@@ -119,8 +119,8 @@ def _copied(module: nn.Module) -> nn.Module:
     return own
 
 
-def _depends(logits: Tensor, picture: Tensor) -> bool:
+def _depends(logits: Tensor, image: Tensor) -> bool:
     if not logits.requires_grad:
         return False
-    (slope,) = torch.autograd.grad(logits.sum(), picture, allow_unused=True)
+    (slope,) = torch.autograd.grad(logits.sum(), image, allow_unused=True)
     return slope is not None

@@ -36,7 +36,7 @@ from drone_rl.utils.settings import Settings, below
 class ForeignPolicy(Pilot):
     """A third-party network with its task, camera and transforms; see `policy_from`.
 
-    It has no file, so no certificate of it can be checked by others.
+    It has no file, so nobody else can check a certificate of it.
     """
 
     name: str
@@ -148,7 +148,7 @@ def policy_from(
     """
     if not callable(logits):
         raise InputError(
-            f"policy_from got a {type(logits).__name__}; give a callable from pictures to logits"
+            f"policy_from got a {type(logits).__name__}; give a callable from images to logits"
         )
     policy = ForeignPolicy(
         name=name or getattr(logits, "__name__", type(logits).__name__),

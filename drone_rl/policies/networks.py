@@ -27,7 +27,7 @@ class PictureNetwork(nn.Module):
     in_shape: tuple[int, ...]
     """Shape (C, H, W) of one frame."""
     actions: Actions = MOVES
-    """What the outputs mean."""
+    """The actions that the outputs parametrize."""
     owner: str = "the policy"
     """Name of the policy in error messages."""
     is_differentiable: bool = True
@@ -110,7 +110,7 @@ class PolicyNetwork(PictureNetwork):
         """Raise an `InputError` for frames of another shape than the network's."""
         if tuple(pixels.shape[-3:]) != self.in_shape:
             raise InputError(
-                f"the policy was built for pictures of shape {self.in_shape}, not "
+                f"the policy was built for images of shape {self.in_shape}, not "
                 f"{tuple(pixels.shape[-3:])}; use the camera and transforms it was trained with"
             )
 
@@ -227,7 +227,7 @@ def _flat_size(convolutions: "OrderedDict[str, nn.Module]", in_shape: Sequence[i
     if high < 1 or wide < 1:
         smallest = next(s for s in range(1, 10_000) if _left(stack, s) >= 1)
         raise InputError(
-            f"a picture of {height}x{width} pixels is too small for the network; give at least "
+            f"an image of {height}x{width} pixels is too small for the network; give at least "
             f"{smallest}x{smallest} (camera.height, camera.width)"
         )
     filters = [m.out_channels for m in stack if isinstance(m, nn.Conv2d)]

@@ -57,12 +57,12 @@ class Sb3Logits(nn.Module):
     @torch.no_grad()
     def _agrees(self, policy: ActorCriticPolicy) -> bool:
         """Return whether it computes the policy's logits; a recurrent one has others."""
-        picture = torch.zeros(1, *(policy.observation_space.shape or ()), device=policy.device)
+        image = torch.zeros(1, *(policy.observation_space.shape or ()), device=policy.device)
         try:
-            distribution: Any = policy.get_distribution(picture).distribution
+            distribution: Any = policy.get_distribution(image).distribution
         except TypeError:
             return False
-        own = self(picture).log_softmax(-1)
+        own = self(image).log_softmax(-1)
         return bool(torch.allclose(own, distribution.logits, atol=_SAME))
 
 
@@ -74,8 +74,8 @@ def _channels_first(shape: tuple[int, ...]) -> tuple[int, ...] | None:
 
 def _refusal(model: BaseAlgorithm) -> InputError:
     return InputError(
-        f"the policy of {type(model).__name__} gives no logits of a picture alone; give one of PPO "
-        "or A2C with discrete actions, or a callable from pictures to logits"
+        f"the policy of {type(model).__name__} gives no logits of a single image; give one of PPO "
+        "or A2C with discrete actions, or a callable from images to logits"
     )
 
 
@@ -90,7 +90,7 @@ class Sb3Trunk(BaseFeaturesExtractor):
         """Build it for frames (C, H, W); Stable-Baselines3 initialises it orthogonally."""
         shape = observation_space.shape
         if len(shape) != 3:
-            raise InputError(f"Sb3Trunk got observations of shape {shape}; give pictures (C, H, W)")
+            raise InputError(f"Sb3Trunk got observations of shape {shape}; give images (C, H, W)")
         made: Any = (network or SmallCnn()).make(shape, 1)
         assert isinstance(made, PolicyNetwork)
         width = made.layers.get_parameter("logits.weight").shape[1]

@@ -77,7 +77,7 @@ def test_module_is_copied_in_eval_mode():
 @pytest.mark.parametrize(
     ("logits", "message"),
     [
-        (nn.Linear(7, 3), r"can't take pictures of shape \(1, 1, 2, 4\) \(RuntimeError: .*\); give "
+        (nn.Linear(7, 3), r"can't take images of shape \(1, 1, 2, 4\) \(RuntimeError: .*\); give "
          "the camera and transforms that it was trained with"),
         (lambda x: x.fly(), "can't take pictures of .*AttributeError: 'Tensor' object has no"),
         (lambda x: left_half(x)[:, :2], r"gives logits of shape \(1, 2\); give one that gives "
@@ -86,7 +86,7 @@ def test_module_is_copied_in_eval_mode():
         (lambda x: (left_half(x), x), "gives a tuple; give a callable that gives logits of shape"),
         (lambda x: None, "gives a NoneType; give a callable"),
         (lambda x: left_half(x) / 0 * 0, "gives logits that are not finite"),
-        (lambda x: torch.rand(len(x), 3), "gives other logits for the same picture"),
+        (lambda x: torch.rand(len(x), 3), "gives other logits for the same image"),
     ],
 )  # fmt: skip
 def test_invalid_logits_raise(logits, message):
@@ -96,7 +96,7 @@ def test_invalid_logits_raise(logits, message):
 
 
 def test_byte_images_of_another_size_raise():
-    with pytest.raises(InputError, match=r"can't take pictures of shape \(1, 2, 4, 3\)"):
+    with pytest.raises(InputError, match=r"can't take images of shape \(1, 2, 4, 3\)"):
         make(lambda x: x.reshape(len(x), 5), (3, 2, 4), takes_bytes=True)
 
 

@@ -148,8 +148,8 @@ def test_network_attributes_define_transforms():
 @pytest.mark.parametrize(
     ("given", "options", "message"),
     [
-        (3, {}, "policy_from got a int; give a callable from pictures to logits"),
-        (nn.Linear(9, 3), {}, r"the network can't take pictures of shape \(1, 1, 25, 64\)"),
+        (3, {}, "policy_from got a int; give a callable from images to logits"),
+        (nn.Linear(9, 3), {}, r"the network can't take images of shape \(1, 1, 25, 64\)"),
         (lambda x: left(x)[:, :2], {}, r"the network gives logits of shape \(1, 2\); give one"),
         (left, {"transforms": [Resize()]}, "the transform resize needs floats; let gray come f"),
         (left, {"transforms": [Gray(), Gray()]}, "the transform gray needs the camera's own RGB"),
@@ -161,7 +161,7 @@ def test_mismatched_arguments_raise_at_construction(given, options, message):
 
 
 def test_mismatched_camera_raises(network):
-    with pytest.raises(InputError, match=r"built for pictures of shape \(1, 25, 64\), not \(1, 2"):
+    with pytest.raises(InputError, match=r"built for images of shape \(1, 25, 64\), not \(1, 2"):
         drone_rl.policy_from(network, camera=drone_rl.CameraSettings(width=32))
 
 

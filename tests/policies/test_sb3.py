@@ -95,11 +95,11 @@ def test_policy_with_custom_forward_raises():
         model.policy.mlp_extractor.value_net[0].bias.fill_(1.0)
         model.policy.action_net.weight.mul_(100)
     model.policy.mlp_extractor.forward_actor = model.policy.mlp_extractor.forward_critic
-    with pytest.raises(InputError, match=r"^the policy of PPO gives no logits of a picture alone"):
+    with pytest.raises(InputError, match=r"^the policy of PPO gives no logits of a single image"):
         Sb3Logits(model)
 
 
 def test_model_without_action_probabilities_raises():
     model = sb3.DQN("MlpPolicy", StaticEnv(FLOATS), buffer_size=10)
-    with pytest.raises(InputError, match=r"^the policy of DQN gives no logits of a picture"):
+    with pytest.raises(InputError, match=r"^the policy of DQN gives no logits of a single image"):
         Sb3Logits(model)

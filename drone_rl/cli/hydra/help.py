@@ -20,7 +20,7 @@ examples
   drone-rl train seed=1 optimiser.lr=2e-3        change settings
   drone-rl train experiment=smoke                a ready-made set of settings
   drone-rl train -m seed=0,1,2                   several runs, side by side
-  drone-rl evaluate policy=latest                test the newest policy on unseen worlds"""
+  drone-rl evaluate policy=latest                evaluate the newest policy"""
 
 
 def show_help(command: str, conf: Path, overrides: Sequence[str]) -> None:

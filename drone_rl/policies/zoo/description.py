@@ -44,7 +44,7 @@ MOST_PARAMETERS = 2**24
 MOST_PIXELS = 2**18
 """Of a camera's frame."""
 MOST_NUMBERS = 2**20
-"""Of one picture after any transform."""
+"""Of one image after any transform."""
 _KEYS = ("format", "format_version", "task", "camera", "transforms", "network")
 _OPTIONAL: dict[str, tuple[type[Settings], Settings]] = {
     "appearance": (AppearanceSettings, MINIMAL),
@@ -68,11 +68,11 @@ class PolicyDescription:
     """In the order in which they are applied."""
     network: Network
     appearance: AppearanceSettings = MINIMAL
-    """How the worlds look; files without it mean the minimal one."""
+    """Appearance of the scenes; files without it mean the minimal one."""
     dynamics: DynamicsSettings = COMPUTER_VISION
-    """How the drone moves; files without it mean computer-vision mode."""
+    """The vehicle dynamics; files without it mean computer-vision mode."""
     actions: ActionSettings = MOVES_SETTINGS
-    """What the network can ask for; files without it mean moves."""
+    """The action space; files without it mean moves."""
 
     def __post_init__(self) -> None:
         """Check that it can be built with bounded memory."""
@@ -98,7 +98,7 @@ class PolicyDescription:
             frame = output_of(transform, frame)
             if math.prod(frame.shape) > MOST_NUMBERS:
                 raise InputError(
-                    f"the transform {transform.name} makes pictures of shape {frame.shape}; give "
+                    f"the transform {transform.name} makes images of shape {frame.shape}; give "
                     f"sizes that make at most {MOST_NUMBERS} numbers"
                 )
         return frame
