@@ -151,7 +151,7 @@ class CsvCallback(Callback):
         """Append a row."""
         done = training.progress
         counters = {"update": done.updates, "frames": done.frames, "episodes": done.episodes}
-        counters["seconds"] = round(done.seconds, 3)
+        counters = {**counters, "seconds": round(done.seconds, 3)}
         is_new = not self.path.exists() or self.path.stat().st_size == 0
         with self.path.open("a", newline="") as file:
             writer = csv.writer(file)

@@ -7,7 +7,7 @@ import pytest
 from omegaconf import OmegaConf
 
 from drone_rl.cli.hydra.help import _with_parents, comments, explained, read_comments, show_help
-from tests.cli.hydra.conftest import MODULES
+from tests.cli.hydra.conftest import FILES
 
 CONF = Path(__file__).parents[3] / "conf"
 
@@ -41,7 +41,7 @@ def test_values_stand_below_their_comments():
     ]
 
 
-@pytest.mark.parametrize("command", MODULES)
+@pytest.mark.parametrize("command", FILES)
 def test_every_knob_of_every_command_is_explained(command, config, capsys):
     show_help(command, CONF, ["--help"])
     lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
