@@ -79,7 +79,7 @@ def test_module_is_copied_in_eval_mode():
     [
         (nn.Linear(7, 3), r"can't take images of shape \(1, 1, 2, 4\) \(RuntimeError: .*\); give "
          "the camera and transforms that it was trained with"),
-        (lambda x: x.fly(), "can't take pictures of .*AttributeError: 'Tensor' object has no"),
+        (lambda x: x.fly(), "can't take images of .*AttributeError: 'Tensor' object has no"),
         (lambda x: left_half(x)[:, :2], r"gives logits of shape \(1, 2\); give one that gives "
          r"\(1, 3\), one of each of forward, left, right"),
         (lambda x: left_half(x).argmax(-1), r"gives logits of shape \(1,\); give one that"),

@@ -30,5 +30,5 @@ def test_other_networks_are_supported():
 
 
 def test_vector_observations_raise():
-    with pytest.raises(InputError, match=r"^Sb3Trunk got observations of shape \(28,\); give pic"):
+    with pytest.raises(InputError, match=r"^Sb3Trunk got observations of shape \(28,\); give ima"):
         Sb3Trunk(spaces.Box(0, 1, (28,)))
