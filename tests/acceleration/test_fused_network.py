@@ -73,7 +73,7 @@ def test_copies_are_independent():
 def test_images_of_another_shape_raise():
     fused = FusedNetwork.try_create(make_network())
     assert fused.in_shape == (1, 12, 20) and fused.num_actions == 3
-    with pytest.raises(InputError, match="built for pictures"):
+    with pytest.raises(InputError, match="built for images"):
         fused(halves(5, 1, 12, 21))
 
 
