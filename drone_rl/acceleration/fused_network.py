@@ -35,18 +35,18 @@ GradientsOf = Literal["weights", "pixels"]
 class ActivationCache:
     """Activations of all layers, kept by a fused collector for the learner's forward pass.
 
-    A handle names the activations of one observation: an entry of the batch carries it from the
-    collector to the network. Handles are valid until the collector's next batch. Some pixels of
-    each observation are compared, so that changed observations are computed again; code that
-    changes a few pixels only must remove the entry.
+    A handle identifies the activations of one observation. The collector passes it to the network
+    as an entry of the batch. Handles are valid until the collector's next batch. `find` compares
+    some pixels of each observation, so that changed observations are evaluated again. Code that
+    changes only a few pixels must remove the entry.
     """
 
     def __init__(self, num_rows: int, num_outputs: int) -> None:
-        """Allocate memory for observations of one batch, of `num_outputs` numbers each."""
+        """Allocate memory for one batch of observations with `num_outputs` activations each."""
         self.outputs = torch.empty(num_rows, num_outputs)
         """Written by the collector between `clear` and `add`."""
         self.generation = 0
-        """Counts the calls of `clear`."""
+        """Number of calls of `clear`."""
         self._weights = torch.empty(0)
         self._samples: Tensor | None = None
 
@@ -55,9 +55,9 @@ class ActivationCache:
         self.generation += 1
 
     def add(self, rows: Tensor, weights: Tensor, observations: Tensor) -> Tensor:
-        """Return handles of activations (k,): -1 for each if there was not enough memory for all.
+        """Return the handles of activations, (k,); all are -1 if the memory does not suffice.
 
-        `rows` (k,) are those of `outputs`, `weights` the packed weights of the activations.
+        `rows`, (k,), index `outputs`; `weights` are the packed weights of the activations.
         """
         self._weights = weights
         if int(rows.max()) >= len(self.outputs):
@@ -71,7 +71,7 @@ class ActivationCache:
     def find(self, handles: Tensor, weights: Tensor, observations: Tensor) -> Tensor | None:
         """Return the rows of activations by their handles (k,), or None unless all are valid.
 
-        The packed weights and the observations (k, *) may have changed.
+        Handles are invalid if the packed weights or the observations, (k, *), have changed.
         """
         rows = handles - self.generation * len(self.outputs)
         is_valid = (rows >= 0) & (rows < len(self.outputs))
@@ -92,8 +92,8 @@ def _sample_pixels(observations: Tensor) -> Tensor:
 class FusedNetwork(PictureNetwork):
     """Compute the same logits and gradients as a network, faster than torch.
 
-    On a small network torch spends a third of its time between matrix products. The fused kernel
-    passes blocks of observations through all layers, so that their numbers stay in cache.
+    With a small network, torch spends a third of its time between matrix products. The fused kernel
+    passes blocks of observations through all layers, so that the activations stay in cache.
     """
 
     def __init__(
@@ -124,9 +124,9 @@ class FusedNetwork(PictureNetwork):
         """Return the fused network, or the reasons why the kernel does not support the network.
 
         Args:
-            network: From pixels to logits.
-            num_threads: Threads that share the observations; sums over these depend on it.
-            of: What has gradients. With those of the pixels, the weights stay as they are first.
+            network: Network from pixels to logits.
+            num_threads: Threads that share the observations; it affects the rounding of sums.
+            of: Differentiate by the weights or the pixels. For pixels, the weights are read once.
             cache: Called if the network is supported; see `FusedCollector.cache_activations`.
         """
         reasons = unsupported(network)
@@ -157,11 +157,11 @@ class FusedNetwork(PictureNetwork):
 
 class _Activations(NamedTuple):
     outputs: Tensor
-    """Of all layers, one observation after the other; there may be memory beyond. Flat."""
+    """Outputs of all layers, flat, observation by observation; the end may be unused."""
     rows: Tensor
     """Row of each observation."""
     generation: int | None
-    """Of the `ActivationCache`, if they are from there."""
+    """Generation of the `ActivationCache`; None if the activations are not cached."""
 
 
 class _Logits(torch.autograd.Function):
@@ -170,7 +170,7 @@ class _Logits(torch.autograd.Function):
         ctx: Any, work: "_Work", pixels: Tensor, handles: Tensor | None, *parameters: Tensor
     ) -> Tensor:
         ctx.work, ctx.is_learning = work, bool(parameters)
-        ctx.pixels = pixels.detach()  # Warp reads .grad of arrays, which torch warns of
+        ctx.pixels = pixels.detach()  # Warp reads .grad, about which torch warns
         ctx.made = work.compute(ctx.pixels, handles)
         return work.logits(ctx.made)
 
@@ -224,7 +224,7 @@ class _Work:
                 setattr(workspace, name, wp.empty(size, dtype=float, device="cpu"))
             workspace.gradients = wp.from_torch(gradients[: 0 if self._is_fixed else None])
         self._spare: Tensor | None = None
-        """Outputs to overwrite; new memory takes longer than a layer."""
+        """Buffer to reuse for outputs; allocating one takes longer than evaluating a layer."""
         order.pack(self._weights, self._back)
 
     @property
@@ -281,6 +281,6 @@ class _Work:
 
 
 def _transposed(layer: PackedLayer, weights_at: int) -> list[int]:
-    """Return the fields of the product from the gradient of outputs to that of patches."""
+    """Return the fields of the product that maps gradients of outputs to those of patches."""
     outs, size = layer.num_outs, layer.num_inputs
     return [0, weights_at, 0, layer.geometry[0], 1, outs, 0, 1, outs, 0, size, size, 0]

@@ -1,4 +1,4 @@
-"""Settings of appearance; each value is fixed, or a range that is sampled at every reset."""
+"""Settings of appearance; each value is fixed or a range that is sampled at every reset."""
 
 from typing import Annotated, Any
 
@@ -9,16 +9,16 @@ from drone_rl.utils.schema import Listed, Real, Several, Span, Whole
 from drone_rl.utils.settings import Settings
 
 Number = float | tuple[float, float]
-"""A number, or a range in which every one is as likely."""
+"""A number, or a range that is sampled uniformly."""
 Tint = Color | tuple[Color, Color]
 """Red, green, blue from 0 to 1, or a range of each."""
 Triple = tuple[float, float, float]
 Triples = Triple | tuple[Triple, Triple]
 """Three numbers, or a range of each."""
 Names = str | tuple[str, ...]
-"""A name or several; kept as several."""
+"""A name or several; stored as a tuple."""
 NO_TEXTURE = "none"
-"""The name that stands for no texture, among others from which one is drawn."""
+"""The name for no texture, which a list of textures to sample from may contain."""
 
 _Tint = Span(Several(Real(0.0, 1.0), 3, 3))
 _Light = Span(Real(0.0, 10.0))
@@ -37,13 +37,13 @@ class AppearanceSettings(Settings):
     sun_elevation: Annotated[Number, Span(Real(1.0, 90.0, unit="degrees"))] = 55.2
     """Height of the sun above the horizon, in degrees."""
     sun_azimuth: Annotated[Number, Span(Real(-360.0, 360.0, unit="degrees"))] = 127.9
-    """Where the sun stands: 0 is straight ahead, 90 to the left, in degrees."""
+    """Direction of the sun in degrees: 0 is straight ahead, 90 to the left."""
     sun_strength: Annotated[Number, _Light] = 0.75
-    """Light of the sun on what faces it; with the ambient light's it should be about 1."""
+    """Sunlight on a surface that faces the sun; its sum with ambient light should be about 1."""
     sun_color: Annotated[Tint, _Tint] = (1.0, 1.0, 1.0)
     """Red, green, blue of the sun's light."""
     ambient_strength: Annotated[Number, _Light] = 0.35
-    """Light from everywhere."""
+    """Ambient light, equal from all directions."""
     shadows: Annotated[float, Real(0.0, 1.0)] = 0.0
     """Fraction of episodes in which the sun casts shadows."""
     sky_horizon: Annotated[Tint, _Tint] = (0.62, 0.74, 0.92)
@@ -53,7 +53,7 @@ class AppearanceSettings(Settings):
     fog_visibility: (
         Annotated[Number, Span(Real(0.0, 100_000.0, is_above=True, unit="m"))] | None
     ) = None
-    """Distance at which fog leaves 5% of a contrast, in metres; none for clear air."""
+    """Distance at which fog reduces contrast to 5%, in metres; none for clear air."""
     ground_color: Annotated[Tint, _Tint] = (0.5, 0.54, 0.48)
     """Colour of the ground."""
     object_color: Annotated[Tint, _Tint] | None = None
@@ -62,28 +62,27 @@ class AppearanceSettings(Settings):
     """Texture of the ground: checker, grid, bricks, noise, an image file, or a list of these and
     none, each equally likely."""
     ground_tile: Annotated[Number, _Tile] = 4.0
-    """Edge of a tile of it, in metres."""
+    """Edge length of a tile of the ground texture, in metres."""
     object_texture: Annotated[Names, _Textures] | None = None
-    """The same of targets and obstacles."""
+    """Texture of targets and obstacles; the same values as for the ground."""
     object_tile: Annotated[Number, _Tile] = 2.0
-    """Edge of a tile of it, in metres."""
+    """Edge length of a tile of the object texture, in metres."""
     distractors: Annotated[int | tuple[int, int], Span(Whole(0, 64, "distractors"))] = 0
     """Number of distractors: boxes, balls and cylinders to the sides."""
     distractor_size: Annotated[Number, Span(Real(0.1, 50.0, unit="m"))] = (1.0, 4.0)
-    """Edge or diameter of each, in metres."""
+    """Edge length or diameter of each distractor, in metres."""
     distractor_color: Annotated[Tint, _Tint] | None = None
-    """Colour of each; none for one of six, in turn."""
+    """Colour of each distractor; none for six colours in turn."""
     distractor_distance: Annotated[Number, Span(Real(0.1, 200.0, unit="m"))] = (2.0, 14.0)
-    """How far each is from where targets and obstacles may stand, to the side, in metres."""
+    """Lateral distance of each distractor from the area of targets and obstacles, in metres."""
     camera_offset: Annotated[Triples, _Place] = (0.0, 0.0, 0.0)
     """Offset of the policy's camera from its default place: forward, left, up, in metres."""
     camera_turn: Annotated[Triples, _Turn] = (0.0, 0.0, 0.0)
-    """How it is turned there: roll (to the right), pitch (down) and yaw (to the left), degrees."""
+    """Rotation of the camera, in degrees: roll (to the right), pitch (down), yaw (to the left)."""
     camera_widening: Annotated[Number, Span(Real(-160.0, 160.0, unit="degrees"))] = 0.0
-    """By how much its horizontal field of view is wider than that of the camera's settings, in
-    degrees."""
+    """Degrees added to the horizontal field of view of the camera's settings."""
     exposure: Annotated[Number, Span(Real(0.01, 100.0))] = 1.0
-    """Factor of the camera on all colours."""
+    """Factor by which the camera multiplies all colours."""
 
     @property
     def is_minimal(self) -> bool:
@@ -96,7 +95,7 @@ MINIMAL = AppearanceSettings()
 
 
 _LEAST_HEIGHT = 0.05
-"""Metres above the ground, below which the camera would see through it."""
+"""Minimum height of the camera in metres; any lower, images would show through the ground."""
 _NARROWEST, _WIDEST = 1.0, 170.0
 """Degrees; see `CameraSettings.horizontal_fov`."""
 
@@ -104,10 +103,10 @@ _NARROWEST, _WIDEST = 1.0, 170.0
 def check_appearance(
     settings: AppearanceSettings, camera: CameraSettings, things: Things | None, task: str
 ) -> None:
-    """Check appearance, camera and positions of a task's things (None if unknown) together.
+    """Check that appearance, camera and object positions (None if unknown) are compatible.
 
     Raises:
-        InputError: Distractors have no place, the camera starts inside an object, or its field of
+        InputError: Distractors can't be placed, the camera starts inside an object, or its field of
             view is too wide or narrow.
     """
     own = camera.horizontal_fov
@@ -121,7 +120,7 @@ def check_appearance(
         if _ends(settings.distractors)[1]:
             raise InputError(
                 f"appearance.distractors={_ends(settings.distractors)[1]}: task={task} does not "
-                "say where its things stand, so nothing can stand beside them; give distractors=0"
+                "define object positions, so distractors can't be placed; give distractors=0"
             )
         return
     (_, forward), (most_right, most_left), (lowest, _) = _sides(settings.camera_offset)
@@ -134,23 +133,23 @@ def check_appearance(
     reach = things.first - things.size / 2 - FRONT[0]
     if forward >= reach:
         raise InputError(
-            f"appearance.camera_offset={forward:g} forward puts the camera into the first thing "
-            f"that stands there; give less than {reach:g}"
+            f"appearance.camera_offset={forward:g} forward puts the camera into the first object; "
+            f"give less than {reach:g}"
         )
     limit = things.bound + _ends(settings.distractor_distance)[0]
     if _ends(settings.distractors)[1] and aside >= limit:
         raise InputError(
-            f"appearance.camera_offset={aside:g} aside puts the camera into a distractor; give "
+            f"appearance.camera_offset={aside:g} sideways puts the camera into a distractor; give "
             f"less than {limit:g}, or a greater distractor_distance"
         )
 
 
 def _ends(value: Any) -> tuple[float, float]:
-    """Lowest and highest value."""
+    """Return the lowest and the highest value."""
     return value if isinstance(value, tuple) else (value, value)
 
 
 def _sides(value: Any) -> list[tuple[float, float]]:
-    """Lowest and highest value of each of three."""
+    """Return the lowest and the highest value of each of three numbers."""
     low, high = value if isinstance(value[0], tuple) else (value, value)
     return [*zip(low, high, strict=True)]

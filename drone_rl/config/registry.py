@@ -1,8 +1,8 @@
 """Registry of parts: networks, transforms, return estimators, learners and collectors.
 
-A module of the user's registers a part by a decorator, `drone-rl train plugins=[my_module]` imports
-the module, and `network=my_name` selects the part. Its settings are the parameters of its signature
-with their types and defaults. Policy files contain the registered name and the values only.
+A user's module registers a part with a decorator, `drone-rl train plugins=[my_module]` imports the
+module, and `network=my_name` selects the part. The part's settings are the parameters of its
+signature, with their types and defaults. Policy files contain only the registered name and values.
 
     @drone_rl.register_network("cells")
     class CellNetwork(PolicyNetwork):
@@ -40,7 +40,7 @@ _KINDS: dict[Any, Kind] = {
 
 
 def implements(*variants: type[Variant]) -> Callable[[F], F]:
-    """Make a class or function the factory of built-in variants; a decorator."""
+    """Decorate a class or function as the factory of built-in variants."""
 
     def connect(factory: F) -> F:
         for variant in variants:
@@ -54,7 +54,7 @@ def implements(*variants: type[Variant]) -> Callable[[F], F]:
 
 
 def learns(*objectives: type[Objective]) -> Callable[[F], F]:
-    """Make a function the one that builds the learner of built-in objectives; a decorator."""
+    """Decorate the function that builds the learner of built-in objectives."""
 
     def connect(build: F) -> F:
         for objective in objectives:
@@ -65,10 +65,10 @@ def learns(*objectives: type[Objective]) -> Callable[[F], F]:
 
 
 def register_network(name: str) -> Callable[[F], F]:
-    """Register a network under a name in settings and policy files; a decorator of its class.
+    """Decorate a network class to register it under a name for settings and policy files.
 
-    The class is called as `cls(in_shape, num_actions, *, generator, **settings)` and derives from
-    `drone_rl.policies.PolicyNetwork`. Its settings class is `cls.Settings`.
+    The class is called as `cls(in_shape, num_actions, *, generator, **settings)` and must derive
+    from `drone_rl.policies.PolicyNetwork`. Its settings class is `cls.Settings`.
 
     Raises:
         InputError: The name is invalid or taken, or a parameter has no default or no plain type.
@@ -79,17 +79,17 @@ def register_network(name: str) -> Callable[[F], F]:
 def register_transform(
     name: str, *, output: Callable[[Frame, Any], Frame] | None = None
 ) -> Callable[[F], F]:
-    """Register a transform of images; a decorator of a class derived from TorchRL's `Transform`.
+    """Decorate a class derived from TorchRL's `Transform` to register it as an image transform.
 
-    `output` returns the shape of the transformed image from that of its input and the settings; by
-    default the transform is called with zeros. See `register_network` for errors.
+    `output` maps the input's `Frame` and the settings to the output's `Frame`. By default, the
+    shape is that of the transformed zeros. See `register_network` for errors.
     """
     own = {"output": lambda self, frame: output(frame, self) if output else None}
     return lambda factory: _register(Transform, name, factory, 0, _KEYS, own)
 
 
 def register_returns(name: str) -> Callable[[F], F]:
-    """Register a return estimator; a decorator of a class derived from `ReturnEstimator`.
+    """Decorate a class derived from `ReturnEstimator` to register it as a return estimator.
 
     The class accepts `scale`, for example by passing keyword arguments on to `ReturnEstimator`. See
     `register_network` for errors.
@@ -98,10 +98,10 @@ def register_returns(name: str) -> Callable[[F], F]:
 
 
 def register_learner(name: str) -> Callable[[F], F]:
-    """Register a learner, selected by `objective=NAME`; a decorator of a class or function.
+    """Decorate a class or function to register it as a learner, selected by `objective=NAME`.
 
-    It is called as `factory(settings, collecting, **own)`, with the training's settings and what
-    `make_collector` of `drone_rl.training.components` returned, and returns a
+    It is called as `factory(settings, collecting, **own)`, with the training's settings and the
+    result of `drone_rl.training.components.make_collector`, and returns a
     `drone_rl.training.learners.Learner`. See `register_network` for errors.
     """
 
@@ -119,7 +119,7 @@ def register_learner(name: str) -> Callable[[F], F]:
 
 
 def register_collector(name: str) -> Callable[[F], F]:
-    """Register a collector; a decorator of a class or function.
+    """Decorate a class or function to register it as a collector.
 
     It is called as `factory(settings, task, **own)`, with the training's settings and the task to
     collect from (None for the task of the settings), and returns a
@@ -143,7 +143,7 @@ def _register(
         if variant.registered_name() == name:
             if variant.__module__.startswith("drone_rl."):
                 raise InputError(f"{part.__name__.lower()}={name} is built in; give another name")
-            del variant.target  # a module was imported again: the newer one counts
+            del variant.target  # its module was imported again; the new part replaces the old one
     fields = _fields(name, factory, positional, skipped)
     inherited = part.__dataclass_fields__.keys() if part is Returns else set()
     names = {*(field for field, _, _ in fields), *inherited}
@@ -187,7 +187,7 @@ def _fields(
 
 
 def _annotated(hint: Any, where: str) -> Any:
-    """Return the type of a parameter with the kind of its values."""
+    """Return the type of a parameter, annotated with the kind of its values."""
     if typing.get_origin(hint) is Annotated:
         return hint
     if typing.get_origin(hint) is typing.Literal:

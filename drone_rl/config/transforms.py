@@ -24,17 +24,15 @@ class Transform(Variant):
     """Required input: "bytes" for RGB bytes of the camera, "floats", or any."""
 
     def output(self, frame: Frame) -> Frame | None:
-        """Return shape and type of the transformed image; None if only a call can tell.
+        """Return shape and type of the transformed image; None if they require a call.
 
         Raises:
             InputError: The transform can't process images of this shape and type.
         """
         if self.needs == "bytes" and (frame.is_float or frame.shape[-1] != 3):
-            raise InputError(
-                f"the transform {self.name} needs the camera's own RGB; let it come first"
-            )
+            raise InputError(f"the transform {self.name} needs the camera's own RGB; put it first")
         if self.needs == "floats" and not frame.is_float:
-            raise InputError(f"the transform {self.name} needs floats; let gray come first")
+            raise InputError(f"the transform {self.name} needs floats; put gray before it")
         return self._transformed(frame)
 
     def _transformed(self, frame: Frame) -> Frame:
@@ -63,16 +61,16 @@ class Chromaticity(Transform, target="chromaticity"):
     """Fractions of red and blue in each pixel, minus a third: 0 for every gray level."""
 
     floor: Annotated[float, Real(0.0, 3.0, is_above=True)] = 0.15
-    """Added to the sum of red, green and blue, so that the dark is gray."""
+    """Constant added to the sum of red, green and blue, so that dark pixels are gray."""
 
     def _transformed(self, frame: Frame) -> Frame:
         if not frame.is_float or frame.shape[0] != 3:
-            raise InputError("the transform chromaticity needs three colors; let rgb come before")
+            raise InputError("the transform chromaticity needs three colors; put rgb before it")
         return Frame((2, *frame.shape[1:]), True)
 
 
 class Standardize(Transform, target="standardize"):
-    """Shifted and scaled: (x - mean) / std."""
+    """Shift and scale: (x - mean) / std."""
 
     mean: Annotated[float, Real(-1000.0, 1000.0)] = 0.53
     """Gray level that becomes 0."""
@@ -84,7 +82,7 @@ class Standardize(Transform, target="standardize"):
 
 
 class Crop(Transform, target="crop"):
-    """The rows that are kept, from top (included) to bottom (excluded)."""
+    """Crop to the rows from top (included) to bottom (excluded)."""
 
     top: Annotated[int, Whole(0, 1023, "pixels")] = 5
     """First row."""
@@ -102,30 +100,30 @@ class Crop(Transform, target="crop"):
 
 
 class Resize(Transform, target="resize"):
-    """Averaging over areas; nothing where images already have the size."""
+    """Resize by area averaging; images that already have the size do not change."""
 
     needs: ClassVar[str] = "floats"
     height: Annotated[int, Whole(1, 1024, "pixels")] = 25
-    """Pixels down."""
+    """Height of the output in pixels."""
     width: Annotated[int, Whole(1, 1024, "pixels")] = 64
-    """Pixels across."""
+    """Width of the output in pixels."""
 
     def _transformed(self, frame: Frame) -> Frame:
         return Frame((frame.shape[0], self.height, self.width), True)
 
 
 DEFAULT_TRANSFORMS = (Gray(), Resize(), Standardize())
-"""The resize leaves the default camera's images as they are: networks get 25x64 from any camera."""
+"""Networks get 25x64 pixels from any camera; the default camera's images are not resized."""
 
 
 class Stack(Transform, target="torchrl.envs.CatFrames"):
     """The newest frames as channels, oldest first."""
 
     N: Annotated[int, Whole(1, 16, "frames")] = 2
-    """Frames."""
+    """Number of frames."""
 
     def arguments(self) -> dict[str, Any]:
-        """Return the arguments of TorchRL's transform; the dimension is that of channels."""
+        """Return the arguments of TorchRL's transform, which concatenates channels."""
         return {**self.values(), "dim": -3, "in_keys": ["pixels"]}
 
     def _transformed(self, frame: Frame) -> Frame:
@@ -158,7 +156,7 @@ class Noise(Fault, target="noise"):
     """Sensor noise, clipped at black and white."""
 
     strength: Annotated[float, Real(0.0, 1.0)] = 0.02
-    """Standard deviation; from black to white is 1."""
+    """Standard deviation; black is 0 and white is 1."""
     correlation_time: Annotated[float, Real(0.0, 10_000.0, unit="frames")] = 0.0
     """Time after which the correlation of a pixel's noise has fallen to 1/e; white noise at 0."""
 
@@ -171,7 +169,7 @@ class DeadRows(Fault, target="dead_rows"):
     rows: Annotated[tuple[int, ...], Several(Whole(0, 1023, "rows"), 0, 1024)] = ()
     """Rows that are always dead, from 0 at the top."""
     level: Annotated[float, Real(0.0, 1.0)] = 0.0
-    """Their level; 0 is black, 1 white."""
+    """Gray level of dead rows; 0 is black, 1 is white."""
 
     def check(self) -> None:
         """Reject duplicate rows."""
@@ -184,7 +182,7 @@ class DeadRows(Fault, target="dead_rows"):
         return frame
 
     def check_height(self, height: int) -> None:
-        """Raise an `InputError` for more rows than images have."""
+        """Raise an `InputError` if an image of this height has too few rows."""
         if max(self.rows, default=0) >= height:
             raise InputError(
                 f"rows={list(self.rows)} of an image of {height} rows; give at most {height - 1}"
@@ -200,20 +198,20 @@ class FrozenFrames(Fault, target="frozen_frames"):
     """Frames that repeat the previous one at random."""
 
     share: Annotated[float, Real(0.0, 1.0)] = 0.05
-    """Probability of each frame to repeat."""
+    """Probability that a frame repeats the previous one."""
 
 
 class LateFrames(Fault, target="late_frames"):
-    """Delayed frames; until the first arrives, the episode's first frame."""
+    """Delayed frames; the first frame is repeated until delayed ones arrive."""
 
     frames: Annotated[int, Whole(0, 16, "frames")] = 1
-    """Delay."""
+    """Delay in frames."""
 
 
 class Shift(Fault, target="shift"):
-    """Image shifted by a constant of each episode, as by a misaligned camera."""
+    """Image shift that is constant within an episode, as from a misaligned camera."""
 
     down: Annotated[int, Whole(0, 1023, "pixels")] = 4
-    """Largest shift up or down; uniformly distributed."""
+    """Largest shift up or down; shifts are uniformly distributed."""
     across: Annotated[int, Whole(0, 1023, "pixels")] = 6
     """Largest shift to the left or right."""

@@ -1,7 +1,7 @@
-"""Renders observations of given simulation states, without steps of TorchRL.
+"""Render observations of simulation states without TorchRL's step.
 
-A step of TorchRL copies every entry of every environment through each transform. With few
-environments that takes longer than simulation, rendering and policy together.
+A step of TorchRL copies every entry of every environment in each transform. With few environments,
+this takes longer than simulation, rendering and the policy's forward pass together.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,14 +23,14 @@ _END_REASON = ("next", "info", "end_reason")
 
 
 class Reasons(tuple[str, ...]):
-    """Why an implementation does not support a configuration: plain sentences, at least one."""
+    """Reasons why an implementation does not support a configuration; at least one."""
 
     def __str__(self) -> str:
         return "; ".join(self)
 
 
 class DirectRenderer:
-    """Render what an actor observes of states, and compute the entries of a step.
+    """Render an actor's observations of states, and compute the entries of a step.
 
     If the first transform is `GrayPixels`, the renderer renders gray frames.
     """
@@ -42,7 +42,7 @@ class DirectRenderer:
         observed: Iterable[NestedKey],
         kept: Iterable[NestedKey],
     ) -> None:
-        """Take over the environment's states; see `try_create`."""
+        """Use the environment's simulation and camera; see `try_create`."""
         self.env, self.worlds = env, env.worlds
         self._observed, camera = tuple(observed), env.worlds.camera
         is_gray = type(next(iter(transforms), None)) is GrayPixels
@@ -59,20 +59,20 @@ class DirectRenderer:
 
     @property
     def needs_info(self) -> bool:
-        """Whether `kept` has other entries than reward, flags and end reason."""
+        """Whether `kept` has entries other than reward, flags and end reason."""
         return bool(self._info)
 
     @classmethod
     def try_create(
         cls, env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedKey]
     ) -> Self | Reasons:
-        """Return the renderer of any environment, or the reasons why there is none.
+        """Return the renderer of an environment, or the reasons why it is not supported.
 
         `observed` are the entries that the actor reads, `kept` the ("next", ...) entries to keep.
         """
         base: Any = env.base_env if type(env) is TransformedEnv else env
         if type(base) is not DroneEnv:
-            return Reasons([f"environment {type(base).__name__} is no DroneEnv"])
+            return Reasons([f"environment {type(base).__name__} is not a DroneEnv"])
         one: Any = env.transform if isinstance(env, TransformedEnv) else ()
         transforms: list[Any] = list(one) if isinstance(one, (Compose, tuple)) else [one]
         observed = tuple(observed)
@@ -91,7 +91,7 @@ class DirectRenderer:
         return Reasons(reasons) if reasons else cls(base, transforms, observed, kept)
 
     def look(self, state: State, rows: Tensor | None = None) -> TensorDictBase:
-        """Return what the actor reads of states, of environments `rows` (k,), by default all."""
+        """Return the actor's input for states of environments `rows`, (k,); default: all."""
         size, device = len(state.steps), state.steps.device
         entries: Entries = {}
         if "pixels" in self._observed:

@@ -37,8 +37,8 @@ class Evaluation:
     seed: RootSeed
     """Root of the environments' random streams."""
     rounding: dict[str, Any] | None = None
-    """What computed the actions, and whether another implementation takes the same ones, see
-    `drone_rl.evaluation.outcomes.Rounding`."""
+    """The implementation that computed the actions, and whether another one takes the same actions;
+    see `drone_rl.evaluation.outcomes.Rounding`."""
 
     @property
     def success(self) -> float:
@@ -46,7 +46,7 @@ class Evaluation:
         return self.flown["greedy"]["success"]["share"]
 
     def rows(self) -> list[list[str]]:
-        """Return the figures as a table of texts: a heading, then a row for each figure."""
+        """Return the figures as rows of text: a header, then one row per figure."""
         flown = self.flown.values()
         terms = as_task(self.policy.task).vocabulary
         rows = [
@@ -87,7 +87,7 @@ class Evaluation:
         return table(head, rows) + "".join(map(paragraph, self._notes()))
 
     def _notes(self) -> list[str]:
-        """The arithmetic, the seed, and how the dynamics differ from the policy's own."""
+        """Return notes on the arithmetic, the seed and differences from the training's dynamics."""
         unlike, seed = self.policy.unlike, self.seed.as_dict()
         evidence = {**seed, "rounding": self.rounding}
         notes = [say(EVALUATION, evidence), unlike_text({"unlike": unlike}) if unlike else ""]
@@ -104,10 +104,10 @@ def evaluate(
     """Evaluate a policy, greedily and with sampled actions, and the baselines, on held-out states.
 
     Args:
-        policy: The policy, what `load_policy` takes, or a callable, see `policy_from`.
+        policy: The policy, an argument of `load_policy`, or a callable, see `policy_from`.
         settings: Number of episodes, seed, device and so on.
-        progress: Called with what is running; a progress bar by default.
-        changes: Settings to change, as in `evaluate("good", episodes=200)`.
+        progress: Called with the name of each step; a progress bar by default.
+        changes: Changed settings, as in `evaluate("good", episodes=200)`.
 
     Raises:
         InputError: The policy or a setting is unusable.
@@ -135,7 +135,7 @@ def evaluate(
 def held_out_environments(
     policy: Pilot, settings: FlightSettings, seed: RootSeed
 ) -> AbstractContextManager[tuple[Any, TensorDictModuleBase]]:
-    """Open environments that no training uses, and the policy as their actor."""
+    """Return a context manager of environments that no training uses, and the policy's actor."""
     where: dict[str, Any] = {"device": settings.device, "renderer": settings.renderer}
     return policy.flying(settings.num_worlds, seed=seed.value, **where)
 
@@ -143,7 +143,7 @@ def held_out_environments(
 def _same(evidence: Evidence) -> str:
     found = evidence["rounding"]
     return (
-        f"The same actions in all of the first {found['compared_episodes']:,} greedy episodes "
+        f"All actions of the first {found['compared_episodes']:,} greedy episodes were the same "
         f"when computed again ({found['compared']})."
     )
 
@@ -151,7 +151,7 @@ def _same(evidence: Evidence) -> str:
 def _other(evidence: Evidence) -> str:
     found = evidence["rounding"]
     return (
-        f"Other actions in {found['differing']:,} of the first {found['compared_episodes']:,} "
+        f"Actions differed in {found['differing']:,} of the first {found['compared_episodes']:,} "
         f"greedy episodes when computed again ({found['compared']}): decisions depend on rounding."
     )
 

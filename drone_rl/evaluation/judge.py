@@ -32,7 +32,7 @@ class Claim(Protocol):
     """A certificate of the policy; `drone_rl.verdicts.certificate` has the implementation."""
 
     def as_evidence(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
-        """Return what a verdict on these greedy episodes may quote of the certificate."""
+        """Return the evidence that a verdict on these greedy episodes may quote."""
         ...
 
 
@@ -43,7 +43,7 @@ class Verdict:
     kind: Kind
     certain: bool
     evidence: dict[str, Any]
-    """Plain values: all of `as_dict` but the sentence."""
+    """Plain values: all entries of `as_dict` except the sentence."""
 
     @property
     def exit_code(self) -> int:
@@ -131,8 +131,8 @@ def judge(
 
     Args:
         greedy: The policy's episodes with the most probable actions.
-        baselines: Those of each baseline; the k-th starts in the same state as the policy's.
-        rule: Thresholds.
+        baselines: Episodes of each baseline; the k-th starts in the state of the policy's k-th.
+        rule: Thresholds of the verdict.
         sampled: The policy's episodes with sampled actions, from the same states.
         claim: A certificate of the policy in this task, if there is one.
         unlike: How the dynamics differ from those of the training: setting to "own" and "flown".
@@ -149,7 +149,7 @@ def judge(
     )
     for other in (*baselines.values(), greedy if sampled is None else sampled):
         if not torch.equal(other.goals.world, greedy.goals.world):
-            raise ValueError("policy and baselines have different initial states; pair them")
+            raise ValueError("policy and baselines have different initial states; use the same")
     found = measure(greedy, baselines, rule)
     kind = decide([quantity.level for quantity in found], len(rule.strata))
     certain = is_enough = _is_certain(found, rule)
@@ -190,7 +190,7 @@ def judge(
 def measure(
     greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule, times: int = 1
 ) -> tuple[Quantity, ...]:
-    """Return the rule's quantities with intervals that hold all at once.
+    """Return the rule's quantities with simultaneous confidence intervals.
 
     Every episode counts `times` times, to extrapolate to more episodes.
     """
@@ -205,7 +205,7 @@ def widen(
     rule: Rule,
     outcomes: Outcomes,
 ) -> tuple[Quantity, ...]:
-    """Widen the intervals that `measure` returns by all outcomes that rounding leaves possible.
+    """Widen the intervals of `measure` to include all outcomes that rounding makes possible.
 
     Lower bounds hold even if every episode has the worst of its possible outcomes for a quantity,
     upper bounds even if each has the best one.
@@ -250,7 +250,7 @@ def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
 
 
 def _observe_each(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
-    """The same for all episodes, NaN where there is no value. Shapes: (n,), float64."""
+    """Return the values of `observe` for all episodes, NaN if undefined. Shapes: (n,), float64."""
     oracle = baselines["oracle"]
     observed = [greedy.success - rule.good_share * oracle.success]
     offered = [greedy.offered(stratum) for stratum in range(len(rule.strata))]
@@ -273,7 +273,7 @@ def _is_certain(found: tuple[Quantity, ...], rule: Rule) -> bool:
 
 
 def _enough(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> int | None:
-    """About how many such episodes would be enough to be certain; None for very many."""
+    """Return about how many episodes certainty needs; None if more than `MANY` covers."""
     for times in MANY:
         if _is_certain(measure(greedy, baselines, rule, times), rule):
             return times * len(greedy)

@@ -15,11 +15,11 @@ from drone_rl.utils.errors import InputError
 Logits = Callable[[Any], Any]
 """From a batch of frames to logits (N, number of actions), a tensor or an array."""
 _REPEATS = 1e-5
-"""Logits of the same frame that differ by more are random."""
+"""Largest difference between logits of the same frame from a deterministic network."""
 
 
 class ForeignNetwork(PictureNetwork):
-    """A copy of a torch module in evaluation mode, or a callable as it is.
+    """A copy of a torch module in evaluation mode, or an unchanged callable.
 
     Raises:
         InputError: It does not accept such frames, does not return one logit for each action, or
@@ -35,14 +35,14 @@ class ForeignNetwork(PictureNetwork):
         takes_bytes: bool = False,
         device: torch.device | str = "cpu",
     ) -> None:
-        """Evaluate it on one frame.
+        """Evaluate the callable on one frame to check it.
 
         Args:
             logits: The callable.
             in_shape: Shape (C, H, W) of one frame.
-            actions: One for each logit.
+            actions: The action space; it has one action for each logit.
             takes_bytes: Whether it takes RGB bytes (N, H, W, 3) instead of floats from 0 to 1.
-            device: Of a module.
+            device: Device of a torch module.
         """
         super().__init__()
         self.in_shape, self.actions = tuple(in_shape), actions
@@ -64,13 +64,13 @@ class ForeignNetwork(PictureNetwork):
             ) from error
         if not torch.allclose(found, self(image), atol=_REPEATS):
             raise InputError(
-                "the network gives other logits for the same image; give one without random numbers"
+                "the network gives different logits for the same image; give a deterministic one"
             )
         self.is_differentiable = _depends(found, image)
 
     @property
     def parts(self) -> nn.Module:
-        """The module; an empty one for another callable."""
+        """The torch module; an empty module for other callables."""
         return self._logits if isinstance(self._logits, nn.Module) else nn.Module()
 
     def forward(self, pixels: Tensor) -> Tensor:
@@ -90,7 +90,7 @@ class ForeignNetwork(PictureNetwork):
                 f"{wanted}, one of each of {names}"
             )
         if not torch.isfinite(logits).all():
-            raise InputError("the network gives logits that are not finite; give one that does not")
+            raise InputError("the network gives logits that are not finite; give another network")
         logits = logits * self._factor + self._shift
         return logits.reshape(*pixels.shape[:-3], self.num_actions)
 

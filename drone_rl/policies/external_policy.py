@@ -36,7 +36,7 @@ from drone_rl.utils.settings import Settings, below
 class ForeignPolicy(Pilot):
     """A third-party network with its task, camera and transforms; see `policy_from`.
 
-    It has no file, so nobody else can check a certificate of it.
+    It has no file, so third parties can't check its certificates.
     """
 
     name: str
@@ -44,13 +44,13 @@ class ForeignPolicy(Pilot):
     own_task: BaseTaskSettings | Task[Any]
     camera: CameraSettings
     transforms: tuple[Transform, ...]
-    """Without any, the callable gets the camera's RGB bytes."""
+    """If empty, the callable gets the camera's RGB bytes."""
     own_dynamics: DynamicsSettings = COMPUTER_VISION  # pyright: ignore[reportIncompatibleMethodOverride] (a field)
     """The vehicle dynamics of the training."""
     actions: ActionSettings = MOVES_SETTINGS  # pyright: ignore[reportIncompatibleMethodOverride] (a field)
     """One action for each logit."""
     flown: DynamicsSettings | None = None
-    """The vehicle dynamics; those of the training by default."""
+    """Vehicle dynamics of the evaluation; those of the training by default."""
 
     @property
     def dynamics(self) -> DynamicsSettings:
@@ -64,7 +64,7 @@ class ForeignPolicy(Pilot):
 
     @property
     def origin(self) -> dict[str, Any]:
-        """Its name; nothing is known of its training."""
+        """The policy's name; its training is unknown."""
         return {"policy": self.name, "trained": None}
 
     def in_task(self, **changes: Any) -> "ForeignPolicy":
@@ -127,15 +127,15 @@ def policy_from(
 ) -> ForeignPolicy:
     """Return a third-party policy to judge, evaluate and explain.
 
-    A torch module is copied in evaluation mode, and every explanation is available. Other torch
-    functions have fewer explanations, other callables still fewer.
+    A torch module is copied and set to evaluation mode; all explanations support it. Fewer
+    explanations support other torch functions, and still fewer support other callables.
 
     Args:
-        logits: From a batch of frames, floats (N, C, H, W) after the transforms, to a logit for
-            each action (N, number of actions), as a tensor or an array.
+        logits: Callable from a batch of transformed frames, floats (N, C, H, W), to a logit for
+            each action, a tensor or an array (N, number of actions).
         task: The task.
-        camera: The policy's camera; by default its images have the shape `observation_shape` of
-            `logits`, which `Sb3Logits` has.
+        camera: The policy's camera. By default, its images have the size in
+            `logits.observation_shape` if there is one, as in `Sb3Logits`.
         dynamics: Vehicle dynamics.
         actions: The action space.
         transforms: Transforms of the image, in order; an empty list for the camera's RGB bytes
@@ -175,15 +175,15 @@ def _transforms_of(logits: Logits) -> tuple[Transform, ...]:
 
 
 def _is_sb3_model(which: Any) -> bool:
-    """Return whether this is an algorithm of Stable-Baselines3, without importing that."""
+    """Return whether this is a Stable-Baselines3 algorithm, without importing the library."""
     module = sys.modules.get("stable_baselines3.common.base_class")
     return module is not None and isinstance(which, module.BaseAlgorithm)
 
 
 def as_pilot(which: str | Path | Pilot | Logits, outputs: str | Path = "outputs") -> Pilot:
-    """Return a policy from a callable as for `policy_from`, a model of Stable-Baselines3 or a file.
+    """Convert a callable, see `policy_from`, a Stable-Baselines3 model or a file to a policy.
 
-    `outputs` is the folder of the runs, see `load_policy`; a `Pilot` is returned as it is.
+    `outputs` is the folder of the runs, see `load_policy`. A `Pilot` is returned unchanged.
 
     Raises:
         InputError: There is no such policy, or it is unusable.

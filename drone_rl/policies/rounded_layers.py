@@ -1,6 +1,6 @@
 """Rounding errors of single layers, see `drone_rl.policies.rounding`.
 
-Errors are bounds, in float64, on the difference of any float32 evaluation from the exact one.
+Errors are bounds, in float64, on the difference between any float32 result and the exact one.
 """
 
 import abc
@@ -13,7 +13,7 @@ from torch.nn import functional
 UNIT = 2.0**-24
 """Unit roundoff of float32: the largest relative error of one operation."""
 TINY = 2.0**-126
-"""Least normal number of float32: an operation may replace what is smaller by 0."""
+"""Smallest normal number of float32; an operation may flush smaller numbers to 0."""
 LARGEST = float(torch.finfo(torch.float32).max)
 SLACK = 1.001
 """Factor for the rounding of the bounds' own arithmetic in float64."""
@@ -21,18 +21,18 @@ SLACK = 1.001
 
 @dataclasses.dataclass(frozen=True)
 class Note:
-    """What a layer keeps of a forward pass."""
+    """Values of the forward pass that a layer saves for the backward pass."""
 
     shape: torch.Size
-    """Of its input."""
+    """Shape of the input."""
     local: Tensor | None = None
-    """Errors of its outputs that do not come from its inputs in proportion. Shape: its output's."""
+    """Errors of the outputs that are not proportional to errors of the inputs. Shape: output's."""
     mask: Tensor | None = None
-    """Where an output follows its input."""
+    """Where gradients pass from the output to the input."""
 
 
 class Layer(abc.ABC):
-    """One layer."""
+    """A layer with bounds on its rounding errors."""
 
     @abc.abstractmethod
     def __call__(self, value: Tensor) -> Tensor:
@@ -40,18 +40,22 @@ class Layer(abc.ABC):
 
     @abc.abstractmethod
     def bound(self, largest: Tensor, error: Tensor) -> Tensor:
-        """Return a bound on the errors of outputs for inputs up to a size. Shapes: (1, *), float64.
+        """Return bounds on the errors of outputs, for bounded inputs. Shapes: (1, *), float64.
 
-        `largest` is the size of the largest input in one float32 evaluation, `error` of the inputs.
+        `largest` is the largest absolute value of each input in one float32 evaluation, `error` is
+        the error of each input.
         """
 
     @abc.abstractmethod
     def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
-        """Return exact outputs, their errors and a note, from those of inputs (N, *), float64."""
+        """Return exact outputs, their errors and a note, given inputs and their errors.
+
+        Shapes: (N, *), float64.
+        """
 
     @abc.abstractmethod
     def back(self, slope: Tensor, note: Note) -> Tensor:
-        """Return slopes by the inputs from slopes by the outputs. Shapes: (N, P, *)."""
+        """Return gradients by the inputs, given gradients by the outputs. Shapes: (N, P, *)."""
 
 
 class _Affine(Layer):
@@ -69,7 +73,7 @@ class _Affine(Layer):
         return self._apply(value, *self._single)
 
     def bound(self, largest: Tensor, error: Tensor) -> Tensor:
-        size = largest + 2 * error  # the exact inputs and another evaluation's are both that near
+        size = largest + 2 * error  # covers exact inputs and those of any evaluation
         total = self._apply(size, self._size, self._bias.abs())
         carried = self._apply(error, self._size, None)
         return SLACK * carried + self._local(total, total, size)
@@ -79,7 +83,7 @@ class _Affine(Layer):
         total = self._apply(size, self._size, self._bias.abs())
         carried = self._apply(error, self._size, None)
         made = self._apply(value, self._weight, self._bias)
-        # no partial sum is larger than all positive terms, or all negative ones
+        # no partial sum exceeds the sum of all positive terms or of all negative terms
         most = torch.minimum(total, 0.5 * (total + made.abs() + carried))
         local = self._local(total, most, size)
         return made, SLACK * carried + local, Note(value.shape, local)
@@ -99,7 +103,10 @@ class _Affine(Layer):
         return functional.conv2d(value, weight, bias, stride=self._stride)
 
     def _local(self, total: Tensor, most: Tensor, size: Tensor) -> Tensor:
-        """Return the errors of a sum, from all sizes, the largest partial sum and the inputs."""
+        """Return the rounding errors of sums.
+
+        `total` bounds the sum of absolute terms, `most` partial sums, and `size` the inputs.
+        """
         roundings = SLACK / (1 - self._terms * UNIT)
         rounded = roundings * UNIT * (self._terms * most + 2 * total)
         # weights, inputs, products and sums that are too small to be normal
@@ -129,7 +136,7 @@ class _Rectified(Layer):
 
 
 class _Flat(Layer):
-    """All inputs in a row."""
+    """A flatten layer."""
 
     def __call__(self, value: Tensor) -> Tensor:
         return value.flatten(1)
@@ -145,7 +152,7 @@ class _Flat(Layer):
 
 
 class _Maximum(Layer):
-    """Pooling by maxima of squares that do not overlap."""
+    """Max pooling over squares that do not overlap."""
 
     def __init__(self, side: int) -> None:
         self._side = side
@@ -177,7 +184,7 @@ class _Maximum(Layer):
 
 
 def layer_of(layer: nn.Module) -> Layer | None:
-    """Return the errors of a layer of a network, or None if its kind is not supported."""
+    """Return the rounding errors of a network's layer, or None if it is not supported."""
     if isinstance(layer, nn.Conv2d):
         is_plain = (layer.padding, layer.dilation, layer.groups) == ((0, 0), (1, 1), 1)
         return _Affine(layer) if is_plain and layer.bias is not None else None

@@ -22,7 +22,7 @@ _NOTHING = -1.0
 
 
 class StepContext(NamedTuple):
-    """What an agent may use at one step: n active environments of num_worlds."""
+    """Data that an agent may use at one step, for n active environments of num_worlds."""
 
     worlds: Worlds
     state: State
@@ -42,7 +42,7 @@ class StepContext(NamedTuple):
 
 
 class Agent(Protocol):
-    """Acts in a batch of environments, for one episode each."""
+    """An agent that acts in a batch of environments for one episode each."""
 
     @property
     def knows_truth(self) -> bool:
@@ -101,7 +101,7 @@ class BaselineAgent:
     knows_truth = True
 
     def __init__(self, name: str, actions: Actions, generator: torch.Generator) -> None:
-        """Take "random" or the name of an action, all actions, and the generator of random ones."""
+        """Take "random" or an action's name, the action space, and a generator for "random"."""
         self._actions, self._generator = actions, generator
         self._action = None if name == "random" else actions.always(name)
 
@@ -117,15 +117,15 @@ class BaselineAgent:
 class OracleAgent:
     """The task's oracle, restricted to the cubes that the camera shows.
 
-    It reads the segmentation of the policy's camera, with the same faults: a cube that shows in one
-    pixel it knows exactly, one that shows in none not at all. It knows its own delay. Where it
-    fails, no policy can succeed.
+    It reads the segmentation image of the policy's camera, with the same faults. It uses the exact
+    position of each cube that is visible in at least one pixel, and nothing about the others. It
+    compensates for delayed actions. If it fails, no policy can succeed.
     """
 
     knows_truth = True
 
     def __init__(self, *, looks: bool = True) -> None:
-        """Set `looks=False` to let it know all cubes."""
+        """With `looks=False`, the oracle uses the positions of all cubes."""
         self._looks = looks
 
     def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
@@ -141,7 +141,7 @@ class OracleAgent:
         return rule.decide([info[name] for name in rule.reads], worlds.dynamics.actions), None
 
     def _first_visible(self, context: StepContext, next_cube: Tensor) -> Tensor:
-        """Index of the nearest standing cube that shows, or their number. Shape: (n, 1)."""
+        """Return the index of the nearest visible cube, or the number of cubes. Shape: (n, 1)."""
         props = torch.tensor([*context.worlds.scene.props, -1], device=next_cube.device)
         shown = props[context.render("segmentation").long()].float()[:, None]
         shown = context.apply_faults(shown, context.active, _NOTHING).flatten(1)
@@ -152,5 +152,5 @@ class OracleAgent:
 
 
 def has_oracle(task: Task) -> bool:
-    """Return whether a task has an oracle from which cubes can be hidden."""
+    """Return whether a task has an oracle that can be limited to visible cubes."""
     return task.oracle is not None and "next_cube" in task.oracle.reads

@@ -1,15 +1,17 @@
 """The operating domain: the range of each axis in which the policy is good with 95% confidence.
 
-From no perturbation outwards the search tries every strength of the table and, before each, one
-sampled at random between it and the previous one, to which a policy cannot have been fitted. It
-stops where the policy is not certainly good, and then tries the gap before that strength in `PARTS`
-steps. So the policy was certainly good at everything that was tried within a range.
+The search starts without perturbation and moves outwards. It tests every strength of the table and,
+before each, a strength sampled at random between it and the previous one, to which a policy cannot
+have been fitted. It stops at the first strength at which the policy is not certainly good, and then
+tests the gap before that strength in `PARTS` steps. Within a range, the policy is therefore
+certainly good at every tested strength.
 
-A range is wrong only if the first strength of a side at which the policy is not truly good passes,
-or the first such strength within the gap. Except for which gap it is, both are known beforehand:
-the former passes with the error of a side (`WALKING`), the latter with that of a gap (`REFINING`),
-and both sides of an axis with all their gaps share 5%. Nothing is assumed about the dependence of
-episodes at different strengths, nor that a stronger perturbation is worse.
+A range is wrong only if the policy passes the test at the first strength of a side at which it is
+not truly good, or at the first such strength within the gap. Apart from the choice of the gap, both
+strengths are fixed beforehand. The former test has the error probability of a side (`WALKING`), the
+latter that of a gap (`REFINING`); both sides of an axis and all their gaps share 5%. The argument
+assumes neither that episodes at different strengths are independent nor that a stronger
+perturbation is worse.
 """
 
 import dataclasses
@@ -32,13 +34,13 @@ from drone_rl.utils.intervals import proportion
 from drone_rl.utils.seeding import Stream, torch_generator
 
 PARTS = 4
-"""Of the gap at the end of a range."""
+"""Number of steps in which the gap at the end of a range is searched."""
 WALKING = 1 / 4
-"""Part of an axis's error for each of two sides."""
+"""Fraction of an axis's error probability for the search of each of its two sides."""
 REFINING = 1 / 20
-"""The same for each of ten gaps: five strengths and one before each."""
+"""The same for each of the ten gaps before the five strengths and the five sampled ones."""
 _BETWEEN = 2000
-"""Number of the random stream of strengths between those of the table."""
+"""Number of the random stream that samples strengths between those of the table."""
 
 
 @dataclasses.dataclass
@@ -48,9 +50,9 @@ class End:
     limit: float
     """The last strength at which the policy is certainly good."""
     flown: list[tuple[float, bool]]
-    """Strengths, and whether the policy is certainly good at each."""
+    """Tested strengths, and whether the policy is certainly good at each."""
     failed: float | None = None
-    """The first strength of the course at which it is not."""
+    """The first strength of the outward search at which it is not; None if there is none."""
 
 
 def walk(axis: Axis, sign: int, seed: int, is_good: Callable[[float, float], bool]) -> End:
@@ -101,7 +103,7 @@ def range_of(
 
 
 class Prober:
-    """Tests at which strengths a policy is certainly good."""
+    """Test at which strengths a policy is certainly good."""
 
     def __init__(
         self,
@@ -125,7 +127,7 @@ class Prober:
         self.plain = self.probe(Condition(), plain_part)
 
     def rule_at(self, part: float) -> Rule:
-        """Return the rule with this part of an axis's error."""
+        """Return the rule with this fraction of an axis's error probability."""
         return dataclasses.replace(self._rule, error_rate=part * self._rule.error_rate)
 
     def probe(self, condition: Condition, part: float) -> dict[str, Any]:
@@ -167,13 +169,14 @@ class Prober:
         """Find the widest range of an axis.
 
         Returns:
-            "low", "high": its ends in the axis's unit, None for an infinite one; "positions": its
-            ends on the axis's scale, lower first, None if the policy is not certainly good even
-            without perturbation; "low_open", "high_open": whether the policy is still good at the
-            strongest perturbation of that side, None if there is none; "failed": where the sides
-            end, lower values first: "end", "value", the result of `probe`, the success rate of the
-            oracle ("oracle", None without one), and whether that makes it "impossible"; "flown":
-            everything tried, lowest position first: "value", "position" and "good".
+            "low", "high": the ends in the axis's unit; None if infinite. "positions": the ends on
+            the axis's scale, lower first; None if the policy is not certainly good even without
+            perturbation. "low_open", "high_open": whether the policy is still good at the strongest
+            perturbation of that side; None if the side has no strengths. "failed": the strength at
+            which each side ends, lower values first: "end", "value", the result of `probe`, the
+            oracle's success rate ("oracle"; None without one), and whether it is too low
+            ("impossible"). "flown": all tested strengths, lowest position first: "value",
+            "position" and "good".
         """
         if not self.plain["good"]:
             nothing = {"low": None, "high": None, "positions": None, "failed": [], "flown": []}
@@ -211,13 +214,13 @@ def is_surely_good(found: Mapping[str, Quantity], rule: Rule) -> bool:
 
 
 def _kinds(found: Mapping[str, Quantity], rule: Rule) -> frozenset[Kind]:
-    """All kinds that are possible."""
+    """Return all kinds that the intervals admit."""
     box = tuple(quantity.levels for quantity in found.values())
     return kinds_within(box, len(rule.strata))
 
 
 def _worst(found: Mapping[str, Quantity], rule: Rule) -> dict[str, Any] | None:
-    """The stratum with the smallest fraction of goals reached."""
+    """Return the stratum with the smallest fraction of goals reached, None if unknown."""
     shares = {s: found[f"collected {s}"].value for s in rule.strata}
     known = {stratum: share for stratum, share in shares.items() if share is not None}
     if not known:
@@ -227,7 +230,7 @@ def _worst(found: Mapping[str, Quantity], rule: Rule) -> dict[str, Any] | None:
 
 
 def _course(axis: Axis, side: list[float], seed: int) -> Iterator[float]:
-    """The strengths of one side, weakest first, and a random one before each."""
+    """Yield the strengths of one side, weakest first, each after a randomly sampled one."""
     generator = torch_generator(seed, Stream.SHIFTS, number=_BETWEEN)
     shares = torch.rand(len(axis.strengths), generator=generator, dtype=torch.float64)
     before = axis.neutral
@@ -238,12 +241,12 @@ def _course(axis: Axis, side: list[float], seed: int) -> Iterator[float]:
 
 
 def _side(axis: Axis, sign: int) -> list[float]:
-    """The table's strengths on one side of no perturbation, weakest first."""
+    """Return the table's strengths on one side of the neutral value, weakest first."""
     there = [strength for strength in axis.strengths if sign * axis.position(strength) > 0]
     return sorted(there, key=lambda strength: abs(axis.position(strength)))
 
 
 def _inside(axis: Axis, near: float, far: float, shares: list[float]) -> list[float]:
-    """Strengths between two, nearest first, each once."""
+    """Return strengths between two others at given fractions, without duplicates."""
     there = (axis.between(near, far, share) for share in shares)
     return list(dict.fromkeys(strength for strength in there if strength is not None))

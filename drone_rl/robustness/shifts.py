@@ -46,14 +46,14 @@ class Shifts:
     policy: Pilot
     settings: ShiftSettings
     numbers: dict[str, Any] = dataclasses.field(repr=False)
-    """As in `shifts.json`."""
+    """The results as plain values, as in `shifts.json`."""
     pictures: Mapping[str, Sequence[NDArray | None]] = dataclasses.field(repr=False)
-    """By axis, camera images without perturbation and at each of the five strengths; None where the
-    task does not allow one. Shapes: (H, W, 3), uint8."""
+    """Camera images of each axis: without perturbation, then at each of the five strengths; None if
+    the task does not allow the strength. Shapes: (H, W, 3), uint8."""
 
     @property
     def area(self) -> float:
-        """Mean over axes of the area under success rate over strength."""
+        """Mean over axes of the area under the curve of success rate against strength."""
         areas = [along["areas"]["constant"] for along in self.numbers["axes"].values()]
         known = [area for area in areas if area is not None]
         return sum(known) / max(len(known), 1)
@@ -110,11 +110,11 @@ def shifts(
     Args:
         policy: The policy, what `load_policy` takes, or a callable, see `policy_from`.
         settings: Axes, strengths, number of episodes and so on.
-        task: Settings to change of the policy's task.
-        dynamics: Settings to change of its dynamics.
+        task: Changed settings of the policy's task.
+        dynamics: Changed settings of its vehicle dynamics.
         outputs: See `load_policy`.
-        progress: Called with what is running; a progress bar by default.
-        changes: Settings to change, as in `shifts("good", axes=["light"])`.
+        progress: Called with the name of each step; a progress bar by default.
+        changes: Changed settings, as in `shifts("good", axes=["light"])`.
 
     Raises:
         InputError: The policy or a setting is unusable, or there is no such axis or strength.
@@ -161,7 +161,7 @@ def shifts(
 
 
 def ranges_of(numbers: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return an operating domain, as in `shifts.json`, in the form of requirements."""
+    """Convert the operating domain of `shifts.json` to the format of `require_domain`."""
     return {
         name: {end: found[end] for end in ("low", "high") if found[end] is not None}
         | {"unit": AXES[name].unit}
@@ -177,7 +177,7 @@ def _domain(
     seed: RootSeed,
     tell: Callable[[str], None],
 ) -> dict[str, Any]:
-    """The operating domain: "plain", and "ranges" by axis."""
+    """Return the operating domain: "plain", without perturbation, and "ranges" by axis."""
     task = as_task(subject.task)
     if task.oracle is None:
         raise InputError(f"task={task.name} has no oracle to compare with; give domain=false")
@@ -201,7 +201,7 @@ def make_policy_spec(pilot: Pilot, settings: ShiftSettings) -> PolicySpec:
     task = task if isinstance(task, BaseTaskSettings) else getattr(task, "settings", None)
     if not isinstance(task, BaseTaskSettings):
         raise InputError(
-            f"policy={pilot.name} flies in a task without settings; give one with some"
+            f"the task of policy={pilot.name} has no settings to perturb; give another policy"
         )
     env: Any = pilot.make_env(1, device=settings.device, renderer=settings.renderer)
     try:
@@ -209,7 +209,7 @@ def make_policy_spec(pilot: Pilot, settings: ShiftSettings) -> PolicySpec:
     finally:
         env.close()
     network = pilot.make_network(settings.device).eval()
-    described = getattr(pilot, "description", None)  # of policies from files
+    described = getattr(pilot, "description", None)  # only policies from files have one
     look = MINIMAL if described is None else described.appearance
     where, moved = (settings.device, settings.renderer), (pilot.dynamics, pilot.actions)
     return PolicySpec(network, task, camera, transforms, look, *where, *moved)

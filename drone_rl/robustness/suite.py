@@ -23,18 +23,18 @@ from drone_rl.utils.intervals import mean_bounds, proportion
 
 Report = Callable[[str], None]
 STEP = 8
-"""Step whose image is shown: the first cube is near, and delays show."""
+"""Step of the example images: the first cube is near, and delays are visible."""
 
 
 class Suite:
-    """Runs a policy and the oracle under all conditions."""
+    """Run a policy and the oracle under all conditions."""
 
     def __init__(
         self, evaluator: PairedEvaluator, modes: Sequence[Mode], possible_share: float
     ) -> None:
         """Run both without perturbation.
 
-        A strength is impossible if the oracle's success rate is below `possible_share`.
+        A strength is impossible if the oracle's success rate is certainly below `possible_share`.
         """
         self._evaluator, self._modes, self._possible = evaluator, modes, possible_share
         self.plain = evaluator.run(Condition())
@@ -43,11 +43,11 @@ class Suite:
         self.oracle = self._fly_oracle(Condition()) if self._knows else None
 
     def run(self, axes: Sequence[Axis], numbers: Iterable[int], tell: Report) -> dict[str, Any]:
-        """Measure axes at strengths of these numbers (from 1), one at a time and combined.
+        """Measure axes at the strengths with these numbers (from 1), alone and combined.
 
         Returns:
-            Plain values: "plain", without perturbation, "axes" by name, and "together", all at
-            once at their third strength.
+            Plain values: "plain", without perturbation; "axes", by name; and "together", all axes
+            combined, each at its third strength.
         """
         found = {axis.name: self.along(axis, numbers, tell) for axis in axes}
         tell("all together")
@@ -77,8 +77,8 @@ class Suite:
         """Measure one condition.
 
         Returns:
-            "refused": the reason if task or camera do not allow it, or None. Otherwise "oracle":
-            its success rate, if the task has one; "impossible": whether that is too low; "modes":
+            "refused": why the task or the camera does not allow it, or None; "oracle": the oracle's
+            success rate, if the task has an oracle; "impossible": whether that is too low; "modes":
             figures by mode.
         """
         try:
@@ -99,7 +99,7 @@ class Suite:
         }
 
     def _fly_oracle(self, condition: Condition) -> ConditionResult:
-        """Run the oracle, which light, colours and noise do not affect."""
+        """Run the oracle without light, colours and noise, which do not affect it."""
         faults = tuple(fault for fault in condition.faults if fault.hides)
         kept = dataclasses.replace(condition, looks=(), faults=faults)
         if kept == Condition() and self.oracle is not None:
@@ -125,7 +125,7 @@ class Suite:
 
 
 class FrameRecorder:
-    """Flies straight on and keeps the colour image of one step."""
+    """Fly straight on and record the colour image of one step."""
 
     knows_truth = False
 
@@ -137,7 +137,7 @@ class FrameRecorder:
         """See `Agent`."""
         images = context.render("rgb").movedim(-1, 1).float() / 255.0
         images = context.apply_faults(images, context.active)
-        if self._step <= STEP:  # some episodes end before
+        if self._step <= STEP:  # some episodes end earlier
             self.image = (images[0] * 255).round().to(torch.uint8).movedim(0, -1)
         self._step += 1
         return torch.zeros_like(context.active), None
@@ -159,7 +159,7 @@ def make_strip(evaluator: PairedEvaluator, axis: Axis) -> list[NDArray | None]:
 
 
 def finite(value: float) -> float | None:
-    """Return a value for a file, None if it is infinite, as the visibility without fog."""
+    """Return a finite value unchanged and None for infinity, such as visibility without fog."""
     return value if math.isfinite(value) else None
 
 
@@ -182,13 +182,13 @@ def mcnemar_p(lost: int, gained: int) -> float:
 
 
 def area(positions: Sequence[float], shares: Sequence[float]) -> float:
-    """Return the mean height of the curve through points of rising positions."""
+    """Return the mean height of the curve through points sorted by position."""
     width = positions[-1] - positions[0]
     return float(np.trapezoid(shares, positions)) / width if width else float(shares[0])
 
 
 def success_area(levels: Iterable[dict[str, Any]], plain: float, mode: Mode) -> float | None:
-    """Return the area under success rate over strength, None if there are no levels."""
+    """Return the area under the curve of success rate against strength; None without levels."""
     points = [(0.0, plain)] + [
         (level["position"], level["modes"][mode.value]["success"]["share"])
         for level in levels

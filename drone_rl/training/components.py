@@ -20,7 +20,7 @@ class Group(NamedTuple):
     env: TransformedEnv
     actor: Any
     network: PolicyNetwork
-    """All groups share it."""
+    """Shared by all groups."""
     generator: torch.Generator
     """Random stream of the actions."""
 
@@ -50,7 +50,7 @@ def group_sizes(settings: TrainSettings) -> list[int]:
 
 
 def episode_options(settings: TrainSettings, num_threads: int) -> dict[str, Any]:
-    """Return the arguments of `EpisodeCollector`; `num_threads` are those of a fused kernel."""
+    """Return the arguments of `EpisodeCollector`; a fused kernel uses `num_threads`."""
     chosen = settings.collector
     fused = isinstance(chosen, Episodes) and chosen.compiled
     return {"acceleration": "fused" if fused else "none", "num_threads": num_threads}

@@ -1,7 +1,7 @@
-"""Overrides (`key=value`) in the folder of an earlier run, checked before they are used.
+"""Read and check the overrides (`key=value`) in the folder of an earlier run.
 
-On a command line an override may name classes, files and programs. In a file of unknown origin it
-may not.
+Overrides on the command line may name classes, files and programs. Those in a file of unknown
+origin may not.
 """
 
 import re
@@ -15,9 +15,9 @@ from drone_rl.utils.readers import read_yaml
 from drone_rl.utils.schema import Kind, Several, Text, shown
 
 _OF_ONE_FOLDER = re.compile(r"\+{0,2}(resume|trial|paths(\.\w+)?)")
-"""Overrides of a run's place and sweep, which don't change what it learns; a run can be moved."""
+"""Overrides of a run's folder and sweep, which do not affect training; a run can be moved."""
 MOST_OVERRIDES = 200
-"""Overrides of one run."""
+"""Largest number of overrides of a run."""
 _LONGEST = 500
 _NAME = r"[A-Za-z]\w*"
 _HARMLESS = re.compile(rf"(\+{{0,2}}{_NAME}([./@]{_NAME})*=.*|~{_NAME}([./@]{_NAME})*)")
@@ -39,7 +39,7 @@ _TAKEN_OVER = (
 
 
 class _Command:
-    """A training's command that is safe to copy into a shell."""
+    """A training command that is safe to copy into a shell."""
 
     def read(self, value: Any, where: str) -> str:
         """See `drone_rl.utils.schema.Kind`."""
@@ -50,27 +50,27 @@ class _Command:
             words = []
         if words[:2] != ["drone-rl", "train"] or shlex.join(words) != text or "`" in text:
             raise InputError(
-                f"{where}={shown(value)} is no training command; give drone-rl train and its "
-                "settings, each quoted as a shell wants it"
+                f"{where}={shown(value)} is not a training command; give drone-rl train and its "
+                "settings, each quoted for a shell"
             )
         return text
 
 
 COMMAND: Kind = _Command()
-"""The kind of a training's command."""
+"""Kind (see `schema`) of a training command."""
 
 
 def check_harmless(override: str, where: str) -> str:
-    """Return an override that is safe to copy into a shell.
+    """Return an override if it is safe to copy into a shell.
 
     Raises:
-        InputError: It names code, a setting of Hydra or the value of another setting.
+        InputError: It refers to code, a Hydra setting or the value of another setting.
     """
     text = Text(_LONGEST).read(override, where)
     key = text.partition("=")[0].lstrip("+~")
     if not _HARMLESS.fullmatch(text) or key.startswith("hydra") or "${" in text or "`" in text:
         raise InputError(
-            f"{where} sets {shown(text)}, which is no plain setting; a file may not do that"
+            f"{where} sets {shown(text)}, which is not a plain setting; remove it from the file"
         )
     return text
 
@@ -95,14 +95,14 @@ def taken_over(folder: Path, typed: Collection[str]) -> list[str]:
     found = [o for o in read_overrides(folder) if _key(o) not in keys and not _is_of_one_folder(o)]
     for override in must_be_typed(found):
         raise InputError(
-            f"{folder}/.hydra/overrides.yaml sets {shown(override)}, which is not taken over "
-            "from a file; if it is yours, give it on the command line too"
+            f"{folder}/.hydra/overrides.yaml sets {shown(override)}, which can't be read from a "
+            "file for safety; if you trust it, repeat it on the command line"
         )
     return found
 
 
 def must_be_typed(overrides: Iterable[str]) -> list[str]:
-    """Return the overrides of a run that `taken_over` refuses."""
+    """Return the overrides of a run that `taken_over` rejects."""
     return [
         override
         for override in overrides

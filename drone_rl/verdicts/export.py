@@ -55,7 +55,7 @@ def export(
         Root of the random streams of the verdict's environments.
 
     Raises:
-        InputError: It can't be written, or a given file is unusable.
+        InputError: The policy can't be written, or a given file is unusable.
     """
     settings, seed = with_seed(settings)
     claim = find_claim(policy, certificate, seed=seed)
@@ -109,7 +109,7 @@ def export_policy(
     further files that the card quotes, by their paths.
 
     Raises:
-        InputError: It can't be written.
+        InputError: The files can't be written.
     """
     origin = checkpoint["provenance"]
     about = {
@@ -142,7 +142,7 @@ def write_card(name: str, digest: str, about: Evidence) -> str:
     """Return the card as Markdown.
 
     Args:
-        name: Of the policy.
+        name: Name of the policy.
         digest: SHA-256 of its file.
         about: The file's metadata: "command", "progress", "provenance", "verdict" (as in
             verdict.json), "worlds" (its stream of environments), "seed", "chosen" (None, or "runs"
@@ -164,8 +164,8 @@ def write_card(name: str, digest: str, about: Evidence) -> str:
 {_failures(about["verdict"]["failures"])}
 
 {points}
-- Trained by `{about["command"]}` in {about["progress"]["frames"]:,} frames; its description is in \
-the file's metadata.
+- Trained by `{about["command"]}` for {about["progress"]["frames"]:,} frames; the file's metadata \
+contains its description.
 - SHA-256 of `{name}.safetensors`: `{digest}`
 - revision {revision}; torch {packages["torch"]}, torchrl {packages["torchrl"]}, mujoco-warp \
 {packages["mujoco-warp"]}
@@ -173,7 +173,7 @@ the file's metadata.
 
 
 def _flights(verdict: Evidence) -> str:
-    """Table of greedy and sampled actions, the best random or constant baseline, and the oracle."""
+    """Return a table of greedy and sampled actions, the best blind baseline, and the oracle."""
     best = best_baseline(verdict)
     flown = {
         "most probable actions": verdict["greedy"],
@@ -192,7 +192,7 @@ def _flights(verdict: Evidence) -> str:
 
 
 def _failures(failures: Evidence) -> str:
-    """Rows of the failure table with failures, largest first."""
+    """Return the rows of the failure table that have failures, largest first."""
     largest = failures["largest"]
     if largest is None:
         upper = f"{100 * failures['bound']['upper95']:.1f}% of episodes"
@@ -212,7 +212,7 @@ def _table(rows: list[list[str]]) -> str:
 
 
 def _share(value: Evidence) -> str:
-    """A rate or a mean with its interval."""
+    """Return a rate or a mean with its interval, as text."""
     middle = value["share"] if "share" in value else value["mean"]
     if middle is None:
         return "not offered"
@@ -229,10 +229,11 @@ def _verdict(card: Evidence) -> str:
 
 
 def _reported(card: Evidence) -> str:
-    but = " but those of the certificate" if is_quoted(card["verdict"]) else ""
+    but = " except those of the certificate" if is_quoted(card["verdict"]) else ""
     return (
-        f"All figures{but} are of {card['verdict']['greedy']['episodes']:,} episodes in worlds to "
-        f"report on (seed {card['seed']}), which neither a training nor the choice in a sweep uses."
+        f"All figures{but} are from {card['verdict']['greedy']['episodes']:,} episodes in "
+        f"environments reserved for reports (seed {card['seed']}), which neither training nor the "
+        "selection in a sweep uses."
     )
 
 
@@ -241,15 +242,18 @@ def _chosen(card: Evidence) -> str:
     text = f"It is one of the {chosen['runs']} runs of a sweep"
     if chosen["episodes"] is None:
         return f"{text}, in which it was not judged."
-    return f"{text}, which are compared by {chosen['episodes']} episodes in worlds to choose by."
+    return (
+        f"{text}, which were compared by {chosen['episodes']} episodes in environments reserved "
+        "for selection."
+    )
 
 
 def _tested(card: Evidence) -> str:
     tested = terms_of(card["verdict"]).tested or some_cubes(card["task"])
     unknown = listed(untested(card), "or")
-    but = f": nothing is known of other {unknown}" if unknown else ", but for what is said here"
-    what = "The verdict is of" if has_domain(card) else "Tested with"
-    return f"{what} {tested}, in this task's look and light only{but}."
+    but = f": nothing is known of other {unknown}" if unknown else ", except as stated here"
+    what = "The verdict is for" if has_domain(card) else "Tested with"
+    return f"{what} {tested}, with this task's appearance only{but}."
 
 
 def _flies(card: Evidence) -> bool:
@@ -265,9 +269,9 @@ def _body(card: Evidence) -> str:
     air = " and ".join(filter(None, (wind, gusts))) or "still air"
     every = dynamics["control_ticks"] * dynamics["tick"]
     return (
-        f"Its drone has a body: a quadrotor of {dynamics['mass']:g} kg in {air}, told what to do "
-        f"every {every:.3g} s; nothing is known here of other drones, air or modes (drone-rl "
-        "bodies)."
+        f"The drone has vehicle dynamics: a quadrotor of {dynamics['mass']:g} kg in {air}, with an "
+        f"action every {every:.3g} s. The policy was not tested with other drones, air or modes "
+        "(drone-rl bodies)."
     )
 
 
@@ -278,30 +282,30 @@ SENTENCES = (
         "always",
         lambda c: True,
         lambda c: (
-            "In brackets: 95% intervals that count episodes, whatever depends on what within one; "
-            "those of the failures hold all at once."
+            "In brackets: 95% intervals that count episodes, whose steps may depend on each other; "
+            "those of the failures hold simultaneously."
         ),
     ),
     Sentence(
         "card.reported",
-        "the figures are from worlds to report on",
+        "the figures are from environments reserved for reports",
         lambda c: c["worlds"] == "report",
         _reported,
     ),
     Sentence(
         "card.chosen",
-        "the run lies in a sweep's folder",
+        "the run is in a sweep's folder",
         lambda c: c["chosen"] is not None,
         _chosen,
     ),
     Sentence(
         "card.not_chosen",
-        "the run does not lie in a sweep's folder",
+        "the run is not in a sweep's folder",
         lambda c: c["chosen"] is None,
         lambda c: "Whether it was chosen among several trainings, and how, is not recorded.",
     ),
     Sentence("card.tested", "always", lambda c: True, _tested),
-    Sentence("card.body", "its drone has a body", _flies, _body),
+    Sentence("card.body", "the drone has vehicle dynamics", _flies, _body),
     Sentence(
         "card.domain",
         "a robustness evaluation is of this network and task, and not refused",
@@ -319,8 +323,8 @@ SENTENCES = (
         "always",
         lambda c: True,
         lambda c: (
-            "Intended use: to study what a policy sees and whether to trust it, in this simulator; "
-            "not for a real drone."
+            "Intended use: to study how a policy uses its observations and whether to trust it, in "
+            "this simulator; not for a real drone."
         ),
     ),
 )

@@ -1,4 +1,4 @@
-"""Export a policy as an ONNX model that agrees with it."""
+"""Export a policy as an ONNX model and check that both agree."""
 
 import dataclasses
 from collections.abc import Callable
@@ -22,7 +22,7 @@ from drone_rl.verdicts.export import origin_of
 MOST_DIFFERENCE = 1e-5
 """Largest allowed difference of a probability from PyTorch's."""
 _WORLDS, _STEPS = 100, 100
-"""Of the comparison: 10,000 images."""
+"""Numbers of environments and steps of the comparison: 10,000 images."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Agreement:
     difference: float
     """Largest difference of a probability; NaN if one is NaN."""
     actions_differ: int
-    """Number of images with different most probable actions, or components."""
+    """Number of images for which the most probable action, or the largest component, differs."""
 
 
 @torch.no_grad()
@@ -73,10 +73,10 @@ def export_onnx(
     command: str | None = None,
     seed: int | None = None,
 ) -> Agreement:
-    """Write a policy as an ONNX model, if that agrees with the policy on the CPU.
+    """Write a policy as an ONNX model if the model agrees with the policy on the CPU.
 
     Args:
-        policy: The policy, or what `load_policy` takes.
+        policy: The policy, or an argument of `load_policy`.
         target: The file, ending in .onnx, see `drone_rl.policies.zoo.make_onnx`.
         command: The training command, for the metadata; None takes it from the policy's file or
             folder.
@@ -86,8 +86,8 @@ def export_onnx(
         Agreement of the model and PyTorch on 10,000 images of the policy's episodes.
 
     Raises:
-        InputError: It can't be converted or written, or the model does not agree; then nothing is
-            written.
+        InputError: The policy can't be converted or written, or the model does not agree with it;
+            no file is written.
     """
     policy = policy if isinstance(policy, Policy) else load_policy(policy)
     told = {"command": command or origin_of(policy.path, policy.state)[0]}
@@ -98,8 +98,8 @@ def export_onnx(
         found = agreement(env, actor, model, _STEPS)
     if not found.difference <= MOST_DIFFERENCE:
         raise InputError(
-            f"policy {policy.name} as an ONNX model gives probabilities that differ by up to "
-            f"{found.difference:.2g} from its own, and {MOST_DIFFERENCE:g} is allowed; export it "
+            f"the ONNX model of policy {policy.name} returns probabilities that differ by up to "
+            f"{found.difference:.2g} from the policy's, more than {MOST_DIFFERENCE:g}; export it "
             "with format=safetensors"
         )
     try:

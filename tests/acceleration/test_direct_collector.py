@@ -120,7 +120,7 @@ def test_a_subclass_of_the_environment_is_stepped_by_torchrl():
         pass
 
     env = with_transforms(Windy(2, SHORT), [GrayPixels()])
-    assert "environment Windy is no DroneEnv" in reasons(env, ["pixels"], KEPT)
+    assert "environment Windy is not a DroneEnv" in reasons(env, ["pixels"], KEPT)
 
 
 @pytest.mark.parametrize("name", ["oracle", "random", "left"])

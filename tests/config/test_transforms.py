@@ -37,7 +37,7 @@ _OF_FLOATS = ["blur", "noise", "dead_rows", "frozen_frames", "late_frames", "shi
 
 @pytest.mark.parametrize("name", _OF_FLOATS)
 def test_what_goes_wrong_in_a_camera_goes_wrong_with_floats(name):
-    with pytest.raises(InputError, match=f"{name} needs floats; let gray come first"):
+    with pytest.raises(InputError, match=f"{name} needs floats; put gray before it"):
         Transform.named(name, "x")().output(RGB)
 
 

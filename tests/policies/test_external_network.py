@@ -86,7 +86,7 @@ def test_module_is_copied_in_eval_mode():
         (lambda x: (left_half(x), x), "gives a tuple; give a callable that gives logits of shape"),
         (lambda x: None, "gives a NoneType; give a callable"),
         (lambda x: left_half(x) / 0 * 0, "gives logits that are not finite"),
-        (lambda x: torch.rand(len(x), 3), "gives other logits for the same image"),
+        (lambda x: torch.rand(len(x), 3), "gives different logits for the same image"),
     ],
 )  # fmt: skip
 def test_invalid_logits_raise(logits, message):

@@ -75,7 +75,7 @@ def test_a_card_quotes_a_certificate_that_then_travels_with_the_policy(tmp_path)
     card = (tmp_path / "mine.md").read_text()
     assert "A certificate states for every placement" in card
     assert "re-checked by 1,000 rollouts from fresh placements" in card
-    assert "All figures but those of the certificate are of 4 episodes" in card
+    assert "All figures except those of the certificate are from 4 episodes" in card
     beside = tmp_path / "mine.certificate.json"
     assert beside.read_bytes() == made.read_bytes()
     again = drone_rl.load_policy(target)

@@ -59,7 +59,7 @@ def test_what_is_always_said():
         "**poor** (certain, with a chance of error of at most 5%): "
         "This policy does not do its task."
     )
-    assert "400 episodes in worlds to report on (seed 5)" in found["card.reported"]
+    assert "400 episodes in environments reserved for reports (seed 5)" in found["card.reported"]
     assert "three cubes of 2.5 m, up to 6 m to either side and 0 m" in found["card.tested"]
     assert "nothing is known of other colours, light or sizes" in found["card.tested"]
     assert "not for a real drone" in found["card.use"]
@@ -95,7 +95,7 @@ BODY = {
 
 def test_a_body_is_told_with_its_air():
     told = said(SENTENCES, {**CARD, "dynamics": BODY})["card.body"]
-    assert "a quadrotor of 1.2 kg in wind of 5 m/s and gusts of 1.5 m/s, told" in told
+    assert "a quadrotor of 1.2 kg in wind of 5 m/s and gusts of 1.5 m/s, with" in told
     assert "every 0.198 s" in told and "other drones, air or modes" in told
     still = {**BODY, "wind": [0.0, 0.0, 0.0], "gusts": 0.0}
     assert "kg in still air" in said(SENTENCES, {**CARD, "dynamics": still})["card.body"]

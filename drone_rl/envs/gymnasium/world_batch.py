@@ -1,4 +1,4 @@
-"""Environments with NumPy arrays and Gymnasium spaces, for both Gymnasium classes."""
+"""A batch of environments with NumPy arrays and Gymnasium spaces; both classes use it."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -31,7 +31,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import Settings, kinds_of
 
 _MOST = float(np.finfo(np.float32).max)
-"""Bound of unbounded numbers: Gymnasium's checker requires finite ones."""
+"""Bound of spaces without a limit: Gymnasium's checker requires finite bounds."""
 
 
 def image_space(camera: CameraSettings) -> spaces.Box:
@@ -57,7 +57,7 @@ def action_space(entry: Entry) -> spaces.Space[Any]:
 
 
 def read_action(given: Any, actions: Actions, batch: tuple[int, ...] = ()) -> Tensor:
-    """Check and convert an action, or a batch of them. Shape: (*batch, *) of `actions.entry`.
+    """Check and convert an action, or a batch of them. Shape: (*batch, *actions.entry.shape).
 
     Raises:
         InputError: The action or its shape is invalid.
@@ -96,12 +96,12 @@ _PARTS: dict[str, type[Settings]] = {
     "dynamics": DynamicsSettings,
     "actions": ActionSettings,
 }
-"""Options that may be mappings of some of their settings."""
+"""Options that accept a mapping with some of their settings."""
 FILM_HEIGHT, FILM_WIDTH = 360, 640
 """Size in pixels of the images of `render`, which show the drone from behind."""
 END = "end_reason"
 Chosen = str | BaseTaskSettings | Task[Any] | None
-"""A task, its settings, or the import path of their class; cube collection by default."""
+"""A task, its settings, or the import path of the settings class; default: cube collection."""
 
 
 class WorldBatch:
@@ -110,7 +110,7 @@ class WorldBatch:
     def __init__(self, num_worlds: int, task: Chosen, given: Mapping[str, Any]) -> None:
         """Create the environments.
 
-        `given` are `GymnasiumSettings`, whose parts may be mappings, and settings of the task.
+        `given` has fields of `GymnasiumSettings`, some as mappings, and settings of the task.
 
         Raises:
             InputError: An option or setting is unknown or out of range.
@@ -146,8 +146,8 @@ class WorldBatch:
         self.action_space = action_space(self.worlds.dynamics.actions.entry)
 
     def reset(self, worlds: Tensor, generators: Sequence[np.random.Generator]) -> None:
-        """Start new episodes in environments, shape (k,), each from its random generator."""
-        # both objects share one bit generator
+        """Reset environments by index, shape (k,), each with its own random generator."""
+        # each RandomState shares its generator's bit generator, so both advance together
         streams = [np.random.RandomState(generator.bit_generator) for generator in generators]
         self.worlds.reset(worlds, streams)
 
@@ -171,7 +171,7 @@ class WorldBatch:
         return terminated.cpu().numpy(), truncated.cpu().numpy()
 
     def info(self) -> dict[str, NDArray[Any]]:
-        """Return `Worlds.info` with a scalar "end_reason", and "is_success". (num_worlds, *).
+        """Return `Worlds.info` with flat "end_reason" and with "is_success". (num_worlds, *).
 
         Unknown values are 0, since Gymnasium's checker rejects NaN.
         """
@@ -181,7 +181,7 @@ class WorldBatch:
         return {**info, "is_success": info[END] == self.worlds.task.success_end}
 
     def film(self) -> NDArray[np.uint8] | None:
-        """Render the drones from behind; warn without `render_mode`. (num_worlds, 360, 640, 3)."""
+        """Render each drone from behind, (num_worlds, 360, 640, 3); None without `render_mode`."""
         if self.render_mode is None:
             gymnasium.logger.warn("render() needs render_mode='rgb_array' at creation")
             return None

@@ -1,4 +1,4 @@
-"""Descriptions and files of policies; the package contains some, each with a model card."""
+"""Policy descriptions, policy files, and the shipped policies with their model cards."""
 
 from drone_rl.policies.zoo.description import PolicyDescription as PolicyDescription
 from drone_rl.policies.zoo.description import describe as describe

@@ -36,40 +36,40 @@ class FieldState(State):
     """State of N environments."""
 
     pillars: Tensor  # (N, P, 3) float64
-    """Positions of the pillars' middles, metres, row after row."""
+    """Positions of the pillars' centres in metres, row by row."""
     present: Tensor  # (N, P) bool
-    """Which of them stand; in an episode all do."""
+    """Whether each pillar is present; always true in episodes."""
     touched: Tensor  # (N, P) bool
     """Pillars that the drone has touched."""
     passed: Tensor  # (N, R) bool
-    """Rows that the drone has passed; of the last one, the line behind it."""
+    """Rows that the drone has passed; the last row is passed at the finish line."""
     side: Tensor  # (N, R) int64
-    """`Side` of each row when it came up; -1 before that."""
+    """`Side` of the nearest open lane when the row became the next one; -1 before that."""
     gap: Tensor  # (N, R) float64
-    """Metres between the pillars next to the nearest open lane, then; NaN before that."""
+    """Width in metres of the gap with the nearest open lane at that time; NaN before that."""
 
     @property
     def next_row(self) -> Tensor:
-        """Index of the first row that is not passed, R when none is left. Shape: (N,)."""
+        """Index of the first row that is not yet passed; R if all are passed. Shape: (N,)."""
         return self.passed.long().cumprod(-1).sum(-1)
 
     @property
     def rows(self) -> Tensor:
-        """The y of the pillars, row by row; infinite where none stands. Shape: (N, R, K)."""
+        """The y of the pillars in metres; infinite for absent pillars. Shape: (N, R, K)."""
         y = torch.where(self.present, self.pillars[..., 1], torch.inf)
         return y.unflatten(-1, (self.passed.shape[-1], -1))
 
 
 @dataclasses.dataclass
 class RowGoals(Goals):
-    """Rows that were to be passed; their strata are the sides of the nearest open lane."""
+    """The rows as goals; the stratum of a row is the side of its nearest open lane."""
 
     gap: Tensor  # (n, R) float64
-    """Metres between the pillars next to the nearest open lane; NaN if the row never came up."""
+    """Width in metres of the gap with the nearest open lane; NaN if never the next row."""
 
 
 class Pillars(common.PropTask[FieldState]):
-    """Get to the line and touch no pillar. The reward is progress, 1 for the whole way."""
+    """Reach the finish line without touching a pillar. The reward is progress, 1 in total."""
 
     name = PillarsSettings.name
     ends = EndReason
@@ -81,9 +81,9 @@ class Pillars(common.PropTask[FieldState]):
     scored = ("passed", "side", "gap", "rows")
     remembered = types.MappingProxyType(
         {
-            "rows": "y of the pillars, metres, row by row; infinite where none stands (T, R, K)",
+            "rows": "y of the pillars, metres, row by row; infinite if absent (T, R, K)",
             "passed": "whether each row has been passed, bool (T, R)",
-            "next_target": "index of the pillar of the next row nearest to the way, P if none (T,)",
+            "next_target": "index of the next row's pillar nearest to the path, P if none (T,)",
         }
     )
 
@@ -92,8 +92,8 @@ class Pillars(common.PropTask[FieldState]):
         self.lanes = Lanes(s)
         self.drone_size, self.origin = s.drone_size, (0.0, 0.0, s.altitude)
         tested = (
-            f"{plural(s.num_rows, 'row')} of pillars {s.width:g} m wide, {s.density:g} for each "
-            f"metre across, {s.spacing:g} m from row to row"
+            f"{plural(s.num_rows, 'row')} of pillars {s.width:g} m wide, {s.density:g} per metre "
+            f"of row width, {s.spacing:g} m from row to row"
         )
         self.vocabulary = dataclasses.replace(PILLARS, tested=tested)
         self.oracle = OracleRule(("drone", "rows", "next_row"), self.lanes.fly_through, MOVES)
@@ -126,7 +126,7 @@ class Pillars(common.PropTask[FieldState]):
         return torch.from_numpy(self.lanes.draw_field(random_state))
 
     def start(self, drawn: Tensor, body: BodyState) -> FieldState:
-        """Return states at the start of episodes; `drawn` is the y of pillars, (N, R, K)."""
+        """Return initial states; `drawn` is the sampled y of the pillars, (N, R, K)."""
         s = self.settings
         row = torch.arange(drawn.shape[1], dtype=drawn.dtype, device=drawn.device)
         x = (s.first_distance + s.spacing * row)[:, None].expand_as(drawn)
@@ -168,7 +168,7 @@ class Pillars(common.PropTask[FieldState]):
         return new, progress - s.collision_penalty * is_hit
 
     def _sightings(self, state: FieldState) -> tuple[Tensor, Tensor]:
-        """Return side and width of gap, recorded of each row up to the next one. (N, R)."""
+        """Return the recorded side and gap width of each row up to the next one. (N, R)."""
         index = torch.arange(state.side.shape[1], device=state.side.device)
         is_new = (state.side < 0) & (index <= state.next_row[:, None])
         envs, rows = is_new.nonzero(as_tuple=True)
@@ -181,7 +181,7 @@ class Pillars(common.PropTask[FieldState]):
         return side, gap
 
     def _end_reason(self, state: FieldState) -> Tensor:
-        """Return the first reason that holds, from the last line of this upwards. (N,)."""
+        """Return the end reason; later lines take precedence. Shape: (N,)."""
         s, (x, y, _) = self.settings, state.drone.unbind(-1)
         return (
             torch.zeros_like(state.steps)
@@ -193,12 +193,12 @@ class Pillars(common.PropTask[FieldState]):
         )
 
     def obstacles(self, state: FieldState) -> Obstacles:
-        """Return the pillars."""
+        """Return the pillars as obstacles."""
         s = self.settings
         return Obstacles(self.places(state), (s.width / 2, s.width / 2, s.height / 2))
 
     def info(self, state: FieldState) -> dict[str, Tensor]:
-        """See `entries`."""
+        """Return the values of `entries`."""
         names = ("passed", "touched", "side", "gap")
         return {
             **{name: getattr(state, name).clone() for name in names},
@@ -210,12 +210,12 @@ class Pillars(common.PropTask[FieldState]):
     # Goals
 
     def score(self, info: Mapping[str, Tensor]) -> RowGoals:
-        """Each row is a goal, which is reached by passing it."""
+        """Return the rows as goals; a goal is reached when its row is passed."""
         world = info["rows"].flatten(1)
         return RowGoals(info["passed"], info["side"], world, gap=info["gap"])
 
     def classes(self, goals: RowGoals) -> Iterator[tuple[str, str, Tensor]]:
-        """Yield classes by number of the row, side and width of the gap."""
+        """Yield the classes of goals: by row number, side and gap width."""
         yield from common.number_classes("row", goals)
         yield from super().classes(goals)
         narrow, step = self.settings.drone_size, self.settings.step_length
@@ -225,18 +225,18 @@ class Pillars(common.PropTask[FieldState]):
     # Explanations
 
     def remember(self, info: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """See `remembered`."""
+        """Return the values of `remembered`."""
         drone_y, next_row = info["drone"][:, 1], info["next_row"][:, 0]
         pillar = nearest_pillar(info["rows"], drone_y, next_row)
         return {"rows": info["rows"], "passed": info["passed"], "next_target": pillar}
 
     def tally(self, info: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
-        """Return the number of rows passed; none is missed while the episode goes on."""
+        """Return the numbers of rows passed and missed; a running episode misses none."""
         passed = info["passed"].sum(-1)
         return passed, torch.zeros_like(passed)
 
     def recall(self, kept: Mapping[str, Tensor], body: BodyState) -> FieldState:
-        """Return states as they were, except side and gap, which are not kept."""
+        """Return the recorded states; `side` and `gap` are not recorded and stay unset."""
         rows = kept["rows"].double()
         standing = rows.isfinite()
         state = self.start(torch.where(standing, rows, 0.0), body)
@@ -250,19 +250,19 @@ class Pillars(common.PropTask[FieldState]):
         )
 
     def next_target(self, state: FieldState) -> Tensor:
-        """Return the standing pillar of the next row that is nearest to the drone's lane."""
+        """Return the present pillar of the next row that is nearest to the drone's lane."""
         return nearest_pillar(state.rows, state.drone[:, 1], state.next_row)
 
     def next_offset(self, state: FieldState) -> Tensor:
-        """Return where it stands, level with the drone."""
+        """Return the offset of the target from the drone in the horizontal plane."""
         return super().next_offset(state) * torch.tensor([1.0, 1.0, 0.0]).to(state.pillars)
 
     def is_reached(self, state: FieldState, target: Tensor) -> Tensor:
-        """Return whether the drone is past it and has touched none."""
+        """Return whether the drone has passed the target and touched no pillar."""
         return self.is_behind(state, target) & ~state.touched.any(-1)
 
     def needed(self, offset: Tensor) -> Tensor:
-        """Return a turn away from it where flying straight on would touch it."""
+        """Return a move away from the pillar if flying straight on would touch it."""
         lateral = offset[..., 1]
         is_in_way = lateral.abs() <= self.settings.touch_distance
         turn = torch.where(lateral > 0, Move.RIGHT, Move.LEFT)

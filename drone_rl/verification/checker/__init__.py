@@ -1,1 +1,1 @@
-"""The independent checker of certificates: slow, plain, and without any code of the prover."""
+"""The independent certificate checker: slow, simple, and without code of the prover."""

@@ -1,4 +1,4 @@
-"""Read certificates: data of bounded size, parsed strictly, nothing in it trusted."""
+"""Read certificates: untrusted data of bounded size, parsed strictly."""
 
 import dataclasses
 import hashlib
@@ -36,9 +36,9 @@ _DIGITS = len(str(10**5))
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """One way in which episodes end, and the placements from which they do."""
+    """One outcome of episodes, and the placements that lead to it."""
 
-    end: EndReason  # why
+    end: EndReason  # why the episodes end
     collected: tuple[bool, ...]  # whether each cube is collected by then
     loops: bool  # whether the drone oscillates until the step limit
     share: float  # stated fraction of the volume of all placements
@@ -54,11 +54,11 @@ class Outcome:
 
 @dataclasses.dataclass(frozen=True)
 class Certificate:
-    """The statements about a policy in a task."""
+    """Statements about a policy in a task."""
 
-    name: str  # the policy's name, for people
+    name: str  # the policy's name, for display
     weights: str  # see `fingerprint`
-    description: PolicyDescription  # the policy's, in the task of the certificate
+    description: PolicyDescription  # of the policy, with the task of the certificate
     outcomes: tuple[Outcome, ...]
     undecided_share: float
     undecided: NDArray[np.float64]  # boxes without a statement. Shape: (boxes, cubes, 2)
@@ -79,7 +79,7 @@ def read_certificate(path: Path) -> Certificate:
     """Read a certificate from a JSON file.
 
     Raises:
-        InputError: It is missing, too large, damaged, or no certificate.
+        InputError: The file is missing, too large, damaged or not a certificate.
     """
     content = read_bytes(path, CERTIFICATE_BYTES)
     try:
@@ -100,7 +100,7 @@ def parse_certificate(data: Any) -> Certificate:
     if task.vertical_bound != 0 or task.lateral_bound == 0:
         raise InputError(
             f"its task has vertical_bound={task.vertical_bound} and lateral_bound="
-            f"{task.lateral_bound}; certificates are of 0 and of more than 0"
+            f"{task.lateral_bound}; certificates require 0 and more than 0"
         )
     if task.num_cubes > MOST_CUBES:
         raise InputError(f"num_cubes={task.num_cubes} is out of range; give at most {MOST_CUBES}")
@@ -110,10 +110,10 @@ def parse_certificate(data: Any) -> Certificate:
     )
     undecided = _read_boxes(read["undecided"]["boxes"], "undecided.boxes", cubes)
     if (steps := sum(len(outcome.steps) for outcome in outcomes)) > MOST_STEPS:
-        raise InputError(f"it has {steps} numbers of steps; give at most {MOST_STEPS}")
+        raise InputError(f"it has {steps} step counts; give at most {MOST_STEPS}")
     count = sum(len(outcome.boxes) for outcome in outcomes) + len(undecided)
     if count > (most := min(MOST_BOXES, MOST_CORNERS >> cubes)):
-        raise InputError(f"it has {count} boxes; of {cubes} cubes give at most {most}")
+        raise InputError(f"it has {count} boxes; give at most {most} for {cubes} cubes")
     return Certificate(
         name=read["policy"]["name"],
         weights=read["policy"]["weights"],
@@ -165,7 +165,7 @@ _WHOLE = schema.Record(
 def _read_outcome(read: Mapping[str, Any], where: str, cubes: int) -> Outcome:
     if len(read["collected"]) != cubes:
         raise InputError(
-            f"{where}.collected has {len(read['collected'])} values; give {cubes}, one a cube"
+            f"{where}.collected has {len(read['collected'])} values; give {cubes}, one per cube"
         )
     return Outcome(
         end=EndReason[read["end"].upper()],
@@ -178,12 +178,12 @@ def _read_outcome(read: Mapping[str, Any], where: str, cubes: int) -> Outcome:
 
 
 def _read_steps(value: Any, where: str) -> dict[int, float]:
-    """Return fractions by number of steps, written without leading zeros."""
+    """Parse fractions by number of steps; the numbers have no leading zeros."""
     steps = {}
     for name, share in schema.Plain(deepest=1).read(schema.as_mapping(value, where), where).items():
         if not (name.isascii() and name.isdigit() and len(name) <= _DIGITS and name[0] != "0"):
             raise InputError(
-                f"{where}.{schema.shown(name)} is no number of steps; give one above 0"
+                f"{where}.{schema.shown(name)} is not a number of steps; give one above 0"
             )
         steps[int(name)] = _SHARE.read(share, f"{where}.{name}")
     return steps
@@ -195,13 +195,13 @@ def _read_boxes(value: Any, where: str, cubes: int) -> NDArray[np.float64]:
     numbers = [value]
     for length in (None, cubes, 2):
         if not all(type(part) is list and length in (None, len(part)) for part in numbers):
-            raise InputError(f"{where} is of another shape; {shape}")
+            raise InputError(f"{where} has another shape; {shape}")
         numbers = list(chain.from_iterable(numbers))
     if not {*map(type, numbers)} <= {int, float}:
-        raise InputError(f"{where} holds something else than numbers; {shape}")
+        raise InputError(f"{where} contains values other than numbers; {shape}")
     boxes = np.array(numbers, np.float64).reshape(len(value), cubes, 2)
     if not np.isfinite(boxes).all():
-        raise InputError(f"{where} holds a number that is not finite; {shape}")
+        raise InputError(f"{where} contains a number that is not finite; {shape}")
     size = abs(boxes)
     if ((size < LEAST_BORDER) & (size > 0)).any() or (size > MOST_BORDER).any():
         raise InputError(
@@ -229,25 +229,25 @@ def check_same_policy(
     weights: Mapping[str, torch.Tensor],
     task: BaseTaskSettings | None = None,
 ) -> None:
-    """Check that a certificate is of this policy and task, and that the policy can have one.
+    """Check that a certificate is for this policy and task, and that the policy can have one.
 
-    The task of the description does not count; any task will do by default.
+    The task in `described` is ignored. Without `task`, any task is accepted.
 
     Raises:
-        InputError: It is of another network, camera or task, or the policy has memory or camera
-            faults.
+        InputError: The certificate is for another network, camera or task, or the policy has
+            memory or camera faults.
     """
     require_cubes(described, "certificates")
     if certificate.weights != (own := fingerprint(weights)):
         raise InputError(
             f"the certificate is of a network with the hash {certificate.weights[:12]}..., the "
-            f"policy's has {own[:12]}...; give policy= the file that was proved"
+            f"policy's has {own[:12]}...; set policy to the file that was proved"
         )
     stated, own_parts = certificate.description.as_dict(), described.as_dict()
     for part in ("appearance", "dynamics", "actions", "camera", "transforms", "network"):
         if stated.get(part) != own_parts.get(part):
             raise InputError(
-                f"the certificate and the policy differ in {part}; give policy= the file that was "
+                f"the certificate and the policy differ in {part}; set policy to the file that was "
                 "proved"
             )
     if task is not None and certificate.task != task:

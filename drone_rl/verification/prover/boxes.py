@@ -22,7 +22,7 @@ _MOST_PAIRS = 10_000_000  # pairs of boxes compared at a time; bounds memory
 
 
 def all_placements(bound: float, num_cubes: int) -> Boxes:
-    """Return the one box in which every cube stands anywhere from -bound to bound."""
+    """Return the box of all placements: each cube is anywhere from -bound to bound."""
     return np.broadcast_to([-bound, bound], (1, num_cubes, 2)).astype(np.float64)
 
 
@@ -87,7 +87,7 @@ def complement(boxes: Boxes, space: Boxes, most: int = MOST_GRIDS) -> Boxes | No
 
 
 def _select(boxes: Boxes, space: Boxes, most: int, *, covered: bool) -> Boxes | None:
-    """Return what is covered by boxes or not; None if it takes more than `most` grids."""
+    """Return the part of a space that is covered, or not; None if `most` grids do not suffice."""
     found = []
     for some, sides in _grids(boxes, space, most) or ():
         ends = blocks(_covered(some, sides) == covered)
@@ -107,7 +107,7 @@ def unite(intervals: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
 
 
 def blocks(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the set cells of a grid as blocks: first cell and end. Shape: (N, axes, 2)."""
+    """Return the true cells of a mask as blocks: first cell and end. Shape: (N, axes, 2)."""
     edges = np.diff(mask.view(np.int8), prepend=0, append=0, axis=-1)
     first, last = np.argwhere(edges > 0), np.argwhere(edges < 0)
     after = first + 1
@@ -116,7 +116,7 @@ def blocks(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 
 def ragged(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the row of each entry of rows of different lengths, and its index in the row."""
+    """Return row and index in the row of each entry of rows with these lengths."""
     row = np.repeat(np.arange(len(counts)), counts)
     return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
 
@@ -124,10 +124,10 @@ def ragged(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int
 def resolve_forks(
     forks: Sequence[Boxes], endings: Mapping[E, Boxes], unknown: Sequence[Boxes], num_cubes: int
 ) -> tuple[dict[E, Boxes], Boxes]:
-    """Assign placements with several possible actions to the ending that all branches share.
+    """Assign forks, placements with several possible actions, to the ending all branches share.
 
-    The forks are disjoint. Some branch from each box of `endings` has that ending, and some from
-    each box of `unknown` has no known one; together they cover the forks.
+    The forks are disjoint. From each box of `endings`, at least one branch has that ending; from
+    each box of `unknown`, at least one has no known ending. Together these boxes cover the forks.
 
     Returns:
         The forks with exactly one possible ending, disjoint, by ending; and the rest.
@@ -169,7 +169,7 @@ def _meets(boxes: Boxes, others: Boxes) -> NDArray[np.bool_]:
 
 
 def _grids(boxes: Boxes, space: Boxes, most: int) -> list[tuple[Boxes, Sides]] | None:
-    """Cut a space into at most `most` small grids: the boxes in each, and the grid's borders."""
+    """Cut a space into up to `most` small grids, each with its boxes and borders, if possible."""
     found: list[tuple[Boxes, Sides]] = []
     rest = [(boxes, space)]
     while rest:
@@ -188,7 +188,7 @@ def _grids(boxes: Boxes, space: Boxes, most: int) -> list[tuple[Boxes, Sides]] |
 
 
 def _covered(boxes: Boxes, sides: Sides) -> NDArray[np.bool_]:
-    """Return which cells of a grid any box covers."""
+    """Return whether each cell of a grid is covered by a box."""
     ends = np.stack([np.searchsorted(side, boxes[:, k]) for k, side in enumerate(sides)], 1)
     count = np.zeros([len(side) for side in sides], np.int32)
     for corner in itertools.product((0, 1), repeat=len(sides)):

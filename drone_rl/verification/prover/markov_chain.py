@@ -22,8 +22,8 @@ from drone_rl.verification.prover.policy_spec import PolicySpec
 
 MIN_PROBABILITY = 1e-18  # nodes less probable than this at every step are not evaluated
 NEGLIGIBLE = 1e-15  # sum of the probabilities of running episodes at which propagation stops
-MOST_ROUNDING = 0.1  # largest rounding error of a logit; usual policies have about 0.01
-ROUNDING = 1e-9  # more than the float64 error of some hundred steps
+MOST_ROUNDING = 0.1  # largest rounding error of a logit; typical policies have about 0.01
+ROUNDING = 1e-9  # bound on the float64 error of several hundred steps
 BATCH = 1000  # images rendered at a time; bounds memory
 _FEW = 256
 _BATCH = 512
@@ -37,12 +37,12 @@ class Outcomes(Batch):
     """How episodes end in `P` placements of `C` cubes."""
 
     ends: Tensor  # (P, len(EndReason), 2**C) float64
-    """Probability of each end with exactly these cubes collected; bit k of the last index stands
-    for cube k."""
+    """Probability of each end reason with exactly these cubes collected. Bit k of the last index is
+    set if cube k is collected."""
     steps: Tensor  # (P,) float64; expected length of an episode
     undecided: Tensor  # (P,) float64
-    """Probability not followed to its end. Every other probability is too low by at most this, and
-    never too high, up to float64 rounding."""
+    """Probability of episodes that are not followed to their end. Every other probability is too
+    low by at most this, and never too high, up to float64 rounding."""
 
     @property
     def success(self) -> Tensor:
@@ -51,7 +51,7 @@ class Outcomes(Batch):
 
     @property
     def failure(self) -> Tensor:
-        """Probability that they are not, to full precision even if tiny. Shape: (P,)."""
+        """Probability that a cube is missed, to full precision even if tiny. Shape: (P,)."""
         return self.reasons[:, [end for end in EndReason if end != EndReason.ALL_CUBES]].sum(-1)
 
     @property
@@ -73,7 +73,7 @@ class Outcomes(Batch):
 
 
 def propagate(graph: Graph, evaluate: Evaluate) -> Outcomes:
-    """Carry the probability of every node from step to step until all episodes have ended."""
+    """Propagate the probability of every node step by step until all episodes have ended."""
     count, sets = len(graph.cubes), 2 ** graph.cubes.shape[1]
     placement = graph.nodes.placement.numpy()
     probability, visits, last, dropped = _propagate(graph, evaluate)
@@ -93,7 +93,8 @@ def propagate(graph: Graph, evaluate: Evaluate) -> Outcomes:
 def _propagate(graph: Graph, evaluate: Evaluate) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Return action probabilities (K, A), 0 where not evaluated, and three values of each node.
 
-    They are the expected visits, the probability at the step limit, and that not followed. (K,).
+    The three values, each (K,), are the expected number of visits, the probability at the step
+    limit, and the probability that is not followed.
     """
     target = graph.target.numpy()
     goes_on = target >= 0
@@ -118,7 +119,7 @@ def _propagate(graph: Graph, evaluate: Evaluate) -> tuple[NDArray, NDArray, NDAr
 
 
 class NodeEvaluator:
-    """Renders graph nodes and evaluates the policy's action probabilities there."""
+    """Render graph nodes and evaluate the policy's action probabilities at them."""
 
     def __init__(self, env: TransformedEnv, network: nn.Module) -> None:
         self.pictures = 0  # images rendered so far
@@ -152,7 +153,7 @@ class NodeEvaluator:
             pixels = self._worlds.render(part)
             for transform in self._transforms:
                 pixels = transform._apply_transform(pixels)
-            logits.append(self._network(pixels))  # refuses what is not finite
+            logits.append(self._network(pixels))  # raises for values that are not finite
             self._check_rounding(pixels)
         return torch.cat(logits).double().softmax(-1).cpu()
 
@@ -234,13 +235,13 @@ def _bound(actions: "_ActionBounds", box: Boxes) -> tuple[float, float]:
 
 
 def _reachable(spec: PolicySpec, box: Boxes) -> tuple[list[LatticeState], NDArray[np.int64]]:
-    """Return all reachable states, and where moves may lead (states, moves, possible targets).
+    """Return all reachable states, and targets of moves (states, moves, possible targets).
 
     A target is 0 for failure, 1 for success, else 2 plus the index of the state.
     """
     lattice, number = spec.lattice, {LatticeState(0, 0): 0}
     places, found = [LatticeState(0, 0)], []
-    for place in places:  # which grows
+    for place in places:  # the loop appends to `places`
         for move in _MOVES:
             targets = []
             for moved, _ in lattice.move(place, move, box[None]):
@@ -301,7 +302,7 @@ class _ActionBounds:
 def _extreme(
     values: NDArray[np.float64], lowest: NDArray[np.float64], highest: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the least mean that probabilities within bounds allow. Shapes: (N, A) to (N,)."""
+    """Return the smallest mean over all probabilities within bounds. (N, A) to (N,)."""
     order = values.argsort(-1)
     values, low, high = (np.take_along_axis(v, order, -1) for v in (values, lowest, highest))
     left = (1.0 - low.sum(-1)).clip(0.0)

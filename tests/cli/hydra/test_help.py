@@ -16,10 +16,10 @@ def test_the_comment_above_a_knob_is_its_own():
     found = read_comments(CONF / "transforms" / "original.yaml")
     assert found == {
         "gray": "RGB bytes to gray from 0 to 1.",
-        "standardize": "Shifted and scaled: (x - mean) / std.",
+        "standardize": "Shift and scale: (x - mean) / std.",
         "standardize.mean": "Gray level that becomes 0.",
         "standardize.std": "Deviation that becomes 1.",
-        "crop": "The rows that are kept, from top (included) to bottom (excluded).",
+        "crop": "Crop to the rows from top (included) to bottom (excluded).",
         "crop.top": "First row.",
         "crop.bottom": "First row that is not kept.",
     }

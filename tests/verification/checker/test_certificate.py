@@ -45,12 +45,12 @@ def test_where_it_comes_from_may_be_told(one_sided):
         (["outcomes", 0, "end"], "running", "end='running' is unknown"),
         (["outcomes", 0, "collected"], [True, True], "has 2 values; give 1"),
         (["outcomes", 0, "share"], 1.5, r"outcomes\[0\]\.share=1\.5"),
-        (["outcomes", 0, "steps"], {"007": 0.1}, "'007' is no number of steps"),
+        (["outcomes", 0, "steps"], {"007": 0.1}, "'007' is not a number of steps"),
         (["outcomes", 0, "steps"], {"12": -0.1}, r"steps\.12=-0\.1"),
         (["outcomes", 0, "steps"], [], "must be a mapping"),
         (["outcomes", 0, "boxes"], {}, "another shape"),
         (["outcomes", 0, "boxes"], [[[1.0, 2.0, 3.0]]], "another shape; give a list of boxes"),
-        (["outcomes", 0, "boxes"], [[[1.0, True]]], "something else than numbers"),
+        (["outcomes", 0, "boxes"], [[[1.0, True]]], "values other than numbers"),
         (["outcomes", 0, "boxes"], [[[1.0, float("inf")]]], "not finite"),
         (["outcomes", 0, "boxes"], [[[1.0, 1.0]]], r"boxes\[0\] is empty"),
         (["undecided", "boxes"], [[[2.0, 1.0]]], r"undecided\.boxes\[0\] is empty"),
@@ -77,10 +77,10 @@ def test_a_missing_claim_is_refused(one_sided):
 def test_sizes_are_bounded(one_sided, write, monkeypatch):
     path = write(one_sided)
     monkeypatch.setattr(module, "MOST_BOXES", 2)
-    with pytest.raises(InputError, match="it has 3 boxes; of 1 cubes give at most 2"):
+    with pytest.raises(InputError, match="it has 3 boxes; give at most 2 for 1 cubes"):
         read_certificate(path)
     monkeypatch.setattr(module, "MOST_STEPS", 1)
-    with pytest.raises(InputError, match="numbers of steps; give at most 1"):
+    with pytest.raises(InputError, match="step counts; give at most 1"):
         read_certificate(path)
     monkeypatch.setattr(module, "CERTIFICATE_VALUES", 3)
     with pytest.raises(InputError, match="more than 3 values"):
