@@ -13,10 +13,10 @@ from benchmarks.known_map_policies import path_weights
 from drone_rl.explanations import patches
 from drone_rl.explanations.patches import shuffled_networks
 from drone_rl.explanations.trust import MapOf
-from drone_rl.policies import PictureNetwork
+from drone_rl.policies import ImageNetwork
 
 
-def adversarial_maps(absent: Tensor, other: PictureNetwork) -> dict[str, MapOf]:
+def adversarial_maps(absent: Tensor, other: ImageNetwork) -> dict[str, MapOf]:
     """Return adversarial maps by name.
 
     Args:
@@ -73,7 +73,7 @@ def adversarial_maps(absent: Tensor, other: PictureNetwork) -> dict[str, MapOf]:
     }  # fmt: skip
 
 
-def fingerprint(network: PictureNetwork) -> int:
+def fingerprint(network: ImageNetwork) -> int:
     """Return a hash of a network's weights."""
     digest = hashlib.sha256()
     for value in network.state_dict().values():
@@ -81,7 +81,7 @@ def fingerprint(network: PictureNetwork) -> int:
     return int.from_bytes(digest.digest()[:4], "little")
 
 
-def saliency(network: PictureNetwork, observations: Tensor, actions: Tensor) -> Tensor:
+def saliency(network: ImageNetwork, observations: Tensor, actions: Tensor) -> Tensor:
     """Return the absolute gradient of the action's logit. Shape: (T, h, w)."""
     x = observations.detach().clone().requires_grad_()
     chosen = network(x).gather(1, actions[:, None]).sum()
@@ -111,7 +111,7 @@ def _coarse(seed: int, height: int, width: int) -> Tensor:
     return functional.interpolate(_noise(seed, 1, 5, 8)[:, None], (height, width))[:, 0]
 
 
-def _if_strong(network: PictureNetwork, x: Tensor, guess: Tensor, absent: Tensor) -> Tensor:
+def _if_strong(network: ImageNetwork, x: Tensor, guess: Tensor, absent: Tensor) -> Tensor:
     """Return a guess with noise; the noise alone if the policy hardly depends on the image."""
     with torch.no_grad():
         spread = (network(x).softmax(-1) - network(absent[None]).softmax(-1)).abs().mean()

@@ -25,8 +25,8 @@ from drone_rl.evaluation.evaluate import evaluate
 from drone_rl.evaluation.judge import judge_for_selection
 from drone_rl.policies import MLP
 from drone_rl.policies.external_network import Logits
-from drone_rl.policies.external_policy import ForeignPolicy, policy_from
-from drone_rl.policies.policy import Pilot, load_policy
+from drone_rl.policies.external_policy import ExternalPolicy, policy_from
+from drone_rl.policies.policy import BasePolicy, load_policy
 from drone_rl.policies.zoo import describe, read_policy
 from drone_rl.policies.zoo.files import exported_bytes
 from drone_rl.robustness.shifts import shifts
@@ -188,13 +188,13 @@ def _always_left(frames: Tensor) -> Tensor:
     return _confident_logits([int(Move.LEFT)] * len(frames))
 
 
-def _memorising(make: Callable[[Recording], Logits], stream: Stream) -> ForeignPolicy:
+def _memorising(make: Callable[[Recording], Logits], stream: Stream) -> ExternalPolicy:
     """Return a third-party policy that memorises environments of the known seed."""
     policy = policy_from(_always_left, task=TASK, name="memory")
     return dataclasses.replace(policy, logits=make(record(EPISODES, stream=stream)))
 
 
-def _verdict(make: Callable[[], Pilot | Path], seed: int | None) -> bool:
+def _verdict(make: Callable[[], BasePolicy | Path], seed: int | None) -> bool:
     try:
         done = judge(make(), episodes=EPISODES, sampled=False, seed=seed, progress=silent)
     except InputError:  # the policy depends on more than the frame
@@ -202,12 +202,12 @@ def _verdict(make: Callable[[], Pilot | Path], seed: int | None) -> bool:
     return done.verdict.exit_code == 0
 
 
-def _evaluation(make: Callable[[], Pilot | Path], seed: int | None) -> bool:
+def _evaluation(make: Callable[[], BasePolicy | Path], seed: int | None) -> bool:
     done = evaluate(make(), episodes=EPISODES, baselines=False, seed=seed, progress=silent)
     return done.flown["greedy"]["success"]["lower95"] > _GOOD
 
 
-def _conditions(make: Callable[[], Pilot | Path], seed: int | None) -> bool:
+def _conditions(make: Callable[[], BasePolicy | Path], seed: int | None) -> bool:
     done = shifts(
         make(),
         axes=["noise"],
@@ -243,7 +243,7 @@ def judgements(folder: Path) -> dict[str, Judgement]:
     folder.mkdir(parents=True, exist_ok=True)
 
     @functools.cache
-    def callable_of(make: Callable[[Recording], Logits], stream: Stream) -> ForeignPolicy:
+    def callable_of(make: Callable[[Recording], Logits], stream: Stream) -> ExternalPolicy:
         return _memorising(make, stream)
 
     @functools.cache

@@ -19,7 +19,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from drone_rl.policies import MLP, PictureNetwork, PolicyNetwork, SmallCNN
+from drone_rl.policies import MLP, ImageNetwork, PolicyNetwork, SmallCNN
 from drone_rl.sim.actions import MOVES
 
 Window = tuple[float, float, float, float]
@@ -50,7 +50,7 @@ class KnownMapPolicy:
     """Whether its actions do not depend on the image, so that no map is true."""
 
 
-def path_weights(network: PictureNetwork, observations: Tensor, actions: Tensor) -> Tensor:
+def path_weights(network: ImageNetwork, observations: Tensor, actions: Tensor) -> Tensor:
     """Return how strongly each pixel can influence the action, computed from the weights alone.
 
     It is the sum over all paths from the pixel to the logits of the product of absolute weights.

@@ -16,7 +16,7 @@ from benchmarks.known_map_policies import make_policies, path_weights
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.scenes import Scenes, alternatives, empty_scene
 from drone_rl.explanations.trust import Trial, check_maps, measure
-from drone_rl.policies import PictureNetwork, SmallCNN
+from drone_rl.policies import ImageNetwork, SmallCNN
 from drone_rl.policies.environment import make_env
 from drone_rl.policies.zoo import load_exported, parse, policy_names, policy_path
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, WorldState
@@ -46,7 +46,7 @@ def bench_maps(folder: Path, quick: bool) -> dict[str, Any]:
     seen, absent = scenes.observe(state), scenes.observe(empty_scene(scenes))[0]
     others = list(alternatives(scenes, state).values())
 
-    def trial(network: PictureNetwork) -> Trial:
+    def trial(network: ImageNetwork) -> Trial:
         greedy = probabilities(network, seen).argmax(-1)
         return measure(network, greedy, seen, others, absent, episode)
 
@@ -116,7 +116,7 @@ def expert(scenes: Scenes, state: WorldState) -> Tensor:
     return scenes.needed(scenes.task.next_offset(state))
 
 
-def shipped(absent: Tensor) -> dict[str, PictureNetwork]:
+def shipped(absent: Tensor) -> dict[str, ImageNetwork]:
     """Return the shipped policies with discrete moves and this image shape, by name."""
     networks = {}
     for name in policy_names():
@@ -132,7 +132,7 @@ def shipped(absent: Tensor) -> dict[str, PictureNetwork]:
     return networks
 
 
-def untrained(absent: Tensor, count: int = 4) -> dict[str, PictureNetwork]:
+def untrained(absent: Tensor, count: int = 4) -> dict[str, ImageNetwork]:
     """Return policies with random weights and confident outputs, by name."""
     networks = {}
     for seed in range(count):

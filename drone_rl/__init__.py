@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from drone_rl.flight.commands.state import Sensors as Sensors
     from drone_rl.flight.commands.state import Trajectory as Trajectory
     from drone_rl.policies.environment import make_env as make_env
-    from drone_rl.policies.external_policy import ForeignPolicy as ForeignPolicy
+    from drone_rl.policies.external_policy import ExternalPolicy as ExternalPolicy
     from drone_rl.policies.external_policy import policy_from as policy_from
     from drone_rl.policies.policy import Policy as Policy
     from drone_rl.policies.policy import load_policy as load_policy

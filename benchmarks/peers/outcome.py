@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from drone_rl.policies.external_policy import ForeignPolicy
+from drone_rl.policies.external_policy import ExternalPolicy
 
 TARGET, DECAY = 2.97, 0.99
 """Target and decay of the running mean of episode rewards, which starts at 0."""
@@ -16,5 +16,5 @@ class PeerTraining:
     """Whether the running mean has reached the target."""
     frames: int
     running_reward: float
-    policy: ForeignPolicy
+    policy: ExternalPolicy
     """The trained policy, for evaluation in held-out environments."""

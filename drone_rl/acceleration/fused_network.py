@@ -22,7 +22,7 @@ from drone_rl.acceleration.packed_layers import (
     unsupported,
 )
 from drone_rl.envs.direct_renderer import Reasons
-from drone_rl.policies.networks import PictureNetwork, PolicyNetwork
+from drone_rl.policies.networks import ImageNetwork, PolicyNetwork
 from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 
 MAX_WEIGHTS = 2**20
@@ -89,7 +89,7 @@ def _sample_pixels(observations: Tensor) -> Tensor:
     return flat[:, :: max(1, flat.shape[1] // 16)]
 
 
-class FusedNetwork(PictureNetwork):
+class FusedNetwork(ImageNetwork):
     """Compute the same logits and gradients as a network, faster than torch.
 
     With a small network, torch spends a third of its time between matrix products. The fused kernel

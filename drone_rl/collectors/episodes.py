@@ -91,7 +91,7 @@ class EpisodeCollector(BatchedCollector):
 
 
 _STEPS = 8
-"""Of one rollout; an episode ends within one of several."""
+"""Steps of one call of TorchRL's collector; an episode may span several calls."""
 
 
 class SteppingCollector:

@@ -59,10 +59,10 @@ def accelerated_collector(
         kept: ("next", ...) entries to keep of each step.
         extra: Entries that the actor writes, kept in addition to the action.
         keep_observations: Whether to keep observations and everything that the actor writes.
-        num_threads: Of the fused kernel; no result depends on it.
+        num_threads: Threads of the fused kernel; no result depends on it.
     """
     if acceleration == "none":
-        return Reasons(["collector.compiled is false"])
+        return Reasons(["acceleration is off"])
     package = _package()
     if package is None:
         return MISSING

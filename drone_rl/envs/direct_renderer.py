@@ -87,7 +87,7 @@ class DirectRenderer:
         if "pixels" in observed and not base.pixels:
             reasons.append("the environment renders no pixels")
         reasons += [f"the policy reads {key}" for key in observed if key not in readable]
-        reasons += [f"entry {key} is not fused" for key in kept if key not in known]
+        reasons += [f"entry {key} needs a step of TorchRL" for key in kept if key not in known]
         return Reasons(reasons) if reasons else cls(base, transforms, observed, kept)
 
     def look(self, state: State, rows: Tensor | None = None) -> TensorDictBase:

@@ -15,8 +15,8 @@ from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.evaluation.rounding_sensitivity import run_compared
 from drone_rl.evaluation.verdict_text import unlike as unlike_text
 from drone_rl.policies.external_network import Logits
-from drone_rl.policies.external_policy import as_pilot
-from drone_rl.policies.policy import Pilot
+from drone_rl.policies.external_policy import as_policy
+from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.display import aligned, interval, paragraph, table
 from drone_rl.utils.progress import Bar, Progress
@@ -29,7 +29,7 @@ from drone_rl.utils.text import Evidence, Sentence, fixed_seed, percent, say, se
 class Evaluation:
     """Figures of a policy and of the baselines on the same initial states."""
 
-    policy: Pilot
+    policy: BasePolicy
     settings: EvaluateSettings
     flown: dict[str, dict[str, Any]]
     """Figures by name, see `drone_rl.evaluation.metrics.summarise`: "greedy", "sampled" and the
@@ -95,7 +95,7 @@ class Evaluation:
 
 
 def evaluate(
-    policy: str | Path | Pilot | Logits,
+    policy: str | Path | BasePolicy | Logits,
     settings: EvaluateSettings | None = None,
     *,
     progress: Progress | None = None,
@@ -114,7 +114,7 @@ def evaluate(
     """
     settings, seed = with_seed((settings or EvaluateSettings()).replace(**changes))
     progress = progress or Bar()
-    policy = as_pilot(policy)
+    policy = as_policy(policy)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with held_out_environments(policy, settings, seed) as (env, actor):
         state, dynamics = env.base_env.state_dict(), worlds_of(env).dynamics
@@ -133,7 +133,7 @@ def evaluate(
 
 
 def held_out_environments(
-    policy: Pilot, settings: FlightSettings, seed: RootSeed
+    policy: BasePolicy, settings: FlightSettings, seed: RootSeed
 ) -> AbstractContextManager[tuple[Any, TensorDictModuleBase]]:
     """Return a context manager of environments that no training uses, and the policy's actor."""
     where: dict[str, Any] = {"device": settings.device, "renderer": settings.renderer}

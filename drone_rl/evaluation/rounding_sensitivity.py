@@ -30,10 +30,10 @@ from drone_rl.evaluation.rollouts import (
     outcome_difference,
     run_episodes,
 )
-from drone_rl.policies import PictureNetwork, make_actor
-from drone_rl.policies.external_policy import ForeignPolicy
+from drone_rl.policies import ImageNetwork, make_actor
+from drone_rl.policies.external_policy import ExternalPolicy
 from drone_rl.policies.networks import require_finite
-from drone_rl.policies.policy import Pilot
+from drone_rl.policies.policy import BasePolicy
 from drone_rl.policies.rounding import (
     REMEDY,
     Decide,
@@ -73,16 +73,16 @@ def run_compared(
     return episodes, compare_implementations(env, actor, flown=episodes, log=log)
 
 
-def require_function(policy: Pilot, **how: Any) -> None:
+def require_function(policy: BasePolicy, **how: Any) -> None:
     """Check that a third-party policy acts by the current frame only.
 
     Policies of this package act so by construction. `how` are the seed, device and renderer of the
-    environments, see `Pilot.flying`.
+    environments, see `BasePolicy.flying`.
 
     Raises:
         InputError: Its actions depend on the batch, on a frame's row, or on earlier calls.
     """
-    if isinstance(policy, ForeignPolicy):
+    if isinstance(policy, ExternalPolicy):
         with policy.flying(_CHECKED_EPISODES, **how) as (env, actor):
             run_compared(env, actor, _CHECKED_EPISODES)
 
@@ -104,7 +104,7 @@ def check_rounding(
         InputError: An output is not finite, or a third-party network is no function of the frame.
     """
     network = getattr(actor, "network", None)
-    if not isinstance(network, PictureNetwork):
+    if not isinstance(network, ImageNetwork):
         return None
     decide, is_bound = decider(network)
     arithmetic, is_exact = arithmetic_on(worlds_of(env).device)
@@ -186,9 +186,7 @@ def _first_differences(
 class _CheckingActor(TensorDictModuleBase):
     """Act greedily, and write whether rounding could change the action."""
 
-    def __init__(
-        self, decide: Decide, network: PictureNetwork, *, is_contrary: bool = False
-    ) -> None:
+    def __init__(self, decide: Decide, network: ImageNetwork, *, is_contrary: bool = False) -> None:
         """Take a network; `is_contrary` takes its second best action where that is possible."""
         super().__init__()
         self.in_keys, self.out_keys = ["pixels"], ["action", "fragile"]
@@ -244,7 +242,7 @@ class _Checked:
 
 
 def _run_checked(
-    env: EnvBase, decide: Decide, network: PictureNetwork, episodes: int
+    env: EnvBase, decide: Decide, network: ImageNetwork, episodes: int
 ) -> tuple[_Checked, list[Tensor]]:
     """Run episodes and check each frame. Returns also the actions of each episode."""
     renderer = DirectRenderer.try_create(env, ("pixels",), ())
@@ -295,7 +293,7 @@ def _run_second_best(
 
 
 def _run_regrouped(
-    env: EnvBase, network: PictureNetwork, episodes: int
+    env: EnvBase, network: ImageNetwork, episodes: int
 ) -> tuple[list[Tensor], Episodes]:
     """Run with the network evaluated in other batches. Returns actions and episodes."""
     log, actor = StepLog(), make_actor(Regrouped(network, "mixed"), env.action_spec)
@@ -304,7 +302,7 @@ def _run_regrouped(
 
 
 def _require_function_of_frames(
-    env: EnvBase, network: PictureNetwork, log: StepLog, checked: _Checked
+    env: EnvBase, network: ImageNetwork, log: StepLog, checked: _Checked
 ) -> None:
     """Check that a third-party network acts by the frame alone, in batches of any size."""
     before, frames = base_env(env).state_dict(), torch.empty(0)

@@ -15,7 +15,7 @@ from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.heat_maps import Objective
 from drone_rl.explanations.hooks import actions_of
-from drone_rl.policies import PictureNetwork
+from drone_rl.policies import ImageNetwork
 
 OBJECTIVES: tuple[Objective, ...] = ("probability", "logit")
 AS_PROBABLE = 0.01  # of observations whose probabilities differ by less, the smoothest is the best
@@ -147,7 +147,7 @@ class ImageStatistics:
 
 
 def visualise(
-    network: PictureNetwork,
+    network: ImageNetwork,
     statistics: ImageStatistics,
     settings: ClassModelSettings,
     *,
@@ -176,7 +176,7 @@ def visualise(
 
 
 def search(
-    network: PictureNetwork,
+    network: ImageNetwork,
     statistics: ImageStatistics,
     objective: Objective = "logit",
     *,

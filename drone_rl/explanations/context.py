@@ -17,7 +17,7 @@ from drone_rl.explanations.hooks import feature_layer, features
 from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
-from drone_rl.policies import PictureNetwork, make_actor
+from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
 from drone_rl.verdicts.certificate import Claim
@@ -40,7 +40,7 @@ class Context:
     def __init__(
         self,
         env: TransformedEnv,
-        network: PictureNetwork,
+        network: ImageNetwork,
         settings: ExplainSettings,
         claim: Claim | None = None,
         measured: SavedShifts | None = None,

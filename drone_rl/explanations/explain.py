@@ -20,10 +20,10 @@ from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.report.explanation import FORMAT, FORMAT_VERSION
 from drone_rl.explanations.settings import ExplainSettings
-from drone_rl.policies import PictureNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.policies.external_network import Logits
-from drone_rl.policies.external_policy import as_pilot
-from drone_rl.policies.policy import Pilot
+from drone_rl.policies.external_policy import as_policy
+from drone_rl.policies.policy import BasePolicy
 from drone_rl.utils.display import page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name
@@ -36,7 +36,7 @@ from drone_rl.verdicts.coverage import find_domain
 from drone_rl.verification.prover.policy_spec import one_thread
 
 _Result = tuple[dict[str, Any], dict[str, NDArray], float] | LeftOutError  # or why it is left out
-Given = str | Path | Pilot | Logits  # a policy or something that `as_pilot` converts to one
+Given = str | Path | BasePolicy | Logits  # a policy or something that `as_policy` converts to one
 Section = Callable[[Context], tuple[dict[str, Any], dict[str, NDArray]]]
 """Returns entries of `explanation.json` and `arrays.npz`; writes nothing, runs at any time."""
 SECTIONS: dict[str, Section] = {
@@ -114,7 +114,7 @@ def explain(
     folder, progress = Path(folder), progress or Bar()
     folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(chosen)}
 
-    def explain_one(policy: Pilot, folder: Path) -> dict[str, Any]:
+    def explain_one(policy: BasePolicy, folder: Path) -> dict[str, Any]:
         require_function(policy, seed=seed.value, renderer=settings.renderer)
         env = policy.make_env(num_envs, seed=seed.value, renderer=settings.renderer)
         with closing(env):
@@ -140,11 +140,11 @@ def explain(
     return Explanations(folder, report, numbers, seed)
 
 
-def _named(policies: Given | Sequence[Given]) -> dict[str, Pilot]:
+def _named(policies: Given | Sequence[Given]) -> dict[str, BasePolicy]:
     """Return the policies by name or, if some share a name, by file."""
     if isinstance(policies, str) or not isinstance(policies, Sequence):
         policies = [policies]
-    loaded = [as_pilot(policy) for policy in policies]
+    loaded = [as_policy(policy) for policy in policies]
     names = [policy.name for policy in loaded]
     if len(set(names)) < len(names):
         names = [policy.origin["policy"] for policy in loaded]
@@ -155,7 +155,7 @@ def _named(policies: Given | Sequence[Given]) -> dict[str, Pilot]:
 
 def explain_policy(
     env: TransformedEnv,
-    network: PictureNetwork,
+    network: ImageNetwork,
     folder: Path,
     settings: ExplainSettings,
     *,

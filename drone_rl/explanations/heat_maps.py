@@ -13,7 +13,7 @@ from torch.nn import functional
 from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.explanations.hooks import actions_of, find_layer, probabilities, spatial_layers
 from drone_rl.explanations.patches import replaced
-from drone_rl.policies import PictureNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.utils.errors import InputError
 
 Objective = Literal["probability", "logit"]
@@ -26,7 +26,7 @@ MapMethod = Callable[[Tensor, Tensor], Tensor]  # observations and actions (T,) 
 class Explainer:
     """Heat maps of one policy by several methods, all of the size of its observations."""
 
-    network: PictureNetwork
+    network: ImageNetwork
     absent: Tensor  # baseline: the observation of the scene without targets. Shape: (C, H, W).
     layer: str | None = None  # layer of Grad-CAM; the last convolution's nonlinearity by default
 

@@ -7,7 +7,7 @@ import torch
 from captum.attr import LayerActivation
 from torch import Tensor, nn
 
-from drone_rl.policies import PictureNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.utils.errors import InputError
 
@@ -16,7 +16,7 @@ _TRIED = 2  # observations in the forward pass that finds the layers
 
 
 @torch.no_grad()
-def layers(network: PictureNetwork) -> dict[str, tuple[nn.Module, tuple[int, ...]]]:
+def layers(network: ImageNetwork) -> dict[str, tuple[nn.Module, tuple[int, ...]]]:
     """Return layers by name in the order of the forward pass, with the shapes of their outputs.
 
     A layer has no submodules, runs once, and returns one tensor; a policy that is no torch module
@@ -41,7 +41,7 @@ def layers(network: PictureNetwork) -> dict[str, tuple[nn.Module, tuple[int, ...
     return {names[layer]: (layer, shape) for layer, shape in ran if shape and times[layer] == 1}
 
 
-def find_layer(network: PictureNetwork, name: str) -> nn.Module:
+def find_layer(network: ImageNetwork, name: str) -> nn.Module:
     """Return the layer of that name; if there is none, raise InputError with those that exist."""
     found = dict(network.parts.named_modules()).get(name) if name else None
     if found is None or [*found.children()]:
@@ -50,7 +50,7 @@ def find_layer(network: PictureNetwork, name: str) -> nn.Module:
     return found
 
 
-def spatial_layers(network: PictureNetwork) -> list[str]:
+def spatial_layers(network: ImageNetwork) -> list[str]:
     """Return layers with a feature map, in order; none in an MLP.
 
     Each is the layer after a convolution if it keeps the shape, usually a nonlinearity, or else the
@@ -64,31 +64,31 @@ def spatial_layers(network: PictureNetwork) -> list[str]:
     return found
 
 
-def feature_layer(network: PictureNetwork) -> str | None:
+def feature_layer(network: ImageNetwork) -> str | None:
     """Return the last layer before the logits; None if there is none."""
     names = [*layers(network)]
     return names[-2] if len(names) > 1 else None
 
 
 @torch.no_grad()
-def features(network: PictureNetwork, observations: Tensor, layer: str) -> Tensor:
+def features(network: ImageNetwork, observations: Tensor, layer: str) -> Tensor:
     """Return a layer's output (T, *) on observations (T, C, h, w); see `find_layer` for errors."""
     method = LayerActivation(network, find_layer(network, layer))
     return torch.cat([cast(Tensor, method.attribute(part)) for part in observations.split(BATCH)])
 
 
 @torch.no_grad()
-def outputs(network: PictureNetwork, observations: Tensor) -> Tensor:
+def outputs(network: ImageNetwork, observations: Tensor) -> Tensor:
     """Evaluate the network in batches. Shape: (T, C, h, w) to (T, number of outputs)."""
     return torch.cat([network(part) for part in observations.split(BATCH)])
 
 
 @torch.no_grad()
-def probabilities(network: PictureNetwork, observations: Tensor) -> Tensor:
+def probabilities(network: ImageNetwork, observations: Tensor) -> Tensor:
     """Return action probabilities (Eq. 9). Shape: (T, C, h, w) to (T, number of parts)."""
     return actions_of(network).wish(outputs(network, observations))
 
 
 def actions_of(network: nn.Module) -> Actions:
     """Return the actions that a network's outputs stand for; the three moves if unknown."""
-    return network.actions if isinstance(network, PictureNetwork) else MOVES
+    return network.actions if isinstance(network, ImageNetwork) else MOVES

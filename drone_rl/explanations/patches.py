@@ -17,7 +17,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from drone_rl.explanations.hooks import BATCH, actions_of, probabilities
-from drone_rl.policies import PictureNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.utils.intervals import episode_means, mean_bounds
 
 PATCHES = 40  # approximate number of patches of a frame
@@ -81,7 +81,7 @@ def make_grid(height: int, width: int, patches: int = PATCHES) -> Grid:
 
 @torch.no_grad()
 def replaced(
-    network: PictureNetwork, observations: Tensor, other: Tensor, masks: Tensor
+    network: ImageNetwork, observations: Tensor, other: Tensor, masks: Tensor
 ) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
     """Evaluate the policy with one part of an observation replaced, for all parts that differ.
 
@@ -97,7 +97,7 @@ def replaced(
 
 
 def patch_effects(
-    network: PictureNetwork, observations: Tensor, others: Iterable[Tensor], grid: Grid
+    network: ImageNetwork, observations: Tensor, others: Iterable[Tensor], grid: Grid
 ) -> NDArray:
     """Return the effect on the policy of replacing each patch by alternatives (T, C, h, w).
 
@@ -223,8 +223,8 @@ def smoothed(maps: Tensor, passes: int = 2) -> Tensor:
 
 
 def shuffled_networks(
-    network: PictureNetwork, observations: Tensor, count: int, seed: int = 0
-) -> Iterator[PictureNetwork]:
+    network: ImageNetwork, observations: Tensor, count: int, seed: int = 0
+) -> Iterator[ImageNetwork]:
     """Yield copies of a policy with weights and biases shuffled within each layer.
 
     They are often nearly constant, which alone would distinguish their maps. So each copy's logits,

@@ -15,7 +15,7 @@ from drone_rl.explanations.context import Context
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.rollouts import run_to_end
 from drone_rl.explanations.scenes import Scenes, empty_scene, place_target
-from drone_rl.policies import PictureNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.sim.tasks import CollectCubes, Grid, State
 from drone_rl.utils.errors import InputError
@@ -88,7 +88,7 @@ class OutcomeMap:
 
 def response_map(
     scenes: Scenes,
-    network: PictureNetwork,
+    network: ImageNetwork,
     *,
     num_lateral: int = 41,
     num_forward: int = 31,
@@ -169,7 +169,7 @@ def find_blind(actions: Actions, wishes: Tensor, alone: Tensor, needed: Tensor) 
 
 def outcome_map(
     scenes: Scenes,
-    network: PictureNetwork,
+    network: ImageNetwork,
     *,
     num_lateral: int = 21,
     num_forward: int = 8,
@@ -210,7 +210,7 @@ def summarise(response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str])
 
 
 def asymmetry(
-    network: PictureNetwork, observations: Tensor, episode: NDArray, actions: Actions
+    network: ImageNetwork, observations: Tensor, episode: NDArray, actions: Actions
 ) -> dict[str, Any]:
     """Compare the policy with its mirror image on observations x (T, C, H, W).
 

@@ -23,7 +23,7 @@ from drone_rl.collectors import EpisodeCollector
 from drone_rl.envs import worlds_of
 from drone_rl.explanations.hooks import features, outputs, probabilities
 from drone_rl.explanations.scenes import Region, Scenes
-from drone_rl.policies import PictureNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.rendering import Appearance
@@ -154,7 +154,7 @@ def render_frames(
     flights: RolloutDataset,
     rows: NDArray,
     scenes: Scenes,
-    network: PictureNetwork,
+    network: ImageNetwork,
     layers: tuple[str, ...] = (),
 ) -> RolloutDataset:
     """Return steps (T,) with frames, ground truth, probabilities and outputs of layers."""
@@ -235,7 +235,7 @@ class Step:
 @torch.no_grad()
 def rollout(
     scenes: Scenes,
-    network: PictureNetwork,
+    network: ImageNetwork,
     state: State,
     stays_active: Callable[[Step], Tensor],
     appearance: Appearance | None = None,
@@ -262,7 +262,7 @@ def rollout(
     return done
 
 
-def run_to_end(scenes: Scenes, network: PictureNetwork, state: State) -> State:
+def run_to_end(scenes: Scenes, network: ImageNetwork, state: State) -> State:
     """Step until the episode ends, no target is left, or the policy is in a loop.
 
     A policy without memory is in a loop if it is back at its pose of two steps before. Such

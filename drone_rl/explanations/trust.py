@@ -35,11 +35,11 @@ from drone_rl.explanations.patches import (
     shuffled_networks,
 )
 from drone_rl.explanations.scenes import Scenes, alternatives, empty_scene
-from drone_rl.policies import PictureNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.sim.tasks import State
 from drone_rl.utils.intervals import episode_means, median_bounds
 
-MapOf = Callable[[PictureNetwork, Tensor, Tensor], Tensor]
+MapOf = Callable[[ImageNetwork, Tensor, Tensor], Tensor]
 """A method: network, observations (T, C, h, w) and actions (T,) to maps (T, h, w), 0 or more."""
 ERROR_RATE = 0.05  # probability that any method is trusted whose maps do not depend on the policy
 FRAMES_AN_EPISODE = 10  # frames of an episode that are tested, evenly spaced
@@ -51,7 +51,7 @@ MOST_ALIKE = 0.5  # from this correlation with maps of shuffled weights on, a ma
 class Trial:
     """The reference for tests of one policy's maps: frames in which some patch affects it."""
 
-    network: PictureNetwork
+    network: ImageNetwork
     observations: Tensor  # (T, C, h, w)
     actions: Tensor  # (T,); actions to explain
     effects: NDArray  # (T, patches); effect of each patch; see `patch_effects`
@@ -73,7 +73,7 @@ class Trial:
             episode=self.episode[rows],
         )
 
-    def maps(self, method: MapOf, network: PictureNetwork | None = None) -> Tensor:
+    def maps(self, method: MapOf, network: ImageNetwork | None = None) -> Tensor:
         """Return a method's maps of the trial's frames. Shape: (T, h, w)."""
         if not len(self.observations):
             return self.observations.new_zeros(0, *self.observations.shape[-2:])
@@ -90,7 +90,7 @@ class Trial:
 
 
 def measure(
-    network: PictureNetwork,
+    network: ImageNetwork,
     actions: Tensor,
     observations: Tensor,
     others: Sequence[Tensor],
@@ -123,7 +123,7 @@ def measure(
 
 def make_trial(
     scenes: Scenes,
-    network: PictureNetwork,
+    network: ImageNetwork,
     state: State,
     actions: Tensor,
     episode: NDArray,
@@ -146,7 +146,7 @@ def make_trial(
 def method_maps(explainer: Explainer) -> dict[str, MapOf]:
     """Return an explainer's methods as functions of any network of the same shape."""
 
-    def of(name: str, network: PictureNetwork, *inputs: Tensor) -> Tensor:
+    def of(name: str, network: ImageNetwork, *inputs: Tensor) -> Tensor:
         return dataclasses.replace(explainer, network=network).methods()[name](*inputs)
 
     return {name: functools.partial(of, name) for name in explainer.methods()}

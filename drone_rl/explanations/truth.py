@@ -16,7 +16,7 @@ from drone_rl.explanations.patches import sample_frames
 from drone_rl.explanations.rollouts import Step, rollout
 from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes
 from drone_rl.explanations.trust import Trial
-from drone_rl.policies import PictureNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import State
@@ -163,7 +163,7 @@ class Intervention:
 
 
 def intervene(
-    scenes: Scenes, network: PictureNetwork, state: State, regions: Tensor, seed: int = 0
+    scenes: Scenes, network: ImageNetwork, state: State, regions: Tensor, seed: int = 0
 ) -> list[Intervention]:
     """Remove, move and recolour the next target; as a control, change a patch of ground.
 
@@ -189,7 +189,7 @@ def intervene(
 
 
 def _effect(
-    network: PictureNetwork, scenes: Scenes, base: Tensor, frames: Tensor, area: Tensor
+    network: ImageNetwork, scenes: Scenes, base: Tensor, frames: Tensor, area: Tensor
 ) -> NDArray:
     change = scenes.actions.distance(probabilities(network, scenes.transform(frames)), base)
     return torch.where(area.flatten(1).any(1), change, torch.nan).double().cpu().numpy()
@@ -227,7 +227,7 @@ class TargetRollouts:
 
 
 def measure_outcomes(
-    scenes: Scenes, network: PictureNetwork, state: State, episode: NDArray
+    scenes: Scenes, network: ImageNetwork, state: State, episode: NDArray
 ) -> dict[str, Any]:
     """Compare greedy rollouts with the next target moved, and with another ground.
 
@@ -266,7 +266,7 @@ def measure_outcomes(
 
 def run_to_target(
     scenes: Scenes,
-    network: PictureNetwork,
+    network: ImageNetwork,
     state: State,
     target: Tensor,
     appearance: Appearance | None = None,

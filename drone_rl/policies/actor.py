@@ -16,7 +16,7 @@ from torchrl.data import TensorSpec
 from torchrl.envs.utils import ExplorationType, exploration_type
 from torchrl.modules import ProbabilisticActor
 
-from drone_rl.policies.networks import PictureNetwork
+from drone_rl.policies.networks import ImageNetwork
 from drone_rl.sim.continuous_actions import normal_of
 
 
@@ -189,7 +189,7 @@ def make_actor(
     """
     kind = distribution_of(action_spec.dtype)
     make = CategoricalActor if kind is SeededCategorical else StraightActor
-    in_keys = network.in_keys if isinstance(network, PictureNetwork) else ("pixels",)
+    in_keys = network.in_keys if isinstance(network, ImageNetwork) else ("pixels",)
     return make(
         TensorDictModule(network, in_keys=list(in_keys), out_keys=["logits"]),
         in_keys=["logits"],

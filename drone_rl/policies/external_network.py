@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from drone_rl.policies.networks import PictureNetwork
+from drone_rl.policies.networks import ImageNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.utils.errors import InputError
 
@@ -18,7 +18,7 @@ _REPEATS = 1e-5
 """Largest difference between logits of the same frame from a deterministic network."""
 
 
-class ForeignNetwork(PictureNetwork):
+class ExternalNetwork(ImageNetwork):
     """A copy of a torch module in evaluation mode, or an unchanged callable.
 
     Raises:
@@ -74,7 +74,7 @@ class ForeignNetwork(PictureNetwork):
         return self._logits if isinstance(self._logits, nn.Module) else nn.Module()
 
     def forward(self, pixels: Tensor) -> Tensor:
-        """See `PictureNetwork`; raise an `InputError` if the result is not finite logits."""
+        """See `ImageNetwork`; raise an `InputError` if the result is not finite logits."""
         flat = pixels.reshape(-1, *self.in_shape)
         made = self._logits(self._given(flat))
         wanted, names = (len(flat), self.num_actions), ", ".join(self.actions.output_names)
@@ -95,7 +95,7 @@ class ForeignNetwork(PictureNetwork):
         return logits.reshape(*pixels.shape[:-3], self.num_actions)
 
     def rescale(self, factor: Tensor, shift: Tensor) -> None:
-        """See `PictureNetwork`; the callable itself does not change."""
+        """See `ImageNetwork`; the callable itself does not change."""
         self._factor, self._shift = self._factor * factor, self._shift * factor + shift
 
     def _given(self, flat: Tensor) -> Tensor:

@@ -20,10 +20,10 @@ from drone_rl.config import (
 )
 from drone_rl.config.configuration import Changes
 from drone_rl.config.transforms import Frame, Gray, Rgb, Standardize, Transform
-from drone_rl.policies import ForeignNetwork
+from drone_rl.policies import ExternalNetwork
 from drone_rl.policies.environment import make_env
 from drone_rl.policies.external_network import Logits
-from drone_rl.policies.policy import Pilot, load_policy
+from drone_rl.policies.policy import BasePolicy, load_policy
 from drone_rl.policies.zoo.description import output_of
 from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import Task, as_task
@@ -33,7 +33,7 @@ from drone_rl.utils.settings import Settings, below
 
 
 @dataclasses.dataclass(frozen=True)
-class ForeignPolicy(Pilot):
+class ExternalPolicy(BasePolicy):
     """A third-party network with its task, camera and transforms; see `policy_from`.
 
     It has no file, so third parties can't check its certificates.
@@ -67,7 +67,7 @@ class ForeignPolicy(Pilot):
         """The policy's name; its training is unknown."""
         return {"policy": self.name, "trained": None}
 
-    def in_task(self, **changes: Any) -> "ForeignPolicy":
+    def in_task(self, **changes: Any) -> "ExternalPolicy":
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""
         if not isinstance(self.task, Settings):
             if changes:
@@ -77,7 +77,7 @@ class ForeignPolicy(Pilot):
         with below("task"):
             return dataclasses.replace(self, own_task=self.task.replace(**changed))
 
-    def in_dynamics(self, **changes: Any) -> "ForeignPolicy":
+    def in_dynamics(self, **changes: Any) -> "ExternalPolicy":
         """Return the same policy with other dynamics, such as `in_dynamics(wind=(5, 0, 0))`."""
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
         with below("dynamics"):
@@ -93,12 +93,12 @@ class ForeignPolicy(Pilot):
         parts = {"task": task, "dynamics": dynamics, "transforms": self.transforms or (Rgb(),)}
         return make_env(num_envs, camera=self.camera, **parts, **options)
 
-    def make_network(self, device: str | torch.device = "cpu") -> ForeignNetwork:
-        """Return its network; raise an `InputError` as `ForeignNetwork` does."""
+    def make_network(self, device: str | torch.device = "cpu") -> ExternalNetwork:
+        """Return its network; raise an `InputError` as `ExternalNetwork` does."""
         frame = Frame((self.camera.height, self.camera.width, 3))
         for transform in self.transforms or (Rgb(),):
             frame = output_of(transform, frame)
-        network = ForeignNetwork(
+        network = ExternalNetwork(
             self.logits,
             frame.shape,
             make_dynamics(as_task(self.task).make_dynamics, self.dynamics, self.actions).actions,
@@ -124,7 +124,7 @@ def policy_from(
     actions: ActionSettings = MOVES_SETTINGS,
     transforms: Sequence[Transform] | None = None,
     name: str | None = None,
-) -> ForeignPolicy:
+) -> ExternalPolicy:
     """Return a third-party policy to judge, evaluate and explain.
 
     A torch module is copied and set to evaluation mode; all explanations support it. Fewer
@@ -150,7 +150,7 @@ def policy_from(
         raise InputError(
             f"policy_from got a {type(logits).__name__}; give a callable from images to logits"
         )
-    policy = ForeignPolicy(
+    policy = ExternalPolicy(
         name=name or getattr(logits, "__name__", type(logits).__name__),
         logits=logits,
         own_task=task or TaskSettings(),
@@ -180,15 +180,17 @@ def _is_sb3_model(which: Any) -> bool:
     return module is not None and isinstance(which, module.BaseAlgorithm)
 
 
-def as_pilot(which: str | Path | Pilot | Logits, outputs: str | Path = "outputs") -> Pilot:
+def as_policy(
+    which: str | Path | BasePolicy | Logits, outputs: str | Path = "outputs"
+) -> BasePolicy:
     """Convert a callable, see `policy_from`, a Stable-Baselines3 model or a file to a policy.
 
-    `outputs` is the folder of the runs, see `load_policy`. A `Pilot` is returned unchanged.
+    `outputs` is the folder of the runs, see `load_policy`. A `BasePolicy` is returned unchanged.
 
     Raises:
         InputError: There is no such policy, or it is unusable.
     """
-    if isinstance(which, Pilot):
+    if isinstance(which, BasePolicy):
         return which
     if _is_sb3_model(which):
         from drone_rl.policies.sb3 import Sb3Logits  # needs Stable-Baselines3

@@ -17,7 +17,7 @@ from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.utils.errors import InputError
 
 
-class PictureNetwork(nn.Module):
+class ImageNetwork(nn.Module):
     """Any network from frames to the parameters of the action distribution.
 
     For discrete actions these are logits, see `Actions.num_outputs`. Frames may have any number of
@@ -67,7 +67,7 @@ Weighted = nn.Conv2d | nn.Linear
 """Layers with weights."""
 
 
-class PolicyNetwork(PictureNetwork):
+class PolicyNetwork(ImageNetwork):
     """Layers from a frame to logits; the last one is linear and named "logits"."""
 
     def __init__(
@@ -101,7 +101,7 @@ class PolicyNetwork(PictureNetwork):
 
     @torch.no_grad()
     def rescale(self, factor: Tensor, shift: Tensor) -> None:
-        """See `PictureNetwork`; the last layer changes."""
+        """See `ImageNetwork`; the last layer changes."""
         weight, bias = (self.layers.get_parameter(f"logits.{n}") for n in ("weight", "bias"))
         weight.mul_(factor[:, None])
         bias.mul_(factor).add_(shift)
@@ -115,7 +115,7 @@ class PolicyNetwork(PictureNetwork):
             )
 
     def forward(self, pixels: Tensor) -> Tensor:
-        """See `PictureNetwork`.
+        """See `ImageNetwork`.
 
         Raises:
             InputError: The shape of frames differs or, without gradients, an output is not finite.

@@ -3,17 +3,22 @@
 import abc
 import contextlib
 import dataclasses
+import functools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 import torch
 from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
 from torchrl.envs import EnvBase, TransformedEnv
+from torchrl.envs import Transform as TorchrlTransform
 
 from drone_rl.config import ActionSettings, BaseTaskSettings, DynamicsSettings
 from drone_rl.config.configuration import Changes
-from drone_rl.policies import PictureNetwork, PolicyNetwork, make_actor
+from drone_rl.envs.transforms import memory_of, see_film
+from drone_rl.policies import ImageNetwork, PolicyNetwork, make_actor
 from drone_rl.policies.zoo import PolicyDescription, parse, policy_names, policy_path, read_policy
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.display import table
@@ -23,7 +28,7 @@ from drone_rl.utils.schema import shown
 from drone_rl.utils.seeding import Stream, torch_generator
 
 
-class Pilot(abc.ABC):
+class BasePolicy(abc.ABC):
     """A policy with its observations, task and dynamics."""
 
     name: str
@@ -99,7 +104,7 @@ class Pilot(abc.ABC):
     def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv: ...
 
     @abc.abstractmethod
-    def make_network(self, device: str | torch.device = "cpu") -> PictureNetwork:
+    def make_network(self, device: str | torch.device = "cpu") -> ImageNetwork:
         """Return its network."""
 
     def make_actor(
@@ -135,7 +140,7 @@ class Pilot(abc.ABC):
 
 
 @dataclasses.dataclass(frozen=True)
-class Policy(Pilot):
+class Policy(BasePolicy):
     """A trained policy: its task, camera and transforms, network and provenance."""
 
     name: str
@@ -146,6 +151,10 @@ class Policy(Pilot):
     """Task, camera, transforms and network."""
     state: dict[str, Any] = dataclasses.field(repr=False)
     """Content of its file, see `drone_rl.policies.zoo.read_policy`."""
+    _film: list[Tensor] = dataclasses.field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
+    """Images that `act_batch` remembers, oldest first."""
 
     @property
     def task(self) -> BaseTaskSettings:
@@ -196,6 +205,61 @@ class Policy(Pilot):
         network = self.description.load_network(self.state["policy"]).to(device)
         network.owner = f"policy={self.name}"
         return network
+
+    def act(self, image: np.ndarray | Tensor) -> int | np.ndarray:
+        """Return the greedy action for one image of its camera, see `act_batch`.
+
+        Args:
+            image: RGB, uint8. Shape: (H, W, 3).
+
+        Returns:
+            The index of the action, or the values of a continuous one.
+        """
+        action = self.act_batch(torch.as_tensor(image)[None])[0].numpy()
+        return action if action.ndim else int(action)
+
+    @torch.no_grad()
+    def act_batch(self, images: np.ndarray | Tensor) -> Tensor:
+        """Return the greedy actions for images of several drones.
+
+        The images pass through its transforms, without simulated camera faults. If it stacks
+        frames, it remembers the images of the last calls, until `reset`.
+
+        Args:
+            images: RGB, uint8. Shape: (N, H, W, 3).
+
+        Returns:
+            The index of each action, or the values of continuous ones. Shape: (N, ...).
+
+        Raises:
+            InputError: The images do not fit the camera or the images of the last call.
+        """
+        images, camera = torch.as_tensor(images), self.description.camera
+        size = (camera.height, camera.width, 3)
+        if images.dtype != torch.uint8 or images.ndim != 4 or images.shape[1:] != size:
+            raise InputError(
+                f"images of shape {tuple(images.shape)} and type {images.dtype} do not fit the "
+                f"policy's camera; give uint8 of shape (N, {camera.height}, {camera.width}, 3)"
+            )
+        if self._film and len(self._film[-1]) != len(images):
+            raise InputError(
+                f"{len(images)} images follow {len(self._film[-1])}; call reset() before images of "
+                "another number of drones"
+            )
+        network, transforms = self._network_and_transforms
+        film = [*self._film, images]
+        outputs = network(see_film(transforms, film))
+        self._film[:] = film[-memory_of(transforms) :] if memory_of(transforms) else []
+        return network.actions.greedy(outputs)
+
+    def reset(self) -> None:
+        """Forget the images of earlier calls of `act` and `act_batch`, before a new episode."""
+        self._film.clear()
+
+    @functools.cached_property
+    def _network_and_transforms(self) -> tuple[PolicyNetwork, list[TorchrlTransform]]:
+        made = self.description.without_faults().make_transforms()
+        return self.make_network(), [t for t in made if "pixels" in (t.in_keys or [])]
 
     def _repr_html_(self) -> str:
         progress, described = self.state["progress"], self.description.as_dict()

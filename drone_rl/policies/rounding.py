@@ -18,7 +18,7 @@ from typing import Any, Self
 import torch
 from torch import Tensor, nn
 
-from drone_rl.policies.networks import PictureNetwork, PolicyNetwork
+from drone_rl.policies.networks import ImageNetwork, PolicyNetwork
 from drone_rl.policies.rounded_layers import SLACK, UNIT, Layer, layer_of
 from drone_rl.sim.actions import Actions, DiscreteActions
 from drone_rl.utils.errors import InputError
@@ -208,7 +208,7 @@ def arithmetic_on(device: torch.device) -> tuple[str, bool]:
 
 def _in_float64(network: nn.Module) -> nn.Module | None:
     """Return a copy that computes in float64; None without weights or with a fixed precision."""
-    if not isinstance(network, PictureNetwork) or not network.has_weights:
+    if not isinstance(network, ImageNetwork) or not network.has_weights:
         return None
     device = next(network.parameters()).device
     exact = copy.deepcopy(network).double()
@@ -230,10 +230,10 @@ REMEDY = (
 """What to do about a callable that acts by its batch."""
 
 
-class Regrouped(PictureNetwork):
+class Regrouped(ImageNetwork):
     """Evaluates a network on each frame in another batch; a function of the frame is unchanged."""
 
-    def __init__(self, network: PictureNetwork, groups: str, seed: int = 0) -> None:
+    def __init__(self, network: ImageNetwork, groups: str, seed: int = 0) -> None:
         """Wrap a network.
 
         `groups` is "single", one frame a call, or "mixed": batches of random order and size, each
@@ -250,7 +250,7 @@ class Regrouped(PictureNetwork):
         return self.network.parts
 
     def forward(self, pixels: Tensor) -> Tensor:
-        """See `PictureNetwork`. Shapes: (N, C, H, W), (N, outputs)."""
+        """See `ImageNetwork`. Shapes: (N, C, H, W), (N, outputs)."""
         if self.groups == "single":
             return torch.cat([self.network(one) for one in pixels.split(1)])
         outputs = pixels.new_empty(len(pixels), self.num_actions)
@@ -269,7 +269,7 @@ class Regrouped(PictureNetwork):
 
 
 @torch.no_grad()
-def require_same_in_any_batch(network: PictureNetwork, frames: Tensor, largest: int) -> None:
+def require_same_in_any_batch(network: ImageNetwork, frames: Tensor, largest: int) -> None:
     """Raise an `InputError` if outputs for frames (N, C, H, W) depend on the size of the batch.
 
     Many sizes are tried, `largest` among them.

@@ -10,7 +10,7 @@ from torchrl.envs import Transform
 
 from drone_rl.envs import GrayPixels
 from drone_rl.envs.transforms import memory_of, see_film
-from drone_rl.policies import PictureNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.policies.rounding import decider
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.rendering import Appearance, Poses
@@ -61,7 +61,7 @@ class PolicyAgent:
 
     def __init__(
         self,
-        network: PictureNetwork,
+        network: ImageNetwork,
         transforms: Iterable[Transform],
         num_worlds: int,
         *,

@@ -20,7 +20,7 @@ from drone_rl.config import (
 )
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.rollouts import rollout
-from drone_rl.policies import PictureNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.robustness.agents import Agent, BaselineAgent, PolicyAgent, StepContext
 from drone_rl.robustness.perturbations import (
     ONSET_STEP,
@@ -49,7 +49,7 @@ _CLUTTER = 1000
 class PolicySpec:
     """A policy with its task, camera, transforms and dynamics."""
 
-    network: PictureNetwork
+    network: ImageNetwork
     task: BaseTaskSettings
     camera: CameraSettings
     transforms: Sequence[Transform]

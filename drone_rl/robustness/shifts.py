@@ -18,8 +18,8 @@ from drone_rl.envs import worlds_of
 from drone_rl.evaluation.rounding_sensitivity import require_function
 from drone_rl.evaluation.verdict_text import unlike as say_unlike
 from drone_rl.policies.external_network import Logits
-from drone_rl.policies.external_policy import as_pilot
-from drone_rl.policies.policy import Pilot, Policy
+from drone_rl.policies.external_policy import as_policy
+from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.robustness.agents import OracleAgent
 from drone_rl.robustness.axes import AXES, Axis, check_axes, find_axes
 from drone_rl.robustness.charts import chart, strips
@@ -43,7 +43,7 @@ from drone_rl.verification.checker.certificate import fingerprint
 class Shifts:
     """Success rates of a policy under perturbations, and its operating domain."""
 
-    policy: Pilot
+    policy: BasePolicy
     settings: ShiftSettings
     numbers: dict[str, Any] = dataclasses.field(repr=False)
     """The results as plain values, as in `shifts.json`."""
@@ -96,7 +96,7 @@ class Shifts:
 
 
 def shifts(
-    policy: str | Path | Pilot | Logits,
+    policy: str | Path | BasePolicy | Logits,
     settings: ShiftSettings | None = None,
     *,
     task: Mapping[str, Any] | None = None,
@@ -122,7 +122,7 @@ def shifts(
     settings, seed = with_seed((settings or ShiftSettings()).replace(**changes))
     progress = progress or Bar()
     check_axes(settings.axes or ())
-    pilot = as_pilot(policy, outputs).in_task(**(task or {}))
+    pilot = as_policy(policy, outputs).in_task(**(task or {}))
     pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
     begin = time.perf_counter()
     require_function(pilot, seed=seed.value, device=settings.device, renderer=settings.renderer)
@@ -191,7 +191,7 @@ def _domain(
     return {"plain": prober.plain, "ranges": ranges}
 
 
-def make_policy_spec(pilot: Pilot, settings: ShiftSettings) -> PolicySpec:
+def make_policy_spec(pilot: BasePolicy, settings: ShiftSettings) -> PolicySpec:
     """Return the policy with its task, camera and transforms.
 
     Raises:

@@ -17,8 +17,8 @@ from drone_rl.flight.betaflight.sitl import Betaflight, betaflight_drone
 from drone_rl.flight.in_the_loop.drone import NotReadyError
 from drone_rl.flight.in_the_loop.dynamics import InTheLoopDynamics
 from drone_rl.policies.external_network import Logits
-from drone_rl.policies.external_policy import as_pilot
-from drone_rl.policies.policy import Pilot
+from drone_rl.policies.external_policy import as_policy
+from drone_rl.policies.policy import BasePolicy
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.seeding import RootSeed, root_seed
@@ -83,7 +83,7 @@ class SitlEvaluation:
 
 
 def evaluate_in_the_loop(
-    policy: str | Path | Pilot | Logits,
+    policy: str | Path | BasePolicy | Logits,
     flights: int = 5,
     seed: int | None = None,
     *,
@@ -114,7 +114,7 @@ def evaluate_in_the_loop(
     """
     if not (isinstance(flights, int) and flights >= 1):
         raise InputError(f"flights={flights} is out of range; give a whole number from 1")
-    progress, pilot = progress or Bar(), as_pilot(policy, outputs)
+    progress, pilot = progress or Bar(), as_policy(policy, outputs)
     root = drawn_seed or root_seed(seed)
     program = find_firmware(firmware)
     flown: list[tuple[Episodes, SitlEpisode]] = []
@@ -127,7 +127,7 @@ def evaluate_in_the_loop(
     return SitlEvaluation(pilot.name, root, episodes, summarise(Episodes.joined(ended)))
 
 
-def _fly_or_restart(pilot: Pilot, world: int, *given: Any) -> tuple[Episodes, SitlEpisode]:
+def _fly_or_restart(pilot: BasePolicy, world: int, *given: Any) -> tuple[Episodes, SitlEpisode]:
     """Run one episode; restart a firmware that fails before the policy acts."""
     for _ in range(STARTS - 1):
         with contextlib.suppress(NotReadyError):
@@ -137,7 +137,7 @@ def _fly_or_restart(pilot: Pilot, world: int, *given: Any) -> tuple[Episodes, Si
 
 @torch.no_grad()
 def _fly(
-    pilot: Pilot, world: int, seed: int, program: Path, folder: Path, isolated: bool
+    pilot: BasePolicy, world: int, seed: int, program: Path, folder: Path, isolated: bool
 ) -> tuple[Episodes, SitlEpisode]:
     """Run one episode with a new firmware process."""
     began = time.monotonic()

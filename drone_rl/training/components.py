@@ -44,8 +44,8 @@ def joined(collector: Any, groups: Sequence[Group]) -> Components:
 def group_sizes(settings: TrainSettings) -> list[int]:
     """Return the number of environments of each thread or worker; on a GPU there is one thread."""
     chosen = settings.collector
-    is_one = settings.device.startswith("cuda") and not isinstance(chosen, Ray)
-    groups = 1 if is_one else min(chosen.num_envs, chosen.num_threads)
+    has_one_group = settings.device.startswith("cuda") and not isinstance(chosen, Ray)
+    groups = 1 if has_one_group else min(chosen.num_envs, chosen.num_threads)
     return [chosen.num_envs // groups + (i < chosen.num_envs % groups) for i in range(groups)]
 
 

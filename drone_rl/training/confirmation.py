@@ -29,7 +29,7 @@ class Confirmation:
         self.flights = 0
         """Episodes so far."""
         self.succeeded = 0
-        """Of the last `trainer.confirm_episodes` episodes."""
+        """Successes in the last confirmation."""
 
     def __call__(self, update: int) -> bool:
         """Return whether enough episodes succeed; each update has its own environments."""

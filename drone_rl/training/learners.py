@@ -76,7 +76,7 @@ class GradientLearner:
     """Base of learners with one optimizer: their state, and the step of the scheduler."""
 
     network: nn.Module
-    """The policy's."""
+    """Network of the policy; its weights are saved as "policy"."""
     optimiser: torch.optim.Optimizer
     """Over the parameters that learn."""
     scheduler: torch.optim.lr_scheduler.LRScheduler | None = None
@@ -169,7 +169,7 @@ class ActorCriticLearner(GradientLearner):
     estimator: Advantages
     """Computes advantages from values."""
     loss: A2CLoss | ClipPPOLoss
-    """Of the model's actor and critic; a mean over steps."""
+    """Loss of `model.actor` and `model.critic`, a mean over steps."""
     generator: torch.Generator
     """Shuffles the steps, on the CPU."""
     epochs: int = 1

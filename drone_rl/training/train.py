@@ -135,7 +135,7 @@ def learn(
 def threaded_collector(
     settings: TrainSettings, replay: FailureReplayTask | None = None
 ) -> Components:
-    """Make `collector=threads`: complete episodes, with returns, from threads of this process."""
+    """Make `collector=episodes`: complete episodes, with returns, from threads of this process."""
     sizes = components.group_sizes(settings)
     estimator = settings.returns.make().to(settings.device)
     groups = make_groups(settings, sizes, replay)

@@ -188,23 +188,23 @@ class Trainer:
             return self.stop_signal.name
         if self.stop_request:
             return self.stop_request
-        is_solved = self._is_solved()
+        is_confirmedlved = self._is_confirmedlved()
         if self.stop_signal is not None:  # it came during the confirmation, which a resume repeats
             return self.stop_signal.name
-        if is_solved:
+        if is_confirmedlved:
             return "solved"
         if self.total_episodes is not None and progress.episodes >= self.total_episodes:
             return "episodes"
         return "frames" if progress.frames >= self.total_frames else ""
 
-    def _is_solved(self) -> bool:
+    def _is_confirmedlved(self) -> bool:
         progress = self.progress
         if self.target is None or progress.running_reward < self.target:
             return False
         begin = time.perf_counter()
-        is_so = self.confirm is None or self.confirm(progress.updates)
+        is_confirmed = self.confirm is None or self.confirm(progress.updates)
         progress.seconds += time.perf_counter() - begin
-        return is_so
+        return is_confirmed
 
     def _notify(self, hook: str, *args: object) -> None:
         for callback in self.callbacks:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from drone_rl.config.commands import JudgeSettings
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.outcomes import Rounding
-from drone_rl.policies.policy import Pilot, Policy
+from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
@@ -90,7 +90,7 @@ class Claim:
 
 
 def find_claim(
-    policy: Pilot,
+    policy: BasePolicy,
     given: str | Path | None = None,
     *,
     flights: int = JudgeSettings.certificate_flights,

@@ -11,7 +11,7 @@ import numpy as np
 
 from drone_rl.config.commands import JudgeSettings, ShiftSettings
 from drone_rl.evaluation.rule import Rule
-from drone_rl.policies.policy import Pilot, Policy
+from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import shifts_path
 from drone_rl.robustness.agents import OracleAgent
 from drone_rl.robustness.axes import AXES, Axis, find_axes
@@ -111,7 +111,7 @@ class Coverage:
 
 
 def find_domain(
-    policy: Pilot, given: str | Path | None = None, outputs: str | Path = "outputs"
+    policy: BasePolicy, given: str | Path | None = None, outputs: str | Path = "outputs"
 ) -> SavedShifts | None:
     """Find the robustness evaluation of a policy in its task; return None if there is none.
 
@@ -199,7 +199,7 @@ def _read_need(name: str, value: Any) -> Need:
     return {"low": low, "high": high}
 
 
-def require(policy: Pilot, needed: str | Path, measured: SavedShifts | None) -> Coverage:
+def require(policy: BasePolicy, needed: str | Path, measured: SavedShifts | None) -> Coverage:
     """Compare the requirements in a file with a policy's operating domain.
 
     See `read_requirements` and `find_domain`.
@@ -223,7 +223,7 @@ def require(policy: Pilot, needed: str | Path, measured: SavedShifts | None) -> 
 
 
 def recheck_domain(
-    policy: Pilot,
+    policy: BasePolicy,
     needs: Mapping[str, Need],
     numbers: Mapping[str, Any],
     settings: JudgeSettings,

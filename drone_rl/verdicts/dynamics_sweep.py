@@ -13,8 +13,8 @@ from matplotlib.patches import Rectangle
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.commands import BodiesSettings, JudgeSettings
 from drone_rl.flight.in_the_loop.drone import FlightControllerError
-from drone_rl.policies.external_policy import as_pilot
-from drone_rl.policies.policy import Pilot
+from drone_rl.policies.external_policy import as_policy
+from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.vocabulary import terms_of
 from drone_rl.utils.display import aligned, paragraph, picture, table
 from drone_rl.utils.errors import InputError
@@ -72,7 +72,7 @@ class Bodies:
 
 
 def bodies(
-    policies: str | Path | Pilot | list[Any] | tuple[Any, ...] | None = None,
+    policies: str | Path | BasePolicy | list[Any] | tuple[Any, ...] | None = None,
     settings: BodiesSettings | None = None,
     *,
     outputs: str | Path = "outputs",
@@ -95,7 +95,7 @@ def bodies(
     progress = progress or Bar()
     given = list(settings.policies) if policies is None else policies
     whom = given if isinstance(given, list | tuple) else [given]
-    pilots = [as_pilot(one, outputs) for one in whom]
+    pilots = [as_policy(one, outputs) for one in whom]
     names = [pilot.name for pilot in pilots]
     if not names:
         raise InputError("policies=[] names nobody; give a policy or more")
@@ -122,7 +122,7 @@ def bodies(
     return Bodies(settings, numbers)
 
 
-def _looped(pilot: Pilot, settings: BodiesSettings, seed: RootSeed) -> dict[str, Any]:
+def _looped(pilot: BasePolicy, settings: BodiesSettings, seed: RootSeed) -> dict[str, Any]:
     """Episodes with software in the loop, in still air, or the reason why there are none."""
     from drone_rl.robustness.sitl import evaluate_in_the_loop
 

@@ -20,8 +20,8 @@ from drone_rl.evaluation.judge import Verdict, judge_policy
 from drone_rl.evaluation.rule import NOT_COVERED, NOT_PROVED, Rule
 from drone_rl.evaluation.verdict_text import quantity_label
 from drone_rl.policies.external_network import Logits
-from drone_rl.policies.external_policy import as_pilot
-from drone_rl.policies.policy import Pilot
+from drone_rl.policies.external_policy import as_policy
+from drone_rl.policies.policy import BasePolicy
 from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.robustness.shifts_text import QUOTED, why_not
 from drone_rl.utils.display import aligned, interval, paragraph, table
@@ -128,20 +128,20 @@ class Judgements(tuple[Judgement, ...]):
 
 @overload
 def judge(
-    policy: str | Path | Pilot | Logits, settings: JudgeSettings | None = None, **how: Any
+    policy: str | Path | BasePolicy | Logits, settings: JudgeSettings | None = None, **how: Any
 ) -> Judgement: ...
 
 
 @overload
 def judge(
-    policy: Sequence[str | Path | Pilot | Logits],
+    policy: Sequence[str | Path | BasePolicy | Logits],
     settings: JudgeSettings | None = None,
     **how: Any,
 ) -> Judgements: ...
 
 
 def judge(
-    policy: str | Path | Pilot | Logits | Sequence[str | Path | Pilot | Logits],
+    policy: str | Path | BasePolicy | Logits | Sequence[str | Path | BasePolicy | Logits],
     settings: JudgeSettings | None = None,
     **how: Any,
 ) -> Judgement | Judgements:
@@ -155,7 +155,7 @@ def judge(
         raise InputError("policy=[] names nobody; give one or more policies")
     for one in policy:  # a wrong one is refused before any episode
         if one not in BASELINES:
-            as_pilot(one, how.get("outputs", "outputs"))
+            as_policy(one, how.get("outputs", "outputs"))
     given = how.pop("seed", (settings or JudgeSettings()).seed)
     seed = how.pop("drawn_seed", None) or root_seed(given)  # all in the same environments
     done = (judge_one(one, settings, drawn_seed=seed, **how) for one in policy)
@@ -163,7 +163,7 @@ def judge(
 
 
 def judge_one(
-    policy: str | Path | Pilot | Logits,
+    policy: str | Path | BasePolicy | Logits,
     settings: JudgeSettings | None = None,
     *,
     task: Mapping[str, Any] | None = None,
@@ -200,7 +200,7 @@ def judge_one(
     settings, seed = with_seed((settings or JudgeSettings()).replace(**changes), drawn_seed)
     progress = progress or Bar()
     progress("policy and baselines", 0, 1)
-    pilot = None if policy in BASELINES else as_pilot(policy, outputs)
+    pilot = None if policy in BASELINES else as_policy(policy, outputs)
     name = str(policy) if pilot is None or isinstance(policy, str | Path) else pilot.name
     claim = measured = coverage = None
     if pilot is None:
@@ -232,7 +232,7 @@ def judge_one(
 
 
 def _reflown(
-    pilot: Pilot,
+    pilot: BasePolicy,
     coverage: Coverage | None,
     measured: SavedShifts | None,
     settings: JudgeSettings,

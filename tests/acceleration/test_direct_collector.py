@@ -98,7 +98,13 @@ def reasons(env, observed, kept):
         ([GrayPixels(out_keys=["gray"])], {}, ["gray"], [], "transform GrayPixels is not fused"),
         ([], {}, ["pixels", "hidden"], [], "the policy reads hidden"),
         ([], {}, [("info", "wind")], [], "the policy reads ('info', 'wind')"),
-        ([], {}, ["pixels"], [("next", "pixels")], "entry ('next', 'pixels') is not fused"),
+        (
+            [],
+            {},
+            ["pixels"],
+            [("next", "pixels")],
+            "entry ('next', 'pixels') needs a step of TorchRL",
+        ),
         (None, {"pixels": False}, ["pixels"], [], "the environment renders no pixels"),
     ],
 )

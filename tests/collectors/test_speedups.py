@@ -46,7 +46,7 @@ def test_disabled_acceleration_is_the_reason():
     env = with_transforms(DroneEnv(2, TASK), [GrayPixels()])
     actor = make_actor(SmallCNN((1, 25, 64), 3), env.action_spec)
     found = speedups.accelerated_collector(env, actor, "none", kept=KEPT)
-    assert found == ("collector.compiled is false",)
+    assert found == ("acceleration is off",)
     env.close()
 
 

@@ -10,7 +10,7 @@ from drone_rl.evaluation.rounding_sensitivity import (
     compare_implementations,
     require_same_in_any_batch,
 )
-from drone_rl.policies.external_network import ForeignNetwork
+from drone_rl.policies.external_network import ExternalNetwork
 from drone_rl.policies.external_policy import policy_from
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.utils.errors import InputError
@@ -102,4 +102,4 @@ def test_frames_are_tried_in_batches_of_many_sizes():
 
     frames = torch.rand(9, 1, 1, 3)
     with pytest.raises(InputError, match="in a batch of 57: they differ by 1"):
-        require_same_in_any_batch(ForeignNetwork(logits, (1, 1, 3), MOVES), frames, 10)
+        require_same_in_any_batch(ExternalNetwork(logits, (1, 1, 3), MOVES), frames, 10)

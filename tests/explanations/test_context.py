@@ -7,7 +7,7 @@ import torch
 
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.settings import ExplainSettings
-from drone_rl.policies import ForeignNetwork
+from drone_rl.policies import ExternalNetwork
 from drone_rl.sim.actions import MOVES
 
 SMALL = ExplainSettings(frames=60, perplexity=5, seed=3)
@@ -29,7 +29,7 @@ def test_worlds_and_actions_start_afresh_whoever_asked_first(make_pipeline):
 
 def test_of_a_function_no_layers_are_recorded(make_pipeline):
     env, _ = make_pipeline(num_envs=30)
-    network = ForeignNetwork(lambda x: x.flatten(1)[:, :3], (1, 25, 64), MOVES)
+    network = ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 25, 64), MOVES)
     context = Context(env, network, SMALL)
     assert context.layer is None and context.dataset.features == {}
 
@@ -68,7 +68,7 @@ def test_another_thread_has_the_same_data_and_a_network_of_its_own(make_pipeline
 
 def test_what_has_no_gradients_is_shared_with_another_thread(make_pipeline):
     env, _ = make_pipeline(num_envs=30)
-    network = ForeignNetwork(lambda x: x.detach().flatten(1)[:, :3], (1, 25, 64), MOVES)
+    network = ExternalNetwork(lambda x: x.detach().flatten(1)[:, :3], (1, 25, 64), MOVES)
     assert Context(env, network, SMALL).aside().network is network
 
 

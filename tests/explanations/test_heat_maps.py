@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from drone_rl.explanations.heat_maps import Explainer
-from drone_rl.policies import MLP, ForeignNetwork
+from drone_rl.policies import MLP, ExternalNetwork
 from drone_rl.sim.actions import MOVES
 from drone_rl.utils.errors import InputError
 
@@ -55,13 +55,13 @@ def test_all_methods_give_maps_of_the_pictures_size_and_leave_no_hook(explainer,
 
 
 def test_what_has_no_gradients_has_but_occlusion(explainer, frames):
-    network = ForeignNetwork(torch.no_grad()(explainer.network), (1, 25, 64), MOVES)
+    network = ExternalNetwork(torch.no_grad()(explainer.network), (1, 25, 64), MOVES)
     other = Explainer(network, explainer.absent)
     assert list(other.methods()) == ["occlusion"]
     torch.testing.assert_close(other.occlusion(*frames), explainer.occlusion(*frames))
     with pytest.raises(InputError, match=r"^Grad-CAM needs a convolution"):
         other.grad_cam(*frames)
-    whole = ForeignNetwork(explainer.network, (1, 25, 64), MOVES)
+    whole = ExternalNetwork(explainer.network, (1, 25, 64), MOVES)
     same = Explainer(whole, explainer.absent)
     assert same.layer == "layers.relu1"
     for name, method in same.methods().items():

@@ -10,7 +10,7 @@ from drone_rl.explanations.hooks import (
     probabilities,
     spatial_layers,
 )
-from drone_rl.policies import MLP, ForeignNetwork
+from drone_rl.policies import MLP, ExternalNetwork
 from drone_rl.sim.actions import MOVES
 from drone_rl.utils.errors import InputError
 
@@ -69,7 +69,7 @@ class Elsewhere(nn.Module):
 
 @pytest.fixture
 def elsewhere():
-    return ForeignNetwork(Elsewhere(), (1, 8, 10), MOVES)
+    return ExternalNetwork(Elsewhere(), (1, 8, 10), MOVES)
 
 
 def test_layers_from_elsewhere_stand_in_the_order_in_which_they_act(elsewhere):
@@ -89,11 +89,11 @@ def test_what_is_no_layer(elsewhere, name):
 
 
 def test_a_function_has_no_layers():
-    network = ForeignNetwork(lambda x: x.flatten(1)[:, :3], (1, 8, 10), MOVES)
+    network = ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 8, 10), MOVES)
     assert ([*layers(network)], spatial_layers(network), feature_layer(network)) == ([], [], None)
     with pytest.raises(InputError, match="choose from: none, for it is no torch module"):
         find_layer(network, "conv1")
-    one = ForeignNetwork(nn.Sequential(nn.Flatten(), nn.Linear(80, 3)), (1, 8, 10), MOVES)
+    one = ExternalNetwork(nn.Sequential(nn.Flatten(), nn.Linear(80, 3)), (1, 8, 10), MOVES)
     assert feature_layer(one) == "0"
 
 
@@ -115,6 +115,6 @@ class Over(nn.Module):
 
 
 def test_a_convolution_may_be_the_last_and_what_is_of_no_picture_is_no_layer():
-    network = ForeignNetwork(Last(), (1, 8, 10), MOVES)
+    network = ExternalNetwork(Last(), (1, 8, 10), MOVES)
     assert [*layers(network)] == ["conv"]
     assert spatial_layers(network) == ["conv"] and feature_layer(network) is None

@@ -4,7 +4,7 @@ import torch
 from torch import nn
 
 from drone_rl.explanations.patches import likeness, shuffled_networks
-from drone_rl.policies import MLP, ForeignNetwork, SmallCNN
+from drone_rl.policies import MLP, ExternalNetwork, SmallCNN
 from drone_rl.sim.actions import MOVES
 
 PICTURES = torch.randn(20, 1, 25, 64, generator=torch.Generator().manual_seed(0))
@@ -27,7 +27,7 @@ def test_weights_are_shuffled_within_their_layer_and_the_policy_stays():
 
 def test_networks_from_elsewhere_are_shuffled_as_ours():
     layers = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,)).layers
-    network = ForeignNetwork(nn.Sequential(layers, nn.BatchNorm1d(3)), (1, 25, 64), MOVES)
+    network = ExternalNetwork(nn.Sequential(layers, nn.BatchNorm1d(3)), (1, 25, 64), MOVES)
     (other,) = shuffled_networks(network, PICTURES, 1)
     before, after = network.state_dict(), other.state_dict()
     assert not torch.equal(*(state["_logits.0.conv1.weight"] for state in (before, after)))

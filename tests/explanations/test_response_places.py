@@ -6,7 +6,7 @@ import torch
 
 from drone_rl.explanations import response
 from drone_rl.explanations.scenes import place_target
-from drone_rl.policies import ForeignNetwork
+from drone_rl.policies import ExternalNetwork
 from drone_rl.sim.actions import MOVES
 from drone_rl.verification.prover.cube_images import camera_ahead
 from tests.five_actions import FIVE
@@ -44,6 +44,6 @@ def test_why_there_is_none(context):
     assert "does not choose among forward, left, right" in refused(actions=FIVE)
     assert "not that of collecting cubes" in refused(task=None)
     tall = dataclasses.replace(scenes.task.settings, vertical_bound=1.0)
-    function = ForeignNetwork(lambda x: x.flatten(1)[:, :3], (1, 25, 64), MOVES)
+    function = ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 25, 64), MOVES)
     assert "no torch module" in refused(network=function)
     assert "vertical_bound=1.0" in refused(task=type(scenes.task)(tall))

@@ -5,7 +5,7 @@ import pytest
 import torch
 from torch import nn
 
-from drone_rl.policies import ForeignNetwork
+from drone_rl.policies import ExternalNetwork
 from drone_rl.sim.actions import MOVES
 from drone_rl.utils.errors import InputError
 
@@ -20,7 +20,7 @@ def left_half(x):
 
 
 def make(logits, shape=SHAPE, **kwargs):
-    return ForeignNetwork(logits, shape, MOVES, **kwargs)
+    return ExternalNetwork(logits, shape, MOVES, **kwargs)
 
 
 def test_function_of_images_is_a_network():

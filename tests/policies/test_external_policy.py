@@ -6,7 +6,7 @@ from torch import nn
 
 import drone_rl
 from drone_rl.config.transforms import EpisodeReward, Gray, Resize, Rgb, Stack, Standardize
-from drone_rl.policies.external_policy import as_pilot
+from drone_rl.policies.external_policy import as_policy
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from tests.fake_flight import FLIGHT, floating
@@ -95,16 +95,16 @@ def test_policy_receives_transformed_images(transforms, shape):
 
 def test_policy_has_an_html_representation():
     policy = drone_rl.policy_from(left, camera=drone_rl.CameraSettings(width=32), transforms=())
-    assert repr(policy).startswith("ForeignPolicy(name='left', own_task=TaskSettings(")
+    assert repr(policy).startswith("ExternalPolicy(name='left', own_task=TaskSettings(")
     assert "<td>RGB bytes</td>" in policy._repr_html_()
     assert policy.make_network().in_shape == (3, 25, 32)
 
 
 def test_accepted_types_of_policies(network):
     policy = drone_rl.policy_from(left)
-    assert as_pilot(policy) is policy
-    assert as_pilot("good").name == "good"
-    assert as_pilot(network).logits is network
+    assert as_policy(policy) is policy
+    assert as_policy("good").name == "good"
+    assert as_policy(network).logits is network
 
 
 def test_stable_baselines3_model_uses_its_training_observations():
@@ -116,14 +116,14 @@ def test_stable_baselines3_model_uses_its_training_observations():
     )
     model = sb3.A2C("CnnPolicy", env, seed=0)
     for given in (model, drone_rl.Sb3Logits(model)):
-        policy = as_pilot(given)
+        policy = as_policy(given)
         assert policy.transforms == (Rgb(),)
         assert (policy.camera.height, policy.camera.width) == (40, 48)
     few = {**FEW, "episodes": 2}
     (done,) = drone_rl.judge([model], **few)
     assert done.name == "A2C of Stable-Baselines3"
     frames = env.observation_space.sample()[None]
-    network = as_pilot(model).make_network()
+    network = as_policy(model).make_network()
     images = torch.from_numpy(frames).movedim(-1, 1).float() / 255
     wanted = model.policy.get_distribution(torch.from_numpy(frames).movedim(-1, 1)).distribution
     torch.testing.assert_close(network(images).softmax(-1), wanted.probs)

@@ -4,14 +4,14 @@ import pytest
 import torch
 from torch import nn
 
-from drone_rl.policies import MLP, ForeignNetwork, PictureNetwork, SmallCNN
+from drone_rl.policies import MLP, ExternalNetwork, ImageNetwork, SmallCNN
 from drone_rl.sim.actions import MOVES
 
 X = torch.randn(7, 1, 12, 16, generator=torch.Generator().manual_seed(0))
 
 
 def test_base_class_raises_not_implemented():
-    network = PictureNetwork()
+    network = ImageNetwork()
     assert (network.num_actions, network.parts, network.is_differentiable) == (3, network, True)
     assert not network.has_weights
     for ask in (lambda: network(X), lambda: network.rescale(X, X)):
@@ -24,8 +24,8 @@ def test_base_class_raises_not_implemented():
     [
         SmallCNN((1, 12, 16), 3, channels=(4,), hidden=(8,)),
         MLP((1, 12, 16), 3),
-        ForeignNetwork(nn.Sequential(nn.Flatten(), nn.Linear(192, 3)), (1, 12, 16), MOVES),
-        ForeignNetwork(lambda x: x.flatten(1)[:, :3], (1, 12, 16), MOVES),
+        ExternalNetwork(nn.Sequential(nn.Flatten(), nn.Linear(192, 3)), (1, 12, 16), MOVES),
+        ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 12, 16), MOVES),
     ],
     ids=lambda network: type(network).__name__,
 )

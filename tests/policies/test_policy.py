@@ -5,6 +5,7 @@ import shutil
 
 import pytest
 import torch
+from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 import drone_rl
 from drone_rl.policies.policy import find_policy
@@ -124,3 +125,40 @@ def test_changed_dynamics_change_only_the_environment(monkeypatch):
 def test_invalid_dynamics_changes_raise(changes, message):
     with pytest.raises(InputError, match=f"^{message}"):
         drone_rl.load_policy("good").in_dynamics(**changes)
+
+
+@pytest.mark.parametrize("name", ["good", "pillars_good", "flight_velocity"])
+def test_act_equals_the_actor_in_its_environment(name):
+    """Over several steps, because the pillars' policy stacks two frames."""
+    policy = drone_rl.load_policy(name)
+    with policy.flying(3) as (env, actor), set_exploration_type(ExplorationType.DETERMINISTIC):
+        state = env.reset()
+        for _ in range(4):
+            state = actor(state)
+            images = env.base_env.last_pixels.clone()
+            torch.testing.assert_close(policy.act_batch(images), state["action"])
+            state = env.step_mdp(env.step(state))
+    policy.reset()
+    first = policy.act_batch(images)
+    policy.reset()
+    one = policy.act(images[0].numpy())
+    assert isinstance(one, int) == (name != "flight_velocity")
+    assert one == pytest.approx(first[0].numpy())
+
+
+def test_images_that_do_not_fit_the_camera_raise():
+    policy = drone_rl.load_policy("pillars_good")
+    height, width = policy.description.camera.height, policy.description.camera.width
+    for wrong in (
+        torch.zeros(2, height, width + 1, 3, dtype=torch.uint8),
+        torch.zeros(2, height, width, 3),
+        torch.zeros(height, width, 3, dtype=torch.uint8),
+    ):
+        with pytest.raises(InputError, match=rf"give uint8 of shape \(N, {height}, {width}, 3\)"):
+            policy.act_batch(wrong)
+    policy.act_batch(torch.zeros(2, height, width, 3, dtype=torch.uint8))
+    three = torch.zeros(3, height, width, 3, dtype=torch.uint8)
+    with pytest.raises(InputError, match=r"^3 images follow 2; call reset\(\)"):
+        policy.act_batch(three)
+    policy.reset()
+    assert policy.act_batch(three).shape == (3,)

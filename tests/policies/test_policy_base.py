@@ -3,7 +3,7 @@
 import pytest
 
 import drone_rl
-from drone_rl.policies.policy import Pilot
+from drone_rl.policies.policy import BasePolicy
 
 
 def straight_on(images):
@@ -16,7 +16,7 @@ def straight_on(images):
                                   lambda: drone_rl.policy_from(straight_on)])  # fmt: skip
 def test_environment_is_closed_at_the_end_or_on_failure(make):
     policy = make()
-    assert isinstance(policy, Pilot)
+    assert isinstance(policy, BasePolicy)
     with pytest.raises(KeyError), policy.in_task(num_cubes=2).flying(3, seed=4) as (env, actor):
         state = actor(env.reset())
         assert state["action"].shape == (3,)

@@ -6,7 +6,7 @@ import torch
 from torch import nn
 
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
-from drone_rl.policies.external_network import ForeignNetwork
+from drone_rl.policies.external_network import ExternalNetwork
 from drone_rl.policies.rounding import TOLERANCE, RoundingBound, arithmetic_on, decider
 from drone_rl.sim.actions import MOVES
 
@@ -112,7 +112,7 @@ def test_subnormal_numbers_may_count_as_zero():
 
 def test_unknown_layers_use_a_tolerance():
     logits = torch.tensor([[3.0, 1.0, 0.0], [1.0, 1.0 - TOLERANCE, 0.0]])
-    network = ForeignNetwork(lambda pixels: logits[: len(pixels)], (1, 1, 1), MOVES)
+    network = ExternalNetwork(lambda pixels: logits[: len(pixels)], (1, 1, 1), MOVES)
     decide, is_bound = decider(network)
     assert not is_bound
     assert decide(torch.zeros(2, 1, 1, 1)).is_fragile.tolist() == [False, True]
@@ -134,7 +134,7 @@ class Cancelling(nn.Module):
 
 def test_unknown_module_is_compared_with_float64():
     for precision, is_fragile in ((None, True), (torch.float32, False)):
-        network = ForeignNetwork(Cancelling(precision), (1, 1, 1), MOVES)
+        network = ExternalNetwork(Cancelling(precision), (1, 1, 1), MOVES)
         found = decider(network)[0](torch.zeros(2, 1, 1, 1))
         assert found.is_fragile.tolist() == [is_fragile] * 2
 
@@ -144,7 +144,7 @@ def test_float32_only_module_uses_a_tolerance():
         def forward(self, pixels):
             return nn.functional.linear(pixels.flatten(1).float(), self.weight, self.bias)
 
-    network = ForeignNetwork(Strict(1, 3), (1, 1, 1), MOVES)
+    network = ExternalNetwork(Strict(1, 3), (1, 1, 1), MOVES)
     assert decider(network)[0](torch.ones(1, 1, 1, 1)).outputs.shape == (1, 3)
 
 

@@ -5,7 +5,7 @@ import pytest
 import torch
 from torch import nn
 
-from drone_rl.policies import ForeignNetwork
+from drone_rl.policies import ExternalNetwork
 from drone_rl.sim.actions import MOVES
 from drone_rl.utils.errors import InputError
 
@@ -83,7 +83,7 @@ def test_unnormalized_byte_observations_are_supported():
 
 def test_trained_model_is_copied():
     model = sb3.A2C("MlpPolicy", StaticEnv(FLOATS), n_steps=5, seed=0).learn(5)
-    network = ForeignNetwork(nn.Sequential(nn.Flatten(), Sb3Logits(model)), (1, 1, 3), MOVES)
+    network = ExternalNetwork(nn.Sequential(nn.Flatten(), Sb3Logits(model)), (1, 1, 3), MOVES)
     before = network(torch.ones(1, 1, 1, 3))
     model.learn(5)
     assert torch.equal(network(torch.ones(1, 1, 1, 3)), before)

@@ -4,13 +4,13 @@ import torch
 
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.envs import GrayPixels
-from drone_rl.policies import PictureNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.robustness.paired_evaluation import PolicySpec
 
 TASK = TaskSettings(num_cubes=1, first_distance=8.0, front_margin=4.0)
 
 
-class Steering(PictureNetwork):
+class Steering(ImageNetwork):
     """Turns to where the picture is darkest in its middle row, left of the middle or right."""
 
     in_shape = (1, 5, 16)
@@ -22,7 +22,7 @@ class Steering(PictureNetwork):
         return -torch.stack([middle - 0.01, left, right], -1)
 
 
-class Blind(PictureNetwork):
+class Blind(ImageNetwork):
     """Does the same whatever it sees."""
 
     in_shape = (1, 5, 16)

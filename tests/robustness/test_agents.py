@@ -3,7 +3,7 @@ from torchrl.envs import CatFrames
 
 from drone_rl.config import CameraSettings
 from drone_rl.envs import GrayPixels, RgbPixels
-from drone_rl.policies import PictureNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.robustness.agents import BaselineAgent, PolicyAgent, StepContext
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions
@@ -12,7 +12,7 @@ from tests.continuous import SETTINGS
 from tests.robustness.subjects import TASK
 
 
-class Looking(PictureNetwork):
+class Looking(ImageNetwork):
     """Keeps what it was shown, and turns left."""
 
     def __init__(self):
@@ -67,7 +67,7 @@ def test_a_stack_of_frames_holds_those_of_the_worlds_that_still_fly():
     assert network.shown[1][:, :, 0, 0].tolist() == [[1.25, 1.5], [2.25, 2.5]]
 
 
-class Tied(PictureNetwork):
+class Tied(ImageNetwork):
     """Cannot decide between two actions in bright frames."""
 
     actions = MOVES
