@@ -4,11 +4,13 @@ import dataclasses
 import importlib
 import inspect
 import pkgutil
+from pathlib import Path
 
 import pytest
 
 import drone_rl
 from drone_rl.utils.batch import Batch
+from tools.readme.settings import list_commands, list_groups, list_parts
 
 MUTABLE = {
     "evaluation.metrics:Episodes",
@@ -74,3 +76,9 @@ def test_settings_are_keyword_only(classes):
         if name != "drone_rl.config.configuration:Changes"  # a type only
     }
     assert positional == set()
+
+
+@pytest.mark.parametrize("make", [list_groups, list_parts, list_commands])
+def test_bounds_units_and_defaults_of_settings_are_the_documented_ones(make):
+    page = (Path(drone_rl.__file__).parents[1] / "docs" / "settings.md").read_text()
+    assert make() in page

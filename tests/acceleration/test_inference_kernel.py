@@ -44,3 +44,10 @@ def test_threads_use_separate_buffers(network):
 def test_other_networks_are_not_supported():
     found = BatchedInference.try_create(OriginalCNN((1, 25, 64), 3))
     assert found == ("network OriginalCNN is not fused",)
+
+
+def test_logits_behind_a_first_layer_of_more_outputs():
+    generator = torch.Generator().manual_seed(0)
+    wide = SmallCNN((1, 25, 64), 3, channels=(40,), hidden=(), generator=generator)
+    frames = torch.randn(18, 1, 25, 64)
+    assert torch.allclose(BatchedInference(wide)(frames), wide(frames), atol=1e-5)

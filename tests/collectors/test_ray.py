@@ -67,6 +67,8 @@ def test_episodes_equal_those_of_threads_also_after_a_worker_is_killed(on_ray, o
         on_ray.collect()
 
 
-def test_more_workers_than_cores_raise():
-    with pytest.raises(InputError, match=r"num_threads=4.*more than the cluster's 2 cores"):
-        build(Ray(num_envs=6, num_threads=4))
+@pytest.mark.parametrize(("workers", "cores"), [(4, 1.0), (3, 1.0), (2, 1.5)])
+def test_more_workers_than_cores_raise(workers, cores):
+    message = rf"num_threads={workers} workers .*more than the cluster's 2 cores"
+    with pytest.raises(InputError, match=message):
+        build(Ray(num_envs=6, num_threads=workers, num_cpus=cores))

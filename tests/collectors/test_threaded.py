@@ -1,6 +1,7 @@
 """Parallel collectors give deterministic batches."""
 
 import copy
+from types import SimpleNamespace
 
 import pytest
 import torch
@@ -89,3 +90,11 @@ def test_seed_and_weights_reach_every_collector(make_pipeline):
     batch = joined.collect()
     assert not batch["logits"].any() and first["logits"].any()
     joined.shutdown()
+
+
+def test_activations_are_cached_by_a_single_collector_of_episodes(monkeypatch, make_pipeline):
+    one, *_ = threaded(make_pipeline).collectors
+    monkeypatch.setattr(type(one.source), "cache_activations", lambda source: source)
+    assert ThreadedCollector([one]).cache_activations() is one.source
+    assert ThreadedCollector([one, one]).cache_activations() is None
+    assert ThreadedCollector([SimpleNamespace()]).cache_activations() is None

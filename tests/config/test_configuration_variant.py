@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar
 
 import pytest
 
-from drone_rl.config.configuration import Variant, locate
+from drone_rl.config.configuration import Variant, locate, variant_of
 from drone_rl.config.learning import Returns
 from drone_rl.config.networks import Mlp, Network, OriginalCnn, SmallCnn
 from drone_rl.utils.errors import InputError
@@ -39,3 +39,16 @@ def test_what_is_made_is_imported_only_then():
     with pytest.raises(InputError, match="can't be imported"):
         locate("")
     assert locate("os.path").__name__ == "posixpath"
+
+
+def test_an_unknown_name_without_a_module_is_refused():
+    with pytest.raises(InputError, match=r"^network\._target_='resnet' is not registered"):
+        variant_of(Network, {"_target_": "resnet"}, "network")
+
+
+def test_a_registered_part_keeps_its_factory_with_values_of_the_users_own():
+    part = variant_of(Network, {"_target_": "mlp", "hidden": [4], "more": 1}, "network")
+    assert part.values() == {"hidden": [4], "more": 1}
+    assert type(part).factory is Mlp.factory is not None
+    other = variant_of(Network, {"_target_": "os.path.join", "more": 1}, "network")
+    assert type(other).factory is None

@@ -37,3 +37,19 @@ def test_what_is_just_possible_is_not():
     PillarsSettings(step_limit=34)
     PillarsSettings(width=1.2, spacing=4.01)
     PillarsSettings(height=2.5)
+
+
+def test_rows_with_just_enough_open_ones_are_accepted(monkeypatch):
+    settings = PillarsSettings()
+    num_open = sum(settings._is_open(row) for row in settings._rows())
+    monkeypatch.setattr("drone_rl.config.pillars._LEAST_OPEN", num_open)
+    PillarsSettings()
+    monkeypatch.setattr("drone_rl.config.pillars._LEAST_OPEN", num_open + 1)
+    with pytest.raises(InputError, match="too dense to cross"):
+        PillarsSettings()
+
+
+def test_a_pillar_at_the_touch_distance_closes_a_lane():
+    settings = PillarsSettings(spread=0.95, density=0.5)  # a single lane, in the middle
+    assert not settings._is_open([settings.touch_distance])
+    assert settings._is_open([settings.touch_distance + 1e-9])

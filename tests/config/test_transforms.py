@@ -45,3 +45,19 @@ def test_faults_are_those_by_chance_or_with_memory():
     faults = {variant.registered_name() for variant in Fault.variants()}
     assert faults == {"noise", "dead_rows", "frozen_frames", "late_frames", "shift"}
     assert all(issubclass(variant.factory, CameraFault) for variant in Fault.variants())
+
+
+@pytest.mark.parametrize(
+    ("name", "frame", "message"),
+    [
+        ("gray", Frame((3, 25, 64), True), "gray needs the camera's own RGB"),
+        ("gray", Frame((25, 64, 3), True), "gray needs the camera's own RGB"),
+        ("rgb", Frame((25, 64, 1)), "rgb needs the camera's own RGB"),
+        ("chromaticity", Frame((4, 25, 64), True), "chromaticity needs three colors"),
+        ("chromaticity", Frame((2, 25, 64), True), "chromaticity needs three colors"),
+        ("chromaticity", Frame((3, 25, 64)), "chromaticity needs three colors"),
+    ],
+)
+def test_images_of_another_kind_are_refused(name, frame, message):
+    with pytest.raises(InputError, match=message):
+        Transform.named(name, "x")().output(frame)

@@ -41,6 +41,12 @@ def test_the_configuration_is_there():
     assert (conf_dir() / "train.yaml").is_file()
 
 
+def test_an_installed_wheel_has_its_configuration_in_the_package(monkeypatch, tmp_path):
+    package = tmp_path / "drone_rl"
+    monkeypatch.setattr(composition, "__file__", str(package / "cli" / "hydra" / "composition.py"))
+    assert conf_dir() == package / "conf"
+
+
 def test_a_job_gets_its_settings_and_its_folder(job, tmp_path):
     done, statuses = job(lambda settings, folder: (3, (settings.name, folder)))
     config = OmegaConf.create({"name": "zy"})
