@@ -26,7 +26,7 @@ def test_what_has_room():
         ({"camera_offset": ((0, 0, -3), (0, 0, 1))}, "=-3 up puts the camera into the ground"),
         ({"camera_widening": 36}, "=36 makes a field of view of 171 degrees; give -134 to 35"),
         ({"camera_widening": (-140, 0)}, "=-140 makes a field of view of -5 degrees"),
-        ({"distractors": 1, "camera_offset": (0, -9, 0)}, "=9 aside .* into a distractor"),
+        ({"distractors": 1, "camera_offset": (0, -9, 0)}, "=9 sideways .* into a distractor"),
     ],
 )
 def test_what_has_none_is_refused_in_one_line(given, words):
@@ -44,5 +44,5 @@ def test_a_camera_in_the_first_thing():
 
 def test_tasks_that_do_not_say_where_their_things_stand():
     check_appearance(AppearanceSettings(), CameraSettings(), None, "posts")
-    with pytest.raises(InputError, match="distractors=5: task=posts does not say"):
+    with pytest.raises(InputError, match="distractors=5: task=posts does not define"):
         check_appearance(AppearanceSettings(distractors=(0, 5)), CameraSettings(), None, "posts")

@@ -42,9 +42,9 @@ def test_what_is_just_possible_is_not():
 def test_rows_with_just_enough_open_ones_are_accepted(monkeypatch):
     settings = PillarsSettings()
     num_open = sum(settings._is_open(row) for row in settings._rows())
-    monkeypatch.setattr("drone_rl.config.pillars._LEAST_OPEN", num_open)
+    monkeypatch.setattr("drone_rl.config.task._LEAST_OPEN", num_open)
     PillarsSettings()
-    monkeypatch.setattr("drone_rl.config.pillars._LEAST_OPEN", num_open + 1)
+    monkeypatch.setattr("drone_rl.config.task._LEAST_OPEN", num_open + 1)
     with pytest.raises(InputError, match="too dense to cross"):
         PillarsSettings()
 
