@@ -57,8 +57,8 @@ def test_no_sweep_and_a_damaged_one(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"command": "rm -rf ~"}, "no training command"),
-        ({"command": "drone-rl train; rm -rf ~"}, "no training command"),
+        ({"command": "rm -rf ~"}, "not a training command"),
+        ({"command": "drone-rl train; rm -rf ~"}, "not a training command"),
         ({"settings": [1]}, "must be a mapping"),
         ({"plugins": []}, "'plugins' is unknown"),
         ({"runs": [{"number": 0, "overrides": [], "folder": "../0"}]}, "not inside the sweep's"),

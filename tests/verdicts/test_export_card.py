@@ -12,7 +12,7 @@ def test_a_card_names_policy_verdict_origin_and_digest():
     found = lines()
     assert found[0] == "# mine"
     assert found[2].startswith("**poor** (certain")
-    assert any("`drone-rl train seed=7` in 12,345 frames" in line for line in found)
+    assert any("`drone-rl train seed=7` for 12,345 frames" in line for line in found)
     assert "- SHA-256 of `mine.safetensors`: `0123`" in found
     assert "- revision abc; torch 1, torchrl 2, mujoco-warp 3" in found
 
