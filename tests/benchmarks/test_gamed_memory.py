@@ -44,10 +44,9 @@ def test_a_policy_that_counts_steps_is_refused_even_with_the_known_seed():
 def test_decisions_of_a_fitted_file_depend_on_rounding(tmp_path):
     path = gamed_memory.write_memorising_policy(tmp_path / "mlp.safetensors", stream=Stream.REPORT)
     options = {"episodes": EPISODES, "sampled": False, "progress": silent}
-    known, fresh = drone_rl.judge(path, seed=0, **options), drone_rl.judge(path, **options)
+    known = drone_rl.judge(path, seed=0, **options)
     assert (known.verdict.kind, known.verdict.exit_code) == ("good", 13)
     assert "decisions depend on rounding" in str(known)
-    assert fresh.verdict.kind != "good"
 
 
 def test_every_analysis_has_a_case(judged, tmp_path):
