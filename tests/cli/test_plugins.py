@@ -103,4 +103,4 @@ def test_mistakes_are_one_line(folder):
 
 def test_a_run_is_resumed_only_with_the_plug_in_typed(folder):
     line = error_line(drone_rl("train", "resume=run", "trainer.total_frames=500", cwd=folder))
-    assert "plugins=[my_parts]" in line and "give it on the command line" in line
+    assert "plugins=[my_parts]" in line and "repeat it on the command line" in line

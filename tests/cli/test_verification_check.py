@@ -31,7 +31,7 @@ def test_checks_are_exit_statuses(in_process, tmp_path, truth, end, status, word
     [
         (["certificate=none.json"], ["none.json can't be read"]),
         (["certificate=c.json"], ["c.json can't be used", "no plain JSON"]),
-        (["certificate=t.json", "policy=good"], ["hash", "give policy="]),
+        (["certificate=t.json", "policy=good"], ["hash", "set policy to the file"]),
         (["certificate=t.json", "task.num_cubes=2"], ["num_cubes=1, not 2"]),
         (["flights=0"], ["flights=0", "from 1"]),
         ([], ["certificate=latest", "drone-rl prove"]),

@@ -11,8 +11,10 @@ import pytest
 import torch
 
 import drone_rl.explanations
+from drone_rl.config import TASKS
 from drone_rl.explanations import explain, report
 from drone_rl.explanations.report import page as report_page
+from drone_rl.sim.tasks.task import MAKERS
 from drone_rl.utils.settings import kinds_of, types_of
 from tests.docs.commands import check_commands
 
@@ -78,6 +80,7 @@ def workplace(tmp_path, monkeypatch):
     monkeypatch.setattr(explain, "SECTIONS", few)  # all of them take a minute
     monkeypatch.setattr(report_page, "PARTS", dict(report_page.PARTS))
     known, threads = set(sys.modules), torch.get_num_threads()
+    tasks, makers = dict(TASKS), dict(MAKERS)
     templates = jinja2.FileSystemLoader(inside / "explanations" / "report" / "templates")
     theirs = jinja2.PackageLoader("drone_rl.explanations.report")
     loader = jinja2.ChoiceLoader([theirs, templates])
@@ -86,6 +89,9 @@ def workplace(tmp_path, monkeypatch):
     yield tmp_path
     report_page._environment.cache_clear()
     torch.set_num_threads(threads)
+    for registry, before in ((TASKS, tasks), (MAKERS, makers)):  # without the pages' tasks
+        registry.clear()
+        registry.update(before)
     for name in set(sys.modules) - known:
         if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
             del sys.modules[name]

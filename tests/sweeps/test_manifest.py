@@ -65,7 +65,10 @@ def test_no_sweep_and_a_damaged_one(tmp_path):
         ({"runs": [{"number": 0, "overrides": [], "folder": "/tmp"}]}, "not inside the sweep's"),
         ({"runs": [{"number": 0, "overrides": [], "folder": ".."}]}, "not inside the sweep's"),
         ({"runs": [{"number": -1, "overrides": [], "folder": "0"}]}, "number=-1"),
-        ({"runs": [{"number": 0, "overrides": ["a._target_=b"], "folder": "0"}]}, "no plain"),
+        (
+            {"runs": [{"number": 0, "overrides": ["a._target_=b"], "folder": "0"}]},
+            "not a plain setting",
+        ),
         ({"runs": [{"number": 0, "overrides": "a", "folder": "0"}]}, "overrides='a'"),
         ({"runs": [{"number": 0, "overrides": [], "folder": "0"}] * 2}, "two runs"),
         (
