@@ -405,5 +405,14 @@ MAIN = (
         lambda f: f"{f['ray_over_plain']:.2f}",
         "0.8",
     ),
+    Row(
+        "size",
+        "lines and modules of the package; lines of the file that builds a training, of a minimal task",
+        lambda f: (
+            f"{f['package_lines']:,}; {f['package_modules']}; {f['training_file_lines']}; "
+            f"{f['minimal_task_lines']}"
+        ),
+        "48,000; 350; 200; 80",
+    ),
 )
 """Training and sweeps."""
