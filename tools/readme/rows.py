@@ -407,7 +407,7 @@ MAIN = (
     ),
     Row(
         "size",
-        "lines and modules of the package; lines of the file that builds a training, of a minimal task",
+        "lines and modules of the package; lines of the training file, of a minimal task",
         lambda f: (
             f"{f['package_lines']:,}; {f['package_modules']}; {f['training_file_lines']}; "
             f"{f['minimal_task_lines']}"
