@@ -180,9 +180,14 @@ def with_transforms(env: EnvBase, transforms: Sequence[Transform] = ()) -> Trans
     return TransformedEnv(env, Compose(*transforms))  # pyright: ignore[reportArgumentType]
 
 
+def pixel_transforms(transforms: Iterable[Transform]) -> list[Transform]:
+    """Return the transforms that read "pixels"."""
+    return [transform for transform in transforms if "pixels" in (transform.in_keys or [])]
+
+
 def on_pixels(transforms: Iterable[Transform]) -> Callable[[Tensor], Tensor]:
     """Return a function that applies transforms of "pixels" to images without an environment."""
-    of_images = [transform for transform in transforms if "pixels" in (transform.in_keys or [])]
+    of_images = pixel_transforms(transforms)
 
     def apply(images: Tensor) -> Tensor:
         for transform in of_images:

@@ -9,7 +9,7 @@ from torch.nn import functional
 from torchrl.envs import CatFrames, Transform, TransformedEnv
 
 from drone_rl.envs import ChromaticityPixels, CropRows, RgbPixels, worlds_of
-from drone_rl.envs.transforms import memory_of, see_film
+from drone_rl.envs.transforms import memory_of, pixel_transforms, see_film
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import State
@@ -43,7 +43,7 @@ class Scenes:
         self.task = self.worlds.task
         self.actions = self.worlds.dynamics.actions
         pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
-        self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
+        self._transforms = pixel_transforms(pipeline)
         kinds = {type(transform) for transform in self._transforms}
         colors = {ChromaticityPixels: "chromaticity", RgbPixels: "rgb"}
         self.channels: str = next((name for kind, name in colors.items() if kind in kinds), "gray")

@@ -17,7 +17,7 @@ from torchrl.envs import Transform as TorchrlTransform
 
 from drone_rl.config import ActionSettings, BaseTaskSettings, DynamicsSettings
 from drone_rl.config.configuration import Changes
-from drone_rl.envs.transforms import memory_of, see_film
+from drone_rl.envs.transforms import memory_of, pixel_transforms, see_film
 from drone_rl.policies import ImageNetwork, PolicyNetwork, make_actor
 from drone_rl.policies.zoo import PolicyDescription, parse, policy_names, policy_path, read_policy
 from drone_rl.sim.tasks import Task
@@ -259,7 +259,7 @@ class Policy(BasePolicy):
     @functools.cached_property
     def _network_and_transforms(self) -> tuple[PolicyNetwork, list[TorchrlTransform]]:
         made = self.description.without_faults().make_transforms()
-        return self.make_network(), [t for t in made if "pixels" in (t.in_keys or [])]
+        return self.make_network(), pixel_transforms(made)
 
     def _repr_html_(self) -> str:
         progress, described = self.state["progress"], self.description.as_dict()

@@ -9,7 +9,7 @@ from torch import Tensor
 from torchrl.envs import Transform
 
 from drone_rl.envs import GrayPixels
-from drone_rl.envs.transforms import memory_of, see_film
+from drone_rl.envs.transforms import memory_of, pixel_transforms, see_film
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.rounding import decider
 from drone_rl.sim.actions import Actions
@@ -71,8 +71,8 @@ class PolicyAgent:
         self.is_fragile = torch.zeros(num_worlds, dtype=torch.bool)
         """Episodes with a frame in which rounding can change the action. Shape: (num_worlds,)."""
         self._decide = decider(network)[0] if examines_rounding else None
-        on_pixels = [t for t in transforms if "pixels" in (t.in_keys or [])]
-        self._network, self._first, self._rest = network, on_pixels[0], on_pixels[1:]
+        self._network = network
+        self._first, *self._rest = pixel_transforms(transforms)
         self._memory, self._num_worlds = memory_of(self._rest), num_worlds
         self._film: list[Tensor] = []
 

@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from torchrl.envs import Transform, TransformedEnv
 
 from drone_rl.envs import worlds_of
+from drone_rl.envs.transforms import pixel_transforms
 from drone_rl.policies.rounding import RoundingBound
 from drone_rl.sim.tasks.collect_cubes import EndReason, WorldState
 from drone_rl.utils.batch import Batch
@@ -126,7 +127,7 @@ class NodeEvaluator:
         self._worlds, self._network = worlds_of(env), network
         self._rounding = RoundingBound.find(network)
         pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
-        self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
+        self._transforms = pixel_transforms(pipeline)
 
     def on(self, graph: Graph) -> Evaluate:
         """Return the evaluator of a graph's nodes; no image is rendered twice."""
