@@ -29,7 +29,6 @@ from benchmarks.robust import bench_robust
 from benchmarks.scaling import bench_scaling
 from benchmarks.sentences import bench_sentences
 from benchmarks.shifts import bench_shifts
-from benchmarks.size import bench_size
 from benchmarks.speed import bench_collector, bench_dm_control, bench_render
 from benchmarks.startup import bench_startup
 from benchmarks.sweeps import bench_kills, bench_ray, bench_sweeps
@@ -42,6 +41,7 @@ from benchmarks.training import (
 )
 from benchmarks.verdicts import bench_verdicts
 from drone_rl.utils.errors import InputError
+from tools.size import measure
 
 _RENDERING = ("sim", "envs")
 _COLLECTING = (*_RENDERING, "policies", "collectors")
@@ -98,7 +98,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         "main",
         (*_TRAINING, "conf", "benchmarks/training"),
     ),
-    "size": Benchmark(lambda s: bench_size(), "main", (".", "conf", "benchmarks/size")),
+    "size": Benchmark(lambda s: measure(), "main", (".", "conf")),
     "coverage": Benchmark(
         lambda s: bench_coverage(s.quick),
         "truth",

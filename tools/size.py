@@ -20,6 +20,7 @@ SMALL = 60
 """Modules with fewer lines and a single importer count as `single_use_modules`."""
 PROSE = ("drone_rl", "docs", "conf", "README.md", "AGENTS.md", "tools", "examples")
 """Paths whose phrases are counted; those that do not exist are ignored."""
+_TASK = re.compile(r'^```python title="post.py"\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 _SUFFIXES = (".py", ".md", ".yaml", ".html", ".j2")
 _SUPPRESSION = re.compile(r"^# pyright: (?!reportUnnec)", re.M)
 _ASIDE = "(?:draws|flies|makes|asks|learns|knows|has|does|wants|waits|keeps|can)"
@@ -65,10 +66,14 @@ def measure(root: Path = ROOT) -> dict[str, Any]:
     """Measure the size and structure of a checkout.
 
     Args:
-        root: Folder with `drone_rl`, `benchmarks` and `tests`.
+        root: Folder with `drone_rl`, `benchmarks`, `tests`, README.md and the tutorial of tasks.
 
     Returns:
-        The counts. "longest_module" is a number of lines and a path.
+        The counts. "training_file_lines" are those of training/train.py, "minimal_task_lines" those
+        of the tutorial's task; "longest_module" is a number of lines and a path.
+
+    Raises:
+        ValueError: The tutorial contains no or several tasks.
     """
     package = _read(root, "drone_rl")
     lines = {path: text.count("\n") for path, text in package.items()}
@@ -84,6 +89,9 @@ def measure(root: Path = ROOT) -> dict[str, Any]:
         len(_SUPPRESSION.findall(text)) for p, text in package.items() if "kernel" not in p.stem
     ]
     tests = sum(text.count("\n") for text in _read(root, "tests").values())
+    readme = (root / "README.md").read_text()
+    training = package[root / "drone_rl" / "training" / "train.py"]
+    (task,) = _TASK.findall((root / "docs" / "tutorials" / "task.md").read_text())
     longest = max(package, key=lambda path: (lines[path], path))
     return {
         "package_lines": sum(lines.values()),
@@ -92,7 +100,10 @@ def measure(root: Path = ROOT) -> dict[str, Any]:
         "single_use_modules": len(single),
         "type_suppressions": sum(suppressions),
         "flagged_phrases": sum(1 for _ in find_phrases(root / name for name in PROSE)),
-        "readme_lines": (root / "README.md").read_text().count("\n"),
+        "readme_lines": readme.count("\n"),
+        "readme_words": len(readme.split()),
+        "training_file_lines": len(training.splitlines()),
+        "minimal_task_lines": len(task.splitlines()),
         "test_lines_per_line": round(tests / max(1, sum(lines.values())), 2),
         "longest_module": [lines[longest], longest.relative_to(root).as_posix()],
         "modules_without_test": modules_without_test(root),

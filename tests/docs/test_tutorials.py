@@ -5,6 +5,7 @@ import gc
 import re
 import sys
 from pathlib import Path
+from unittest.mock import patch
 
 import jinja2
 import pytest
@@ -80,18 +81,15 @@ def workplace(tmp_path, monkeypatch):
     monkeypatch.setattr(explain, "SECTIONS", few)  # all of them take a minute
     monkeypatch.setattr(report_page, "PARTS", dict(report_page.PARTS))
     known, threads = set(sys.modules), torch.get_num_threads()
-    tasks, makers = dict(TASKS), dict(MAKERS)
     templates = jinja2.FileSystemLoader(inside / "explanations" / "report" / "templates")
     theirs = jinja2.PackageLoader("drone_rl.explanations.report")
     loader = jinja2.ChoiceLoader([theirs, templates])
     monkeypatch.setattr(jinja2, "PackageLoader", lambda _: loader)
     report_page._environment.cache_clear()  # another tutorial may have made it, with another loader
-    yield tmp_path
+    with patch.dict(TASKS), patch.dict(MAKERS):  # a page's tasks are registered until its end
+        yield tmp_path
     report_page._environment.cache_clear()
     torch.set_num_threads(threads)
-    for registry, before in ((TASKS, tasks), (MAKERS, makers)):  # without the pages' tasks
-        registry.clear()
-        registry.update(before)
     for name in set(sys.modules) - known:
         if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
             del sys.modules[name]

@@ -6,6 +6,8 @@ import pytest
 
 from tools.size import ROOT, find_importers, find_phrases, main, measure
 
+TASK = 'Text.\n\n```python title="post.py"\n"""A task."""\nNAME = 1\n```\n'
+
 
 @pytest.fixture
 def checkout(tmp_path):
@@ -20,6 +22,9 @@ def checkout(tmp_path):
         "drone_rl/b/user.py": '"""An image."""\nfrom ..a import long, twice\n',
         "benchmarks/b.py": "import drone_rl.a.twice\n",
         "tests/a/test_once.py": "1\n" * 5,
+        "drone_rl/training/train.py": '"""Train."""\n\nX = 1\n',
+        "tests/training/test_train.py": "1\n",
+        "docs/tutorials/task.md": TASK,
         "README.md": "A picture\n",
     }
     for name, text in files.items():
@@ -32,17 +37,26 @@ def checkout(tmp_path):
 def test_measure_returns_the_hand_counted_values(checkout):
     found = measure(checkout)
     assert found == {
-        "package_lines": 66,
-        "package_modules": 7,
-        "packages": 2,
+        "package_lines": 69,
+        "package_modules": 8,
+        "packages": 3,
         "single_use_modules": 1,  # once: long has 60 lines, twice has two importers
         "type_suppressions": 1,
         "flagged_phrases": 1,
         "readme_lines": 1,
-        "test_lines_per_line": 0.08,
+        "readme_words": 2,
+        "training_file_lines": 3,
+        "minimal_task_lines": 2,
+        "test_lines_per_line": 0.09,
         "longest_module": [60, "drone_rl/a/long.py"],
         "modules_without_test": ["a/a_kernel", "a/long", "a/twice", "b/user"],
     }
+
+
+def test_tutorial_without_a_task_raises(checkout):
+    (checkout / "docs" / "tutorials" / "task.md").write_text("Text.\n")
+    with pytest.raises(ValueError, match="unpack"):
+        measure(checkout)
 
 
 def test_find_importers_resolves_absolute_and_relative_imports(checkout):
