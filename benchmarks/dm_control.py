@@ -19,7 +19,6 @@ from dm_control.mujoco import engine
 from drone_rl.sim.composer_task import ComposerTask
 from drone_rl.sim.entities import hide_drone
 
-QUALITIES = ("default", "tuned")
 _PLAIN = dict.fromkeys(("shadow", "reflection", "skybox", "fog", "haze"), False)
 
 
