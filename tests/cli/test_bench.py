@@ -13,7 +13,10 @@ from drone_rl.cli.bench import BenchCommand
         (["--help"], ["--help"]),
         (
             ["--quick"],
-            ["only=[render,collector,dm_control,scaling,memory,solve,seeds,large]", "quick=true"],
+            [
+                "only=[render,collector,dm_control,scaling,memory,solve,seeds,large,size]",
+                "quick=true",
+            ],
         ),
         (["many"], ["only=[sweeps,kills,ray]"]),
     ],
