@@ -132,12 +132,12 @@ def possible_ends(settings: TrainSettings) -> list[enum.IntEnum]:
 
 
 def result_of(
-    reason: str, trainer: Trainer, largest_reward: float, confirmation: Confirmation | None
+    trainer: Trainer, largest_reward: float, confirmation: Confirmation | None
 ) -> dict[str, Any]:
     """Return the values of `result.json`."""
     confirmed = {} if confirmation is None else confirmation.result
     progress = dataclasses.asdict(trainer.progress)
-    return {"reason": reason, **progress, "largest_reward": largest_reward, **confirmed}
+    return {"reason": trainer.reason, **progress, "largest_reward": largest_reward, **confirmed}
 
 
 def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Training:

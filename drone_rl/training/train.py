@@ -107,9 +107,10 @@ def learn(
     parts = components.make_collector(settings, replay)
     confirmation = Confirmation(settings, parts.network) if limits.confirm_episodes else None
     checkpoints = run.checkpoints(settings)
+    learner = settings.objective.learner(settings, parts)
     trainer = Trainer(
         collector=parts.collector,
-        learner=settings.objective.learner(settings, parts),
+        learner=learner,
         callbacks=[CsvCallback(folder / "metrics.csv"), checkpoints, *callbacks],
         generators=parts.generators,
         target=limits.target_share and limits.target_share * largest_reward,
@@ -121,14 +122,16 @@ def learn(
     )
     try:
         run.resume(trainer, checkpoints, state)
-        reason = trainer.run()  # for batch in collector: learner.update(batch); callbacks
+        with trainer.running() as batches:
+            for batch in batches:
+                trainer.finish_update(batch, learner.update(batch))  # log, save, other callbacks
     except NotANumberError as error:
         raise InputError(f"{error}; the last good checkpoint is {checkpoints.last_path}") from error
     finally:
         parts.collector.shutdown()
         if confirmation is not None:
             confirmation.close()
-    return run_folder.result_of(reason, trainer, largest_reward, confirmation)
+    return run_folder.result_of(trainer, largest_reward, confirmation)
 
 
 @implements(Threads)

@@ -1,4 +1,4 @@
-"""The training loop: collect, learn, log."""
+"""State of a training: batches, progress, metrics, signals, callbacks."""
 
 import contextlib
 import dataclasses
@@ -76,7 +76,11 @@ TRIMMED_EVERY = 16
 
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
 class Trainer:
-    """Collect batches and pass them to a learner until the task is solved or the budget spent.
+    """Provide batches until the task is solved or the budget spent; count, log and save.
+
+        with trainer.running() as batches:
+            for batch in batches:
+                trainer.finish_update(batch, learner.update(batch))
 
     `state_dict` returns the full state between two updates. On a CPU, a training that resumes from
     it ends with the same parameters, bit for bit, as one that never stopped.
@@ -108,17 +112,27 @@ class Trainer:
     stop_signal: signal.Signals | None = dataclasses.field(default=None, init=False)
     stop_request: str = dataclasses.field(default="", init=False)
     """Why a callback wants training to stop after this update; empty to go on."""
+    _reason: str = dataclasses.field(default="", init=False)
+    _begin: float = dataclasses.field(default=0.0, init=False)
+    _collected: float = dataclasses.field(default=0.0, init=False)
+    """Times at which the current batch was requested and received, in seconds."""
 
-    def run(self) -> str:
-        """Train until solved, out of budget or stopped.
+    @property
+    def reason(self) -> str:
+        """Why it stopped: "solved", "frames", "episodes", a signal or a callback's `stop_request`.
 
-        Ctrl-C and SIGTERM let the current update finish, so that nothing is lost; a second signal
-        acts at once. Signals are watched in the main thread only.
+        "frames" is also the reason if the collector has no more batches. A signal takes precedence,
+        also if it arrives at the end: the caller must raise it again.
+        """
+        return self._reason if self.stop_signal is None else self.stop_signal.name
 
-        Returns:
-            Why it stopped: "solved", "frames" (also if the collector has no more), "episodes", a
-            signal's name or a callback's `stop_request`. A signal takes precedence over any other
-            reason, also if it arrives at the end: the caller must raise it again.
+    @contextlib.contextmanager
+    def running(self) -> Iterator[Iterator[TensorDictBase]]:
+        """Provide the batches of a training; pass each with its metrics to `finish_update`.
+
+        The batches end when the task is solved, the budget is spent or a signal arrives. Ctrl-C and
+        SIGTERM let the current update finish, so that nothing is lost; a second signal acts at
+        once. Signals are watched in the main thread only.
 
         Raises:
             NotANumberError: A loss or gradient was NaN or infinite.
@@ -126,55 +140,54 @@ class Trainer:
         """
         with self._signals():
             self._notify("on_start")
-            batches = iter(self.collector)
             try:
-                while not (reason := self._stop_reason()):
-                    metrics = self._update(batches)
-                    if metrics is None:
-                        reason = "frames"
-                        break
-                    self._notify("on_update", metrics)
-                    if self.progress.updates % TRIMMED_EVERY == 0:
-                        return_freed_memory()
-            except NotANumberError:
+                yield self._batches()
+            except NotANumberError as error:
                 self._notify("on_failure")
-                raise
-            self._notify("on_end", reason)
-        return reason if self.stop_signal is None else self.stop_signal.name
+                raise NotANumberError(
+                    f"{error} at update {self.progress.updates + 1}; the parameters are those "
+                    "before it; lower optimiser.lr or set trainer.max_grad_norm"
+                ) from None
+            self._notify("on_end", self._reason)
 
-    def _update(self, batches: Iterator[TensorDictBase]) -> dict[str, float] | None:
-        """Collect and learn; return the metrics, or None if there is no batch left."""
-        begin = time.perf_counter()
-        batch = next(batches, None)
-        if batch is None:
-            return None
-        collected = time.perf_counter()
-        terms = self._learn(batch)
+    def _batches(self) -> Iterator[TensorDictBase]:
+        batches = iter(self.collector)
+        while not (reason := self._stop_reason()):
+            self._begin = time.perf_counter()
+            batch = next(batches, None)
+            if batch is None:
+                reason = "frames"
+                break
+            self._collected = time.perf_counter()
+            check_batch(batch, self.learner.in_keys, type(self.learner).__name__)
+            yield batch
+            if self.progress.updates % TRIMMED_EVERY == 0:
+                return_freed_memory()
+        self._reason = reason
+
+    def finish_update(self, batch: TensorDictBase, metrics: Mapping[str, float]) -> None:
+        """Count a batch that the learner has learned from, and call the callbacks.
+
+        Args:
+            batch: The batch.
+            metrics: What the learner's `update` returned.
+        """
         end = time.perf_counter()
         rewards, progress = episode_rewards(batch), self.progress
         progress.frames += batch.numel()
         progress.episodes += len(rewards)
         progress.updates += 1
-        progress.seconds += end - begin
+        progress.seconds += end - self._begin
         progress.running_reward = running_mean(progress.running_reward, rewards, self.running_decay)
-        return {
+        logged = {
             "train/running_reward": progress.running_reward,
             **batch_metrics(batch, self.ends),
-            **terms,
-            "time/frames_per_second": batch.numel() / (end - begin),
-            "time/collect_s": collected - begin,
-            "time/learn_s": end - collected,
+            **metrics,
+            "time/frames_per_second": batch.numel() / (end - self._begin),
+            "time/collect_s": self._collected - self._begin,
+            "time/learn_s": end - self._collected,
         }
-
-    def _learn(self, batch: TensorDictBase) -> dict[str, float]:
-        check_batch(batch, self.learner.in_keys, type(self.learner).__name__)
-        try:
-            return self.learner.update(batch)
-        except NotANumberError as error:
-            raise NotANumberError(
-                f"{error} at update {self.progress.updates + 1}; the parameters are those before "
-                "it; lower optimiser.lr or set trainer.max_grad_norm"
-            ) from None
+        self._notify("on_update", logged)
 
     @property
     def _estimator(self) -> ReturnEstimator | None:
@@ -188,16 +201,16 @@ class Trainer:
             return self.stop_signal.name
         if self.stop_request:
             return self.stop_request
-        is_confirmedlved = self._is_confirmedlved()
+        is_solved = self._is_solved()
         if self.stop_signal is not None:  # it came during the confirmation, which a resume repeats
             return self.stop_signal.name
-        if is_confirmedlved:
+        if is_solved:
             return "solved"
         if self.total_episodes is not None and progress.episodes >= self.total_episodes:
             return "episodes"
         return "frames" if progress.frames >= self.total_frames else ""
 
-    def _is_confirmedlved(self) -> bool:
+    def _is_solved(self) -> bool:
         progress = self.progress
         if self.target is None or progress.running_reward < self.target:
             return False

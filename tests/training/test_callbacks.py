@@ -15,6 +15,7 @@ from drone_rl.training import (
 )
 from drone_rl.utils.checkpoint import load_checkpoint
 from drone_rl.utils.errors import InputError
+from tests.training_loop import run
 
 
 def rows(path):
@@ -24,7 +25,7 @@ def rows(path):
 
 def test_last_and_best_checkpoints_are_kept(make_trainer, tmp_path):
     trainer = make_trainer(callbacks=[CheckpointCallback(tmp_path, interval_s=0.0)])
-    trainer.run()
+    run(trainer)
     last, best = (load_checkpoint(tmp_path / name) for name in ("last.pt", "best.pt"))
     assert last["progress"]["updates"] == trainer.progress.updates
     assert best["progress"]["running_reward"] >= last["progress"]["running_reward"]
@@ -63,7 +64,7 @@ def test_uncreatable_folder_raises(make_trainer, tmp_path):
 
 def test_metrics_have_one_row_per_update(make_trainer, tmp_path):
     trainer = make_trainer(callbacks=[CsvCallback(tmp_path / "metrics.csv")])
-    trainer.run()
+    run(trainer)
     table = rows(tmp_path / "metrics.csv")
     assert [int(r["update"]) for r in table] == list(range(1, trainer.progress.updates + 1))
     assert float(table[-1]["train/running_reward"]) == pytest.approx(
@@ -74,26 +75,26 @@ def test_metrics_have_one_row_per_update(make_trainer, tmp_path):
 def test_resumed_run_has_each_row_once(make_trainer, tmp_path):
     path = tmp_path / "metrics.csv"
     first = make_trainer(callbacks=[CsvCallback(path)], total_frames=100)
-    first.run()
+    run(first)
     state = first.state_dict()
     first.total_frames = 200
-    first.run()  # rows after the last checkpoint
+    run(first)  # rows after the last checkpoint
     resumed = make_trainer(callbacks=[CsvCallback(path)], total_frames=300)
     resumed.load_state_dict(state)
-    resumed.run()
+    run(resumed)
     updates = [int(r["update"]) for r in rows(path)]
     assert updates == list(range(1, resumed.progress.updates + 1))
 
 
 def test_torchrl_loggers_are_supported(make_trainer, tmp_path):
     logger = CSVLogger("run", log_dir=str(tmp_path))
-    make_trainer(callbacks=[LoggerCallback([logger])]).run()
+    run(make_trainer(callbacks=[LoggerCallback([logger])]))
     assert list(tmp_path.glob("run/scalars/**/*reward*.csv"))
 
 
 def test_progress_is_logged_as_lines_without_a_terminal(make_trainer, caplog):
     caplog.set_level(logging.INFO)
-    make_trainer(callbacks=[ProgressCallback(interval_s=0.0)]).run()
+    run(make_trainer(callbacks=[ProgressCallback(interval_s=0.0)]))
     lines = [r.getMessage() for r in caplog.records]
     assert any("running reward" in line and "frames/s" in line for line in lines)
     assert "stopped (frames)" in lines[-1]

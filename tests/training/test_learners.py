@@ -15,6 +15,7 @@ from drone_rl.training.learners import check_batch, check_finite
 from drone_rl.utils.checkpoint import load_checkpoint
 from drone_rl.utils.errors import InputError
 from tests.three_state import ThreeStateEnv
+from tests.training_loop import run
 
 GAMMA, PASSES = 0.9, 2
 
@@ -103,7 +104,7 @@ def leaving(learner):
 
 def test_critic_learns_from_partial_episodes(trainer, tmp_path):
     before = leaving(trainer.learner)
-    assert trainer.run() == "frames"
+    assert run(trainer) == "frames"
     assert leaving(trainer.learner) > max(before, 0.9)
     progress = trainer.progress
     assert (progress.frames, progress.updates) == (4000, 200)
@@ -120,7 +121,7 @@ def test_training_ends_with_the_collector(trainer):
     batches = [next(iter(trainer.collector)) for _ in range(2)]
     trainer.collector = batches
     trainer.collector = type("Two", (list,), {"state_dict": dict})(batches)
-    assert trainer.run() == "frames"
+    assert run(trainer) == "frames"
     assert (trainer.progress.updates, trainer.progress.frames) == (2, 40)
 
 
@@ -139,7 +140,7 @@ def test_partial_episodes_need_reward_sums(trainer):
     trainer.collector = type("One", (list,), {"state_dict": dict})([batch])
     batch["next", "done"][:, -1] = False
     with pytest.raises(InputError, match="RewardSum"):
-        trainer.run()
+        run(trainer)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])

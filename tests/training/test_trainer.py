@@ -9,6 +9,7 @@ from drone_rl.training import Callback, CheckpointCallback, NotANumberError
 from drone_rl.training import trainer as trainer_module
 from drone_rl.training.trainer import episode_rewards, running_mean
 from drone_rl.utils.checkpoint import load_checkpoint
+from tests.training_loop import run
 
 
 class At(Callback):
@@ -30,28 +31,28 @@ def parameters(trainer):
 def test_learns_the_bandit(make_trainer):
     trainer = make_trainer(total_frames=4000)
     before = trainer.learner.network(torch.zeros(4)).softmax(-1)[1].item()
-    assert trainer.run() == "frames"
+    assert run(trainer) == "frames"
     assert trainer.learner.network(torch.zeros(4)).softmax(-1)[1].item() > before + 0.3
 
 
 def test_seed_determines_parameters_bit_for_bit(make_trainer):
     first, second, other = make_trainer(), make_trainer(), make_trainer(1)
     for trainer in (first, second, other):
-        trainer.run()
+        run(trainer)
     assert torch.equal(parameters(first), parameters(second))
     assert not torch.equal(parameters(first), parameters(other))
 
 
 def test_resumed_run_equals_an_uninterrupted_one_bit_for_bit(make_trainer, tmp_path):
     whole = make_trainer(total_frames=400)
-    whole.run()
+    run(whole)
     half = make_trainer(total_frames=150, callbacks=[CheckpointCallback(tmp_path)])
-    half.run()
+    run(half)
     torch.rand(17)  # changes the global random state
     resumed = make_trainer(seed=5, total_frames=400)
     resumed.load_state_dict(load_checkpoint(tmp_path / "last.pt"))
     assert resumed.progress.updates == half.progress.updates
-    resumed.run()
+    run(resumed)
     assert torch.equal(parameters(resumed), parameters(whole))
     assert resumed.progress.frames == whole.progress.frames
     assert resumed.progress.running_reward == whole.progress.running_reward
@@ -64,7 +65,7 @@ def test_signal_saves_and_stops_after_the_update(make_trainer, tmp_path, number)
     before = signal.getsignal(number)
     kill = At(3, lambda _: signal.raise_signal(number))
     trainer = make_trainer(callbacks=[kill, CheckpointCallback(tmp_path)])
-    assert trainer.run() == number.name
+    assert run(trainer) == number.name
     assert trainer.progress.updates == 3
     assert load_checkpoint(tmp_path / "last.pt")["progress"]["updates"] == 3
     assert signal.getsignal(number) == before
@@ -80,7 +81,7 @@ def test_signal_during_confirmation_stops_after_it(make_trainer):
         return True
 
     trainer = make_trainer(target=-1e6, confirm=confirm)
-    assert trainer.run() == "SIGTERM"
+    assert run(trainer) == "SIGTERM"
     assert calls == [0]
 
 
@@ -90,7 +91,7 @@ def test_signal_during_the_last_save_is_returned(make_trainer):
             assert reason == "frames"
             signal.raise_signal(signal.SIGTERM)
 
-    assert make_trainer(callbacks=[Late()]).run() == "SIGTERM"
+    assert run(make_trainer(callbacks=[Late()])) == "SIGTERM"
 
 
 def test_other_threads_install_no_signal_handlers(make_trainer):
@@ -98,7 +99,7 @@ def test_other_threads_install_no_signal_handlers(make_trainer):
     seen = []
     look = At(1, lambda _: seen.append(signal.getsignal(signal.SIGTERM)))
     trainer = make_trainer(callbacks=[look])
-    thread = threading.Thread(target=trainer.run)
+    thread = threading.Thread(target=run, args=(trainer,))
     thread.start()
     thread.join()
     assert seen == [before] and trainer.progress.frames >= trainer.total_frames
@@ -108,7 +109,7 @@ def test_handler_from_outside_python_is_kept(make_trainer, monkeypatch):
     installed = []
     monkeypatch.setattr(signal, "getsignal", lambda number: None)
     monkeypatch.setattr(signal, "signal", lambda *args: installed.append(args))
-    assert make_trainer().run() == "frames"
+    assert run(make_trainer()) == "frames"
     assert installed == []
 
 
@@ -121,7 +122,7 @@ def test_second_ctrl_c_aborts_at_once(make_trainer):
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
-            make_trainer(callbacks=[At(2, twice)]).run()
+            run(make_trainer(callbacks=[At(2, twice)]))
     finally:
         signal.signal(signal.SIGINT, before)
 
@@ -144,14 +145,14 @@ def test_nan_stops_and_keeps_the_last_good_checkpoint(make_trainer, tmp_path, wh
     trainer.callbacks.append(At(2, poison))
     name = "loss_actor" if where == "loss" else "gradient of weight"
     with pytest.raises(NotANumberError, match=f"{name} is NaN or infinite at update 3"):
-        trainer.run()
+        run(trainer)
     assert torch.equal(parameters(trainer), good[0])
     assert load_checkpoint(tmp_path / "last.pt")["progress"]["updates"] == 2
 
 
 def test_stops_when_solved(make_trainer):
     trainer = make_trainer(target=0.5, running_decay=0.9, total_frames=100_000)
-    assert trainer.run() == "solved"
+    assert run(trainer) == "solved"
     assert trainer.progress.running_reward >= 0.5
 
 
@@ -163,11 +164,11 @@ def test_training_is_solved_only_after_confirmation(make_trainer):
         return len(calls) == 3
 
     trainer = make_trainer(target=0.5, running_decay=0.9, total_frames=100_000)
-    trainer.run()
+    run(trainer)
     first = trainer.progress.updates
     trainer = make_trainer(target=0.5, running_decay=0.9, total_frames=100_000)
     trainer.confirm = confirm
-    assert trainer.run() == "solved"
+    assert run(trainer) == "solved"
     assert calls[0] == first and calls[2] == trainer.progress.updates
     assert calls == sorted(set(calls)) and trainer.progress.running_reward >= 0.5
 
@@ -178,13 +179,13 @@ def test_memory_is_released_periodically(make_trainer, monkeypatch):
         trainer_module, "return_freed_memory", lambda: given.append(trainer.progress.updates)
     )
     trainer.callbacks.append(At(40, lambda t: setattr(t, "stop_request", "enough")))
-    trainer.run()
+    run(trainer)
     assert given == [16, 32]
 
 
 def test_stops_at_episodes(make_trainer):
     trainer = make_trainer(total_episodes=16)
-    assert trainer.run() == "episodes"
+    assert run(trainer) == "episodes"
     assert trainer.progress.episodes == 16
 
 
@@ -192,7 +193,7 @@ def test_progress_counts_frames_and_episodes(make_trainer):
     trainer, batches = make_trainer(total_frames=100), []
     collect = trainer.collector.collect
     trainer.collector.collect = lambda: batches.append(collect()) or batches[-1]
-    assert trainer.run() == "frames"
+    assert run(trainer) == "frames"
     progress = trainer.progress
     assert progress.updates == len(batches) and progress.frames == sum(len(b) for b in batches)
     assert progress.frames - len(batches[-1]) < 100 <= progress.frames
@@ -219,13 +220,13 @@ def test_end_metrics_use_the_given_names(make_trainer):
         return batch
 
     trainer.collector.collect = with_ends
-    trainer.run()
+    run(trainer)
     assert {metrics["end/odd"] for metrics in at.metrics} == {1.0}
 
 
 def test_update_has_the_expected_metrics(make_trainer):
     at = At(-1, None)
-    make_trainer(callbacks=[at], max_grad_norm=1e-3).run()
+    run(make_trainer(callbacks=[at], max_grad_norm=1e-3))
     names = {"train/reward", "train/running_reward", "train/length", "loss/loss_actor"}
     assert names | {"loss/entropy", "loss/grad_norm", "time/frames_per_second"} <= set(
         at.metrics[0]
