@@ -12,6 +12,7 @@ Built-in parts have settings classes in this package, and `implements` connects 
 classes and functions in higher layers.
 """
 
+import dataclasses
 import inspect
 import math
 import re
@@ -26,6 +27,7 @@ from drone_rl.config.networks import Network
 from drone_rl.config.transforms import Frame, Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Flag, Kind, Maybe, OneOf, Real, Several, Text, Whole
+from drone_rl.utils.settings import Settings
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -128,6 +130,20 @@ def register_collector(name: str) -> Callable[[F], F]:
     return lambda factory: _register(Collector, name, factory, 2)
 
 
+def modules_of(settings: Any) -> set[str]:
+    """Return the modules that register the user's parts among settings.
+
+    Other processes must import them before they read the settings' configuration.
+    """
+    if isinstance(settings, tuple):
+        return set[str]().union(*map(modules_of, settings))
+    if not isinstance(settings, Settings):
+        return set()
+    values = (getattr(settings, field.name) for field in dataclasses.fields(settings))
+    own = type(settings).__module__
+    return modules_of(tuple(values)) | ({own} if not own.startswith("drone_rl.") else set())
+
+
 def _register(
     part: type[Variant],
     name: str,
@@ -145,6 +161,11 @@ def _register(
                 raise InputError(f"{part.__name__.lower()}={name} is built in; give another name")
             del variant.target  # its module was imported again; the new part replaces the old one
     fields = _fields(name, factory, positional, skipped)
+    for field, _, _ in fields:
+        if field in {*dir(part), "target"} - {own.name for own in dataclasses.fields(part)}:
+            raise InputError(
+                f"{name}: the parameter {field} has the name of an attribute of settings; rename it"
+            )
     inherited = part.__dataclass_fields__.keys() if part is Returns else set()
     names = {*(field for field, _, _ in fields), *inherited}
     namespace = {

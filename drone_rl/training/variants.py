@@ -1,6 +1,7 @@
 """Variants of the pipeline in `train.py`: a critic (PPO, A2C), workers of a Ray cluster."""
 
 import functools
+import importlib
 import logging
 from typing import Any
 
@@ -9,7 +10,7 @@ import torch
 from drone_rl.collectors import EpisodeCollector, RolloutCollector, ThreadedCollector
 from drone_rl.config.configuration import as_config, from_config
 from drone_rl.config.learning import A2c, Ppo, Ray, Rollouts, WithCritic
-from drone_rl.config.registry import implements, learns
+from drone_rl.config.registry import implements, learns, modules_of
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies import ActorCritic, PolicyNetwork
 from drone_rl.policies.zoo import describe
@@ -73,9 +74,8 @@ def ray_collector(settings: TrainSettings, replay: FailureReplayTask | None = No
     sizes = group_sizes(settings)
     (local,) = make_groups(settings, [1])
     local.env.close()
-    config = as_config(settings)
-    workers = range(len(sizes))
-    makers = [functools.partial(_remote_collector, config, sizes, i, replay) for i in workers]
+    sent = (as_config(settings), sorted(modules_of(settings)), sizes)
+    makers = [functools.partial(_remote_collector, *sent, i, replay) for i in range(len(sizes))]
     collector = RayEpisodeCollector(
         makers,
         local.actor,
@@ -90,9 +90,15 @@ def ray_collector(settings: TrainSettings, replay: FailureReplayTask | None = No
 
 
 def _remote_collector(
-    config: dict[str, Any], sizes: list[int], number: int, replay: FailureReplayTask | None
+    config: dict[str, Any],
+    modules: list[str],
+    sizes: list[int],
+    number: int,
+    replay: FailureReplayTask | None,
 ) -> tuple[EpisodeCollector, PolicyNetwork, torch.Generator]:
-    """Make a worker's collector, from arguments that can be sent."""
+    """Make a worker's collector, from arguments that can be sent; `modules` register its parts."""
+    for module in modules:
+        importlib.import_module(module)
     settings = from_config(TrainSettings, config)
     assert isinstance(settings.collector, Ray)
     (group,) = make_groups(settings, sizes, replay, [number])

@@ -9,6 +9,7 @@ from drone_rl.config.configuration import as_config, from_config
 from drone_rl.config.learning import Collector, LeaveOneOut, Objective, Returns
 from drone_rl.config.networks import Network, SmallCnn
 from drone_rl.config.registry import (
+    modules_of,
     register_collector,
     register_learner,
     register_network,
@@ -162,3 +163,22 @@ def test_defaults_of_classes_are_those_of_their_settings():
     assert SmallCNN((1, 25, 64), 3).layers.fc1.out_features == SmallCnn().hidden[0]
     made = LeaveOneOutEstimator()
     assert (made.gamma, made.scale) == (LeaveOneOut().gamma, LeaveOneOut().scale)
+
+
+@pytest.mark.parametrize("name", ["values", "make", "name", "target"])
+def test_a_parameter_with_the_name_of_an_attribute_of_settings_is_refused(name):
+    scope = {}
+    exec(f"def learner(settings, collecting, *, {name}: int = 1): ...", scope)
+    with pytest.raises(
+        InputError, match=f"mine: the parameter {name} has the name of an attribute"
+    ):
+        register_learner("mine")(scope["learner"])
+
+
+def test_the_modules_of_registered_parts(registered):
+    assert modules_of(TrainSettings()) == set()
+    registered(register_network("wide")(Wide))
+    assert modules_of(TrainSettings(network="wide")) == {__name__}
+    registered(register_transform("mirror")(Mirror))
+    mirrored = from_config(TrainSettings, {"transforms": {"gray": {}, "mirror": {}}})
+    assert modules_of(mirrored) == {__name__}
