@@ -102,7 +102,7 @@ def imagined(scenes: Scenes, episodes: int, frames: int) -> tuple[WorldState, np
     assert isinstance(task, CollectCubes)  # the policies with known maps look for cubes
     settings = task.settings
     random_state = np.random.RandomState(0)
-    cubes = torch.stack([CollectCubes(settings).draw(random_state) for _ in range(episodes)])
+    cubes = torch.stack([CollectCubes(settings).sample(random_state) for _ in range(episodes)])
     state = CollectCubes(settings).start(cubes.repeat_interleave(frames, 0))
     where = torch.from_numpy(random_state.uniform(size=(len(state.drone), 2)))
     state.drone[:, 0] = where[:, 0] * (settings.last_distance - settings.touch_distance)

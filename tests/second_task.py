@@ -88,7 +88,7 @@ class Posts(Task[PostsState]):
         """Return the posts."""
         return [Post(1.0, (0.1, 0.1, 0.6), name=f"post_{i}") for i in range(NUM_POSTS)]
 
-    def draw(self, random_state):
+    def sample(self, random_state):
         """Sample a side for each post: 1 for left, -1 for right."""
         return torch.from_numpy(random_state.choice([-1.0, 1.0], size=NUM_POSTS))
 
@@ -104,7 +104,7 @@ class Posts(Task[PostsState]):
             end_reason=torch.zeros(len(drawn), dtype=torch.int64),
         )
 
-    def judge(self, state, body):
+    def step(self, state, body):
         """Reward each post that the drone has passed in this step."""
         away = (body.position[:, None] - state.posts).abs().amax(-1)
         passed = state.passed | (body.position[:, None, 0] > state.posts[..., 0])

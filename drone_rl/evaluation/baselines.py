@@ -55,7 +55,9 @@ def oracle_policy(
 def random_policy(actions: Actions, generator: torch.Generator) -> TensorDictModule:
     """Return a policy that samples every action with the same probability."""
     return TensorDictModule(
-        lambda done: actions.draw(done.shape[:-1], generator), in_keys=["done"], out_keys=["action"]
+        lambda done: actions.sample(done.shape[:-1], generator),
+        in_keys=["done"],
+        out_keys=["action"],
     )
 
 

@@ -110,7 +110,7 @@ class BaselineAgent:
         active = context.active
         if self._action is not None:
             return self._action.expand(len(active), *self._action.shape).to(active.device), None
-        sampled = self._actions.draw(tuple(active.shape), self._generator)
+        sampled = self._actions.sample(tuple(active.shape), self._generator)
         return sampled.to(active.device), None
 
 

@@ -82,7 +82,7 @@ class PairedEvaluator:
             subject.appearance, episodes, subject.device, task=task, camera=subject.camera
         )
         self.looks.reset(torch.arange(episodes), streams)
-        self._drawn = torch.stack([task.draw(stream) for stream in streams])
+        self._drawn = torch.stack([task.sample(stream) for stream in streams])
         dynamics = make_dynamics(task.make_dynamics, subject.dynamics, subject.actions)
         self._seeds = draw_seeds(streams) if dynamics.is_random else None
         self._built: dict[tuple[Any, ...], Worlds] = {}

@@ -171,7 +171,7 @@ class Actions(abc.ABC):
         """Return the full-speed action of a part, by name. Shape: the entry's."""
 
     @abc.abstractmethod
-    def draw(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
+    def sample(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
         """Sample uniformly, on the generator's device. Shape: `shape`, then the entry's."""
 
     @abc.abstractmethod
@@ -225,7 +225,7 @@ class DiscreteActions(Actions):
         """Return the number of the action."""
         return torch.tensor(self.names.index(name))
 
-    def draw(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
+    def sample(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
         """Sample numbers."""
         return torch.randint(len(self), shape, generator=generator, device=generator.device)
 

@@ -165,7 +165,7 @@ class ComposerTask(composer.Task):
         """Apply the task's rules."""
         flight = self._flight
         body = self._found(physics) if flight is None else flight.finished(physics)
-        self.state, reward = self.rules.judge(self.state, body)
+        self.state, reward = self.rules.step(self.state, body)
         self._reward = float(reward)
         self._show(physics)
         physics.forward()  # what is observed next must not show things that have just vanished
@@ -184,7 +184,7 @@ class ComposerTask(composer.Task):
 
     def _begin(self, random_state: np.random.RandomState) -> None:
         origin = torch.tensor([self.rules.origin], dtype=torch.float64)
-        drawn = self.rules.draw(random_state)
+        drawn = self.rules.sample(random_state)
         seeds = [draw_seeds([random_state])] if self.dynamics.is_random else []
         self.state: State = self.rules.start(drawn[None], self.dynamics.start(origin, *seeds))
         """State of the running episode, as a batch of one."""

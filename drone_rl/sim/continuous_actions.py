@@ -125,8 +125,8 @@ class ContinuousActions(Actions):
         given = ((1, 0, 0), (-1, 1, 0), (-1, -1, 0), (-1, 0, 1), (-1, 0, -1))
         return torch.tensor(given[self.names.index(name)], dtype=torch.float32)
 
-    def draw(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
-        """See `Actions.draw`."""
+    def sample(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
+        """See `Actions.sample`."""
         given = torch.rand(*shape, 3, generator=generator, device=generator.device)
         return 2 * given - 1
 

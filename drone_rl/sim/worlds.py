@@ -60,7 +60,7 @@ class Worlds:
         self._every = torch.arange(num_worlds, device=self.device)
         self._make_renderer, self._num_shards = find_renderer(renderer), num_shards
         self.policy_view = self.view()
-        drawn = self.task.draw(np.random.RandomState(0))
+        drawn = self.task.sample(np.random.RandomState(0))
         self.state = self.start(torch.zeros_like(drawn).expand(num_worlds, *drawn.shape).clone())
 
     @property
@@ -125,7 +125,7 @@ class Worlds:
         """Start new episodes in environments, shape (k,), each from a random state."""
         if not len(worlds):
             return
-        drawn = torch.stack([self.task.draw(r) for r in random_states])
+        drawn = torch.stack([self.task.sample(r) for r in random_states])
         seeds = draw_seeds(random_states) if self.dynamics.is_random else None
         self.state[worlds] = self.start(drawn, seeds)
 
@@ -142,7 +142,7 @@ class Worlds:
     def advance(self, state: State, action: Tensor) -> tuple[State, Tensor]:
         """Return states a step later, and rewards; the environments stay as they are."""
         around = [self.task.obstacles(state)] if self.dynamics.needs_obstacles else []
-        return self.task.judge(state, self.dynamics.step(state.body, action, *around))
+        return self.task.step(state, self.dynamics.step(state.body, action, *around))
 
     def render(
         self, state: State, view: View | None = None, appearance: Appearance | None = None

@@ -225,7 +225,7 @@ def _bounded(
 def _drawn(task: TaskSettings, count: int, seed: RootSeed) -> Tensor:
     """Return the first placement of each of `count` held-out environments."""
     streams = (world_random_state(seed.value, env, Stream.REPORT) for env in range(count))
-    return torch.stack([CollectCubes(task).draw(stream) for stream in streams])
+    return torch.stack([CollectCubes(task).sample(stream) for stream in streams])
 
 
 def _given(task: TaskSettings, cubes: Any) -> Tensor:

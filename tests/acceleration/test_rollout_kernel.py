@@ -72,8 +72,8 @@ class HalfFlying(FlyingCubes):
 
 
 class Half(CollectCubes):
-    def judge(self, state, body):
-        new, reward = super().judge(state, body)
+    def step(self, state, body):
+        new, reward = super().step(state, body)
         return new, 0.5 * reward
 
     def fused_rules(self, dynamics, num_envs):

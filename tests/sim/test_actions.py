@@ -17,9 +17,9 @@ def test_move_numbers_are_those_of_files():
 
 def test_constant_and_random_actions():
     assert (MOVES.always("right"), FIVE.always("stay")) == (2, 4)
-    drawn = FIVE.draw((5000,), torch.Generator().manual_seed(0))
+    drawn = FIVE.sample((5000,), torch.Generator().manual_seed(0))
     assert (drawn.bincount() / 5000 - 0.2).abs().max() < 0.03
-    assert FIVE.draw((2, 3), torch.Generator()).shape == (2, 3)
+    assert FIVE.sample((2, 3), torch.Generator()).shape == (2, 3)
 
 
 def test_greedy_action_has_the_greatest_output():

@@ -88,7 +88,7 @@ def test_part_probabilities_match_sampled_actions():
 
 
 def test_uniform_actions_have_equal_parts():
-    drawn = ALL.draw((30_000,), torch.Generator().manual_seed(0))
+    drawn = ALL.sample((30_000,), torch.Generator().manual_seed(0))
     assert drawn.shape == (30_000, 3) and drawn.abs().max() <= 1
     still = torch.stack([drawn[:, 0], drawn[:, 1], torch.zeros(30_000)], -1)
     assert (ALL.part(still).bincount() / 30_000 - 1 / 3).abs().max() < 0.012

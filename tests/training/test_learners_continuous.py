@@ -41,7 +41,7 @@ def policy():
 
 def steps(count=7):
     pixels = torch.randn(count, *SHAPE, generator=generator(2))
-    action = ACTIONS.draw((count,), generator(3))
+    action = ACTIONS.sample((count,), generator(3))
     returns = torch.randn(count, 1, generator=generator(4))
     return TensorDict({"pixels": pixels, "action": action, "return_to_go": returns}, [count])
 

@@ -122,13 +122,13 @@ def test_the_first_part_is_the_usual_training_and_the_largest_boxes_are_kept(
 
 def test_failures_are_practised(tmp_path, monkeypatch):
     begun = []
-    draw = provable.FailureReplayTask.draw
+    sample = provable.FailureReplayTask.sample
 
     def note(self, random_state):
-        begun.append((self.boxes[0, 0, 0], float(draw(self, random_state)[0, 1])))
-        return draw(self, random_state)
+        begun.append((self.boxes[0, 0, 0], float(sample(self, random_state)[0, 1])))
+        return sample(self, random_state)
 
-    monkeypatch.setattr(provable.FailureReplayTask, "draw", note)
+    monkeypatch.setattr(provable.FailureReplayTask, "sample", note)
     train(tmp_path)
     first = [y for low, y in begun if low == 1.75]
     second = [y for low, y in begun if low == 0.75]

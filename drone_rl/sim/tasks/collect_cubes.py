@@ -118,7 +118,7 @@ class CollectCubes(PropTask[WorldState]):
 
     # Reset and rules
 
-    def draw(self, random_state: np.random.RandomState) -> Tensor:
+    def sample(self, random_state: np.random.RandomState) -> Tensor:
         """Sample the positions of the cubes (Algorithm 2). Shape: (C, 3), metres."""
         s = self.settings
         bounds = (s.lateral_bound, s.vertical_bound)
@@ -145,8 +145,8 @@ class CollectCubes(PropTask[WorldState]):
         launch(start_all, self.settings, state)
         return state
 
-    def judge(self, state: WorldState, body: BodyState) -> tuple[WorldState, Tensor]:
-        """Apply Algorithms 1 and 3, see `collect_cubes_kernel.judge`."""
+    def step(self, state: WorldState, body: BodyState) -> tuple[WorldState, Tensor]:
+        """Apply Algorithms 1 and 3, see `collect_cubes_kernel.step`."""
         written = ("collected", "passed", "side", "lateral")
         copies = {name: getattr(state, name).clone() for name in written}
         end = torch.empty_like(state.steps)
@@ -158,7 +158,7 @@ class CollectCubes(PropTask[WorldState]):
 
     def fused_rules(self, dynamics: Dynamics, num_envs: int) -> FlyingCubes | None:
         """See `Task.fused_rules`."""
-        if type(self).judge is CollectCubes.judge and FlyingCubes.supports(dynamics):
+        if type(self).step is CollectCubes.step and FlyingCubes.supports(dynamics):
             return FlyingCubes(self.settings, dynamics, num_envs)
         return None
 
@@ -325,9 +325,9 @@ class FailureReplayTask(CollectCubes):
             raise InputError(f"boxes reach beyond {bound} m to either side; give such within")
         self.boxes, self.share = boxes, share
 
-    def draw(self, random_state: np.random.RandomState) -> Tensor:
+    def sample(self, random_state: np.random.RandomState) -> Tensor:
         """Sample the positions of the cubes. Shape: (num_cubes, 3)."""
-        cubes = super().draw(random_state)
+        cubes = super().sample(random_state)
         chance, which, *parts = random_state.uniform(size=2 + len(cubes))
         if chance < self.share:
             lower, upper = self.boxes[int(which * len(self.boxes))].T

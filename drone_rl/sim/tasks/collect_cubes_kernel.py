@@ -1,4 +1,4 @@
-"""The rules of cube collection, stated by the Warp function `judge` alone."""
+"""The rules of cube collection, stated by the Warp function `step` alone."""
 
 import enum
 import functools
@@ -71,7 +71,7 @@ class Outcome:
 
 
 @wp.func
-def judge(cubes: Cubes, env: int, drone: wp.vec3d, steps: int, is_lost: bool) -> Outcome:
+def step(cubes: Cubes, env: int, drone: wp.vec3d, steps: int, is_lost: bool) -> Outcome:
     """Apply Algorithms 1 and 3 after a drone has moved, and write `cubes`.
 
     A touched cube is collected and worth 1; a cube left behind vanishes; the episode ends when all
@@ -153,7 +153,7 @@ def judge_all(
     """Apply the rules to environments, a thread each."""
     env = wp.tid()
     cubes = Cubes(bounds, places, collected, passed, side, lateral)
-    outcome = judge(cubes, env, drones[env], int(steps[env]), is_lost[env])
+    outcome = step(cubes, env, drones[env], int(steps[env]), is_lost[env])
     end_reasons[env] = wp.int64(outcome.end_reason)
     rewards[env] = outcome.reward
 
@@ -238,7 +238,7 @@ def move(flights: Flights, world: int, action: int) -> float:
         drone = drone + flights.moves[action]
     flights.drones[world] = drone
     flights.steps[world] = flights.steps[world] + 1
-    outcome = judge(flights.cubes, world, drone, flights.steps[world], lost)
+    outcome = step(flights.cubes, world, drone, flights.steps[world], lost)
     flights.end_reasons[world] = outcome.end_reason
     return float(outcome.reward)
 

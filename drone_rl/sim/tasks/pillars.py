@@ -121,7 +121,7 @@ class Pillars(common.PropTask[FieldState]):
 
     # Reset and rules
 
-    def draw(self, random_state: np.random.RandomState) -> Tensor:
+    def sample(self, random_state: np.random.RandomState) -> Tensor:
         """Sample the y of the pillars of a field that can be crossed. Shape: (R, K), metres."""
         return torch.from_numpy(self.lanes.draw_field(random_state))
 
@@ -147,7 +147,7 @@ class Pillars(common.PropTask[FieldState]):
         state.side, state.gap = self._sightings(state)
         return state
 
-    def judge(self, state: FieldState, body: BodyState) -> tuple[FieldState, Tensor]:
+    def step(self, state: FieldState, body: BodyState) -> tuple[FieldState, Tensor]:
         """Apply the rules after a step.
 
         The distance to the line is worth 1, evenly; a touched pillar costs the penalty. Of several

@@ -46,7 +46,7 @@ class DrawnState(State):
     """The state of a task without a state class of its own."""
 
     drawn: Tensor  # (N, *)
-    """What `Task.draw` returned for each environment."""
+    """What `Task.sample` returned for each environment."""
 
 
 S = TypeVar("S", bound=State)
@@ -118,7 +118,7 @@ class Grid(NamedTuple):
 
 
 class Task(abc.ABC, Generic[S]):
-    """Something to do. A subclass defines `name`, `draw` and `judge`; all else has a default.
+    """Something to do. A subclass defines `name`, `sample` and `step`; all else has a default.
 
     With the defaults a task has one goal, which is reached where the episode ends by `success_end`.
     Explanations need the methods from `remember` on, which have no default.
@@ -161,7 +161,7 @@ class Task(abc.ABC, Generic[S]):
     @property
     def entries(self) -> Mapping[str, Entry]:
         """Shapes and types of what `info` returns, for one environment."""
-        drawn = self.draw(np.random.RandomState(0))
+        drawn = self.sample(np.random.RandomState(0))
         return {
             "drawn": Entry(tuple(drawn.shape), torch.float32),
             "end_reason": Entry((1,), torch.int64, 0, len(self.ends) - 1),
@@ -176,20 +176,20 @@ class Task(abc.ABC, Generic[S]):
         return ()
 
     @abc.abstractmethod
-    def draw(self, random_state: np.random.RandomState) -> Tensor:
+    def sample(self, random_state: np.random.RandomState) -> Tensor:
         """Sample what is random about an episode, always of one shape."""
 
     def start(self, drawn: Tensor, body: BodyState) -> S:
         """Return states at the start of episodes.
 
-        `drawn` is from `draw`, stacked, shape (N, *); `body` are the drones at `origin`.
+        `drawn` is from `sample`, stacked, shape (N, *); `body` are the drones at `origin`.
         """
         zero = torch.zeros(len(drawn), dtype=torch.int64, device=drawn.device)
         state: Any = DrawnState(body, zero, zero.clone(), drawn)
         return state
 
     @abc.abstractmethod
-    def judge(self, state: S, body: BodyState) -> tuple[S, Tensor]:
+    def step(self, state: S, body: BodyState) -> tuple[S, Tensor]:
         """Return the state after a step, and the reward: float64, shape (N,).
 
         `state` is that before the step and stays as it is; `body` are the drones after it.

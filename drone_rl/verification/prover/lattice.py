@@ -228,9 +228,9 @@ def _follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes,
     ahead, aside, _ = (moves.repeat(len(nodes), 1)).unbind(-1)
     moved = dataclasses.replace(before, ahead=before.ahead + ahead, aside=before.aside + aside)
     body = BodyState.at_rest(_positions(settings, moved))
-    judged, _ = CollectCubes(settings).judge(_states(settings, cubes, before), body)
-    moved.collected = _as_bits(judged.collected)
-    return moved, judged.end_reason.view(len(nodes), len(moves))
+    after, _ = CollectCubes(settings).step(_states(settings, cubes, before), body)
+    moved.collected = _as_bits(after.collected)
+    return moved, after.end_reason.view(len(nodes), len(moves))
 
 
 def _states(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> WorldState:

@@ -94,7 +94,7 @@ def test_random_dynamics_are_seeded_by_the_environments_stream():
     expected = []
     for i in range(2):
         stream = world_random_state(0, i)
-        CollectCubes().draw(stream)
+        CollectCubes().sample(stream)
         expected.append(stream.randint(2**31 - 1))
     assert states["gusty"].body.seed.tolist() == expected
     assert states["calm"].body.seed.tolist() == [0, 0]

@@ -15,7 +15,7 @@ SETTINGS = PillarsSettings(num_rows=2, width=0.5, height=6.0)
 
 def field(task):
     """Return the state of one environment with obstacles straight ahead."""
-    drawn = torch.zeros(1, *task.draw(np.random.RandomState(0)).shape).double()
+    drawn = torch.zeros(1, *task.sample(np.random.RandomState(0)).shape).double()
     return task.start(drawn, BodyState.at_rest(torch.tensor([[0.0, 0.0, 2.5]]).double()))
 
 

@@ -5,7 +5,7 @@ import torch
 from drone_rl.sim.tasks.collect_cubes import EndReason, Side
 
 
-def judge(settings, state, body):
+def step(settings, state, body):
     """Return the fields of the state after a step, and the reward."""
     drone = body.position
     away = (drone[:, None] - state.cubes).abs().amax(-1)  # (N, C)

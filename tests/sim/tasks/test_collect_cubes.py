@@ -28,19 +28,19 @@ def body(*place):
 
 
 def fly(state, x, y, settings=SETTINGS):
-    return CollectCubes(settings).judge(state, body(x, y, settings.altitude))
+    return CollectCubes(settings).step(state, body(x, y, settings.altitude))
 
 
 def move(task, state, action):
     """Step all environments in computer-vision mode."""
     moves = torch.tensor([action] * len(state))
-    return CollectCubes(task).judge(state, ComputerVision(task.step_length).step(state.body, moves))
+    return CollectCubes(task).step(state, ComputerVision(task.step_length).step(state.body, moves))
 
 
 def test_cubes_are_sampled_uniformly_within_bounds():
     settings = TaskSettings(vertical_bound=1.0, altitude=5.0)
     draws = torch.stack(
-        [CollectCubes(settings).draw(np.random.RandomState(i)) for i in range(2000)]
+        [CollectCubes(settings).sample(np.random.RandomState(i)) for i in range(2000)]
     )
     assert draws[..., 0].unique().tolist() == [15.0, 24.0, 33.0]
     assert draws[..., 1].abs().max() <= 6.0
@@ -77,7 +77,7 @@ def test_next_cube_is_the_first_present_one():
 
 def test_start_state_has_all_cubes():
     settings = TaskSettings(altitude=4.0)
-    cubes = CollectCubes(settings).draw(np.random.RandomState(0))
+    cubes = CollectCubes(settings).sample(np.random.RandomState(0))
     state = CollectCubes(settings).start(torch.stack([cubes, cubes + 1.0]))
     assert state.drone.tolist() == [[0.0, 0.0, 4.0]] * 2
     assert torch.equal(state.cubes[1], cubes + 1.0)
@@ -111,24 +111,24 @@ def test_contact_distance_is_exact(axis, sign):
         cube = torch.zeros(1, 1, 3).double()
         cube[..., axis] = sign * distance
         state = CollectCubes(SETTINGS).start(cube)
-        state, reward = CollectCubes(SETTINGS).judge(state, body(0, 0, 0))
+        state, reward = CollectCubes(SETTINGS).step(state, body(0, 0, 0))
         assert state.collected.item() == touches
         assert reward.item() == float(touches)
 
 
 def test_contact_needs_all_three_axes():
     corner = torch.tensor([[[1.6, -1.6, 1.6]]]).double()
-    assert CollectCubes(SETTINGS).judge(CollectCubes(SETTINGS).start(corner), body(0, 0, 0))[1] == 1
+    assert CollectCubes(SETTINGS).step(CollectCubes(SETTINGS).start(corner), body(0, 0, 0))[1] == 1
     for axis in range(3):
         aside = corner.clone()
         aside[..., axis] *= 1.1
         state = CollectCubes(SETTINGS).start(aside)
-        assert CollectCubes(SETTINGS).judge(state, body(0, 0, 0))[1] == 0
+        assert CollectCubes(SETTINGS).step(state, body(0, 0, 0))[1] == 0
 
 
 def test_reward_is_two_for_two_simultaneous_cubes():
     cubes = torch.tensor([[[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [1.7, 0.0, 0.0]]]).double()
-    state, reward = CollectCubes(SETTINGS).judge(CollectCubes(SETTINGS).start(cubes), body(0, 0, 0))
+    state, reward = CollectCubes(SETTINGS).step(CollectCubes(SETTINGS).start(cubes), body(0, 0, 0))
     assert reward.tolist() == [2.0] and reward.dtype == torch.float64
     assert state.collected.tolist() == [[True, True, False]]
 
@@ -206,11 +206,11 @@ def test_lost_drone_ends_only_its_own_episode():
     state.collected[:] = True
     body = Floating(FLIGHT, None).start(torch.zeros(2, 3).double())
     body.lost[1] = True
-    ended, _ = CollectCubes(SETTINGS).judge(state, body)
+    ended, _ = CollectCubes(SETTINGS).step(state, body)
     assert ended.end_reason.tolist() == [EndReason.ALL_CUBES, EndReason.LOST_CONTROL]
     state.collected[:] = False
     body.position[:, 1] = 1000.0
-    ended, _ = CollectCubes(SETTINGS).judge(state, body)
+    ended, _ = CollectCubes(SETTINGS).step(state, body)
     assert ended.end_reason.tolist() == [EndReason.SIDE_BOUNDARY, EndReason.LOST_CONTROL]
 
 
@@ -264,7 +264,7 @@ def test_samples_follow_the_random_stream_in_order():
     task = TaskSettings(vertical_bound=1.0, num_cubes=2)
     raw = np.random.RandomState(5).uniform(-1, 1, size=(2, 2))
     expected = [[15.0, 6 * raw[0, 0], 2.5 + raw[0, 1]], [24.0, 6 * raw[1, 0], 2.5 + raw[1, 1]]]
-    assert CollectCubes(task).draw(np.random.RandomState(5)).tolist() == expected
+    assert CollectCubes(task).sample(np.random.RandomState(5)).tolist() == expected
 
 
 MOVES = st.lists(st.sampled_from(list(Move)), min_size=1, max_size=60)

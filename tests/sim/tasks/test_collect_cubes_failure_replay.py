@@ -32,7 +32,7 @@ ANYWHERE = (0.5, 0.5, 0.75, 0.5)
 def test_placements_match_hand_computed_ones():
     task = FailureReplayTask(TASK, BOXES, 0.5)
     left = [
-        task.draw(Given(*ANYWHERE, chance, which, 0.25, 0.5)).tolist()
+        task.sample(Given(*ANYWHERE, chance, which, 0.25, 0.5)).tolist()
         for chance, which in ((0.6, 0.0), (0.4, 0.49), (0.4, 0.5))
     ]
     assert left == [
@@ -45,10 +45,10 @@ def test_placements_match_hand_computed_ones():
 def test_extreme_fractions_replay_none_or_all():
     usual, world = CollectCubes(TASK), world_random_state(3, 0)
     assert torch.equal(
-        FailureReplayTask(TASK, BOXES, 0.0).draw(world_random_state(3, 0)), usual.draw(world)
+        FailureReplayTask(TASK, BOXES, 0.0).sample(world_random_state(3, 0)), usual.sample(world)
     )
     always = FailureReplayTask(TASK, BOXES, 1.0)
-    y = np.stack([always.draw(world)[:, 1].numpy() for _ in range(200)])
+    y = np.stack([always.sample(world)[:, 1].numpy() for _ in range(200)])
     is_inside = ((y[:, None] >= BOXES[..., 0]) & (y[:, None] <= BOXES[..., 1])).all(-1)
     assert is_inside.any(-1).all()
     assert 60 < is_inside[:, 0].sum() < 140  # boxes are equally frequent, regardless of size
@@ -60,10 +60,10 @@ def test_saved_stream_resumes_placements():
         world_random_state(1, 2),
         world_random_state(9, 9),
     )
-    task.draw(world)
+    task.sample(world)
     set_state(other, get_state(world))
     for _ in range(20):
-        assert torch.equal(task.draw(world), task.draw(other))
+        assert torch.equal(task.sample(world), task.sample(other))
 
 
 def test_inflated_boxes_stay_within_the_placements():

@@ -18,7 +18,7 @@ from drone_rl.sim.tasks.collect_cubes_kernel import (
     place,
 )
 from drone_rl.sim.worlds import Worlds
-from tests.sim.tasks.reference_rules import judge as reference_judge
+from tests.sim.tasks.reference_rules import step as reference_step
 
 start_warp("cpu")
 WORLDS = 60
@@ -59,7 +59,7 @@ def test_random_episodes_follow_the_reference_rules(settings, ends):
         wp.launch(step, WORLDS, inputs=[flying.flights, flying.poses, *inputs], device="cpu")
         before, moved = state, worlds.dynamics.step(state.body, actions[going])
         state, reward = worlds.advance(state, actions[going])
-        expected, earned = reference_judge(task, before, moved)
+        expected, earned = reference_step(task, before, moved)
         assert torch.equal(reward, earned)
         for name, value in expected.items():
             torch.testing.assert_close(getattr(state, name), value, rtol=0, atol=0, equal_nan=True)
@@ -102,8 +102,8 @@ def test_other_rules_and_moves_are_unsupported():
         pass
 
     class Strict(CollectCubes):
-        def judge(self, state, body):
-            return super().judge(state, body)
+        def step(self, state, body):
+            return super().step(state, body)
 
     assert CollectCubes().fused_rules(ComputerVision(), 1) is not None
     assert CollectCubes().fused_rules(Windy(), 1) is None

@@ -50,7 +50,7 @@ def fly(settings, state, *places):
     """Fly through positions; return the last state and the sum of rewards."""
     total = 0.0
     for x, y in places:
-        state, reward = Pillars(settings).judge(state, body(x, y))
+        state, reward = Pillars(settings).step(state, body(x, y))
         total += float(reward)
     return state, total
 
@@ -148,10 +148,10 @@ def test_contact_precedes_finish_line_precedes_step_limit(settings, field):
 def test_lost_control_precedes_contact(settings, field):
     state = field((0.0, -6.0), FAR, x=7.0)
     lost = Floating(FLIGHT, None).start(torch.tensor([[8.5, 0.0, 2.5]]).double())
-    state, _ = Pillars(settings).judge(state, lost)
+    state, _ = Pillars(settings).step(state, lost)
     assert state.end_reason == EndReason.PILLAR_TOUCHED
     lost.lost[:] = True
-    state, _ = Pillars(settings).judge(field((0.0, -6.0), FAR, x=7.0), lost)
+    state, _ = Pillars(settings).step(field((0.0, -6.0), FAR, x=7.0), lost)
     assert state.end_reason == EndReason.LOST_CONTROL and state.touched.any()
 
 
@@ -197,9 +197,9 @@ def test_environments_are_independent(settings, field):
     both = Pillars(settings).start(
         torch.tensor([[(0.0, 5.0), FAR], [FAR, FAR]]).double(), _pair(7.0)
     )
-    new, reward = Pillars(settings).judge(both, _pair(8.0))
+    new, reward = Pillars(settings).step(both, _pair(8.0))
     for i, alone in enumerate((one, two)):
-        expected, earned = Pillars(settings).judge(alone, body(8.0, 0.0))
+        expected, earned = Pillars(settings).step(alone, body(8.0, 0.0))
         assert new.end_reason[i] == expected.end_reason[0] and reward[i] == earned[0]
         assert torch.equal(new.side[i], expected.side[0])
 
@@ -380,7 +380,7 @@ def test_info_matches_the_entries(settings, field):
 
 def test_fields_are_sampled_from_the_given_stream(settings):
     task = Pillars(settings)
-    one, two = (task.draw(np.random.RandomState(3)) for _ in range(2))
+    one, two = (task.sample(np.random.RandomState(3)) for _ in range(2))
     assert one.shape == (2, 2) and torch.equal(one, two) and one.dtype == torch.float64
 
 

@@ -72,7 +72,7 @@ def test_plan_crosses_every_field():
             break
         now = state[on]
         move = LANES.fly_through(now.drone, now.rows, now.next_row[:, None])
-        state[on] = Pillars(SETTINGS).judge(now, dynamics.step(now.body, move))[0]
+        state[on] = Pillars(SETTINGS).step(now, dynamics.step(now.body, move))[0]
     assert (state.end_reason == EndReason.FINISH_LINE).all()
 
 

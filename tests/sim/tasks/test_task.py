@@ -80,10 +80,10 @@ def test_torchrl_specs_follow_the_task():
 class Minimal(Task):
     name = "minimal"
 
-    def draw(self, random_state):
+    def sample(self, random_state):
         return torch.from_numpy(random_state.uniform(size=2))
 
-    def judge(self, state, body):
+    def step(self, state, body):
         end = (body.position[:, 0] > state.drawn[:, 0]).long() * EndReason.SUCCESS
         steps = state.steps + 1
         return dataclasses.replace(state, body=body, steps=steps, end_reason=end), end.double()

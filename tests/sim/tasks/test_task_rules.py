@@ -26,7 +26,7 @@ def test_info_matches_the_entries(worlds, task):
 def test_random_stream_determines_episodes(task):
     def drawn():
         stream = world_random_state(4, 2)
-        return [task.draw(stream) for _ in range(4)]
+        return [task.sample(stream) for _ in range(4)]
 
     first, again = drawn(), drawn()
     assert all(torch.equal(a, b) for a, b in zip(first, again, strict=True))
@@ -37,7 +37,7 @@ def test_random_stream_determines_episodes(task):
 def test_judge_does_not_modify_its_input(worlds, task):
     before = {name: value.clone() for name, value in tensors(worlds.state).items()}
     body = worlds.dynamics.step(worlds.state.body, torch.zeros(5, dtype=torch.int64))
-    after, reward = task.judge(worlds.state, body)
+    after, reward = task.step(worlds.state, body)
     for name, value in tensors(worlds.state).items():
         torch.testing.assert_close(value, before[name], equal_nan=True, rtol=0, atol=0)
     assert reward.shape == (5,) and reward.dtype == torch.float64

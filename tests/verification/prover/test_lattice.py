@@ -97,7 +97,7 @@ def test_random_walks_end_as_the_simulator_has_it():
         while True:
             action = int(random.choice([AHEAD, AHEAD, AHEAD, LEFT, RIGHT]))
             body = dynamics.step(state.body, torch.tensor([action]))
-            state, _ = CollectCubes(TASK).judge(state, body)
+            state, _ = CollectCubes(TASK).step(state, body)
             boxes = np.stack([y, np.nextafter(y, 9)], -1)[None]
             ((place, _),) = moves(place, action, boxes, lattice).items()
             collected = sum(int(c) << k for k, c in enumerate(state.collected[0]))

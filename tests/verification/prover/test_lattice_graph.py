@@ -44,7 +44,7 @@ TASKS = [
 def test_random_walks_go_as_the_rules_have_it(settings):
     random = np.random.RandomState(0)
     walks = 24
-    cubes = torch.stack([CollectCubes(settings).draw(random) for _ in range(walks)])
+    cubes = torch.stack([CollectCubes(settings).sample(random) for _ in range(walks)])
     graph = explore(settings, cubes)
     every = graph.states()
     dynamics = ComputerVision(settings.step_length)
@@ -57,7 +57,7 @@ def test_random_walks_go_as_the_rules_have_it(settings):
         for name in ("cubes", "collected", "passed", "next_cube", "end_reason"):
             assert torch.equal(getattr(shown, name), getattr(state, name)), name
         action = torch.from_numpy(random.choice(3, len(state), p=[0.4, 0.35, 0.25]))
-        state, _ = CollectCubes(settings).judge(state, dynamics.step(state.body, action))
+        state, _ = CollectCubes(settings).step(state, dynamics.step(state.body, action))
         assert torch.equal(graph.reason[node, action], state.end_reason)
         collected = (graph.collected[node, action][:, None] >> bit & 1).bool()
         assert torch.equal(collected, state.collected)

@@ -160,7 +160,7 @@ def test_flights_of_the_simulator_with_drawn_actions_agree(place, monkeypatch):
     cubes = place(task.settings, [4.0, -3.0])
     graph = explore(task.settings, cubes)
     done = propagate(graph, NodeEvaluator(env, network).on(graph))
-    monkeypatch.setattr(task, "draw", lambda random_state: cubes[0])
+    monkeypatch.setattr(task, "sample", lambda random_state: cubes[0])
     actor = make_actor(network, env.action_spec, torch.Generator().manual_seed(0))
     flown = run_episodes(env, actor, flights, greedy=False)
     env.close()
