@@ -65,3 +65,11 @@ def test_the_second_stage_runs_if_the_first_passes(tmp_path):
     assert found["both"].status == found["others"].status == found["unskipped"].status == "failed"
     assert found["both"].failing == "test_second.py::test_second"
     assert found["skipped"].status == "passed" and found["skipped"].failing is None
+
+
+def test_the_first_stage_runs_before_the_others(tmp_path):
+    for name, assertion in {"known": "1 == 2", "own": "1 == 3"}.items():
+        (tmp_path / f"test_{name}.py").write_text(f"def test():\n    assert {assertion}\n")
+    runs = [Run("a", ["test_own.py"], 60.0, first=["test_known.py"])]
+    (outcome,) = run_all(iter(runs), tmp_path, tmp_path, jobs=1)
+    assert outcome.failing == "test_known.py::test"

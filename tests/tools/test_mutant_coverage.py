@@ -102,3 +102,17 @@ def test_importers_through_a_package_count(root):
     records = {far: record((f"{far}::far", 1.0, []))}
     chosen = coverage.Coverage(root, records).tests_for(mutant(1, 8))
     assert chosen.own == () and chosen.others == (far,)
+
+
+@pytest.mark.parametrize(
+    ("test", "first"),
+    [
+        (f"{OWN}::low", (OWN,)),  # a fast file
+        (f"{FAR}::long", (f"{FAR}::long",)),
+        (f"{FAR}::removed", ()),
+        (f"{OTHER}::wrong", ()),  # fails without a mutation
+        (None, ()),
+    ],
+)
+def test_the_test_that_killed_a_mutant_before_comes_first(root, test, first):
+    assert coverage.Coverage(root, RECORDS).again(test) == first

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.mutants import filters, targets
+from tools.mutants import filters, results, targets
 
 ROOT = Path(__file__).parents[2]
 SOURCE = '''\
@@ -107,3 +107,11 @@ def test_each_listed_survivor_has_a_harm():
     if not any("harm" in row for row in survivors):
         pytest.skip("the list predates harms")
     assert [row["id"] for row in survivors if not row["harm"]] == []
+
+
+def test_killers_are_read_from_lists_and_mappings(tmp_path):
+    rows = [{"id": "a", "by": "x::y"}, {"id": "b", "by": None}, {"id": "c", "by": "old"}]
+    (tmp_path / "list.json").write_text(json.dumps({"mutants": rows}))
+    (tmp_path / "memory.json").write_text(json.dumps({"c": "new"}))
+    paths = [tmp_path / name for name in ("list.json", "memory.json", "missing.json")]
+    assert results.read_killers(*paths) == {"a": "x::y", "c": "new"}

@@ -40,7 +40,7 @@ def main() -> int:
         if options.only:
             own = {file for module in modules for file in targets.own_tests(module)}
             tests = [file for file in tests if file in own]
-        _run(database, todo, tree, work, tests, options.jobs)
+        _run(database, todo, tree, work, tests, options)
         done = {
             job: json.loads(result.output)
             for job, result in database.results
@@ -135,23 +135,31 @@ def _run(
     tree: Path,
     work: Path,
     tests: list[str],
-    jobs: int,
+    options: argparse.Namespace,
 ) -> None:
-    """Record the coverage of each test, then run the tests that cover each mutant."""
+    """Record the coverage of each test, then run the tests that cover each mutant.
+
+    The test that killed a mutant in an earlier run comes first.
+    """
+    memory = work / "killers.json"
+    killers = results.read_killers(options.out, memory)
     forks.import_libraries(work / "kernels")
     shutil.rmtree(work / "scratch", ignore_errors=True)
     (work / "scratch").mkdir()
-    for line in coverage.record(tree, work, tests, jobs):
+    for line in coverage.record(tree, work, tests, options.jobs):
         _print(line)
     covered = coverage.read(tree, work, tests)
     if covered.failed:
         _print(f"skipped, because they fail without a mutation: {', '.join(covered.failed)}")
     by_id = {mutant.id: mutant for mutant in todo}
-    runs = (run for mutant in todo if (run := _make_run(mutant, tree, covered)))
-    for count, outcome in enumerate(forks.run_all(runs, tree, work / "scratch", jobs), 1):
+    runs = (run for mutant in todo if (run := _make_run(mutant, tree, covered, killers)))
+    for count, outcome in enumerate(forks.run_all(runs, tree, work / "scratch", options.jobs), 1):
         mutant = by_id.pop(outcome.run.name)
         result = {"outcome": OUTCOMES[outcome.status], "by": outcome.failing}
         database.set_result(mutant.job, _result(result))
+        if outcome.failing:
+            killers[mutant.id] = outcome.failing
+            memory.write_text(json.dumps(killers))
         if outcome.status == "passed" or count % 20 == 0:
             _print(f"{count}/{len(todo)} {_line(mutant, tree, result)}")
     for mutant in by_id.values():
@@ -160,7 +168,9 @@ def _run(
         _print(f"no test covers it: {_line(mutant, tree, result)}")
 
 
-def _make_run(mutant: worklist.Mutant, tree: Path, covered: coverage.Coverage) -> forks.Run | None:
+def _make_run(
+    mutant: worklist.Mutant, tree: Path, covered: coverage.Coverage, killers: dict[str, str]
+) -> forks.Run | None:
     tests = covered.tests_for(mutant)
     source = mutant.source(tree)
     if source is None or not (tests.own or tests.others):
@@ -171,6 +181,7 @@ def _make_run(mutant: worklist.Mutant, tree: Path, covered: coverage.Coverage) -
         tests.limit_s,
         mutant.module,
         source,
+        first=covered.again(killers.get(mutant.id)),
         then=tests.others,
         skip=covered.failed,
     )

@@ -90,6 +90,13 @@ class Coverage:
         limit = START_S + TIME_FACTOR * total + (COMPILING_S if is_compiled else 0.0)
         return Chosen(first, second, limit)
 
+    def again(self, test: str | None) -> tuple[str, ...]:
+        """Return what to run first for a test that killed a mutant before, if it still exists."""
+        if test is None or test not in self._seconds or test in self.failed:
+            return ()
+        file = _file(test)
+        return (file,) if self._seconds[file] <= WHOLE_FILE_S else (test,)
+
     def _of_import(self, module: str) -> list[str]:
         """Return the tests of a module and its importers, which cover code that runs at import."""
         name = module_name(module)

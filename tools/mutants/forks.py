@@ -70,6 +70,8 @@ class Run:
     module: str | None = None
     """Path of the mutated module relative to the tree; None for the original program."""
     source: str = ""
+    first: Sequence[str] = ()
+    """Tests to run in the same process before `tests`."""
     then: Sequence[str] = ()
     """Tests to run in the same process if `tests` have passed."""
     skip: Sequence[str] = ()
@@ -193,7 +195,7 @@ def _test(run: Run, tree: Path, temporary: Path) -> int:
         sys.meta_path.insert(0, _MutantFinder(run.module, run.source))
     options = [*OPTIONS, f"--basetemp={temporary}", *(f"--deselect={t}" for t in run.skip)]
     if run.record is None:
-        stages = [tests for tests in (run.tests, run.then) if tests]
+        stages = [tests for tests in (run.first, run.tests, run.then) if tests]
         return next(filter(None, (int(pytest.main(["-x", *options, *t])) for t in stages)), 0)
     recorder = Recorder(run.record)
     record_launches(recorder)

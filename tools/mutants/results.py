@@ -63,6 +63,16 @@ def score(rows: list[dict[str, Any]]) -> float:
     return killed / max(1, killed + counts["survived"])
 
 
+def read_killers(*paths: Path) -> dict[str, str]:
+    """Return the test that killed each mutant, by id, from lists or a plain mapping."""
+    found: dict[str, str] = {}
+    for path in filter(Path.exists, paths):
+        content = json.loads(path.read_text())
+        rows = {row["id"]: row["by"] for row in content.get("mutants", [])}
+        found |= {name: by for name, by in (rows or content).items() if isinstance(by, str)}
+    return found
+
+
 def merge(
     path: Path, modules: dict[str, str], rows: list[dict[str, Any]]
 ) -> tuple[list[dict[str, Any]], float]:
