@@ -20,7 +20,7 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import describe
-from drone_rl.sim.tasks import FailureReplayTask, as_task
+from drone_rl.sim.tasks import FailureReplayTask, as_settings, as_task
 from drone_rl.training import components, run_folder
 from drone_rl.training.callbacks import Callback, CsvCallback, ForwardProgress
 from drone_rl.training.components import Components, Group
@@ -57,7 +57,8 @@ def train(
         resume: Whether to resume the run in the folder, bit for bit.
         callbacks: Called after every update, besides those that write checkpoints and metrics.
         progress: Called with the progress; a bar by default.
-        changes: Settings to change, as in `train(seed=1, task=TaskSettings(num_cubes=5))`.
+        changes: Settings to change, as in `train(seed=1, task=TaskSettings(num_cubes=5))`. `task`
+            may be a `Task`, see `drone_rl.register_task`.
 
     Raises:
         InputError: A setting is unusable, or learning broke down.
@@ -68,6 +69,8 @@ def train(
     run, state = RunFolder.open(folder, resume)
     if settings is None:
         settings = TrainSettings() if state is None else run_folder.settings_of(state["config"])
+    if "task" in changes:
+        changes["task"] = as_settings(changes["task"])
     settings = settings.replace(**changes)
     run.path.mkdir(parents=True, exist_ok=True)
     with folder_lock(run.path):

@@ -11,5 +11,6 @@ from drone_rl.sim.tasks.task import OracleRule as OracleRule
 from drone_rl.sim.tasks.task import Prop as Prop
 from drone_rl.sim.tasks.task import State as State
 from drone_rl.sim.tasks.task import Task as Task
+from drone_rl.sim.tasks.task import as_settings as as_settings
 from drone_rl.sim.tasks.task import as_task as as_task
 from drone_rl.sim.tasks.task import register_task as register_task

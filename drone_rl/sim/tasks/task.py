@@ -302,11 +302,48 @@ MAKERS: dict[type[BaseTaskSettings], Callable[[Any], Task[Any]]] = {}
 """What makes a task, by the class of its settings."""
 
 
-def register_task(settings: type[BaseTaskSettings], make: Callable[[Any], Task[Any]]) -> None:
-    """Register a task by its settings and what makes it; raises `InputError` for a taken name."""
+class ObjectSettings(BaseTaskSettings):
+    """Settings of a task that is registered as an object: none."""
+
+
+def register_task(
+    settings: type[BaseTaskSettings] | Task[Any], make: Callable[[Any], Task[Any]] | None = None
+) -> None:
+    """Register a task by name, for settings and policy files.
+
+    Args:
+        settings: Class of the task's settings, or a task without settings.
+        make: Makes the task from its settings; not for a task without settings.
+
+    Raises:
+        InputError: Another task has this name.
+    """
+    if isinstance(settings, Task):
+        as_settings(settings)
+        return
+    if make is None:
+        raise InputError(f"{settings.__name__}: give register_task what makes the task, too")
     if TASKS.get(settings.name, settings) is not settings:
         raise InputError(f"there is a task called {settings.name}; give another name")
     TASKS[settings.name], MAKERS[settings] = settings, make
+
+
+def as_settings(task: BaseTaskSettings | Task[Any]) -> BaseTaskSettings:
+    """Return settings that make a task; a task without registered settings is registered.
+
+    Raises `InputError` if another task has its name.
+    """
+    if not isinstance(task, Task):
+        return task
+    own: Any = getattr(task, "settings", None)
+    if type(own) in MAKERS and type(as_task(own)) is type(task):
+        return own
+    kind = TASKS.get(task.name)
+    if kind is None or not issubclass(kind, ObjectSettings):  # else a notebook's cell ran again
+        names = {"name": task.name, "__module__": type(task).__module__}
+        kind = type("ObjectSettings", (ObjectSettings,), names)
+    register_task(kind, lambda _: task)
+    return kind()
 
 
 def as_task(task: BaseTaskSettings | Task[Any] | str | None) -> Task[Any]:

@@ -1,10 +1,11 @@
 from typing import ClassVar
+from unittest.mock import patch
 
 import pytest
 
 from drone_rl.config import TASKS, BaseTaskSettings, PillarsSettings, TaskSettings, read_task
 from drone_rl.sim.tasks import CollectCubes, Pillars
-from drone_rl.sim.tasks.task import MAKERS, as_task, register_task
+from drone_rl.sim.tasks.task import MAKERS, as_settings, as_task, register_task
 from drone_rl.utils.errors import InputError
 from tests.second_task import Posts
 
@@ -43,3 +44,23 @@ def test_user_tasks_can_be_registered(monkeypatch):
 
     with pytest.raises(InputError, match="there is a task called posts; give another name"):
         register_task(Other, lambda _: Posts())
+
+
+def test_tasks_without_settings_are_registered_as_objects():
+    with patch.dict(TASKS), patch.dict(MAKERS):
+        settings, again = as_settings(Posts()), Posts()
+        assert read_task({"name": "posts"}, "task") == settings == as_settings(settings)
+        assert isinstance(as_task(settings), Posts)
+        register_task(again)  # a cell of a notebook ran twice
+        assert as_task(settings) is again
+        two_cubes = TaskSettings(num_cubes=2)
+        assert as_settings(CollectCubes(two_cubes)) == two_cubes
+
+        class Variant(CollectCubes):
+            pass
+
+        with pytest.raises(InputError, match="there is a task called collect_cubes; give another"):
+            as_settings(Variant())
+        with pytest.raises(InputError, match="PostsSettings: give register_task what makes"):
+            register_task(PostsSettings)
+    assert "posts" not in TASKS
