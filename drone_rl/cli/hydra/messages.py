@@ -41,6 +41,7 @@ def guarded(command: Callable[[], int]) -> int:
     os.environ["HYDRA_FULL_ERROR"] = "1"  # let Hydra's own errors through to be shortened here
     logging.raiseExceptions = False  # a log that can't be written is no reason for a traceback
     absl_logging.set_verbosity(absl_logging.WARNING)  # dm_control logs the OpenGL that it found
+    logging.getLogger("OpenGL").setLevel(logging.WARNING)  # and PyOpenGL what it did not find
     lost = _errors_in_threads()
     try:
         status = command()
