@@ -41,6 +41,7 @@ from benchmarks.training import (
 )
 from benchmarks.verdicts import bench_verdicts
 from drone_rl.utils.errors import InputError
+from tools.docs.run import measure as measure_pages
 from tools.size import measure
 
 _RENDERING = ("sim", "envs")
@@ -218,6 +219,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         ("sim/rendering", "benchmarks/render_truth", "benchmarks/random_scenes"),
     ),
     "mutants": Benchmark(lambda s: bench_mutants(), "truth", ("benchmarks/mutants",)),
+    "docs": Benchmark(lambda s: measure_pages(), "truth", (".", "conf")),
     "sweeps": Benchmark(
         lambda s: bench_sweeps(s.runs, s.device, s.quick),
         "many",

@@ -8,7 +8,10 @@ import pytest
 import drone_rl
 from tests.docs.commands import check_command, check_commands
 from tests.docs.conftest import ROOT
+from tools.docs.blocks import COMMAND, PYTHON, find_pages, read_blocks
+from tools.docs.rules import ALL, Rules, read_rules, rules_for
 
+RULES = read_rules()
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 LANGUAGE = r"^```{}\n(.*?)^```$"
 
@@ -20,9 +23,24 @@ def blocks(page, language):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_commands_are_known(page):
-    typed = [re.sub(r"^\$ ", "", block, flags=re.M) for block in blocks(page, "console")]
-    shown = [block for block in blocks(page, "sh") if not block.startswith("make ")]
-    assert all(check_commands(block) for block in [*typed, *shown])
+    for block in read_blocks(page.relative_to(ROOT).as_posix()):
+        is_valid = block.code.startswith("drone-rl ") and block.status not in (1, 2)
+        if block.kind == COMMAND and is_valid and "plugins=" not in block.code:
+            assert check_commands(block.code)
+
+
+@pytest.mark.parametrize("page", find_pages())
+def test_every_block_is_run_or_listed_with_a_reason(page):
+    found, rules = read_blocks(page), rules_for(page, RULES)
+    assert all(rules.not_run.values())
+    for block in found:
+        is_run = block.kind in (COMMAND, PYTHON) or block.title
+        assert is_run or rules.why_not_run(block), f"{page}:{block.line}"
+    assert RULES.get(page, Rules()).find_unused(found) == []
+
+
+def test_rules_are_those_of_pages():
+    assert {*RULES} <= {ALL, *find_pages()}
 
 
 def test_a_command_that_is_unknown_is_found():

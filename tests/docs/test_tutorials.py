@@ -1,10 +1,10 @@
-"""Every tutorial runs as it stands, block by block, but for sizes that would take minutes."""
+"""The Python of every page runs block by block, with smaller sizes.
 
-import ast
+`drone-rl bench docs` runs pages and commands with their own sizes and compares the outputs.
+"""
+
 import gc
-import re
 import sys
-from pathlib import Path
 from unittest.mock import patch
 
 import jinja2
@@ -18,52 +18,61 @@ from drone_rl.explanations.report import page as report_page
 from drone_rl.sim.tasks.task import MAKERS
 from drone_rl.utils.settings import kinds_of, types_of
 from tests.docs.commands import check_commands
+from tools.docs import session
+from tools.docs.blocks import PYTHON, find_pages, read_blocks
+from tools.docs.outputs import find_different_words
+from tools.docs.rules import read_rules, rules_for
 
-DOCS = Path(__file__).parents[2] / "docs"
-PAGES = [
-    DOCS / "flight.md",
-    DOCS / "howto.md",
-    DOCS / "pilot.md",
-    *sorted((DOCS / "tutorials").glob("*.md")),
-]
-BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
+RULES = read_rules()
+PAGES = [page for page in find_pages() if any(b.kind == PYTHON for b in read_blocks(page))]
 SHORT = (
     "trainer=drone_rl.TrainerSettings(total_frames=1500, checkpoint_interval_s=0.0), "
     "collector=drone_rl.config.learning.Threads(num_envs=8)"
 )
+_MAIN = {
+    "judge(training.policy)": "judge(training.policy, episodes=8)",
+    "episodes=200": "episodes=8",
+    'explain(["good", "poor"])': 'explain(["good"], frames=30, episodes=8, perplexity=5)',
+}
 SMALLER = {
-    "notebook": {
+    "README.md": {"train(seed=1)": f"train(seed=1, {SHORT})", **_MAIN},
+    "docs/tour.md": {"seed=1)": f"seed=1, {SHORT})", **_MAIN},
+    "docs/tutorials/notebook.md": {
         "train(seed=1)": f"train(seed=1, {SHORT})",
         "judge(policy)": "judge(policy, episodes=8)",
         "episodes=200": "episodes=8",
         'explain([policy, "poor"], ': "explain([policy], frames=30, episodes=8, perplexity=5, ",
     },
-    "returns": {"seed=1)": f"seed=1, {SHORT})"},
-    "network": {"seed=1)": f"seed=1, {SHORT})", "episodes=200": "episodes=8"},
-    "motion": {
+    "docs/tutorials/returns.md": {"seed=1)": f"seed=1, {SHORT})"},
+    "docs/tutorials/network.md": {"seed=1)": f"seed=1, {SHORT})", "episodes=200": "episodes=8"},
+    "docs/tutorials/motion.md": {
         "100": "10",
         "make_env(64": "make_env(8",
         "total_frames=400_000": "total_frames=2_000",
     },
-    "task": {
+    "docs/tutorials/task.md": {
         "make_env(64": "make_env(8",
         "total_frames=100_000": "total_frames=500",
         "actor, 400": "actor, 20",
+        "episodes=400": "episodes=8",
     },
-    "learner": {
+    "docs/tutorials/learner.md": {
         "make_env(64": "make_env(8",
         "total_frames=200_000": "total_frames=1_500",
         "total_frames=20_000": "total_frames=3_000",
         "total_frames=10_000": "total_frames=1_500",
     },
-    "sb3": {
+    "docs/tutorials/sb3.md": {
         "num_envs=32": "num_envs=4",
         "n_steps=128, batch_size=512": "n_steps=16, batch_size=64",
         "40_000": "64",
         "episodes=400": "episodes=8",
         'folder="outputs/explain/sb3"': 'folder="sb3", frames=30, episodes=6, perplexity=5',
     },
-    "section": {"frames=120": "frames=30, perplexity=5", "make_env(64)": "make_env(30)"},
+    "docs/tutorials/section.md": {
+        "frames=120": "frames=30, perplexity=5",
+        "make_env(64)": "make_env(30)",
+    },
 }
 """What the tests change of a page, and into what."""
 
@@ -98,42 +107,47 @@ def workplace(tmp_path, monkeypatch):
     gc.collect()
 
 
-def read_blocks(page):
-    """Language, file name and code of each, with the sizes of the tests."""
-    text = page.read_text()
-    for large, small in SMALLER.get(page.stem, {}).items():
-        assert large in text, f"{page.stem} no longer has {large!r}"
-        text = text.replace(large, small)
-    return BLOCK.findall(text)
+def show(value):
+    """Display the value of a block's last line as a notebook would."""
+    if hasattr(value, "_repr_html_"):
+        assert value._repr_html_().startswith("<")
+    else:
+        session.show(value)
 
 
-def run(code, where, names):
-    """Runs a block as a notebook would: what its last line is worth is shown."""
-    tree = ast.parse(code)
-    last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
-    exec(compile(tree, where, "exec"), names)
-    if last is not None:
-        value = eval(compile(ast.Expression(last.value), where, "eval"), names)
-        if hasattr(value, "_repr_html_"):
-            assert value._repr_html_().startswith("<")
+def shrink(page, code):
+    """Return the code with the sizes of the tests."""
+    for large, small in SMALLER.get(page, {}).items():
+        code = code.replace(large, small)
+    return code
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", PAGES)
 def test_it_runs(page, workplace):
-    if page.stem == "sb3":
+    if page.endswith("sb3.md"):
         pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
-    names = {"__name__": "__main__"}
-    for number, (language, title, code) in enumerate(read_blocks(page)):
-        if title:
-            (workplace / title).parent.mkdir(parents=True, exist_ok=True)
-            (workplace / title).write_text(code)
-        elif language == "python":
-            run(code, f"{page.stem}, block {number}", names)
-        elif language == "sh":
-            check_commands(code)
+    names, rules = {"__name__": "__main__"}, rules_for(page, RULES)
+    for block in read_blocks(page):
+        if block.title:
+            (workplace / block.title).parent.mkdir(parents=True, exist_ok=True)
+            (workplace / block.title).write_text(block.code)
+        elif rules.why_not_run(block):
+            continue
+        elif block.kind == PYTHON:
+            code = shrink(page, block.code)
+            printed = session.run_python(code, f"{page}:{block.line}", names, show)
+            if page not in SMALLER:
+                assert find_different_words(block.shown, printed) is None
+        elif "plugins=" in block.code:  # tests/docs/test_pages.py checks the other commands
+            assert check_commands(block.code)
+
+
+@pytest.mark.parametrize("page", SMALLER)
+def test_smaller_sizes_are_those_of_the_page(page):
+    code = "".join(block.code for block in read_blocks(page))
+    assert [large for large in SMALLER[page] if large not in code] == []
 
 
 def test_a_minimal_task_takes_at_most_80_lines():
-    blocks = BLOCK.findall((DOCS / "tutorials" / "task.md").read_text())
-    (post,) = [text for _, title, text in blocks if title == "post.py"]
+    (post,) = [b.code for b in read_blocks("docs/tutorials/task.md") if b.title == "post.py"]
     assert len(post.splitlines()) <= 80

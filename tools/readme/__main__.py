@@ -58,8 +58,13 @@ def make_blocks(root: Path) -> dict[str, str]:
         "parts": list_parts(),
         "commands": list_commands(),
         "presets": list_presets(root / "conf"),
-        "run_onnx": f"```python\n{(root / 'examples' / 'run_onnx.py').read_text()}```",
+        "run_onnx": show_file(root, "examples/run_onnx.py"),
     }
+
+
+def show_file(root: Path, path: str) -> str:
+    """Return a program as a code block with its path as the title."""
+    return f'```python title="{path}"\n{(root / path).read_text()}```'
 
 
 def make_files(root: Path) -> dict[str, str]:

@@ -165,6 +165,13 @@ TRUTH = (
         lambda f: f"{f['explain_s']:.0f} s, {f['explain_peak_memory_mib'] / 1024:.1f} GiB",
         "120 s, 2 GiB",
     ),
+    Row(
+        "docs",
+        "commands and code blocks of all pages that run and print what the page shows; of these "
+        "with smaller sizes",
+        lambda f: f"{f['docs_blocks_run']} of {f['docs_blocks']}; {f['docs_blocks_smaller']}",
+        "all that need no cluster, account or installation",
+    ),
 )
 """Adversarial tests."""
 PROOF = (

@@ -1,0 +1,141 @@
+"""Run the blocks of one page in a folder: `python -m tools.docs.session PAGE RESULTS`."""
+
+import ast
+import contextlib
+import dataclasses
+import io
+import json
+import os
+import subprocess
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from tools.docs.blocks import COMMAND, PYTHON, Block, read_blocks
+from tools.docs.outputs import find_difference
+from tools.docs.rules import read_rules, rules_for
+
+LIMIT = 900.0
+"""Seconds after which a command is killed."""
+RAN, SMALLER, NOT_RUN, FAILED = "ran", "ran with smaller sizes", "not run", "failed"
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """Result of a block."""
+
+    line: int
+    code: str
+    """First line of the block."""
+    status: str
+    """One of `RAN`, `SMALLER`, `NOT_RUN` and `FAILED`."""
+    why: str = ""
+    """Reason of a failure, or why the block is not run."""
+    printed: str = ""
+    seconds: float = 0.0
+
+
+class Session:
+    """A page that is run from top to bottom in the current folder."""
+
+    def __init__(self, page: str) -> None:
+        self.blocks = read_blocks(page, Path())
+        self.rules = rules_for(page, read_rules())
+        self.names: dict[str, Any] = {"__name__": "__main__"}
+        """Names that the Python blocks of the page have defined."""
+
+    def run(self) -> list[Outcome]:
+        """Run every block and return the outcomes."""
+        for command in self.rules.before:
+            printed, status = run_command(command)
+            if status:
+                raise RuntimeError(f"{command}: exit status {status}\n{printed}")
+        return [self.run_block(block) for block in self.blocks]
+
+    def run_block(self, block: Block) -> Outcome:
+        """Run a block and compare its output with the page."""
+        first = block.code.partition("\n")[0]
+        if why := self.rules.why_not_run(block):
+            return Outcome(block.line, first, NOT_RUN, why)
+        begin = time.perf_counter()
+        try:
+            printed, why = self._execute(block)
+        except BaseException:  # of the page's code, SystemExit included
+            printed, why = "", traceback.format_exc()
+        missing = None if why else find_difference(block.shown, printed)
+        if missing is not None:
+            why = f"the page shows, but the program did not print: {missing}"
+        status = SMALLER if self.rules.is_smaller(block) else RAN
+        seconds = round(time.perf_counter() - begin, 1)
+        return Outcome(block.line, first, FAILED if why else status, why, printed, seconds)
+
+    def _execute(self, block: Block) -> tuple[str, str]:
+        """Run a block; return what it printed and why it failed, if it did."""
+        if block.title:
+            Path(block.title).parent.mkdir(parents=True, exist_ok=True)
+            Path(block.title).write_text(block.code)
+            return "", ""
+        if block.kind == COMMAND:
+            printed, status = run_command(self.rules.make_command(block))
+            expected = f"exit status {status} instead of {block.status}"
+            return printed, "" if status == block.status else f"{expected}\n{printed[-2000:]}"
+        if block.kind == PYTHON:
+            return run_python(block.code, f"{block.page}:{block.line}", self.names), ""
+        return "", f"a block of {block.kind or 'no language'} that is neither run nor listed"
+
+
+def run_command(command: str) -> tuple[str, int]:
+    """Run a command in bash; return what it printed and its exit status."""
+    done = subprocess.run(
+        ["bash", "-c", command],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+        timeout=LIMIT,
+    )
+    return done.stdout, done.returncode
+
+
+def show(value: Any) -> None:
+    """Print the value of a block's last line."""
+    if value is not None:
+        print(value)
+
+
+def run_python(
+    code: str, where: str, names: dict[str, Any], show: Callable[[Any], None] = show
+) -> str:
+    """Run a block as a notebook would.
+
+    Args:
+        code: The block.
+        where: Its place, for tracebacks.
+        names: Names that it can use, to which it adds its own.
+        show: Displays the value of its last line.
+
+    Returns:
+        What it printed.
+    """
+    tree = ast.parse(code)
+    last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        exec(compile(tree, where, "exec"), names)
+        if last is not None:
+            show(eval(compile(ast.Expression(last.value), where, "eval"), names))
+    return printed.getvalue()
+
+
+def main() -> None:
+    """Run a page in the current folder and write the outcomes as JSON."""
+    page, results = sys.argv[1:]
+    sys.path.insert(0, os.getcwd())
+    outcomes = Session(page).run()
+    Path(results).write_text(json.dumps([dataclasses.asdict(o) for o in outcomes], indent=1))
+
+
+if __name__ == "__main__":
+    main()
