@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test check format bench readme keep stale docs count mutants clean clean-outputs
+.PHONY: demo notebook test check format bench readme keep stale docs count mutants clean clean-outputs
 
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -18,6 +18,11 @@ $(STAMP): pyproject.toml
 
 demo: $(STAMP)
 	@$(BIN)/drone-rl demo
+
+# Open the notebook of the documentation in JupyterLab.
+notebook: $(STAMP)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(EXTRAS),notebook]'
+	@$(BIN)/jupyter lab docs/tutorials/notebook.ipynb
 
 test: check
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
