@@ -57,8 +57,7 @@ def train(
         resume: Whether to resume the run in the folder, bit for bit.
         callbacks: Called after every update, besides those that write checkpoints and metrics.
         progress: Called with the progress; a bar by default.
-        changes: Settings to change, as in `train(seed=1, task=TaskSettings(num_cubes=5))`. `task`
-            may be a `Task`, see `drone_rl.register_task`.
+        changes: Settings, as in `train(seed=1, task=TaskSettings(num_cubes=5))`, or a `Task`.
 
     Raises:
         InputError: A setting is unusable, or learning broke down.
@@ -69,9 +68,7 @@ def train(
     run, state = RunFolder.open(folder, resume)
     if settings is None:
         settings = TrainSettings() if state is None else run_folder.settings_of(state["config"])
-    if "task" in changes:
-        changes["task"] = as_settings(changes["task"])
-    settings = settings.replace(**changes)
+    settings = settings.replace(**{name: as_settings(value) for name, value in changes.items()})
     run.path.mkdir(parents=True, exist_ok=True)
     with folder_lock(run.path):
         callbacks = [*callbacks, ForwardProgress(progress or Bar())]

@@ -328,10 +328,10 @@ def register_task(
     TASKS[settings.name], MAKERS[settings] = settings, make
 
 
-def as_settings(task: BaseTaskSettings | Task[Any]) -> BaseTaskSettings:
+def as_settings(task: Any) -> Any:
     """Return settings that make a task; a task without registered settings is registered.
 
-    Raises `InputError` if another task has its name.
+    Anything else is returned. Raises `InputError` if another task has its name.
     """
     if not isinstance(task, Task):
         return task
