@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.hostile_case import Case, npz, zipped
+from benchmarks.hostile_case import Case, npz, zipped, zipped_zeros
 
 _NUMBERS = {"format": "drone_rl explanation", "format_version": 3, "name": "x"}
 
@@ -57,9 +57,7 @@ def _arrays() -> dict[str, bytes]:
         "long_header": zipped({"a.npy": _npy((1,), "<f8" + " " * 60_000, bytes(8))}),
         "version_3": zipped({"a.npy": _npy((1,), "<f8", bytes(8)).replace(b"Y\x01", b"Y\x03", 1)}),
         "no_array": zipped({"a.npy": b"hello"}),
-        "unpacks_to_1_gib": zipped(
-            {"a.npy": _npy((2**27,), "<f8", bytes(2**30))}, zipfile.ZIP_DEFLATED
-        ),
+        "unpacks_to_1_gib": _npz_of_zeros((2**27,), "<f8", 2**30),
         "longer_than_its_directory_says": _shorter(2**29),
         "many_files": zipped({f"{i}.npy": b"" for i in range(10_001)}),
         "one_content_for_all": _overlapping(),
@@ -104,7 +102,9 @@ def _data() -> dict[str, bytes]:
         "frames_of_4_channels": _npz(frames=np.zeros((3, 4, 4, 4), np.uint8)),
         "frames_wide": _npz(frames=np.zeros((1, 1, 2**22, 3), np.uint8)),
         "frames_of_no_height": zipped({"frames.npy": _npy((1, 2**30, 0, 3), "|u1", b"")}),
-        "frames_of_256_mib": _npz(frames=np.zeros((342, 512, 512, 3), np.uint8)),
+        "frames_of_256_mib": _npz_of_zeros(
+            (342, 512, 512, 3), "|u1", 342 * 512 * 512 * 3, "frames"
+        ),
         "probabilities_of_2_22": _npz(probabilities=np.zeros((1, 2**22), np.float32)),
         "meta_of_objects": zipped({"meta.npy": _npy((1,), "|O", bytes(8))}),
     }
@@ -115,7 +115,7 @@ def _together(folder: Path) -> list[Case]:
     here = folder / "explanation_arrays_two_of_2_28"
     here.mkdir()
     (here / "explanation.json").write_text(json.dumps(_NUMBERS))
-    half = zipped({"a.npy": _npy((2**25,), "<f8", bytes(2**28))}, zipfile.ZIP_DEFLATED)
+    half = _npz_of_zeros((2**25,), "<f8", 2**28)
     for other in ("arrays", "dataset"):
         (here / f"{other}.npz").write_bytes(half)
     several = [here.with_name(f"{here.name}_{i}") for i in range(3)]
@@ -162,9 +162,14 @@ def _npy(shape: Any, dtype: str, data: bytes) -> bytes:
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + data
 
 
+def _npz_of_zeros(shape: Any, dtype: str, size: int, name: str = "a") -> bytes:
+    """Return a compressed file of one array of zeros, which takes `size` bytes."""
+    return zipped_zeros(f"{name}.npy", _npy(shape, dtype, b""), size)
+
+
 def _shorter(size: int) -> bytes:
     """Return an archive whose directory declares an unpacked size of 100 bytes."""
-    content = zipped({"a.npy": _npy((size // 8,), "<f8", bytes(size))}, zipfile.ZIP_DEFLATED)
+    content = _npz_of_zeros((size // 8,), "<f8", size)
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         unpacked = archive.infolist()[0].file_size
     return content.replace(struct.pack("<L", unpacked), struct.pack("<L", 100))

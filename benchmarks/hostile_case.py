@@ -2,6 +2,7 @@
 
 import os
 import zipfile
+import zlib
 from collections.abc import Callable, Mapping
 from io import BytesIO
 from pathlib import Path
@@ -15,6 +16,7 @@ Make = Callable[[Path], Any]
 """Creates a file or anything else at a path."""
 NOTED = "noted_"
 """Prefix of cases that are not refused: the report names the damaged run."""
+_ZEROS = bytes(2**20)
 
 
 def put(path: Path, content: bytes | Make) -> None:
@@ -42,6 +44,30 @@ def zipped(members: Mapping[str, bytes], method: int = zipfile.ZIP_STORED) -> by
     with zipfile.ZipFile(file, "w", method) as archive:
         for name, content in members.items():
             archive.writestr(name, content)
+    return file.getvalue()
+
+
+def zipped_zeros(name: str, head: bytes, zeros: int) -> bytes:
+    """Return a compressed zip archive of one member: `head`, then as many zero bytes.
+
+    All blocks of zeros share one compressed block, so a GiB takes no seconds.
+    """
+    packer = zlib.compressobj(wbits=-zlib.MAX_WBITS)
+    packed = packer.compress(head) + packer.flush(zlib.Z_FULL_FLUSH)
+    block = packer.compress(_ZEROS) + packer.flush(zlib.Z_FULL_FLUSH)
+    blocks, rest = divmod(zeros, len(_ZEROS))
+    packed += block * blocks + packer.compress(bytes(rest)) + packer.flush()
+    checksum = zlib.crc32(head)
+    for part in (*[_ZEROS] * blocks, bytes(rest)):
+        checksum = zlib.crc32(part, checksum)
+    file = BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr(name, packed)
+        (member,) = archive.infolist()
+        member.compress_type, member.CRC = zipfile.ZIP_DEFLATED, checksum
+        member.file_size = len(head) + zeros
+        file.seek(0)
+        file.write(member.FileHeader())
     return file.getvalue()
 
 

@@ -18,7 +18,7 @@ import torch
 from safetensors.torch import save
 
 from benchmarks.hostile_arrays import hostile_arrays
-from benchmarks.hostile_case import NOT_REGULAR, Case, Make, nested, zipped
+from benchmarks.hostile_case import NOT_REGULAR, Case, Make, nested, zipped, zipped_zeros
 from benchmarks.hostile_claims import hostile_claims
 from benchmarks.hostile_explanations import hostile_explanations
 from benchmarks.hostile_folders import hostile_folders, make_run
@@ -312,7 +312,7 @@ def _checkpoints(folder: Path) -> list[Case]:
         "pickle": pickle.dumps(_Call(os.system, f"touch {canary}/ran")),
         "truncated": whole[: len(whole) // 2],
         "text": b"print('hello')",
-        "bomb": zipped({"a/data.pkl": bytes(2**29)}, zipfile.ZIP_DEFLATED),
+        "bomb": zipped_zeros("a/data.pkl", b"", 2**29),
         "many_files": zipped({f"a/data/{i}": b"" for i in range(10_001)}),
         "code": zipped({"a/data.pkl": b"\x80\x02N.", "a/code/x.py": b"import os"}),
         "memo": zipped({"a/data.pkl": b"\x80\x02Nr\xff\xff\xff\x7f."}),

@@ -13,7 +13,7 @@ import numpy as np
 import torch
 import yaml
 
-from benchmarks.hostile_case import Case, nested, npz
+from benchmarks.hostile_case import Case, nested, npz, zipped_zeros
 
 
 def hostile_folders(folder: Path, state: Mapping[str, Any]) -> list[Case]:
@@ -142,7 +142,7 @@ def _explanations(folder: Path) -> list[Case]:
         "huge": (numbers(name="x").replace("2", "2" * 5000), npz(arrays)),
         "name": (numbers(name="../../canary/\n\x1b[2J"), npz(arrays)),
         "objects": (numbers(name="x"), npz({"a": np.array([folder], dtype=object)})),
-        "bomb": (numbers(name="x"), npz({"a": np.zeros(2**27)})),
+        "bomb": (numbers(name="x"), _bomb()),
         "no_archive": (numbers(name="x"), b"PK\x03\x04 and so on"),
         "giant": (numbers(name="x"), _false_header()),
     }
@@ -163,6 +163,15 @@ def _explanations(folder: Path) -> list[Case]:
         make(here / "arrays.npz")
         cases.append((here.name, ["report", f"explanations={here}"], "not a regular file"))
     return cases
+
+
+def _bomb() -> bytes:
+    """Return a file of one array of a GiB of zeros."""
+    file = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        file, {"descr": "<f8", "fortran_order": False, "shape": (2**27,)}
+    )
+    return zipped_zeros("a.npy", file.getvalue(), 2**30)
 
 
 def _false_header() -> bytes:

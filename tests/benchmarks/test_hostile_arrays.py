@@ -24,6 +24,15 @@ def test_a_thousand_entries_share_one_content():
         assert sum(member.file_size for member in archive.infolist()) == 1000 * 2**20
 
 
+@pytest.mark.parametrize(("head", "zeros"), [(b"abc", 5), (b"", 2**22), (b"abc" * 9, 2**21 + 1)])
+def test_zeros_are_compressed_block_by_block(head, zeros):
+    content = hostile_arrays.zipped_zeros("x", head, zeros)
+    assert len(content) < 300 + zeros / 900
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        assert archive.testzip() is None
+        assert archive.read("x") == head + bytes(zeros)
+
+
 def test_a_hand_written_array_is_valid():
     content = hostile_arrays.zipped(
         {"a.npy": hostile_arrays._npy((2,), "<f8", np.array([1.0, 2.0]).tobytes())}

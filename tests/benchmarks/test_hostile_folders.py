@@ -6,10 +6,11 @@ from benchmarks.hostile_files import checkpoint_state
 from benchmarks.hostile_folders import hostile_folders
 
 
-@pytest.fixture
-def cases(tmp_path):
-    (tmp_path / "canary").mkdir()
-    return tmp_path, hostile_folders(tmp_path, checkpoint_state())
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("hostile")
+    (folder / "canary").mkdir()
+    return folder, hostile_folders(folder, checkpoint_state())
 
 
 def test_runs_sweeps_and_explanations_are_opened_by_their_commands(cases):
