@@ -33,7 +33,7 @@ def bench_memory(folder: Path, frames: int, device: str, quick: bool) -> dict[st
     Raises:
         RuntimeError: The training failed.
     """
-    settling, frames = (1_000, 40_000) if quick else (SETTLING_FRAMES, frames)
+    settling, frames = (1_000, 10_000) if quick else (SETTLING_FRAMES, frames)
     arguments = [str(folder / "memory"), str(settling + frames), device]
     command = [sys.executable, "-m", __name__, *arguments]
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)

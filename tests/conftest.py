@@ -8,16 +8,24 @@ import sys
 os.environ.update(OMP_NUM_THREADS="1", OMP_WAIT_POLICY="PASSIVE")
 
 import pytest
-import torch
 
-from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
-from drone_rl.policies import SmallCNN, make_actor
+from tests.forked import stop_servers
+
+# Fixtures import torch and the package, because the process that starts the workers needs neither.
 
 
 @pytest.fixture(autouse=True)
 def one_thread():
     """Limit torch to one thread, whatever the previous test has set."""
+    import torch
+
     torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _no_fork_server_is_left():
+    yield
+    stop_servers()
 
 
 @pytest.fixture(scope="session")
@@ -35,6 +43,11 @@ def egl():
 @pytest.fixture
 def make_pipeline():
     """Return a factory of environments with default transforms and actors with a small network."""
+    import torch
+
+    from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+    from drone_rl.policies import SmallCNN, make_actor
+
     envs = []
 
     def build(num_envs=4, seed=0, **kwargs):

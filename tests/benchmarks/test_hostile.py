@@ -10,11 +10,13 @@ import pytest
 
 from benchmarks import hostile
 from benchmarks.hostile import SECRET
+from tests.forked import run_module_forked
 
 
 @pytest.mark.slow
-def test_malicious_files_are_refused(tmp_path):
+def test_malicious_files_are_refused(tmp_path, monkeypatch):
     """A sample; the benchmark opens all files."""
+    monkeypatch.setattr(hostile.subprocess, "run", run_module_forked)
     outcomes = hostile.run_all(tmp_path, every=31)
     assert len(outcomes) >= 12
     assert len({outcome["name"] for outcome in outcomes}) == len(outcomes)

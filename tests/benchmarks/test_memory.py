@@ -2,7 +2,9 @@
 
 import pytest
 
+from benchmarks import memory
 from benchmarks.memory import bench_memory, growth
+from tests.forked import run_module_forked
 
 
 def test_growth_by_hand():
@@ -21,14 +23,16 @@ def test_too_few_samples(samples):
     assert growth(samples, 100) is None
 
 
-def test_the_memory_of_a_training_is_recorded(tmp_path):
+def test_the_memory_of_a_training_is_recorded(tmp_path, monkeypatch):
+    monkeypatch.setattr(memory.subprocess, "run", run_module_forked)
     result = bench_memory(tmp_path, 1_000_000, "cpu", quick=True)
     assert 200 < result["peak_memory_mib"] < 4096
     assert isinstance(result["memory_growth_mib_per_million_frames"], float)
-    assert result["memory_frames"] == 40_000
+    assert result["memory_frames"] == 10_000
     assert (tmp_path / "memory" / "metrics.csv").is_file()
 
 
-def test_a_failed_training_is_an_error(tmp_path):
+def test_a_failed_training_is_an_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(memory.sys, "executable", "false")
     with pytest.raises(RuntimeError, match="failed: status 1"):
         bench_memory(tmp_path, 1, "no such device", quick=True)

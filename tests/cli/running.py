@@ -1,17 +1,15 @@
 """`drone-rl` as a user runs it."""
 
-import subprocess
-import sys
+from tests.forked import run_forked
 
 TINY = ["experiment=smoke", "logger=csv", "trainer.total_frames=400", "collector.num_envs=4"]
 """A training of a second."""
 
 
-def drone_rl(*args, cwd, **kwargs):
-    command = [sys.executable, "-m", "drone_rl.cli.main", *map(str, args)]
-    return subprocess.run(
-        command, cwd=cwd, capture_output=True, text=True, check=False, timeout=300, **kwargs
-    )
+def drone_rl(*args, cwd, stdout=None, setup=""):
+    """Run a command in a process of its own, after the Python code `setup`."""
+    code = f"{setup}\nfrom drone_rl.cli.main import main; main()"
+    return run_forked(code, *args, cwd=cwd, stdout=stdout)
 
 
 def error_line(done):

@@ -1,7 +1,6 @@
 """Usage, help, and one line for each of the mistakes that any command can be given."""
 
 import os
-import subprocess
 import sys
 
 import pytest
@@ -49,17 +48,12 @@ def test_what_is_printed_without_running_anything(monkeypatch, capsys, tmp_path,
         (["train", "policy=resnet"], ["network/resnet", "small_cnn"]),
         (["train", "returns.gamma=high"], ["gamma=high", "Float"]),
         (["evaluate", "episodes=many"], ["episodes=many", "Integer"]),
-        (["explain", "frames=x"], ["frames=x", "Integer"]),
         (
             ["train", *(f"transforms.resize.{side}=2" for side in ("height", "width"))],
             ["2x2", "too small"],
         ),
         (["train", "seed=-1"], ["seed=-1", "0 or more"]),
-        (["train", "optimiser.lr=0"], ["optimiser.lr=0.0", "above 0"]),
         (["train", "optimiser.lr=1e38"], ["optimiser.lr=1e+38", "up to 1e+30"]),
-        (["train", "returns.gamma=2"], ["gamma=2", "0 to 1"]),
-        (["train", "trainer.target_share=2.97"], ["target_share=2.97", "up to 1"]),
-        (["train", "collector.num_envs=0"], ["num_envs=0", "1 or more"]),
         (["train", "resume=nowhere"], ["nowhere", "folder of a run"]),
         (["train", "hydra.run.dir=/dev/null/x"], ["/dev/null"]),
         (["evaluate"], ["policy=latest", "drone-rl train"]),
@@ -72,7 +66,6 @@ def test_what_is_printed_without_running_anything(monkeypatch, capsys, tmp_path,
         (["sweep-report", "no/such"], ["no/such", "sweep.json"]),
         (["bench", "speed"], ["speed", "render"]),
         (["train", "task=base_task"], ["base_task", "collect_cubes, collect_one, pillars"]),
-        (["train", "dynamics=base_dynamics"], ["base_dynamics", "one of: computer_vision,"]),
         (["train", "sweep=nope"], ["sweep/nope", "learning_rate"]),
         (["train", "task=nope"], ["task/nope", "one of: collect_cubes, collect_one, pillars"]),
         (["train", "-m", "task=collect_one,base_task"], ["base_task", "collect_one"]),
@@ -88,18 +81,14 @@ def test_a_reader_that_leaves_is_no_error(tmp_path, args):
     """As in `drone-rl --help | head -1`."""
     reader, writer = os.pipe()
     os.close(reader)
-    command = [sys.executable, "-m", "drone_rl.cli.main", *args]
-    done = subprocess.run(
-        command, cwd=tmp_path, stdout=writer, stderr=subprocess.PIPE, text=True, check=False
-    )
+    done = drone_rl(*args, cwd=tmp_path, stdout=writer)
     os.close(writer)
     assert (done.returncode, done.stderr) == (141, "")
 
 
 def test_an_output_that_is_full_is_one_line(tmp_path):
     with open("/dev/full", "w") as full:
-        command = [sys.executable, "-m", "drone_rl.cli.main"]
-        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        done = drone_rl(cwd=tmp_path, stdout=full.fileno())
     assert done.returncode == 2
     assert done.stderr == "error: standard output can't be written (No space left on device)\n"
 
@@ -109,14 +98,12 @@ def test_an_output_that_is_full_is_one_line(tmp_path):
 )
 def test_a_full_disk_is_one_line_with_path_and_remedy(tmp_path, limit, file):
     """A limit on the sizes of files stands in for a full disk, of Hydra's files and of others."""
-    code = (
+    limited = (
         "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "from drone_rl.cli.main import main\n"
-        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, -1)); main()\n"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, -1))\n"
     )
     settings = ["train", *TINY, "logger=tensorboard", "hydra.run.dir=full"]
-    command = [sys.executable, "-c", code, *settings]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = drone_rl(*settings, cwd=tmp_path, setup=limited)
     line = error_line(done)
     assert len(done.stderr.splitlines()) == 1
     assert file in line and "File too large" in line and "free some space" in line

@@ -11,6 +11,7 @@ import pytest
 import torch
 
 from drone_rl.utils.checkpoint import load_checkpoint
+from tests.cli.running import drone_rl
 
 pytestmark = pytest.mark.slow
 
@@ -49,8 +50,8 @@ def sweep(tmp_path_factory):
 
 def test_a_killed_sweep_ends_as_one_that_never_was(sweep, tmp_path):
     (run,) = sweep.glob("0_*seed-0*")
-    alone = [*PROGRAM, "train", *TINY, "seed=0", "hydra.run.dir=alone"]
-    subprocess.run(alone, cwd=tmp_path, check=True)
+    done = drone_rl("train", *TINY, "seed=0", "hydra.run.dir=alone", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
     one, two = (
         load_checkpoint(folder / "checkpoints" / "last.pt") for folder in (run, tmp_path / "alone")
     )

@@ -3,9 +3,6 @@
 import json
 import shutil
 import signal
-import subprocess
-import sys
-import time
 
 import pytest
 import torch
@@ -18,6 +15,7 @@ from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.training import Callback
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
+from tests.forked import run_forked
 
 TINY = TrainSettings(
     task=TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60),
@@ -237,22 +235,20 @@ def test_stopped_confirmation_is_repeated_on_resume(tmp_path, handlers, monkeypa
 )
 def test_signal_ends_a_loop_of_trainings(tmp_path, number, statuses):
     code = (
-        "import signal, drone_rl\n"
+        "import os, signal, threading, time, drone_rl\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "def send():\n"
+        "    while not os.path.exists('run0/metrics.csv'):\n"
+        "        time.sleep(0.02)\n"
+        f"    os.kill(os.getpid(), {int(number)})\n"
+        "threading.Thread(target=send, daemon=True).start()\n"
         "short = drone_rl.TrainerSettings(total_frames=10_000_000)\n"
         "for seed in range(3):\n"
         "    drone_rl.train(folder=f'run{seed}', seed=seed, trainer=short)\n"
     )
-    process = subprocess.Popen(
-        [sys.executable, "-c", code], cwd=tmp_path, stderr=subprocess.PIPE, text=True
-    )
-    while not (tmp_path / "run0" / "metrics.csv").exists():
-        assert process.poll() is None
-        time.sleep(0.02)
-    process.send_signal(number)
-    _, printed = process.communicate(timeout=60)
-    assert process.returncode in statuses, printed
-    assert ("KeyboardInterrupt: training stopped" in printed) == (number == signal.SIGINT)
+    done = run_forked(code, cwd=tmp_path)
+    assert done.returncode in statuses, done.stderr
+    assert ("KeyboardInterrupt: training stopped" in done.stderr) == (number == signal.SIGINT)
     assert [path.name for path in tmp_path.iterdir()] == ["run0"]
     state = drone_rl.load_policy(tmp_path / "run0").state["progress"]
     rows = (tmp_path / "run0" / "metrics.csv").read_text().splitlines()

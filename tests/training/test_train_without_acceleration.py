@@ -1,12 +1,11 @@
 """Training works, more slowly, without the package `drone_rl.acceleration`."""
 
-import subprocess
-import sys
+from tests.forked import run_forked
 
 PROGRAM = """
 import logging, sys
 sys.modules["drone_rl.acceleration"] = None  # any import of it fails
-logging.basicConfig(level=logging.INFO, format="%(message)s", stream=sys.stdout)
+logging.basicConfig(level=logging.INFO, format="%(message)s", stream=sys.stdout, force=True)
 import drone_rl
 from drone_rl.config.learning import Ppo, Rollouts
 from drone_rl.config.training import TrainerSettings
@@ -25,12 +24,7 @@ assert not any(name.startswith("drone_rl.acceleration.") for name in sys.modules
 
 
 def test_every_objective_trains_without_the_acceleration(tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(tmp_path / "run")],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_forked(PROGRAM, "run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     log = "stepping collector: drone_rl.acceleration is not installed"
     assert done.stdout.count(log) == 2

@@ -1,10 +1,13 @@
 """Comparison of learners, with short trainings."""
 
+import subprocess
+
 import pytest
 
 from benchmarks.peers import comparison
 from benchmarks.peers.comparison import bench_peers, train_ours, train_theirs
 from benchmarks.peers.settings import LABELS, OURS, THEIRS
+from tests.forked import run_module_forked
 
 KEYS = {"seconds", "seconds_without_imports", "frames", "is_solved", "success_lower95"}
 
@@ -38,7 +41,13 @@ def test_learners_alternate_for_each_seed(tmp_path, monkeypatch):
     assert (tmp_path / "peers.png").stat().st_size > 10_000
 
 
-def test_train_ours_runs_the_command(tmp_path):
+@pytest.fixture
+def forked(monkeypatch):
+    """Programs start in forks, which have imported the package already."""
+    monkeypatch.setattr(subprocess, "run", run_module_forked)
+
+
+def test_train_ours_runs_the_command(tmp_path, forked):
     short = ["trainer.total_frames=1", "collector.num_envs=2", "task.num_cubes=1"]
     found = train_ours(short, seed=1, episodes=2, folder=tmp_path)
     assert found.keys() == KEYS and not found["is_solved"]
@@ -47,12 +56,12 @@ def test_train_ours_runs_the_command(tmp_path):
     assert (tmp_path / "1" / "result.json").is_file()
 
 
-def test_train_theirs_runs_a_third_party_training():
+def test_train_theirs_runs_a_third_party_training(forked):
     settings = {"num_envs": 2, "steps": 160}
     found = train_theirs("torchrl", settings, seed=1, episodes=2, max_frames=1)
     assert found.keys() == KEYS and found["frames"] == 320 and not found["is_solved"]
 
 
-def test_a_failed_third_party_training_is_an_error():
+def test_a_failed_third_party_training_is_an_error(forked):
     with pytest.raises(RuntimeError, match="no_such failed"):
         train_theirs("no_such", {}, seed=0, episodes=1, max_frames=1)

@@ -1,7 +1,7 @@
 """The program of third-party trainings, with short trainings."""
 
 import json
-import subprocess
+import runpy
 import sys
 import time
 
@@ -11,19 +11,18 @@ import drone_rl
 from benchmarks.peers.program import measure, success_lower95
 from drone_rl.utils.errors import InputError
 
-PROGRAM = [sys.executable, "-m", "benchmarks.peers.program"]
 
-
-def test_the_program_prints_one_line_of_json():
+def test_the_program_prints_one_line_of_json(monkeypatch, capsys):
     reason = "Stable-Baselines3 is not installed"
     pytest.importorskip("stable_baselines3", reason=reason)
     short = {"num_envs": 4, "n_steps": 8, "batch_size": 8, "n_epochs": 1}
     options = ["--seed", "1", "--max-frames", "32", "--episodes", "3"]
     began = time.time()
-    command = [*PROGRAM, "sb3_ppo", *options, "--started", str(began)]
-    command += ["--settings", json.dumps(short)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    (line,) = done.stdout.splitlines()
+    options += ["--started", str(began), "--settings", json.dumps(short)]
+    monkeypatch.setattr(sys, "argv", ["program", "sb3_ppo", *options])
+    monkeypatch.delitem(sys.modules, "benchmarks.peers.program")
+    runpy.run_module("benchmarks.peers.program", run_name="__main__")
+    (line,) = capsys.readouterr().out.splitlines()
     found = json.loads(line)
     assert 0 < found["seconds_without_imports"] < found["seconds"] < time.time() - began
     assert (found["frames"], found["is_solved"]) == (32, False)
