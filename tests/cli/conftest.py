@@ -7,6 +7,13 @@ import pytest
 
 from drone_rl.cli.main import main
 from tests.cli.running import TINY, drone_rl
+from tests.composing import composing_fast
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _composing_fast():
+    with composing_fast():
+        yield
 
 
 @pytest.fixture
@@ -31,9 +38,9 @@ def in_process(monkeypatch, capsys, tmp_path):
     return call
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def run(tmp_path_factory):
-    """A finished training of a second."""
+    """A finished training of a second; tests may add folders to it, but change no file."""
     folder = tmp_path_factory.mktemp("run")
     done = drone_rl("train", *TINY, "hydra.run.dir=run", cwd=folder)
     assert done.returncode == 0, done.stderr

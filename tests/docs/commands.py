@@ -1,17 +1,14 @@
 """Command lines of a page, composed as the program would, but not run."""
 
+import functools
 import re
 import shlex
 
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 
-from drone_rl.cli.hydra.composition import (
-    conf_dir,
-    import_plugins,
-    read_settings,
-    register_schemas,
-)
+from drone_rl.cli.hydra import composition
+from drone_rl.cli.hydra.composition import conf_dir, import_plugins, read_settings
 from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.utils.errors import InputError
 
@@ -24,11 +21,12 @@ def check_commands(text):
     found = COMMAND.findall(text)
     for name, words in found:
         if name != "demo":
-            check_command(name, shlex.split(words, comments=True))
+            check_command(name, *shlex.split(words, comments=True))
     return len(found)
 
 
-def check_command(name, words):
+@functools.cache
+def check_command(name, *words):
     """Makes sure that a command knows all it is told; of a sweep's values the first."""
     assert name in COMMANDS, name
     command = find_command(name)
@@ -42,7 +40,7 @@ def check_command(name, words):
             import_plugins(told)
         except InputError:
             return  # of a tutorial, whose own test has the module
-    register_schemas(**{file: command})
+    composition.register_schemas(**{file: command})
     GlobalHydra.instance().clear()
     with initialize_config_dir(str(conf_dir()), version_base="1.3"):
         config = compose(file, told, return_hydra_config=True)

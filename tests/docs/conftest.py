@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.composing import composing_fast
+
 ROOT = Path(__file__).parents[2]
 OFFLINE = """
 import socket, sys
@@ -16,6 +18,12 @@ socket.socket.connect = socket.create_connection = socket.getaddrinfo = refuse
 from mkdocs.__main__ import cli
 cli(sys.argv[1:])
 """
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _composing_fast():
+    with composing_fast():
+        yield
 
 
 @pytest.fixture(scope="session")

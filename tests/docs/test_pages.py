@@ -48,7 +48,7 @@ def test_a_command_that_is_unknown_is_found():
         check_commands("drone-rl fly")
     with pytest.raises(Exception, match="num_cubs"):
         check_commands("X=1 drone-rl train task.num_cubs=3  # more of them\n")
-    check_command("train", ["seed=1,2", "returns=reward_to_go,leave_one_out", "-m"])
+    check_command("train", "seed=1,2", "returns=reward_to_go,leave_one_out", "-m")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
