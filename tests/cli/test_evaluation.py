@@ -5,12 +5,12 @@ from pathlib import Path
 
 import torch
 
-from tests.cli.running import drone_rl, error_line
+from tests.cli.running import error_line
 
 
-def test_evaluate_writes_table_json_and_videos(run):
+def test_evaluate_writes_table_json_and_videos(run, in_process):
     args = ["evaluate", f"checkpoint={run}", "episodes=5", "videos=1", "hydra.run.dir=evaluation"]
-    done = drone_rl(*args, cwd=run)
+    done = in_process(*args, cwd=run)
     assert done.returncode == 0, done.stderr
     assert "all cubes" in done.stdout
     assert "oracle" in done.stdout

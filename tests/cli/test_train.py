@@ -31,8 +31,8 @@ def test_training_leaves_everything_behind(run):
     assert state["provenance"]["versions"]["torch"] == torch.__version__
 
 
-def test_same_seed_gives_the_same_parameters_byte_for_byte(run, tmp_path):
-    done = drone_rl("train", *TINY, "hydra.run.dir=again", cwd=tmp_path)
+def test_same_seed_gives_the_same_parameters_byte_for_byte(run, in_process, tmp_path):
+    done = in_process("train", *TINY, "hydra.run.dir=again")
     assert done.returncode == 0, done.stderr
     first, again = (
         load_checkpoint(folder / "checkpoints" / "last.pt")["policy"]
@@ -41,9 +41,9 @@ def test_same_seed_gives_the_same_parameters_byte_for_byte(run, tmp_path):
     assert all(first[k].numpy().tobytes() == again[k].numpy().tobytes() for k in first)
 
 
-def test_killed_and_resumed_is_bit_for_bit_the_uninterrupted(tmp_path):
+def test_killed_and_resumed_is_bit_for_bit_the_uninterrupted(in_process, tmp_path):
     settings = [*TINY, "trainer.total_frames=1500"]
-    whole = drone_rl("train", *settings, "hydra.run.dir=whole", cwd=tmp_path)
+    whole = in_process("train", *settings, "hydra.run.dir=whole")
     assert whole.returncode == 0, whole.stderr
     command = [sys.executable, "-m", "drone_rl.cli.main", "train", *settings, "hydra.run.dir=half"]
     process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL)
@@ -53,7 +53,7 @@ def test_killed_and_resumed_is_bit_for_bit_the_uninterrupted(tmp_path):
         time.sleep(0.02)
     process.send_signal(signal.SIGTERM)
     assert process.wait(60) == 128 + signal.SIGTERM
-    done = drone_rl("train", "resume=half", cwd=tmp_path)
+    done = in_process("train", "resume=half")
     assert done.returncode == 0, done.stderr
     one, two = (
         load_checkpoint(tmp_path / name / "checkpoints" / "last.pt") for name in ("whole", "half")
@@ -68,15 +68,15 @@ def test_killed_and_resumed_is_bit_for_bit_the_uninterrupted(tmp_path):
 def test_a_critic_is_chosen_stopped_and_gone_on_with(in_process, tmp_path, objective):
     """What `resume` takes over, it takes over with all that the objective brought."""
     told = ["train", *TINY, f"objective={objective}", "objective.num_steps=20", "returns.gamma=0.9"]
-    for name, frames in (("whole", 800), ("half", 400)):
+    for name, frames in (("whole", 320), ("half", 160)):
         run = [f"hydra.run.dir={name}", f"trainer.total_frames={frames}"]
         assert in_process(*told, *run).returncode == 0
-    assert in_process("train", "resume=half", "trainer.total_frames=800").returncode == 0
+    assert in_process("train", "resume=half", "trainer.total_frames=320").returncode == 0
     one, two = (
         load_checkpoint(tmp_path / name / "checkpoints" / "last.pt") for name in ("whole", "half")
     )
     assert one["config"]["collector"]["_target_"] == "rollouts"
-    assert one["progress"]["frames"] == two["progress"]["frames"] == 800
+    assert one["progress"]["frames"] == two["progress"]["frames"] == 320
     for key in ("policy", "critic"):
         assert all(torch.equal(one[key][name], two[key][name]) for name in one[key])
 
@@ -85,11 +85,7 @@ def test_a_critic_is_chosen_stopped_and_gone_on_with(in_process, tmp_path, objec
     ("told", "remedy"),
     [
         (["objective=ppo", "collector=episodes"], "of collector; give collector=rollouts"),
-        (["objective=a2c", "collector=ray"], "of collector; give collector=rollouts"),
-        (["objective=ppo", "returns=leave_one_out"], "of returns; give returns=gae"),
         (["returns=gae"], "lacks; give objective=ppo or a2c, or another returns"),
-        (["collector=rollouts"], "lacks; give objective=ppo or a2c, or another collector"),
-        (["objective=ppo", "objective.epochs=0"], "objective.epochs=0 is out of range"),
         (["objective=a2c", "objective.epochs=2"], "epochs"),
     ],
 )
@@ -152,6 +148,10 @@ def test_a_refused_resume_changes_nothing(run, in_process, tmp_path, wrong):
     before = contents(folder)
     error_line(in_process("train", f"resume={folder}", *wrong))
     assert contents(folder) == before
+
+
+def test_an_accepted_resume_notes_its_settings(run, in_process, tmp_path):
+    folder = shutil.copytree(run, tmp_path / "copy")
     longer = "trainer.total_frames=500"
     assert in_process("train", f"resume={folder}", longer, "logger=tensorboard").returncode == 0
     assert list(folder.glob("tensorboard/events*"))
@@ -232,8 +232,8 @@ def test_nan_names_itself_and_the_last_good_checkpoint(in_process, tmp_path):
 
 def test_full_disk_while_saving_keeps_the_previous_checkpoint(run, tmp_path):
     """A file-size limit stands in for a full disk: writing a checkpoint fails half-way."""
-    code = (
-        "import resource, sys, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+    limited = (
+        "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "from drone_rl.utils import checkpoint as c\n"
         "save = c.save_checkpoint; n = [0]\n"
         "from drone_rl.training import callbacks\n"
@@ -242,11 +242,9 @@ def test_full_disk_while_saving_keeps_the_previous_checkpoint(run, tmp_path):
         "    if n[0] > 2: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, -1))\n"
         "    save(path, state)\n"
         "callbacks.save_checkpoint = limited\n"
-        "from drone_rl.cli.main import main; main()\n"
     )
     settings = ["train", *TINY, "hydra.run.dir=full", "trainer.checkpoint_interval_s=0"]
-    command = [sys.executable, "-c", code, *settings]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = drone_rl(*settings, cwd=tmp_path, setup=limited)
     assert "previous checkpoint is intact" in error_line(done)
     folder = tmp_path / "full" / "checkpoints"
     assert sorted(p.name for p in folder.iterdir()) == ["best.pt", "last.pt"]

@@ -1,22 +1,14 @@
 """`drone-rl prove` as a user calls it."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 
 from tests.cli.running import error_line
 
-PROGRAM = [sys.executable, "-m", "drone_rl.cli.main"]
 
-
-def call(*args):
-    return subprocess.run([*PROGRAM, *args], capture_output=True, text=True, check=False)
-
-
-def test_one_cube(tmp_path):
-    done = call(
+def test_one_cube(in_process, tmp_path):
+    done = in_process(
         "prove", "policy=right_and_forward", "task.num_cubes=1", f"hydra.run.dir={tmp_path}"
     )
     assert done.returncode == 15, done.stderr
