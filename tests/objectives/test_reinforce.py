@@ -117,8 +117,11 @@ def test_mean_gradients_are_exact_for_the_process_of_fig_3():
 
     With p the probability of action 1 in state 0, J = 3/4 (1 - (1 - p)^H), so with respect to the
     logit of action 1, dJ = 3/4 H (1 - p)^(H - 1) p (1 - p).
+
+    The batches are the collector's. test_bias.py enumerates all outcomes instead, so a difference
+    of a third is enough here: it is at least 5.5 standard errors, so 4 detect it in 93% of samples.
     """
-    horizon, episodes, repeats = 3, 500, 50
+    horizon, episodes, repeats = 3, 500, 12
     network, actor = make(features=3)
     with torch.no_grad():
         network.theta[0] = torch.tensor([0.4, -0.3])
@@ -135,7 +138,7 @@ def test_mean_gradients_are_exact_for_the_process_of_fig_3():
         estimates.append(-torch.stack(both) / episodes)
     estimates = torch.stack(estimates)
     error = estimates.std(0) / repeats**0.5
-    assert (error < 0.025 * derivative).all()  # small enough to detect a wrong formula
+    assert (error < 0.06 * derivative).all()
     assert ((estimates.mean(0) - derivative).abs() < 4 * error).all()
 
 

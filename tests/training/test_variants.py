@@ -26,7 +26,7 @@ from drone_rl.utils.progress import silent
 from drone_rl.verdicts.export import export
 
 TASK = TaskSettings(num_cubes=2, first_distance=4.0, spacing=4.0, front_margin=2.0, step_limit=29)
-TINY = TrainSettings(task=TASK, trainer=TrainerSettings(total_frames=300)).replace(
+TINY = TrainSettings(task=TASK, trainer=TrainerSettings(total_frames=180)).replace(
     objective=Ppo(num_steps=12, minibatch_size=30),
     collector=Rollouts(num_envs=5, num_threads=2),
 )
@@ -163,10 +163,10 @@ def assert_same(one, two):
 
 @pytest.mark.parametrize("settings", KINDS.values(), ids=KINDS)
 def test_resuming_within_episodes_equals_an_uninterrupted_run(settings, tmp_path):
-    longer = settings.trainer.replace(total_frames=900)
+    longer = settings.trainer.replace(total_frames=420)
     whole = drone_rl.train(settings, folder=tmp_path / "whole", trainer=longer, progress=silent)
     half = drone_rl.train(settings, folder=tmp_path / "half", progress=silent)
-    assert half.result["frames"] == 300
+    assert half.result["frames"] == 180
     counts = [c["step_count"] for c in checkpoint(half)["collector"]["collectors"]]
     assert torch.cat(counts).count_nonzero() > 0  # episodes are running
     again = drone_rl.train(folder=half.folder, resume=True, trainer=longer, progress=silent)
