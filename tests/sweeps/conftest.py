@@ -1,5 +1,6 @@
 """A sweep that was finished by hand, and a program that stands in for a training."""
 
+import functools
 import json
 import sys
 
@@ -78,10 +79,16 @@ EPISODES = 200
 def _flights(shares, success):
     """An evaluation in which each episode has the mean share."""
     means = {
-        name: {**mean_bounds([] if share is None else np.full(EPISODES, share)), "goals": 3}
+        name: {**_constant_bounds(0 if share is None else EPISODES, share or 0.0), "goals": 3}
         for name, share in shares.items()
     }
     return {"episodes": EPISODES, "success": proportion(success, EPISODES), "shares": means}
+
+
+@functools.cache
+def _constant_bounds(count, value, *others):
+    """The interval of the mean of equal values, of which tests need the same ones many times."""
+    return mean_bounds(np.full(count, value), *others)
 
 
 def _quantities(evidence):
@@ -92,7 +99,7 @@ def _quantities(evidence):
         if name.startswith("offered "):
             bounds = proportion(round(value * count), count, rule.confidence)
         else:
-            bounds = mean_bounds(np.full(count, value), low, high, rule.confidence)
+            bounds = _constant_bounds(count, value, low, high, rule.confidence)
         ends = {"lower": bounds["lower95"], "upper": bounds["upper95"]}
         found[name] = {"value": value, **ends, "thresholds": list(thresholds)}
     return found
