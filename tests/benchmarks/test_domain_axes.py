@@ -28,8 +28,17 @@ class FakeShifts:
 
 @pytest.fixture
 def count(tmp_path, monkeypatch):
+    find, found = domain_axes.find_domain, {}
+
+    def find_once(policy, folder):
+        if folder not in found:
+            found[folder] = find(policy, folder)
+        return found[folder]
+
     def run(result):
+        found.clear()
         monkeypatch.setattr(domain_axes, "shifts", lambda *a, **k: result)
+        monkeypatch.setattr(domain_axes, "find_domain", find_once)
         monkeypatch.setattr(
             domain_axes, "recheck_domain", lambda *a: type("R", (), {"contradictions": ()})
         )

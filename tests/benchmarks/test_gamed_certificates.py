@@ -1,5 +1,7 @@
 """Forged files and trivial tasks are not judged good or proved."""
 
+import functools
+
 import pytest
 
 import drone_rl
@@ -7,6 +9,18 @@ from benchmarks import gamed_certificates
 from benchmarks.gamed_certificates import cases, forged_shifts
 from drone_rl.policies.zoo import shifts_path
 from drone_rl.verdicts.coverage import find_domain
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _few_episodes():
+    """Take fewer episodes, with which honest files are accepted.
+
+    See below for certificates and tests/cli/test_evaluation_verdict.py for operating domains.
+    """
+    few = functools.partial(drone_rl.judge, episodes=150, certificate_flights=400)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(gamed_certificates, "judge", few)
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -1,11 +1,37 @@
+import functools
 from types import SimpleNamespace
 
 import pytest
 
 from benchmarks import gamed_rounding
 from benchmarks.gamed_rounding import cases, judged_good, non_finite
+from drone_rl.robustness.shifts import shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.judge import judge
+from drone_rl.verification.prove import prove
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _few_episodes():
+    """Take fewer episodes and prove for a narrow field.
+
+    These numbers are enough for honest policies: see the next test, test_gamed_memory.py (120
+    episodes of `shifts`) and test_gamed_certificates.py (400 of a certificate).
+    """
+    task = {"num_cubes": 1, "lateral_bound": 1.0}
+    changed = {
+        "judge": functools.partial(judge, certificate_flights=400),
+        "shifts": lambda path, **how: shifts(path, **{**how, "domain_episodes": 120}),
+        "prove": lambda path, **how: prove(path, **{**how, "task": task}),
+    }
+    with pytest.MonkeyPatch.context() as patch:
+        for name, function in changed.items():
+            patch.setattr(gamed_rounding, name, function)
+        yield
+
+
+def test_an_honest_policy_is_proved_for_the_narrow_field():
+    assert gamed_rounding.proved("good")
 
 
 @pytest.fixture(scope="module")
