@@ -7,6 +7,7 @@ from drone_rl.training import Callback
 from drone_rl.training.callbacks import OngoingTraining, Progress
 from drone_rl.verdicts.export import export_policy
 from tests.policies.zoo.test_files import CHECKPOINT
+from tests.training_loop import run
 from tests.verdicts.test_export_card_text import VERDICT
 
 
@@ -30,4 +31,4 @@ def test_callbacks_receive_the_trainer_interface(make_trainer):
             assert isinstance(training.progress, Progress)
             training.stop_request = "seen"
 
-    assert make_trainer(callbacks=[Look()]).run() == "seen"
+    assert run(make_trainer(callbacks=[Look()])) == "seen"
