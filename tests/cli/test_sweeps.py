@@ -17,7 +17,8 @@ pytestmark = pytest.mark.slow
 
 PROGRAM = [sys.executable, "-m", "drone_rl.cli.main"]
 TINY = ["experiment=smoke", "logger=csv", "collector.num_envs=4", "trainer.total_frames=1200"]
-SWEEP = [*PROGRAM, "train", "-m", *TINY, "seed=0,-1", "evaluate_after=10"]
+ONE_BY_ONE = "hydra.launcher.num_jobs=1"
+SWEEP = [*PROGRAM, "train", "-m", *TINY, "seed=0,-1", "evaluate_after=10", ONE_BY_ONE]
 FOLDER = "outputs/train/multiruns"
 
 
