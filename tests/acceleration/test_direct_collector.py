@@ -47,9 +47,13 @@ def collector(acceleration, task, keep=(REASON,), look=None):
     return made
 
 
-@pytest.mark.parametrize("task", [SHORT, PillarsSettings(num_rows=1)])
-@pytest.mark.parametrize("worlds", [None, 3])
-@pytest.mark.parametrize("look", [None, LOOK])
+@pytest.mark.parametrize(
+    ("task", "worlds", "look"),
+    [
+        *((SHORT, None, LOOK), (SHORT, 3, None)),
+        *((PillarsSettings(num_rows=1), None, None), (PillarsSettings(num_rows=1), 3, LOOK)),
+    ],
+)
 def test_direct_and_stepping_batches_are_identical(task, worlds, look):
     keep = (REASON, ("next", "info", "drone"))
     collectors = [collector(how, task, keep, look) for how in ("direct", "none")]

@@ -67,7 +67,7 @@ def test_episodes_equal_those_of_threads_also_after_a_worker_is_killed(on_ray, o
         on_ray.collect()
 
 
-@pytest.mark.parametrize(("workers", "cores"), [(4, 1.0), (3, 1.0), (2, 1.5)])
+@pytest.mark.parametrize(("workers", "cores"), [(3, 1.0), (2, 1.5)])
 def test_more_workers_than_cores_raise(workers, cores):
     message = rf"num_threads={workers} workers .*more than the cluster's 2 cores"
     with pytest.raises(InputError, match=message):

@@ -32,6 +32,8 @@ from drone_rl.utils.errors import InputError
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
 SMALL = CameraSettings(width=16, height=8)
+LONG = 14
+"""Steps after which every environment is in its second episode."""
 KINDS = {
     "noise": lambda: [Noise(0.1)],
     "correlated": lambda: [Noise(0.1, 5.0)],
@@ -67,23 +69,23 @@ def test_specs_agree_with_data(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_seed_determines_faults(kind):
-    first, second = fly(make_env(kind, seed=3), 20), fly(make_env(kind, seed=3), 20)
+    first, second = fly(make_env(kind, seed=3), LONG), fly(make_env(kind, seed=3), LONG)
     assert torch.equal(first, second)
     env = make_env(kind, seed=5)
-    assert not torch.equal(first, fly(env, 20))
+    assert not torch.equal(first, fly(env, LONG))
     env.set_seed(3)
-    assert torch.equal(first, fly(env, 20))
-    assert not torch.equal(first, fly(env, 20))  # the random streams have advanced
+    assert torch.equal(first, fly(env, LONG))
+    assert not torch.equal(first, fly(env, LONG))  # the random streams have advanced
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_first_environments_do_not_depend_on_batch_size(kind):
-    whole = fly(make_env(kind, 4, seed=1), 20)
-    assert torch.equal(fly(make_env(kind, 2, seed=1), 20, 2), whole[:2])
+    whole = fly(make_env(kind, 4, seed=1), LONG)
+    assert torch.equal(fly(make_env(kind, 2, seed=1), LONG, 2), whole[:2])
     env = make_env(kind, 2, seed=1, first_world=2)
-    moves = torch.arange(20)[None] + torch.arange(2, 4)[:, None]
+    moves = torch.arange(LONG)[None] + torch.arange(2, 4)[:, None]
     state, seen = env.reset(), []
-    for t in range(20):
+    for t in range(LONG):
         seen.append(state["pixels"])
         state = env.step_and_maybe_reset(state.set("action", moves[:, t] % 3))[1]
     assert torch.equal(torch.stack(seen, 1), whole[2:])

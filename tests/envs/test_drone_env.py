@@ -1,16 +1,19 @@
 import copy
 import functools
+import pickle
+from pathlib import Path
 
 import pytest
 import torch
 from tensordict import TensorDict
-from torchrl.envs import Compose, ParallelEnv, RewardSum, SerialEnv, TransformedEnv
+from torchrl.envs import Compose, RewardSum, SerialEnv, TransformedEnv
 from torchrl.envs.utils import check_env_specs
 
 from drone_rl.config import AppearanceSettings, TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
+from tests.forked import run_forked
 
 SHORT = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=5, front_margin=3.0)
 
@@ -39,11 +42,10 @@ def test_specs_with_transforms():
     env.close()
 
 
-@pytest.mark.parametrize("kind", [SerialEnv, pytest.param(ParallelEnv, marks=pytest.mark.slow)])
-def test_parallel_environments_equal_one_batch(kind):
-    """TorchRL's two workers with two environments each equal one batch of four."""
+def compare_with_one_batch(kind, **how):
+    """Compare two workers with two environments each with one batch of four."""
     make = [functools.partial(make_transformed_env, seed=4, first_world=first) for first in (0, 2)]
-    env = kind(2, make)
+    env = kind(2, pickle.loads(pickle.dumps(make)), **how)
     try:
         check_env_specs(env, break_when_any_done="both")
         env.set_seed(4, static_seed=True)
@@ -53,6 +55,21 @@ def test_parallel_environments_equal_one_batch(kind):
         assert states["next", "done"][:, :, -1].any()
     finally:
         env.close()
+
+
+def test_serial_environments_equal_one_batch():
+    compare_with_one_batch(SerialEnv)
+
+
+def test_parallel_environments_equal_one_batch():
+    """The workers are forks, which need not import the package; their factories are pickled."""
+    code = (
+        "from torchrl.envs import ParallelEnv\n"
+        "from tests.envs.test_drone_env import compare_with_one_batch\n"
+        "compare_with_one_batch(ParallelEnv, mp_start_method='fork')"
+    )
+    done = run_forked(code, cwd=Path(__file__).parents[2])
+    assert done.returncode == 0, done.stderr
 
 
 def test_environments_reset_independently():
