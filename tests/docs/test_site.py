@@ -1,11 +1,13 @@
 """The site has every page, no broken link, and asks nobody for anything."""
 
+import json
 import re
 from html.parser import HTMLParser
 from urllib.parse import unquote, urlsplit
 
 import pytest
 
+from tests.chromium import open_page
 from tests.docs.conftest import ROOT
 
 PAGES = sorted(
@@ -77,3 +79,29 @@ def test_the_readers_files_are_beside_the_pages(site):
     for name in ("results.json", "tutorials/notebook.ipynb", "flight.gif"):
         assert (site / name).read_bytes() == (ROOT / "docs" / name).read_bytes()
     assert not (site / "mutants.json").exists()
+
+
+@pytest.fixture
+def browser(site, tmp_path):
+    """A real browser, which opens the site from the disk."""
+    pytest.importorskip("selenium.webdriver")
+    with open_page(site / "index.html", tmp_path, size=(1400, 1000)) as driver:
+        yield driver
+
+
+def test_it_can_be_searched_and_asks_nobody(browser):
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    field = browser.find_element(By.CSS_SELECTOR, "input.md-search__input")
+    browser.execute_script("arguments[0].focus()", field)
+    field.send_keys("placebo")
+    found = WebDriverWait(browser, 20).until(
+        lambda b: b.find_elements(By.CSS_SELECTOR, ".md-search-result__link")
+    )
+    assert any("explanations.html" in link.get_attribute("href") for link in found)
+    events = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
+    asked = [e["params"]["request"]["url"] for e in events if e["method"].endswith("WillBeSent")]
+    assert any(url.endswith("search_index.js") for url in asked)
+    assert [url for url in asked if url.startswith(("http", "ws", "ftp"))] == []
+    assert [e for e in browser.get_log("browser") if e["level"] == "SEVERE"] == []

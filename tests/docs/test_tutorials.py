@@ -82,6 +82,7 @@ def workplace(tmp_path, monkeypatch):
     """A folder as a reader's: modules are found there, and so are files for the package."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
+    gc.freeze()  # what was there before is not collected below, which takes a second
     inside = tmp_path / "drone_rl"
     for package in (drone_rl.explanations, report):
         folder = inside.joinpath(*package.__name__.split(".")[1:])
@@ -105,6 +106,7 @@ def workplace(tmp_path, monkeypatch):
     kinds_of.cache_clear()  # a tutorial's settings count as variants as long as a cache holds them
     types_of.cache_clear()
     gc.collect()
+    gc.unfreeze()
 
 
 def show(value):
