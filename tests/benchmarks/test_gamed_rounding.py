@@ -18,7 +18,7 @@ def _few_episodes():
     These numbers are enough for honest policies: see the next test, test_gamed_memory.py (120
     episodes of `shifts`) and test_gamed_certificates.py (400 of a certificate).
     """
-    task = {"num_cubes": 1, "lateral_bound": 1.0}
+    task = {"num_cubes": 1, "lateral_bound": 0.1}
     changed = {
         "judge": functools.partial(judge, certificate_flights=400),
         "shifts": lambda path, **how: shifts(path, **{**how, "domain_episodes": 120}),

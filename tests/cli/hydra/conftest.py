@@ -1,5 +1,7 @@
 """Composes as the command line does."""
 
+import copy
+
 import pytest
 from hydra import compose, initialize_config_dir
 
@@ -20,11 +22,24 @@ def registered():
     register_schemas(**commands())
 
 
+@pytest.fixture(scope="session")
+def composed():
+    """What Hydra has made of commands and overrides so far."""
+    return {}
+
+
 @pytest.fixture
-def config(registered):
+def config(registered, composed):
     """What Hydra makes of a command and overrides."""
+
+    def read(command, overrides=()):
+        key = (command, *overrides)
+        if key not in composed:
+            composed[key] = compose(command, [*overrides])
+        return copy.deepcopy(composed[key])
+
     with initialize_config_dir(str(conf_dir()), version_base="1.3"):
-        yield compose
+        yield read
 
 
 @pytest.fixture
