@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from hydra._internal.core_plugins.file_config_source import FileConfigSource
+from hydra.core.override_parser.overrides_parser import OverridesParser
 
 from drone_rl.cli.hydra import composition
 from drone_rl.config import TASKS
@@ -14,32 +15,53 @@ from drone_rl.config import TASKS
 
 @contextlib.contextmanager
 def composing_fast() -> Iterator[None]:
-    """Keep parsed files of conf/ and registered schemas, as long as both are unchanged."""
-    load, register = FileConfigSource.load_config, composition.register_schemas
-    parsed, registered = {}, {}
+    """Keep parsed files of conf/, parsed overrides and registered schemas while unchanged."""
+    with pytest.MonkeyPatch.context() as patch:
+        _keep_files(patch)
+        _keep_overrides(patch)
+        _keep_schemas(patch)
+        yield
+
+
+def _keep_files(patch: pytest.MonkeyPatch) -> None:
+    load, kept = FileConfigSource.load_config, {}
 
     def load_once(self, config_path):
         file = Path(self.path, self._normalize_file_name(config_path))
         if not file.is_relative_to(composition.conf_dir()) or not file.is_file():
             return load(self, config_path)
         key = (self.provider, file, file.read_bytes())
-        if key not in parsed:
-            parsed[key] = load(self, config_path)
-        return copy.deepcopy(parsed[key])
+        if key not in kept:
+            kept[key] = load(self, config_path)
+        return copy.deepcopy(kept[key])
+
+    patch.setattr(FileConfigSource, "load_config", load_once)
+
+
+def _keep_overrides(patch: pytest.MonkeyPatch) -> None:
+    parse, kept = OverridesParser.parse_rule, {}
+
+    def parse_once(self, text, rule):
+        if (text, rule) not in kept:
+            kept[text, rule] = parse(self, text, rule)
+        return copy.deepcopy(kept[text, rule])
+
+    patch.setattr(OverridesParser, "parse_rule", parse_once)
+
+
+def _keep_schemas(patch: pytest.MonkeyPatch) -> None:
+    register, kept = composition.register_schemas, {}
 
     def register_once(**commands):
         parts = [*composition.PARTS.values(), *composition.SEVERAL.values()]
         variants = [v for part in parts for v in part.variants()]
         known = [*TASKS.values(), *composition.GROUPS.values(), *variants]
         state = tuple((id(cls), cls.__qualname__) for cls in known)
-        if state not in registered:
-            registered.clear()
-        done = registered.setdefault(state, {})
+        if state not in kept:
+            kept.clear()
+        done = kept.setdefault(state, {})
         if not commands.items() <= done.items():
             register(**commands)
             done.update(commands)
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(FileConfigSource, "load_config", load_once)
-        patch.setattr(composition, "register_schemas", register_once)
-        yield
+    patch.setattr(composition, "register_schemas", register_once)
