@@ -9,6 +9,7 @@ import numpy as np
 
 from benchmarks.pipeline import make_drone_env, random_walk
 from drone_rl.config import CameraSettings
+from drone_rl.utils.palette import INK, MUTED, css
 
 
 def bench_scaling(folder: Path, device: str, quick: bool) -> dict[str, Any]:
@@ -75,8 +76,10 @@ def _plot(series: dict[str, dict[int, float]], path: Path) -> None:
         x, y = np.array(list(points)), np.array(list(points.values()))
         line = np.polyfit(x, y, 1)
         grid = np.linspace(0, x.max(), 50)
-        axes.plot(grid, np.polyval(line, grid), color="0.7", label="straight line")
-        axes.plot(x, y, "o", color="tab:red", label="measured")
-        axes.set(title=f"time against {name}", xlabel=name, ylabel="seconds", ylim=(0, None))
+        axes.plot(grid, np.polyval(line, grid), color=css(MUTED), label="straight line")
+        axes.plot(x, y, "o", color=css(INK), label="measured")
+        axes.set(
+            title=f"time against {name}", xlabel=name, ylabel="seconds", ylim=(0, 1.1 * y.max())
+        )
         axes.legend()
     figure.savefig(path, dpi=120)

@@ -37,6 +37,7 @@ from drone_rl.sim.rendering.appearance import Mounting, product, rotate
 from drone_rl.sim.tasks import Task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.palette import MUTED, PAPER
 from drone_rl.utils.seeding import legacy_seed
 
 _BACK = (1.0, -1.0, -1.0, -1.0)
@@ -51,7 +52,7 @@ _STRIP = CHASE_HEIGHT + GAP
 _BOTTOM = _STRIP + STRIP_HEIGHT + 9
 _FIVE = tuple(c.name for c in (FRONT_LEFT, FRONT_CENTER, FRONT_RIGHT, BACK_CENTER, BOTTOM_CENTER))
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
-_BACKGROUND, _TEXT, _CHOSEN, _BAR = (24, 26, 31), (235, 235, 240), (226, 74, 51), (120, 130, 150)
+_BACKGROUND, _TEXT, _CHOSEN, _BAR = (24, 26, 31), (235, 235, 240), PAPER, MUTED
 
 
 def film(

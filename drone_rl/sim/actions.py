@@ -15,10 +15,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from drone_rl.utils import palette
+from drone_rl.utils.palette import Rgb
+
 Wish = TypeVar("Wish", Tensor, NDArray)
 """One wish or a batch. Shape: (*, num_parts)."""
-Rgb = tuple[int, int, int]
-"""Red, green, blue, 0 to 255."""
 
 
 class Entry(NamedTuple):
@@ -262,7 +263,7 @@ MOVES = DiscreteActions(
     left=Move.LEFT,
     order=(Move.LEFT, Move.FORWARD, Move.RIGHT),
     arrows=((0.0, 1.0), (-1.0, 0.0), (1.0, 0.0)),
-    colors=((214, 39, 40), (44, 160, 44), (31, 96, 200)),
+    colors=(palette.FORWARD, palette.LEFT, palette.RIGHT),
 )
 """The moves as a set of actions; nothing undoes a move forward."""
 DIRECTIONS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0))

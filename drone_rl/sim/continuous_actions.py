@@ -20,6 +20,7 @@ from torch import Tensor
 
 from drone_rl.config.dynamics import ActionSettings
 from drone_rl.sim.actions import MOVES, Actions, Entry, listed
+from drone_rl.utils import palette
 
 FORWARD, SIDEWAYS, YAW = range(3)
 """Indices of an action's numbers."""
@@ -54,7 +55,7 @@ class ContinuousActions(Actions):
             left=1,
             order=(3, 1, 0, 2, 4) if settings.yaw_rate else (1, 0, 2),
             arrows=(*MOVES.arrows, (-_SLANTED, _SLANTED), (_SLANTED, _SLANTED))[:count],
-            colors=(*MOVES.colors, (152, 223, 138), (174, 199, 232))[:count],
+            colors=(*MOVES.colors, palette.TURN_LEFT, palette.TURN_RIGHT)[:count],
             speeds=(settings.forward_speed, settings.sideways_speed, yaw_rate),
         )
 

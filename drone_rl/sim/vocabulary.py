@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from drone_rl.utils import palette
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Flag, Kind, Real, Record, Several, Text, Whole, as_mapping, shown
 
@@ -156,23 +157,22 @@ class ShownActions:
     names: tuple[str, ...]
     order: tuple[int, ...]
     arrows: tuple[tuple[float, float], ...]
-    colors: tuple[tuple[int, int, int], ...]
+    colors: tuple[palette.Rgb, ...]
     speeds: tuple[float, float, float] | None = None
     """Greatest speeds of continuous actions: forward and sideways, m/s; yaw rate, degrees/s."""
 
     def css(self, action: int) -> str:
         """Return the colour of an action for style sheets."""
-        return "#{:02x}{:02x}{:02x}".format(*self.colors[action])
+        return palette.css(self.colors[action])
 
 
 SHOWN_MOVES = ShownActions(
     ("forward", "left", "right"),
     (1, 0, 2),
     ((0.0, 1.0), (-1.0, 0.0), (1.0, 0.0)),
-    ((214, 39, 40), (44, 160, 44), (31, 96, 200)),
+    (palette.FORWARD, palette.LEFT, palette.RIGHT),
 )
-"""The chapter's three moves, also of files without actions. Red forward, green left, blue right, as
-in Figs. 7 and 8."""
+"""The chapter's three moves, also of files without actions."""
 
 
 def shown_actions(numbers: Mapping[str, Any]) -> ShownActions:

@@ -3,6 +3,7 @@
 import dataclasses
 import io
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps, style
@@ -15,16 +16,19 @@ from drone_rl.evaluation.rule import KINDS
 from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.sweeps.rows import Row
 from drone_rl.sweeps.summary import FAILED, Group, median_band, on_grid
+from drone_rl.utils.palette import BAD, FAINT, GOOD, MUTED, ONE_SIDED, css, light
 
 FAVOURITE_AXIS = "optimiser.lr"
 COLORS = {
-    "good": "tab:green",
-    "good, but trivial": "tab:olive",
-    "one-sided": "tab:orange",
-    "poor": "tab:red",
-    "none of these": "0.5",
-    FAILED: "tab:purple",
+    "good": css(GOOD),
+    "good, but trivial": css(light(GOOD)),
+    "one-sided": css(ONE_SIDED),
+    "poor": css(BAD),
+    "none of these": css(MUTED),
+    FAILED: css(FAINT),
 }
+MARKERS = dict(zip(COLORS, ("o", "D", "s", "v", "P", "X"), strict=True))
+"""Shapes, so that no kind is told by its colour alone."""
 MAX_PANELS = 6
 LOG_FROM = 3.0
 """Ratio of the greatest to the least value from which the axis is logarithmic."""
@@ -126,7 +130,7 @@ def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
         x = _aside(axes, np.array([place for place, _ in known]), 0.08 * (i - 2), places)
         y, low, high = (np.array([s[k] for _, s in known]) for k in ("share", "lower95", "upper95"))
         error = np.abs([y - low, high - y])
-        axes.errorbar(x, y, yerr=error, marker="o", markersize=4, capsize=2, color=COLORS[kind])
+        axes.errorbar(x, y, yerr=error, markersize=4, capsize=2, **_style(kind))
     axes.set(ylabel="share of runs", ylim=(-0.03, 1.03))
     _explain_colours(axes)
 
@@ -161,7 +165,7 @@ def _dots(
                 shift = 0.05 * (i - (len(close) - 1) / 2)
                 x = _aside(axes, np.array([place]), shift, places)
                 fill = "full" if row.is_certain else "none"
-                axes.plot(x, [y], "o", markersize=4, color=COLORS[str(row.kind)], fillstyle=fill)
+                axes.plot(x, [y], ls="", markersize=4, fillstyle=fill, **_style(str(row.kind)))
     _explain_colours(axes)
 
 
@@ -173,19 +177,25 @@ def _aside(axes: Axes, places: NDArray, shift: float, every: Sequence[float]) ->
     return places * np.exp(shift * step) if is_log else places + shift * step
 
 
+def _style(kind: str) -> dict[str, Any]:
+    return {"marker": MARKERS[kind], "color": COLORS[kind]}
+
+
 def _explain_colours(axes: Axes) -> None:
     """Add one legend above the image."""
     figure = axes.get_figure()
     if figure is None or figure.legends:
         return
-    handles = [Line2D([], [], marker="o", color=c, label=kind) for kind, c in COLORS.items()]
+    handles = [Line2D([], [], label=kind, **_style(kind)) for kind in COLORS]
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=8)
 
 
 def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     for place, group in zip(_places(axes, layout, groups), groups, strict=True):
         for row in group.known:
-            shape, color = ("o", "tab:blue") if row.is_solved else ("^", "0.5")
+            shape, color = (
+                ("o", COLORS["good"]) if row.is_solved else ("^", COLORS["none of these"])
+            )
             color = COLORS["poor"] if row.state == FAILED else color
             fill = "full" if row.is_solved else "none"
             axes.plot([place], [row.frames], shape, alpha=0.6, color=color, fillstyle=fill)

@@ -18,6 +18,7 @@ from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.vocabulary import terms_of
 from drone_rl.utils.display import aligned, paragraph, picture, table
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.palette import BAD, EMPTY, FAINT, GOOD, INK, ONE_SIDED, css, light
 from drone_rl.utils.progress import Bar, Progress, silent
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
@@ -29,13 +30,13 @@ LOOPED = "software in the loop"
 GUSTS = 0.25
 """Standard deviation of the wind along each axis, as a fraction of its mean."""
 _COLORS = {
-    "good": "#b9e0b0",
-    "good, but trivial": "#dfe7bd",
-    "poor": "#f2b5ad",
-    "one-sided": "#f7d7a0",
-    "none": "#e3e6ea",
+    "good": css(light(GOOD)),
+    "good, but trivial": css(light(GOOD, 0.15)),
+    "poor": css(light(BAD)),
+    "one-sided": css(light(ONE_SIDED)),
+    "none": css(light(EMPTY)),
 }
-_INK, _FAINT = "#1e2024", "#5b616b"
+_INK, _FAINT = css(INK), css(FAINT)
 _WIDTH, _HEIGHT = 1.75, 0.95
 """Inches of a cell."""
 

@@ -10,7 +10,7 @@ from tests.continuous import SETTINGS
 def test_moves_are_the_default_display():
     display = shown_actions({"actions": actions.MOVES.as_dict()})
     assert display == SHOWN_MOVES == shown_actions({"name": "an older one"})
-    assert [SHOWN_MOVES.css(i) for i in range(3)] == ["#d62728", "#2ca02c", "#1f60c8"]
+    assert [SHOWN_MOVES.css(i) for i in range(3)] == ["#cc79a7", "#e69f00", "#0072b2"]
 
 
 def test_speeds_are_in_meters_and_degrees_per_second():

@@ -3,6 +3,7 @@
 from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
 
+from drone_rl.utils import palette
 from drone_rl.verdicts.dynamics_sweep import LOOPED, chart
 from tests.verdicts.test_dynamics_sweep_text import BAD, GOOD, NUMBERS
 
@@ -15,7 +16,7 @@ def test_each_cell_has_the_colour_of_its_verdict():
     boxes = cells(chart(NUMBERS))
     assert [box.get_xy() for box in boxes] == [(0, 0), (1, 0)]
     green, red = (to_hex(box.get_facecolor()) for box in boxes)
-    assert (green, red) == ("#b9e0b0", "#f2b5ad")
+    assert (green, red) == (*(palette.css(palette.light(c)) for c in (palette.GOOD, palette.BAD)),)
 
 
 def test_it_says_verdict_share_interval_and_what_fails():

@@ -8,26 +8,17 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from drone_rl.sim.vocabulary import SHOWN_MOVES, ShownActions
+from drone_rl.utils.palette import BOX, INK, MUTED, PAPER, Rgb
 
-Color = tuple[int, int, int]
-"""Red, green, blue, 0 to 255."""
-BACKGROUND: Color = (255, 255, 255)
-INK: Color = (30, 32, 36)
-MUTED: Color = (150, 156, 166)
-CHOSEN: Color = (214, 39, 40)
-BOX: Color = (236, 238, 242)
-LEFT, UP, RIGHT = (-1.0, 0.0), (0.0, 1.0), (1.0, 0.0)
-HEIGHT = 84
-"""Height of the three arrows, pixels."""
 ROW = 18
-"""Height of one row otherwise, pixels."""
+"""Height of an action's row, pixels."""
 SCALE = 5
 """Enlargement of a single frame."""
 _CHANNELS = {"gray": 1, "rgb": 3, "chromaticity": 2}
 """Channels of each frame."""
 
 
-def tint(frame: NDArray, color: Color, strength: float = 0.4) -> NDArray:
+def tint(frame: NDArray, color: Rgb, strength: float = 0.4) -> NDArray:
     """Tint a frame with its action's colour. Shape: (H, W, 3), uint8."""
     wash = np.array(color, dtype=np.float64)
     return (frame * (1 - strength) + wash * strength).astype(np.uint8)
@@ -43,14 +34,14 @@ def heated(frame: NDArray, heat: NDArray) -> NDArray:
     return (gray * (1 - weight) + color * weight).astype(np.uint8)
 
 
-def thumbnails(frames: NDArray, colors: Sequence[Color], cells: NDArray) -> Image.Image:
+def thumbnails(frames: NDArray, colors: Sequence[Rgb], cells: NDArray) -> Image.Image:
     """Place frames, each tinted with its action's colour, on the cells of a grid.
 
     Shapes: (N, H, W, 3) of the frames; (N, 2), column and row, of the cells.
     """
     height, width = frames.shape[1:3]
     columns, rows = cells.max(0) + 1
-    canvas = Image.new("RGB", (int(columns) * width, int(rows) * height), BACKGROUND)
+    canvas = Image.new("RGB", (int(columns) * width, int(rows) * height), PAPER)
     for frame, color, (column, row) in zip(frames, colors, cells, strict=True):
         picture = Image.fromarray(tint(frame, color))
         canvas.paste(picture, (int(column) * width, int(row) * height))
@@ -92,7 +83,7 @@ def enlarge(frame: NDArray, scale: int = SCALE) -> Image.Image:
 
 def titled(picture: Image.Image, caption: str) -> Image.Image:
     """Put a line of text above an image."""
-    canvas = Image.new("RGB", (picture.width, picture.height + 22), BACKGROUND)
+    canvas = Image.new("RGB", (picture.width, picture.height + 22), PAPER)
     ImageDraw.Draw(canvas).text((2, 2), caption, INK, ImageFont.load_default(14))
     canvas.paste(picture, (0, 22))
     return canvas
@@ -102,7 +93,7 @@ def stacked(pictures: Sequence[Image.Image], gap: int = 3) -> Image.Image:
     """Stack images from top to bottom."""
     width = max(p.width for p in pictures)
     height = sum(p.height for p in pictures) + gap * (len(pictures) - 1)
-    canvas, y = Image.new("RGB", (width, height), BACKGROUND), 0
+    canvas, y = Image.new("RGB", (width, height), PAPER), 0
     for picture in pictures:
         canvas.paste(picture, (0, y))
         y += picture.height + gap
@@ -114,7 +105,7 @@ def gridded(pictures: Sequence[Image.Image], columns: int, gap: int = 12) -> Ima
     width, height = pictures[0].width, pictures[0].height
     rows = -(-len(pictures) // columns)
     size = (columns * (width + gap) - gap, rows * (height + gap) - gap)
-    canvas = Image.new("RGB", size, BACKGROUND)
+    canvas = Image.new("RGB", size, PAPER)
     for i, picture in enumerate(pictures):
         canvas.paste(picture, ((i % columns) * (width + gap), (i // columns) * (height + gap)))
     return canvas
@@ -139,52 +130,18 @@ def shown_picture(observation: NDArray, low: float, high: float, channels: str) 
 def indicator(
     probabilities: Sequence[float], chosen: int, width: int, actions: ShownActions = SHOWN_MOVES
 ) -> Image.Image:
-    """Draw one bar per action, as long as it is probable; that of the chosen action is red."""
-    if sorted(actions.arrows) == sorted((LEFT, UP, RIGHT)):
-        return _arrows(probabilities, chosen, width, actions)
-    return _rows(probabilities, chosen, width, actions)
+    """Draw a row per action, those to the left first: name, probability and a bar of its length.
 
-
-def _arrows(
-    probabilities: Sequence[float], chosen: int, width: int, actions: ShownActions
-) -> Image.Image:
-    """Bars to the left, up and to the right from the middle of the lower edge."""
-    canvas, draw, font = _canvas(width, HEIGHT)
-    middle, base, thick = width // 2, HEIGHT - 16, 10
-    reach, up = width // 2 - 62, HEIGHT - 24
-    left, ahead, right = (actions.arrows.index(arrow) for arrow in (LEFT, UP, RIGHT))
-    share = {action: float(probabilities[action]) for action in (left, ahead, right)}
-    bars = {
-        left: (middle - 8 - reach * share[left], base - thick, middle - 8, base),
-        right: (middle + 8, base - thick, middle + 8 + reach * share[right], base),
-        ahead: (middle - thick // 2, base - up * share[ahead], middle + thick // 2, base),
-    }
-    for action, box in bars.items():
-        color = CHOSEN if action == chosen else MUTED
-        draw.rectangle((box[0], min(box[1], box[3] - 1), max(box[2], box[0] + 1), box[3]), color)
-    places = {left: (6, base - 14), right: (width - 62, base - 14), ahead: (middle + 12, 4)}
-    for action, place in places.items():
-        draw.text(place, f"{actions.names[action]} {share[action]:.2f}", INK, font)
-    return canvas
-
-
-def _rows(
-    probabilities: Sequence[float], chosen: int, width: int, actions: ShownActions
-) -> Image.Image:
-    """One row per action, those to the left first."""
-    canvas, draw, font = _canvas(width, ROW * len(actions.names) + 4)
-    start = width // 2
+    The bar of the chosen action is dark.
+    """
+    canvas = Image.new("RGB", (width, ROW * len(actions.names) + 4), BOX)
+    draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(13)
+    shares = [float(share) for share in probabilities]
+    texts = [f"{name} {share:.2f}" for name, share in zip(actions.names, shares, strict=True)]
+    start = max(width // 2, round(max(map(font.getlength, texts))) + 12)  # right of all texts
     for row, action in enumerate(actions.order):
-        share, top = float(probabilities[action]), ROW * row + 4
-        color = CHOSEN if action == chosen else MUTED
-        end = max(start + 1, start + (width - start - 6) * share)
+        top, color = ROW * row + 4, INK if action == chosen else MUTED
+        end = max(start + 1, start + (width - start - 6) * shares[action])
         draw.rectangle((start, top, end, top + ROW - 6), color)
-        draw.text((6, top - 2), f"{actions.names[action]} {share:.2f}", INK, font)
+        draw.text((6, top - 2), texts[action], INK, font)
     return canvas
-
-
-def _canvas(
-    width: int, height: int
-) -> tuple[Image.Image, ImageDraw.ImageDraw, ImageFont.FreeTypeFont | ImageFont.ImageFont]:
-    canvas = Image.new("RGB", (width, height), BOX)
-    return canvas, ImageDraw.Draw(canvas), ImageFont.load_default(13)

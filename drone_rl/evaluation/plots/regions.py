@@ -12,6 +12,7 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from drone_rl.sim.vocabulary import ShownActions
+from drone_rl.utils.palette import INK, MUTED, css
 
 _LINE = 'fill="none" class="line"'
 
@@ -41,11 +42,11 @@ def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: Show
     axis.set(xlim=(side, -side), ylim=(-0.04 * far, far), aspect="equal")
     axis.set_xlabel("metres to the left (+) or right (-)")
     axis.set_ylabel("metres ahead of the camera")
-    axis.axhline(near, color="#1d2026", lw=0.5)
+    axis.axhline(near, color=css(INK), lw=0.5)
     axis.set_title("what it does about one cube that stands there")
     handles = [Patch(color=names.css(a), label=f"goes {names.names[a]}") for a in names.order]
     if numbers["unseen"]:
-        style = {"facecolor": "#b4b8c0", "edgecolor": "white", "hatch": "////"}
+        style = {"facecolor": css(MUTED), "edgecolor": "white", "hatch": "////"}
         handles.append(Patch(**style, label="cube not seen"))
     handles += axis.get_legend_handles_labels()[0]
     axis.legend(
@@ -60,10 +61,10 @@ def _mark(axis: Axes, numbers: Mapping[str, Any]) -> None:
     for y in (-touch, touch):
         label = "beyond: flying straight on misses it" if y < 0 else None
         axis.axvline(y, color="white", ls=(0, (5, 4)), lw=1.6)
-        axis.axvline(y, color="#1d2026", ls=(0, (5, 4)), lw=0.8, label=label)
-    axis.plot(0, 0, "^", color="#1d2026", ms=11, clip_on=False, ls="", label="camera, looking up")
+        axis.axvline(y, color=css(INK), ls=(0, (5, 4)), lw=0.8, label=label)
+    axis.plot(0, 0, "^", color=css(INK), ms=11, clip_on=False, ls="", label="camera, looking up")
     at = numbers["least_gap_left"], numbers["least_gap_ahead"]
-    for color, width, label in (("white", 2, None), ("#1d2026", 1, "logits closest")):
+    for color, width, label in (("white", 2, None), (css(INK), 1, "logits closest")):
         axis.plot(*at, "o", ms=11, mfc="none", mew=width, color=color, ls="", label=label)
 
 

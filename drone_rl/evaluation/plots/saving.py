@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import imageio.v3 as iio
+from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
@@ -23,15 +25,25 @@ FRAMES_PER_SECOND = 8
 """Of videos."""
 
 
-def save_drawn(drawn: Image.Image | Figure | NDArray, path: Path) -> str:
-    """Save an image or chart as PNG, a video as MP4; return it as a data URI.
+def new_chart(width: float = 4.5, height: float = 3.2) -> tuple[Figure, Axes]:
+    """Return a chart of one panel; at the default width, in inches, a phone shows it legibly."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots()
 
-    The path is without suffix. See `report.part.Drawn`.
+
+def save_drawn(drawn: Image.Image | Figure | NDArray, path: Path) -> str:
+    """Save an image as PNG, a chart as PNG and SVG, a video as MP4; return it as a data URI.
+
+    The path is without suffix. See `report.explanation.Drawn`.
     """
     if isinstance(drawn, (Image.Image, Figure)):
         content = to_png(drawn)
         path.with_name(path.name + ".png").write_bytes(content)
-        return to_uri(content, "image/png")
+        if isinstance(drawn, Image.Image):
+            return to_uri(content, "image/png")
+        content = _to_svg(drawn)
+        path.with_name(path.name + ".svg").write_bytes(content)
+        return to_uri(content, "image/svg+xml")
     film = path.with_name(path.name + ".mp4")
     iio.imwrite(film, drawn, fps=FRAMES_PER_SECOND, codec="libx264")
     return to_uri(film.read_bytes(), "video/mp4")
@@ -58,6 +70,13 @@ def to_png(picture: Image.Image | Figure) -> bytes:
         picture.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
     else:
         picture.save(buffer, "png", optimize=True)
+    return buffer.getvalue()
+
+
+def _to_svg(figure: Figure) -> bytes:
+    buffer = io.BytesIO()
+    with rc_context({"svg.hashsalt": "drone_rl"}):  # the same SVG of the same chart
+        figure.savefig(buffer, format="svg", dpi=2 * _DPI, metadata={"Date": None})
     return buffer.getvalue()
 
 

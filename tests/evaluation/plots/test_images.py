@@ -4,7 +4,8 @@ import numpy as np
 from PIL import Image
 
 from drone_rl.evaluation.plots import images as pictures
-from drone_rl.evaluation.plots.images import BACKGROUND, SCALE, indicator
+from drone_rl.evaluation.plots.images import SCALE, indicator
+from drone_rl.utils.palette import PAPER
 
 BLACK = np.zeros((4, 6, 3), np.uint8)
 RED, BLUE = (214, 39, 40), (31, 96, 200)
@@ -39,7 +40,7 @@ def test_thumbnails_stand_on_their_cells():
     of = {c: tuple(pictures.tint(BLACK, c)[0, 0].tolist()) for c in (RED, BLUE)}
     assert picture.getpixel((5, 3)) == of[RED]
     assert picture.getpixel((12, 4)) == of[BLUE]
-    assert picture.getpixel((6, 0)) == BACKGROUND
+    assert picture.getpixel((6, 0)) == PAPER
 
 
 def test_pictures_are_enlarged_captioned_stacked_and_gridded():
@@ -91,14 +92,14 @@ def test_where_pictures_of_a_stack_and_of_a_grid_stand():
     parts = [Image.new("RGB", (4, 3), (shade, 0, 0)) for shade in (50, 100, 150, 200, 250)]
     stack = np.asarray(pictures.stacked([parts[0], parts[1].resize((2, 3))], gap=2))
     assert stack.shape == (8, 4, 3)
-    assert (stack[:3] == (50, 0, 0)).all() and (stack[3:5] == BACKGROUND).all()
-    assert (stack[5:, :2] == (100, 0, 0)).all() and (stack[5:, 2:] == BACKGROUND).all()
+    assert (stack[:3] == (50, 0, 0)).all() and (stack[3:5] == PAPER).all()
+    assert (stack[5:, :2] == (100, 0, 0)).all() and (stack[5:, 2:] == PAPER).all()
     grid = np.asarray(pictures.gridded(parts, columns=2, gap=1))
     assert grid.shape == (3 * 3 + 2, 9, 3)
     corners = [(0, 0), (0, 5), (4, 0), (4, 5), (8, 0)]
     for (y, x), part in zip(corners, parts, strict=True):
         assert (grid[y : y + 3, x : x + 4] == np.asarray(part)).all()
-    assert (grid[8:, 4:] == BACKGROUND).all() and (grid[3] == BACKGROUND).all()
+    assert (grid[8:, 4:] == PAPER).all() and (grid[3] == PAPER).all()
 
 
 def test_heat_by_the_level():

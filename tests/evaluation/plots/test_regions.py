@@ -60,7 +60,7 @@ def corners(words):
 def test_the_element_has_the_same_corners_turned_upwards():
     root = ElementTree.fromstring(svg(NUMBERS, WAYS, SHOWN_MOVES))
     paths = [p for p in root.iter("path") if p.get("fill-rule")]
-    assert [p.get("fill") for p in paths] == ["#d62728", "#2ca02c", "url(#unseen)"]
+    assert [p.get("fill") for p in paths] == ["#cc79a7", "#e69f00", "url(#unseen)"]
     assert corners(paths[0].get("d")).tolist() == [[3, -2], [3, -4], [-1, -4], [-1, -2]]
     assert paths[0].find("title").text == "goes forward"
     small = corners(paths[2].get("d"))

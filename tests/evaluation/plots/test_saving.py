@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
-from drone_rl.evaluation.plots.saving import save_drawn, save_numbers, save_rows, to_uri
+from drone_rl.evaluation.plots.saving import new_chart, save_drawn, save_numbers, save_rows, to_uri
 
 
 def content(uri, kind):
@@ -25,11 +25,17 @@ def test_a_picture_is_a_png_and_a_uri_of_the_same_pixels(tmp_path):
         assert (read.size, read.getpixel((2, 1))) == ((3, 2), (10, 20, 30))
 
 
-def test_a_chart_is_a_png_of_90_dots_an_inch(tmp_path):
-    with Image.open(
-        io.BytesIO(content(save_drawn(Figure((2, 1)), tmp_path / "c"), "image/png"))
-    ) as p:
+def test_a_chart_is_a_png_of_90_dots_an_inch_and_an_svg_of_the_same_bytes_each_time(tmp_path):
+    saved = [content(save_drawn(Figure((2, 1)), tmp_path / "c"), "image/svg+xml") for _ in "ab"]
+    assert saved[0] == saved[1] == (tmp_path / "c.svg").read_bytes()
+    assert b'width="144pt" height="72pt"' in saved[0]
+    with Image.open(tmp_path / "c.png") as p:
         assert p.size == (180, 90)
+
+
+def test_a_chart_of_one_panel():
+    figure, axis = new_chart(height=2.0)
+    assert figure.axes == [axis] and figure.get_size_inches().tolist() == [4.5, 2.0]
 
 
 def test_a_film_is_an_mp4_with_all_frames(tmp_path):
