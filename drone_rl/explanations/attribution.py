@@ -12,7 +12,7 @@ from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.tasks import Task
 
 SHOWN = ("grad_cam", "grad_cam_logit")
-"""Maps of the film; the second is shown where the first has no heat."""
+"""Maps of "film_heat"; the second is shown where the first has no heat."""
 INSTEAD = ("saliency", "occlusion")  # without Grad-CAM, the first one that the policy allows
 COUNT = 6  # key frames of an episode, as in Figs. 13 to 15.
 
@@ -21,20 +21,23 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Return "attribution".
 
     Arrays: "map_..." (T, H, W) of each method, each frame's maximum 1; of the film's n steps
-    "film_frames" (n, H, W, 3), "film_heat" (n, H, W), "film_probabilities" and "film_actions".
+    "film_frames" (n, H, W, 3), "film_heat" (n, H, W), "film_heat_..." of each method,
+    "film_probabilities" and "film_actions".
     """
     arrays = {f"map_{name}": _normalized(maps) for name, maps in context.frame_maps.items()}
     flights, explainer, film = context.flights, context.explainer, context.film
     first = int(np.flatnonzero(flights.episode == FILMED)[0])
     methods = [name for name in SHOWN if name in context.maps]
     methods = methods or [name for name in INSTEAD if name in context.maps][:1]
+    inputs = film.tensor("observations"), film.tensor("actions")
+    every = {n: context.scenes.to_frame(of(*inputs)) for n, of in explainer.methods().items()}
     heat = torch.zeros(film.frames.shape[:-1])
     by: list[str | None] = [None] * len(film)
     for name in methods:
-        maps = explainer.methods()[name](film.tensor("observations"), film.tensor("actions"))
-        for step, one in enumerate(context.scenes.to_frame(maps)):
+        for step, one in enumerate(every[name]):
             if by[step] is None and one.max() > 0:
                 heat[step], by[step] = one, name
+    arrays |= {f"film_heat_{name}": _normalized(maps) for name, maps in every.items()}
     arrays |= {
         "film_frames": film.frames,
         "film_heat": _normalized(heat),
@@ -49,6 +52,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
         "film": {
             "episode": FILMED,
             "heat_by": by,
+            "heat_of": list(every),
             "key_steps": [{"step": frame - first, "why": why} for frame, why in frames],
         },
     }

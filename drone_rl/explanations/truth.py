@@ -41,7 +41,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     state = data.state(scenes.task, scenes.worlds.dynamics).to(str(context.env.device))
     trial = trust.make_trial(scenes, network, state, data.tensor("actions"), episode, seed)
     changes = intervene(scenes, network, state, data.tensor("regions"), seed=seed)
-    shown = int(np.argmax(np.nan_to_num(changes[0].effect)))
+    shown = clear_frame(changes[0])
     outcomes = measure_outcomes(scenes, network, state, episode)
     maps = {name: one.numpy() for name, one in context.frame_maps.items()}
     numbers = {
@@ -186,6 +186,17 @@ def intervene(
         Intervention(name, area, _effect(network, scenes, base, frames, area), frames)
         for name, (frames, area) in changes.items()
     ]
+
+
+def clear_frame(change: Intervention) -> int:
+    """Return a frame on which a change has an effect and covers about a twentieth of the pixels.
+
+    Where the target fills the frame, a reader sees no more than one colour.
+    """
+    effect = np.nan_to_num(change.effect)
+    covered = change.area.flatten(1).double().mean(1).cpu().numpy()
+    is_clear = (effect >= 0.5 * effect.max()) & (covered > 0)
+    return int(np.where(is_clear, np.abs(covered - 0.05), np.inf).argmin())
 
 
 def _effect(

@@ -1,6 +1,6 @@
 """Charts of a robustness evaluation: curves of success rates, and strips of camera images."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -8,21 +8,18 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from drone_rl.evaluation.plots.images import (
-    BACKGROUND,
-    INK,
-    MUTED,
-    enlarge,
-    gridded,
-    stacked,
-    titled,
-)
+from drone_rl.evaluation.plots.images import enlarge, gridded, stacked, titled
+from drone_rl.evaluation.plots.saving import new_chart
 from drone_rl.robustness.shifts_text import NAMES
+from drone_rl.utils.palette import BAD, FAINT, GOOD, INK, MUTED, PAPER, css
 from drone_rl.utils.text import percent
 
 _COLUMNS = 4
-_POLICY, _ORACLE, _GOOD = "#1f60c8", "#2ca02c", "#2ca02c"
-_OTHERS = {"drifting": ("#e07b00", "--", "drifting"), "onset": ("#8a4fbf", ":", "from step 20 on")}
+_POLICY, _ORACLE, _GOOD = css(INK), css(MUTED), css(GOOD)
+_OTHERS = {
+    "drifting": (css(FAINT), "--", "drifting"),
+    "onset": (css(FAINT), ":", "from step 20 on"),
+}
 _SCALE = 3
 _LABEL = 190
 """Width of the names next to strips, pixels."""
@@ -42,11 +39,28 @@ def chart(numbers: Mapping[str, Any]) -> Figure:
         _curve(place, name, along, numbers["plain"], ranges.get(name))
     for place in places[len(axes) :]:
         place.axis("off")
-    handles = {}
-    for place in places[: len(axes)]:
-        handles |= dict(zip(*reversed(place.get_legend_handles_labels()), strict=True))
-    places[len(axes)].legend(handles.values(), handles.keys(), loc="center", frameon=False)
+    _explain(places[len(axes)], places[: len(axes)])
     return figure
+
+
+def curves(numbers: Mapping[str, Any]) -> dict[str, Figure]:
+    """Return a chart of one panel for each axis, by its label, and their legend; see `chart`."""
+    ranges = (numbers["domain"] or {}).get("ranges", {})
+    charts = {NAMES[name]: new_chart(height=2.9) for name in numbers["axes"]}
+    for (_, place), (name, along) in zip(charts.values(), numbers["axes"].items(), strict=True):
+        _curve(place, name, along, numbers["plain"], ranges.get(name))
+    figure, place = new_chart(height=2.9)
+    place.axis("off")
+    _explain(place, [panel for _, panel in charts.values()])
+    return {**{name: chart for name, (chart, _) in charts.items()}, "legend": figure}
+
+
+def _explain(place: Axes, panels: Iterable[Axes]) -> None:
+    """Add one legend of several panels."""
+    handles: dict[str, Any] = {}
+    for panel in panels:
+        handles |= dict(zip(*reversed(panel.get_legend_handles_labels()), strict=True))
+    place.legend(handles.values(), handles.keys(), loc="center", frameon=False)
 
 
 def _curve(
@@ -71,7 +85,7 @@ def _curve(
         place.plot(where, shares, color=_ORACLE, lw=1, label=label, zorder=1)
     for level in levels:
         if level["impossible"]:
-            place.plot(level["position"], 0.03, "x", color="#d62728", label="impossible", ls="")
+            place.plot(level["position"], 0.03, "x", color=css(BAD), label="impossible", ls="")
     if found is not None and found["positions"] is not None:
         low, high = found["positions"]
         place.axvspan(
@@ -82,7 +96,7 @@ def _curve(
     place.set(ylim=(-0.03, 1.05), yticks=[0, 0.5, 1], yticklabels=["0%", "50%", "100%"])
     place.set_title(NAMES[name], fontsize=11)
     place.set_xlabel(along["unit"], fontsize=9)
-    place.axvline(0.0, color="#b4b8c0", lw=0.8, ls=":", label="as it was trained", zorder=0)
+    place.axvline(0.0, color=css(MUTED), lw=0.8, ls=":", label="as it was trained", zorder=0)
     place.spines[["top", "right"]].set_visible(False)
 
 
@@ -111,24 +125,36 @@ def strips(
     `numbers` are those of `shifts.json`; `pictures` are by axis, without perturbation and at each
     strength. Shapes: (H, W, 3).
     """
-    rows = [_strip(name, numbers["axes"][name], shown) for name, shown in pictures.items()]
+    rows = [_strip(numbers, name, shown) for name, shown in pictures.items()]
     return stacked(rows, gap=0)
 
 
-def _strip(name: str, along: Mapping[str, Any], pictures: Sequence[NDArray | None]) -> Image.Image:
-    by_number = {level["number"]: level for level in along["levels"]}
-    first = pictures[0]
-    assert first is not None
-    cells = [titled(enlarge(first, _SCALE), "as it was trained")]
-    for number, picture in enumerate(pictures[1:], 1):
-        if picture is not None and number in by_number:
-            level = by_number[number]
-            success = percent(level["modes"]["constant"]["success"]["share"])
-            caption = f"{level['value']:.3g}: success rate {success}"
-            cells.append(titled(enlarge(picture, _SCALE), caption))
+def conditions(
+    numbers: Mapping[str, Any], name: str, pictures: Sequence[NDArray | None]
+) -> dict[str, Image.Image]:
+    """Return camera images of one axis by caption, which has the strength and the success rate."""
+    shown: dict[str, Image.Image] = {}
+    if pictures[0] is not None:
+        shown[f"as trained: {_success(numbers['plain'])}"] = enlarge(pictures[0], _SCALE)
+    for level in numbers["axes"][name]["levels"]:
+        if (picture := pictures[level["number"]]) is not None:
+            caption = f"{level['value']:.3g}: {_success(level['modes']['constant'])}"
+            shown[caption] = enlarge(picture, _SCALE)
+    return shown
+
+
+def _success(flown: Mapping[str, Any]) -> str:
+    return f"{percent(flown['success']['share'])} succeed"
+
+
+def _strip(
+    numbers: Mapping[str, Any], name: str, pictures: Sequence[NDArray | None]
+) -> Image.Image:
+    along, shown = numbers["axes"][name], conditions(numbers, name, pictures)
+    cells = [titled(picture, caption) for caption, picture in shown.items()]
     strip = gridded(cells, len(cells), gap=8)
     height = strip.height
-    canvas = Image.new("RGB", (_LABEL + 6 * (cells[0].width + 8), height + 6), BACKGROUND)
+    canvas = Image.new("RGB", (_LABEL + 6 * (cells[0].width + 8), height + 6), PAPER)
     canvas.paste(strip, (_LABEL, 0))
     pen = ImageDraw.Draw(canvas)
     pen.multiline_text((4, height // 2 - 16), NAMES[name], INK, ImageFont.load_default(15))

@@ -53,8 +53,8 @@ def is_tested(e: Evidence, name: str) -> bool:
     return bool(flown) and not flown[-1]["unchanged"]
 
 
-def _wide(e: Evidence) -> list[str]:
-    """Axes with a range in which the policy is good."""
+def wide(e: Evidence) -> list[str]:
+    """Return the axes with a range in which the policy is good."""
     limits = {name: found["positions"] or (0.0, 0.0) for name, found in _ranges(e).items()}
     return [name for name, (low, high) in limits.items() if low < high and is_tested(e, name)]
 
@@ -101,7 +101,7 @@ def _range(e: Evidence, name: str) -> str:
 
 
 def _good(e: Evidence) -> str:
-    ranges = listed([_range(e, name) for name in _wide(e)])
+    ranges = listed([_range(e, name) for name in wide(e)])
     return f"Good with {ranges} (95% confidence for each range)."
 
 
@@ -170,7 +170,7 @@ SHIFTS = (
     Sentence(
         "shifts.good",
         "certainly good without perturbation and up to both ends of a range with an effect",
-        lambda e: bool(_wide(e)),
+        lambda e: bool(wide(e)),
         _good,
     ),
     Sentence(
@@ -215,7 +215,7 @@ SHIFTS = (
     Sentence(
         "shifts.scope",
         "a range was found",
-        lambda e: bool(_wide(e)),
+        lambda e: bool(wide(e)),
         lambda e: (
             "Tested within each range, with constant perturbations: its limits, the strengths of "
             "the table and a random one between each two; not tested: other strengths, and "

@@ -5,6 +5,7 @@ the JSON files, so that a test can change the evidence and see the sentence chan
 """
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -85,12 +86,24 @@ def said(paragraph: Paragraph, evidence: Evidence) -> Claims:
     return paragraph(evidence)
 
 
-def percent(share: float) -> str:
-    """Return a rate in percent; 0% and 100% only if it is exactly 0 or 1."""
-    text = f"{100 * share:.0f}%"
-    if text == "100%" and share < 1:
-        return "more than 99%"
-    return "less than 1%" if text == "0%" and share > 0 else text
+def percent(share: float, digits: int = 0) -> str:
+    """Return a rate in percent with so many decimals; 0% and 100% only if it is exactly 0 or 1."""
+    if share in (0, 1):
+        return f"{share:.0%}"
+    text, step = f"{100 * share:.{digits}f}%", 10.0**-digits
+    if float(text[:-1]) >= 100:
+        return f"more than {100 - step:g}%"
+    return f"less than {step:g}%" if float(text[:-1]) <= 0 else text
+
+
+decimal_percent = functools.partial(percent, digits=1)
+"""Returns a rate in percent with one decimal."""
+
+
+def rate(figure: Mapping[str, Any], key: str = "share") -> str:
+    """Return a rate in percent with its 95% confidence interval."""
+    share, low, high = (f"{100 * figure[name]:.1f}" for name in (key, "lower95", "upper95"))
+    return f"{share}% (95% CI {low} to {high})"
 
 
 SEED_KEYS = ("seed", "seed_is_fixed")

@@ -1,8 +1,8 @@
 import numpy as np
 
 from benchmarks.evidence import SHIFTS, changed
-from drone_rl.evaluation.plots.images import INK
-from drone_rl.robustness.charts import chart, strips
+from drone_rl.robustness.charts import chart, conditions, curves, strips
+from drone_rl.utils.palette import INK
 
 PICTURES = [np.full((25, 64, 3), 40 * i, np.uint8) for i in range(6)]
 
@@ -58,3 +58,19 @@ def test_a_strip_by_the_pixel():
     for number, level in enumerate((0, 40, 200)):  # with nothing different, then strengths 1 and 5
         left = 190 + number * 200
         assert (shown[22:97, left : left + 192] == level).all()
+
+
+def test_a_chart_of_each_axis_and_their_legend():
+    charts = curves(SHIFTS)
+    assert next(iter(charts)) == "elevation of the sun"
+    assert [*charts][-1] == "legend" and len(charts) == 4
+    sun = charts["elevation of the sun"].axes[0]
+    assert [text.get_text() for text in sun.get_xticklabels()] == ["0", "55", "60"]
+    labels = [text.get_text() for text in charts["legend"].axes[0].get_legend().get_texts()]
+    assert "success rate of the policy" in labels and "certainly good in this range" in labels
+
+
+def test_images_are_captioned_with_strength_and_success():
+    shown = conditions(SHIFTS, "sun", PICTURES)
+    assert [*shown] == ["as trained: 100% succeed", "60: more than 99% succeed", "0: 10% succeed"]
+    assert all(picture.size == (3 * 64, 3 * 25) for picture in shown.values())

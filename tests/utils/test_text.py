@@ -1,4 +1,15 @@
-from drone_rl.utils.text import all_cubes, among, bounds, exact, listed, ordinal, percent, plural
+from drone_rl.utils.text import (
+    all_cubes,
+    among,
+    bounds,
+    decimal_percent,
+    exact,
+    listed,
+    ordinal,
+    percent,
+    plural,
+    rate,
+)
 
 
 def test_numbers_as_people_write_them():
@@ -38,3 +49,15 @@ def test_nearly_all_is_never_all():
         assert exact(share) == "more than 0.999999999"
     assert exact(1 - 1e-16, is_all=True) == "1"
     assert exact(0.5, is_all=True) == "0.5"
+
+
+def test_percentages_with_one_decimal_are_never_rounded_to_nothing_or_all():
+    shares = (0, 0.0004, 0.0123, 0.9749, 0.9996, 1.0)
+    assert [decimal_percent(share) for share in shares] == [
+        "0%", "less than 0.1%", "1.2%", "97.5%", "more than 99.9%", "100%"
+    ]  # fmt: skip
+    assert [percent(share) for share in shares] == [
+        "0%", "less than 1%", "1%", "97%", "more than 99%", "100%"
+    ]  # fmt: skip
+    figure = {"share": 0.975, "lower95": 0.9543, "upper95": 0.9881}
+    assert rate(figure) == "97.5% (95% CI 95.4 to 98.8)"
