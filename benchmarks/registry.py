@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from benchmarks.accessibility import bench_accessibility
 from benchmarks.benchmark import Benchmark, Setup
 from benchmarks.coverage import bench_coverage
 from benchmarks.domain_axes import bench_domain_axes
@@ -153,6 +154,11 @@ BENCHMARKS: dict[str, Benchmark] = {
             "benchmarks/injections",
             "benchmarks/injected_pages",
         ),
+    ),
+    "accessibility": Benchmark(
+        lambda s: bench_accessibility(s.runs / "accessibility", s.quick),
+        "truth",
+        ("explanations", "utils/display", "benchmarks/accessibility"),
     ),
     "gamed": Benchmark(
         lambda s: bench_gamed(s.runs / "gamed"),

@@ -132,6 +132,8 @@ def test_table_cells():
         "gamed_total": 34,
         "fragile_honest": 2,
         "fragile_honest_total": 14,
+        "a11y_violations": 0,
+        "a11y_pages": 40,
         "injections_run": 0,
         "injections_total": 1234,
         "domain_axes_right": 21,

@@ -111,6 +111,12 @@ TRUTH = (
         "0",
     ),
     Row(
+        "accessibility",
+        "serious or critical accessibility violations of the report and the site (axe-core)",
+        lambda f: f"{f['a11y_violations']} on {f['a11y_pages']} pages",
+        "0",
+    ),
+    Row(
         "domain_axes",
         "axes whose operating domain is enforced in the right direction, from file to verdict",
         lambda f: f"{f['domain_axes_right']} of {f['domain_axes']}",
