@@ -210,7 +210,10 @@ EXPLANATION: Plain = {
     "attribution": {
         "layer": "relu2",
         "shown": "grad_cam",
-        "film": {"heat_by": ["grad_cam", "grad_cam_logit", None, "grad_cam"]},
+        "film": {
+            "heat_by": ["grad_cam", "grad_cam_logit", None, "grad_cam"],
+            "heat_of": ["grad_cam", "saliency"],
+        },
     },
     "truth": {
         "trusted": "saliency",

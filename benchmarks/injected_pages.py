@@ -25,7 +25,7 @@ from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary
 from drone_rl.sweeps.report import render_page as render_sweep
 from drone_rl.utils.display import page, paragraph, table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.text import say
+from drone_rl.utils.text import said
 
 Place = tuple[tuple[Any, ...], bool]
 """Path of keys to an entry, and whether the place is its name (else its value)."""
@@ -110,10 +110,24 @@ def accepted(
 
 
 class _PixelImages(dict[str, str]):
-    """An image of one pixel under every name."""
+    """An image of one pixel under every name, as well as several with the payload as caption."""
+
+    text: str = ""
 
     def __missing__(self, name: str) -> str:
-        return PIXEL
+        pixel = _Pixel(PIXEL)
+        pixel.caption = self.text
+        return pixel
+
+
+class _Pixel(str):
+    """A data URI that is also a mapping of one."""
+
+    caption: str = ""
+
+    def items(self) -> list[tuple[str, str]]:
+        """Return caption and data URI."""
+        return [(self.caption, PIXEL)]
 
 
 class _Forged(Explanation):
@@ -158,17 +172,20 @@ class _ForgedPolicy(Policy):
         """See `Policy`."""
         explanation = self.explanation
         extras = self.extras.get(part.title) or part.extras(explanation)
-        sentences = {name: say(may, explanation.numbers) for name, may in part.text.items()}
+        found = {n: [*said(may, explanation.numbers).values()] for n, may in part.text.items()}
         if self.text:
             plain = json.loads(json.dumps({k: v for k, v in extras.items() if k != "svg"}))
             extras = {**extras, **_everywhere(plain, self.text)}
-            sentences = {name: f"{text} {self.text}" for name, text in sentences.items()}
+            found = {name: [*claims, self.text] for name, claims in found.items()}
+        pictures = _PixelImages({} if extras.get("rows") == [] else {"shown": PIXEL})
+        pictures.text = self.text
         return {
             "name": explanation.name,
             "numbers": explanation.numbers,
             "actions": explanation.actions,
-            "pictures": _PixelImages({} if extras.get("rows") == [] else {"shown": PIXEL}),
-            "text": sentences,
+            "pictures": pictures,
+            "text": {name: " ".join(claims) for name, claims in found.items()},
+            "found": found,
             "terms": explanation.terms,
             "extras": extras,
         }

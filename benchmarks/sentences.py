@@ -23,6 +23,7 @@ from drone_rl.evaluation import evaluate as evaluation
 from drone_rl.evaluation import verdict_text as verdict
 from drone_rl.explanations.report.behavior import say_source
 from drone_rl.explanations.report.page import PARTS
+from drone_rl.explanations.report.summary import say_summary
 from drone_rl.robustness import shifts_text as shifts
 from drone_rl.sweeps import text as sweep
 from drone_rl.utils import text as seeds
@@ -34,7 +35,11 @@ SENTENCES: dict[str, tuple[tuple[Paragraph, ...], Mapping[str, Any]]] = {
     "verdict": ((verdict.SENTENCES,), VERDICT),
     "evaluation": ((evaluation.EVALUATION,), EVALUATION),
     "explanation": (
-        (say_source, *(paragraph for part in PARTS.values() for paragraph in part.text.values())),
+        (
+            say_source,
+            say_summary,
+            *(paragraph for part in PARTS.values() for paragraph in part.text.values()),
+        ),
         EXPLANATION,
     ),
     "card": ((card.SENTENCES,), CARD),

@@ -16,9 +16,9 @@ from drone_rl.utils.text import (
     Evidence,
     among,
     bounds,
+    decimal_percent,
     is_fixed,
     listed,
-    percent,
     plural,
     seed_line,
     seed_of,
@@ -113,8 +113,13 @@ def _draw_shifts(explanation: Explanation) -> Drawn:
     numbers = explanation.numbers["shifts"]
     if not is_quoted(explanation.numbers):
         return {}
-    frames = {name: [*explanation.arrays[f"shifts_{name}"]] for name in numbers["axes"]}
-    return {"shifts": charts.chart(numbers), "conditions": charts.strips(numbers, frames)}
+    frames = {
+        f"conditions_{name}": charts.conditions(
+            numbers, name, [*explanation.arrays[f"shifts_{name}"]]
+        )
+        for name in numbers["axes"]
+    }
+    return {"shifts": charts.curves(numbers), **frames}
 
 
 def _shifts_tables(explanation: Explanation) -> dict[str, Rows]:
@@ -128,7 +133,10 @@ SHIFTS_PART = Part(
     text={"shifts": QUOTED},
     draw=_draw_shifts,
     tables=_shifts_tables,
-    extras=lambda explanation: {"rows": _shifts_tables(explanation).get("shifts", [])},
+    extras=lambda explanation: {
+        "rows": _shifts_tables(explanation).get("shifts", []),
+        "names": charts.NAMES,
+    },
 )
 LEFT_OUT_PART = Part(
     title="What is left out, and why",
@@ -152,7 +160,7 @@ def say_dataset(evidence: Evidence) -> Claims:
             f"{found['steps']:,} steps with sampled actions."
         )
     if max(shares.values()) < 1:
-        parts = listed([f"{percent(share)} {name}" for name, share in shares.items()])
+        parts = listed([f"{decimal_percent(share)} {name}" for name, share in shares.items()])
         claims["dataset.actions"] = f"Actions taken: {parts}."
     if max(shares.values()) == 1:
         only = next(name for name, share in shares.items() if share == 1)
@@ -199,33 +207,31 @@ def say_loops(evidence: Evidence) -> Claims:
         return {
             "loops.some": (
                 f"In {among(share)} of these sampled episodes the drone moves back and forth in a "
-                f"loop ({bounds(share, percent)}); the longest loop has {found['longest']} steps, "
-                f"and all loops together have {percent(found['frames_share'])} of the steps."
+                f"loop ({bounds(share, decimal_percent)}); the longest loop has {found['longest']} "
+                f"steps, and all loops together have {decimal_percent(found['frames_share'])} of "
+                "the steps."
             )
         }
     return {
         "loops.none": (
             f"None of these {share['trials']} sampled episodes has a loop, in which the drone "
-            f"moves back and forth; up to {percent(share['upper95'])} of such episodes may have "
-            "one (95%)."
+            f"moves back and forth; up to {decimal_percent(share['upper95'])} of such episodes may "
+            "have one (95%)."
         )
     }
 
 
-def pairs(explanation: Explanation, kind: str) -> Image.Image | None:
-    """Return an image of the worst pairs of a kind; None if there is none."""
+def pairs(explanation: Explanation, kind: str) -> dict[str, Image.Image]:
+    """Return images of the worst pairs of a kind, left and right in turn, by caption."""
     listed = explanation.numbers["contradictions"]["list"]
     shown = [pair for pair in listed if pair["kind"] == kind][:MOST_PAIRS]
-    if not shown:
-        return None
-    tiles = [
-        images.probed_frame(
+    return {
+        f"pair {i}, frame {pair[side]}: more {side}": images.probed_frame(
             explanation.data, pair[side], f"frame {pair[side]}: more {side}", explanation.actions
         )
-        for pair in shown
+        for i, pair in enumerate(shown, start=1)
         for side in ("left", "right")
-    ]
-    return images.gridded(tiles, 2)
+    }
 
 
 DATASET_PART = Part(
@@ -237,6 +243,6 @@ FLAWS_PART = Part(
     needs=("contradictions", "loops"),
     text={"contradictions": say_contradictions, "loops": say_loops},
     draw=lambda explanation: {
-        f"pairs_{kind}": image for kind in KINDS if (image := pairs(explanation, kind)) is not None
+        f"pairs_{kind}": images for kind in KINDS if (images := pairs(explanation, kind))
     },
 )

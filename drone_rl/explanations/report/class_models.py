@@ -35,22 +35,32 @@ def say_class_models(evidence: Evidence) -> Claims:
 
 def grid(explanations: Sequence[Explanation]) -> Image.Image:
     """Return images by action (columns), policy and objective (rows), with the probabilities."""
-    tiles = []
-    for explanation in explanations:
-        start = f"{explanation.name[:18]}: " if len(explanations) > 1 else ""
-        numbers = explanation.numbers["class_model"]
-        low, high = numbers["statistics"]["low"], numbers["statistics"]["high"]
-        # version 0.1 wrote "color" instead of "channels"
-        channels = numbers.get("channels", "rgb" if numbers.get("color") else "gray")
-        for objective in _OBJECTIVES:
-            reached = numbers[objective]["probabilities"]
-            shown = explanation.arrays[f"class_model_{objective}"]
-            for action in explanation.actions.order:
-                image = images.shown_picture(shown[action], low, high, channels)
-                name = explanation.actions.names[action]
-                caption = f"{start}{name} {reached[action]:.3f} (by {objective})"
-                tiles.append(images.titled(images.enlarge(image), caption))
-    return images.gridded(tiles, len(explanations[0].actions.names))
+    shown = [
+        image
+        for explanation in explanations
+        for image in tiles(
+            explanation, f"{explanation.name[:18]}: " if len(explanations) > 1 else ""
+        ).values()
+    ]
+    return images.gridded(shown, len(explanations[0].actions.names))
+
+
+def tiles(explanation: Explanation, start: str = "") -> dict[str, Image.Image]:
+    """Return the images of one policy by caption, each with a start."""
+    shown: dict[str, Image.Image] = {}
+    numbers = explanation.numbers["class_model"]
+    low, high = numbers["statistics"]["low"], numbers["statistics"]["high"]
+    # version 0.1 wrote "color" instead of "channels"
+    channels = numbers.get("channels", "rgb" if numbers.get("color") else "gray")
+    for objective in _OBJECTIVES:
+        reached = numbers[objective]["probabilities"]
+        found = explanation.arrays[f"class_model_{objective}"]
+        for action in explanation.actions.order:
+            image = images.shown_picture(found[action], low, high, channels)
+            name = explanation.actions.names[action]
+            caption = f"{start}{name} {reached[action]:.3f} (by {objective})"
+            shown[caption] = images.titled(images.enlarge(image), caption)
+    return shown
 
 
 PART = Part(
@@ -58,6 +68,6 @@ PART = Part(
     label="Class models",
     needs=("class_model",),
     text={"class_model": say_class_models},
-    draw=lambda explanation: {"class_model": grid([explanation])},
+    draw=lambda explanation: {"class_model": tiles(explanation)},
     compare=lambda explanations: {"class_models": grid(explanations)},
 )

@@ -98,8 +98,10 @@ class Explanation:
         return cls(numbers, arrays, data, f"{folder.name}/explanation.json")
 
 
-Drawn = Mapping[str, Image.Image | Figure | NDArray]
-"""Images, charts and films by name. A film: (T, H, W, 3), uint8, sizes multiples of 16."""
+Picture = Image.Image | Figure | NDArray
+"""An image, a chart, or a film (T, H, W, 3), uint8, with sizes that are multiples of 16."""
+Drawn = Mapping[str, Picture | Mapping[str, Picture]]
+"""Pictures by name; several under one name, by caption, are laid out side by side."""
 
 
 def _nothing(_: Any) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from drone_rl.explanations.report import (
     class_models,
     embedding,
     response,
+    summary,
     truth,
 )
 from drone_rl.explanations.report.explanation import FRAME, Drawn, Explanation, Part
@@ -24,7 +25,7 @@ from drone_rl.utils.display import content_security_policy, page_environment, st
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest, to_file_name
 from drone_rl.utils.limits import ARRAYS_BYTES, Allowance
-from drone_rl.utils.text import percent, say
+from drone_rl.utils.text import decimal_percent, said, say
 
 PARTS: dict[str, Part] = {
     "evaluation": behavior.EVALUATION_PART,
@@ -43,7 +44,7 @@ PARTS: dict[str, Part] = {
 """All parts in the order of the page, by the names of `explanations.explain.SECTIONS`; entries of
 an explanation that no part shows are printed as JSON."""
 STYLES = ("style.css", "report.css")  # files of the page's one style element
-SCRIPTS = ("map.js", "zoom.js")
+SCRIPTS = ("map.js", "zoom.js", "save.js")
 """Files of the page's one script element; their data are in elements of type JSON."""
 _INCOMPLETE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
 """Errors while rendering that a missing number or one of another type causes."""
@@ -136,11 +137,14 @@ class Policy:
             if part.fits(self.explanation):
                 part.tables(self.explanation)
                 for paragraph in part.text.values():
-                    say(paragraph, self.explanation.numbers)
+                    said(paragraph, self.explanation.numbers)
 
     def show(self, part: Part) -> dict[str, Any]:
         """Save the figures and numbers of a part; return what its template needs."""
         explanation, numbers = self.explanation, self.explanation.numbers
+        found = {
+            name: [*said(paragraph, numbers).values()] for name, paragraph in part.text.items()
+        }
         for name, rows in part.tables(explanation).items():
             save_rows(rows, self.folder / f"{self.prefix}_{name}")
         for name in part.needs:
@@ -150,7 +154,8 @@ class Policy:
             "numbers": numbers,
             "actions": explanation.actions,
             "pictures": _save(part.draw(explanation), self.folder, f"{self.prefix}_"),
-            "text": {name: say(paragraph, numbers) for name, paragraph in part.text.items()},
+            "text": {name: " ".join(claims) for name, claims in found.items()},
+            "found": found,
             "terms": explanation.terms,
             "extras": part.extras(explanation),
         }
@@ -160,11 +165,13 @@ def render_page(policies: Sequence[Policy]) -> str:
     """Return the page of some policies, as HTML."""
     environment = _environment()
     explanations = [policy.explanation for policy in policies]
+    fitting = {name for name, part in PARTS.items() if any(map(part.fits, explanations))}
     style, script = static_text(environment, STYLES), static_text(environment, SCRIPTS)
     return environment.get_template("report.html").render(
         title="Can these policies be trusted?" if policies[1:] else "Can this policy be trusted?",
         parts=_parts(environment, policies),
         policies=explanations,
+        summaries=[(e.name, summary_lines(e, fitting)) for e in explanations],
         sources=[say(behavior.say_source, {**e.numbers, "source": e.source}) for e in explanations],
         policy=content_security_policy(style, script),
         style=style,
@@ -172,12 +179,23 @@ def render_page(policies: Sequence[Policy]) -> str:
     )
 
 
+def summary_lines(explanation: Explanation, parts: Collection[str]) -> list[tuple[str, ...]]:
+    """Return label, section (empty if it is not among the parts) and text of each line."""
+    lines: list[tuple[str, ...]] = []
+    for name, text in said(summary.say_summary, explanation.numbers).items():
+        label, section = summary.LINES[name.removeprefix("summary.").partition("_")[0]]
+        lines.append((label, section if section in parts else "", text))
+    return lines
+
+
 @functools.cache
 def _environment() -> jinja2.Environment:
     """Return the templates of this page, compiled once."""
     environment = page_environment("drone_rl.explanations.report")
     environment.filters |= {
-        "percent": lambda of: percent(of).replace("less than ", "<").replace("more than ", ">"),
+        "percent": lambda of: (
+            decimal_percent(of).replace("less than ", "<").replace("more than ", ">")
+        ),
         "json": functools.partial(json.dumps, indent=1),
     }
     return environment
@@ -213,5 +231,15 @@ def _render(template: jinja2.Template, part: Part, policies: Sequence[Policy]) -
     return Markup(template.render(policies=[p.show(part) for p in fitting], shared=shared))
 
 
-def _save(drawn: Drawn, folder: Path, prefix: str) -> Mapping[str, str]:
-    return {name: save_drawn(one, folder / f"{prefix}{name}") for name, one in drawn.items()}
+def _save(drawn: Drawn, folder: Path, prefix: str) -> dict[str, str | dict[str, str]]:
+    """Save pictures; return their data URIs by name, and by caption where a name has several."""
+    saved: dict[str, str | dict[str, str]] = {}
+    for name, one in drawn.items():
+        path = folder / f"{prefix}{name}"
+        if isinstance(one, Mapping):
+            files = [path.with_name(f"{path.name}_{i}") for i in range(1, len(one) + 1)]
+            pictures = zip(one.items(), files, strict=True)
+            saved[name] = {caption: save_drawn(drawn, file) for (caption, drawn), file in pictures}
+        else:
+            saved[name] = save_drawn(one, path)
+    return saved

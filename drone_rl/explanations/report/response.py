@@ -13,14 +13,15 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from drone_rl.evaluation.plots import images, regions
-from drone_rl.evaluation.plots.saving import Rows
+from drone_rl.evaluation.plots.saving import Rows, new_chart
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary, terms_of
-from drone_rl.utils.text import Claims, Evidence, bounds, listed, percent
+from drone_rl.utils.palette import EMPTY, GOOD, css
+from drone_rl.utils.text import Claims, Evidence, bounds, decimal_percent, listed
 from drone_rl.verification.text import rows as place_rows
 from drone_rl.verification.text import say_places
 
-_OUTCOMES = ("#d9d9de", "#4269d0")  # colours of targets that are not handled, and of those that are
+_OUTCOMES = (css(EMPTY), css(GOOD))  # colours of targets not handled, and of those that are
 
 
 def say_response(evidence: Evidence) -> Claims:
@@ -42,7 +43,9 @@ def say_response(evidence: Evidence) -> Claims:
         claims["response.heights"] = f"With the {terms.target} {'; '.join(parts)}."
     blind = {row["side"]: row["blind"] for row in level if row["side"] != "ahead"}
     if None not in blind.values():
-        parts = [f"{percent(of)} of the places {terms.place(side)}" for side, of in blind.items()]
+        parts = [
+            f"{decimal_percent(of)} of the places {terms.place(side)}" for side, of in blind.items()
+        ]
         claims["response.blind"] = (
             f"It is blind at {listed(parts)}: a turn is needed, it makes none, and its "
             f"probabilities differ by less than {evidence['response']['blind_below']:g} from those "
@@ -87,33 +90,31 @@ def say_asymmetry(evidence: Evidence) -> Claims:
     return claims
 
 
-def response_chart(explanation: Explanation) -> Figure:
+def response_charts(explanation: Explanation) -> dict[str, Figure]:
     """Plot over the target's place: the actions' probabilities, the best action, the outcome.
 
-    There is a row for each height of targets, the highest on top.
+    There are charts for each height of targets, the highest first.
     """
-    arrays = explanation.arrays
-    heights = arrays["response_height"]
-    actions, count = explanation.actions, len(explanation.actions.names)
-    terms = explanation.terms
-    figure = Figure(figsize=(3.2 * (count + 2), 3.9 * len(heights)), layout="constrained")
-    axes = figure.subplots(len(heights), count + 2, squeeze=False, sharex=True, sharey=True)
-    for layer, row in zip(range(len(heights)), axes[::-1], strict=True):
-        _draw_row(row, arrays, layer, actions)
-        level = f", {terms.target} {heights[layer]:+g} m" if len(heights) > 1 else ""
-        row[0].set_ylabel(f"metres ahead{level}")
-    figure.colorbar(axes[0, 0].images[0], ax=axes[:, :count], shrink=0.8, label="probability")
-    for axis in axes[-1]:
-        axis.set_xlabel("metres to the left (+) or right (-)", fontsize=9)
+    arrays, actions, terms = explanation.arrays, explanation.actions, explanation.terms
+    heights, count = arrays["response_height"], len(explanation.actions.names)
     named = ([actions.css(action) for action in range(count)], actions.names)
     ends = (_OUTCOMES, [f"{terms.target} {what}" for what in (terms.unhandled, terms.handled)])
-    for axis, labels in ((axes[-1, -2], named), (axes[-1, -1], ends)):
-        handles = [Patch(color=c, label=n) for c, n in zip(*labels, strict=True)]
-        axis.legend(
-            handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, fontsize=8,
-            frameon=False,
-        )  # fmt: skip
-    return figure
+    charts: dict[str, Figure] = {}
+    for layer in reversed(range(len(heights))):
+        panels = [new_chart(height=4.4) for _ in range(count + 2)]
+        axes = [axis for _, axis in panels]
+        _draw_row(axes, arrays, layer, actions)
+        level = f", {terms.target} {heights[layer]:+g} m" if len(heights) > 1 else ""
+        for figure, axis in panels:
+            axis.set(ylabel="metres ahead", xlabel="metres to the left (+) or right (-)")
+            charts[f"{axis.get_title()}{level}"] = figure
+            axis.set_title(f"{axis.get_title()}{level}", fontsize=11)
+        for figure, axis in panels[:count]:
+            figure.colorbar(axis.images[0], ax=axis, shrink=0.8, label="probability")
+        for (figure, _), labels in zip(panels[count:], (named, ends), strict=True):
+            handles = [Patch(color=c, label=n) for c, n in zip(*labels, strict=True)]
+            figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
+    return charts
 
 
 def _draw_row(
@@ -132,15 +133,16 @@ def _draw_row(
         axis.set_title(f"P({actions.names[action]})")
     shades = ListedColormap([actions.css(action) for action in range(len(wishes))])
     most.imshow(probabilities.argmax(-1), vmin=0, vmax=len(wishes) - 1, cmap=shades, **style)
-    most.set_title("most probable action\n(inside the white line: blind)", fontsize=10)
+    most.set_title("most probable action")
     blind = arrays["response_blind"][layer]
     if blind.any():
         most.contour(
             lateral, forward, blind.astype(float), levels=[0.5], colors="white", linewidths=2.5
         )
+        most.set_title("most probable action; inside the white line: blind")
     ends = ListedColormap(_OUTCOMES)
     outcome.imshow(arrays["outcome_collected"][layer], vmin=0, vmax=1, cmap=ends, **style)
-    outcome.set_title("outcome", fontsize=10)
+    outcome.set_title("outcome")
 
 
 def response_tables(explanation: Explanation) -> dict[str, Rows]:
@@ -170,14 +172,15 @@ def _grid(
         yield at, tuple(round(float(axis[i]), 3) for axis, i in zip(axes, at, strict=True))
 
 
-def worst_frames(explanation: Explanation) -> Image.Image:
-    """Return the three frames on which the policy and its mirror image differ most."""
-    data, actions = explanation.data, explanation.actions
-    tiles = [
-        images.probed_frame(data, one["frame"], f"differs by {one['distance']:.2f}", actions)
-        for one in explanation.numbers["asymmetry"]["dataset"]["worst"][:3]
-    ]
-    return images.gridded(tiles, 3)
+def worst_frames(explanation: Explanation) -> dict[str, Image.Image]:
+    """Return the three frames on which the policy and its mirror image differ most, by caption."""
+    shown: dict[str, Image.Image] = {}
+    for one in explanation.numbers["asymmetry"]["dataset"]["worst"][:3]:
+        caption = f"frame {one['frame']}: differs by {one['distance']:.2f}"
+        shown[caption] = images.probed_frame(
+            explanation.data, one["frame"], caption, explanation.actions
+        )
+    return shown
 
 
 RESPONSE_PART = Part(
@@ -185,7 +188,7 @@ RESPONSE_PART = Part(
     label="Response map",
     needs=("response",),
     text={"response": say_response},
-    draw=lambda explanation: {"response": response_chart(explanation)},
+    draw=lambda explanation: {"response": response_charts(explanation)},
     tables=response_tables,
 )
 ASYMMETRY_PART = Part(

@@ -1,7 +1,8 @@
 """Report section "truth": tests of heat maps, and the effects of changes to a scene."""
 
 import operator
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,54 +11,76 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from drone_rl.evaluation.plots import images
+from drone_rl.evaluation.plots.saving import new_chart
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.text import Claims, Evidence, bounds, listed, percent, plural
+from drone_rl.utils.palette import (
+    FAINT,
+    GOOD,
+    GROUND,
+    INK,
+    MUTED,
+    NEXT_CUBE,
+    OTHER_CUBES,
+    SKY,
+    css,
+)
+from drone_rl.utils.text import Claims, Evidence, bounds, decimal_percent, listed, plural
 
-_METHOD, _PLACEBO = "#4269d0", "#b4b8c0"
-_COLORS = ("#4269d0", "#efb118", "#ff725c", "#6cc5b0", "#9c6b4e")
-_REGION_COLORS = ("#d62728", "#ff9896", "#222222", "#8c9a7b", "#9ecae9")
 _KINDS = {"deletion": "lower is better", "insertion": "higher is better"}
+_DASHES = ("-", "--", "-.", ":", (0, (1, 1)))
+_REGIONS = [css(color) for color in (NEXT_CUBE, OTHER_CUBES, INK, GROUND, SKY)]
+_UNMOVED = "no patch of any frame\naffects this policy"
 
 
 def _name(method: str) -> str:
     return METHOD_NAMES.get(method, method)
 
 
-def truth_chart(explanation: Explanation) -> Figure:
+def _color(method: Mapping[str, Any]) -> str:
+    return css(GOOD if method.get("trusted") else FAINT)
+
+
+def truth_charts(explanation: Explanation) -> dict[str, Figure]:
     """Plot the scores of methods and placebos, and the tests that a method must pass."""
     truth = explanation.numbers["truth"]
-    figure = Figure(figsize=(17, 4.6), layout="constrained")
-    axes = figure.subplots(1, 4, width_ratios=(2, 1.3, 1.3, 1.3))
-    _scores(axes[0], truth)
+    scores, axis = new_chart(height=1.2 + 0.3 * (len(truth["methods"]) + len(truth["placebos"])))
+    _scores(axis, truth)
+    charts = {"scores of methods and placebos": scores}
     tests = (
         ("placebos", 0.0, "score above its strongest placebo\n(must be above 0)"),
         ("pointing", 0.0, "hits above chance\n(must be above 0)"),
         ("likeness", 0.5, "similarity on shuffled weights\n(must be below 0.5)"),
     )
-    for axis, (test, bar, title) in zip(axes[1:], tests, strict=True):
+    for test, bar, title in tests:
         of = _hardest if test == "placebos" else operator.methodcaller("get", test)
-        _test(axis, {name: of(method) for name, method in truth["methods"].items()}, bar, title)
-    for axis in axes[2:]:
-        axis.set_yticklabels([])
-    return figure
+        charts[title.replace("\n", " ")], axis = new_chart()
+        _test(axis, truth["methods"], of, bar)
+        if not axis.lines[:-1] and not axis.texts:
+            why = _UNMOVED if truth["methods"] else "no method was tested"
+            axis.text(0.5, 0.5, why, ha="center", va="center", transform=axis.transAxes)
+        axis.set_title(title, fontsize=11)
+    return charts
 
 
 def _scores(axis: Axes, truth: Mapping[str, Any]) -> None:
     placebos = sorted(truth["placebos"].items(), key=lambda item: -(item[1]["mean"] or 0.0))
-    rows = [(_name(n), m["score"], _METHOD) for n, m in truth["methods"].items()]
-    rows += [(f"placebo: {n}", score, _PLACEBO) for n, score in placebos]
+    rows = [(_name(n), m["score"], _color(m)) for n, m in truth["methods"].items()]
+    rows += [(f"placebo: {n}", score, css(MUTED)) for n, score in placebos]
     for y, (_, score, color) in enumerate(rows[::-1]):
         if score["mean"] is None:
-            axis.text(0.02, y, "no patch affects the policy", va="center", fontsize=9)
             continue
         axis.barh(y, score["mean"], color=color, height=0.65)
         axis.plot([score["lower95"], score["upper95"]], [y, y], color="black", lw=1.5)
-    axis.axvline(0, color="#8b8f98", lw=1)
-    axis.set(yticks=range(len(rows)), yticklabels=[name for name, *_ in rows[::-1]], xlim=(-0.5, 1))
+    if all(score["mean"] is None for _, score, _ in rows):
+        axis.text(0.25, len(rows) / 2 - 0.5, _UNMOVED, ha="center", va="center")
+    axis.axvline(0, color=css(MUTED), lw=1)
+    names = [textwrap.fill(name, 26) for name, *_ in rows[::-1]]
+    axis.set(xlim=(-0.5, 1), ylim=(-0.6, len(rows) - 0.4))
+    axis.set_yticks(range(len(rows)), names, fontsize=8)
     axis.set_title(
-        "agreement with the patches that affect the policy\n(score; chance: 0; line: 95%)",
+        "agreement with the patches that affect\nthe policy (score; chance: 0; line: 95%)",
         fontsize=11,
     )
 
@@ -68,85 +91,97 @@ def _hardest(method: Mapping[str, Any]) -> Mapping[str, Any] | None:
     return min(comparisons, key=lambda b: -1.0 if b["lower"] is None else b["lower"], default=None)
 
 
-def _test(axis: Axes, results: dict[str, Mapping[str, Any] | None], bar: float, title: str) -> None:
+def _test(
+    axis: Axes,
+    methods: Mapping[str, Mapping[str, Any]],
+    of: Callable[[Mapping[str, Any]], Mapping[str, Any] | None],
+    bar: float,
+) -> None:
     """Plot the median and the bounds of one test for each method, the first on top."""
-    for y, test in enumerate(reversed(results.values())):
+    for y, method in enumerate([*methods.values()][::-1]):
+        test = of(method)
         if test is not None and test["lower"] is None:
-            axis.text(bar, y, "too few episodes", va="center", fontsize=9)
+            axis.text(bar, y, " too few episodes", va="center", fontsize=9)
         elif test is not None:
             axis.plot([test["lower"], test["upper"]], [y, y], color="black", lw=1.5)
-            axis.plot(test["median"], y, "o", color=_METHOD)
-    axis.axvline(bar, color="#c62828", ls="--", lw=1.2)
-    names = [_name(method) for method in reversed(results)]
-    axis.set(yticks=range(len(names)), yticklabels=names, ylim=(-0.6, len(names) - 0.4))
-    axis.set_title(title, fontsize=11)
+            axis.plot(test["median"], y, "o", color=_color(method))
+    axis.axvline(bar, color=css(INK), ls="--", lw=1.2)
+    names = [_name(method) for method in [*methods][::-1]]
+    axis.set(yticks=range(len(names)), yticklabels=names, ylim=(-0.6, max(len(names), 1) - 0.4))
 
 
 def heat_chart(explanation: Explanation) -> Figure:
     """Plot the fraction of each method's heat in each region of the frame."""
-    figure = Figure(figsize=(9, 3.2), layout="constrained")
-    axis, heat = figure.subplots(), explanation.numbers["truth"]["heat"]
+    figure, axis = new_chart()
+    heat = explanation.numbers["truth"]["heat"]
     first = next(iter(heat.values()))
     bars = [*((shares, "share") for shares in heat.values()), (first, "chance")]
     for y, (shares, of) in zip(range(len(heat), -1, -1), bars, strict=True):
         left = 0.0
-        for region, color in zip(first, _REGION_COLORS, strict=True):
+        for region, color in zip(first, _REGIONS, strict=True):
             value = shares[region][of]["mean"] or 0.0
             label = region.replace("_", " ") if of == "chance" else None
             axis.barh(y, value, left=left, color=color, height=0.7, label=label)
             left += value
+        if not left:
+            axis.text(0.5, y, "no heat", ha="center", va="center")
     names = ["the pixels", *(_name(method) for method in reversed(heat))]
     axis.set(yticks=range(len(names)), yticklabels=names, xlim=(0, 1))
-    axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=5, fontsize=8, frameon=False)
+    figure.legend(loc="outside lower center", ncols=3, fontsize=9, frameon=False)
     return figure
 
 
-def curves_chart(explanation: Explanation) -> Figure:
+def curves_charts(explanation: Explanation) -> dict[str, Figure]:
     """Plot the mean effect of each patch, and deletion and insertion by action."""
-    curves = explanation.numbers["truth"]["curves"]
-    actions = explanation.actions
-    columns = 1 + len(actions.names)
-    figure = Figure(figsize=(max(17.0, 3.8 * columns), 7), layout="constrained")
-    axes = figure.subplots(2, columns)
-    _effects(axes[0, 0], explanation)
-    axes[1, 0].axis("off")
-    shown = [actions.names[action] for action in actions.order]
-    for column, action in zip(axes.T[1:], shown, strict=True):
-        for axis, (kind, better) in zip(column, _KINDS.items(), strict=True):
-            _curves(axis, curves, action, kind)
-            axis.set_title(f"{action}, {kind}\n({better})", fontsize=11)
-    handles, labels = axes[0, 2].get_legend_handles_labels()
-    axes[1, 0].legend(handles, labels, loc="center", fontsize=9, frameon=False)
-    return figure
+    curves, actions = explanation.numbers["truth"]["curves"], explanation.actions
+    trusted = {n for n, m in explanation.numbers["truth"]["methods"].items() if m.get("trusted")}
+    title = "mean effect of each patch on the policy"
+    figure, axis = new_chart()
+    charts = {title: figure}
+    _effects(axis, explanation)
+    axis.set_title(title, fontsize=11)
+    for kind, better in _KINDS.items():
+        for action in (actions.names[action] for action in actions.order):
+            figure, axis = new_chart(height=4.2)
+            _curves(axis, curves, action, kind, trusted)
+            charts[f"{action}, {kind} ({better})"] = figure
+            axis.set_title(f"{action}, {kind} ({better})", fontsize=11)
+            figure.legend(loc="outside lower center", ncols=2, fontsize=9, frameon=False)
+    return charts
 
 
 def _effects(axis: Axes, explanation: Explanation) -> None:
     effects = explanation.arrays["patch_effects"]
     image = axis.imshow(effects, cmap="magma", vmin=0, vmax=max(float(effects.max()), 1e-6))
     axis.set(xticks=[], yticks=[])
-    axis.set_title("mean effect of each patch\non the policy", fontsize=11)
+    if not effects.any():
+        axis.text(0.5, 0.5, _UNMOVED, color="white", ha="center", va="center",
+                  transform=axis.transAxes)  # fmt: skip
     axis.figure.colorbar(image, ax=axis, shrink=0.8, location="bottom")
 
 
-def _curves(axis: Axes, curves: Mapping[str, Any], action: str, kind: str) -> None:
+def _curves(
+    axis: Axes, curves: Mapping[str, Any], action: str, kind: str, trusted: Collection[str]
+) -> None:
     share = 100 * np.array(curves["shares"])
-    colors = dict(zip(METHOD_NAMES, _COLORS, strict=True))
+    dashes = dict(zip(METHOD_NAMES, _DASHES, strict=True))
     methods = {name: by_action[action] for name, by_action in curves.items() if name != "shares"}
     named_placebo = False
     for name, found in methods.items():
         curve = found[kind]["curve"]
         points = curve if curve is not None else np.full(len(share), np.nan)
         if name in METHOD_NAMES:
-            axis.plot(share, points, color=colors[name], label=METHOD_NAMES[name])
+            color = css(GOOD if name in trusted else INK)
+            axis.plot(share, points, ls=dashes[name], color=color, label=METHOD_NAMES[name])
         else:
             label = None if named_placebo else "placebos"
-            axis.plot(share, points, color=_PLACEBO, ls="--", lw=1, label=label, zorder=0)
+            axis.plot(share, points, color=css(MUTED), lw=0.7, label=label, zorder=0)
             named_placebo = True
     axis.set_xscale("symlog", linthresh=1)
     axis.set(xlim=(0, 100), ylim=(-0.02, 1.02), xlabel="% of the pixels", ylabel="P(chosen action)")
     axis.set_xticks([0, 1, 3, 10, 30, 100], ["0", "1", "3", "10", "30", "100"])
     if all(found["frames"] == 0 for found in methods.values()):
-        axis.text(10, 0.5, "never taken", ha="center")
+        axis.text(10, 0.5, f"{action} is never taken\nin the tested frames", ha="center")
 
 
 _FAILED = {
@@ -180,7 +215,8 @@ def _say_tests(evidence: Evidence) -> Claims:
         )
         claims["truth.hits"] = (
             "Its hottest patch is one of those that affect the policy most in "
-            f"{percent(pointing['hit'])} of these frames (chance: {percent(pointing['chance'])})."
+            f"{decimal_percent(pointing['hit'])} of these frames (chance: "
+            f"{decimal_percent(pointing['chance'])})."
         )
     elif affects_any:
         claims["truth.none"] = "No heat map of this policy can be trusted."
@@ -220,8 +256,8 @@ def _say_outcomes(evidence: Evidence) -> Claims:
         )
     claims["truth.ground"] = (
         "Another ground colour, which should not matter, changes the outcome of "
-        f"{percent(ground['mean'])} of these rollouts, and of no more than "
-        f"{percent(ground['upper95'])} (95%)."
+        f"{decimal_percent(ground['mean'])} of these rollouts, and of no more than "
+        f"{decimal_percent(ground['upper95'])} (95%)."
     )
     return claims
 
@@ -275,18 +311,19 @@ def _is_above(value: float | None, bar: float) -> bool:
     return value is not None and value > bar
 
 
-def changes(explanation: Explanation) -> Image.Image:
-    """Return one frame before and after each change to its scene."""
+def changes(explanation: Explanation) -> dict[str, Image.Image]:
+    """Return one frame before and after each change to its scene, by caption."""
     truth = explanation.numbers["truth"]
     before = explanation.data["frames"][truth["shown_frame"]]
-    tiles = [images.titled(images.enlarge(before), "as it was")]
+    tiles = {"as it was": images.titled(images.enlarge(before), "as it was")}
     after = explanation.arrays["interventions"]
     for (name, effect), frame in zip(truth["interventions"].items(), after, strict=True):
         size = "not tried"
         if effect["mean"] is not None:
             size = f"{effect['mean']:.2f} [{effect['lower95']:.2f}, {effect['upper95']:.2f}]"
-        tiles.append(images.titled(images.enlarge(frame), f"{name}: {size}"))
-    return images.gridded(tiles, 3)
+        caption = f"{name}: {size}"
+        tiles[caption] = images.titled(images.enlarge(frame), caption)
+    return tiles
 
 
 PART = Part(
@@ -295,8 +332,8 @@ PART = Part(
     needs=("truth",),
     text={"truth": say_findings, "reasons": say_reasons},
     draw=lambda explanation: {
-        "truth": truth_chart(explanation),
-        "curves": curves_chart(explanation),
+        "truth": truth_charts(explanation),
+        "curves": curves_charts(explanation),
         "heat": heat_chart(explanation),
         "interventions": changes(explanation),
     },

@@ -38,7 +38,7 @@ _SIZES = {
 _Described = tuple[str, tuple[str | int, ...], int]  # kind of dtype, (largest) sizes, most bytes
 _ARRAYS: Mapping[str, _Described] = {
     "film_frames": (_PIXEL, ("steps of the film", _SIDE, _SIDE, 3), 2**23),
-    "film_heat": (_FLOAT, ("steps of the film", _SIDE, _SIDE), 2**23),
+    "film_heat(_[a-z_]+)?": (_FLOAT, ("steps of the film", _SIDE, _SIDE), 2**23),
     "film_probabilities": (_FLOAT, ("steps of the film", "actions"), 2**20),
     "film_actions": (_INTEGER, ("steps of the film",), 2**20),
     "class_model_(probability|logit)": (_FLOAT, ("actions", 64, _SIDE, _SIDE), 2**25),

@@ -1,13 +1,15 @@
 import numpy as np
 import pytest
 
-from benchmarks.evidence import EXPLANATION
+from benchmarks.evidence import EXPLANATION, changed
 from drone_rl.explanations.report.attribution import (
     BLOCK,
+    PART,
     explained_step,
     film,
     key_frames,
     say_attribution,
+    say_untrusted,
 )
 
 STEPS = 5
@@ -20,7 +22,8 @@ def explanation(make_explanation):
     numbers = {"attribution": {"film": {"key_steps": entries, "heat_by": by}}}
     arrays = {
         "film_frames": np.zeros((STEPS, 4, 20, 3), np.uint8),
-        "film_heat": np.zeros((STEPS, 4, 20), np.float16),
+        "film_heat": np.ones((STEPS, 4, 20), np.float16) * np.array([1, 1, 0, 1, 1])[:, None, None],
+        "film_heat_saliency": np.tri(4, 20, dtype=np.float16)[None].repeat(STEPS, 0),
         "film_probabilities": np.full((STEPS, 3), 1 / 3),
         "film_actions": np.array([0, 1, 2, 0, 1]),
     }
@@ -28,27 +31,63 @@ def explanation(make_explanation):
 
 
 def test_a_film_shows_every_step_in_a_size_that_can_be_encoded(explanation):
-    frames = film(explanation)
-    step = np.asarray(explained_step(explanation, 3, "step 3"))
+    frames = film(explanation, None)
+    step = np.asarray(explained_step(explanation, 3, "step 3", None))
     assert frames.shape[0] == STEPS
     assert all(size % BLOCK == 0 for size in frames.shape[1:3])
     assert (frames[3, : step.shape[0], : step.shape[1]] == step).all()
     assert (frames[3, step.shape[0] :] == 255).all()
 
 
-def test_key_frames_stand_three_in_a_row(explanation):
-    tile = explained_step(explanation, 0, "1. first")
-    assert key_frames(explanation).size == (3 * tile.width + 24, 2 * tile.height + 12)
+def test_key_frames_have_number_and_reason(explanation):
+    assert [*key_frames(explanation, None)] == ["1. first", "2. first", "3. first", "4. first"]
 
 
 def test_a_step_without_heat_says_so(explanation):
-    shown = {t: np.asarray(explained_step(explanation, t, "x")) for t in (0, 1, 2, 3)}
+    shown = {t: np.asarray(explained_step(explanation, t, "x", None)) for t in (0, 1, 2, 3)}
     assert (shown[0] == shown[3]).all()
     assert not (shown[0] == shown[2]).all()
 
 
+def test_the_map_that_passed_is_shown_and_the_other_one_comes_second(explanation):
+    explanation.numbers["truth"] = {"trusted": "saliency", "methods": {"saliency": {}}}
+    explanation.numbers["attribution"]["film"]["heat_of"] = ["saliency"]
+    drawn = PART.draw(explanation)
+    assert [*drawn] == ["sequence", "untrusted", "episode"]
+    for name, method in (("sequence", "saliency"), ("untrusted", None)):
+        tile = explained_step(explanation, 0, "1. first", method)
+        assert list(drawn[name]["1. first"].getdata()) == list(tile.getdata())
+    assert (drawn["episode"] == film(explanation, "saliency")).all()
+    assert (drawn["episode"] != film(explanation, None)).any()
+
+
+def test_without_one_that_passed_only_untrusted_maps_are_shown(explanation):
+    for truth in (None, {"trusted": None, "methods": {"saliency": {}}}):
+        explanation.numbers["truth"] = truth
+        assert [*PART.draw(explanation)] == ["untrusted", "episode"]
+    explanation.numbers["truth"] = {"trusted": "saliency", "methods": {"saliency": {}}}
+    assert [*PART.draw(explanation)] == ["untrusted", "episode"]  # no maps of it in the file
+    (claim,) = say_attribution(explanation.numbers).values()
+    assert "run drone-rl explain again" in claim
+
+
+def test_grad_cam_that_passed_is_not_shown_twice(explanation):
+    explanation.arrays["film_heat_grad_cam"] = explanation.arrays["film_heat"]
+    explanation.numbers["truth"] = {"trusted": "grad_cam", "methods": {"grad_cam": {}}}
+    explanation.numbers["attribution"] |= {"shown": "grad_cam"}
+    explanation.numbers["attribution"]["film"]["heat_of"] = ["grad_cam"]
+    assert [*PART.draw(explanation)] == ["sequence", "episode"]
+
+
+def test_the_page_says_first_that_no_map_passed():
+    none = changed(EXPLANATION, {"truth.trusted": None})
+    assert [*say_attribution(none)] == ["attribution.none_passed"]
+    assert [*say_attribution({**none, "truth": None})] == ["attribution.untested"]
+    assert [*say_attribution(EXPLANATION)] == ["attribution.trusted"]
+
+
 def test_empty_maps_are_counted_and_no_reason_is_made_up():
-    found = say_attribution(EXPLANATION)
-    assert found["attribution.stand_in"].startswith("On 1 of the 4 steps shown")
-    assert found["attribution.no_heat"] == "On 1 of the 4 steps shown, the map is zero everywhere."
+    found = say_untrusted(EXPLANATION)
+    assert found["attribution.stand_in"].startswith("On 1 of the 4 steps")
+    assert found["attribution.no_heat"] == "On 1 of the 4 steps, the map is zero everywhere."
     assert "because" not in " ".join(found.values())

@@ -13,14 +13,14 @@ def test_the_data_set():
     assert speak()["dataset.size"] == (
         "600 frames, spread evenly over 30 whole episodes of 1,300 steps with sampled actions."
     )
-    assert speak()["dataset.actions"] == "Actions taken: 80% forward, 10% left and 10% right."
+    assert speak()["dataset.actions"] == "Actions taken: 80.0% forward, 10.0% left and 10.0% right."
     assert speak()["dataset.entropy"].endswith("(95%: 0.06 to 0.20).")
 
 
 def test_nearly_always_is_not_always():
     found = speak(dataset__action_shares=[0.0, 0.9999, 0.0001])
     assert "dataset.one_action" not in found
-    assert "less than 1% right" in found["dataset.actions"]
+    assert "less than 0.1% right" in found["dataset.actions"]
 
 
 def test_no_loop_seen_is_not_never():
@@ -28,7 +28,7 @@ def test_no_loop_seen_is_not_never():
     found = speak(loops__loops=0, loops__episodes=share)
     assert found["loops.none"] == (
         "None of these 30 sampled episodes has a loop, in which the drone moves back and forth; up "
-        "to 12% of such episodes may have one (95%)."
+        "to 11.6% of such episodes may have one (95%)."
     )
     assert "loops.some" not in found
 

@@ -54,7 +54,7 @@ def test_the_report_names_and_draws_the_parts(folder, tmp_path):
     for name in NAMES:
         assert name in page, name
     assert "if that is above a third of the maximum" in page
-    assert "<th>turn left</th><th>turn right</th><th>roughness</th>" in page
+    assert 'turn left</th><th scope="col">turn right</th><th scope="col">roughness</th>' in page
     assert "The first 5 maps" in page
     table = next(tmp_path.rglob("*response*.csv")).read_text().splitlines()
     assert "p_turn left" in table[0]

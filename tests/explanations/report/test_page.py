@@ -69,24 +69,40 @@ def test_the_policy_allows_the_pages_own_style_and_script_alone(report):
 def test_every_part_is_there_in_order_with_a_link_to_it(report):
     page = report.read_text()
     order = [name for name in (*PARTS, "provenance") if name not in ("left_out", "shifts")]
-    assert re.findall(r'<section id="([^"]+)">', page) == order
-    assert re.findall(r'<a href="#([^"]+)">', page) == order
-    assert order[0] == "evaluation"
+    ids = ["summary", *order[:-1], "methods", "provenance"]
+    assert re.findall(r'<section id="([^"]+)">', page) == ids
+    nav = page[page.index("<nav") : page.index("</nav>")]
+    assert re.findall(r'<a href="#([^"]+)">', nav) == ids[1:]
+    assert set(re.findall(r'<a href="#([^"]+)">', page)) <= set(re.findall(r'id="([^"]+)"', page))
     assert page.index("of the cubes") < page.index('<section id="dataset">')
+
+
+def test_the_summary_answers_each_question_with_a_link(report):
+    page = report.read_text()
+    part = page[page.index('<section id="summary">') :].split("</section>")[0]
+    labels = ["Verdict", "Success rate", "Robustness", "Verification", "Exact map", "Heat maps"]
+    found = re.findall(r"<dt>(?:<a href=\"#(\w+)\">)?([^<]+)", part)
+    assert [label for _, label in found] == [*labels, "Not shown"] * 2
+    assert [section for section, _ in found][:7] == [
+        "evaluation", "evaluation", "", "evaluation", "places", "truth", ""
+    ]  # fmt: skip
+    assert "(95% CI" in part and "run drone-rl shifts" in part and "drone-rl prove" in part
 
 
 def test_figures_are_saved_with_their_numbers(report):
     figures = report.parent / "figures"
     for name in (
         "tsne_features",
-        "class_model",
-        "sequence",
-        "truth",
-        "response",
+        "class_model_1",
+        "untrusted_1",
+        "truth_1",
+        "response_1",
         "places",
-        "asymmetry",
+        "asymmetry_1",
     ):
         assert (figures / f"1_second_{name}.png").read_bytes().startswith(b"\x89PNG")
+    for name in ("truth_1", "response_1", "places", "curves_1", "heat"):
+        assert (figures / f"1_second_{name}.svg").read_text().startswith("<?xml")
     with open(figures / "1_second_response.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 41 * 31
@@ -146,7 +162,8 @@ def test_conditions_are_shown_where_they_were_flown(explanations, tmp_path):
         np.savez_compressed(folder / "arrays.npz", **{**kept, **arrays})
     page = write_report([folder], tmp_path).read_text()
     part = page[page.index('<section id="shifts">') :].split("</section>")[0]
-    assert "the sun at 21.1 to 60 degrees" in part and part.count("data:image/png") == 2
+    assert "the sun at 21.1 to 60 degrees" in part and part.count("data:image/svg") == 3 + 1
+    assert part.count("data:image/png") == 3 + 3 + 2  # as trained, and each strength
     assert "not measured again here" in part and "<td>elevation of the sun</td>" in part
     assert "nothing here tests other colours or sizes" in page
 
@@ -155,8 +172,8 @@ def test_what_is_missing_is_left_out(changed, tmp_path):
     maps = ("response", "places")
     gone = ("tsne", "truth", "attribution", *maps, "class_model", "contradictions")
     page = write_report([changed(**dict.fromkeys(gone))], tmp_path).read_text()
-    shown = ["evaluation", "dataset", "asymmetry", "provenance"]
-    assert re.findall(r'<section id="([^"]+)">', page) == [*shown[:3], "others", shown[3]]
+    shown = ["evaluation", "dataset", "asymmetry", "others", "methods", "provenance"]
+    assert re.findall(r'<section id="([^"]+)">', page) == ["summary", *shown]
     assert "<summary>loops</summary>" in page  # half of a part that needs contradictions, too
 
 
@@ -170,7 +187,8 @@ def test_what_no_part_shows_is_laid_out_plainly_and_names_no_file(changed, tmp_p
     assert html.escape(key) in page and "&#34;height&#34;: 3.25" in page
     written = {path.name for path in (tmp_path / "x" / "y").rglob("*") if path.is_file()}
     stems = {name.rpartition(".")[0] for name in written}
-    assert stems == {"report", "0_second_dataset", "0_second_asymmetry"}
+    asymmetry = {"0_second_asymmetry", *(f"0_second_asymmetry_{i}" for i in (1, 2, 3))}
+    assert stems == {"report", "0_second_dataset", *asymmetry}
 
 
 def test_a_damaged_explanation_is_refused(tmp_path):

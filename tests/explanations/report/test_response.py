@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from drone_rl.explanations.report.response import response_chart, response_tables
+from drone_rl.explanations.report.response import response_charts, response_tables
 
 
 @pytest.fixture
@@ -41,25 +41,25 @@ def test_each_place_has_a_row_with_what_it_does_and_what_comes_of_it(explanation
     ]  # fmt: skip
 
 
-def test_maps_of_each_height_the_highest_on_top(explanation):
-    axes = response_chart(explanation).axes[:10]
-    titles = [axis.get_title().split("\n")[0] for axis in axes[:5]]
-    assert titles == [
-        "P(left)", "P(forward)", "P(right)", "most probable action", "outcome"
-    ]  # fmt: skip
-    assert axes[0].get_ylabel().endswith("cube +1.5 m")
-    assert axes[5].get_ylabel().endswith("cube +0 m")
-    left = axes[0].images[0].get_array()
+def test_maps_of_each_height_the_highest_first(explanation):
+    charts = response_charts(explanation)
+    names = ["P(left)", "P(forward)", "P(right)"]
+    blind = "most probable action; inside the white line: blind"
+    assert [*charts] == [
+        *(f"{name}, cube +1.5 m" for name in (*names, "most probable action", "outcome")),
+        *(f"{name}, cube +0 m" for name in (*names, blind, "outcome")),
+    ]
+    left = charts["P(left), cube +1.5 m"].axes[0].images[0].get_array()
     assert left[2, 3] == 0.5 and left.sum() == 0.5
 
 
-def test_the_size_of_the_chart_its_key_and_what_is_needed(explanation, make_explanation):
-    figure = response_chart(explanation)
-    assert figure.get_size_inches().tolist() == [3.2 * 5, 3.9 * 2]
-    assert len(figure.axes) == 10 + 1  # and the bar of colours
-    keys = {i: a.get_legend() for i, a in enumerate(figure.axes[:10]) if a.get_legend()}
-    assert list(keys) == [8, 9]  # below the last two
-    assert [t.get_text() for t in keys[8].get_texts()] == ["forward", "left", "right"]
+def test_the_size_of_the_charts_their_keys_and_what_is_needed(explanation, make_explanation):
+    charts = response_charts(explanation)
+    assert {tuple(chart.get_size_inches()) for chart in charts.values()} == {(4.5, 4.4)}
+    keys = {name: chart.legends[0] for name, chart in charts.items() if chart.legends}
+    assert len(keys) == 4  # the last two of each height
+    texts = keys["most probable action, cube +1.5 m"].get_texts()
+    assert [t.get_text() for t in texts] == ["forward", "left", "right"]
     _, *rows = response_tables(explanation)["response"]
     assert [row[-2] for row in rows[:4]] == ["right", "forward", "forward", "left"]
     arrays = dict(explanation.arrays)
@@ -73,6 +73,8 @@ def test_of_one_height_alone_it_is_not_said(explanation, make_explanation):
         name: values[:1] if values.ndim > 1 or name.endswith("height") else values
         for name, values in explanation.arrays.items()
     }
-    axes = response_chart(make_explanation(arrays=arrays)).axes
-    assert axes[0].get_ylabel() == "metres ahead"
-    assert all(axis.get_xlabel() == "metres to the left (+) or right (-)" for axis in axes[:5])
+    charts = response_charts(make_explanation(arrays=arrays))
+    axes = [chart.axes[0] for chart in charts.values()]
+    assert next(iter(charts)) == axes[0].get_title() == "P(left)"
+    assert all(axis.get_ylabel() == "metres ahead" for axis in axes)
+    assert all(axis.get_xlabel() == "metres to the left (+) or right (-)" for axis in axes)

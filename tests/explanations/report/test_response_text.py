@@ -17,7 +17,7 @@ def test_outcomes_are_counted_and_blindness_is_told_of_both_sides():
         "from 64 of 72 places on its left, 72 of 72 places ahead and 60 of 72 places on its right."
     )
     assert (
-        "60% of the places on its left and 50% of the places on its right"
+        "60.0% of the places on its left and 50.0% of the places on its right"
         in found["response.blind"]
     )
     assert "response.heights" not in found

@@ -1,0 +1,48 @@
+from benchmarks.evidence import EXPLANATION, PROOF, SHIFTS, changed
+from drone_rl.explanations.report.summary import LINES, say_summary
+
+
+def speak(**changes):
+    evidence = changed(EXPLANATION, {k.replace("__", "."): v for k, v in changes.items()})
+    return say_summary(evidence)
+
+
+def test_each_question_has_one_line_in_order():
+    for evidence in (EXPLANATION, {"left_out": {}}):
+        names = [name.split(".")[1].split("_")[0] for name in say_summary(evidence)]
+        expected = [n for n in LINES if n != "success" or "verdict" in evidence]
+        assert names == expected
+
+
+def test_rates_have_one_decimal_and_an_interval():
+    assert speak()["summary.success"] == (
+        "60.0% (95% CI 58.0 to 62.0) of 400 episodes, with every cube collected by the most "
+        "probable actions."
+    )
+
+
+def test_robustness_names_the_axes_with_a_range():
+    found = speak(shifts=SHIFTS, verdict__kind="good")
+    assert found["summary.robustness"] == (
+        "Certainly good in a range of strengths on 2 of 3 axes tested: elevation of the sun and "
+        "blur."
+    )
+    found = speak(shifts={"refused": "it is of another task"})
+    assert found["summary.robustness_refused"].endswith("not shown here: it is of another task.")
+
+
+def test_only_a_certificate_that_was_checked_is_called_one_of_success():
+    assert "1,000 rollouts" in speak(verdict__proof=PROOF)["summary.certificate"]
+    unchecked = {**PROOF, "wrong_at_most": None}
+    assert "not a proof" in speak(verdict__proof=unchecked)["summary.certificate_partly"]
+    assert "drone-rl prove" in speak()["summary.certificate_none"]
+
+
+def test_what_was_not_run_is_said_with_the_command_that_adds_it():
+    found = say_summary({})
+    assert found["summary.verdict_missing"] == "Not run; drone-rl explain adds it."
+    assert "t-SNE" in found["summary.limits"] and "drone-rl explain" in found["summary.limits"]
+    assert "shifts" in found["summary.robustness_unknown"]
+    assert speak()["summary.limits"] == (
+        "Real cameras and drones, other colours, light or sizes and what was left out (embedding)."
+    )
