@@ -31,7 +31,7 @@ def _runs(folder: Path, state: Mapping[str, Any]) -> list[Case]:
     canary = folder / "canary"
     overrides: dict[str, Any] = {
         "target": ["policy._target_=os.system"],
-        "nested_target": ["+optimiser.x={_target_:os.system}"],
+        "nested_target": ["+optimizer.x={_target_:os.system}"],
         "output": [f"hydra.run.dir={canary}"],
         "hydra": ["hydra/job_logging=none"],
         "paths": [f"paths.outputs={canary}"],

@@ -147,7 +147,7 @@ def _journals(folder: Path) -> list[Case]:
         here.mkdir()
         put(here / "optuna.journal", content)
         settings = ["hydra/sweeper=optuna", "hydra/launcher=local", f"hydra.sweep.dir={here}"]
-        command = ["train", "-m", *settings, "optimiser.lr=interval(1e-4,1e-1)"]
+        command = ["train", "-m", *settings, "optimizer.lr=interval(1e-4,1e-1)"]
         cases.append((here.name, command, "an invalid journal"))
     return cases
 

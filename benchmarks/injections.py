@@ -224,7 +224,7 @@ def summary(folder: Path) -> dict[str, Any]:
 
     sweep = folder / "sweep"
     shutil.rmtree(sweep, ignore_errors=True)
-    runs = [Run(i, (f"optimiser.lr={i}", f"seed={i}"), sweep / str(i)) for i in range(3)]
+    runs = [Run(i, (f"optimizer.lr={i}", f"seed={i}"), sweep / str(i)) for i in range(3)]
     begun = open_sweep(sweep, ["drone-rl", "train", "-m", "seed=0,1"], {"seed": 0}, runs)
     for run in runs[:2]:
         run.folder.mkdir()

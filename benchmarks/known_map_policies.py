@@ -166,13 +166,13 @@ def trained(window: Window, observations: Tensor, targets: Tensor, seed: int = 0
     network = MLP(shape, len(MOVES), hidden=(16,), generator=generator)
     visible = (_window_mean(shape, [window]) > 0).flatten()
     weight = network.layers.fc1.weight
-    optimiser = torch.optim.Adam(network.parameters(), lr=0.01)
+    optimizer = torch.optim.Adam(network.parameters(), lr=0.01)
     for _ in range(STEPS):
         with torch.no_grad():
             weight[:, ~visible] = 0.0
-        optimiser.zero_grad()
+        optimizer.zero_grad()
         functional.cross_entropy(network(observations), targets).backward()
-        optimiser.step()
+        optimizer.step()
     with torch.no_grad():
         weight[:, ~visible] = 0.0
     return network

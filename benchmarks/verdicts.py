@@ -101,7 +101,7 @@ def _policies(folder: Path, device: str, quick: bool) -> Iterator[tuple[str, str
     for rate in () if quick else RATES:
         for seed in SEEDS:
             run = folder / f"verdict_{rate:g}_{seed}"
-            settings = ["experiment=high_rate", f"optimiser.lr={rate:g}", f"seed={seed}"]
+            settings = ["experiment=high_rate", f"optimizer.lr={rate:g}", f"seed={seed}"]
             call("train", *settings, "logger=csv", f"device={device}", f"hydra.run.dir={run}")
             yield f"lr={rate:g} seed={seed}", str(run / "checkpoints" / "last.pt")
 

@@ -61,7 +61,7 @@ def train(
         auto_register_policy_transforms=False,
     )
     loss = ReinforceLoss(actor, entropy_coeff=0.0)
-    optimiser = torch.optim.Adam(loss.parameters(), lr=lr)
+    optimizer = torch.optim.Adam(loss.parameters(), lr=lr)
     for batch in collector:
         done.frames += batch.numel()
         for reward in batch["next", "episode_reward"][batch["next", "done"]].tolist():
@@ -69,9 +69,9 @@ def train(
         logging.info("%d frames, running reward %.2f", done.frames, done.running_reward)
         if done.running_reward >= target:
             break
-        optimiser.zero_grad()
+        optimizer.zero_grad()
         loss(batch)["loss_actor"].backward()
-        optimiser.step()
+        optimizer.step()
     collector.shutdown()
     return done
 

@@ -7,8 +7,8 @@ from typing import Any
 OURS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "reinforce": (),
-        "a2c": ("objective=a2c", "objective.num_steps=32", "optimiser.lr=3e-3"),
-        "ppo": ("objective=ppo", "objective.epochs=1", "optimiser.lr=3e-3"),
+        "a2c": ("objective=a2c", "objective.num_steps=32", "optimizer.lr=3e-3"),
+        "ppo": ("objective=ppo", "objective.epochs=1", "optimizer.lr=3e-3"),
     }
 )
 """Overrides of `drone-rl train` for this project's learners."""

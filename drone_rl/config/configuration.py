@@ -24,6 +24,7 @@ from drone_rl.utils.settings import (
     check_names,
     kinds_of,
     plain,
+    present_names,
     snake_case,
     types_of,
 )
@@ -49,7 +50,7 @@ class Variant(Settings):
     """Whether the class declares all settings, so that files may contain them."""
 
     def __init_subclass__(cls, *, target: str = "", **kwargs: Any) -> None:
-        """Set the registered name of a variant, as in `class Adam(Optimiser, target=...)`."""
+        """Set the registered name of a variant, as in `class Adam(Optimizer, target=...)`."""
         if target:
             cls.target = target
         super().__init_subclass__(**kwargs)
@@ -144,7 +145,7 @@ def from_config(cls: type[S], config: Any, where: str = "") -> S:
     Raises:
         InputError: A name is unknown or a value invalid; the message begins with its place.
     """
-    given = as_mapping(config, where or "settings")
+    given = present_names(cls, as_mapping(config, where or "settings"))
     prefix = f"{where}." if where else ""
     check_names(cls, given)
     values = {name: _read(types_of(cls)[name], given[name], prefix + name) for name in given}

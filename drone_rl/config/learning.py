@@ -130,18 +130,18 @@ LearningRate = Annotated[float, Real(0.0, 1e30, is_above=True)]
 above that torch fails with an error of its own. Which rates make sense is for training to find."""
 
 
-class Optimiser(Variant):
+class Optimizer(Variant):
     """Settings of an optimizer."""
 
 
-class Adam(Optimiser, target="torch.optim.Adam"):
+class Adam(Optimizer, target="torch.optim.Adam"):
     """Adam."""
 
     lr: LearningRate = 1e-3
     """Learning rate."""
 
 
-class Sgd(Optimiser, target="torch.optim.SGD"):
+class Sgd(Optimizer, target="torch.optim.SGD"):
     """Plain stochastic gradient ascent (Eq. 13)."""
 
     lr: LearningRate = 1e-4
@@ -217,7 +217,7 @@ class WithCritic(Objective):
 
 
 class A2c(WithCritic, target="torchrl.objectives.A2CLoss"):
-    """Advantage actor-critic: one step of the optimiser from each batch."""
+    """Advantage actor-critic: one step of the optimizer from each batch."""
 
     num_steps: Annotated[int, Whole(2, 4096)] = 16
 

@@ -21,7 +21,7 @@ from drone_rl.config.learning import (
     Gae,
     LeaveOneOut,
     Objective,
-    Optimiser,
+    Optimizer,
     Reinforce,
     Returns,
     Rollouts,
@@ -89,7 +89,7 @@ class TrainSettings(Settings):
     """Return estimator."""
     objective: Objective = Reinforce()
     """Loss and learner."""
-    optimiser: Optimiser = Adam()
+    optimizer: Optimizer = Adam()
     """Optimizer."""
     scheduler: Scheduler = Constant()
     """Learning-rate schedule."""

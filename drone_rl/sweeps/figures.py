@@ -18,7 +18,7 @@ from drone_rl.sweeps.rows import Row
 from drone_rl.sweeps.summary import FAILED, Group, median_band, on_grid
 from drone_rl.utils.palette import BAD, FAINT, GOOD, MUTED, ONE_SIDED, css, light
 
-FAVOURITE_AXIS = "optimiser.lr"
+FAVOURITE_AXIS = "optimizer.lr"
 COLORS = {
     "good": css(GOOD),
     "good, but trivial": css(light(GOOD)),

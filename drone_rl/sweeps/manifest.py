@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.config.configuration import check_same_config
+from drone_rl.config.training import TrainSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes, read_json, refuse_links, write_atomically
 from drone_rl.utils.limits import RESULT_BYTES, SWEEP_BYTES
@@ -17,6 +18,7 @@ from drone_rl.utils.overrides import COMMAND, MOST_OVERRIDES, check_harmless
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.readers import with_present_names
 from drone_rl.utils.schema import Maybe, Plain, Record, Several, Text, Whole, as_mapping, shown
+from drone_rl.utils.settings import present_names
 
 FORMAT = "drone_rl sweep"
 MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s", "renderer")
@@ -159,7 +161,8 @@ def read_sweep(folder: Path) -> Sweep:
             raise InputError("two runs have the same number")
         if len({run.folder for run in runs}) < len(runs):
             raise InputError("two runs have the same folder, so that one result would count twice")
-        settings = dict(as_mapping(content["settings"], "settings"))
+        given = as_mapping(content["settings"], "settings")
+        settings = present_names(TrainSettings, given)
         return Sweep(folder, content["command"], settings, runs)
     except InputError as error:
         raise InputError(

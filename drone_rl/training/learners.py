@@ -16,10 +16,12 @@ from drone_rl.collectors import take_rows
 from drone_rl.objectives import Advantages, ReinforceLoss
 from drone_rl.policies import ActorCritic
 from drone_rl.policies.critic import LOG_PROB, PIXELS, VALUE
-from drone_rl.training.restore import check_fits, check_optimiser
+from drone_rl.training.restore import check_fits, check_optimizer
 from drone_rl.utils.errors import InputError
 
 ADVANTAGE, TARGET, ENTROPY = "advantage", "value_target", "entropy"
+_OPTIMIZER = "optimiser"
+"""Key of the optimizer's state in checkpoints; the spelling is part of the file format."""
 
 
 class NotANumberError(RuntimeError):
@@ -77,7 +79,7 @@ class GradientLearner:
 
     network: nn.Module
     """Network of the policy; its weights are saved as "policy"."""
-    optimiser: torch.optim.Optimizer
+    optimizer: torch.optim.Optimizer
     """Over the parameters that learn."""
     scheduler: torch.optim.lr_scheduler.LRScheduler | None = None
     """Stepped after each update."""
@@ -88,27 +90,27 @@ class GradientLearner:
         """Step the scheduler; return the learning rate of the next update."""
         if self.scheduler is not None:
             self.scheduler.step()
-        return self.optimiser.param_groups[0]["lr"]
+        return self.optimizer.param_groups[0]["lr"]
 
     def state_dict(self) -> dict[str, Any]:
         """Return the weights and the states of optimizer and scheduler."""
         return {
             "policy": self.network.state_dict(),
-            "optimiser": self.optimiser.state_dict(),
+            _OPTIMIZER: self.optimizer.state_dict(),
             "scheduler": None if self.scheduler is None else self.scheduler.state_dict(),
         }
 
     def check_state(self, state: Mapping[str, Any]) -> None:
         """See `Learner.check_state`."""
         for key, value in self.state_dict().items():
-            if key != "optimiser":
+            if key != _OPTIMIZER:
                 check_fits(state[key], value, key)
-        check_optimiser(state["optimiser"], self.optimiser)
+        check_optimizer(state[_OPTIMIZER], self.optimizer)
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Resume from a state."""
         self.network.load_state_dict(state["policy"])
-        self.optimiser.load_state_dict(state["optimiser"])
+        self.optimizer.load_state_dict(state[_OPTIMIZER])
         if self.scheduler is not None:
             self.scheduler.load_state_dict(state["scheduler"])
 
@@ -144,12 +146,12 @@ class ReinforceLearner(GradientLearner):
         mask = batch.get(("collector", "mask"), None)
         steps = batch.reshape(-1) if mask is None else batch[mask]
         is_sum = self.loss.reduction == "sum"
-        self.optimiser.zero_grad()
+        self.optimizer.zero_grad()
         try:
             terms = accumulate(steps, self.loss, self.minibatch_frames, is_sum=is_sum)
-            norm = descend(self.optimiser, self.network.named_parameters(), self.max_grad_norm)
+            norm = descend(self.optimizer, self.network.named_parameters(), self.max_grad_norm)
         except NotANumberError:
-            self.optimiser.zero_grad()
+            self.optimizer.zero_grad()
             raise
         losses = {f"loss/{name}": value for name, value in {**terms, "grad_norm": norm}.items()}
         return {**losses, "train/learning_rate": self._next_rate()}
@@ -200,7 +202,7 @@ class ActorCriticLearner(GradientLearner):
             metrics = list(self._descend(steps))
         except NotANumberError:
             self.load_state_dict(before)
-            self.optimiser.zero_grad()
+            self.optimizer.zero_grad()
             raise
         means = {f"loss/{k}": sum(m[k] for m in metrics) / len(metrics) for k in metrics[0]}
         return {**means, "loss/entropy": entropy, "train/learning_rate": self._next_rate()}
@@ -250,10 +252,10 @@ class ActorCriticLearner(GradientLearner):
         for _ in range(self.epochs):
             order = torch.randperm(len(steps), generator=self.generator).to(steps.device)
             for rows in order.chunk(pieces):
-                self.optimiser.zero_grad()
+                self.optimizer.zero_grad()
                 minibatch = take_rows(steps, rows)
                 terms = accumulate(minibatch, self._losses, self.chunk_frames)
-                norm = descend(self.optimiser, self.model.named_parameters(), self.max_grad_norm)
+                norm = descend(self.optimizer, self.model.named_parameters(), self.max_grad_norm)
                 yield {**{k: terms[k] for k in logged if k in terms}, "grad_norm": norm}
 
     def _losses(self, chunk: TensorDictBase) -> TensorDictBase:
@@ -329,7 +331,7 @@ def accumulate(
 
 
 def descend(
-    optimiser: torch.optim.Optimizer,
+    optimizer: torch.optim.Optimizer,
     parameters: Iterable[tuple[str, nn.Parameter]],
     max_norm: float | None,
 ) -> float:
@@ -346,5 +348,5 @@ def descend(
             check_finite(gradient, f"the gradient of {name}")
     if max_norm is not None:
         clip_grads_with_norm_(known.values(), max_norm, norm)
-    optimiser.step()
+    optimizer.step()
     return float(norm)

@@ -35,24 +35,24 @@ def check_fits(saved: Any, own: Any, where: str) -> None:
         _check_value(saved, own, where)
 
 
-def check_optimiser(saved: Any, optimiser: torch.optim.Optimizer) -> None:
+def check_optimizer(saved: Any, optimizer: torch.optim.Optimizer) -> None:
     """Check a state of an optimizer as `check_fits` does, and its hyperparameters."""
-    own = _after_a_step(optimiser)
+    own = _after_a_step(optimizer)
     if isinstance(saved, Mapping) and saved.get("state") == {}:
         own["state"] = {}
-    check_fits(saved, own, "optimiser")
+    check_fits(saved, own, "optimizer")
     for mine, theirs in zip(own["param_groups"], saved["param_groups"], strict=True):
         for key in mine:
             values = [list(v[key]) if isinstance(v[key], tuple) else v[key] for v in (mine, theirs)]
             if key not in MAY_DIFFER and values[0] != values[1]:
                 raise _misfit(
-                    f"optimiser.{key}", f"is {shown(theirs[key])}, not {shown(mine[key])}"
+                    f"optimizer.{key}", f"is {shown(theirs[key])}, not {shown(mine[key])}"
                 )
 
 
-def _after_a_step(optimiser: torch.optim.Optimizer) -> dict[str, Any]:
+def _after_a_step(optimizer: torch.optim.Optimizer) -> dict[str, Any]:
     """Return the state of a copy after one step along a gradient of 0."""
-    again = copy.deepcopy(optimiser)
+    again = copy.deepcopy(optimizer)
     for group in again.param_groups:
         for parameter in group["params"]:
             parameter.grad = torch.zeros_like(parameter)

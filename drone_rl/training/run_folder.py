@@ -25,7 +25,7 @@ from drone_rl.utils.files import remove_leftovers, write_atomically
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import Real
-from drone_rl.utils.settings import kinds_of
+from drone_rl.utils.settings import kinds_of, present_names
 
 MAY_CHANGE = (
     "trainer.total_frames",
@@ -178,13 +178,14 @@ def hand_on_signal(training: Training) -> Training:
 
 def _own(config: Mapping[str, Any]) -> dict[str, Any]:
     """Return the training settings of a checkpoint."""
-    return {k: v for k, v in config.items() if k in kinds_of(TrainSettings)}
+    given = present_names(TrainSettings, config)
+    return {k: v for k, v in given.items() if k in kinds_of(TrainSettings)}
 
 
 def settings_of(config: Mapping[str, Any]) -> TrainSettings:
     """Return a checkpoint's settings; raise an `InputError` if they name an unregistered part."""
     settings = from_config(TrainSettings, _own(config))
-    parts = (settings.network, settings.returns, settings.objective, settings.optimiser)
+    parts = (settings.network, settings.returns, settings.objective, settings.optimizer)
     for part in (*parts, settings.scheduler, settings.collector, *settings.transforms):
         if not part.is_known:
             raise InputError(

@@ -189,11 +189,11 @@ def reinforce_learner(settings: TrainSettings, parts: Components) -> ReinforceLe
     limits, actor = settings.trainer, components.learning_actor(settings, parts)
     if actor is not parts.collector.actor:  # it is fused; the kernel has threads of its own
         torch.set_num_threads(1)
-    optimizer = settings.optimiser.make(parts.network.parameters())
+    optimizer = settings.optimizer.make(parts.network.parameters())
     return ReinforceLearner(
         network=parts.network,
         loss=settings.objective.make(actor).to(settings.device),
-        optimiser=optimizer,
+        optimizer=optimizer,
         scheduler=settings.scheduler.make(optimizer),
         max_grad_norm=limits.max_grad_norm,
         minibatch_frames=limits.minibatch_frames,

@@ -146,7 +146,7 @@ class Trainer:
                 self._notify("on_failure")
                 raise NotANumberError(
                     f"{error} at update {self.progress.updates + 1}; the parameters are those "
-                    "before it; lower optimiser.lr or set trainer.max_grad_norm"
+                    "before it; lower optimizer.lr or set trainer.max_grad_norm"
                 ) from None
             self._notify("on_end", self._reason)
 

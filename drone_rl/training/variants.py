@@ -47,13 +47,13 @@ def actor_critic_learner(settings: TrainSettings, parts: Components) -> ActorCri
     weights = torch_generator(settings.seed, Stream.CRITIC_INIT)
     own = None if objective.shares_trunk else describe(settings).build_critic(weights)
     model = ActorCritic(parts.network, own, weights).to(settings.device)
-    optimizer = settings.optimiser.make(model.parameters())
+    optimizer = settings.optimizer.make(model.parameters())
     learner = ActorCriticLearner(
         network=parts.network,
         model=model,
         estimator=settings.returns.make().to(settings.device),
         loss=objective.make(model.actor, model.critic).to(settings.device),
-        optimiser=optimizer,
+        optimizer=optimizer,
         generator=torch_generator(settings.seed, Stream.MINIBATCHES),
         scheduler=settings.scheduler.make(optimizer),
         max_grad_norm=settings.trainer.max_grad_norm,

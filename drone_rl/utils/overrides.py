@@ -13,6 +13,7 @@ from typing import Any
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.readers import read_yaml
 from drone_rl.utils.schema import Kind, Several, Text, shown
+from drone_rl.utils.settings import FORMER_NAMES
 
 _OF_ONE_FOLDER = re.compile(r"\+{0,2}(resume|trial|paths(\.\w+)?)")
 """Overrides of a run's folder and sweep, which do not affect training; a run can be moved."""
@@ -24,7 +25,7 @@ _HARMLESS = re.compile(rf"(\+{{0,2}}{_NAME}([./@]{_NAME})*=.*|~{_NAME}([./@]{_NA
 _SCALAR = r"[\w.+-]*"
 _VALUE = rf"({_SCALAR}|\[({_SCALAR}(, ?{_SCALAR})*)?\])"
 _SECTIONS = (
-    "task|appearance|dynamics|actions|camera|trainer|network|policy|returns|objective|optimiser|"
+    "task|appearance|dynamics|actions|camera|trainer|network|policy|returns|objective|optimizer|"
     "scheduler|transforms|provable"
 )
 _TAKEN_OVER = (
@@ -60,8 +61,16 @@ COMMAND: Kind = _Command()
 """Kind (see `schema`) of a training command."""
 
 
+_FORMER = re.compile(rf"^(\+{{0,2}}|~)({'|'.join(FORMER_NAMES)})(?=[.=@]|$)")
+
+
+def with_present_name(override: str) -> str:
+    """Return an override of a training under the present name of its setting."""
+    return _FORMER.sub(lambda found: found[1] + FORMER_NAMES[found[2]], override)
+
+
 def check_harmless(override: str, where: str) -> str:
-    """Return an override if it is safe to copy into a shell.
+    """Return an override under its present name if it is safe to copy into a shell.
 
     Raises:
         InputError: It refers to code, a Hydra setting or the value of another setting.
@@ -72,7 +81,7 @@ def check_harmless(override: str, where: str) -> str:
         raise InputError(
             f"{where} sets {shown(text)}, which is not a plain setting; remove it from the file"
         )
-    return text
+    return with_present_name(text)
 
 
 def read_overrides(folder: Path) -> list[str]:

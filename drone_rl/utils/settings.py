@@ -6,6 +6,7 @@ A setting is defined in one such field, which checks files, Hydra's values and P
 import contextlib
 import dataclasses
 import functools
+import operator
 import re
 import types
 import typing
@@ -16,6 +17,8 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Flag, Instance, Kind, Maybe, Record, Text, as_mapping
 
 S = TypeVar("S", bound="Settings")
+FORMER_NAMES = {"optimiser": "optimizer"}
+"""Former names of settings, accepted as arguments, on command lines and in files."""
 
 
 class _Frozen:
@@ -52,6 +55,8 @@ class Settings(_Frozen):
         dataclasses.dataclass(frozen=True, kw_only=True)(cls)
         for name, field in fields.items():
             setattr(cls, name, field)
+        if not cls.__dataclass_fields__.keys().isdisjoint(FORMER_NAMES.values()):
+            _accept_former_names(cls)
         del cls.__setattr__, cls.__delattr__
 
     def __post_init__(self) -> None:
@@ -65,6 +70,7 @@ class Settings(_Frozen):
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with other values; raise an `InputError` for unknown or invalid ones."""
+        changes = present_names(type(self), changes)
         check_names(type(self), changes)
         return dataclasses.replace(self, **changes)
 
@@ -107,6 +113,25 @@ def check_names(cls: type[Settings], given: Mapping[str, Any]) -> None:
     for name in given:
         if name not in kinds_of(cls):
             raise InputError(f"{name} is unknown; there are: {', '.join(kinds_of(cls))}")
+
+
+def present_names(cls: type[Settings], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values of settings under the present names, see `FORMER_NAMES`."""
+    known = kinds_of(cls)
+    return {k if k in known else FORMER_NAMES.get(k, k): value for k, value in given.items()}
+
+
+def _accept_former_names(cls: type[Settings]) -> None:
+    """Let the constructor and the attributes of a class have former names, too."""
+    construct = cls.__init__
+
+    @functools.wraps(construct)
+    def accepting(self: Settings, **given: Any) -> None:
+        construct(self, **present_names(type(self), given))
+
+    setattr(cls, "__init__", accepting)  # noqa: B010
+    for former, present in FORMER_NAMES.items():
+        setattr(cls, former, property(operator.attrgetter(present)))
 
 
 @contextlib.contextmanager

@@ -50,7 +50,7 @@ def infer(packed, images, num_actions):
 def test_logits_equal_the_network_after_updates(shape, options):
     network = SmallCNN(shape, 3, generator=torch.Generator().manual_seed(0), **options)
     packed = PackedNetwork(network, 6)
-    optimiser = torch.optim.Adam(network.parameters(), lr=0.1)
+    optimizer = torch.optim.Adam(network.parameters(), lr=0.1)
     for count in (6, 1, 5):
         images = torch.randn(count, *shape)
         packed.update()
@@ -58,7 +58,7 @@ def test_logits_equal_the_network_after_updates(shape, options):
         given = infer(packed, images, 3)
         assert logits.abs().max() > 1e-3 and torch.allclose(given, logits, rtol=1e-4, atol=1e-5)
         logits.square().sum().backward()
-        optimiser.step()
+        optimizer.step()
         assert not torch.allclose(given, network(images), rtol=1e-3)
 
 

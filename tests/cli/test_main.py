@@ -13,7 +13,7 @@ from tests.cli.running import TINY, drone_rl, error_line
 def test_usage_and_help(tmp_path):
     assert drone_rl("--help", cwd=tmp_path).stdout.strip() == USAGE.strip()
     help_text = drone_rl("train", "--help", cwd=tmp_path).stdout
-    assert "optimiser: adam, sgd" in help_text
+    assert "optimizer: adam, sgd" in help_text
     assert "# Cubes placed in every episode." in help_text
     assert "num_cubes: 3" in help_text
 
@@ -53,7 +53,7 @@ def test_what_is_printed_without_running_anything(monkeypatch, capsys, tmp_path,
             ["2x2", "too small"],
         ),
         (["train", "seed=-1"], ["seed=-1", "0 or more"]),
-        (["train", "optimiser.lr=1e38"], ["optimiser.lr=1e+38", "up to 1e+30"]),
+        (["train", "optimizer.lr=1e38"], ["optimizer.lr=1e+38", "up to 1e+30"]),
         (["train", "resume=nowhere"], ["nowhere", "folder of a run"]),
         (["train", "hydra.run.dir=/dev/null/x"], ["/dev/null"]),
         (["evaluate"], ["policy=latest", "drone-rl train"]),

@@ -122,9 +122,9 @@ def test_cuda_without_a_gpu(in_process):
 
 def test_resume_with_a_changed_setting(run, in_process):
     before = (run / "checkpoints" / "last.pt").read_bytes()
-    line = error_line(in_process("train", f"resume={run}", "optimiser.lr=0.5", cwd=run))
-    assert "optimiser.lr=0.5" in line
-    assert "optimiser.lr=0.001" in line
+    line = error_line(in_process("train", f"resume={run}", "optimizer.lr=0.5", cwd=run))
+    assert "optimizer.lr=0.5" in line
+    assert "optimizer.lr=0.001" in line
     assert (run / "checkpoints" / "last.pt").read_bytes() == before
 
 
@@ -137,7 +137,7 @@ def contents(folder):
     [
         ["seed=9"],
         ["provable.rounds=1", "seed=9"],
-        ["logger=tensorboard", "optimiser.lr=0.5"],
+        ["logger=tensorboard", "optimizer.lr=0.5"],
         ["trainer.total_frames=800", "hydra.run.dir=elsewhere"],
         ["task.num_cubes=0"],
     ],
@@ -222,7 +222,7 @@ def test_the_command_that_is_printed_goes_on_with_a_stopped_run(
 
 
 def test_nan_names_itself_and_the_last_good_checkpoint(in_process, tmp_path):
-    sgd = ["optimiser=sgd", "optimiser.lr=1e30", "trainer.total_frames=4000"]
+    sgd = ["optimizer=sgd", "optimizer.lr=1e30", "trainer.total_frames=4000"]
     line = error_line(in_process("train", *TINY, *sgd, "hydra.run.dir=nan"))
     assert "NaN or infinite" in line
     assert "nan/checkpoints/last.pt" in line

@@ -8,7 +8,7 @@ import pytest
 from drone_rl.cli.evaluation import PlayCommand
 from drone_rl.config import AppearanceSettings, TaskSettings
 from drone_rl.config.configuration import as_config, from_config, variant_of
-from drone_rl.config.learning import Adam, Optimiser
+from drone_rl.config.learning import Adam, Optimizer
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.config.transforms import Crop, Gray
@@ -38,8 +38,8 @@ def test_a_training_comes_back_as_it_was():
         ({"task": {"vertical_bound": 3.0}}, "task.vertical_bound=3.0 puts cubes"),
         ({"trainer": 3}, "trainer=3 must be a mapping"),
         ({"unheard": 3}, "unheard is unknown"),
-        ({"optimiser": {"lr": 1.0}}, "optimiser._target_=None names nothing"),
-        ({"optimiser": {"_target_": Adam.target, "lr": 0}}, "optimiser.lr=0 is out of range"),
+        ({"optimizer": {"lr": 1.0}}, "optimizer._target_=None names nothing"),
+        ({"optimizer": {"_target_": Adam.target, "lr": 0}}, "optimizer.lr=0 is out of range"),
         ({"transforms": {"a": {"_target_": Crop.target, "top": -1}}}, r"transforms\.a\.top=-1"),
         ({"collector": {"_target_": "their.Own", "num_envs": 0}}, "collector.num_envs=0"),
         ([], "settings="),
@@ -51,16 +51,16 @@ def test_mistakes_are_named_by_their_place(config, message):
 
 
 def test_what_only_the_user_knows_is_kept_and_checked_where_it_is_known():
-    sgd = {"_target_": "mine.Optimiser", "momentum": 0.9}
-    found = variant_of(Optimiser, sgd, "optimiser")
+    sgd = {"_target_": "mine.Optimizer", "momentum": 0.9}
+    found = variant_of(Optimizer, sgd, "optimizer")
     assert not found.is_known
     assert as_config(found) == sgd
     more = {"_target_": Adam.target, "lr": 0.1, "amsgrad": True}
-    assert as_config(variant_of(Optimiser, more, "optimiser")) == more
-    with pytest.raises(InputError, match=r"optimiser\.lr=-1 "):
-        variant_of(Optimiser, {**more, "lr": -1}, "optimiser")
-    assert variant_of(Optimiser, {"_target_": Adam.target, "lr": 0.1}, "x") == Adam(lr=0.1)
-    with pytest.raises(InputError, match=r"_target_=mine\.Optimiser can't be imported"):
+    assert as_config(variant_of(Optimizer, more, "optimizer")) == more
+    with pytest.raises(InputError, match=r"optimizer\.lr=-1 "):
+        variant_of(Optimizer, {**more, "lr": -1}, "optimizer")
+    assert variant_of(Optimizer, {"_target_": Adam.target, "lr": 0.1}, "x") == Adam(lr=0.1)
+    with pytest.raises(InputError, match=r"_target_=mine\.Optimizer can't be imported"):
         found.make()
 
 

@@ -105,9 +105,9 @@ def test_algorithm_4_matches_a_hand_computed_step():
         },
         [3],
     )
-    optimiser = torch.optim.SGD(network.parameters(), lr=0.1)
+    optimizer = torch.optim.SGD(network.parameters(), lr=0.1)
     gradient(ReinforceLoss(actor, reduction="sum", entropy_coeff=0.0), network, batch)
-    optimiser.step()
+    optimizer.step()
     step = 0.1 * 0.5 * (-4 - 1 - 5) / root
     torch.testing.assert_close(network.theta.detach(), torch.tensor([[step, -step]]))
 

@@ -149,9 +149,9 @@ def sweep(begin_sweep):
     """Two learning rates by two seeds: three finished, one failed."""
     return begin_sweep(
         {
-            "optimiser.lr=1e-3 seed=0 logger=csv": {"verdict": _verdict()},
-            "optimiser.lr=1e-3 seed=1 logger=csv": {"verdict": _verdict(), "frames": 2000},
-            "optimiser.lr=1e-1 seed=0 logger=csv": {"verdict": LEFT_LOST, "reason": "frames"},
-            "optimiser.lr=1e-1 seed=1 logger=csv": "<b>NaN</b>",
+            "optimizer.lr=1e-3 seed=0 logger=csv": {"verdict": _verdict()},
+            "optimizer.lr=1e-3 seed=1 logger=csv": {"verdict": _verdict(), "frames": 2000},
+            "optimizer.lr=1e-1 seed=0 logger=csv": {"verdict": LEFT_LOST, "reason": "frames"},
+            "optimizer.lr=1e-1 seed=1 logger=csv": "<b>NaN</b>",
         }
     )

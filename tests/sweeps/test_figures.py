@@ -63,9 +63,9 @@ def test_runs_that_were_never_solved_are_open_triangles_at_what_they_had(sweep):
 
 
 def test_costs_are_seen_beside_a_panel_without_any(begin_sweep):
-    sweep = begin_sweep({"a=1 optimiser.lr=1": {"frames": 2000}, "a=2 optimiser.lr=1": None})
+    sweep = begin_sweep({"a=1 optimizer.lr=1": {"frames": 2000}, "a=2 optimizer.lr=1": None})
     solved, none = make_groups(read_rows(sweep))
-    layout = figures.Layout("optimiser.lr", {"first": [none], "second": [solved]})
+    layout = figures.Layout("optimizer.lr", {"first": [none], "second": [solved]})
     first, second = Figure().subplots(1, 2, sharey=True)
     figures._costs(first, layout, [none])
     figures._costs(second, layout, [solved])
@@ -78,7 +78,7 @@ def test_costs_are_seen_beside_a_panel_without_any(begin_sweep):
 def test_learners_are_shown_side_by_side(begin_sweep, make_verdict, learners, size):
     """Up to three in a row, the three figures of each below one another, 110 pixels an inch."""
     judged = {"verdict": make_verdict()}
-    runs = {f"objective={i} optimiser.lr={lr}": judged for i in range(learners) for lr in (1, 2)}
+    runs = {f"objective={i} optimizer.lr={lr}": judged for i in range(learners) for lr in (1, 2)}
     layout = figures.lay_out(make_groups(read_rows(begin_sweep(runs))))
     assert list(layout.panels) == [f"objective={i}" for i in range(learners)]
     assert struct.unpack(">II", figures.draw_outcome(layout)[16:24]) == size
@@ -86,10 +86,10 @@ def test_learners_are_shown_side_by_side(begin_sweep, make_verdict, learners, si
 
 @pytest.mark.parametrize("values", [("1e-3", "3e-3"), ("1", "2", "2.5"), ("0.1", "1", "10")])
 def test_labels_are_the_values_and_do_not_overlap(begin_sweep, make_verdict, values):
-    """What `drone-rl train -m optimiser.lr=1e-3,3e-3` draws: a dot was shifted by 0.05, not 5%."""
+    """What `drone-rl train -m optimizer.lr=1e-3,3e-3` draws: a dot was shifted by 0.05, not 5%."""
     judged = {"verdict": make_verdict()}
     groups = make_groups(
-        read_rows(begin_sweep({f"optimiser.lr={v} seed={i}": judged for v in values for i in "01"}))
+        read_rows(begin_sweep({f"optimizer.lr={v} seed={i}": judged for v in values for i in "01"}))
     )
     figure = Figure(figsize=(5, 3), layout="constrained")
     axes = figure.subplots()
@@ -106,7 +106,7 @@ def test_labels_are_the_values_and_do_not_overlap(begin_sweep, make_verdict, val
 
 def test_labels_that_would_overlap_are_left_out(begin_sweep):
     values = [*map(str, range(1, 30)), "1000"]
-    groups = make_groups(read_rows(begin_sweep({f"optimiser.lr={v}": {} for v in values})))
+    groups = make_groups(read_rows(begin_sweep({f"optimizer.lr={v}": {} for v in values})))
     axes = Figure().subplots()
     figures._costs(axes, figures.lay_out(groups), groups)
     labels = [label.get_text() for label in axes.get_xticklabels()]

@@ -14,7 +14,7 @@ def test_report_has_every_sentence_and_escapes_what_it_shows(sweep):
     assert "<b>NaN</b>" not in page
     assert "&lt;b&gt;NaN" in page
     assert page.count("data:image/png;base64,") == 10  # five figures, light and dark
-    assert "drone-rl train optimiser.lr=1e-3 seed=0" in page
+    assert "drone-rl train optimizer.lr=1e-3 seed=0" in page
     assert 'href="./2/"' in page
     assert "http:" not in page
     assert "https:" not in page

@@ -17,7 +17,7 @@ def rewrite(sweep, number, **changed):
 def test_rows_tell_what_became_of_every_run(sweep):
     rows = read_rows(sweep)
     assert [row.state for row in rows] == ["finished", "finished", "finished", "failed"]
-    assert rows[0].choice == {"optimiser.lr": "1e-3", "seed": "0"}
+    assert rows[0].choice == {"optimizer.lr": "1e-3", "seed": "0"}
     assert [row.kind for row in rows] == ["good", "good", "one-sided", None]
     assert [row.is_certain for row in rows] == [True, True, False, False]
     assert [row.is_solved for row in rows] == [True, True, False, False]

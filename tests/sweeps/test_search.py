@@ -8,7 +8,7 @@ from drone_rl.sweeps import search  # noqa: E402
 from drone_rl.sweeps.search import next_trials, note_outcome, open_study  # noqa: E402
 from drone_rl.utils.errors import InputError  # noqa: E402
 
-SPACE = {"optimiser.lr": optuna.distributions.FloatDistribution(1e-4, 1e-1, log=True)}
+SPACE = {"optimizer.lr": optuna.distributions.FloatDistribution(1e-4, 1e-1, log=True)}
 
 
 def begin(folder, **attributes):

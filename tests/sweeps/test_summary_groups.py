@@ -15,7 +15,7 @@ def groups(sweep):
 
 def test_groups_are_runs_that_differ_in_their_seed_alone(sweep):
     low, high = groups(sweep)
-    assert low["optimiser.lr"] == "1e-3"
+    assert low["optimizer.lr"] == "1e-3"
     assert low["solved"]["successes"] == 2
     assert low["frames_to_solve"]["median"] == 1500
     assert low["seconds_to_solve"]["median"] == 2

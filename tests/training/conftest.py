@@ -55,15 +55,15 @@ def make_trainer():
         nn.init.zeros_(network.bias)
         actions = torch.Generator().manual_seed(seed + 100)
         actor = make_actor(network, Categorical(2), actions)
-        optimiser = torch.optim.Adam(network.parameters(), lr=0.05)
+        optimizer = torch.optim.Adam(network.parameters(), lr=0.05)
         settings = {"target": None, "total_frames": 200, **kwargs}
         return Trainer(
             collector=Bandit(actor, seed=seed, postproc=TimeBaseline(0.9, max_steps=4)),
             learner=ReinforceLearner(
                 network=network,
                 loss=ReinforceLoss(actor, entropy_coeff=0.0),
-                optimiser=optimiser,
-                scheduler=torch.optim.lr_scheduler.StepLR(optimiser, 2, 0.9),
+                optimizer=optimizer,
+                scheduler=torch.optim.lr_scheduler.StepLR(optimizer, 2, 0.9),
                 max_grad_norm=max_grad_norm,
                 minibatch_frames=minibatch_frames,
             ),

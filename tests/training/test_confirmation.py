@@ -75,8 +75,8 @@ def test_training_continues_until_confirmed(tmp_path, episodes, reason):
         total_frames=400, target_share=1e-3, confirm_episodes=episodes
     )
     collector = SETTINGS.collector.replace(num_envs=4)
-    optimiser = SETTINGS.optimiser.replace(lr=1e-9)
-    settings = SETTINGS.replace(trainer=trainer, collector=collector, optimiser=optimiser)
+    optimizer = SETTINGS.optimizer.replace(lr=1e-9)
+    settings = SETTINGS.replace(trainer=trainer, collector=collector, optimizer=optimizer)
     done = drone_rl.train(settings, folder=tmp_path / "run", progress=silent)
     assert done.reason == reason
     assert done.result.get("confirming_flights", 0) % 8 == 0

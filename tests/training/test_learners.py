@@ -28,7 +28,7 @@ class CriticLearner:
     def __init__(self, actor):
         self.actor, self.critic = actor, nn.Linear(3, 1)
         parameters = [*actor.parameters(), *self.critic.parameters()]
-        self.optimiser = torch.optim.Adam(parameters, lr=0.05)
+        self.optimizer = torch.optim.Adam(parameters, lr=0.05)
 
     def update(self, batch):
         for _ in range(PASSES):
@@ -43,16 +43,16 @@ class CriticLearner:
             }
             for name, loss in losses.items():
                 check_finite(loss, name)
-            self.optimiser.zero_grad()
+            self.optimizer.zero_grad()
             sum(losses.values()).backward()
-            self.optimiser.step()
+            self.optimizer.step()
         return {f"loss/{name}": float(loss.detach()) for name, loss in losses.items()}
 
     def state_dict(self):
         return {
             "policy": self.actor.state_dict(),
             "critic": self.critic.state_dict(),
-            "optimiser": self.optimiser.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
         }
 
     def check_state(self, state):
@@ -61,7 +61,7 @@ class CriticLearner:
     def load_state_dict(self, state):
         self.actor.load_state_dict(state["policy"])
         self.critic.load_state_dict(state["critic"])
-        self.optimiser.load_state_dict(state["optimiser"])
+        self.optimizer.load_state_dict(state["optimizer"])
 
 
 def make_actor():
@@ -111,7 +111,7 @@ def test_critic_learns_from_partial_episodes(trainer, tmp_path):
     assert 4000 / 3 - 4 <= progress.episodes <= 4000
     assert 0.5 < progress.running_reward < 0.95  # the optimum is 0.75
     state = load_checkpoint(tmp_path / "last.pt")
-    assert {"policy", "critic", "optimiser", "progress"} <= set(state)
+    assert {"policy", "critic", "optimizer", "progress"} <= set(state)
     again = CriticLearner(make_actor())
     again.load_state_dict(state)
     assert leaving(again) == leaving(trainer.learner)

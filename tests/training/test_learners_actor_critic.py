@@ -34,15 +34,15 @@ def make_learner():
         with torch.no_grad():
             for parameter in model.critic.parameters():
                 parameter.copy_(torch.eye(*parameter.shape) if parameter.ndim == 2 else 0.0)
-        optimiser = torch.optim.Adam(model.parameters(), lr=lr)
+        optimizer = torch.optim.Adam(model.parameters(), lr=lr)
         return ActorCriticLearner(
             network=network,
             model=model,
             estimator=Advantages(GAMMA, LMBDA, scale),
             loss=kind(model.actor, model.critic, functional=False, **(loss or {})),
-            optimiser=optimiser,
+            optimizer=optimizer,
             generator=generator(2),
-            scheduler=torch.optim.lr_scheduler.StepLR(optimiser, 1, 0.5),
+            scheduler=torch.optim.lr_scheduler.StepLR(optimizer, 1, 0.5),
             **kwargs,
         )
 
@@ -97,7 +97,7 @@ def test_advantages_at_termination_truncation_and_batch_end(make_learner, batch,
 
 
 def gradient(learner, steps, name="loss_objective"):
-    learner.optimiser.zero_grad()
+    learner.optimizer.zero_grad()
     learner._losses(steps.copy())[name].backward()
     return learner.network.layers[-1].weight.grad.clone()
 
@@ -269,7 +269,7 @@ def test_state_dict_restores_the_learner(make_learner, batch):
             {"module.weight": torch.zeros(1, 3), "module.bias": torch.zeros(1)},
             r"critic\.module",
         ),
-        ("optimiser", {}, "optimiser has other names"),
+        ("optimiser", {}, "optimizer has other names"),
         ("scheduler", None, "scheduler has other names"),
         ("minibatches", torch.zeros(3), "minibatches is not of shape"),
     ],

@@ -102,7 +102,7 @@ def learner_of(network, model, kind, rate=0.02, **kwargs):
         model=model,
         estimator=Advantages(0.98, 0.95, True),
         loss=kind(model.actor, model.critic, functional=False, entropy_coeff=0.001),
-        optimiser=torch.optim.Adam(model.parameters(), lr=rate),
+        optimizer=torch.optim.Adam(model.parameters(), lr=rate),
         generator=generator(5),
         **kwargs,
     )
@@ -135,9 +135,9 @@ def test_policy_converges_to_the_best_action(policy, kind):
     network, actor = policy
     target = torch.tensor([0.5, -0.3, 0.0])
     if kind is None:
-        optimiser = torch.optim.Adam(network.parameters(), lr=0.02)
+        optimizer = torch.optim.Adam(network.parameters(), lr=0.02)
         loss = ReinforceLoss(actor, entropy_coeff=0.0)
-        learner = ReinforceLearner(network=network, loss=loss, optimiser=optimiser)
+        learner = ReinforceLearner(network=network, loss=loss, optimizer=optimizer)
         estimate = LeaveOneOut(1.0, scale=False)
     else:
         model = ActorCritic(network, None, generator())
@@ -168,9 +168,9 @@ def test_policy_learns_to_reach_a_cube(kind):
 
     before = success()
     if kind == "reinforce":
-        optimiser = torch.optim.Adam(network.parameters(), lr=3e-3)
+        optimizer = torch.optim.Adam(network.parameters(), lr=3e-3)
         loss, estimator = ReinforceLoss(actor, entropy_coeff=0.01), LeaveOneOut(0.98, scale=False)
-        learner = ReinforceLearner(network=network, loss=loss, optimiser=optimiser)
+        learner = ReinforceLearner(network=network, loss=loss, optimizer=optimizer)
         collector, updates = EpisodeCollector(env, actor, postproc=estimator), 30
     else:
         model = ActorCritic(network, None, generator(2))

@@ -41,8 +41,8 @@ def test_gradient_and_terms_match_hand_computed_values(chunk, is_sum, wanted):
 def test_gradient_norm_is_clipped(most, step):
     layer = one_weight()
     layer.weight.grad = torch.tensor([[6.0]])
-    optimiser = torch.optim.SGD(layer.parameters(), lr=1.0)
-    assert descend(optimiser, layer.named_parameters(), most) == pytest.approx(6.0)
+    optimizer = torch.optim.SGD(layer.parameters(), lr=1.0)
+    assert descend(optimizer, layer.named_parameters(), most) == pytest.approx(6.0)
     assert float(layer.weight.detach()) == pytest.approx(1.0 - step)
 
 

@@ -18,7 +18,7 @@ def test_minibatch_gradients_sum_to_the_batch_gradient(make_trainer, reduction):
         trainer = make_trainer(minibatch_frames=size)
         learner = trainer.learner
         learner.loss.reduction = reduction
-        learner.optimiser.step, learner.scheduler = lambda: None, None
+        learner.optimizer.step, learner.scheduler = lambda: None, None
         learner.update(trainer.collector.collect())
         gradients.append(learner.network.weight.grad.clone())
     torch.testing.assert_close(*gradients)
@@ -72,7 +72,7 @@ def test_in_keys_include_returns(make_trainer):
 def test_sgd_step_matches_the_hand_computed_one(make_trainer):
     """One frame with return 2: the gradient of -2 log p(a) is 2 (p - onehot(a))."""
     learner = make_trainer().learner
-    learner.optimiser = torch.optim.SGD(learner.network.parameters(), lr=0.5)
+    learner.optimizer = torch.optim.SGD(learner.network.parameters(), lr=0.5)
     learner.scheduler = None
     frame = torch.tensor([[1.0, 0.0, 0.0, 0.0]])
     before = learner.network.bias.detach().clone()
@@ -110,7 +110,7 @@ def test_nan_changes_nothing(make_trainer):
     ("part", "value", "message"),
     [
         ("policy", {"weight": torch.zeros(2, 4)}, "policy has other names"),
-        ("optimiser", {}, "optimiser has other names"),
+        ("optimiser", {}, "optimizer has other names"),
         ("scheduler", None, "scheduler has other names"),
     ],
 )

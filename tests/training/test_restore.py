@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch import nn
 
-from drone_rl.training.restore import check_fits, check_optimiser
+from drone_rl.training.restore import check_fits, check_optimizer
 from drone_rl.utils.errors import InputError
 
 OWN = {"a": torch.zeros(2), "b": [1, 0.5], "c": None, "d": "x", "e": True, "f": {}}
@@ -62,32 +62,32 @@ def test_nan_is_accepted_where_the_own_state_has_it(saved, fits):
 def stepped(kind=torch.optim.Adam, **settings):
     torch.manual_seed(0)
     network = nn.Linear(2, 1)
-    optimiser = kind(network.parameters(), lr=0.1, **settings)
+    optimizer = kind(network.parameters(), lr=0.1, **settings)
     network(torch.ones(1, 2)).sum().backward()
-    optimiser.step()
-    return network, optimiser
+    optimizer.step()
+    return network, optimizer
 
 
 @pytest.mark.parametrize("kind", [torch.optim.Adam, torch.optim.SGD, torch.optim.RMSprop])
 def test_own_optimizer_state_is_accepted(kind):
-    network, optimiser = stepped(kind)
+    network, optimizer = stepped(kind)
     before = {k: v.clone() for k, v in network.state_dict().items()}
-    check_optimiser(optimiser.state_dict(), optimiser)
+    check_optimizer(optimizer.state_dict(), optimizer)
     fresh = kind(nn.Linear(2, 1).parameters(), lr=0.1)
-    check_optimiser(fresh.state_dict(), fresh)
-    check_optimiser(optimiser.state_dict(), fresh)
+    check_optimizer(fresh.state_dict(), fresh)
+    check_optimizer(optimizer.state_dict(), fresh)
     assert all(torch.equal(before[k], v) for k, v in network.state_dict().items())
     assert not fresh.state_dict()["state"]
 
 
 def test_only_the_learning_rate_may_differ():
-    _, optimiser = stepped()
-    state = copy.deepcopy(optimiser.state_dict())
+    _, optimizer = stepped()
+    state = copy.deepcopy(optimizer.state_dict())
     state["param_groups"][0]["lr"] = 0.05
-    check_optimiser(state, optimiser)
+    check_optimizer(state, optimizer)
     state["param_groups"][0]["betas"] = (0.5, 0.5)
-    with pytest.raises(InputError, match=r"optimiser\.betas"):
-        check_optimiser(state, optimiser)
+    with pytest.raises(InputError, match=r"optimizer\.betas"):
+        check_optimizer(state, optimizer)
 
 
 @pytest.mark.parametrize(
@@ -104,10 +104,10 @@ def test_only_the_learning_rate_may_differ():
     ],
 )
 def test_foreign_optimizer_states_raise(change, message):
-    _, optimiser = stepped()
-    state = copy.deepcopy(optimiser.state_dict())
+    _, optimizer = stepped()
+    state = copy.deepcopy(optimizer.state_dict())
     change(state)
     with pytest.raises(InputError, match=message):
-        check_optimiser(state, optimiser)
+        check_optimizer(state, optimizer)
     with pytest.raises(InputError):
-        check_optimiser(5, optimiser)
+        check_optimizer(5, optimizer)

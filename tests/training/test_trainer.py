@@ -56,7 +56,7 @@ def test_resumed_run_equals_an_uninterrupted_one_bit_for_bit(make_trainer, tmp_p
     assert torch.equal(parameters(resumed), parameters(whole))
     assert resumed.progress.frames == whole.progress.frames
     assert resumed.progress.running_reward == whole.progress.running_reward
-    lr = [t.learner.optimiser.param_groups[0]["lr"] for t in (resumed, whole)]
+    lr = [t.learner.optimizer.param_groups[0]["lr"] for t in (resumed, whole)]
     assert lr[0] == lr[1]
 
 

@@ -61,7 +61,7 @@ def test_kernel_gradients_give_the_same_updates_as_torch():
     learned = {}
     for is_compiled in (True, False):
         limits = TrainerSettings(compiled=is_compiled, minibatch_frames=40)
-        settings = TrainSettings(task=TASK, trainer=limits, optimiser=Sgd(lr=1.0))
+        settings = TrainSettings(task=TASK, trainer=limits, optimizer=Sgd(lr=1.0))
         made = make_collector(settings)
         learner = settings.objective.learner(settings, made)
         network = learner.loss.actor_network.module[0].module
@@ -287,8 +287,8 @@ def test_collector_without_next_observations_raises(monkeypatch, tmp_path):
 
 def test_too_high_learning_rate_raises_a_clear_error(tmp_path):
     """Overflow gives a one-line error and keeps the previous checkpoint."""
-    settings = TINY.replace(optimiser=Sgd(lr=1e30))
-    with pytest.raises(InputError, match=r"NaN or infinite at update .*lower optimiser\.lr"):
+    settings = TINY.replace(optimizer=Sgd(lr=1e30))
+    with pytest.raises(InputError, match=r"NaN or infinite at update .*lower optimizer\.lr"):
         drone_rl.train(settings, folder=tmp_path, progress=silent)
     state = load_checkpoint(tmp_path / "checkpoints" / "last.pt")
     assert all(value.isfinite().all() for value in state["policy"].values())

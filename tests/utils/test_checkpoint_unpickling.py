@@ -60,12 +60,12 @@ FOUR = struct.pack("<4f", 1, 2, 3, 4)
 
 def test_as_torch_reads_it():
     network = nn.Conv2d(1, 2, 3).to(memory_format=torch.channels_last)
-    optimiser = torch.optim.Adam(network.parameters())
+    optimizer = torch.optim.Adam(network.parameters())
     network(torch.ones(1, 1, 4, 4)).sum().backward()
-    optimiser.step()
+    optimizer.step()
     state = {
         "policy": network.state_dict(),
-        "optimiser": optimiser.state_dict(),
+        "optimizer": optimizer.state_dict(),
         "bytes": torch.get_rng_state(),
         "shared": [torch.arange(6)[2:4], torch.zeros(0), torch.tensor(3.0), torch.tensor([True])],
         "plain": (None, True, -5, 2**100, 0.5, float("-inf"), "text", [], {}, (1, 2, 3, 4)),
@@ -80,7 +80,7 @@ def test_as_torch_reads_it():
     for value, other in zip(found["shared"], expected["shared"], strict=True):
         assert torch.equal(value, other) and value.dtype == other.dtype
     assert torch.equal(found["bytes"], expected["bytes"])
-    moments = [s["optimiser"]["state"][0]["exp_avg"] for s in (found, expected)]
+    moments = [s["optimizer"]["state"][0]["exp_avg"] for s in (found, expected)]
     assert torch.equal(*moments)
 
 

@@ -29,7 +29,7 @@ print({LOADED})"""
 
 
 def test_without_it_the_same_is_learned(tmp_path):
-    """Optimisers ask it to leave them alone, which they may be without."""
+    """Optimizers ask it to leave them alone, which they may be without."""
     code = """
 import torch
 torch.manual_seed(0)

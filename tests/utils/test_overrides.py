@@ -10,6 +10,7 @@ from drone_rl.utils.overrides import (
     must_be_typed,
     read_overrides,
     taken_over,
+    with_present_name,
 )
 
 
@@ -29,9 +30,9 @@ def test_settings_of_a_training_are_taken_over(noted):
         *("seed=1", "device=cuda:0", "evaluate_after=200"),
         *("experiment=smoke", "logger=csv", "policy=mlp", "collector=ray", "transforms=stack"),
         *("policy.hidden=[128,64]", "policy.hidden=[128, 64]", "policy.channels=[]"),
-        *("optimiser.lr=1e-3", "task.spacing=-9.5", "trainer.total_episodes=null"),
+        *("optimizer.lr=1e-3", "task.spacing=-9.5", "trainer.total_episodes=null"),
         *("task.cube_color=[0.1, 0.2, 0.3]", "transforms.crop.top=3", "~transforms.standardize"),
-        *("+optimiser.amsgrad=true", "objective.reduction=sum", "collector.num_envs=8"),
+        *("+optimizer.amsgrad=true", "objective.reduction=sum", "collector.num_envs=8"),
     ]
     assert taken_over(noted(settings), []) == settings
 
@@ -41,8 +42,8 @@ def test_nothing_noted_is_nothing(tmp_path):
 
 
 def test_what_is_told_anew_is_not_taken_over(noted):
-    folder = noted(["seed=1", "optimiser.lr=1", "policy=mlp"])
-    assert taken_over(folder, ["optimiser.lr=2", "+seed=2"]) == ["policy=mlp"]
+    folder = noted(["seed=1", "optimizer.lr=1", "policy=mlp"])
+    assert taken_over(folder, ["optimizer.lr=2", "+seed=2"]) == ["policy=mlp"]
 
 
 def test_where_a_run_was_does_not_matter(noted):
@@ -61,7 +62,7 @@ def test_where_a_run_was_does_not_matter(noted):
         *("policy=../x", "policy=/x", "policy=a/b", "experiment=[a,b]", "+policy=mlp"),
         *("seed=${oc.env:HOME}", "task.spacing=${task.num_cubes}", "seed=1,2", "seed=range(9)"),
         *("--config-dir=/x", "-m", "seed", "~policy", "seed=1\nx=2", "device=os.system"),
-        *("trainer.x.y.z=1", "task.spacing=a b", "optimiser.lr='1'", "seed=`id`", "seed=\x1b"),
+        *("trainer.x.y.z=1", "task.spacing=a b", "optimizer.lr='1'", "seed=`id`", "seed=\x1b"),
     ],
 )
 def test_what_no_file_may_set(noted, setting):
@@ -107,3 +108,14 @@ def test_commands():
     for command in [*bad, "drone-rl train '`rm x`'", "drone-rl train\nrm x"]:
         with pytest.raises(InputError):
             COMMAND.read(command, "x")
+
+
+def test_former_names_in_a_file_are_read_as_the_present_ones(noted):
+    older = ["optimiser=sgd", "+optimiser.amsgrad=true", "~optimiser.lr", "seed=1"]
+    read = ["optimizer=sgd", "+optimizer.amsgrad=true", "~optimizer.lr", "seed=1"]
+    assert read_overrides(noted(older)) == read
+    assert taken_over(noted(older), ["optimizer.amsgrad=false", "optimizer.lr=1"]) == [
+        *("optimizer=sgd", "seed=1")
+    ]
+    for other in ("network.optimiser=1", "optimisers=1", "x.optimiser.lr=1"):
+        assert with_present_name(other) == other

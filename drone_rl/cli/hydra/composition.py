@@ -35,7 +35,7 @@ from drone_rl.config import (
 )
 from drone_rl.config.commands import PathsSettings, ProvableSettings
 from drone_rl.config.configuration import Changes, Variant, from_config
-from drone_rl.config.learning import Collector, Objective, Optimiser, Returns, Scheduler
+from drone_rl.config.learning import Collector, Objective, Optimizer, Returns, Scheduler
 from drone_rl.config.networks import Network
 from drone_rl.config.training import Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
@@ -60,7 +60,7 @@ PARTS: dict[str, type[Variant]] = {
     "network": Network,
     "returns": Returns,
     "objective": Objective,
-    "optimiser": Optimiser,
+    "optimizer": Optimizer,
     "scheduler": Scheduler,
     "collector": Collector,
 }

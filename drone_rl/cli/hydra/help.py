@@ -17,7 +17,7 @@ _NOT_SHOWN = ("hydra", "paths")
 """Groups without choices for users."""
 _EXAMPLES = """\
 examples
-  drone-rl train seed=1 optimiser.lr=2e-3        change settings
+  drone-rl train seed=1 optimizer.lr=2e-3        change settings
   drone-rl train experiment=smoke                a ready-made set of settings
   drone-rl train -m seed=0,1,2                   several runs, side by side
   drone-rl evaluate policy=latest                evaluate the newest policy"""

@@ -70,6 +70,8 @@ class SweepLauncher(Launcher):
         try:
             with folder_lock(folder), _sigterm_as_interrupt():
                 sweep = open_sweep(folder, _command(), self._settings(), runs)
+                begun = {run.number: run for run in sweep.runs}
+                runs = [begun[run.number] for run in runs]  # in the folders of the first start
                 finished = sum(read_result(run.folder) is not None for run in runs)
                 _log.info("sweep of %d runs, %d finished before: %s", len(runs), finished, folder)
                 failed = self._finish(sweep, runs)
@@ -254,7 +256,7 @@ class OptunaSweeper(Sweeper):
         if not space:
             raise InputError(
                 "there is nothing to search; give a range such as "
-                "'optimiser.lr=tag(log,interval(1e-4,1e-1))' or sweep=search"
+                "'optimizer.lr=tag(log,interval(1e-4,1e-1))' or sweep=search"
             )
         folder = Path(str(self.config.hydra.sweep.dir)).absolute()
         folder.mkdir(parents=True, exist_ok=True)

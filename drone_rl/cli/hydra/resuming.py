@@ -13,12 +13,14 @@ from omegaconf import OmegaConf
 from drone_rl.sweeps.manifest import is_sweep, quoted, sweep_name
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import refuse_links, write_atomically
-from drone_rl.utils.overrides import must_be_typed, taken_over
+from drone_rl.utils.overrides import must_be_typed, taken_over, with_present_name
+from drone_rl.utils.settings import FORMER_NAMES
 
 
-def networks(overrides: Sequence[str]) -> list[str]:
-    """Translate `policy=mlp` to `network=mlp`, `policy.hidden=[64]` alike, in trainings."""
-    return [re.sub(r"^(\+{0,2}|~)policy(?=[.=])", r"\1network", o) for o in overrides]
+def present(overrides: Sequence[str]) -> list[str]:
+    """Translate former names in trainings: `policy=mlp` to `network=mlp`, and `FORMER_NAMES`."""
+    named = map(with_present_name, overrides)
+    return [re.sub(r"^(\+{0,2}|~)policy(?=[.=])", r"\1network", o) for o in named]
 
 
 _FOLDER = "hydra.sweep.dir=${paths.outputs}/${hydra.job.config_name}/multiruns/"
@@ -34,10 +36,10 @@ def complete(overrides: Sequence[str]) -> list[str]:
     Raises:
         InputError: There is no run at `resume=FOLDER`, or its settings are unclear.
     """
-    typed = networks(overrides)
+    typed = present(overrides)
     if is_sweep(typed):
         is_named = any(o.startswith("hydra.sweep.dir=") for o in typed)
-        return typed if is_named else [*typed, _FOLDER + sweep_name(typed)]
+        return typed if is_named else [*typed, _FOLDER + _sweep_folder(typed)]
     folders = [o.split("=", 1)[1] for o in typed if o.startswith("resume=")]
     if not folders or folders[-1] in ("", "null"):
         return typed
@@ -48,10 +50,20 @@ def complete(overrides: Sequence[str]) -> list[str]:
         raise InputError(f"resume={folder} has no checkpoints/last.pt; give the folder of a run")
     refuse_links(folder)
     former = [re.sub(r"^(\+{0,2}|~)network(?=[.=])", r"\1policy", o) for o in typed]
-    kept = networks(taken_over(folder, [*typed, *former]))
+    kept = present(taken_over(folder, [*typed, *former]))
     plain = [_resume(folder) if o.startswith("resume=") else o for o in typed]
     own = ["hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}", *_WRITE_NOTHING]
     return [*kept, *plain, *own]
+
+
+def _sweep_folder(typed: Sequence[str]) -> str:
+    """Return the folder's name, or that of the same sweep begun under former names of settings."""
+    older = [*typed]
+    for former, name in FORMER_NAMES.items():
+        older = [re.sub(rf"^(\+{{0,2}}|~){name}(?=[.=@])", rf"\1{former}", o) for o in older]
+    outputs = [o.partition("=")[2] for o in typed if o.startswith("paths.outputs=")]
+    begun = Path((outputs or ["outputs"])[-1]) / "train" / "multiruns" / sweep_name(older)
+    return begun.name if begun.is_dir() else sweep_name(typed)
 
 
 def check_folder(resume: str, folder: Path) -> None:

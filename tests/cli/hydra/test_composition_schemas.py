@@ -112,14 +112,14 @@ def test_every_return_estimator_builds_and_estimates(group, name, settings):
     assert estimator(TensorDict(batch, [4]))["return_to_go"].shape == (4, 1)
 
 
-@pytest.mark.parametrize(("group", "name"), files("optimiser", "scheduler"))
-def test_every_optimiser_and_schedule_builds_and_steps(group, name, settings):
+@pytest.mark.parametrize(("group", "name"), files("optimizer", "scheduler"))
+def test_every_optimizer_and_schedule_builds_and_steps(group, name, settings):
     told = settings("train", f"{group}={name}")
     weight = torch.nn.Parameter(torch.ones(1))
-    optimiser = told.optimiser.make([weight])
-    schedule = told.scheduler.make(optimiser)
+    optimizer = told.optimizer.make([weight])
+    schedule = told.scheduler.make(optimizer)
     weight.sum().backward()
-    optimiser.step()
+    optimizer.step()
     schedule.step()
     assert weight < 1
 
@@ -157,7 +157,7 @@ def test_any_setting_of_the_task_can_be_changed_for_a_trained_policy(command, co
     "override",
     [
         *("task.num_cubs=3", "sed=1", "task.num_cubes=three", "trainer.total_frames=many"),
-        *("network=no_such", "optimiser.learning_rate=1", "returns.gamma=high"),
+        *("network=no_such", "optimizer.learning_rate=1", "returns.gamma=high"),
         *("transforms.standardize.mean=x", "logger.tensorboard.log=x", "network.patch=big"),
     ],
 )
@@ -171,7 +171,7 @@ def test_original_is_algorithm_4(settings):
     assert told.collector.num_envs == 1
     assert told.objective.reduction == "sum"
     assert told.returns.name == "standardised"
-    assert (told.optimiser.target, told.optimiser.lr) == ("torch.optim.SGD", 1e-4)
+    assert (told.optimizer.target, told.optimizer.lr) == ("torch.optim.SGD", 1e-4)
     assert (told.scheduler.step_size, told.scheduler.gamma) == (5, 0.99)
     assert round(3 * told.trainer.target_share, 2) == 2.99
     assert told.trainer.running_decay == 0.9
@@ -199,9 +199,9 @@ def test_a_pipeline_keeps_its_order(settings):
 
 
 def test_what_only_the_user_knows_is_passed_on(settings):
-    told = settings("train", "+optimiser.amsgrad=true", "optimiser.lr=0.5")
-    assert told.optimiser.values() == {"lr": 0.5, "amsgrad": True}
-    made = told.optimiser.make([torch.nn.Parameter(torch.ones(1))])
+    told = settings("train", "+optimizer.amsgrad=true", "optimizer.lr=0.5")
+    assert told.optimizer.values() == {"lr": 0.5, "amsgrad": True}
+    made = told.optimizer.make([torch.nn.Parameter(torch.ones(1))])
     assert made.defaults["amsgrad"] is True
 
 

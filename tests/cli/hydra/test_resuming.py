@@ -9,6 +9,7 @@ from omegaconf import OmegaConf
 
 from drone_rl.cli.hydra import resuming
 from drone_rl.cli.hydra.resuming import check_folder, complete, note_settings, resume_command
+from drone_rl.sweeps.manifest import sweep_name
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.overrides import read_overrides
 
@@ -95,3 +96,18 @@ def test_the_command_to_resume_repeats_what_no_file_may_set(typed, tmp_path):
 def test_no_run_to_go_on_with(tmp_path):
     with pytest.raises(InputError, match="folder of a run"):
         complete([f"resume={tmp_path}"])
+
+
+def test_a_setting_has_its_former_name_on_command_lines(run):
+    assert complete(["optimiser=sgd", "optimiser.lr=1"]) == ["optimizer=sgd", "optimizer.lr=1"]
+
+
+def test_a_sweep_goes_on_in_the_folder_with_the_former_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    typed = ["-m", "optimizer.lr=1,2"]
+    assert "optimizer.lr" in complete(typed)[-1]
+    older = sweep_name(["-m", "optimiser.lr=1,2"])
+    (tmp_path / "outputs" / "train" / "multiruns" / older).mkdir(parents=True)
+    assert complete(typed)[-1].endswith(f"/multiruns/{older}")
+    assert complete(["-m", "optimiser.lr=1,2"])[-1] == complete(typed)[-1]
+    assert "optimizer.lr" in complete([*typed, "paths.outputs=elsewhere"])[-1]
