@@ -6,6 +6,7 @@ import sys
 from typing import Any
 
 import drone_rl
+from drone_rl.cli.commands import COMMANDS, TABLE
 from drone_rl.utils.imports import leave_compiler_unloaded
 from drone_rl.utils.memory import look_for_garbage_rarely
 
@@ -15,22 +16,8 @@ drone-rl: train, evaluate and audit vision policies of a drone.
 usage: drone-rl COMMAND [setting=value ...]
 
 commands
-  demo       train with the defaults, then evaluate, film and explain the result
-  train      train a policy; writes checkpoints and logs under outputs/train
-  evaluate   evaluate a policy in held-out environments: table, JSON, videos
-  play       film a policy, or watch it in dm_control's viewer
-  explain    explain what a policy has learned, and what to trust, in an HTML report
-  report     build the report of explanations again, or one report of several policies
-  verdict    judge a policy: good, poor or one-sided, proved or not; JSON and an exit status
-  prove      verify a policy for all placements of the cubes; writes a certificate
-  check      check a certificate by new rollouts; JSON and an exit status
-  places     map a policy's decisions over the positions of one cube
-  shifts     measure robustness to light, camera, object sizes, faults and motion
-  bodies     compare verdicts under several vehicle dynamics, winds and camera mounts
-  chain      compute the exact probability of each outcome under sampled actions
-  export     write a policy as safetensors with a model card, or as an ONNX model
-  sweep-report  compare the runs of a sweep: CSV, JSON, one HTML page
-  bench      measure the figures in the README
+  demo          train with the defaults, then evaluate, film and explain the result
+{commands}
 
 examples
   drone-rl train                       train with the defaults
@@ -39,9 +26,10 @@ examples
   drone-rl train resume=RUN_FOLDER     resume an interrupted run
   drone-rl evaluate                    evaluate the newest policy
   drone-rl explain policy=good         explain a policy of the package
-  drone-rl COMMAND --help              every setting of a command
+  drone-rl COMMAND --help              the most used settings of a command, and examples
+  drone-rl COMMAND --help all          every setting of a command
   drone-rl --version                   the version
-"""
+""".format(commands="\n".join(f"  {name:<12}  {entry['about']}" for name, entry in TABLE.items()))
 DEMO_USAGE = """\
 drone-rl demo [setting=value ...]
 
@@ -52,20 +40,6 @@ Runs three commands, each with its own folder under outputs/:
 
 The settings are those of drone-rl train; drone-rl train --help lists them.
 """
-COMMANDS = {
-    "train": "train",
-    **dict.fromkeys(("evaluate", "play"), "evaluation"),
-    **dict.fromkeys(("explain", "report"), "explanation"),
-    "verdict": "evaluation",
-    **dict.fromkeys(("prove", "check", "places"), "verification"),
-    **dict.fromkeys(("shifts", "bodies"), "evaluation"),
-    "chain": "verification",
-    "export": "evaluation",
-    "sweep-report": "sweep_report",
-    "bench": "bench",
-}
-"""Module in `drone_rl.cli` of each command; `demo` runs three of them."""
-
 CLOSED = 128 + 13
 """Exit status when standard output is closed, as of a program that SIGPIPE ends."""
 
@@ -92,15 +66,19 @@ def _let_output_go() -> None:
 
 def _main(args: list[str]) -> int:
     """Run a command line; return the exit status."""
+    if args[:1] == ["help"] and len(args) > 1:
+        args = [args[1], "--help", *args[2:]]
     if not args or args[0] in ("-h", "--help", "help"):
         print(USAGE)
         return 0
-    if args[0] in ("-V", "--version"):
+    if {"-V", "--version"} & set(args) or args == ["version"]:
         print(f"drone-rl {drone_rl.__version__}")
         return 0
     name, overrides = args[0], args[1:]
     if name not in ("demo", *COMMANDS):
-        sys.exit(f"error: command {name!r} is unknown; use one of: demo, {', '.join(COMMANDS)}")
+        from drone_rl.cli.hydra.words import no_command  # slow: imports Hydra
+
+        sys.exit(f"error: {no_command(name, overrides, ['demo', *COMMANDS])}")
     if name == "demo" and {"-h", "--help"} & set(overrides):
         print(DEMO_USAGE)
         return 0

@@ -9,6 +9,7 @@ from typing import Any
 import drone_rl
 from drone_rl.config.commands import PathsSettings
 from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
+from drone_rl.utils.files import newest
 from drone_rl.utils.settings import Settings
 
 _log = logging.getLogger(__name__)
@@ -28,6 +29,14 @@ class CommandSettings(Settings):
     def run(self, folder: Path) -> tuple[int, object]:
         """Run the command; return the exit status and the value that a sweep maximises."""
         raise NotImplementedError
+
+    def used_policy(self, folder: Path) -> str:
+        """Return what `policy=` takes for the policy that the command, now finished, acted on."""
+        del folder
+        which = getattr(self, "policy", None) or "latest"
+        which = which if isinstance(which, str) else which[0]
+        last = newest(Path(self.paths.outputs).glob("train/**/checkpoints/last.pt"))
+        return str(last.parents[1]) if which == "latest" and last is not None else which
 
 
 class PolicyCommandSettings(CommandSettings):

@@ -19,6 +19,7 @@ from drone_rl.cli.hydra.launchers import (
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.training import Logger, Tensorboard, TrainSettings
+from drone_rl.sweeps.manifest import read_result
 from drone_rl.utils.progress import silent
 from drone_rl.utils.schema import Instance, Several, Whole
 from drone_rl.verification.text import found
@@ -47,8 +48,13 @@ class TrainCommand(CommandSettings, TrainSettings):
         register_plugins(LocalLauncher, SlurmLauncher, RayLauncher, OptunaSweeper)
         return resuming.complete(overrides)
 
+    def used_policy(self, folder: Path) -> str:
+        """Return the folder of the run."""
+        return str(folder)
+
     def run(self, folder: Path) -> tuple[int, float]:
         """Train one policy; return the exit status and the running mean of rewards."""
+        before = read_result(folder) if self.resume is not None else None
         train = drone_rl.train  # slow to import; not needed by a sweep
         if self.provable.rounds:
             train = functools.partial(drone_rl.train_until_proved, how=self.provable)
@@ -67,6 +73,12 @@ class TrainCommand(CommandSettings, TrainSettings):
         _log.info("run folder: %s", folder)
         for row in done.result.get("rounds", ()):
             _log.info(found(row))
+        if before is not None and before.get("frames") == done.result["frames"]:
+            _log.info(
+                "the run is already finished (%s, %s frames); to train longer, give a larger "
+                "trainer.total_frames",
+                *(done.reason, f"{done.result['frames']:,}"),
+            )
         if not done.reason.startswith("SIG"):
             return 0, done.running_reward
         _log.info("resume with: %s", resuming.resume_command(folder))

@@ -16,7 +16,7 @@ from drone_rl.config import (
     TaskSettings,
     named_settings,
 )
-from drone_rl.utils.errors import InputError
+from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.schema import as_mapping, shown
 from drone_rl.utils.settings import (
     Settings,
@@ -94,7 +94,8 @@ class Variant(Settings):
                 return variants[name]
         raise InputError(
             f"{where}={shown(name)} is not registered; there are: {', '.join(variants)}; if it is "
-            f"a part of your own, give plugins=[MODULE] with the module that registers it"
+            "a part of your own, give plugins=[MODULE] with the module that registers it"
+            f"{did_you_mean(name, variants)}"
         )
 
     @classmethod
@@ -147,7 +148,7 @@ def from_config(cls: type[S], config: Any, where: str = "") -> S:
     """
     given = present_names(cls, as_mapping(config, where or "settings"))
     prefix = f"{where}." if where else ""
-    check_names(cls, given)
+    check_names(cls, given, prefix)
     values = {name: _read(types_of(cls)[name], given[name], prefix + name) for name in given}
     if not where:
         return cls(**values)
@@ -258,8 +259,8 @@ class Changes:
         given = as_mapping(value, where)
         for name in given:
             if name not in self.types:
-                known = ", ".join(self.types)
-                raise InputError(f"{where}.{name} is unknown; there are: {known}")
+                known, meant = ", ".join(self.types), did_you_mean(name, self.types)
+                raise InputError(f"{where}.{name} is unknown; there are: {known}{meant}")
         given = {name: v for name, v in given.items() if v is not None}
         if self.of is None:
             return given

@@ -5,7 +5,7 @@ import random
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 
-from drone_rl.utils.errors import InputError
+from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.schema import Real, Several, Whole, as_mapping, shown
 from drone_rl.utils.settings import Settings
 
@@ -65,7 +65,8 @@ def add_task(settings: S) -> S:
 def settings_of(name: object, where: str = "task.name") -> type[BaseTaskSettings]:
     """Return the class of a task's settings; `where` is the setting's name for messages."""
     if not isinstance(name, str) or name not in TASKS:
-        raise InputError(f"{where}={shown(name)} is unknown; there are: {', '.join(TASKS)}")
+        meant = did_you_mean(name, TASKS)
+        raise InputError(f"{where}={shown(name)} is unknown; there are: {', '.join(TASKS)}{meant}")
     return TASKS[name]
 
 

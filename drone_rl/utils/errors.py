@@ -1,6 +1,8 @@
 """Errors that a user can correct."""
 
+import difflib
 import importlib
+from collections.abc import Iterable
 from typing import Any
 
 
@@ -10,6 +12,12 @@ class InputError(ValueError):
     The message is one line with the value and the remedy. The command line prints it without a
     traceback and exits with a non-zero status; any other exception is a bug.
     """
+
+
+def did_you_mean(name: object, known: Iterable[str]) -> str:
+    """Return the end of a message with the known name that is most like an unknown one."""
+    near = difflib.get_close_matches(str(name)[:100], [*known], 1, 0.7)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 def extra(module: str, name: str, setting: str) -> Any:

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
-from drone_rl.utils.errors import InputError
+from drone_rl.utils.errors import InputError, did_you_mean
 
 LONGEST_TEXT = 4000
 """Characters of one text in a file."""
@@ -110,7 +110,10 @@ class OneOf:
     def read(self, value: Any, where: str) -> str:
         """See `Kind`."""
         if not isinstance(value, str) or value not in self.names:
-            raise InputError(f"{where}={shown(value)} is unknown; give {', '.join(self.names)}")
+            meant = did_you_mean(value, self.names)
+            raise InputError(
+                f"{where}={shown(value)} is unknown; give {', '.join(self.names)}{meant}"
+            )
         return value
 
 

@@ -13,7 +13,7 @@ import typing
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Self, TypeVar
 
-from drone_rl.utils.errors import InputError
+from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.schema import Flag, Instance, Kind, Maybe, Record, Text, as_mapping
 
 S = TypeVar("S", bound="Settings")
@@ -108,11 +108,13 @@ def types_of(cls: type[Settings]) -> Mapping[str, Any]:
     return {field.name: hints[field.name] for field in dataclasses.fields(cls)}
 
 
-def check_names(cls: type[Settings], given: Mapping[str, Any]) -> None:
+def check_names(cls: type[Settings], given: Mapping[str, Any], prefix: str = "") -> None:
     """Raise an `InputError` for names that are no settings; it lists those that exist."""
+    known = kinds_of(cls)
     for name in given:
-        if name not in kinds_of(cls):
-            raise InputError(f"{name} is unknown; there are: {', '.join(kinds_of(cls))}")
+        if name not in known:
+            meant = did_you_mean(name, known)
+            raise InputError(f"{prefix}{name} is unknown; there are: {', '.join(known)}{meant}")
 
 
 def present_names(cls: type[Settings], given: Mapping[str, Any]) -> dict[str, Any]:

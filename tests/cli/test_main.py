@@ -13,6 +13,8 @@ from tests.cli.running import TINY, drone_rl, error_line
 def test_usage_and_help(tmp_path):
     assert drone_rl("--help", cwd=tmp_path).stdout.strip() == USAGE.strip()
     help_text = drone_rl("train", "--help", cwd=tmp_path).stdout
+    assert "task.num_cubes=3\n      Cubes placed in every episode." in help_text
+    help_text = drone_rl("train", "--help", "all", cwd=tmp_path).stdout
     assert "optimizer: adam, sgd" in help_text
     assert "# Cubes placed in every episode." in help_text
     assert "num_cubes: 3" in help_text
@@ -22,6 +24,7 @@ def test_usage_and_help(tmp_path):
     ("args", "printed"),
     [
         (["--version"], f"drone-rl {drone_rl_package.__version__}"),
+        (["train", "--version"], f"drone-rl {drone_rl_package.__version__}"),
         (["-V"], f"drone-rl {drone_rl_package.__version__}"),
         (["demo", "--help"], DEMO_USAGE),
         (["demo", "seed=1", "-h"], DEMO_USAGE),
@@ -41,13 +44,13 @@ def test_what_is_printed_without_running_anything(monkeypatch, capsys, tmp_path,
     ("args", "words"),
     [
         (["trian"], ["trian", "train"]),
-        (["train", "sed=1"], ["sed", "--help"]),
-        (["train", "task.num_cubs=1"], ["num_cubs"]),
+        (["train", "sed=1"], ["sed=1", "did you mean seed=1?", "--help all"]),
+        (["train", "task.num_cubs=1"], ["num_cubs", "task.num_cubes=1"]),
         (["train", "task.num_cubes=three"], ["three"]),
         (["train", "task.spacing=-9"], ["spacing=-9", "from 0.001"]),
-        (["train", "policy=resnet"], ["network/resnet", "small_cnn"]),
-        (["train", "returns.gamma=high"], ["gamma=high", "Float"]),
-        (["evaluate", "episodes=many"], ["episodes=many", "Integer"]),
+        (["train", "policy=resnet"], ["network=resnet", "small_cnn"]),
+        (["train", "returns.gamma=high"], ["gamma=high", "a number", "gamma=0.95"]),
+        (["evaluate", "episodes=many"], ["episodes=many", "a whole number", "episodes=1000"]),
         (
             ["train", *(f"transforms.resize.{side}=2" for side in ("height", "width"))],
             ["2x2", "too small"],
@@ -58,16 +61,16 @@ def test_what_is_printed_without_running_anything(monkeypatch, capsys, tmp_path,
         (["train", "hydra.run.dir=/dev/null/x"], ["/dev/null"]),
         (["evaluate"], ["policy=latest", "drone-rl train"]),
         (["evaluate", "checkpoint=no.pt"], ["no.pt", "does not exist"]),
-        (["train", "-m", "no_such=1,2"], ["no_such", "--help"]),
+        (["train", "-m", "no_such=1,2"], ["no_such=1,2", "--help all"]),
         (["train", "-m", "seed=0,1", "hydra.launcher.num_jobs=0"], ["num_jobs=0", "at least 1"]),
         (["train", "-m", "seed=0,1", "hydra/launcher=pbs"], ["pbs", "slurm"]),
-        (["train", "-m", "seed=interval(0,1)"], ["INTERVAL", "hydra/sweeper=optuna"]),
+        (["train", "-m", "seed=interval(0,1)"], ["interval(0,1)", "hydra/sweeper=optuna"]),
         (["sweep-report"], ["folder=latest", "drone-rl train -m"]),
         (["sweep-report", "no/such"], ["no/such", "sweep.json"]),
         (["bench", "speed"], ["speed", "render"]),
         (["train", "task=base_task"], ["base_task", "collect_cubes, collect_one, pillars"]),
-        (["train", "sweep=nope"], ["sweep/nope", "learning_rate"]),
-        (["train", "task=nope"], ["task/nope", "one of: collect_cubes, collect_one, pillars"]),
+        (["train", "sweep=nope"], ["sweep=nope", "learning_rate"]),
+        (["train", "task=nope"], ["task=nope", "one of: collect_cubes, collect_one, pillars"]),
         (["train", "-m", "task=collect_one,base_task"], ["base_task", "collect_one"]),
     ],
 )

@@ -96,7 +96,7 @@ def test_mistakes_are_one_line(folder):
         (["plugins=[nowhere]"], "plugins=nowhere can't be imported"),
         (["plugins=[my_parts]", "network=cells", "network.row=3"], "network.row"),
         (["plugins=[my_parts]", "network=cells", "network.rows=many"], "network.rows"),
-        (["network=cells"], "could not find network/cells"),
+        (["network=cells"], "network=cells is unknown"),
     ):
         assert told in error_line(drone_rl("train", *TINY, *given, cwd=folder))
 

@@ -120,6 +120,17 @@ def test_cuda_without_a_gpu(in_process):
     assert "give device=cpu" in error_line(in_process("train", "device=cuda"))
 
 
+def test_resuming_a_finished_run_says_so(run, in_process, tmp_path, caplog):
+    folder = shutil.copytree(run, tmp_path / "copy")
+    caplog.set_level("INFO")
+    assert in_process("train", f"resume={folder}").returncode == 0
+    assert "already finished (frames, " in caplog.text
+    assert "give a larger trainer.total_frames" in caplog.text
+    caplog.clear()
+    assert in_process("train", f"resume={folder}", "trainer.total_frames=900").returncode == 0
+    assert "already finished" not in caplog.text
+
+
 def test_resume_with_a_changed_setting(run, in_process):
     before = (run / "checkpoints" / "last.pt").read_bytes()
     line = error_line(in_process("train", f"resume={run}", "optimizer.lr=0.5", cwd=run))

@@ -18,11 +18,15 @@ from hydra._internal.hydra import Hydra
 from hydra.core import utils as hydra_utils
 from hydra.core.config_store import ConfigStore
 from hydra.core.hydra_config import HydraConfig
+from hydra.errors import HydraException
 from hydra.types import RunMode
 from omegaconf import MISSING, DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
 
-from drone_rl.cli.hydra.help import check_choices, show_help
-from drone_rl.cli.hydra.messages import is_output_closed, one_line
+from drone_rl.cli.hydra.help import next_steps, show_help
+from drone_rl.cli.hydra.messages import input_error, is_output_closed, one_line
+from drone_rl.cli.hydra.mistakes import check_choices, explain, whole_numbers
+from drone_rl.cli.hydra.words import check_words
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config import (
     TASKS,
@@ -196,21 +200,27 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
 
     `name` is that of its file in conf/. `command.prepare` translates the overrides first.
     """
-    overrides = command.prepare(overrides)
-    check_choices(overrides, conf_dir())
+    is_help = bool({"--help", "-h"} & set(overrides))
+    is_all = is_help and "all" in overrides
+    words = [word for word in overrides if not (is_all and word == "all")]
+    overrides = command.prepare([*map(whole_numbers, words)])
     import_plugins(overrides)
     register_schemas(**{name: command})
-    if {"--help", "-h"} & set(overrides):
-        show_help(name, conf_dir(), overrides)
+    check_choices(overrides, conf_dir())
+    if is_help:
+        with _explained(name, overrides):
+            show_help(name, conf_dir(), overrides, command, is_all=is_all)
         return 0
+    check_words(name, conf_dir(), overrides)
     statuses: list[int] = []
-    job = _job(name, command, statuses)
+    job = _job(name, command, statuses, overrides)
     wrapped = hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name=name)(job)
     argv = sys.argv
     sys.argv = [f"drone-rl {name.replace('_', '-')}", *overrides]
     mode = Hydra.get_mode if _may_be_multirun(name, overrides) else lambda *_, **__: RunMode.RUN
     try:
         with (
+            _explained(name, overrides),
             _replaced(Hydra, "get_mode", mode),
             _replaced(hydra_utils, "_save_config", _save_named),
         ):
@@ -227,6 +237,17 @@ def _may_be_multirun(name: str, overrides: Sequence[str]) -> bool:
     """
     text = (conf_dir() / f"{name}.yaml").read_text()
     return any(map(_MULTIRUN_WORDS.search, overrides)) or bool(_MULTIRUN_TEXT.search(text))
+
+
+@contextlib.contextmanager
+def _explained(name: str, overrides: Sequence[str]) -> Iterator[None]:
+    """Raise an `InputError` for settings that Hydra or OmegaConf rejects."""
+    try:
+        yield
+    except (HydraException, OmegaConfBaseException) as error:
+        if input_error(error) is not None:
+            raise
+        raise explain(error, name, conf_dir(), overrides) from error
 
 
 @contextlib.contextmanager
@@ -257,14 +278,18 @@ def read_settings(cls: type[Settings], config: DictConfig) -> Any:
 
 
 def _job(
-    name: str, command: type[CommandSettings], statuses: list[int]
+    name: str, command: type[CommandSettings], statuses: list[int], overrides: Sequence[str] = ()
 ) -> Callable[[DictConfig], object]:
     """Return the function that Hydra calls for each run."""
 
     def job(config: DictConfig) -> object:
         try:
-            settings = read_settings(command, config)
-            status, value = settings.run(Path(HydraConfig.get().runtime.output_dir))
+            with _explained(name, overrides):
+                settings = read_settings(command, config)
+            folder = Path(HydraConfig.get().runtime.output_dir)
+            status, value = settings.run(folder)
+            if status < 128 and sys.stdout.isatty():  # for people; pipes get the results alone
+                print(next_steps(name.replace("_", "-"), settings.used_policy(folder), folder))
         except (InputError, OSError) as error:  # one bad run of a sweep leaves the others alone
             if isinstance(error, BrokenPipeError) and is_output_closed():
                 raise

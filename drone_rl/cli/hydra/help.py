@@ -1,48 +1,98 @@
-"""`drone-rl COMMAND --help`, and the choices of configuration groups."""
+"""`drone-rl COMMAND --help`."""
 
 import re
+import shlex
+import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import yaml
-from hydra import compose, initialize_config_dir
-from hydra.core.global_hydra import GlobalHydra
 from omegaconf import OmegaConf
 
-from drone_rl.utils.errors import InputError
+from drone_rl.cli.commands import TABLE
+from drone_rl.cli.hydra.mistakes import composed
+from drone_rl.utils.settings import Settings, kinds_of
 
 _KNOB = re.compile(r"(?P<indent> *)(?P<name>[A-Za-z_]\w*):(?= |$)")
 _NOT_SHOWN = ("hydra", "paths")
 """Groups without choices for users."""
-_EXAMPLES = """\
-examples
-  drone-rl train seed=1 optimizer.lr=2e-3        change settings
-  drone-rl train experiment=smoke                a ready-made set of settings
-  drone-rl train -m seed=0,1,2                   several runs, side by side
-  drone-rl evaluate policy=latest                evaluate the newest policy"""
+_WIDTH = 100
+_LONGEST_VALUE = 60
+_RUN_FOLDER = "Folder of this command's files; a new one under outputs/ by default."
 
 
-def show_help(command: str, conf: Path, overrides: Sequence[str]) -> None:
-    """Print the settings of a command, the name of a file in `conf`, with their values."""
-    typed = [o for o in overrides if not o.startswith("-")]
-    GlobalHydra.instance().clear()
-    with initialize_config_dir(str(conf), version_base="1.3"):
-        config = compose(command, typed, return_hydra_config=True)
+def show_help(
+    command: str,
+    conf: Path,
+    overrides: Sequence[str],
+    settings: type[Settings],
+    *,
+    is_all: bool = False,
+) -> None:
+    """Print the most used settings of a command, or all, and examples.
+
+    `command` is the name of its file in `conf`; `settings` is its class.
+    """
+    typed = [o for o in overrides if "=" in o or o.startswith("~")]
+    config = composed(command, conf, typed)
     choices = config.hydra.runtime.choices
     chosen = {k: v for k, v in choices.items() if "/" not in k and "@" not in k}
     values: Any = OmegaConf.to_container(config, resolve=False)
     del values["hydra"]
-    print(f"drone-rl {command.replace('_', '-')} [setting=value ...]\n")
-    print((conf / f"{command}.yaml").read_text().split("\ndefaults:")[0], end="\n\n")
+    meanings = comments(command, conf, chosen)
     groups = {g: sorted(p.stem for p in (conf / g).glob("*.yaml")) for g in chosen}
-    lines = [f"  {g}: {', '.join(f)}" for g, f in groups.items() if f and g not in _NOT_SHOWN]
-    if lines:
-        print("Groups, each chosen by the name of a file:", *lines, "", sep="\n")
-    print("Settings, as they would be used now:")
-    for line in explained(values, comments(command, conf, chosen)):
-        print(f"  {line}")
-    print(f"\n{_EXAMPLES}")
+    groups = {g: names for g, names in groups.items() if names and g not in _NOT_SHOWN}
+    name = command.replace("_", "-")
+    print(f"drone-rl {name} [setting=value ...]\n")
+    print((conf / f"{command}.yaml").read_text().split("\ndefaults:")[0], end="\n\n")
+    if is_all:
+        if groups:
+            lines = [f"  {g}: {', '.join(names)}" for g, names in groups.items()]
+            print("Groups, each chosen by the name of a file:", *lines, "", sep="\n")
+        print("Settings, as they would be used now:")
+        for line in explained(values, meanings):
+            print(f"  {line}")
+    else:
+        print(f"Most used settings, with their values (drone-rl {name} --help all lists all):")
+        meanings |= {g: f"One of: {', '.join(names)}." for g, names in groups.items()}
+        meanings["hydra.run.dir"] = _RUN_FOLDER
+        for key in TABLE[name]["settings"]:
+            value = chosen[key] if key in chosen else OmegaConf.select(config, key)
+            shown = "FOLDER" if key == "hydra.run.dir" else _value(value)
+            unit = _unit(settings, key.split("."))
+            shown = shown if len(shown) <= _LONGEST_VALUE else f"{shown[:_LONGEST_VALUE]}..."
+            print(f"  {key}={shown}" + (f"  ({unit})" if unit else ""))
+            text = " ".join(meanings.get(key, "").split())
+            print(textwrap.indent(textwrap.fill(text, _WIDTH - 6), " " * 6))
+    print("\nexamples")
+    for line, purpose in TABLE[name]["examples"]:
+        print(f"  {line:<55}  {purpose}")
+
+
+def next_steps(name: str, policy: str, folder: Path) -> str:
+    """Return the lines about the policy that a command used, and what a user may do next."""
+    quoted = {"policy": shlex.quote(policy), "folder": shlex.quote(str(folder))}
+    steps = [f"  {line.format(**quoted)}" for line in TABLE[name]["next"]]
+    is_used = any("{policy}" in line for line in TABLE[name]["next"])
+    lines = [f"policy: {policy}"] if is_used else []
+    return "\n".join([*lines, *(["next:", *steps] if steps else [])])
+
+
+def _value(value: Any) -> str:
+    """Return a value as YAML on one line."""
+    plain = OmegaConf.to_container(value) if OmegaConf.is_config(value) else value
+    return yaml.safe_dump(plain, default_flow_style=True, width=1000).splitlines()[0]
+
+
+def _unit(settings: Any, path: Sequence[str]) -> str:
+    """Return the unit of a setting, empty if it has none."""
+    kind: Any = kinds_of(settings).get(path[0])
+    if path[1:]:
+        inside = getattr(kind, "of", None)
+        is_settings = isinstance(inside, type) and issubclass(inside, Settings)
+        return _unit(inside, path[1:]) if is_settings else ""
+    return getattr(getattr(kind, "kind", kind), "unit", "")
 
 
 def explained(values: Any, meanings: dict[str, str], prefix: str = "") -> Iterator[str]:
@@ -58,8 +108,7 @@ def explained(values: Any, meanings: dict[str, str], prefix: str = "") -> Iterat
             yield f"{indent}{name}:"
             yield from explained(value, meanings, f"{prefix}{name}.")
         else:
-            shown = yaml.safe_dump(value, default_flow_style=True, width=1000)
-            yield f"{indent}{name}: {shown.splitlines()[0]}"
+            yield f"{indent}{name}: {_value(value)}"
 
 
 def comments(command: str, conf: Path, chosen: dict[str, str | None]) -> dict[str, str]:
@@ -104,47 +153,3 @@ def _with_parents(path: Path) -> Iterator[Path]:
         if isinstance(entry, str) and entry != "_self_":
             yield from _with_parents(path.with_name(f"{entry}.yaml"))
     yield path
-
-
-SCHEMA = "base_"
-"""Prefix of schemas' names, see `drone_rl.cli.hydra.composition`."""
-_NOT_FOUND = re.compile(
-    r"Could not find '(?P<what>[^']+)' Available options in '[^']+': (?P<all>.*)"
-)
-_SEARCH_PATH = re.compile(r" ?Config search path: .*")
-_OWN_FOLDERS = ("--config-dir", "-cd", "hydra.searchpath")
-"""Options that add folders of the user."""
-
-
-def check_choices(overrides: Sequence[str], conf: Path) -> None:
-    """Raise an `InputError` for a schema or unknown sweep as a choice, which Hydra accepts."""
-    has_own = any(override.startswith(_OWN_FOLDERS) for override in overrides)
-    for override in overrides:
-        key, _, value = override.partition("=")
-        group = key.lstrip("+").partition("@")[0]
-        if not (conf / group).is_dir() or group.startswith((".", "/")) or not group:
-            continue
-        names = [name.strip() for name in value.split(",")]
-        wrong = [name for name in names if name.startswith(SCHEMA)]
-        if group == "sweep" and not has_own:
-            wrong += [
-                n for n in names if n != "null" and not (conf / group / f"{n}.yaml").is_file()
-            ]
-        if wrong:
-            offered = sorted(path.stem for path in (conf / group).glob("*.yaml"))
-            raise InputError(_message(f"{group}/{wrong[0]}", offered))
-
-
-def without_schemas(text: str) -> str:
-    """Remove schemas and the search path from a message of Hydra."""
-    text = _SEARCH_PATH.sub("", text)
-    found = _NOT_FOUND.search(text)
-    if found is None:
-        return text
-    offered = [name for name in found["all"].split() if not name.startswith(SCHEMA)]
-    return _message(found["what"], offered)
-
-
-def _message(what: str, offered: Sequence[str]) -> str:
-    group, _, name = what.rpartition("/")
-    return f"could not find {what} ({group}={name}); give one of: {', '.join(offered)}"

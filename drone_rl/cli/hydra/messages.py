@@ -14,7 +14,6 @@ from hydra.errors import HydraException
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from drone_rl.cli.hydra.help import without_schemas
 from drone_rl.utils.errors import InputError
 
 MISTAKES = (InputError, HydraException, OmegaConfBaseException, OSError)
@@ -32,8 +31,6 @@ _REMEDIES = {
     ),
 }
 """What to do about an error of the file system, by its number."""
-_UNKNOWN = ("is not in struct", "Could not override", "Could not load")
-"""Parts of Hydra's messages about names that don't exist."""
 
 
 def guarded(command: Callable[[], int]) -> int:
@@ -103,21 +100,19 @@ def file_error(error: OSError) -> str:
     return "".join(c if c.isprintable() else "?" for c in text)
 
 
+def input_error(error: BaseException) -> InputError | None:
+    """Return the first `InputError` of an error and its causes."""
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, InputError):
+        cause = cause.__cause__ or cause.__context__
+    return cause
+
+
 def one_line(error: BaseException) -> str:
     """Return the most specific message of an error and its causes on one line."""
-    cause: BaseException | None = error
-    while cause is not None:
-        if isinstance(cause, InputError):
-            return "".join(c if c.isprintable() else "?" for c in str(cause))
-        cause = cause.__cause__ or cause.__context__
+    if (ours := input_error(error)) is not None:
+        return "".join(c if c.isprintable() else "?" for c in str(ours))
     for cause in (error, error.__cause__):
         if isinstance(cause, OSError) and not isinstance(cause, HydraException):
             return file_error(cause)  # Hydra's error of an unknown choice is an OSError, too
-    text = without_schemas(" ".join(str(error).split())) or type(error).__name__
-    if isinstance(error.__cause__, OmegaConfBaseException):
-        text += f": {str(error.__cause__).splitlines()[0]}"
-    if any(said in text for said in _UNKNOWN):
-        text += "; see drone-rl COMMAND --help for the names that exist"
-    if "does not support sweep type" in text:
-        text += "; to search an interval, add hydra/sweeper=optuna"
-    return text
+    return " ".join(str(error).split()) or type(error).__name__

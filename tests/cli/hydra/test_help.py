@@ -6,7 +6,17 @@ from pathlib import Path
 import pytest
 from omegaconf import OmegaConf
 
-from drone_rl.cli.hydra.help import _with_parents, comments, explained, read_comments, show_help
+from drone_rl.cli.commands import TABLE
+from drone_rl.cli.hydra.composition import register_schemas
+from drone_rl.cli.hydra.help import (
+    _with_parents,
+    comments,
+    explained,
+    read_comments,
+    show_help,
+)
+from drone_rl.cli.hydra.mistakes import composed
+from drone_rl.cli.main import find_command
 from tests.cli.hydra.conftest import FILES
 
 CONF = Path(__file__).parents[3] / "conf"
@@ -43,7 +53,7 @@ def test_values_stand_below_their_comments():
 
 @pytest.mark.parametrize("command", FILES)
 def test_every_knob_of_every_command_is_explained(command, config, capsys):
-    show_help(command, CONF, ["--help"])
+    show_help(command, CONF, ["--help"], find_command(command.replace("_", "-")), is_all=True)
     lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
     told = lines[lines.index("Settings, as they would be used now:") :]
     for before, line in itertools.pairwise(told):
@@ -63,3 +73,37 @@ def test_every_knob_of_every_file_has_a_comment(path):
         if name == "defaults" or isinstance(value, dict):
             continue
         assert name.startswith("_") or name in found, name
+
+
+@pytest.mark.parametrize("command", FILES)
+def test_help_begins_with_the_most_used_settings(command, config, capsys):
+    name = command.replace("_", "-")
+    show_help(command, CONF, ["--help"], find_command(name))
+    lines = capsys.readouterr().out.splitlines()
+    shown = [line.strip().partition("=")[0] for line in lines if line[:3].strip() and "=" in line]
+    assert [key for key in shown if key in TABLE[name]["settings"]] == TABLE[name]["settings"]
+    assert f"drone-rl {name} --help all" in "\n".join(lines)
+    settings = lines[2 + lines.index("") : lines.index("examples")]
+    assert len(settings) < 60 and max(map(len, settings)) <= 100
+    values = [i for i, line in enumerate(lines) if line.startswith("  ") and line[2] != " "]
+    assert all(lines[i + 1].startswith("      ") for i in values if i < lines.index("examples"))
+
+
+def test_help_shows_units_defaults_and_choices(config, capsys):
+    show_help("train", CONF, ["--help", "seed=7"], find_command("train"))
+    text = capsys.readouterr().out
+    assert "  trainer.total_frames=2000000  (frames)\n      Stop once" in text
+    assert "  seed=7\n" in text
+    assert "  objective=reinforce\n      One of: a2c, ppo, reinforce.\n" in text
+    assert "drone-rl evaluate" not in text
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_examples_are_command_lines_of_the_command(name):
+    command, lines = name.replace("-", "_"), [line for line, _ in TABLE[name]["examples"]]
+    register_schemas(**{command: find_command(name)})
+    for line in lines:
+        first, second, *words = line.split()
+        assert (first, second) == ("drone-rl", name)
+        typed = find_command(name).prepare([w for w in words if "resume=" not in w])
+        composed(command, CONF, [w for w in typed if not w.startswith("-") and "," not in w])

@@ -10,7 +10,6 @@ from absl import logging as absl_logging
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException, MissingConfigException
 from omegaconf import OmegaConf
-from omegaconf.errors import OmegaConfBaseException
 
 from drone_rl.cli.hydra.messages import file_error, guarded, is_output_closed, one_line
 from drone_rl.utils.errors import InputError
@@ -32,45 +31,18 @@ def test_what_a_file_says_can_not_leave_its_line():
     assert one_line(InputError("a\nb\x1b[0m")) == "a?b?[0m"
 
 
-def test_hydras_where_and_omegaconfs_what():
-    what = OmegaConfBaseException("Value 'x' is no Integer\n  full_key: a")
-    assert one_line(raised(HydraException("Error merging a=x"), what)) == (
-        "Error merging a=x: Value 'x' is no Integer"
-    )
-
-
-@pytest.mark.parametrize(
-    ("text", "remedy"),
-    [
-        ("Could not override 'x'", "--help"),
-        ("Key 'x' is not in struct", "--help"),
-        ("In 'train': Could not load 'logger/wandb'.", "--help"),
-        ("BasicSweeper does not support sweep type: INTERVAL", "hydra/sweeper=optuna"),
-    ],
-)
-def test_what_hydra_leaves_out(text, remedy):
-    assert remedy in one_line(HydraException(text))
-
-
 def test_lines_of_other_libraries_are_hidden():
     absl_logging.set_verbosity(absl_logging.INFO)
     assert guarded(lambda: 0) == 0
     assert absl_logging.get_verbosity() == absl_logging.WARNING
 
 
-def test_an_unknown_choice_is_no_file(capsys):
-    text = (
-        "In 'train': Could not find 'task/pillarz'\n\nAvailable options in 'task':\n"
-        "\tbase_task\n\tpillars\nConfig search path:\n\tprovider=hydra, path=pkg://hydra.conf"
-    )
-
+def test_an_error_of_hydra_is_no_file(capsys):
     def command():
-        raise MissingConfigException(text, "task/pillarz")
+        raise MissingConfigException("In 'train':\n no task/pillarz", "task/pillarz")
 
     assert guarded(command) == 2
-    assert capsys.readouterr().err == (
-        "error: could not find task/pillarz (task=pillarz); give one of: pillars\n"
-    )
+    assert capsys.readouterr().err == "error: In 'train': no task/pillarz\n"
 
 
 def test_statuses(capsys):

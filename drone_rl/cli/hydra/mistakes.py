@@ -1,0 +1,282 @@
+"""Explain why Hydra rejected settings: one line with the value and what to type instead.
+
+Hydra's own messages are about its grammar and classes.
+"""
+
+import contextlib
+import difflib
+import re
+import shlex
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from hydra import compose, initialize_config_dir
+from hydra.core.config_store import ConfigStore
+from hydra.core.global_hydra import GlobalHydra
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Override
+from hydra.errors import HydraException
+from omegaconf import DictConfig, ListConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from drone_rl.sweeps.manifest import is_sweep, quoted
+from drone_rl.utils.errors import InputError
+
+OTHER_NAMES = tomllib.loads(Path(__file__).parent.with_name("names.toml").read_text("utf-8"))
+"""Names of other projects, and ours."""
+OWN_FOLDERS = ("--config-dir", "-cd", "hydra.searchpath")
+"""Options that add folders of the user, whose files are not known here."""
+SCHEMA = "base_"
+"""Prefix of schemas' names, see `drone_rl.cli.hydra.composition`."""
+
+_HYDRAS_OWN = ("hydra.run.dir", "hydra.sweep.dir", "hydra.launcher.num_jobs", "hydra.verbose")
+_EXPECTED = {
+    **dict.fromkeys(("integer", "int"), "a whole number"),
+    "float": "a number",
+    **dict.fromkeys(("boolean", "bool"), "true or false"),
+    **dict.fromkeys(("string", "str"), "a text"),
+}
+_TYPE = re.compile(r"(?:converted to|convert \S+ to|field of type|a valid) '?(?:Optional\[)?(\w+)")
+"""The type that a setting needs, in OmegaConf's messages."""
+_MAGNITUDES = {"k": 10**3, "m": 10**6, "g": 10**9}
+_TEXTS = re.compile(
+    r"[+~]*(hydra|paths|policy|policies|resume|certificate|explanations|folder|name|shifts|require)"
+)
+"""Settings whose values are names and paths."""
+_EXPONENT = re.compile(r"(?<=[=,\[(])(\d+(?:\.\d+)?[eE]\+?\d+)(?=[,\])]|$)")
+_LARGEST_WHOLE = 10**15
+
+
+def composed(command: str, conf: Path, typed: Sequence[str]) -> DictConfig:
+    """Compose the settings of a command, the name of a file in `conf`."""
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(conf), version_base="1.3"):
+        return compose(command, [*typed], return_hydra_config=True)
+
+
+def whole_numbers(override: str) -> str:
+    """Write whole numbers such as 1e5 without an exponent, as whole-number settings need them."""
+
+    def plain(found: re.Match[str]) -> str:
+        value = float(found[1])
+        return str(int(value)) if value.is_integer() and value < _LARGEST_WHOLE else found[1]
+
+    return override if _TEXTS.match(override) else _EXPONENT.sub(plain, override)
+
+
+def is_group(conf: Path, name: str) -> bool:
+    """Return whether a name is that of a folder of choices."""
+    return bool(name) and not name.startswith((".", "/")) and (conf / name).is_dir()
+
+
+def choices(conf: Path, group: str) -> list[str]:
+    """Return the choices of a group: names of its files, and parts of plug-ins."""
+    names = [path.name for path in (conf / group).glob("*.yaml")]
+    with contextlib.suppress(OSError):  # nothing is stored in the group
+        names += ConfigStore.instance().list(group)
+    names = {n.removesuffix(".yaml") for n in names if n.endswith(".yaml")}
+    return sorted(name for name in names if not name.startswith(SCHEMA))
+
+
+def check_choices(overrides: Sequence[str], conf: Path) -> None:
+    """Raise an `InputError` for the first unknown choice of a group."""
+    if any(override.startswith(OWN_FOLDERS) for override in overrides):
+        return
+    for override in overrides:
+        key, _, value = override.partition("=")
+        group = key.lstrip("+").partition("@")[0]
+        if not is_group(conf, group) or not re.fullmatch(r"[\w\s,'\"\[\].-]*", value):
+            continue
+        offered = choices(conf, group)
+        for name in re.split(r"[,\s'\"\[\]]+", value.strip("[] '\"")):
+            if name not in (*offered, "null"):
+                near = difflib.get_close_matches(name, offered, 1)
+                meant = f"did you mean {group}={near[0]}? " if near else ""
+                raise InputError(
+                    f"{group}={name} is unknown; {meant}give one of: {', '.join(offered)}"
+                )
+
+
+def closest(name: str, known: Sequence[str]) -> str | None:
+    """Return the known name that was most likely meant, or None."""
+    word = name.strip().lstrip("+~").replace("-", "_").lower()
+    last = word.rpartition(".")[2]
+    others = {
+        other: next((ours for ours in names if ours.partition("=")[0] in known), None)
+        for other, names in OTHER_NAMES["settings"].items()
+    }
+    by_last = {key.rpartition(".")[2]: key for key in reversed(known)}
+    for meant in (
+        word if word in known else None,
+        others.get(word),
+        others.get(last),
+        by_last.get(last),
+    ):
+        if meant:
+            return meant
+    if near := difflib.get_close_matches(word, known, 1, 0.8):
+        return near[0]
+    by_last = {**{other: ours for other, ours in others.items() if ours}, **by_last}
+    near = difflib.get_close_matches(last, by_last, 1, 0.75)
+    return by_last[near[0]] if near else None
+
+
+class Command:
+    """A command's settings, composed when a mistake has to be explained."""
+
+    def __init__(self, name: str, conf: Path, groups: Sequence[str] = ()) -> None:
+        self.name, self.conf = name.replace("_", "-"), conf
+        self.config = composed(name, conf, groups)
+        chosen = self.config.hydra.runtime.choices
+        self.groups = [g for g in chosen if "@" not in g and (conf / g).is_dir() and g != "hydra"]
+        own: Any = OmegaConf.to_container(self.config, resolve=False)
+        del own["hydra"]
+        self.keys = [*_flatten(own), *self.groups, *_HYDRAS_OWN]
+        self.list_all = f"drone-rl {self.name} --help all lists the settings"
+
+    def instead(self, name: str, value: str) -> str | None:
+        """Return the override that was most likely meant."""
+        ours = closest(name, self.keys)
+        return ours if ours is None or "=" in ours else f"{ours}={value or 'VALUE'}"
+
+    def unknown(self, override: str, name: str) -> InputError:
+        """Return the error about a name that this command doesn't have."""
+        value = override.partition("=")[2]
+        text = f"{override}: drone-rl {self.name} has no setting {name}; "
+        if ours := self.instead(name, value):
+            return InputError(f"{text}did you mean {ours}? ({self.list_all})")
+        prefix = f"{name.rpartition('.')[0]}."
+        inside = [k.removeprefix(prefix) for k in self.keys if k.startswith(prefix)]
+        listed = f"{prefix[:-1]} has: {', '.join(inside[:40])}" if inside else self.list_all
+        return InputError(text + listed)
+
+
+def _flatten(values: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    for name, value in values.items():
+        if not name.startswith("_"):
+            yield prefix + name
+            if isinstance(value, Mapping):
+                yield from _flatten(value, f"{prefix}{name}.")
+
+
+def explain(error: Exception, name: str, conf: Path, overrides: Sequence[str]) -> InputError:
+    """Return the error for a user whose settings Hydra or OmegaConf rejected."""
+    parsed: list[Override] = []
+    for word in (o for o in overrides if not o.startswith("-") and ("=" in o or o[:1] == "~")):
+        try:
+            parsed.append(OverridesParser.create().parse_override(word))
+        except HydraException:
+            return _syntax(word)
+    text = " ".join(str(error.__cause__ or error).split()).split(" full_key:")[0]
+    if key := re.search(r"Interpolation key '([^']*)'", text):
+        return InputError(f"${{{key[1]}}} refers to a setting that does not exist; give a value")
+    if not any(o.startswith(OWN_FOLDERS) for o in overrides):
+        groups = [o for o in parsed if is_group(conf, o.key_or_group)]
+        alone = [f"{o.key_or_group}={o.value()}" for o in groups if isinstance(o.value(), str)]
+        command = Command(name, conf, alone)
+        for override in parsed:
+            if found := _wrong(command, override, override in groups, is_sweep(overrides)):
+                return found
+        text = command.list_all
+    return InputError(f"{' '.join(overrides)}: these settings can't be read; {text}")
+
+
+def _syntax(word: str) -> InputError:
+    """Return the error about a setting whose value has characters with a meaning of their own."""
+    key, _, value = word.partition("=")
+    if value.startswith("="):
+        return InputError(f"{word} has two equals signs; type {key}={value.lstrip('=')}")
+    if re.search(r"\s[\w.]+=", value):
+        return InputError(f"{word!r} holds two settings in one pair of quotes; type: {word}")
+    if not re.fullmatch(r"(\+{0,2}|~)[A-Za-z_][\w./@-]*", key) or key.endswith("."):
+        fixed = re.sub(r"[^\w./@]", "_", key.strip()).strip("._")
+        return InputError(f"{word}: {key!r} is no name of a setting; type {fixed}={value}")
+    if value.startswith("~"):
+        return InputError(f"{word}: the shell left ~ as it is; type {key}=$HOME{value[1:]}")
+    if found := re.fullmatch(r"\((.*)\)", value):
+        return InputError(f"{word}: lists have square brackets; type {key}=[{found[1]}]")
+    closed = in_quotes(f"{key}={quoted(value)}")
+    return InputError(f"{word}: {value!r} has special characters, which need quotes; type {closed}")
+
+
+def in_quotes(text: str) -> str:
+    """Quote a text for a shell, in double quotes if that is easier to read."""
+    is_simple = "'" in text and not {*text} & {*'"$`\\!'}
+    return f'"{text}"' if is_simple else shlex.quote(text)
+
+
+def _wrong(
+    command: Command, override: Override, is_choice: bool, is_several: bool
+) -> InputError | None:
+    """Return the error about a setting that the command doesn't accept, or None."""
+    key, text = override.key_or_group, str(override.input_line)
+    is_unknown = key not in command.keys and not key.startswith("hydra.")
+    if is_unknown and not is_choice and not text.startswith("+"):
+        return command.unknown(text, key)
+    if override.is_sweep_override() and (not is_several or override.is_interval_sweep()):
+        return _several(command, override, text)
+    if text.startswith("+") and not override.is_force_add() and not is_unknown:
+        return InputError(f"{text}: {key} exists already; type {text.lstrip('+')}")
+    value: Any = override.value()
+    if is_choice and isinstance(value, list):
+        return InputError(f"{text}: {key} is one choice; type {key}={value[0]}")
+    return None if is_choice or override.is_delete() else _wrong_type(command, override)
+
+
+def _wrong_type(command: Command, override: Override) -> InputError | None:
+    """Return the error about a value that a setting doesn't accept, or None."""
+    key, text = override.key_or_group, str(override.input_line)
+    for value in _values(override):
+        try:
+            OmegaConf.update(command.config, key, value, force_add=text.startswith("+"))
+        except (AttributeError, KeyError):  # of OmegaConf
+            return command.unknown(text, key)
+        except OmegaConfBaseException as error:
+            return _wrong_value(command.config, key, value, text, str(error).splitlines()[0])
+    return None
+
+
+def _values(override: Override) -> list[Any]:
+    """Return the values of an override: several for a sweep."""
+    if not override.is_sweep_override():
+        return [override.value()]
+    parser = OverridesParser.create()
+    return [parser.parse_override(f"x={v}").value() for v in override.sweep_string_iterator()]
+
+
+def _several(command: Command, override: Override, text: str) -> InputError:
+    """Return the error about several values of one setting in one run."""
+    key, _, value = text.partition("=")
+    if override.is_interval_sweep():
+        return InputError(f"{text}: only a search tries an interval; add -m hydra/sweeper=optuna")
+    if re.fullmatch(r"\d{1,3}(,\d{3})+", value):
+        return InputError(f"{text}: commas separate values; type {key}={value.replace(',', '')}")
+    line = f"drone-rl {command.name} -m {in_quotes(text) if '(' in text else text}"
+    listed = OverridesParser.create().parse_override(f"{key}=[{value}]")
+    if key in command.groups or "(" in value or _wrong_type(command, listed):
+        return InputError(f"{text} gives several values; for one run with each, type {line}")
+    return InputError(
+        f"{text} gives several values; for a list, type {key}=[{value}]; for one run with each, "
+        f"type {line}"
+    )
+
+
+def _wrong_value(config: DictConfig, key: str, value: Any, text: str, reason: str) -> InputError:
+    """Return the error about a value of the wrong type, for OmegaConf's `reason`."""
+    name, now = text.partition("=")[0], OmegaConf.select(config, key)
+    found = _TYPE.search(reason)
+    expected = _EXPECTED.get(found[1].lower(), "") if found else ""
+    if isinstance(now, DictConfig):
+        return InputError(f"{text}: {key} is a group of settings; type {key}.NAME=VALUE")
+    if isinstance(now, ListConfig):
+        listed = [value] if isinstance(value, int | float) else ([*now] or [1, 2])
+        listed = str(listed).replace(" ", "").replace("'", "")
+        return InputError(f"{text} is no list of such values; type one such as {name}={listed}")
+    written = re.fullmatch(r"(\d+(?:\.\d+)?)([kKmMgG])", str(value))
+    if written and "number" in expected:
+        now = f"{float(written[1]) * _MAGNITUDES[written[2].lower()]:.0f}"
+    expected = expected or "another value"
+    example = "" if now is None else f", such as {name}={str(now).lower()}"
+    return InputError(f"{text} does not fit; type {expected}{example}")

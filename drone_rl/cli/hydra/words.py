@@ -1,0 +1,122 @@
+"""Find words on a command line that are no settings, before Hydra reads it."""
+
+import difflib
+import re
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from drone_rl.cli.hydra.mistakes import OTHER_NAMES, Command, choices, in_quotes
+from drone_rl.utils.errors import InputError
+
+_FLAGS = {"-m", "--multirun", "-h", "--help", "-r", "--run", "--hydra-help", "--resolve"}
+_VALUED = {
+    *("-c", "--cfg", "-i", "--info", "-p", "--package", "-cp", "--config-path", "-cn"),
+    *("--config-name", "-cd", "--config-dir", "-sc", "--shell-completion"),
+    *("--experimental-rerun",),
+}
+_SPACED = re.compile(r"(?:^|\s)([\w.]+)(?: =|= | = )([^\s=]\S*)")
+"""A setting with spaces around its equals sign."""
+_DASHES = "-\N{EN DASH}\N{EM DASH}\N{MINUS SIGN}"
+_PAIRS = {"[": "]", "(": ")", "{": "}"}
+_MAIN = ("policy", "certificate", "explanations", "policies", "folder")
+"""Settings that a word without a name may be meant for, in this order."""
+_CHOICES = ("experiment", "objective", "network", "appearance", "dynamics", "task", "logger")
+"""Groups that such a word may be a choice of."""
+
+
+def check_words(name: str, conf: Path, words: Sequence[str]) -> None:
+    """Raise an `InputError` for the first word on a command line that is no setting."""
+    position = 0
+    while position < len(words):
+        word = words[position]
+        is_flag = word in _FLAGS or any(word.startswith(f"{f}=") for f in _VALUED)
+        if word in _VALUED:
+            position += 1
+        elif not is_flag and word.startswith(tuple(_DASHES)):
+            raise _dashed(Command(name, conf), word, words[position + 1 :])
+        elif not is_flag and "=" in word[1:]:
+            _check_brackets(word, words[position + 1 :])
+        elif not is_flag and not (word.startswith("~") and len(word) > 1):
+            raise _bare(Command(name, conf), words, position)
+        position += 1
+
+
+def _dashed(command: Command, word: str, following: Sequence[str]) -> InputError:
+    name, is_given, value = word.lstrip(_DASHES).partition("=")
+    if not is_given:
+        is_value = following and "=" not in following[0] and not following[0].startswith("--")
+        value = following[0] if is_value else ""
+        word = f"{word} {value}" if is_value else word
+    if len(name) > 1 and (ours := command.instead(name, value)):
+        if ours.removesuffix("=VALUE") not in command.groups:
+            ours = ours.replace("=VALUE", "=true")
+        return InputError(f"{word}: settings have no dashes; type {ours}")
+    return InputError(
+        f"{word}: drone-rl {command.name} has no such option; settings are typed name=value, "
+        f"without dashes ({command.list_all})"
+    )
+
+
+def _check_brackets(word: str, following: Sequence[str]) -> None:
+    """Check that each bracket and quote of a setting is closed."""
+    open_ = _unclosed(word)
+    if open_ is None:
+        return
+    joined = word
+    for more in following:
+        joined += more if joined.endswith(("[", ",", "(", "{")) else f" {more}"
+        if _unclosed(joined) is None:
+            raise InputError(
+                f"{word}: the shell ends a setting at a space; type it without spaces or in "
+                f"quotes: {in_quotes(joined)}"
+            )
+    raise InputError(f"{word} has no closing {open_}; type {in_quotes(word + open_)}")
+
+
+def _unclosed(text: str) -> str | None:
+    """Return the character that would close the last open bracket or quote, or None."""
+    open_: list[str] = []
+    for char in re.sub(r"\\.", "", text):
+        if open_ and char == open_[-1]:
+            open_.pop()
+        elif not (open_ and open_[-1] in "'\"") and (char in _PAIRS or char in "'\""):
+            open_.append(_PAIRS.get(char, char))
+    return open_[-1] if open_ else None
+
+
+def _bare(command: Command, words: Sequence[str], position: int) -> InputError:
+    """Return the error about a word without an equals sign."""
+    word, after = words[position] or "''", [*words[position + 1 :], ""]
+    if spaced := _SPACED.search(" ".join(words[max(0, position - 1) : position + 3])):
+        name, value = spaced.groups()
+        return InputError(f"{name} = {value}: no spaces around =; type {name}={value}")
+    key, is_colon, value = word.partition(":")
+    if is_colon and (ours := command.instead(key, value or after[0])):
+        return InputError(f"{word} has a colon instead of an equals sign; type {ours}")
+    if word in command.keys or word in OTHER_NAMES["settings"]:
+        ours = command.instead(word, "" if "=" in after[0] else after[0])
+        return InputError(f"{word} has no =; type {ours or 'NAME=VALUE'}")
+    named = [g for g in _CHOICES if g in command.groups and word in choices(command.conf, g)]
+    main = _MAIN if not word.endswith(".json") else sorted(_MAIN)  # certificate comes first
+    named += [key for key in main if key in command.keys]
+    if named:
+        return InputError(f"{word} has no name before it; type {named[0]}={word}")
+    return InputError(
+        f"{word} has no =; settings are typed name=value, as in seed=1 ({command.list_all})"
+    )
+
+
+def no_command(word: str, following: Sequence[str], known: Sequence[str]) -> str:
+    """Return the message about a first word that is no command."""
+    if "=" in word or word.startswith(tuple(_DASHES)):
+        command = next((w for w in following if w in known), "train")
+        others = [w for w in (word, *following) if w != command]
+        return f"{word}: the command comes first; type drone-rl {shlex.join([command, *others])}"
+    near = difflib.get_close_matches(word.lower(), known, 1)
+    meant = OTHER_NAMES["commands"].get(word.lower()) or (near and near[0])
+    if meant:
+        return (
+            f"command {word!r} is unknown; did you mean drone-rl {meant}? drone-rl --help lists all"
+        )
+    return f"command {word!r} is unknown; use one of: {', '.join(known)}"

@@ -1,0 +1,81 @@
+"""`drone-rl policies`."""
+
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import drone_rl
+from drone_rl.cli.settings import CommandSettings
+from drone_rl.sweeps.manifest import read_result
+from drone_rl.utils.display import aligned, interval
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Whole, as_mapping
+
+_LONGEST_NAME = 18
+"""Characters of a path above which its figures are on a line of their own."""
+_WRITE_NOTHING = (
+    *("hydra.run.dir=.", "hydra.output_subdir=null", "hydra.job_logging.root.handlers=[console]"),
+    "++hydra.job_logging.handlers.file.delay=true",
+)
+
+
+class PoliciesCommand(CommandSettings):
+    """Settings of `drone-rl policies`."""
+
+    most: Annotated[int, Whole(0, 10_000, "policies")] = 20
+    """Trained policies to list, the newest first."""
+
+    @classmethod
+    def prepare(cls, overrides: Sequence[str]) -> list[str]:
+        """Return the command line of a command that writes no files."""
+        return [*super().prepare(overrides), *_WRITE_NOTHING]
+
+    def run(self, folder: Path) -> tuple[int, None]:
+        """List the shipped and the trained policies; return the exit status."""
+        from drone_rl.policies.zoo import policy_names, policy_path  # imports torch
+
+        shipped = [_row(policy_path(name), name) for name in policy_names()]
+        found = Path(self.paths.outputs).glob("train/**/checkpoints/last.pt")
+        newest = sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
+        trained = [_row(path, str(path.parents[1])) for path in newest[: self.most]]
+        head = ("policy=", "task", "verdict", "success (95% CI)", "trained")
+        lines = aligned([head, *(_short(row) for row in (*shipped, *trained))]).splitlines()
+        names = ["", *(row[0] for row in (*shipped, *trained))]
+        for name, line in zip(names, lines, strict=True):
+            print(*([name] if len(name) > _LONGEST_NAME else []), line, sep="\n")
+        left = len(newest) - len(trained)
+        if left:
+            print(f"and {left} older ones; most={len(newest)} lists them")
+        if not newest:
+            print(f"no trained policies under {self.paths.outputs}/train; drone-rl train makes one")
+        return 0, None
+
+
+def _short(row: Sequence[str]) -> Sequence[str]:
+    return ["  ..." if len(row[0]) > _LONGEST_NAME else row[0], *row[1:]]
+
+
+def _row(path: Path, name: str) -> list[str]:
+    """Return name, task, verdict, success rate and origin of a policy."""
+    try:
+        policy = drone_rl.load_policy(path)
+    except InputError:
+        return [name, "", "can't be read", "", ""]
+    verdict, run = policy.state.get("verdict"), path.parents[1]
+    if path.suffix == ".pt":
+        verdict = (read_result(run) or {}).get("verdict")
+        origin = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
+    else:
+        origin = f"revision {str(policy.state['provenance']['git_revision'])[:7]}"
+    return [name, policy.task.name, *_figures(verdict), origin]
+
+
+def _figures(verdict: Any) -> Iterator[str]:
+    """Yield the kind and the success rate of a recorded verdict."""
+    try:
+        kind, success = verdict["kind"], as_mapping(verdict["greedy"]["success"], "success")
+        figures = [f"{kind}{'' if verdict['certain'] else ' (uncertain)'}"]
+        yield from (*figures, interval(success, "share"))
+    except (InputError, KeyError, TypeError):
+        yield from ("not judged", "")

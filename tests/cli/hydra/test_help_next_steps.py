@@ -1,0 +1,41 @@
+"""Commands end with what a user may do next, in a terminal."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from drone_rl.cli.commands import TABLE
+from drone_rl.cli.hydra.composition import conf_dir, register_schemas
+from drone_rl.cli.hydra.help import next_steps
+from drone_rl.cli.hydra.mistakes import composed
+from drone_rl.cli.main import find_command
+
+
+def test_the_policy_and_the_next_commands():
+    assert next_steps("verdict", "my run", Path("x")).splitlines() == [
+        "policy: my run",
+        "next:",
+        "  drone-rl explain policy='my run'",
+        "  drone-rl shifts policy='my run'",
+        "  drone-rl prove policy='my run'",
+    ]
+    assert next_steps("bench", "latest", Path("x")) == ""
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_next_commands_exist_with_these_settings(name):
+    assert len(TABLE[name]["next"]) <= 3
+    for line in next_steps(name, "good", Path("x")).splitlines():
+        if line.startswith("  drone-rl"):
+            command, *words = line.split()[1:]
+            register_schemas(**{command: find_command(command)})
+            composed(command, conf_dir(), words)
+
+
+def test_they_are_for_terminals_alone(run, in_process, monkeypatch, tmp_path):
+    command = ["verdict", f"policy={run}", "episodes=2", "sampled=false", "num_envs=2"]
+    assert "next:" not in in_process(*command).stdout
+    monkeypatch.setattr(type(sys.stdout), "isatty", lambda self: True)
+    printed = in_process(*command).stdout
+    assert f"policy: {run}\nnext:\n  drone-rl explain policy={run}" in printed

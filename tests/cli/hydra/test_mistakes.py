@@ -1,0 +1,116 @@
+"""Names that were most likely meant, and values that Hydra and OmegaConf reject."""
+
+import re
+
+import pytest
+from hydra.errors import HydraException
+
+from drone_rl.cli.hydra.composition import conf_dir
+from drone_rl.cli.hydra.mistakes import OTHER_NAMES, Command, closest, explain, whole_numbers
+from drone_rl.cli.main import COMMANDS
+
+KNOWN = ("seed", "optimizer", "optimizer.lr", "task", "task.num_cubes", "hydra.run.dir", "device")
+
+
+pytestmark = pytest.mark.usefixtures("registered")
+
+
+def said(*overrides, command="train"):
+    return str(explain(HydraException("Hydra's words"), command, conf_dir(), overrides))
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("sed", "seed"),
+        ("SEED", "seed"),
+        ("lr", "optimizer.lr"),
+        ("--learning-rate", "optimizer.lr"),
+        ("optimizer.learning_rate", "optimizer.lr"),
+        ("trainer.lr", "optimizer.lr"),
+        ("optimzer.lr", "optimizer.lr"),
+        ("+num_cubes", "task.num_cubes"),
+        ("num_cubs", "task.num_cubes"),
+        ("env", "task"),
+        ("use_cuda", "device=cuda"),
+        ("learningrat", "optimizer.lr"),
+        ("log-dir", "hydra.run.dir"),
+        ("xyz", None),
+        ("policy", None),
+    ],
+)
+def test_the_name_that_was_meant(name, meant):
+    assert closest(name, KNOWN) == meant
+
+
+def test_names_of_other_projects_lead_to_settings_that_exist():
+    names = {"train": ["objective=ppo"], "evaluate": [], "verdict": [], "explain": []}
+    keys = {k for name, groups in names.items() for k in Command(name, conf_dir(), groups).keys}
+    for candidates in OTHER_NAMES["settings"].values():
+        assert {c.partition("=")[0] for c in candidates} <= keys | {"certificate"}, candidates
+    for meant in OTHER_NAMES["commands"].values():
+        assert meant.split()[0] in COMMANDS
+
+
+@pytest.mark.parametrize(
+    ("override", "number"),
+    [
+        ("trainer.total_frames=1e5", "trainer.total_frames=100000"),
+        ("trainer.total_frames=1.5E+3", "trainer.total_frames=1500"),
+        ("collector.num_envs=1e1,2e1", "collector.num_envs=10,20"),
+        ("network.hidden=[1e2,64]", "network.hidden=[100,64]"),
+        ("optimizer.lr=1e-3", "optimizer.lr=1e-3"),
+        ("optimizer.lr=1.5e0", "optimizer.lr=1.5e0"),
+        ("optimizer.lr=1e30", "optimizer.lr=1e30"),
+        ("hydra.run.dir=1e5", "hydra.run.dir=1e5"),
+        ("policy=1e5", "policy=1e5"),
+        ("task=x1e5", "task=x1e5"),
+    ],
+)
+def test_whole_numbers_may_have_an_exponent(override, number):
+    assert whole_numbers(override) == number
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("seed=x", "seed=x does not fit; type a whole number, such as seed=0"),
+        ("seed=null", "seed=null does not fit; type another value, such as seed=0"),
+        (
+            "optimizer.lr=x",
+            "optimizer.lr=x does not fit; type a number, such as optimizer.lr=0.001",
+        ),
+        ("collector.compiled=x", "true or false, such as collector.compiled=true"),
+        ("trainer.total_frames=2.5k", "such as trainer.total_frames=2500"),
+        ("network.hidden=64", "network.hidden=64 is no list .* network.hidden=\\[64\\]"),
+        ("network.hidden=[a]", "network.hidden=\\[a\\] is no list .* network.hidden=\\[128\\]"),
+        ("network={a:1}", "network"),
+        ("seed=1,000", "commas separate values; type seed=1000"),
+        ("seed=0,1", "for one run with each, type drone-rl train -m seed=0,1$"),
+        ("network.hidden=1,2", "for a list, type network.hidden=\\[1,2\\]; "),
+        ("task=pillars,collect_one", "train -m task=pillars,collect_one$"),
+        ("seed=range(3)", "type drone-rl train -m 'seed=range"),
+        ("seed=interval(0,1)", "add -m hydra/sweeper=optuna"),
+        ("optimizer=[adam,sgd]", "optimizer is one choice; type optimizer=adam"),
+        ("+seed=1", "seed exists already; type seed=1"),
+        ("~x", "~x: drone-rl train has no setting x"),
+        ("seed==1", "two equals signs; type seed=1"),
+        ("seed=1 device=cpu", "holds two settings"),
+        ("seed.=1", "'seed.' is no name of a setting; type seed=1"),
+        ("network.hidden=(1,2)", "square brackets; type network.hidden=\\[1,2\\]"),
+        ("resume=a=b", "need quotes; type \"resume='a=b'\""),
+        ("device=cpu", "device=cpu: these settings can't be read; drone-rl train --help all"),
+    ],
+)
+def test_what_is_wrong_and_what_to_type(override, message):
+    found = said("objective=reinforce", override)
+    assert re.search(message, found), found
+
+
+def test_lists_are_offered_where_they_are_accepted():
+    assert "policy=[good,poor]" in said("policy=good,poor", command="explain")
+    assert "[good,poor]" not in said("policy=good,poor", command="verdict")
+
+
+def test_hydras_words_are_kept_if_the_user_has_files_of_settings():
+    assert "Hydra's words" in said("seed=x", "--config-dir=my")

@@ -1,0 +1,61 @@
+"""Words that are no settings get an answer before Hydra reads the command line."""
+
+import pytest
+
+from drone_rl.cli.hydra.composition import conf_dir
+from drone_rl.cli.hydra.words import check_words, no_command
+from drone_rl.cli.main import COMMANDS
+from drone_rl.utils.errors import InputError
+
+pytestmark = pytest.mark.usefixtures("registered")
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("train --seed 1", "^--seed 1: settings have no dashes; type seed=1$"),
+        ("train --num-envs=8", "type collector.num_envs=8$"),
+        ("train --cuda", "type device=cuda$"),
+        ("train --algo", "type objective=VALUE$"),
+        ("train --nope 1", "--nope 1: .* no such option"),
+        ("train -s 1", "-s 1: .* no such option"),
+        ("verdict --sampled", "type sampled=true$"),
+        ("verdict good", "^good has no name before it; type policy=good$"),
+        ("check x.json", "type certificate=x.json$"),
+        ("train ppo", "type objective=ppo$"),
+        ("train seed 1", "^seed has no =; type seed=1$"),
+        ("train seed device=cpu", "type seed=VALUE$"),
+        ("train lr 1", "type optimizer.lr=1$"),
+        ("train seed:1", "has a colon .* type seed=1$"),
+        ("train seed = 1", "no spaces around =; type seed=1$"),
+        ("train seed =1", "no spaces around =; type seed=1$"),
+        ("train seed= 1", "no spaces around =; type seed=1$"),
+        ("train device=cpu nothing", "^nothing has no =; settings are typed name=value"),
+        ("train network.hidden=[64, 64]", "quotes: 'network.hidden=\\[64,64\\]'"),
+        ("train network.hidden=[64", r"has no closing \]; type 'network.hidden=\[64\]'"),
+        ("train device='cpu", "has no closing '; type \"device='cpu'\""),
+    ],
+)
+def test_what_to_type(line, message):
+    command, *words = line.split(" ")
+    with pytest.raises(InputError, match=message):
+        check_words(command, conf_dir(), words)
+
+
+def test_settings_and_options_of_hydra_are_accepted():
+    words = ["-m", "seed=0,1", "--config-dir", "my", "--cfg", "job", "~logger", "+a.b=1", "a='b c'"]
+    check_words("train", conf_dir(), [*words, "--config-dir=my", "x=[1,2]", "y='[', ']'"])
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["trian"], "command 'trian' is unknown; did you mean drone-rl train?"),
+        (["eval", "policy=x"], "did you mean drone-rl evaluate?"),
+        (["qwertz"], "command 'qwertz' is unknown; use one of: train, "),
+        (["-m", "train", "seed=0,1"], "type drone-rl train -m seed=0,1"),
+        (["seed=1"], "seed=1: the command comes first; type drone-rl train seed=1"),
+    ],
+)
+def test_no_command(words, message):
+    assert message in no_command(words[0], words[1:], [*COMMANDS])
