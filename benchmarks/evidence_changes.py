@@ -11,6 +11,7 @@ OTHER_SEED = {"seed": 193287468211}
 _TRIVIAL = {"baselines.forward.success.share": 0.95}
 _NO_FAILURES = {"failures.largest": None, "failures.bound.successes": 0}
 _IN_WIND = {"unlike": {"wind": {"own": [0.0, 0.0, 0.0], "flown": [5.0, 0.0, 0.0]}}}
+_IN_FOG = {"unlike": {"appearance.fog_visibility": {"own": None, "flown": 40.0}}}
 _UNDECIDED = {"certain": False, "enough": 1600}
 _PROVED = {"proof": PROOF}
 _PARTLY_PROVED = {"proof": {**PROOF, "every": False, "share": 0.6, "lost": 0.3, "undecided": 0.1}}
@@ -62,6 +63,8 @@ OF_VERDICTS = (
     ("failures.never", {"failures.bound.upper95": 0.2}, _NO_FAILURES),
     ("unlike", {"unlike": {}}, _IN_WIND),
     ("unlike", {"unlike": {"wind": {"own": [0.0, 0.0, 0.0], "flown": [8.0, 0.0, 0.0]}}}, _IN_WIND),
+    ("unlike", {"unlike": {}}, _IN_FOG),
+    ("unlike", {"unlike": {"appearance.fog_visibility": {"own": None, "flown": 20.0}}}, _IN_FOG),
     ("drawing", {"drawing.upper95": 0.05}),
     ("drawing", {"drawing": None}),
     ("fixed_seed", FRESH_SEED),

@@ -3,7 +3,7 @@
 import json
 import logging
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import drone_rl
 from drone_rl.cli.settings import CommandSettings, RolloutCommandSettings, finish
@@ -24,7 +24,19 @@ from drone_rl.utils.text import seed_line
 _log = logging.getLogger(__name__)
 
 
-class EvaluateCommand(RolloutCommandSettings, EvaluateSettings):
+class SeenCommandSettings(RolloutCommandSettings):
+    """Settings of a command in which the appearance can be changed."""
+
+    appearance: AppearanceSettings | None = None
+    """Appearance of the scenes (see conf/appearance); none for that of the policy's training."""
+
+    def load_policy(self) -> Any:
+        """Return the policy with the changes of task, dynamics and appearance."""
+        policy = super().load_policy()
+        return policy if self.appearance is None else policy.in_appearance(self.appearance)
+
+
+class EvaluateCommand(SeenCommandSettings, EvaluateSettings):
     """Settings of `drone-rl evaluate`."""
 
     videos: Annotated[int, Whole(0, unit="episodes")] = 2
@@ -55,7 +67,7 @@ class EvaluateCommand(RolloutCommandSettings, EvaluateSettings):
         return 0, done.success
 
 
-class PlayCommand(RolloutCommandSettings):
+class PlayCommand(SeenCommandSettings):
     """Settings of `drone-rl play`."""
 
     episodes: Annotated[int, Whole(1, unit="episodes")] = 3
@@ -70,16 +82,13 @@ class PlayCommand(RolloutCommandSettings):
     """Device of renderer and policy: cpu, cuda or cuda:N."""
     renderer: RendererName = "raytrace"
     """Renderer: raytrace, this package's ray tracer, or mujoco_warp, MuJoCo Warp's."""
-    appearance: AppearanceSettings | None = None
-    """Appearance of the scenes (see conf/appearance); none for that of the policy's training."""
 
     def run(self, folder: Path) -> tuple[int, None]:
         """Record videos of a policy; return the exit status."""
         policy = self.load_policy()
         from drone_rl.evaluation.video import film, view  # slow to import
 
-        names = ("greedy", "seed", "device", "renderer", "appearance")
-        chosen = {k: getattr(self, k) for k in names if getattr(self, k) is not None}
+        chosen = {k: getattr(self, k) for k in ("greedy", "seed", "device", "renderer")}
         if self.viewer:
             view(policy, **chosen)
         else:
@@ -87,7 +96,7 @@ class PlayCommand(RolloutCommandSettings):
         return 0, None
 
 
-class VerdictCommand(RolloutCommandSettings, JudgeSettings):
+class VerdictCommand(SeenCommandSettings, JudgeSettings):
     """Settings of `drone-rl verdict`."""
 
     certificate: str | None = None
@@ -106,7 +115,7 @@ class VerdictCommand(RolloutCommandSettings, JudgeSettings):
 
     def run(self, folder: Path) -> tuple[int, str]:
         """Judge one policy; return the exit status and the kind's name."""
-        names = ("dynamics", "certificate", "shifts", "require_domain")
+        names = ("dynamics", "appearance", "certificate", "shifts", "require_domain")
         given = {name: getattr(self, name) for name in names}
         done = drone_rl.judge(self.policy, self, **given, **self.shared(), progress=silent)
         finish(done, folder / "verdict.json")

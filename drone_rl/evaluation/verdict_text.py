@@ -306,12 +306,15 @@ def quantity_label(name: str, evidence: Evidence) -> str:
 
 
 def unlike(evidence: Evidence) -> str:
-    """Return how the dynamics differ from those that a policy was trained with."""
+    """Return how dynamics and appearance differ from those that a policy was trained with."""
     parts = [
-        f"dynamics.{name}={_said(of['flown'])} instead of {_said(of['own'])}"
+        f"{name if '.' in name else f'dynamics.{name}'}={_said(of['flown'])} instead of "
+        f"{_said(of['own'])}"
         for name, of in evidence["unlike"].items()
     ]
-    return f"It was trained with other dynamics: here it flew with {listed(parts)}."
+    seen = ["another appearance"] if any("." in name for name in evidence["unlike"]) else []
+    moved = ["other dynamics"] if not all("." in name for name in evidence["unlike"]) else []
+    return f"It was trained with {listed(moved + seen)}: here it flew with {listed(parts)}."
 
 
 def _said(value: Any) -> str:
@@ -336,7 +339,7 @@ SENTENCES = (
     ),
     Sentence(
         "unlike",
-        "the dynamics are not those that the policy was trained with",
+        "dynamics or appearance are not those that the policy was trained with",
         lambda e: bool(e.get("unlike")),
         unlike,
     ),

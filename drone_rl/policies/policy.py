@@ -15,14 +15,19 @@ from torch import Tensor
 from torchrl.envs import EnvBase, TransformedEnv
 from torchrl.envs import Transform as TorchrlTransform
 
-from drone_rl.config import ActionSettings, BaseTaskSettings, DynamicsSettings
+from drone_rl.config import (
+    ActionSettings,
+    AppearanceSettings,
+    BaseTaskSettings,
+    DynamicsSettings,
+)
 from drone_rl.config.configuration import Changes
 from drone_rl.envs.transforms import memory_of, pixel_transforms, see_film
 from drone_rl.policies import ImageNetwork, PolicyNetwork, make_actor
 from drone_rl.policies.zoo import PolicyDescription, parse, policy_names, policy_path, read_policy
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.display import table
-from drone_rl.utils.errors import InputError
+from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.files import newest
 from drone_rl.utils.schema import shown
 from drone_rl.utils.seeding import Stream, torch_generator
@@ -61,6 +66,17 @@ class BasePolicy(abc.ABC):
         if self.dynamics.is_computer_vision:  # where nothing else counts
             own, flown = ({"mode": of["mode"]} for of in (own, flown))
         return {n: {"own": own[n], "flown": v} for n, v in flown.items() if own[n] != v}
+
+    def in_appearance(self, appearance: AppearanceSettings) -> Self:
+        """Return the same policy in scenes of another appearance.
+
+        Raises:
+            InputError: It was made elsewhere, and its appearance is unknown.
+        """
+        del appearance
+        raise InputError(
+            f"policy={self.name} was made elsewhere, in an unknown appearance; leave appearance out"
+        )
 
     @property
     @abc.abstractmethod
@@ -177,6 +193,14 @@ class Policy(BasePolicy):
         return parse(self.state["description"]).dynamics
 
     @property
+    def unlike(self) -> dict[str, dict[str, Any]]:
+        """See `BasePolicy`; settings of another appearance are named "appearance.NAME"."""
+        own = parse(self.state["description"]).appearance.values()
+        here = self.description.appearance.values().items()
+        other = {f"appearance.{n}": {"own": own[n], "flown": v} for n, v in here if own[n] != v}
+        return {**super().unlike, **other}
+
+    @property
     def origin(self) -> dict[str, Any]:
         """The file, and "description", "progress", "provenance" and "command" of the training."""
         keys = ("description", "progress", "provenance")
@@ -196,6 +220,11 @@ class Policy(BasePolicy):
         described = self.description.as_dict()
         described["dynamics"] = {**self.dynamics.values(), **changed}
         return dataclasses.replace(self, description=parse(described))
+
+    def in_appearance(self, appearance: AppearanceSettings) -> "Policy":
+        """Return the same policy in scenes of another appearance."""
+        described = dataclasses.replace(self.description, appearance=appearance)
+        return dataclasses.replace(self, description=described)
 
     def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv:
         return self.description.build_env(num_envs, **options)
@@ -317,6 +346,6 @@ def find_policy(which: str | Path, outputs: str | Path = "outputs") -> Path:
     if not path.exists():
         raise InputError(
             f"policy={which} does not exist; give a file, the folder of a run, latest, or one of "
-            f"{', '.join(policy_names())}"
+            f"{', '.join(policy_names())}{did_you_mean(which, policy_names())}"
         )
     return path / "checkpoints" / "last.pt" if path.is_dir() else path

@@ -10,7 +10,7 @@ from typing import Any, cast, overload
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
-from drone_rl.config import DynamicsSettings, TaskSettings
+from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
 from drone_rl.config.commands import FlightSettings, JudgeSettings
 from drone_rl.config.configuration import Changes
 from drone_rl.envs import DroneEnv
@@ -168,6 +168,7 @@ def judge_one(
     *,
     task: Mapping[str, Any] | None = None,
     dynamics: Mapping[str, Any] | None = None,
+    appearance: AppearanceSettings | None = None,
     certificate: str | Path | None = None,
     shifts: str | Path | None = None,
     require_domain: str | Path | None = None,
@@ -184,6 +185,7 @@ def judge_one(
         settings: Number of episodes, seed, device and so on.
         task: Settings to change of the policy's task or, for a baseline, of the default one.
         dynamics: Settings to change of the dynamics, likewise.
+        appearance: Appearance of the scenes; by default that of the policy's training.
         certificate: Certificate to quote, see `drone_rl.verdicts.certificate.find_claim`.
         shifts: Robustness evaluation to quote, see `drone_rl.verdicts.coverage.find_domain`.
         require_domain: File of the required domain, see
@@ -205,6 +207,8 @@ def judge_one(
     claim = measured = coverage = None
     if pilot is None:
         _refuse_files(name, certificate=certificate, shifts=shifts, require_domain=require_domain)
+        if appearance is not None:
+            raise InputError(f"policy={name} sees no images; leave appearance out")
         changed = Changes(TaskSettings).read(task or {}, "task")
         moved = DynamicsSettings(**Changes(DynamicsSettings).read(dynamics or {}, "dynamics"))
         moved.check_air()
@@ -212,6 +216,7 @@ def judge_one(
     else:
         pilot = pilot.in_task(**(task or {}))
         pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
+        pilot = pilot if appearance is None else pilot.in_appearance(appearance)
         measured = find_domain(pilot, shifts, outputs)
         coverage = require(pilot, require_domain, measured) if require_domain is not None else None
         coverage = _reflown(pilot, coverage, measured, settings, seed)

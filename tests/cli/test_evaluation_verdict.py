@@ -139,3 +139,23 @@ def test_conditions_that_cannot_be_required(in_process, tmp_path, needed, words)
 def test_mistakes_get_one_line(in_process, command, words):
     line = error_line(in_process(*command))
     assert all(word in line for word in words), line
+
+
+def test_a_verdict_under_another_appearance_says_so(in_process, tmp_path):
+    done = in_process(*ONE, "appearance=fog", "hydra.run.dir=v")
+    assert "It was trained with another appearance: here it flew with " in done.stdout
+    assert "appearance.fog_visibility=40 instead of None" in done.stdout
+    kept = json.loads((tmp_path / "v" / "verdict.json").read_text())
+    assert kept["unlike"]["appearance.fog_visibility"] == {"own": None, "flown": 40.0}
+    proved = ["verdict", "policy=proved", "appearance=fog", "episodes=10", "sampled=false"]
+    done = in_process(*proved, "require=proved", "hydra.run.dir=p")
+    assert done.returncode == 16, done.stdout
+    assert "A certificate states" not in done.stdout
+
+
+def test_figures_under_another_appearance(in_process, tmp_path):
+    settings = ["policy=good", "task.num_cubes=1", "episodes=5", "videos=0", "baselines=false"]
+    done = in_process("evaluate", *settings, "appearance=dusk", "hydra.run.dir=e")
+    assert "another appearance" in done.stdout, done.stderr
+    kept = json.loads((tmp_path / "e" / "evaluation.json").read_text())
+    assert any(name.startswith("appearance.sun") for name in kept["unlike"])

@@ -5,7 +5,10 @@ import re
 import pytest
 
 import drone_rl
+from drone_rl.config import AppearanceSettings
 from drone_rl.evaluation.evaluate import Evaluation
+from drone_rl.evaluation.verdict_text import unlike
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
@@ -63,6 +66,25 @@ def test_the_table_of_an_evaluation(good):
     assert rows[8].split() == ["ended:", "step", "limit", "1", "1"]
     assert len({len(row) for row in rows}) == 1
     assert all(len(re.split(" {2,}", row)) == 3 for row in rows)  # no two columns touch
+
+
+def test_in_another_appearance_it_is_said_so(good):
+    few, fog = (
+        {"episodes": 4, "sampled": False, "progress": silent},
+        AppearanceSettings(shadows=1.0),
+    )
+    done = drone_rl.judge(good, appearance=fog, **few)
+    said = (
+        "It was trained with another appearance: here it flew with appearance.shadows=1 instead of"
+    )
+    assert said in str(done) and said in done.as_dict()["sentence"]
+    assert done.as_dict()["unlike"] == {"appearance.shadows": {"own": 0.0, "flown": 1.0}}
+    found = drone_rl.evaluate(good.in_appearance(fog), episodes=2, num_envs=2, progress=silent)
+    assert said in str(found) and "appearance.shadows" in found.as_dict()["unlike"]
+    both = good.in_appearance(fog).in_dynamics(mode="simple_flight")
+    assert "with other dynamics and another appearance: " in unlike({"unlike": both.unlike})
+    with pytest.raises(InputError, match="policy=forward sees no images"):
+        drone_rl.judge("forward", appearance=fog, **few)
 
 
 def test_in_another_body_it_is_said_so(good, monkeypatch):

@@ -8,6 +8,8 @@ import torch
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 import drone_rl
+from drone_rl.config import MINIMAL, AppearanceSettings
+from drone_rl.policies.external_policy import policy_from
 from drone_rl.policies.policy import find_policy
 from drone_rl.policies.zoo import policy_path
 from drone_rl.utils.errors import InputError
@@ -92,6 +94,20 @@ def test_missing_policies_raise(tmp_path):
         drone_rl.load_policy("latest", outputs=tmp_path)
     with pytest.raises(InputError, match=r"policy=nobody does not exist.*good, .*poor"):
         drone_rl.load_policy("nobody")
+
+
+def test_another_appearance_changes_only_the_environment():
+    policy, fog = drone_rl.load_policy("good"), AppearanceSettings(fog_visibility=40.0)
+    other = policy.in_appearance(fog)
+    assert other.unlike == {"appearance.fog_visibility": {"own": None, "flown": 40.0}}
+    assert other.in_task(num_cubes=1).description.appearance == fog
+    assert policy.unlike == {} and other.in_appearance(MINIMAL).unlike == {}
+    with policy.flying(1) as (plain, _), other.flying(1) as (hazy, _):
+        assert hazy.base_env.looks.settings == fog
+        assert not torch.equal(plain.reset()["pixels"], hazy.reset()["pixels"])
+    made = policy_from(lambda pixels: torch.zeros(len(pixels), 3), name="mine")
+    with pytest.raises(InputError, match=r"policy=mine was made elsewhere.*leave appearance out"):
+        made.in_appearance(fog)
 
 
 def test_changed_dynamics_change_only_the_environment(monkeypatch):
