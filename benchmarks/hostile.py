@@ -30,7 +30,7 @@ MAX_ADDRESS_SPACE = 3 * 2**29
 """Largest growth of the address space in bytes, so that a decompression bomb ends its case only."""
 TIMEOUT_S = 30
 """Time after which a command counts as hung."""
-_PACKAGES = (
+PACKAGES = (
     *("cli", "sweeps", "verification", "robustness", "verdicts", "evaluation", "policies"),
     *("training", "explanations", "utils"),
 )
@@ -95,8 +95,8 @@ def _main(folder: Path, every: int) -> None:
 
     cases = hostile_files(folder / "files")[::every]
     program = importlib.import_module("drone_rl.cli.main")
-    for package in _PACKAGES:
-        _import_all(f"drone_rl.{package}")
+    for package in PACKAGES:
+        import_all(f"drone_rl.{package}")
     for name in _MORE:
         importlib.import_module(name)
     sys.modules["hydra.core.plugins"].Plugins.instance()  # scans all packages once
@@ -112,7 +112,7 @@ def _main(folder: Path, every: int) -> None:
     (folder / "outcomes.json").write_text(json.dumps(outcomes, indent=1))
 
 
-def _import_all(package: str) -> None:
+def import_all(package: str) -> None:
     """Import a package and its modules, except those that need a missing extra."""
     found = importlib.import_module(package)
     for module in pkgutil.walk_packages(found.__path__, f"{package}."):

@@ -19,6 +19,7 @@ from benchmarks.hostile import bench_hostile
 from benchmarks.injections import bench_injections
 from benchmarks.maps import bench_maps
 from benchmarks.memory import bench_memory
+from benchmarks.mistakes import bench_mistakes
 from benchmarks.mutants import bench_mutants
 from benchmarks.onnx_export import bench_onnx
 from benchmarks.peers.comparison import bench_peers
@@ -281,6 +282,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_revisions(s.runs / "revisions", s.quick),
         "room",
         (*_TRAINING, "evaluation", "explanations", "cli", "conf", "benchmarks/revisions"),
+    ),
+    "mistakes": Benchmark(
+        lambda s: bench_mistakes(s.runs / "mistakes"),
+        "truth",
+        ("cli", "config", "conf", "utils", "benchmarks/mistakes"),
     ),
     "startup": Benchmark(
         lambda s: bench_startup(s.runs / "startup", s.device, s.quick),
