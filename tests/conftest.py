@@ -13,6 +13,10 @@ from tests.forked import stop_servers
 
 # Fixtures import torch and the package, because the process that starts the workers needs neither.
 
+# Else every worker, and every program that a test starts, compiles tests and package again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 
 @pytest.fixture(autouse=True)
 def one_thread():
