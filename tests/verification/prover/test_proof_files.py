@@ -18,6 +18,25 @@ def spec():
     spec.close()
 
 
+@pytest.fixture(scope="module")
+def narrow():
+    """A small task, so that a proof in parts of 100 combinations has two of them."""
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=1.0)
+    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
+    yield spec
+    spec.close()
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(spec):
+    return finish(Prover(spec))
+
+
+@pytest.fixture(scope="module")
+def uninterrupted_parts(narrow):
+    return finish(Prover(narrow, 100))
+
+
 def finish(prover):
     while not prover.is_finished:
         prover.advance()
@@ -27,7 +46,7 @@ def finish(prover):
 
 
 @pytest.mark.parametrize("places", [3, 40])
-def test_stopped_and_gone_on_with(spec, tmp_path, places):
+def test_stopped_and_gone_on_with(spec, uninterrupted, tmp_path, places):
     path = tmp_path / "state.npz"
     stopped = Prover(spec)
     for _ in range(places):
@@ -36,14 +55,12 @@ def test_stopped_and_gone_on_with(spec, tmp_path, places):
     later = Prover(spec)
     load(later, path, "this")
     assert later.decided == stopped.decided
-    assert finish(later) == finish(Prover(spec))
+    assert finish(later) == uninterrupted
 
 
 @pytest.mark.parametrize("places", [5, None])
-def test_stopped_within_a_part_or_between_two(tmp_path, places):
-    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=1.0)
-    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
-    path, stopped, later = tmp_path / "state.npz", *(Prover(spec, 100) for _ in range(2))
+def test_stopped_within_a_part_or_between_two(narrow, uninterrupted_parts, tmp_path, places):
+    path, stopped, later = tmp_path / "state.npz", *(Prover(narrow, 100) for _ in range(2))
     assert len(stopped.parts) == 2
     stopped.advance()
     while stopped.waiting and stopped.num_places != places:
@@ -52,8 +69,7 @@ def test_stopped_within_a_part_or_between_two(tmp_path, places):
     save(stopped, path, "this")
     load(later, path, "this")
     assert len(later.parts) == 1 and later.boxes_under_way == stopped.boxes_under_way
-    assert finish(later) == finish(Prover(spec, 100))
-    spec.close()
+    assert finish(later) == uninterrupted_parts
 
 
 def test_another_proofs_state_is_refused(spec, tmp_path):

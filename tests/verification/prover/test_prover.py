@@ -10,10 +10,22 @@ from drone_rl.verification.prover.policy_spec import make_policy_spec
 from drone_rl.verification.prover.prover import Prover
 
 
+class Noting(Prover):
+    """Notes the volume of the forked boxes when a part is finished."""
+
+    def __init__(self, *args):
+        super().__init__(*args)
+        self.forked_volumes = []
+
+    def _finish_part(self):
+        self.forked_volumes.append(sum(volumes(b).sum() for b in self.forked))
+        super()._finish_part()
+
+
 def prove(name, gap=1e-4, most=500_000_000, **task):
     policy = drone_rl.load_policy(name).in_task(num_cubes=1, **task)
     spec = make_policy_spec(policy.description, policy.make_network(), gap)
-    prover = Prover(spec, most)
+    prover = Noting(spec, most)
     while not prover.is_finished:
         prover.advance()
     spec.close()
@@ -23,6 +35,12 @@ def prove(name, gap=1e-4, most=500_000_000, **task):
 @pytest.fixture(scope="module")
 def one_sided():
     return prove("right_and_forward")
+
+
+@pytest.fixture(scope="module")
+def narrow():
+    """The same with less room for the cube: 2 m to each side."""
+    return prove("right_and_forward", lateral_bound=2.0)
 
 
 def shares(findings, bound=6.0):
@@ -41,15 +59,15 @@ def test_the_share_that_a_policy_collects(one_sided):
     assert undecided < 1e-6
 
 
-def test_part_by_part_it_comes_to_the_same(one_sided):
-    partition_placements = prove("right_and_forward", most=200)
-    assert partition_placements.num_places > one_sided.num_places
+def test_part_by_part_it_comes_to_the_same(narrow):
+    partition_placements = prove("right_and_forward", most=200, lateral_bound=2.0)
+    assert partition_placements.num_places > narrow.num_places
     (parts, undecided), (whole, left) = (
-        shares(partition_placements.findings()),
-        shares(one_sided.findings()),
+        shares(partition_placements.findings(), bound=2.0),
+        shares(narrow.findings(), bound=2.0),
     )
     assert parts == pytest.approx(whole, abs=1e-12) and undecided == pytest.approx(left, abs=1e-12)
-    assert partition_placements.findings().steps.keys() == one_sided.findings().steps.keys()
+    assert partition_placements.findings().steps.keys() == narrow.findings().steps.keys()
 
 
 def test_steps_are_counted(one_sided):
@@ -119,22 +137,13 @@ def test_parts_that_are_not_begun_with_are_undecided():
     assert undecided == pytest.approx(1 - 1 / count, abs=1e-6)
 
 
-def test_where_logits_are_close_nothing_is_claimed(one_sided, monkeypatch):
+def test_where_logits_are_close_nothing_is_claimed(narrow):
     """The larger the gap that is asked for, the more ways are followed, and nothing is wrong."""
-    forked = []
-    resolve_forks = Prover._finish_part
-
-    def noted(prover):
-        forked.append(sum(volumes(b).sum() for b in prover.forked))
-        resolve_forks(prover)
-
-    monkeypatch.setattr(Prover, "_finish_part", noted)
-    prove("right_and_forward")
-    careful = prove("right_and_forward", gap=3.0)
-    assert forked[0] < 1e-3 < forked[1]
-    parts, _ = shares(careful.findings())
-    assert parts.get(("ALL_CUBES", 1), 0) <= (6 + 1.65) / 12 + 1e-9
-    assert parts.get(("FRONT_BOUNDARY", 0), 0) <= (6 - 1.65) / 12 + 1e-9
+    careful = prove("right_and_forward", gap=3.0, lateral_bound=2.0)
+    assert narrow.forked_volumes[0] < 1e-3 < careful.forked_volumes[0]
+    parts, _ = shares(careful.findings(), bound=2.0)
+    assert parts.get(("ALL_CUBES", 1), 0) <= (2 + 1.65) / 4 + 1e-9
+    assert parts.get(("FRONT_BOUNDARY", 0), 0) <= (2 - 1.65) / 4 + 1e-9
 
 
 def test_to_and_fro_ends_at_the_step_limit(monkeypatch):
