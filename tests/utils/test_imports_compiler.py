@@ -1,9 +1,11 @@
-"""Each in a process of its own: what is imported once stays so."""
+"""Most in a process of its own: what is imported once stays so. This one has the compiler."""
 
 import subprocess
 import sys
 
-import pytest
+import torch._dynamo.eval_frame
+
+from drone_rl.utils.imports import leave_compiler_unloaded
 
 LOADED = "hasattr(sys.modules.get('torch._dynamo'), '__file__')"
 START = """import sys
@@ -19,18 +21,9 @@ def run(code):
     return done.stdout
 
 
-def test_a_training_does_without_it(tmp_path):
-    code = f"""{START}
-import drone_rl
-short = drone_rl.TrainerSettings(total_frames=1)
-drone_rl.train(folder={str(tmp_path / "run")!r}, trainer=short)
-print({LOADED})"""
-    assert run(code).splitlines()[-1] == "False"
-
-
-def test_without_it_the_same_is_learned(tmp_path):
+def test_a_training_does_without_it_and_the_same_is_learned(tmp_path):
     """Optimizers ask it to leave them alone, which they may be without."""
-    code = """
+    learn = """
 import torch
 torch.manual_seed(0)
 layer = torch.nn.Linear(3, 2)
@@ -39,15 +32,30 @@ for _ in range(3):
     adam.zero_grad()
     layer(torch.ones(4, 3)).square().sum().backward()
     adam.step()
-print(layer.weight.tolist(), {0})
+learned = layer.weight.tolist()
 """
-    with_it, without = run("import sys" + code.format(LOADED)), run(START + code.format(LOADED))
-    assert with_it.replace("True", "False") == without
+    code = f"""{START}{learn}
+print(learned, {LOADED})
+import drone_rl
+short = drone_rl.TrainerSettings(total_frames=1)
+drone_rl.train(folder={str(tmp_path / "run")!r}, trainer=short)
+print({LOADED})"""
+    lines = run(code).splitlines()
+    with torch.random.fork_rng():
+        exec(learn, here := {})
+    assert (lines[0], lines[-1]) == (f"{here['learned']} False", "False")
 
 
 def test_whoever_compiles_gets_it_and_all_that_was_noted():
+    """What was disabled before stays so."""
     code = f"""{START}
 import torch, tensordict
+@torch.compiler.disable
+def plain(x):
+    return x, torch.compiler.is_compiling()
+assert plain(torch.ones(1))[1] is False
+def outer(x):
+    return plain(x)[1], torch.compiler.is_compiling()
 assert not ({LOADED})
 noted = sys.modules["torch._dynamo"]._allowed
 assert noted
@@ -57,40 +65,22 @@ assert {LOADED}
 from torch._dynamo import trace_rules
 assert all(trace_rules.is_callable_allowed(f) for f in noted)
 from torch._dynamo.eval_frame import OptimizedModule
-print("done")"""
-    assert run(code) == "done\n"
-
-
-def test_what_is_disabled_stays_so_once_it_is_there():
-    code = f"""{START}
-import torch
-@torch.compiler.disable
-def plain(x):
-    return x, torch.compiler.is_compiling()
-assert plain(torch.ones(1))[1] is False
-def outer(x):
-    return plain(x)[1], torch.compiler.is_compiling()
 print(torch.compile(outer, backend="eager")(torch.ones(1)))"""
-    assert run(code).strip() == "(False, True)"
+    assert run(code) == "(False, True)\n"
 
 
-@pytest.mark.parametrize("first", ["import torch._dynamo", "import torch._dynamo.eval_frame"])
-def test_one_that_is_there_is_left_alone(first):
-    assert run(f"{first}\n{START}print({LOADED})").strip() == "True"
+def test_one_that_is_there_is_left_alone():
+    there = sys.modules["torch._dynamo"]
+    leave_compiler_unloaded()
+    assert sys.modules["torch._dynamo"] is there and eval(LOADED)
 
 
-def test_submodules_can_be_imported_and_inspection_loads_nothing():
+def test_submodules_can_be_imported_and_inspection_and_marking_load_nothing():
     code = f"""{START}
 import torch, inspect
+assert torch.compiler.assume_constant_result(lambda: 1)._dynamo_marked_constant
 inspect.getmodule(torch.ones)
 assert not ({LOADED})
 import torch._dynamo.config
 print({LOADED}, torch._dynamo.config.verbose)"""
-    assert run(code).strip() == "True False"
-
-
-def test_what_is_marked_constant_is_so_marked():
-    code = f"""{START}
-import torch
-print(torch.compiler.assume_constant_result(lambda: 1)._dynamo_marked_constant, {LOADED})"""
     assert run(code).strip() == "True False"
