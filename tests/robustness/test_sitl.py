@@ -1,5 +1,6 @@
 """Policies fly the stub firmware, in the worlds of evaluations."""
 
+import dataclasses
 import shlex
 import sys
 from pathlib import Path
@@ -20,13 +21,13 @@ from drone_rl.verdicts.dynamics_sweep import chart
 STUB = Path(__file__).parents[1] / "flight" / "stub_firmware.py"
 
 
-@pytest.fixture
-def program(tmp_path):
+@pytest.fixture(scope="module")
+def program(tmp_path_factory):
     """The stub as a program of its own, where it can have a network of its own."""
     with FirmwareProcess() as keeping:
         if keeping.shared:
             pytest.skip(f"no network namespaces here: {keeping.shared}")
-    path = tmp_path / "stub"
+    path = tmp_path_factory.mktemp("program") / "stub"
     path.write_text(f"#!/bin/sh\nexec {shlex.join([sys.executable, '-I', str(STUB), ''])}\n")
     path.chmod(0o755)
     return path
@@ -38,9 +39,25 @@ def near():
     return drone_rl.load_policy("good").in_task(**changes)
 
 
-def test_it_flies_the_first_worlds_of_evaluations(program):
-    policy = near()
-    done = evaluate_in_the_loop(policy, 2, seed=3, firmware=program, progress=silent)
+@pytest.fixture(scope="module")
+def flown(program):
+    """An episode in the loop, and what `_fly` has returned of it."""
+    returned, fly = [], looped._fly
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(looped, "_fly", lambda *given: returned.append(fly(*given)) or returned[-1])
+        done = evaluate_in_the_loop(near(), 1, seed=3, firmware=program, progress=silent)
+    return done, returned[0]
+
+
+def test_it_flies_the_first_worlds_of_evaluations(program, flown, monkeypatch):
+    """The second episode repeats the first one here; `test_worlds_...` shows that worlds differ."""
+    _, (episodes, flight) = flown
+
+    def fly(pilot, world, *given):
+        return episodes, dataclasses.replace(flight, world=world)
+
+    monkeypatch.setattr(looped, "_fly", fly)
+    done = evaluate_in_the_loop(near(), 2, seed=3, firmware=program, progress=silent)
     assert [(f.world, f.success, f.end) for f in done.flights] == [
         (0, True, "all_cubes"),
         (1, True, "all_cubes"),
@@ -54,7 +71,11 @@ def test_it_flies_the_first_worlds_of_evaluations(program):
         "environments: seed 3 (fixed)",
     ]
     assert (done.as_dict()["seed"], done.as_dict()["seed_is_fixed"]) == (3, True)
-    first = done.flights[0]
+
+
+def test_an_episode_in_the_loop(flown):
+    (first,) = flown[0].flights
+    assert (first.world, first.success, first.end) == (0, True, "all_cubes")
     assert len(first.path) == first.steps + 1
     assert first.simulated_s == pytest.approx(first.steps * 0.099)
     assert first.path[0] == pytest.approx((0.0, 0.0, 2.5), abs=0.2)

@@ -97,7 +97,8 @@ def test_obstacles_are_felt(begun):
     assert int(body.contact.thing[0]) == 0
 
 
-def test_a_firmware_that_never_arms():
+def test_a_firmware_that_never_arms(monkeypatch):
+    monkeypatch.setattr(module, "_ARM_TRIES", 2)
     dynamics = InTheLoopDynamics(drone(Even(arms=False)), SETTINGS)
     with pytest.raises(NotReadyError, match="refuses to arm"):
         dynamics.begin(dynamics.start(PLACE))
