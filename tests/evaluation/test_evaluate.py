@@ -89,13 +89,16 @@ def test_in_another_appearance_it_is_said_so(good):
 
 def test_in_another_body_it_is_said_so(good, monkeypatch):
     floating(monkeypatch)
+    good = good.in_task(num_cubes=1)  # short episodes
     few = {"episodes": 4, "sampled": False, "progress": silent}
     done = drone_rl.judge(good, dynamics={"mode": "simple_flight"}, **few)
     changed = {"mode": {"own": "computer_vision", "flown": "simple_flight"}}
     assert done.as_dict()["unlike"] == changed
     assert "here it flew with dynamics.mode=simple_flight instead of computer_vision." in str(done)
     assert "unlike" not in drone_rl.judge(good, **few).as_dict()
-    luck = drone_rl.judge("forward", dynamics={"mode": "simple_flight"}, **few)
+    luck = drone_rl.judge(
+        "forward", task={"num_cubes": 1}, dynamics={"mode": "simple_flight"}, **few
+    )
     assert "unlike" not in luck.as_dict()
     moved = good.in_dynamics(mode="simple_flight", wind=[-5.0, 0.0, 0.0])
     done = drone_rl.evaluate(moved, episodes=2, num_envs=2, progress=silent)

@@ -218,7 +218,7 @@ def mirrored(episodes):
 
 @given(st.lists(st.tuples(st.sampled_from(LAYOUTS), st.booleans(), st.booleans()), min_size=1))
 @settings(
-    max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 def test_a_mirrored_flight_gets_the_mirrored_kind(make_episodes, make_baselines, drawn):
     sides, hits = [row[0] for row in drawn] * 30, [row[1:] for row in drawn] * 30

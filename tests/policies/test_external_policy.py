@@ -14,6 +14,8 @@ from tests.second_dynamics import Turning
 from tests.second_task import Posts
 
 FEW = {"episodes": 8, "sampled": False, "seed": 0, "progress": silent}
+ONE = {"num_cubes": 1}
+"""A task with short episodes."""
 
 
 @pytest.fixture(scope="module")
@@ -38,14 +40,14 @@ def left(images):
 
 
 def test_verdict_does_not_depend_on_the_wrapping(network):
-    own = drone_rl.judge("good", **FEW).as_dict()
+    own = drone_rl.judge("good", task=ONE, **FEW).as_dict()
     wrappings = {
         "module": network,
         "function": lambda x: network(x),
         "bytes": drone_rl.policy_from(on_bytes(network), transforms=()),
     }
     for name, wrapping in wrappings.items():
-        found = drone_rl.judge(wrapping, **FEW).as_dict()
+        found = drone_rl.judge(wrapping, task=ONE, **FEW).as_dict()
         for key in ("kind", "greedy", "skill", "quantities"):
             assert found[key] == own[key], (name, key)
 
@@ -177,7 +179,8 @@ def test_external_policies_cannot_be_proved(tmp_path):
 
 @pytest.mark.slow
 def test_callable_gets_a_reduced_report(network, tmp_path):
-    policy = drone_rl.policy_from(on_bytes(network), transforms=(), name="a function")
+    task = drone_rl.TaskSettings(**ONE)
+    policy = drone_rl.policy_from(on_bytes(network), transforms=(), name="a function", task=task)
     small = {"frames": 40, "episodes": 6, "perplexity": 5}
     done = drone_rl.explain(policy, folder=tmp_path, progress=silent, **small)
     numbers = done.numbers["a function"]

@@ -82,6 +82,7 @@ def test_what_is_required_is_held_against_what_was_found(good, tmp_path, needs, 
 
 def test_a_verdict_tells_the_domain_and_may_speak_against_it(good, tmp_path):
     """With few flights it is not certain, and lets it stand; a stricter one does not."""
+    good = good.in_task(num_cubes=1)  # short episodes
     path = leave(tmp_path / "a", shifts_of(good))
     (tmp_path / "needs.yaml").write_text("blur: {high: 1.0, unit: pixels}")
     told = {"shifts": path, "require_domain": tmp_path / "needs.yaml", "progress": silent}

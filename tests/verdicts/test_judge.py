@@ -117,7 +117,7 @@ def test_mistakes_name_the_argument(change, message):
 
 
 def test_two_verdicts_differ_in_seed_and_a_printed_seed_reproduces_one(good):
-    how = {"episodes": 12, "sampled": True, "progress": silent}
+    how = {"episodes": 12, "sampled": True, "task": {"num_cubes": 1}, "progress": silent}
     one, other = (drone_rl.judge(good, **how) for _ in range(2))
     first, second = one.verdict.evidence, other.verdict.evidence
     assert first["seed"] != second["seed"]
