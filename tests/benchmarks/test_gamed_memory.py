@@ -7,6 +7,7 @@ import pytest
 import drone_rl
 from benchmarks import gamed_memory
 from benchmarks.gamed_memory import EPISODES, cases, frame_lookup, judgements, record, step_playback
+from drone_rl.config import TaskSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import Stream
@@ -18,8 +19,12 @@ NAMES = (
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _recorded_once():
+def _small_and_recorded_once():
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(gamed_memory, "TASK", TaskSettings(num_cubes=1))
+        patch.setattr(gamed_memory, "COUNTEREXAMPLES", 10)
+        # little more than the 674 different frames, so that the fit has large weights
+        patch.setattr(gamed_memory, "WIDTH", 690)
         patch.setattr(gamed_memory, "record", functools.cache(record))
         yield
 
