@@ -1,5 +1,6 @@
 """Explanations of a small untrained policy, computed once, and small ones made by hand."""
 
+import functools
 import json
 import shutil
 
@@ -9,10 +10,12 @@ import torch
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.explanations.explain import explain_policy
+from drone_rl.explanations.report import write_report
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import SmallCNN
 from tests.explanations.quick import quick
+from tests.shared import shared_folder
 
 NASTY = '</script><b>"a" & b'
 """A name that would break a page that didn't escape it."""
@@ -21,7 +24,18 @@ NASTY = '</script><b>"a" & b'
 @pytest.fixture(scope="session")
 def explanations(tmp_path_factory):
     """Two folders; the second is the first under another name."""
-    root = tmp_path_factory.mktemp("explanations")
+    root = shared_folder(tmp_path_factory, "explanations", explain_twice)
+    return [root / "a", root / "b"]
+
+
+@pytest.fixture(scope="session")
+def report(explanations, tmp_path_factory):
+    """The page of both; other files of the report are next to it."""
+    make = functools.partial(write_report, explanations)
+    return shared_folder(tmp_path_factory, "report", make) / "report.html"
+
+
+def explain_twice(root):
     env = with_transforms(DroneEnv(30), [GrayPixels(), StandardizePixels()])
     generator = torch.Generator().manual_seed(0)
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,), generator=generator)
@@ -33,7 +47,6 @@ def explanations(tmp_path_factory):
     shutil.copytree(root / "a", root / "b")
     numbers = json.loads((root / "b" / "explanation.json").read_text())
     (root / "b" / "explanation.json").write_text(json.dumps({**numbers, "name": "second"}))
-    return [root / "a", root / "b"]
 
 
 @pytest.fixture

@@ -4,8 +4,6 @@ import json
 
 import pytest
 
-from drone_rl.explanations.report import write_report
-
 pytest.importorskip("selenium.webdriver")
 
 from selenium.webdriver.common.action_chains import ActionChains
@@ -16,9 +14,8 @@ from tests.chromium import open_page
 
 
 @pytest.fixture(scope="module")
-def browser(explanations, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("browser")
-    with open_page(write_report(explanations, folder), folder / "profile") as driver:
+def browser(report, tmp_path_factory):
+    with open_page(report, tmp_path_factory.mktemp("profile")) as driver:
         WebDriverWait(driver, 20).until(
             lambda d: d.find_element(By.ID, "map1").get_attribute("data-ready") == "true"
         )

@@ -19,11 +19,6 @@ from drone_rl.utils.intervals import proportion
 from tests.explanations.report.conftest import NASTY
 
 
-@pytest.fixture(scope="session")
-def report(explanations, tmp_path_factory):
-    return write_report(explanations, tmp_path_factory.mktemp("report"))
-
-
 @pytest.fixture
 def changed(explanations, tmp_path):
     """Copies an explanation with entries added or (None) taken away."""
