@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import torch
 
+from drone_rl.config import TaskSettings
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import ExternalNetwork
@@ -16,7 +17,7 @@ SMALL = ExplainSettings(frames=60, perplexity=5, seed=3)
 def test_worlds_and_actions_start_afresh_whoever_asked_first(make_pipeline):
     flown = []
     for first in ("flights", "restart"):
-        env, actor = make_pipeline(num_envs=30)
+        env, actor = make_pipeline(num_envs=30, task=TaskSettings(num_cubes=1))
         context = Context(env, actor.module[0].module, SMALL)
         if first == "restart":
             policy = context.restart()
@@ -28,14 +29,14 @@ def test_worlds_and_actions_start_afresh_whoever_asked_first(make_pipeline):
 
 
 def test_of_a_function_no_layers_are_recorded(make_pipeline):
-    env, _ = make_pipeline(num_envs=30)
+    env, _ = make_pipeline(num_envs=30, task=TaskSettings(num_cubes=1))
     network = ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 25, 64), MOVES)
     context = Context(env, network, SMALL)
     assert context.layer is None and context.dataset.features == {}
 
 
 def test_frames_are_of_the_flights_and_maps_of_the_frames(make_pipeline):
-    env, actor = make_pipeline(num_envs=30)
+    env, actor = make_pipeline(num_envs=30, task=TaskSettings(num_cubes=1))
     context = Context(env, actor.module[0].module, SMALL)
     data, flights = context.dataset, context.flights
     assert len(np.unique(flights.episode)) == len(np.unique(data.episode)) == 30
@@ -51,7 +52,7 @@ def test_frames_are_of_the_flights_and_maps_of_the_frames(make_pipeline):
 
 
 def test_another_thread_has_the_same_data_and_a_network_of_its_own(make_pipeline):
-    env, actor = make_pipeline(num_envs=30)
+    env, actor = make_pipeline(num_envs=30, task=TaskSettings(num_cubes=1))
     network = actor.module[0].module
     context = Context(env, network, SMALL)
     twin = context.aside()
@@ -67,7 +68,7 @@ def test_another_thread_has_the_same_data_and_a_network_of_its_own(make_pipeline
 
 
 def test_what_has_no_gradients_is_shared_with_another_thread(make_pipeline):
-    env, _ = make_pipeline(num_envs=30)
+    env, _ = make_pipeline(num_envs=30, task=TaskSettings(num_cubes=1))
     network = ExternalNetwork(lambda x: x.detach().flatten(1)[:, :3], (1, 25, 64), MOVES)
     assert Context(env, network, SMALL).aside().network is network
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.config import TaskSettings
 from drone_rl.explanations.context import LeftOutError
 from drone_rl.explanations.explain import SECTIONS, explain_policy
 from drone_rl.explanations.settings import ExplainSettings
@@ -26,7 +27,7 @@ def explain(env, network, folder, settings=SMALL, **kwargs):
 def test_everything_is_written_and_the_order_of_sections_changes_nothing(make_pipeline, tmp_path):
     contents, found = [], SECTIONS
     for name, order in (("a", list(found)), ("b", list(found)[::-1])):
-        env, actor = make_pipeline(num_envs=30, seed=2)
+        env, actor = make_pipeline(num_envs=30, seed=2, task=TaskSettings(num_cubes=1))
         network = actor.module[0].module
         sections = {title: found[title] for title in order}
         explain(env, network, tmp_path / name, sections=sections)
@@ -46,7 +47,7 @@ def test_everything_is_written_and_the_order_of_sections_changes_nothing(make_pi
 
 @pytest.mark.slow
 def test_a_policy_without_convolutions_and_with_one_action_is_explained(make_pipeline, tmp_path):
-    env, _ = make_pipeline(num_envs=30)
+    env, _ = make_pipeline(num_envs=30, task=TaskSettings(num_cubes=1))
     network = MLP((1, 25, 64), 3, hidden=(8,))
     with torch.no_grad():
         network.layers.logits.bias.copy_(torch.tensor([0.0, 50.0, 0.0]))  # always left
@@ -59,7 +60,7 @@ def test_a_policy_without_convolutions_and_with_one_action_is_explained(make_pip
 
 
 def test_a_section_that_can_not_be_made_is_told_of_and_the_others_are(make_pipeline, tmp_path):
-    env, actor = make_pipeline(num_envs=30)
+    env, actor = make_pipeline(num_envs=30, task=TaskSettings(num_cubes=1))
 
     def fails(context):
         raise LeftOutError("It has no eyes.")

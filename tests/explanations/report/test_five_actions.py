@@ -5,6 +5,7 @@ import json
 import pytest
 import torch
 
+from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.explanations.explain import SECTIONS, explain_policy
 from drone_rl.explanations.report import write_report
@@ -18,7 +19,10 @@ from tests.second_dynamics import Turning
 def folder(tmp_path_factory):
     """All sections but the verdict: the task's oracle does not know how to fly these drones."""
     folder = tmp_path_factory.mktemp("turning")
-    env = with_transforms(DroneEnv(6, dynamics=Turning()), [GrayPixels(), StandardizePixels()])
+    env = with_transforms(
+        DroneEnv(6, TaskSettings(num_cubes=1), dynamics=Turning()),
+        [GrayPixels(), StandardizePixels()],
+    )
     network = MLP((1, 25, 64), 5, hidden=(8,), generator=torch.Generator().manual_seed(0))
     network.actions = Turning.actions
     with torch.no_grad():  # mostly onwards, or flights last for ever
