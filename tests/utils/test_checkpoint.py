@@ -54,7 +54,7 @@ def test_the_system_says_why_pytorch_could_not_write(tmp_path):
     """A limit on the sizes of files stands in for a full disk."""
     code = (
         "import resource, signal, torch; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "from drone_rl.training import save_checkpoint\n"
+        "from drone_rl.utils.checkpoint import save_checkpoint\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, -1))\n"
         "save_checkpoint('last.pt', {'a': torch.zeros(10**6)})\n"
     )

@@ -65,6 +65,8 @@ def test_what_an_exported_file_says_of_its_origin_goes_on(checkpoint):
 
 
 FEW = FlightSettings(episodes=4)
+ONE = {"num_cubes": 1}
+"""A task with short episodes."""
 
 
 def test_a_card_quotes_a_certificate_that_then_travels_with_the_policy(tmp_path):
@@ -83,7 +85,7 @@ def test_a_card_quotes_a_certificate_that_then_travels_with_the_policy(tmp_path)
 
 
 def test_a_card_quotes_no_certificate_that_rollouts_refute(tmp_path):
-    policy, made = drone_rl.load_policy("poor"), tmp_path / "made.json"
+    policy, made = drone_rl.load_policy("poor").in_task(**ONE), tmp_path / "made.json"
     made.write_text(json.dumps(of_every_place(policy)))
     target = tmp_path / "mine.safetensors"
     with pytest.raises(InputError, match="ended otherwise than stated"):
@@ -92,9 +94,10 @@ def test_a_card_quotes_no_certificate_that_rollouts_refute(tmp_path):
 
 
 def test_a_certificate_of_another_is_no_word_of_a_card(tmp_path):
-    policy, target = drone_rl.load_policy("poor"), tmp_path / "mine.safetensors"
+    poor, good = (drone_rl.load_policy(name).in_task(**ONE) for name in ("poor", "good"))
+    policy, target = poor, tmp_path / "mine.safetensors"
     beside = tmp_path / "mine.certificate.json"
-    beside.write_text(json.dumps(of_every_place(drone_rl.load_policy("good"))))
+    beside.write_text(json.dumps(of_every_place(good)))
     with pytest.raises(InputError, match="network with the hash"):
         export(policy, target, FEW, certificate=beside)
     export(policy, target, FEW)
@@ -106,7 +109,7 @@ def test_a_certificate_of_another_is_no_word_of_a_card(tmp_path):
 @pytest.mark.parametrize(("name", "is_good"), [("good", True), ("right_and_forward", False)])
 def test_a_card_quotes_conditions_that_then_travel_with_the_policy(tmp_path, name, is_good):
     """Those of one whom the card's verdict surely finds to be something else are not believed."""
-    policy, made = drone_rl.load_policy(name), tmp_path / "made.json"
+    policy, made = drone_rl.load_policy(name).in_task(**ONE), tmp_path / "made.json"
     made.write_text(json.dumps(shifts_of(policy)))
     settings = dataclasses.replace(FEW, episodes=4 if is_good else 300, num_envs=300)
     export(policy, tmp_path / "mine.safetensors", settings, shifts=made)

@@ -42,7 +42,7 @@ def test_what_is_stated_when_it_is_stopped_within_a_part_is_accepted(tmp_path):
     network = policy.make_network()
     path, found = tmp_path / "certificate.json", {}
     with closing(make_policy_spec(policy.description, network, 1e-4)) as spec:
-        prover = Prover(spec, 100)
+        prover = Prover(spec, 200)
         while prover.parts.size:
             prover.advance()
         while not prover.ended:
@@ -54,10 +54,10 @@ def test_what_is_stated_when_it_is_stopped_within_a_part_is_accepted(tmp_path):
     assert not found["finished"] and found["found"]["stopped_by"] == "limit_s"
     shares = sum(o["share"] for o in found["outcomes"])
     assert 0.0 < shares < 1.0 and shares + found["undecided"]["share"] == pytest.approx(1.0)
-    assert drone_rl.check(path, flights=300).accepted
+    assert drone_rl.check(path, flights=150).accepted
     found["outcomes"][0]["boxes"] += found["undecided"]["boxes"][:1]
     path.write_text(json.dumps(found | provenance()))
-    assert not drone_rl.check(path, flights=300).accepted
+    assert not drone_rl.check(path, flights=150).accepted
 
 
 def test_the_second_checker_refuses_what_was_changed(proof, tmp_path):
