@@ -91,7 +91,7 @@ def test_a_page_that_is_not_understood_is_refused(write, tmp_path, text, why):
 
 def test_every_block_is_run(write):
     write(PAGE)
-    outcomes = Session("docs/page.md").run()
+    outcomes = list(Session("docs/page.md").run())
     assert [(outcome.status, outcome.why) for outcome in outcomes] == [(RAN, "")] * 6
 
 
@@ -148,7 +148,7 @@ def test_outputs_are_written_into_a_page(write, tmp_path):
     page = write(
         "```sh\necho 1\n```\n\n```text\n```\n\n```console\n$ echo 2\n3\n$ echo 5\n[...]4\n```\n"
     )
-    outcomes = Session(page).run()
+    outcomes = list(Session(page).run())
     assert [o.status for o in outcomes] == [RAN, FAILED, FAILED]
     assert len(update_page(page, outcomes, tmp_path)) == 1  # it omits text
     assert (tmp_path / page).read_text() == (

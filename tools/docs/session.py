@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -47,13 +47,13 @@ class Session:
         self.names: dict[str, Any] = {"__name__": "__main__"}
         """Names that the Python blocks of the page have defined."""
 
-    def run(self) -> list[Outcome]:
-        """Run every block and return the outcomes."""
+    def run(self) -> Iterator[Outcome]:
+        """Run every block and yield its outcome."""
         for command in self.rules.before:
             printed, status = run_command(command)
             if status:
                 raise RuntimeError(f"{command}: exit status {status}\n{printed}")
-        return [self.run_block(block) for block in self.blocks]
+        yield from map(self.run_block, self.blocks)
 
     def run_block(self, block: Block) -> Outcome:
         """Run a block and compare its output with the page."""
@@ -133,8 +133,10 @@ def main() -> None:
     """Run a page in the current folder and write the outcomes as JSON."""
     page, results = sys.argv[1:]
     sys.path.insert(0, os.getcwd())
-    outcomes = Session(page).run()
-    Path(results).write_text(json.dumps([dataclasses.asdict(o) for o in outcomes], indent=1))
+    outcomes = []
+    for outcome in Session(page).run():
+        outcomes.append(dataclasses.asdict(outcome))
+        Path(results).write_text(json.dumps(outcomes, indent=1))  # also of a page that is stopped
 
 
 if __name__ == "__main__":
