@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hydra._internal.core_plugins.file_config_source import FileConfigSource
+from hydra._internal.sources_registry import SourcesRegistry
+from hydra.core.config_store import ConfigStore
 from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.plugins import Plugins
 
 from drone_rl.cli.hydra import composition
 from drone_rl.config import TASKS
@@ -24,7 +26,9 @@ def composing_fast() -> Iterator[None]:
 
 
 def _keep_files(patch: pytest.MonkeyPatch) -> None:
-    load, kept = FileConfigSource.load_config, {}
+    Plugins.instance()  # registers a class of its own, not the one that an import returns
+    source = SourcesRegistry.instance().resolve("file")
+    load, kept = source.load_config, {}
 
     def load_once(self, config_path):
         file = Path(self.path, self._normalize_file_name(config_path))
@@ -35,7 +39,7 @@ def _keep_files(patch: pytest.MonkeyPatch) -> None:
             kept[key] = load(self, config_path)
         return copy.deepcopy(kept[key])
 
-    patch.setattr(FileConfigSource, "load_config", load_once)
+    patch.setattr(source, "load_config", load_once)
 
 
 def _keep_overrides(patch: pytest.MonkeyPatch) -> None:
@@ -65,3 +69,5 @@ def _keep_schemas(patch: pytest.MonkeyPatch) -> None:
             done.update(commands)
 
     patch.setattr(composition, "register_schemas", register_once)
+    # Hydra copies the store of all schemas for every command, but changes only copies of its nodes.
+    patch.setattr(ConfigStore, "__deepcopy__", lambda store, memo: store, raising=False)
