@@ -32,6 +32,7 @@ from drone_rl.verification.prover.markov_chain import (
 )
 from drone_rl.verification.prover.policy_spec import make_policy_spec
 from drone_rl.verification.requirements import require_cubes
+from drone_rl.verification.text import exact_percent
 
 _BOUNDS = {
     "least": "everywhere at least",
@@ -250,9 +251,7 @@ def _given(task: TaskSettings, cubes: Any) -> Tensor:
     )
 
 
-def _row(
-    name: str, values: Tensor, show: Callable[[float], str] = lambda share: f"{100 * share:.4g}%"
-) -> list[str]:
+def _row(name: str, values: Tensor, show: Callable[[float], str] = exact_percent) -> list[str]:
     return [name, *(show(float(figure)) for figure in (values.mean(), values.min(), values.max()))]
 
 
