@@ -96,6 +96,8 @@ when_imported("gymnasium", register)
 # dm_control searches for a display; TorchRL derives classes from one that it deprecates
 import_quietly("dm_control._render.glfw_renderer", "GLFWError", "DISPLAY")
 import_quietly("torchrl.collectors.weight_update", "DeprecationWarning", "WeightUpdaterBase")
+import_quietly("torchrl.collectors.distributed.generic", "DeprecationWarning", "WeightUpdaterBase")
+import_quietly("torchrl.collectors.distributed.rpc", "DeprecationWarning", "WeightUpdaterBase")
 
 
 def __getattr__(name: str) -> Any:

@@ -122,11 +122,11 @@ def shifts(
     settings, seed = with_seed((settings or ShiftSettings()).replace(**changes))
     progress = progress or Bar()
     check_axes(settings.axes or ())
-    pilot = as_policy(policy, outputs).in_task(**(task or {}))
-    pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
+    loaded = as_policy(policy, outputs).in_task(**(task or {}))
+    loaded = loaded.in_dynamics(**dynamics) if dynamics else loaded
     begin = time.perf_counter()
-    require_function(pilot, seed=seed.value, device=settings.device, renderer=settings.renderer)
-    subject = make_policy_spec(pilot, settings)
+    require_function(loaded, seed=seed.value, device=settings.device, renderer=settings.renderer)
+    subject = make_policy_spec(loaded, settings)
     axes = find_axes(settings.axes, subject)
     total = len(axes) * (len(settings.strengths) + settings.domain) + 1
     done = itertools.count()
@@ -142,13 +142,13 @@ def shifts(
         pictures = {axis.name: make_strip(filmed, axis) for axis in axes}
     progress("flown", total, total)
     identity = None  # of a third-party policy
-    if isinstance(pilot, Policy):
-        described = pilot.description.as_dict()
-        identity = {"weights": fingerprint(pilot.state["policy"]), "description": described}
+    if isinstance(loaded, Policy):
+        described = loaded.description.as_dict()
+        identity = {"weights": fingerprint(loaded.state["policy"]), "description": described}
     numbers = {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
-        "policy": pilot.name,
+        "policy": loaded.name,
         "network": identity,
         "settings": settings.values(),
         **seed.as_dict(),
@@ -157,7 +157,7 @@ def shifts(
         "domain": domain,
         "seconds": time.perf_counter() - begin,
     }
-    return Shifts(pilot, settings, numbers, pictures)
+    return Shifts(loaded, settings, numbers, pictures)
 
 
 def ranges_of(numbers: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -191,25 +191,25 @@ def _domain(
     return {"plain": prober.plain, "ranges": ranges}
 
 
-def make_policy_spec(pilot: BasePolicy, settings: ShiftSettings) -> PolicySpec:
+def make_policy_spec(policy: BasePolicy, settings: ShiftSettings) -> PolicySpec:
     """Return the policy with its task, camera and transforms.
 
     Raises:
         InputError: The task has no settings to perturb.
     """
-    task: Any = pilot.task
+    task: Any = policy.task
     task = task if isinstance(task, BaseTaskSettings) else getattr(task, "settings", None)
     if not isinstance(task, BaseTaskSettings):
         raise InputError(
-            f"the task of policy={pilot.name} has no settings to perturb; give another policy"
+            f"the task of policy={policy.name} has no settings to perturb; give another policy"
         )
-    env: Any = pilot.make_env(1, device=settings.device, renderer=settings.renderer)
+    env: Any = policy.make_env(1, device=settings.device, renderer=settings.renderer)
     try:
         camera, transforms = worlds_of(env).camera, [*env.transform]
     finally:
         env.close()
-    network = pilot.make_network(settings.device).eval()
-    described = getattr(pilot, "description", None)  # only policies from files have one
+    network = policy.make_network(settings.device).eval()
+    described = getattr(policy, "description", None)  # only policies from files have one
     look = MINIMAL if described is None else described.appearance
-    where, moved = (settings.device, settings.renderer), (pilot.dynamics, pilot.actions)
+    where, moved = (settings.device, settings.renderer), (policy.dynamics, policy.actions)
     return PolicySpec(network, task, camera, transforms, look, *where, *moved)

@@ -114,42 +114,44 @@ def evaluate_in_the_loop(
     """
     if not (isinstance(flights, int) and flights >= 1):
         raise InputError(f"flights={flights} is out of range; give a whole number from 1")
-    progress, pilot = progress or Bar(), as_policy(policy, outputs)
+    progress, loaded = progress or Bar(), as_policy(policy, outputs)
     root = drawn_seed or root_seed(seed)
     program = find_firmware(firmware)
     flown: list[tuple[Episodes, SitlEpisode]] = []
     with tempfile.TemporaryDirectory(prefix="betaflight-") as folder:
         for world in range(flights):
-            progress(f"{pilot.name}: software in the loop", world, flights)
-            flown.append(_fly_or_restart(pilot, world, root.value, program, Path(folder), isolated))
+            progress(f"{loaded.name}: software in the loop", world, flights)
+            flown.append(
+                _fly_or_restart(loaded, world, root.value, program, Path(folder), isolated)
+            )
     progress("flown", flights, flights)
     ended, episodes = zip(*flown, strict=True)
-    return SitlEvaluation(pilot.name, root, episodes, summarise(Episodes.joined(ended)))
+    return SitlEvaluation(loaded.name, root, episodes, summarise(Episodes.joined(ended)))
 
 
-def _fly_or_restart(pilot: BasePolicy, world: int, *given: Any) -> tuple[Episodes, SitlEpisode]:
+def _fly_or_restart(policy: BasePolicy, world: int, *given: Any) -> tuple[Episodes, SitlEpisode]:
     """Run one episode; restart a firmware that fails before the policy acts."""
     for _ in range(STARTS - 1):
         with contextlib.suppress(NotReadyError):
-            return _fly(pilot, world, *given)
-    return _fly(pilot, world, *given)
+            return _fly(policy, world, *given)
+    return _fly(policy, world, *given)
 
 
 @torch.no_grad()
 def _fly(
-    pilot: BasePolicy, world: int, seed: int, program: Path, folder: Path, isolated: bool
+    policy: BasePolicy, world: int, seed: int, program: Path, folder: Path, isolated: bool
 ) -> tuple[Episodes, SitlEpisode]:
     """Run one episode with a new firmware process."""
     began = time.monotonic()
-    settings = pilot.dynamics.replace(mode="simple_flight")
+    settings = policy.dynamics.replace(mode="simple_flight")
     with contextlib.ExitStack() as stack:
         stack.enter_context(set_exploration_type(ExplorationType.DETERMINISTIC))
         drone = stack.enter_context(
             betaflight_drone(settings, firmware=program, folder=folder, isolated=isolated)
         )
-        dynamics = InTheLoopDynamics(drone, settings, pilot.actions)
+        dynamics = InTheLoopDynamics(drone, settings, policy.actions)
         env, actor = stack.enter_context(
-            pilot.flying(1, seed=seed, first_world=world, dynamics=dynamics)
+            policy.flying(1, seed=seed, first_world=world, dynamics=dynamics)
         )
         seen, worlds = env.reset(), worlds_of(env)
         actor(seen.clone())  # once before the firmware waits for it

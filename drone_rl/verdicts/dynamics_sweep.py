@@ -95,39 +95,39 @@ def bodies(
     settings, seed = with_seed((settings or BodiesSettings()).replace(**changes))
     progress = progress or Bar()
     given = list(settings.policies) if policies is None else policies
-    whom = given if isinstance(given, list | tuple) else [given]
-    pilots = [as_policy(one, outputs) for one in whom]
-    names = [pilot.name for pilot in pilots]
+    listed = given if isinstance(given, list | tuple) else [given]
+    loaded = [as_policy(one, outputs) for one in listed]
+    names = [policy.name for policy in loaded]
     if not names:
-        raise InputError("policies=[] names nobody; give a policy or more")
+        raise InputError("policies=[] is empty; give at least one policy")
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise InputError(f"two policies are called {twice}; give each once, or rename a file")
-    asked = settings.narrowed(JudgeSettings)
+    shared = settings.narrowed(JudgeSettings)
     found: dict[str, dict[str, Any]] = {}
-    steps = len(pilots) * (len(settings.bodies) + bool(settings.loop_flights))
-    for pilot in pilots:
-        flown = found.setdefault(pilot.name, {})
+    steps = len(loaded) * (len(settings.bodies) + bool(settings.loop_flights))
+    for policy in loaded:
+        verdicts = found.setdefault(policy.name, {})
         for body in settings.bodies:
             count = sum(map(len, found.values()))
-            progress(f"{pilot.name}: {body}", count, steps)
-            how = {"dynamics": changes_of(body, pilot.dynamics), "outputs": outputs}
-            done = judge(pilot, asked, **how, progress=silent, drawn_seed=seed)
-            flown[body] = done.verdict.as_dict()
+            progress(f"{policy.name}: {body}", count, steps)
+            how = {"dynamics": changes_of(body, policy.dynamics), "outputs": outputs}
+            done = judge(policy, shared, **how, progress=silent, drawn_seed=seed)
+            verdicts[body] = done.verdict.as_dict()
     numbers: dict[str, Any] = {"bodies": [*settings.bodies], **seed.as_dict(), "policies": found}
     if settings.loop_flights:
         looped = numbers[LOOPED] = {}
-        for pilot in pilots:
-            progress(f"{pilot.name}: {LOOPED}", steps - len(pilots) + len(looped), steps)
-            looped[pilot.name] = _looped(pilot, settings, seed)
+        for policy in loaded:
+            progress(f"{policy.name}: {LOOPED}", steps - len(loaded) + len(looped), steps)
+            looped[policy.name] = _looped(policy, settings, seed)
     progress("flown", steps, steps)
     return Bodies(settings, numbers)
 
 
-def _looped(pilot: BasePolicy, settings: BodiesSettings, seed: RootSeed) -> dict[str, Any]:
+def _looped(policy: BasePolicy, settings: BodiesSettings, seed: RootSeed) -> dict[str, Any]:
     """Episodes with software in the loop, in still air, or the reason why there are none."""
     from drone_rl.robustness.sitl import evaluate_in_the_loop
 
-    still = pilot.in_dynamics(**changes_of("simple flight", pilot.dynamics))
+    still = policy.in_dynamics(**changes_of("simple flight", policy.dynamics))
     count = settings.loop_flights
     try:
         return evaluate_in_the_loop(still, count, drawn_seed=seed, progress=silent).as_dict()

@@ -75,7 +75,7 @@ def test_it_tells_what_is_being_flown():
     ("policies", "told", "message"),
     [
         ("nobody", {}, "nobody"),
-        ([], {}, r"policies=\[\] names nobody"),
+        ([], {}, r"policies=\[\] is empty"),
         (["good", "good"], {}, "two policies are called good"),
         ("good", {"bodies": ["submarine"]}, "submarine.* is unknown"),
     ],
