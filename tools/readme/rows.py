@@ -172,6 +172,12 @@ TRUTH = (
         "120 s, 2 GiB",
     ),
     Row(
+        "mistakes",
+        "wrong inputs on the command line that are answered in one line with a remedy",
+        lambda f: f"{f['mistakes_ok']} of {f['mistakes_total']}",
+        "all",
+    ),
+    Row(
         "docs",
         "commands and code blocks of all pages that run and print what the page shows; of these "
         "with smaller sizes",
