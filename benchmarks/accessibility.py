@@ -41,7 +41,7 @@ def bench_accessibility(
         page, size and scheme; "a11y_pages", the number of pages.
 
     Raises:
-        InputError: Chromium, its driver or axe-core is not installed.
+        InputError: Chromium, its driver or axe-core is not installed, or a page can't be opened.
     """
     with chromium(folder / "profile") as browser:
         report = write_report([explanation or explained(folder)], folder / "report")
@@ -89,6 +89,8 @@ def check(browser: Any, page: Path, sizes: Sequence[tuple[int, int]]) -> Iterato
         for width, height in sizes:
             browser.set_window_size(width, height)
             browser.get(page.absolute().as_uri())
+            if browser.execute_script("return location.protocol") != "file:":
+                raise InputError(f"Chromium can't open {page}")  # it shows a page of its own
             browser.execute_script(source)
             for found in browser.execute_async_script(_RUN):
                 if found["impact"] in IMPACTS:

@@ -110,7 +110,7 @@ def test_each_listed_survivor_has_a_harm():
 
 
 def test_killers_are_read_from_lists_and_mappings(tmp_path):
-    rows = [{"id": "a", "by": "x::y"}, {"id": "b", "by": None}, {"id": "c", "by": "old"}]
+    rows = [{"id": "a", "by": "x::y"}, {"id": "b"}, {"id": "c", "by": "old"}]
     (tmp_path / "list.json").write_text(json.dumps({"mutants": rows}))
     (tmp_path / "memory.json").write_text(json.dumps({"c": "new"}))
     paths = [tmp_path / name for name in ("list.json", "memory.json", "missing.json")]

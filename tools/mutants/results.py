@@ -68,7 +68,7 @@ def read_killers(*paths: Path) -> dict[str, str]:
     found: dict[str, str] = {}
     for path in filter(Path.exists, paths):
         content = json.loads(path.read_text())
-        rows = {row["id"]: row["by"] for row in content.get("mutants", [])}
+        rows = {row["id"]: row.get("by") for row in content.get("mutants", [])}
         found |= {name: by for name, by in (rows or content).items() if isinstance(by, str)}
     return found
 
