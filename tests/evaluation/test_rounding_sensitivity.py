@@ -4,6 +4,8 @@ import pytest
 import torch
 
 import drone_rl
+from drone_rl.evaluation import rounding_sensitivity
+from drone_rl.evaluation.outcomes import Outcomes
 from drone_rl.evaluation.rollouts import StepLog, run_episodes
 from drone_rl.evaluation.rounding_sensitivity import (
     check_rounding,
@@ -103,3 +105,14 @@ def test_frames_are_tried_in_batches_of_many_sizes():
     frames = torch.rand(9, 1, 1, 3)
     with pytest.raises(InputError, match="in a batch of 57: they differ by 1"):
         require_same_in_any_batch(ExternalNetwork(logits, (1, 1, 3), MOVES), frames, 10)
+
+
+def test_outcomes_of_several_batches_are_numbered_by_episode(make_episodes):
+    ends = make_episodes([[0], [1]], [[True], [False]])
+    found = Outcomes(ends, torch.tensor([1, 0]), torch.tensor([False, True]))
+    fragile = [torch.tensor([False])] * 8
+    batches = [(0, found, torch.tensor([0, 2])), (4, found, torch.tensor([1, 3]))]
+    outcomes = rounding_sensitivity._Checked(ends, fragile, batches).outcomes()
+    assert outcomes.owner.tolist() == [2, 0, 7, 5]
+    assert outcomes.is_open.nonzero()[:, 0].tolist() == [2, 7]
+    assert outcomes.episodes.success.tolist() == [1, 0, 1, 0]

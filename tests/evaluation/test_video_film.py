@@ -1,8 +1,10 @@
 """Films of a policy's flights, and the viewer that needs a display."""
 
+import numpy as np
 import pytest
 
 import drone_rl
+from drone_rl.evaluation import video
 from drone_rl.evaluation.video import film, view
 from drone_rl.utils.errors import InputError
 
@@ -13,6 +15,18 @@ def test_one_mp4_and_one_gif_each(tmp_path):
     files = film(flying, tmp_path, 1)
     assert [file.name for file in files] == ["episode_0.mp4", "episode_0.gif"]
     assert all(file.stat().st_size > 0 for file in files)
+
+
+def test_every_episode_has_a_single_environment(tmp_path, monkeypatch):
+    sizes = []
+
+    def film_episode(env, actor, *, greedy):
+        sizes.append(env.batch_size)
+        yield np.zeros((720, 1280, 3), np.uint8)
+
+    monkeypatch.setattr(video, "film_episode", film_episode)
+    film(drone_rl.load_policy("good"), tmp_path, 2)
+    assert sizes == [(1,), (1,)]
 
 
 def test_no_display(monkeypatch):
