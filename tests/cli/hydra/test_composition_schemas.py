@@ -103,6 +103,8 @@ def test_every_choice_of_what_a_policy_is_builds(group, name, settings):
 
 @pytest.mark.parametrize(("group", "name"), sorted({*files("returns")} - {("returns", "gae")}))
 def test_every_return_estimator_builds_and_estimates(group, name, settings):
+    import drone_rl.objectives  # noqa: F401  (connects settings with estimators)
+
     estimator = settings("train", f"{group}={name}").returns.make()
     reward = torch.tensor([0.0, 1.0, 0.0, 1.0])[:, None]
     done = torch.tensor([False, True, False, True])[:, None]
