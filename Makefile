@@ -59,8 +59,8 @@ docs: $(STAMP)
 count: $(STAMP)
 	@$(BIN)/python -m tools.size
 
-# Mutation testing of the package: a sample of 1,000 mutants takes about 45 minutes on two idle cores,
-# including 15 minutes to record the coverage of all tests. It resumes where it stopped. To run only the
+# Mutation testing of the package: a sample of 1,000 mutants takes about two hours on two idle cores,
+# including half an hour to record the coverage of all tests. It resumes where it stopped. To run only the
 # survivors after adding tests for them: MUTANTS="--again docs/mutants.json".
 mutants: $(STAMP)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(EXTRAS),mutants]'
