@@ -15,8 +15,9 @@ import signal
 import subprocess
 import sys
 import traceback
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from benchmarks.hostile_case import NOTED
 
@@ -134,7 +135,7 @@ def _fork(main: Any, arguments: list[str], here: Path, *, is_noted: bool = False
     """
     child = os.fork()
     if child == 0:
-        _run_child(main, arguments, here)
+        run_child(main, arguments, here, TIMEOUT_S, _limit_memory)
     _, status, used = os.wait4(child, 0)
     stderr = (here / "stderr").read_text(errors="replace")
     grown = used.ru_maxrss * 1024 - int((here / _BEFORE).read_text())
@@ -154,30 +155,51 @@ def _fork(main: Any, arguments: list[str], here: Path, *, is_noted: bool = False
     return {"wrong": wrong, "mib": round(grown / 2**20, 1), "seconds": round(seconds, 3)}
 
 
-def _run_child(main: Any, arguments: list[str], here: Path) -> None:
-    """Run the command in this fork with limits on memory and time; never return."""
+def run_child(
+    main: Callable[[], object],
+    arguments: list[str],
+    here: Path,
+    timeout_s: int,
+    prepare: Callable[[], object] = lambda: None,
+) -> NoReturn:
+    """Run a command in this fork, which ends; its output is in the files stdout and stderr.
+
+    Args:
+        main: Entry point of the program.
+        arguments: Arguments of the command.
+        here: Working folder.
+        timeout_s: Time after which the fork is killed.
+        prepare: Called in the working folder before the command.
+    """
     status = 1
     try:
         os.chdir(here)
-        Path(_BEFORE).write_text(str(_resident_bytes()))  # less than the parent's
         for number, name in ((1, "stdout"), (2, "stderr")):
             target = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
             os.dup2(target, number)
         sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w")
-        limit = _address_bytes() + MAX_ADDRESS_SPACE
-        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-        signal.alarm(TIMEOUT_S)
+        prepare()
+        signal.alarm(timeout_s)
         sys.argv = ["drone-rl", *arguments]
         main()
         status = 0
     except SystemExit as stop:
         status = stop.code if isinstance(stop.code, int) else 1
+        if isinstance(stop.code, str):  # as the interpreter prints it
+            sys.stderr.write(f"{stop.code}\n")
     except BaseException:
         traceback.print_exc()
     finally:
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
         os._exit(status)
+
+
+def _limit_memory() -> None:
+    """Note the resident memory, which is less than the parent's, and limit the address space."""
+    Path(_BEFORE).write_text(str(_resident_bytes()))
+    limit = _address_bytes() + MAX_ADDRESS_SPACE
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 
 
 def _resident_bytes() -> int:

@@ -13,12 +13,11 @@ import shlex
 import subprocess
 import sys
 import tomllib
-import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.hostile import PACKAGES, import_all
+from benchmarks.hostile import PACKAGES, import_all, run_child
 from drone_rl.utils.provenance import num_cores
 
 _CASES = Path(__file__).with_suffix(".toml")
@@ -113,7 +112,7 @@ def _main(folder: Path, every: int) -> None:
             (here / "notes.txt").write_text("no policy\n")
             child = os.fork()
             if child == 0:
-                _run_child(program.main, shlex.split(line), here)
+                run_child(program.main, shlex.split(line), here, _TIMEOUT_S)
             started.append((child, here, line, words))
         for child, here, line, words in started:
             status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
@@ -121,31 +120,6 @@ def _main(folder: Path, every: int) -> None:
             wrong = find_fault(status, stdout, stderr, line, words)
             outcomes.append({"line": line, "answer": stderr.strip(), "wrong": wrong})
     (folder / "outcomes.json").write_text(json.dumps(outcomes, indent=1))
-
-
-def _run_child(main: Any, arguments: list[str], here: Path) -> None:
-    """Run the command in this fork; never return."""
-    status = 1
-    try:
-        os.chdir(here)
-        for number, name in ((1, "stdout"), (2, "stderr")):
-            target = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
-            os.dup2(target, number)
-        sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w")
-        importlib.import_module("signal").alarm(_TIMEOUT_S)
-        sys.argv = ["drone-rl", *arguments]
-        main()
-        status = 0
-    except SystemExit as stop:
-        status = stop.code if isinstance(stop.code, int) else 1
-        if isinstance(stop.code, str):  # as the interpreter prints it
-            sys.stderr.write(f"{stop.code}\n")
-    except BaseException:
-        traceback.print_exc()
-    finally:
-        for stream in (sys.stdout, sys.stderr):
-            stream.flush()
-        os._exit(status)
 
 
 if __name__ == "__main__":
