@@ -10,6 +10,7 @@ from drone_rl.cli.settings import CommandSettings
 from drone_rl.sweeps.manifest import read_result
 from drone_rl.utils.display import aligned, interval
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import trained_policies
 from drone_rl.utils.schema import Whole, as_mapping
 
 _LONGEST_NAME = 18
@@ -36,8 +37,7 @@ class PoliciesCommand(CommandSettings):
         from drone_rl.policies.zoo import policy_names, policy_path  # imports torch
 
         shipped = [_row(policy_path(name), name) for name in policy_names()]
-        found = Path(self.paths.outputs).glob("train/**/checkpoints/last.pt")
-        newest = sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
+        newest = trained_policies(self.paths.outputs)
         trained = [_row(path, str(path.parents[1])) for path in newest[: self.most]]
         head = ("policy=", "task", "verdict", "success (95% CI)", "trained")
         lines = aligned([head, *(_short(row) for row in (*shipped, *trained))]).splitlines()

@@ -9,7 +9,7 @@ from typing import Any
 import drone_rl
 from drone_rl.config.commands import PathsSettings
 from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
-from drone_rl.utils.files import newest
+from drone_rl.utils.files import trained_policies
 from drone_rl.utils.settings import Settings
 
 _log = logging.getLogger(__name__)
@@ -35,8 +35,8 @@ class CommandSettings(Settings):
         del folder
         which = getattr(self, "policy", None) or "latest"
         which = which if isinstance(which, str) else which[0]
-        last = newest(Path(self.paths.outputs).glob("train/**/checkpoints/last.pt"))
-        return str(last.parents[1]) if which == "latest" and last is not None else which
+        trained = trained_policies(self.paths.outputs) if which == "latest" else []
+        return str(trained[0].parents[1]) if trained else which
 
 
 class PolicyCommandSettings(CommandSettings):

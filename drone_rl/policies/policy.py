@@ -28,7 +28,7 @@ from drone_rl.policies.zoo import PolicyDescription, parse, policy_names, policy
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.files import newest
+from drone_rl.utils.files import trained_policies
 from drone_rl.utils.schema import shown
 from drone_rl.utils.seeding import Stream, torch_generator
 
@@ -333,13 +333,13 @@ def load_policy(which: str | Path, *, outputs: str | Path = "outputs") -> Policy
 def find_policy(which: str | Path, outputs: str | Path = "outputs") -> Path:
     """Return the file of a policy, see `load_policy`; raise an `InputError` if there is none."""
     if which == "latest":
-        last = newest(Path(outputs).glob("train/**/checkpoints/last.pt"))
-        if last is None:
+        trained = trained_policies(outputs)
+        if not trained:
             raise InputError(
                 f"policy=latest, but there is no run under {outputs}/train; "
                 "run drone-rl train first or give the path of a checkpoint"
             )
-        return last
+        return trained[0]
     if which in policy_names():
         return policy_path(str(which))
     path = Path(which)

@@ -76,6 +76,12 @@ def newest(paths: Iterable[Path]) -> Path | None:
     return max(paths, key=lambda path: path.stat().st_mtime, default=None)
 
 
+def trained_policies(outputs: str | Path) -> list[Path]:
+    """Return last.pt of every training under a folder of outputs, the newest first."""
+    found = Path(outputs).glob("train/**/checkpoints/last.pt")
+    return sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
+
+
 def read_json(path: Path, most: int = SMALL_JSON_BYTES) -> Any:
     """Return plain data from a JSON file; see `read_bytes` and `parse_json` for errors."""
     return parse_json(read_bytes(path, most), str(path))

@@ -20,6 +20,7 @@ from drone_rl.utils.files import (
     refuse_links,
     remove_leftovers,
     to_file_name,
+    trained_policies,
     write_all_atomically,
     write_atomically,
 )
@@ -40,6 +41,18 @@ def test_the_newest_is_the_one_that_was_changed_last(tmp_path):
         os.utime(path, (99, changed))
     assert newest(paths) == tmp_path / "b"
     assert newest([]) is None
+
+
+def test_trained_policies_are_sorted_by_the_time_of_their_last_checkpoint(tmp_path):
+    files = []
+    for name, changed in (("runs/a", 20), ("multiruns/s/0", 30), ("runs/b", 10)):
+        files.append(tmp_path / "train" / name / "checkpoints" / "last.pt")
+        files[-1].parent.mkdir(parents=True)
+        files[-1].touch()
+        os.utime(files[-1], (99, changed))
+    files[0].with_name("best.pt").touch()
+    assert trained_policies(tmp_path) == [files[1], files[0], files[2]]
+    assert trained_policies(tmp_path / "empty") == []
 
 
 def test_a_folder_has_one_holder_at_a_time(tmp_path):
