@@ -277,7 +277,7 @@ def _quote(evidence: Evidence) -> str:
 
 def _axes(shifts: Evidence) -> str:
     names = [NAMES[name] for name in shifts["axes"]]
-    count = plural(len(names), "axis").replace("axiss", "axes")
+    count = plural(len(names), "axis", "axes")
     return f"{count} ({listed(names)})" if len(names) <= MOST_NAMED else count
 
 

@@ -29,9 +29,9 @@ def listed(parts: Sequence[str], last: str = "and") -> str:
     return f"{', '.join(parts[:-1])} {last} {parts[-1]}"
 
 
-def plural(count: int, noun: str) -> str:
-    """Return a count with its noun, whose plural is regular."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+def plural(count: int, noun: str, several: str = "") -> str:
+    """Return a count with its noun; `several` is the plural if it is not regular."""
+    return f"{count} {noun}" if count == 1 else f"{count} {several or f'{noun}s'}"
 
 
 def ordinal(number: int) -> str:

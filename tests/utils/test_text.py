@@ -30,6 +30,7 @@ def test_counts():
     assert (plural(0, "pair"), plural(1, "pair"), plural(2, "pair")) == (
         "0 pairs", "1 pair", "2 pairs",
     )  # fmt: skip
+    assert (plural(1, "axis", "axes"), plural(2, "axis", "axes")) == ("1 axis", "2 axes")
 
 
 def test_ordinals_go_on_beyond_their_names():

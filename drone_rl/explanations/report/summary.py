@@ -75,7 +75,7 @@ def _say_robustness(evidence: Evidence) -> Claims:
     if not shifts_text.is_quoted(evidence):
         why = shifts_text.why_not(evidence)
         return {"summary.robustness_refused": f"Measured, but not shown here: {why}."}
-    count = plural(len(shifts["axes"]), "axis").replace("axiss", "axes")
+    count = plural(len(shifts["axes"]), "axis", "axes")
     if shifts["domain"] is None:
         return {"summary.robustness_table": f"Success rates under {count} of perturbations."}
     wide = [shifts_text.NAMES[name] for name in shifts_text.wide(shifts)]
