@@ -1,20 +1,17 @@
 """Report text about exact maps and proofs; imports nothing heavy."""
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from drone_rl.sim.vocabulary import shown_actions
-from drone_rl.utils.text import Claims, Evidence, all_cubes, exact, listed
+from drone_rl.utils.text import Claims, Evidence, all_cubes, exact, listed, percent
 
 WHERE = {"left": "on its left", "ahead": "straight ahead", "right": "on its right"}
 
 
-def exact_percent(share: float) -> str:
-    """Format a known fraction; never 0% or 100% if it is only close to that."""
-    if share in (0, 1):
-        return f"{share:.0%}"
-    text = f"{100 * share:.2f}%"
-    return {"0.00%": "less than 0.01%", "100.00%": "more than 99.99%"}.get(text, text)
+exact_percent = functools.partial(percent, digits=2)
+"""Returns a known fraction in percent with two decimals."""
 
 
 def rows(places: Evidence, names: Sequence[str]) -> list[list[str]]:
