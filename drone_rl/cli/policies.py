@@ -8,10 +8,11 @@ from typing import Annotated, Any
 import drone_rl
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.sweeps.manifest import read_result
-from drone_rl.utils.display import aligned, interval
+from drone_rl.utils.display import aligned
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import trained_policies
 from drone_rl.utils.schema import Whole, as_mapping
+from drone_rl.utils.text import rate
 
 _LONGEST_NAME = 18
 """Characters of a path above which its figures are on a line of their own."""
@@ -76,6 +77,6 @@ def _figures(verdict: Any) -> Iterator[str]:
     try:
         kind, success = verdict["kind"], as_mapping(verdict["greedy"]["success"], "success")
         figures = [f"{kind}{'' if verdict['certain'] else ' (uncertain)'}"]
-        yield from (*figures, interval(success, "share"))
+        yield from (*figures, rate(success, label=""))
     except (InputError, KeyError, TypeError):
         yield from ("not judged", "")

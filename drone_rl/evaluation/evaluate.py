@@ -1,6 +1,7 @@
 """Evaluate a policy next to the baselines, and print the figures."""
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,11 @@ from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.tasks import as_task
-from drone_rl.utils.display import aligned, interval, paragraph, table
+from drone_rl.utils.display import aligned, paragraph, table
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import Evidence, Sentence, fixed_seed, percent, say, seed_line
+from drone_rl.utils.text import Evidence, Sentence, fixed_seed, interval, percent, say, seed_line
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,24 +47,34 @@ class Evaluation:
         return self.flown["greedy"]["success"]["share"]
 
     def rows(self) -> list[list[str]]:
-        """Return the figures as rows of text: a header, then one row per figure."""
+        """Return the figures as rows of text: a header, then one row per figure.
+
+        Intervals are those of the policy only, so that the table fits a terminal.
+        """
         flown = self.flown.values()
         terms = as_task(self.policy.task).vocabulary
-        rows = [
-            ["", *self.flown],
-            [f"all {terms.goals}", *(interval(f["success"], "share") for f in flown)],
-            [f"mean {terms.goals}", *(f"{f['mean_goals']:.3f}" for f in flown)],
-        ]
+        rows = [["", *self.flown], *self._rates("success rate", [f["success"] for f in flown])]
         for name in self.flown["greedy"]["shares"]:
-            cells = (interval(f["shares"][name], "mean") for f in flown)
-            rows.append([f"share {name}", *cells])
-        rows.append(["never reached", *(f"{f['never_reached']['mean']:.3f}" for f in flown)])
+            label = f"{terms.goals} {terms.reached}" if name == "all" else terms.side(name)
+            rows += self._rates(label, [f["shares"][name] for f in flown])
+        rows.append([f"mean {terms.goals}", *(f"{f['mean_goals']:.2f}" for f in flown)])
+        rows.append(["never reached", *(percent(f["never_reached"]["mean"]) for f in flown)])
         for reason in self.flown["greedy"]["ends"]:
             cells = (str(f["ends"][reason]["successes"]) for f in flown)
-            rows.append([f"ended: {reason.replace('_', ' ')}", *cells])
+            rows.append([f"end: {reason.replace('_', ' ')}", *cells])
         rows.append(["mean length", *(f"{f['mean_length']:.1f}" for f in flown)])
         rows.append(["episodes", *(str(f["episodes"]) for f in flown)])
         return rows
+
+    def _rates(self, label: str, figures: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+        """Return a row of rates, and a row of the policy's 95% intervals."""
+        rates = [f["share"] if "share" in f else f["mean"] for f in figures]
+        known = ["-" if rate is None else percent(rate) for rate in rates]
+        policy = [
+            interval(figure) if name in ("greedy", "sampled") and rate is not None else ""
+            for name, rate, figure in zip(self.flown, rates, figures, strict=True)
+        ]
+        return [[label, *known], ["  95% CI", *policy]]
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values, as in `evaluation.json`."""

@@ -22,7 +22,7 @@ from drone_rl.policies.policy import BasePolicy
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.seeding import RootSeed, root_seed
-from drone_rl.utils.text import LOOPED, say, seed_line
+from drone_rl.utils.text import LOOPED, interval, say, seed_line
 
 STARTS = 3
 """Attempts to start a firmware for one episode."""
@@ -75,10 +75,9 @@ class SitlEvaluation:
             for f in self.flights
         ]
         success = self.figures["success"]
-        ends = (f"{100 * success[bound]:.0f}%" for bound in ("lower95", "upper95"))
         share = f"{success['successes']} of {success['trials']} succeeded"
         seed = self.seed.as_dict()
-        notes = [f"{share} ({' to '.join(ends)})", say(LOOPED, seed), seed_line(seed)]
+        notes = [f"{share} (95% CI {interval(success)}%)", say(LOOPED, seed), seed_line(seed)]
         return "\n".join([*lines, *filter(None, notes)])
 
 

@@ -131,14 +131,14 @@ def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
         y, low, high = (np.array([s[k] for _, s in known]) for k in ("share", "lower95", "upper95"))
         error = np.abs([y - low, high - y])
         axes.errorbar(x, y, yerr=error, markersize=4, capsize=2, **_style(kind))
-    axes.set(ylabel="share of runs", ylim=(-0.03, 1.03))
+    axes.set(ylabel="fraction of runs", ylim=(-0.03, 1.03))
     _explain_colours(axes)
 
 
 def _sides(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     _dots(axes, layout, groups, lambda row: row.lean)
     axes.axhline(0.0, color="0.5", linewidth=0.8, zorder=0)
-    axes.set(ylabel="share right - share left", ylim=(-1.1, 1.1))
+    axes.set(ylabel="cubes collected, right minus left", ylim=(-1.1, 1.1))
 
 
 def _entropies(axes: Axes, layout: Layout, groups: list[Group]) -> None:

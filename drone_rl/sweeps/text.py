@@ -144,7 +144,7 @@ SENTENCES = (
         lambda e: 0 < e["judged"] == e["certain"],
         lambda e: (
             f"All of them are certain, each with an error probability of at most "
-            f"{percent(max(e['error_rates']))}."
+            f"{100 * max(e['error_rates']):g}%."
         ),
     ),
     _if_any(

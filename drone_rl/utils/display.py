@@ -10,8 +10,8 @@ import hashlib
 import html
 import io
 import urllib.parse
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import jinja2
@@ -57,17 +57,6 @@ def page(document: str, height: int = 800) -> str:
         f'<iframe sandbox="allow-scripts" srcdoc="{html.escape(document)}" '
         f'style="width: 100%; height: {height}px; border: 0"></iframe>'
     )
-
-
-def interval(figure: Mapping[str, Any], key: str) -> str:
-    """Return a rate and its 95% interval in percent.
-
-    `figure` has the rate (None if there is none) under `key`, "lower95" and "upper95".
-    """
-    if figure[key] is None:
-        return "not offered"
-    share, low, high = (f"{100 * figure[k]:.3g}" for k in (key, "lower95", "upper95"))
-    return f"{share}% [{low}, {high}]"
 
 
 _SOURCES = (

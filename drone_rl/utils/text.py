@@ -5,7 +5,6 @@ the JSON files, so that a test can change the evidence and see the sentence chan
 """
 
 import dataclasses
-import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -86,7 +85,7 @@ def said(paragraph: Paragraph, evidence: Evidence) -> Claims:
     return paragraph(evidence)
 
 
-def percent(share: float, digits: int = 0) -> str:
+def percent(share: float, digits: int = 1) -> str:
     """Return a rate in percent with so many decimals; 0% and 100% only if it is exactly 0 or 1."""
     if share in (0, 1):
         return f"{share:.0%}"
@@ -96,14 +95,18 @@ def percent(share: float, digits: int = 0) -> str:
     return f"less than {step:g}%" if float(text[:-1]) <= 0 else text
 
 
-decimal_percent = functools.partial(percent, digits=1)
-"""Returns a rate in percent with one decimal."""
+def interval(figure: Mapping[str, Any]) -> str:
+    """Return the 95% confidence interval of a rate, in percent."""
+    return " to ".join(f"{100 * figure[end]:.1f}" for end in ("lower95", "upper95"))
 
 
-def rate(figure: Mapping[str, Any], key: str = "share") -> str:
-    """Return a rate in percent with its 95% confidence interval."""
-    share, low, high = (f"{100 * figure[name]:.1f}" for name in (key, "lower95", "upper95"))
-    return f"{share}% (95% CI {low} to {high})"
+def rate(figure: Mapping[str, Any], label: str = "95% CI ") -> str:
+    """Return a rate in percent with its 95% confidence interval, which the label precedes.
+
+    `figure` has the rate under "share" or, for a mean over episodes, "mean"; None if it has none.
+    """
+    share = figure["share"] if "share" in figure else figure["mean"]
+    return "not offered" if share is None else f"{100 * share:.1f}% ({label}{interval(figure)})"
 
 
 SEED_KEYS = ("seed", "seed_is_fixed")

@@ -22,7 +22,7 @@ from drone_rl.utils.palette import BAD, EMPTY, FAINT, GOOD, INK, ONE_SIDED, css,
 from drone_rl.utils.progress import Bar, Progress, silent
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import BODIES, Evidence, percent, say, seed_line
+from drone_rl.utils.text import BODIES, Evidence, interval, rate, say, seed_line
 from drone_rl.verdicts.judge import judge
 
 LOOPED = "software in the loop"
@@ -168,7 +168,7 @@ def cell(verdict: Evidence) -> str:
     """Return a verdict in a few words: its kind and the success rate."""
     success = verdict["greedy"]["success"]
     unsure = "" if verdict["certain"] else "?"
-    return f"{verdict['kind']}{unsure} {percent(success['share'])} ({_interval(success)})"
+    return f"{verdict['kind']}{unsure} {rate(success, label='')}"
 
 
 def sitl_cell(flights: Evidence) -> str:
@@ -176,7 +176,7 @@ def sitl_cell(flights: Evidence) -> str:
     if "left_out" in flights:
         return "left out"
     success = flights["success"]
-    return f"no verdict: {success['successes']} of {success['trials']} ({_interval(success)})"
+    return f"no verdict: {success['successes']} of {success['trials']} ({interval(success)}%)"
 
 
 def left_out(numbers: Evidence) -> list[str]:
@@ -189,10 +189,6 @@ def failure(verdict: Evidence) -> str:
     """Return where most episodes fail, or nothing."""
     row: dict[str, Any] | None = verdict["failures"]["largest"]
     return "" if row is None else terms_of(verdict).failing(row["by"], row["value"])
-
-
-def _interval(success: Evidence) -> str:
-    return f"{100 * success['lower95']:.0f} to {100 * success['upper95']:.0f}"
 
 
 def chart(numbers: Mapping[str, Any]) -> Figure:
@@ -230,7 +226,7 @@ def _verdict_cell(verdict: Evidence) -> tuple[str, str | None, list[tuple[float,
     color = _COLORS.get(kind) or _COLORS.get(kind.split()[0], _COLORS["none"])
     lines = [
         (0.2, f"{kind}{'' if verdict['certain'] else ' ?'}", 9.0, _INK),
-        (0.45, f"{100 * success['share']:.1f}%  ({_interval(success)})", 9.5, _INK),
+        (0.45, rate(success, label=""), 9.5, _INK),
         (0.77, textwrap.fill(failure(verdict), 26), 7.0, _FAINT),
     ]
     return color, None, lines

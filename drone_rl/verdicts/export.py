@@ -25,7 +25,7 @@ from drone_rl.utils.files import read_bytes, write_all_atomically
 from drone_rl.utils.limits import CERTIFICATE_BYTES, SHIFTS_BYTES
 from drone_rl.utils.overrides import COMMAND, read_overrides
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import Evidence, Sentence, listed, said, say
+from drone_rl.utils.text import Evidence, Sentence, listed, rate, said, say
 from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import find_domain
 
@@ -183,11 +183,11 @@ def _flights(verdict: Evidence) -> str:
     }
     flown = {name: flights for name, flights in flown.items() if flights is not None}
     terms = terms_of(verdict)
-    successes = (_share(flights["success"]) for flights in flown.values())
+    successes = (rate(flights["success"], label="") for flights in flown.values())
     rows = [["", *flown], [f"episodes with all {terms.goals}", *successes]]
     for side in verdict["greedy"]["shares"]:
         label = f"{terms.goals} {terms.reached}" if side == "all" else f"of those {side}"
-        rows.append([label, *(_share(f["shares"][side]) for f in flown.values())])
+        rows.append([label, *(rate(f["shares"][side], label="") for f in flown.values())])
     return _table(rows)
 
 
@@ -199,24 +199,16 @@ def _failures(failures: Evidence) -> str:
         return _table([["fails", "never"], ["upper bound", upper]])
     failed = [row for row in failures["rows"] if row["failed"] and row != largest]
     rows = [
-        [f"{row['by']}: {row['value']}", str(row["failed"]), str(row["episodes"]), _share(row)]
-        for row in (largest, *failed)
+        [f"{r['by']}: {r['value']}", str(r["failed"]), str(r["episodes"]), rate(r, label="")]
+        for r in (largest, *failed)
     ]
-    return _table([["fails first at", "episodes", "of", "share"], *rows])
+    return _table([["fails first at", "episodes", "of", "rate"], *rows])
 
 
 def _table(rows: list[list[str]]) -> str:
     head, *rest = rows
     lines = [head, ["---"] * len(head), *rest]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def _share(value: Evidence) -> str:
-    """Return a rate or a mean with its interval, as text."""
-    middle = value["share"] if "share" in value else value["mean"]
-    if middle is None:
-        return "not offered"
-    return f"{middle:.3f} ({value['lower95']:.3f} to {value['upper95']:.3f})"
 
 
 def _verdict(card: Evidence) -> str:

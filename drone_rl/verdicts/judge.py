@@ -24,12 +24,12 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.robustness.shifts_text import QUOTED, why_not
-from drone_rl.utils.display import aligned, interval, paragraph, table
+from drone_rl.utils.display import aligned, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
-from drone_rl.utils.text import say, seed_line
+from drone_rl.utils.text import rate, say, seed_line
 from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import Coverage, find_domain, recheck_domain, require
 
@@ -111,9 +111,9 @@ class Judgements(tuple[Judgement, ...]):
 
     def rows(self) -> list[list[str]]:
         """Return a table of texts: a heading, then a row for each policy."""
-        rows = [["policy", "verdict", "certain", "success rate (95% interval)"]]
+        rows = [["policy", "verdict", "certain", "success rate (95% CI)"]]
         for name, verdict in ((one.name, one.verdict) for one in self):
-            success = interval(verdict.evidence["greedy"]["success"], "share")
+            success = rate(verdict.evidence["greedy"]["success"], label="")
             rows.append([name, verdict.kind.value, "yes" if verdict.certain else "no", success])
         return rows
 

@@ -32,7 +32,7 @@ def test_trained_policies_newest_first(run, in_process, tmp_path):
     (runs / "broken" / "checkpoints" / "last.pt").write_text("x")
     lines = in_process("policies").stdout.splitlines()
     where = lines.index(f"outputs/train/runs/{name}")
-    assert "poor (uncertain)" in lines[where + 1] and "50% [40, 60]" in lines[where + 1]
+    assert "poor (uncertain)" in lines[where + 1] and "50.0% (40.0 to 60.0)" in lines[where + 1]
     assert any("not judged" in line for line in lines)
     assert any("can't be read" in line for line in lines)
     assert max(map(len, lines)) <= 100

@@ -33,7 +33,7 @@ def test_an_evaluation_in_python(good):
     assert done.as_dict()["trained"]["frames"] > 0
     assert said[0] == ("most probable actions", 0, 3)
     assert said[-1] == ("evaluated", 3, 3)
-    assert "<td>all cubes</td>" in done._repr_html_()
+    assert "<td>success rate</td>" in done._repr_html_()
 
 
 def test_without_baselines_there_are_none(good):
@@ -59,13 +59,13 @@ def test_the_table_of_an_evaluation(good):
     assert told[-1] == "environments: seed 8 (fresh)"
     rows = told[:-1]
     assert rows[0].split() == ["greedy", "oracle"]
-    assert rows[1].split("  ")[0] == "all cubes"
-    assert "25% [0.631, 80.6]" in rows[1]
-    assert "100% [39.8, 100]" in rows[1]
-    assert "share left" in rows[4] and rows[4].endswith("not offered")
-    assert rows[8].split() == ["ended:", "step", "limit", "1", "1"]
-    assert len({len(row) for row in rows}) == 1
-    assert all(len(re.split(" {2,}", row)) == 3 for row in rows)  # no two columns touch
+    assert rows[1].split() == ["success", "rate", "25.0%", "100%"]
+    assert re.split(" {2,}", rows[2].strip()) == ["95% CI", "0.6 to 80.6"]  # of the policy only
+    assert rows[5].split() == ["on", "its", "left", "50.0%", "-"]
+    assert rows[13].split() == ["end:", "step", "limit", "1", "1"]
+    whole = [row for row in rows if "95% CI" not in row]
+    assert len({len(row) for row in whole}) == 1
+    assert all(len(re.split(" {2,}", row)) == 3 for row in whole)  # no two columns touch
 
 
 def test_in_another_appearance_it_is_said_so(good):

@@ -21,8 +21,8 @@ def said(**changes):
 def test_an_evaluation_that_depends_on_rounding_says_so_even_if_both_implementations_agree():
     assert said().endswith(
         "when computed again (fused kernel). These figures hold for this arithmetic only: in 400 "
-        "of 2,000 of these episodes' frames (20%) the order in which float32 sums are computed can "
-        "change the action."
+        "of 2,000 of these episodes' frames (20.0%) the order in which float32 sums are computed "
+        "can change the action."
     )
 
 

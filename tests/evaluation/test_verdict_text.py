@@ -61,14 +61,14 @@ def speak(evidence):
 
 def test_what_is_said_of_a_good_policy(evidence):
     assert speak(evidence) == {
-        "kind": "This policy does its task: it collects every cube in 94% of episodes.",
+        "kind": "This policy does its task: it collects every cube in 94.0% of episodes.",
         "fixed_seed": "Fixed seed 0: a policy could have been fitted to these environments.",
-        "shares": "It collects 90% of the cubes on its left, 100% of those ahead and 100% of those "
-        "on its right.",
-        "baselines": "From the same initial states it collects 96% of all cubes, acting at random "
-        "28% and the oracle 100%.",
+        "shares": "It collects 90.0% of the cubes on its left, 100% of those ahead and 100% of "
+        "those on its right.",
+        "baselines": "From the same initial states it collects 96.0% of all cubes, acting at "
+        "random 28.0% and the oracle 100%.",
         "failures.largest": "It fails most with cubes on its left: in 30 of 300 episodes that "
-        "offered one (10%).",
+        "offered one (10.0%).",
     }
 
 
@@ -121,14 +121,14 @@ def test_luck_that_is_enough(evidence):
     evidence["baselines"]["forward"] = flights(0.9, None, 1.0, None, 1.0)
     found = speak(evidence)
     assert found["pointless"] == (
-        "This task is trivial: flying straight on collects every cube in 90% of episodes."
+        "This task is trivial: flying straight on collects every cube in 90.0% of episodes."
     )
     assert "baselines" not in found
     evidence["kind"] = "good, but trivial"
     found = speak(evidence)
     assert found["kind"] == (
-        "Flying straight on does as well: it collects every cube in 90% of episodes, this policy "
-        "in 94%."
+        "Flying straight on does as well: it collects every cube in 90.0% of episodes, this policy "
+        "in 94.0%."
     )
     assert "pointless" not in found
     evidence["baselines"]["forward"] = flights(0.89, None, 1.0, None, 1.0)
@@ -140,7 +140,7 @@ def test_luck_that_is_enough(evidence):
 def test_a_task_that_nobody_can_do(evidence):
     assert "hopeless" not in speak(evidence)
     evidence["baselines"]["oracle"]["success"] = share(0.48)
-    assert "in only 48% of episodes" in speak(evidence)["hopeless"]
+    assert "in only 48.0% of episodes" in speak(evidence)["hopeless"]
     evidence["baselines"]["oracle"]["success"] = share(0.495)
     assert "hopeless" not in speak(evidence)
 
@@ -148,13 +148,13 @@ def test_a_task_that_nobody_can_do(evidence):
 @pytest.mark.parametrize(
     ("largest", "text"),
     [
-        (row("cube", "first", 40), "at the first cube: in 40 of 400 episodes (10%)."),
-        (row("cube", "third", 9, 90), "third cube: in 9 of 90 episodes that got so far (10%)."),
+        (row("cube", "first", 40), "at the first cube: in 40 of 400 episodes (10.0%)."),
+        (row("cube", "third", 9, 90), "third cube: in 9 of 90 episodes that got so far (10.0%)."),
         (row("cube", "third", 400), "at the third cube: in all 400 episodes."),
         (row("sideways", "4 to 6 m", 9, 90), "with cubes 4 to 6 m to its side: in 9 of 90"),
         (row("height", "higher", 9, 90), "with cubes higher than itself: in 9 of 90 episodes"),
         (row("side", "ahead", 90, 90), "with cubes ahead: in all 90 episodes that offered one."),
-        (row("end", "step_limit", 40), "by ending at the step limit: in 40 of 400 episodes (10%)."),
+        (row("end", "step_limit", 40), "at the step limit: in 40 of 400 episodes (10.0%)."),
     ],
 )
 def test_the_largest_failure(evidence, largest, text):
@@ -165,7 +165,8 @@ def test_the_largest_failure(evidence, largest, text):
 def test_how_many_episodes_end(evidence):
     rows, largest = evidence["failures"]["rows"], evidence["failures"]["largest"]
     rows[2] = row("end", "step_limit", 120)
-    assert speak(evidence)["failures.largest"].endswith("(10%); 30% of all end at the step limit.")
+    said = speak(evidence)["failures.largest"]
+    assert said.endswith("(10.0%); 30.0% of all end at the step limit.")
     rows[2] = row("end", "step_limit", 16)  # at least 2% are not sure
     assert "step limit" not in speak(evidence)["failures.largest"]
     rows[1] = row("end", "front_boundary", 400)  # who missed a cube ends there
@@ -187,7 +188,7 @@ def test_no_failure_has_a_bound(evidence):
 def test_drawn_actions_that_differ_beyond_doubt(evidence):
     for bounds in ((0.01, 0.1), (-0.5, -0.01)):
         evidence["drawing"] = dict(zip(("lower95", "upper95"), bounds, strict=True))
-        assert "every cube in 50% of episodes, not in 94%" in speak(evidence)["drawing"]
+        assert "every cube in 50.0% of episodes, not in 94.0%" in speak(evidence)["drawing"]
     evidence["drawing"] = None
     assert "drawing" not in speak(evidence)
 

@@ -12,9 +12,9 @@ def test_the_whole():
         "Good with the sun at 21.1 to 60 degrees (no more was tried) and blur of up to 1.5 pixels "
         "(95% confidence for each range)."
     )
-    assert text["shifts.not"] == "Not with brightness at 0.8 times: cubes on its right 47%."
-    assert text["shifts.impossible"].endswith("elevation of the sun at 0 degrees, 45%.")
-    assert "succeeds in 2% of episodes" in text["shifts.together"]
+    assert text["shifts.not"] == "Not with brightness at 0.8 times: cubes on its right 47.0%."
+    assert text["shifts.impossible"].endswith("elevation of the sun at 0 degrees, 45.0%.")
+    assert "succeeds in 1.5% of episodes" in text["shifts.together"]
     assert text["shifts.fixed_seed"].startswith("Fixed seed 0: ")
     said_too = ("good", "not", "impossible", "together", "scope", "fixed_seed")
     assert set(text) == {f"shifts.{name}" for name in said_too}
@@ -88,16 +88,16 @@ def test_the_table():
     assert head == ["success, constant", "1", "2", "3", "4", "5", "area", ""]
     assert sun == [
         "elevation of the sun",
-        "60: more than 99%",
+        "60: 99.5%",
         "",
         "",
         "",
-        "0: 10%*",
+        "0: 10.0%*",
         "0.75",
         "degrees",
     ]
     refused = {"axes.sun.levels.0.refused": "task.cube_size=9", "axes.sun.areas.constant": None}
-    assert rows(changed(EVIDENCE, refused))[1][1:7] == ["60: -", "", "", "", "0: 10%*", ""]
+    assert rows(changed(EVIDENCE, refused))[1][1:7] == ["60: -", "", "", "", "0: 10.0%*", ""]
 
 
 def test_what_nobody_can_is_not_the_policys_failure():
@@ -105,7 +105,7 @@ def test_what_nobody_can_is_not_the_policys_failure():
     failed = {**failed, "impossible": True, "oracle": {"share": 0.3}}
     text = said(SHIFTS, changed(EVIDENCE, {"domain.ranges.brightness.failed": [failed]}))
     assert "shifts.not" not in text and "shifts.too_few" not in text
-    assert "brightness at 0.8 times, 30%" in text["shifts.impossible"]
+    assert "brightness at 0.8 times, 30.0%" in text["shifts.impossible"]
     end = {**failed, "end": "high", "value": 2.0}
     text = said(SHIFTS, changed(EVIDENCE, {"domain.ranges.blur.failed": [end]}))
     assert "blur of up to 1.5 pixels (no more is possible)" in text["shifts.good"]

@@ -43,7 +43,7 @@ SAID = {
     "runs.read": "All figures of 6 runs were read from files in their folders",
     "verdicts.basis": "of 6 runs, by 200 greedy episodes each in selection environments",
     "verdicts.certain": "error probability of at most 5%",
-    "best.chosen": "Run 3: good, with more than 99% of its cubes; selected by 200 episodes in",
+    "best.chosen": "Run 3: good, with 99.9% of its cubes; selected by 200 episodes in",
     "best.flattered": "best of 6 runs",
     "best.report": "`report`, which uses other environments",
     "curves.band": "median over runs",

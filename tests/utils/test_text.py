@@ -2,7 +2,6 @@ from drone_rl.utils.text import (
     all_cubes,
     among,
     bounds,
-    decimal_percent,
     exact,
     listed,
     ordinal,
@@ -15,7 +14,7 @@ from drone_rl.utils.text import (
 def test_numbers_as_people_write_them():
     found = {"lower95": 0.1, "upper95": 0.256, "successes": 3, "trials": 30}
     assert bounds(found) == "95%: 0.10 to 0.26"
-    assert bounds(found, percent) == "95%: 10% to 26%"
+    assert bounds(found, percent) == "95%: 10.0% to 25.6%"
     assert among(found) == "3 of 30"
 
 
@@ -54,11 +53,14 @@ def test_nearly_all_is_never_all():
 
 def test_percentages_with_one_decimal_are_never_rounded_to_nothing_or_all():
     shares = (0, 0.0004, 0.0123, 0.9749, 0.9996, 1.0)
-    assert [decimal_percent(share) for share in shares] == [
+    assert [percent(share) for share in shares] == [
         "0%", "less than 0.1%", "1.2%", "97.5%", "more than 99.9%", "100%"
     ]  # fmt: skip
-    assert [percent(share) for share in shares] == [
+    assert [percent(share, 0) for share in shares] == [
         "0%", "less than 1%", "1%", "97%", "more than 99%", "100%"
     ]  # fmt: skip
     figure = {"share": 0.975, "lower95": 0.9543, "upper95": 0.9881}
     assert rate(figure) == "97.5% (95% CI 95.4 to 98.8)"
+    assert rate({**figure, "mean": 0.5}, label="") == "97.5% (95.4 to 98.8)"
+    assert rate({**figure, "share": None}) == "not offered"
+    assert rate({"mean": 0.5, "lower95": 0.0, "upper95": 1.0}) == "50.0% (95% CI 0.0 to 100.0)"

@@ -23,8 +23,8 @@ def test_it_says_verdict_share_interval_and_what_fails():
     said = [text.get_text() for text in chart(NUMBERS).axes[0].texts]
     assert said[:3] == ["computer vision", "wind 8 m/s", "one"]
     assert said[3:] == [
-        "good", "97.5%  (95 to 99)", "",
-        "poor ?", "10.0%  (7 to 14)", "by ending at the step\nlimit",
+        "good", "97.5% (95.4 to 98.8)", "",
+        "poor ?", "10.0% (7.0 to 14.0)", "by ending at the step\nlimit",
     ]  # fmt: skip
 
 
@@ -53,5 +53,5 @@ def test_flights_under_a_firmware_are_the_last_column():
     figure = chart({**NUMBERS, LOOPED: {"one": flown}})
     last = figure.axes[0].texts[-1]
     assert last.get_position() == (2.5, 0.5)
-    assert last.get_text() == "no verdict: 3 of 14\n(19 to 99)"  # 22 letters a line
+    assert last.get_text() == "no verdict: 3 of 14\n(19.4 to 99.4%)"  # 22 letters a line
     assert cells(figure)[-1].get_xy() == (2, 0) and cells(figure)[-1].get_hatch() == ".."

@@ -30,7 +30,7 @@ NUMBERS = {
 
 
 @pytest.mark.parametrize(
-    ("verdict", "words"), [(GOOD, "good 98% (95 to 99)"), (BAD, "poor? 10% (7 to 14)")]
+    ("verdict", "words"), [(GOOD, "good 97.5% (95.4 to 98.8)"), (BAD, "poor? 10.0% (7.0 to 14.0)")]
 )
 def test_a_cell_has_kind_share_and_interval(verdict, words):
     assert cell(verdict) == words
@@ -39,7 +39,7 @@ def test_a_cell_has_kind_share_and_interval(verdict, words):
 def test_a_row_a_policy_a_column_a_body():
     assert rows(NUMBERS) == [
         ["", "computer vision", "wind 8 m/s"],
-        ["one", "good 98% (95 to 99)", "poor? 10% (7 to 14)"],
+        ["one", "good 97.5% (95.4 to 98.8)", "poor? 10.0% (7.0 to 14.0)"],
     ]
 
 

@@ -22,8 +22,8 @@ def test_flights_stand_side_by_side_with_the_best_luck_and_the_oracle():
     head = "|  | most probable actions | sampled actions | best blind baseline (forward) | oracle |"
     assert head in found
     row = found[found.index(head) + 3]
-    assert row.startswith("| cubes collected | 0.900 (0.800 to 1.000) | 0.600 (")
-    assert "| 0.300 (" in row and "| 1.000 (" in row
+    assert row.startswith("| cubes collected | 90.0% (80.0 to 100.0) | 60.0% (")
+    assert "| 30.0% (" in row and "| 100.0% (" in row
 
 
 def test_a_side_without_cubes_is_not_offered():
@@ -37,7 +37,7 @@ def test_greedy_flights_alone_have_no_column_of_drawn_ones():
 
 def test_the_largest_failure_comes_first_and_those_that_never_happened_are_left_out():
     found = lines()
-    at = found.index("| fails first at | episodes | of | share |")
+    at = found.index("| fails first at | episodes | of | rate |")
     assert found[at + 2] == "| cube: first | 31 | 400 | 0.750 (0.700 to 0.800) |"
     assert found[at + 3].startswith("| end: step_limit | 4 | 400 |")
     assert found[at + 4] == ""

@@ -27,9 +27,9 @@ def test_it_is_a_sequence(both):
 
 def test_each_is_a_row_with_its_rate_of_successes(both):
     assert both.rows() == [
-        ["policy", "verdict", "certain", "success rate (95% interval)"],
-        ["a", "good", "yes", "95% [90, 100]"],
-        ["<b>", "poor", "no", "10% [5, 15]"],
+        ["policy", "verdict", "certain", "success rate (95% CI)"],
+        ["a", "good", "yes", "95.0% (90.0 to 100.0)"],
+        ["<b>", "poor", "no", "10.0% (5.0 to 15.0)"],
     ]
     assert [line.split()[0] for line in str(both).splitlines()] == ["policy", "a", "<b>"]
 

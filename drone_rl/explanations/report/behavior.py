@@ -16,9 +16,9 @@ from drone_rl.utils.text import (
     Evidence,
     among,
     bounds,
-    decimal_percent,
     is_fixed,
     listed,
+    percent,
     plural,
     seed_line,
     seed_of,
@@ -160,7 +160,7 @@ def say_dataset(evidence: Evidence) -> Claims:
             f"{found['steps']:,} steps with sampled actions."
         )
     if max(shares.values()) < 1:
-        parts = listed([f"{decimal_percent(share)} {name}" for name, share in shares.items()])
+        parts = listed([f"{percent(share)} {name}" for name, share in shares.items()])
         claims["dataset.actions"] = f"Actions taken: {parts}."
     if max(shares.values()) == 1:
         only = next(name for name, share in shares.items() if share == 1)
@@ -207,15 +207,15 @@ def say_loops(evidence: Evidence) -> Claims:
         return {
             "loops.some": (
                 f"In {among(share)} of these sampled episodes the drone moves back and forth in a "
-                f"loop ({bounds(share, decimal_percent)}); the longest loop has {found['longest']} "
-                f"steps, and all loops together have {decimal_percent(found['frames_share'])} of "
+                f"loop ({bounds(share, percent)}); the longest loop has {found['longest']} "
+                f"steps, and all loops together have {percent(found['frames_share'])} of "
                 "the steps."
             )
         }
     return {
         "loops.none": (
             f"None of these {share['trials']} sampled episodes has a loop, in which the drone "
-            f"moves back and forth; up to {decimal_percent(share['upper95'])} of such episodes may "
+            f"moves back and forth; up to {percent(share['upper95'])} of such episodes may "
             "have one (95%)."
         )
     }

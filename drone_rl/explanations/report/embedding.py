@@ -11,7 +11,7 @@ from scipy.spatial.distance import cdist
 from drone_rl.evaluation.plots import images
 from drone_rl.evaluation.plots.saving import Rows, to_png, to_uri
 from drone_rl.explanations.report.explanation import Explanation, Part
-from drone_rl.utils.text import Claims, Evidence, decimal_percent, listed
+from drone_rl.utils.text import Claims, Evidence, listed, percent
 
 MOST_THUMBNAILS = 900  # if there are more frames, an evenly spaced selection is shown
 CELLS_A_THUMBNAIL = 2.2  # empty cells show where clusters end
@@ -26,10 +26,10 @@ def say_embedding(evidence: Evidence) -> Claims:
     claims = {
         "tsne.faithful": (
             f"Faithfulness of the maps: of the {one['neighbours']} nearest neighbours on a map, "
-            f"{decimal_percent(one['neighbours_kept'])} (features of layer {one['layer']}) and "
-            f"{decimal_percent(two['neighbours_kept'])} (pixels) are nearest neighbours in the "
-            f"original space (chance: {decimal_percent(one['neighbours_chance'])} and "
-            f"{decimal_percent(two['neighbours_chance'])}); trustworthiness "
+            f"{percent(one['neighbours_kept'])} (features of layer {one['layer']}) and "
+            f"{percent(two['neighbours_kept'])} (pixels) are nearest neighbours in the "
+            f"original space (chance: {percent(one['neighbours_chance'])} and "
+            f"{percent(two['neighbours_chance'])}); trustworthiness "
             f"{one['trustworthiness']:.3f} and {two['trustworthiness']:.3f} of 1."
         )
     }

@@ -25,7 +25,7 @@ from drone_rl.utils.display import content_security_policy, page_environment, st
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest, to_file_name
 from drone_rl.utils.limits import ARRAYS_BYTES, Allowance
-from drone_rl.utils.text import decimal_percent, said, say
+from drone_rl.utils.text import percent, said, say
 
 PARTS: dict[str, Part] = {
     "evaluation": behavior.EVALUATION_PART,
@@ -193,9 +193,7 @@ def _environment() -> jinja2.Environment:
     """Return the templates of this page, compiled once."""
     environment = page_environment("drone_rl.explanations.report")
     environment.filters |= {
-        "percent": lambda of: (
-            decimal_percent(of).replace("less than ", "<").replace("more than ", ">")
-        ),
+        "percent": lambda of: percent(of).replace("less than ", "<").replace("more than ", ">"),
         "json": functools.partial(json.dumps, indent=1),
     }
     return environment

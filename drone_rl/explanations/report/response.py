@@ -17,7 +17,7 @@ from drone_rl.evaluation.plots.saving import Rows, new_chart
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary, terms_of
 from drone_rl.utils.palette import EMPTY, GOOD, css
-from drone_rl.utils.text import Claims, Evidence, bounds, decimal_percent, listed
+from drone_rl.utils.text import Claims, Evidence, bounds, listed, percent
 from drone_rl.verification.text import rows as place_rows
 from drone_rl.verification.text import say_places
 
@@ -43,9 +43,7 @@ def say_response(evidence: Evidence) -> Claims:
         claims["response.heights"] = f"With the {terms.target} {'; '.join(parts)}."
     blind = {row["side"]: row["blind"] for row in level if row["side"] != "ahead"}
     if None not in blind.values():
-        parts = [
-            f"{decimal_percent(of)} of the places {terms.place(side)}" for side, of in blind.items()
-        ]
+        parts = [f"{percent(of)} of the places {terms.place(side)}" for side, of in blind.items()]
         claims["response.blind"] = (
             f"It is blind at {listed(parts)}: a turn is needed, it makes none, and its "
             f"probabilities differ by less than {evidence['response']['blind_below']:g} from those "

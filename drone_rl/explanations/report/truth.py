@@ -26,7 +26,7 @@ from drone_rl.utils.palette import (
     SKY,
     css,
 )
-from drone_rl.utils.text import Claims, Evidence, bounds, decimal_percent, listed, plural
+from drone_rl.utils.text import Claims, Evidence, bounds, listed, percent, plural
 
 _KINDS = {"deletion": "lower is better", "insertion": "higher is better"}
 _DASHES = ("-", "--", "-.", ":", (0, (1, 1)))
@@ -215,8 +215,8 @@ def _say_tests(evidence: Evidence) -> Claims:
         )
         claims["truth.hits"] = (
             "Its hottest patch is one of those that affect the policy most in "
-            f"{decimal_percent(pointing['hit'])} of these frames (chance: "
-            f"{decimal_percent(pointing['chance'])})."
+            f"{percent(pointing['hit'])} of these frames (chance: "
+            f"{percent(pointing['chance'])})."
         )
     elif affects_any:
         claims["truth.none"] = "No heat map of this policy can be trusted."
@@ -256,8 +256,8 @@ def _say_outcomes(evidence: Evidence) -> Claims:
         )
     claims["truth.ground"] = (
         "Another ground colour, which should not matter, changes the outcome of "
-        f"{decimal_percent(ground['mean'])} of these rollouts, and of no more than "
-        f"{decimal_percent(ground['upper95'])} (95%)."
+        f"{percent(ground['mean'])} of these rollouts, and of no more than "
+        f"{percent(ground['upper95'])} (95%)."
     )
     return claims
 
