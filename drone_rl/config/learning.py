@@ -1,6 +1,6 @@
 """Settings of what learns: returns, loss, optimizer, scheduler and collector."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
 
 from drone_rl.config.configuration import Variant
@@ -174,10 +174,8 @@ Weight = Annotated[float, Real(0.0)]
 
 
 class Objective(Variant):
-    """Settings of a loss and its learner."""
+    """Settings of a loss and its learner, which `make` builds from a training's components."""
 
-    learner: ClassVar[Callable[..., Any]]
-    """Builds the learner from the training's settings and what it collects with."""
     needs: ClassVar[Mapping[str, Variant]] = {}
     """Other parts that the objective requires, and selects unless they are given."""
 
@@ -212,8 +210,7 @@ class WithCritic(Objective):
     def arguments(self) -> dict[str, Any]:
         """Return the settings of the loss."""
         others = {"num_steps", "shares_trunk", *self.passes}
-        values = {name: value for name, value in self.values().items() if name not in others}
-        return {"functional": False, **values}
+        return {name: value for name, value in self.values().items() if name not in others}
 
 
 class A2c(WithCritic, target="torchrl.objectives.A2CLoss"):

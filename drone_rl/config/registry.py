@@ -55,17 +55,6 @@ def implements(*variants: type[Variant]) -> Callable[[F], F]:
     return connect
 
 
-def learns(*objectives: type[Objective]) -> Callable[[F], F]:
-    """Decorate the function that builds the learner of built-in objectives."""
-
-    def connect(build: F) -> F:
-        for objective in objectives:
-            objective.learner = staticmethod(build)
-        return build
-
-    return connect
-
-
 def register_network(name: str) -> Callable[[F], F]:
     """Decorate a network class to register it under a name for settings and policy files.
 
@@ -102,22 +91,11 @@ def register_returns(name: str) -> Callable[[F], F]:
 def register_learner(name: str) -> Callable[[F], F]:
     """Decorate a class or function to register it as a learner, selected by `objective=NAME`.
 
-    It is called as `factory(settings, collecting, **own)`, with the training's settings and the
+    It is called as `factory(settings, components, **own)`, with the training's settings and the
     result of `drone_rl.training.components.make_collector`, and returns a
     `drone_rl.training.learners.Learner`. See `register_network` for errors.
     """
-
-    def register(factory: F) -> F:
-        _register(Objective, name, factory, 2)
-        settings: Any = vars(factory)["Settings"]
-        settings.learner = staticmethod(
-            lambda training, collecting: factory(
-                training, collecting, **training.objective.arguments()
-            )
-        )
-        return factory
-
-    return register
+    return lambda factory: _register(Objective, name, factory, 2)
 
 
 def register_collector(name: str) -> Callable[[F], F]:

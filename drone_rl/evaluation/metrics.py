@@ -52,8 +52,8 @@ class Episodes:
 
     @property
     def success(self) -> Tensor:
-        """1 where every goal was reached, else 0. Shape: (n,), float64."""
-        return self.goals.reached.all(-1).double()
+        """1 where the episode ended with success, else 0. Shape: (n,), float64."""
+        return (self.end_reason == self.task.success_end).double()
 
     @property
     def share(self) -> Tensor:

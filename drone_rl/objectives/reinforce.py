@@ -9,11 +9,9 @@ from tensordict.utils import NestedKey
 from torchrl.objectives import LossModule
 
 from drone_rl.config.learning import Reinforce
-from drone_rl.config.registry import implements
 from drone_rl.utils.errors import InputError
 
 
-@implements(Reinforce)
 class ReinforceLoss(LossModule):
     """-sum_t g_t log pi(a_t | s_t), reduced over the batch (chapter, Eq. 15).
 

@@ -67,10 +67,16 @@ def make_collector(settings: TrainSettings, replay: FailureReplayTask | None = N
 
 
 def learning_actor(settings: TrainSettings, parts: Components) -> Any:
-    """Return the actor that the loss evaluates, with a fused network if it is supported."""
+    """Return the actor that the loss evaluates, with a fused network if it is supported.
+
+    The fused kernel has `trainer.num_threads` threads of its own; PyTorch then gets one.
+    """
     actor, threads = parts.collector.actor, settings.trainer.num_threads
     if not settings.trainer.compiled:
         return actor
     cache = parts.collector.cache_activations
     fused = accelerated_gradients(parts.network, threads, cache=cache)
-    return actor if fused is parts.network else make_actor(fused, actor.spec["action"])
+    if fused is parts.network:
+        return actor
+    torch.set_num_threads(1)
+    return make_actor(fused, actor.spec["action"])

@@ -15,9 +15,10 @@ from torchrl.envs import Compose, TransformedEnv
 
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
 from drone_rl.config.learning import Reinforce, Threads
-from drone_rl.config.registry import implements, learns
+from drone_rl.config.registry import implements
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
+from drone_rl.objectives import ReinforceLoss
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import describe
 from drone_rl.sim.tasks import FailureReplayTask, as_settings, as_task
@@ -107,7 +108,7 @@ def learn(
     parts = components.make_collector(settings, replay)
     confirmation = Confirmation(settings, parts.network) if limits.confirm_episodes else None
     checkpoints = run.checkpoints(settings)
-    learner = settings.objective.learner(settings, parts)
+    learner = settings.objective.make(settings, parts)
     trainer = Trainer(
         collector=parts.collector,
         learner=learner,
@@ -183,16 +184,14 @@ def make_groups(
     return groups
 
 
-@learns(Reinforce)
-def reinforce_learner(settings: TrainSettings, parts: Components) -> ReinforceLearner:
-    """Make the learner without a critic: loss, optimizer and scheduler."""
+@implements(Reinforce)
+def reinforce_learner(settings: TrainSettings, parts: Components, **own: Any) -> ReinforceLearner:
+    """Make the learner without a critic; `own` are the settings of its loss."""
     limits, actor = settings.trainer, components.learning_actor(settings, parts)
-    if actor is not parts.collector.actor:  # it is fused; the kernel has threads of its own
-        torch.set_num_threads(1)
     optimizer = settings.optimizer.make(parts.network.parameters())
     return ReinforceLearner(
         network=parts.network,
-        loss=settings.objective.make(actor).to(settings.device),
+        loss=ReinforceLoss(actor, **own).to(settings.device),
         optimizer=optimizer,
         scheduler=settings.scheduler.make(optimizer),
         max_grad_norm=limits.max_grad_norm,

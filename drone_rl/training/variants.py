@@ -8,9 +8,9 @@ from typing import Any
 import torch
 
 from drone_rl.collectors import EpisodeCollector, RolloutCollector, ThreadedCollector
-from drone_rl.config.configuration import as_config, from_config
+from drone_rl.config.configuration import as_config, from_config, locate
 from drone_rl.config.learning import A2c, Ppo, Ray, Rollouts, WithCritic
-from drone_rl.config.registry import implements, learns, modules_of
+from drone_rl.config.registry import implements, modules_of
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies import ActorCritic, PolicyNetwork
 from drone_rl.policies.zoo import describe
@@ -39,20 +39,26 @@ def rollout_collector(
     return joined(ThreadedCollector(collectors), groups)
 
 
-@learns(A2c, Ppo)
-def actor_critic_learner(settings: TrainSettings, parts: Components) -> ActorCriticLearner:
-    """Make the learner with a critic, on the policy's features or with its own network."""
+@implements(A2c, Ppo)
+def actor_critic_learner(
+    settings: TrainSettings, parts: Components, **own: Any
+) -> ActorCriticLearner:
+    """Make the learner with a critic, on the policy's features or with its own network.
+
+    `own` are the settings of TorchRL's loss, whose dotted name is the objective's target.
+    """
     objective = settings.objective
     assert isinstance(objective, WithCritic)
     weights = torch_generator(settings.seed, Stream.CRITIC_INIT)
-    own = None if objective.shares_trunk else describe(settings).build_critic(weights)
-    model = ActorCritic(parts.network, own, weights).to(settings.device)
+    critic = None if objective.shares_trunk else describe(settings).build_critic(weights)
+    model = ActorCritic(parts.network, critic, weights).to(settings.device)
+    loss = locate(objective.target)(model.actor, model.critic, functional=False, **own)
     optimizer = settings.optimizer.make(model.parameters())
     learner = ActorCriticLearner(
         network=parts.network,
         model=model,
         estimator=settings.returns.make().to(settings.device),
-        loss=objective.make(model.actor, model.critic).to(settings.device),
+        loss=loss.to(settings.device),
         optimizer=optimizer,
         generator=torch_generator(settings.seed, Stream.MINIBATCHES),
         scheduler=settings.scheduler.make(optimizer),

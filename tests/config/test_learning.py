@@ -62,25 +62,19 @@ def test_what_a_file_says_is_what_was_said():
     assert from_config(TrainSettings, as_config(told)) == told
 
 
-def test_the_loss_is_told_what_is_its_own(monkeypatch):
-    given = {}
-    monkeypatch.setattr("torchrl.objectives.ClipPPOLoss", lambda *a, **k: given.update(k, args=a))
-    Ppo(clip_epsilon=0.1).make("actor", "critic")
-    assert given.pop("args") == ("actor", "critic")
-    assert given == {
-        "functional": False,
+def test_the_loss_gets_its_own_settings():
+    assert Ppo(clip_epsilon=0.1).arguments() == {
         "critic_coeff": Ppo().critic_coeff,
         "entropy_coeff": Ppo().entropy_coeff,
         "clip_epsilon": 0.1,
     }
 
 
-def test_a_setting_of_torchrls_loss_that_is_not_ours_is_passed_on(monkeypatch):
-    monkeypatch.setattr("torchrl.objectives.ClipPPOLoss", lambda *a, **k: k)
+def test_a_setting_of_torchrls_loss_that_is_not_ours_is_passed_on():
     config = {"_target_": Ppo.target, "clip_value": 0.3, "epochs": 5, "shares_trunk": False}
     told = from_config(TrainSettings, {**as_config(TrainSettings().replace(objective=Ppo()))})
     mine = from_config(TrainSettings, {**as_config(told), "objective": config}).objective
-    assert mine.make() == {"functional": False, "clip_value": 0.3}
+    assert mine.arguments() == {"clip_value": 0.3} and mine.factory is Ppo.factory
     assert mine.passes == {"epochs": 5, "minibatch_size": Ppo().minibatch_size}
 
 

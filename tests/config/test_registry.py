@@ -120,7 +120,7 @@ def test_a_learner_and_a_collector_get_the_settings_of_the_training(registered):
         objective=Objective.named("mine", "x")(alpha=0.1),
         collector=Collector.named("theirs", "x")(num_envs=5),
     )
-    assert training.objective.learner(training, "made") == (training, "made", 0.1)
+    assert training.objective.make(training, "made") == (training, "made", 0.1)
     assert training.collector.make(training, None) == (training, None, 3)
 
 

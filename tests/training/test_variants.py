@@ -51,7 +51,7 @@ def test_every_objective_has_its_learner():
     for settings, kind in ((TINY, ActorCriticLearner), (TrainSettings(), ReinforceLearner)):
         settings = settings.replace(task=TASK)
         made = make_collector(settings)
-        learner = settings.objective.learner(settings, made)
+        learner = settings.objective.make(settings, made)
         assert isinstance(learner, kind)
         assert learner.network is made.network
         made.collector.shutdown()
@@ -63,7 +63,7 @@ def test_kernel_gradients_give_the_same_updates_as_torch():
         limits = TrainerSettings(compiled=is_compiled, minibatch_frames=40)
         settings = TrainSettings(task=TASK, trainer=limits, optimizer=Sgd(lr=1.0))
         made = make_collector(settings)
-        learner = settings.objective.learner(settings, made)
+        learner = settings.objective.make(settings, made)
         network = learner.loss.actor_network.module[0].module
         assert isinstance(network, FusedNetwork) is is_compiled
         before = [p.detach().clone() for p in made.network.parameters()]
@@ -93,7 +93,7 @@ def test_kernel_gradients_give_the_same_updates_as_torch():
 def test_activations_are_cached_if_the_learner_uses_them(settings, is_kept):
     settings = TrainSettings(task=TASK).replace(**settings)
     made = make_collector(settings)
-    learner = settings.objective.learner(settings, made)
+    learner = settings.objective.make(settings, made)
     sources = [getattr(part, "source", None) for part in made.collector.collectors]
     kept = [s._cache for s in sources if isinstance(s, FusedCollector) and s._cache is not None]
     assert (len(kept) == 1) is is_kept and bool(kept) is is_kept
@@ -115,7 +115,7 @@ def test_cached_activations_are_used_and_give_the_same_update(monkeypatch):
         monkeypatch.setattr(ActivationCache, "find", note)
         settings = TrainSettings(task=TASK, trainer=TrainerSettings(minibatch_frames=40))
         made = make_collector(settings)
-        learner, batches = settings.objective.learner(settings, made), iter(made.collector)
+        learner, batches = settings.objective.make(settings, made), iter(made.collector)
         for _ in range(3):
             learner.update(next(batches))
         made.collector.shutdown()
@@ -132,9 +132,7 @@ def test_critic_is_seeded_and_does_not_change_the_policy(shares):
     for seed in (0, 0, 1):
         made = make_collector(settings.replace(seed=seed))
         states.append(
-            copy.deepcopy(
-                settings.objective.learner(settings.replace(seed=seed), made).state_dict()
-            )
+            copy.deepcopy(settings.objective.make(settings.replace(seed=seed), made).state_dict())
         )
         made.collector.shutdown()
     one, two, other = (state["critic"] for state in states)
@@ -252,7 +250,7 @@ def refused(trained, folder, state, message):
 def test_advantages_equal_torchrls_gae(is_ours):
     """TorchRL evaluates every next observation as well; batches of its collector are accepted."""
     made = make_collector(TINY.replace(collector=Rollouts(num_envs=5, num_threads=1)))
-    learner, (ours,) = TINY.objective.learner(TINY, made), made.collector.collectors
+    learner, (ours,) = TINY.objective.make(TINY, made), made.collector.collectors
     torch.nn.init.normal_(learner.model.critic.module.weight)
     collector = Collector(
         ours.env,
