@@ -118,7 +118,7 @@ class OpenGL:
 
 def render(scene: Scene) -> Images:
     """Return the ray tracer's images with "facets" and "nudged", see `compare`."""
-    renderer = Raytracer(scene, num_worlds=1, num_shards=1)
+    renderer = Raytracer(scene, num_envs=1, num_shards=1)
     cameras = (CAMERA, *NUDGED)
     view = View(cameras=cameras, height=SIZE, width=SIZE, modalities=_MODALITIES)
     still = Poses(torch.zeros(1, 3), torch.tensor([[1.0, 0.0, 0.0, 0.0]]), torch.zeros(1, 0, 3))

@@ -108,7 +108,7 @@ def _over_warp(height: int, width: int, device: str, seconds: float) -> float:
 
 def _render_appearance(env: DroneEnv) -> int:
     """Render every environment with its own appearance at 64x64 pixels."""
-    every = torch.arange(env.worlds.num_worlds)
+    every = torch.arange(env.worlds.num_envs)
     view = env.worlds.view(height=64, width=64)
     return len(env.worlds.render(env.worlds.state, view, env.looks.drawn(every)))
 

@@ -23,7 +23,7 @@ LAUNCHERS = ("cores", "pixels")
 def tracer(launcher="cores", kind="box", size=".5 .5 .5"):
     model = mujoco.MjModel.from_xml_string(XML.format(kind=kind, size=size))
     scene = Scene(model, (SemanticClass.GROUND, SemanticClass.TARGET), (-1, -1), (0.2, 0.4, 0.6))
-    renderer = Raytracer(scene, num_worlds=2, num_shards=2)
+    renderer = Raytracer(scene, num_envs=2, num_shards=2)
     if launcher == "pixels":
         renderer._launcher = GpuLauncher("cpu")  # the GPU kernels run on a CPU as well
     return renderer

@@ -35,8 +35,8 @@ class End(enum.IntEnum):
 class PostsState(State):
     """The state of environments with posts."""
 
-    posts: Tensor  # (num_worlds, NUM_POSTS, 3) float64
-    passed: Tensor  # (num_worlds, NUM_POSTS) bool
+    posts: Tensor  # (num_envs, NUM_POSTS, 3) float64
+    passed: Tensor  # (num_envs, NUM_POSTS) bool
 
 
 class Post(Cube):

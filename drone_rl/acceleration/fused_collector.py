@@ -56,7 +56,7 @@ class FusedCollector:
         self._actor = actor
         renderer = self._renderer = direct.renderer
         self._network, self._worlds = network, worlds
-        count, view = renderer.worlds.num_worlds, renderer.view
+        count, view = renderer.worlds.num_envs, renderer.view
         self._workers = WorkerPool(count, num_threads)
         raytracer: Any = renderer.worlds.renderer
         camera: Any = rollout_kernel.CameraView()
@@ -91,7 +91,7 @@ class FusedCollector:
         """Return the fused form of a collector, or the reasons why it is not supported."""
         reasons = [*_not_fused(direct.renderer), *_not_fused_policy(direct)]
         worlds = direct.renderer.worlds
-        flown = worlds.task.fused_rules(worlds.dynamics, worlds.num_worlds)
+        flown = worlds.task.fused_rules(worlds.dynamics, worlds.num_envs)
         if flown is None:
             names = f"{type(worlds.task).__name__} with {type(worlds.dynamics).__name__}"
             reasons.append(f"task {names} is not fused")

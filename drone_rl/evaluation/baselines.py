@@ -92,7 +92,7 @@ def make_baseline(
 
 
 def run_baselines(
-    num_worlds: int,
+    num_envs: int,
     task: BaseTaskSettings | Task[Any],
     worlds: dict[str, Any],
     episodes: int,
@@ -101,14 +101,14 @@ def run_baselines(
 ) -> dict[str, Episodes]:
     """Run so many episodes of every baseline, the k-th of each from the same initial state.
 
-    `worlds` is `DroneEnv.state_dict` from before the policy's first episode, and `num_worlds` the
+    `worlds` is `DroneEnv.state_dict` from before the policy's first episode, and `num_envs` the
     policy's batch size. The task's default dynamics are used by default.
 
     Raises:
         InputError: The task has no oracle.
     """
     task = as_task(task)
-    env = DroneEnv(num_worlds, task, pixels=False, device=device, dynamics=dynamics)
+    env = DroneEnv(num_envs, task, pixels=False, device=device, dynamics=dynamics)
     actions = env.worlds.dynamics.actions
     env.load_state_dict(worlds)
     source = env.side_streams(torch.tensor([0]), _RANDOM_ACTIONS)[0]

@@ -136,8 +136,8 @@ def evaluate(
         flown = {"greedy": greedy, "sampled": run_episodes(env, actor, episodes, greedy=False)}
     if settings.baselines:
         progress("baselines", 2, steps)
-        num_worlds, device = settings.num_worlds, settings.device
-        flown |= run_baselines(num_worlds, policy.task, state, episodes, device, dynamics)
+        num_envs, device = settings.num_envs, settings.device
+        flown |= run_baselines(num_envs, policy.task, state, episodes, device, dynamics)
     progress("evaluated", steps, steps)
     figures = {name: summarise(e) for name, e in flown.items()}
     return Evaluation(policy, settings, figures, seed, rounding and rounding.as_dict())
@@ -148,7 +148,7 @@ def held_out_environments(
 ) -> AbstractContextManager[tuple[Any, TensorDictModuleBase]]:
     """Return a context manager of environments that no training uses, and the policy's actor."""
     where: dict[str, Any] = {"device": settings.device, "renderer": settings.renderer}
-    return policy.flying(settings.num_worlds, seed=seed.value, **where)
+    return policy.flying(settings.num_envs, seed=seed.value, **where)
 
 
 def _same(evidence: Evidence) -> str:

@@ -243,7 +243,7 @@ def render_chase(worlds: Worlds, look: Appearance | None, height: int, width: in
     visible.
 
     Returns:
-        Colours. Shape: (num_worlds, height, width, 3), uint8.
+        Colours. Shape: (num_envs, height, width, 3), uint8.
     """
     view = worlds.view(CHASE.name, height=height, width=width, show_drone=True)
     state = worlds.state
@@ -259,7 +259,7 @@ def render_chase(worlds: Worlds, look: Appearance | None, height: int, width: in
 def level(attitude: Tensor, camera: str) -> Mounting:
     """Return the mounting that keeps the chase camera level on tilted bodies.
 
-    The attitudes are quaternions (w, x, y, z), shape (num_worlds, 4); the camera is given by its
+    The attitudes are quaternions (w, x, y, z), shape (num_envs, 4); the camera is given by its
     full name in the model.
     """
     back = product(attitude * attitude.new_tensor(_BACK), heading_only(attitude))

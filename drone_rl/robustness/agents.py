@@ -22,7 +22,7 @@ _NOTHING = -1.0
 
 
 class StepContext(NamedTuple):
-    """Data that an agent may use at one step, for n active environments of num_worlds."""
+    """Data that an agent may use at one step, for n active environments of num_envs."""
 
     worlds: Worlds
     state: State
@@ -63,17 +63,17 @@ class PolicyAgent:
         self,
         network: ImageNetwork,
         transforms: Iterable[Transform],
-        num_worlds: int,
+        num_envs: int,
         *,
         examines_rounding: bool = False,
     ) -> None:
         """Take a policy's network and transforms; `examines_rounding` fills `is_fragile`."""
-        self.is_fragile = torch.zeros(num_worlds, dtype=torch.bool)
-        """Episodes with a frame in which rounding can change the action. Shape: (num_worlds,)."""
+        self.is_fragile = torch.zeros(num_envs, dtype=torch.bool)
+        """Episodes with a frame in which rounding can change the action. Shape: (num_envs,)."""
         self._decide = decider(network)[0] if examines_rounding else None
         self._network = network
         self._first, *self._rest = pixel_transforms(transforms)
-        self._memory, self._num_worlds = memory_of(self._rest), num_worlds
+        self._memory, self._num_envs = memory_of(self._rest), num_envs
         self._film: list[Tensor] = []
 
     def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
@@ -86,7 +86,7 @@ class PolicyAgent:
         film = [*(earlier[context.active] for earlier in self._film), images]
         observation = see_film(self._rest, film)
         if self._memory:
-            newest = images.new_zeros(self._num_worlds, *images.shape[1:])
+            newest = images.new_zeros(self._num_envs, *images.shape[1:])
             newest[context.active] = images
             self._film = [*self._film, newest][-self._memory :]
         if self._decide is not None:

@@ -48,7 +48,7 @@ class AppearanceChange:
     """A change of the appearance, with a variation in each environment."""
 
     change: Callable[[Appearance, Tensor], Appearance]
-    """Takes an appearance and variations from -1 to 1, (num_worlds, dimensions), float64."""
+    """Takes an appearance and variations from -1 to 1, (num_envs, dimensions), float64."""
     dimensions: int = 0
     """Numbers that a variation has."""
 
@@ -91,14 +91,14 @@ class Condition:
 
 
 def variations(
-    mode: Mode, dimensions: Sequence[int], num_worlds: int, generator: torch.Generator
+    mode: Mode, dimensions: Sequence[int], num_envs: int, generator: torch.Generator
 ) -> Iterator[list[Tensor]]:
     """Yield the variations of each step, without end, of all environments, active or not.
 
     `dimensions` are those of each part of the condition; one tensor per part is yielded. Shapes:
-    (num_worlds, dimensions), float64.
+    (num_envs, dimensions), float64.
     """
-    shape, is_drifting = (num_worlds, sum(dimensions)), mode is Mode.DRIFTING
+    shape, is_drifting = (num_envs, sum(dimensions)), mode is Mode.DRIFTING
     variation = torch.rand(shape, generator=generator, dtype=torch.float64).round() * 2 - 1
     variation = torch.zeros_like(variation) if is_drifting else variation
     while True:
@@ -208,13 +208,13 @@ def as_bright(color: Sequence[float]) -> tuple[float, ...]:
     return tuple(min(1.0, wanted / has * c) for c in _BLUE)
 
 
-def sample_distractors(things: Things, num_worlds: int, generator: torch.Generator) -> Tensor:
+def sample_distractors(things: Things, num_envs: int, generator: torch.Generator) -> Tensor:
     """Sample positions of distractors next to the area of the task, metres, world frame.
 
-    Shape: (num_worlds, MOST, 3), float64.
+    Shape: (num_envs, MOST, 3), float64.
     """
     near, far = _AWAY
-    sampled = torch.rand(num_worlds, MOST, 3, generator=generator, dtype=torch.float64)
+    sampled = torch.rand(num_envs, MOST, 3, generator=generator, dtype=torch.float64)
     ahead = things.first / 2 + sampled[..., 0] * things.last
     is_left = sampled[..., 2].round().bool()
     return stand(things, ahead, near + sampled[..., 1] * (far - near), is_left, things.altitude)
@@ -223,7 +223,7 @@ def sample_distractors(things: Things, num_worlds: int, generator: torch.Generat
 def clutter(appearance: Appearance | None, things: Things, places: Tensor) -> Appearance:
     """Add distractors of the size, height and luminance of the task's objects.
 
-    Their places are in metres, world frame. Shape: (num_worlds, count, 3).
+    Their places are in metres, world frame. Shape: (num_envs, count, 3).
     """
     color = torch.tensor(as_bright(things.color)).to(places)
     more = Distractors(
@@ -254,13 +254,13 @@ class FaultPipeline:
     """Applies faults in a batch of environments, of which fewer and fewer are active."""
 
     def __init__(
-        self, faults: Sequence[FaultModel], num_worlds: int, seed: int, *, hiding_only: bool = False
+        self, faults: Sequence[FaultModel], num_envs: int, seed: int, *, hiding_only: bool = False
     ) -> None:
         """Take faults in the order in which they act; each has a random stream of its own.
 
         `hiding_only` leaves out those that hide nothing.
         """
-        self._num_worlds = num_worlds
+        self._num_envs = num_envs
         self._faults = [
             (fault, torch_generator(seed, Stream.SHIFTS, number=1 + i))
             for i, fault in enumerate(faults)
@@ -278,7 +278,7 @@ class FaultPipeline:
             sample = self._sampler(generator, active)
             if i not in self._memories:
                 rows = fault.begin(images, sample)
-                self._memories[i] = rows.new_zeros(self._num_worlds, *rows.shape[1:])
+                self._memories[i] = rows.new_zeros(self._num_envs, *rows.shape[1:])
             else:
                 rows = fault.update(self._memories[i][active], images, sample)
             self._memories[i][active] = rows
@@ -288,7 +288,7 @@ class FaultPipeline:
     def _sampler(self, generator: torch.Generator, active: Tensor) -> Sample:
         def sample(*shape: int, normal: bool = False) -> Tensor:
             draw = torch.randn if normal else torch.rand
-            every = draw(self._num_worlds, *shape, generator=generator)
+            every = draw(self._num_envs, *shape, generator=generator)
             return every.to(active.device)[active]
 
         return sample

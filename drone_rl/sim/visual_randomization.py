@@ -116,7 +116,7 @@ class Appearances:
     def __init__(
         self,
         settings: AppearanceSettings,
-        num_worlds: int,
+        num_envs: int,
         device: str = "cpu",
         *,
         task: BaseTaskSettings | Task[Any] | None = None,
@@ -143,8 +143,8 @@ class Appearances:
             None if settings.is_minimal else self._made(torch.tensor(middle, dtype=torch.float64))
         )
         """Appearance of imagined environments; None for the task's own."""
-        self.values = torch.tensor([middle], dtype=torch.float64).repeat(num_worlds, 1)
-        """Sampled numbers. Shape: (num_worlds, *)."""
+        self.values = torch.tensor([middle], dtype=torch.float64).repeat(num_envs, 1)
+        """Sampled numbers. Shape: (num_envs, *)."""
         self._now: Appearance | None = None
 
     def reset(self, worlds: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
@@ -176,7 +176,7 @@ class Appearances:
         return [*look, *draw_distractors(self.settings, self._things, source)]
 
     def _made(self, values: Tensor) -> Appearance:
-        """Appearance of rows of `_draw`, or of one. Shape: (num_worlds, *) or (*)."""
+        """Appearance of rows of `_draw`, or of one. Shape: (num_envs, *) or (*)."""
         settings, values = self.settings, values.to(self._device)
         columns = iter(values.unbind(-1))
         number = functools.partial(next, columns)

@@ -32,11 +32,11 @@ _POSE = {"drone": Entry((3,), torch.float32), "attitude": Entry((4,), torch.floa
 
 
 class Worlds:
-    """`num_worlds` environments that step, reset and render together, or any of them alone."""
+    """`num_envs` environments that step, reset and render together, or any of them alone."""
 
     def __init__(
         self,
-        num_worlds: int,
+        num_envs: int,
         task: BaseTaskSettings | Task[Any] | None = None,
         camera: CameraSettings | None = None,
         *,
@@ -52,16 +52,16 @@ class Worlds:
         self.appearance, self.distractors = appearance, distractors
         self._combined: tuple[Appearance, Appearance | None, Appearance] | None = None
         """The last appearance given, the default one, and both combined."""
-        self.num_worlds = num_worlds
+        self.num_envs = num_envs
         self.task = as_task(task)
         self.camera = camera or CameraSettings()
         self.dynamics = make_dynamics(self.task.make_dynamics, dynamics, actions)
         self.device = torch.device(device)
-        self._every = torch.arange(num_worlds, device=self.device)
+        self._every = torch.arange(num_envs, device=self.device)
         self._make_renderer, self._num_shards = find_renderer(renderer), num_shards
         self.policy_view = self.view()
         drawn = self.task.sample(np.random.RandomState(0))
-        self.state = self.start(torch.zeros_like(drawn).expand(num_worlds, *drawn.shape).clone())
+        self.state = self.start(torch.zeros_like(drawn).expand(num_envs, *drawn.shape).clone())
 
     @property
     def entries(self) -> Mapping[str, Entry]:
@@ -91,7 +91,7 @@ class Worlds:
         """The renderer, created at first use."""
         shards, device = self._num_shards, str(self.device)
         return self._make_renderer(
-            self.scene, num_worlds=self.num_worlds, num_shards=shards, device=device
+            self.scene, num_envs=self.num_envs, num_shards=shards, device=device
         )
 
     def view(

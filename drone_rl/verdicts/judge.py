@@ -276,7 +276,7 @@ def _baseline(
 ) -> Iterator[tuple[EnvBase, TensorDictModuleBase]]:
     """Environments without images, and a baseline."""
     env = DroneEnv(
-        settings.num_worlds,
+        settings.num_envs,
         task,
         seed=seed.value,
         stream=Stream.REPORT,

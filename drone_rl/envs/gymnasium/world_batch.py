@@ -107,7 +107,7 @@ Chosen = str | BaseTaskSettings | Task[Any] | None
 class WorldBatch:
     """A batch of environments, their observations and their spaces."""
 
-    def __init__(self, num_worlds: int, task: Chosen, given: Mapping[str, Any]) -> None:
+    def __init__(self, num_envs: int, task: Chosen, given: Mapping[str, Any]) -> None:
         """Create the environments.
 
         `given` has fields of `GymnasiumSettings`, some as mappings, and settings of the task.
@@ -125,7 +125,7 @@ class WorldBatch:
         changes = {name: value for name, value in given.items() if name not in own}
         check_device(options.device)
         self.worlds = Worlds(
-            num_worlds,
+            num_envs,
             _make_task(task, changes),
             options.camera,
             dynamics=options.dynamics,
@@ -133,7 +133,7 @@ class WorldBatch:
             renderer=options.renderer,
             device=options.device,
         )
-        self._every = torch.arange(num_worlds, device=self.worlds.device)
+        self._every = torch.arange(num_envs, device=self.worlds.device)
         self.render_mode = options.render_mode
         self.has_images = options.observations == "pixels"
         self.names = tuple(name for name in self.worlds.entries if name != END)
@@ -152,7 +152,7 @@ class WorldBatch:
         self.worlds.reset(worlds, streams)
 
     def step(self, actions: Tensor) -> NDArray[np.float64]:
-        """Step all environments; return their rewards. Shapes: (num_worlds, *) to (num_worlds,)."""
+        """Step all environments; return their rewards. Shapes: (num_envs, *) to (num_envs,)."""
         actions = actions.to(self.worlds.device)
         return self.worlds.step(self._every, actions).cpu().numpy()
 
@@ -166,12 +166,12 @@ class WorldBatch:
         return torch.cat(flat, 1).cpu().numpy()
 
     def flags(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return the terminated and truncated flags. Shapes: (num_worlds,)."""
+        """Return the terminated and truncated flags. Shapes: (num_envs,)."""
         terminated, truncated = self.worlds.ends()
         return terminated.cpu().numpy(), truncated.cpu().numpy()
 
     def info(self) -> dict[str, NDArray[Any]]:
-        """Return `Worlds.info` with flat "end_reason" and with "is_success". (num_worlds, *).
+        """Return `Worlds.info` with flat "end_reason" and with "is_success". (num_envs, *).
 
         Unknown values are 0, since Gymnasium's checker rejects NaN.
         """
@@ -181,7 +181,7 @@ class WorldBatch:
         return {**info, "is_success": info[END] == self.worlds.task.success_end}
 
     def film(self) -> NDArray[np.uint8] | None:
-        """Render each drone from behind, (num_worlds, 360, 640, 3); None without `render_mode`."""
+        """Render each drone from behind, (num_envs, 360, 640, 3); None without `render_mode`."""
         if self.render_mode is None:
             gymnasium.logger.warn("render() needs render_mode='rgb_array' at creation")
             return None

@@ -45,13 +45,13 @@ class Command(abc.ABC):
         """Return the goals for the next control period."""
 
     def is_complete(self, body: FlightState) -> Tensor:
-        """Return which drones have completed the command. Shape: (num_worlds,), bool."""
+        """Return which drones have completed the command. Shape: (num_envs,), bool."""
         return torch.zeros(len(body), dtype=torch.bool)
 
     def rest(self, body: FlightState) -> Tensor | None:
         """Return the pose to hold after success, or None if the command sets no position.
 
-        Shape: (num_worlds, 4), as in `FlightState.reference`.
+        Shape: (num_envs, 4), as in `FlightState.reference`.
         """
         del body
         return None
@@ -65,13 +65,13 @@ def goals_of(
     heading: float | Tensor,
     z: float | Tensor,
 ) -> Goals:
-    """Build goals from scalars (for all drones) or tensors of shape (num_worlds,)."""
+    """Build goals from scalars (for all drones) or tensors of shape (num_envs,)."""
     values = (torch.as_tensor(v, dtype=torch.float64) for v in (x, y, heading, z))
     return Goals(modes, torch.stack([value.expand(len(body)) for value in values], -1))
 
 
 def hold(reference: Tensor) -> Goals:
-    """Return goals that hold a pose. Shape: (num_worlds, 4), as in `FlightState.reference`."""
+    """Return goals that hold a pose. Shape: (num_envs, 4), as in `FlightState.reference`."""
     return Goals(HOLD, reference)
 
 
@@ -234,7 +234,7 @@ def fly_command(
 
     Returns:
         The state at the start and after each of T - 1 control periods, and the index of the first
-        one at which each drone was complete, of shape (num_worlds,), int64; T if it never was.
+        one at which each drone was complete, of shape (num_envs,), int64; T if it never was.
     """
     ticks = period_ticks(quadrotor.settings)
     states = [body]

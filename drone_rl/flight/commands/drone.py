@@ -77,8 +77,8 @@ class Drone:
             changes: Dynamics settings to change, such as wind=[5, 0, 0].
         """
         if worlds is not None:
-            if worlds.num_worlds != 1:
-                raise InputError(f"worlds has {worlds.num_worlds} worlds; give Worlds(1, ...)")
+            if worlds.num_envs != 1:
+                raise InputError(f"worlds has {worlds.num_envs} worlds; give Worlds(1, ...)")
             if dynamics is None and isinstance(worlds.dynamics, Quadrotor):
                 dynamics = worlds.dynamics.settings
             if obstacles is None:

@@ -1,6 +1,6 @@
 """Path following by pure pursuit to a lookahead point on a polyline; heading control on the way.
 
-All functions are batched over `num_worlds` paths of P points each (the last point may be repeated).
+All functions are batched over `num_envs` paths of P points each (the last point may be repeated).
 Positions are in metres in the world frame; `along` is an arc length in metres.
 """
 
@@ -93,9 +93,9 @@ class YawControl:
         self._heading = body.heading.clone()
 
     def goal(self, travel: Tensor) -> Tensor:
-        """Return the heading goals, radians (per second). Shape: (num_worlds,).
+        """Return the heading goals, radians (per second). Shape: (num_envs,).
 
-        `travel` is a displacement or velocity in the world frame, shape (num_worlds, 3); up to a
+        `travel` is a displacement or velocity in the world frame, shape (num_envs, 3); up to a
         horizontal length of `ACCURACY` the previous goal is kept.
         """
         wanted = math.radians(self.yaw_mode.yaw_or_rate)
@@ -123,9 +123,9 @@ class PathCommand(Command):
         adaptive: float = 1.0,
         braking: float = 1.8,
     ) -> None:
-        """Take the state at the start and the waypoints, metres. Shape: (num_worlds, P, 3).
+        """Take the state at the start and the waypoints, metres. Shape: (num_envs, P, 3).
 
-        The speed is in metres per second, for all drones or for each, shape (num_worlds,); the
+        The speed is in metres per second, for all drones or for each, shape (num_envs,); the
         command fails after `limit` seconds. See `lookahead_of` for `lookahead` and `adaptive`, and
         `braking_time`. A lookahead that is too short is an `InputError`.
         """
@@ -250,26 +250,26 @@ def braking_time(settings: DynamicsSettings) -> float:
 class Paths:
     """A batch of polylines."""
 
-    points: Tensor  # (num_worlds, P, 3) float64
+    points: Tensor  # (num_envs, P, 3) float64
     """Waypoints in order."""
-    along: Tensor  # (num_worlds, P) float64
+    along: Tensor  # (num_envs, P) float64
     """Arc length at each waypoint."""
-    directions: Tensor  # (num_worlds, P - 1, 3) float64
+    directions: Tensor  # (num_envs, P - 1, 3) float64
     """Unit vectors from each waypoint to the next; zeros between equal waypoints."""
 
     @property
     def ends(self) -> Tensor:
-        """The last points. Shape: (num_worlds, 3)."""
+        """The last points. Shape: (num_envs, 3)."""
         return self.points[:, -1]
 
     @property
     def lengths(self) -> Tensor:
-        """Lengths of the paths. Shape: (num_worlds,)."""
+        """Lengths of the paths. Shape: (num_envs,)."""
         return self.along[:, -1]
 
 
 def make_paths(points: Tensor) -> Paths:
-    """Build paths through points. Shape: (num_worlds, P, 3), P at least 2."""
+    """Build paths through points. Shape: (num_envs, P, 3), P at least 2."""
     steps = points.diff(dim=1)
     lengths = steps.norm(dim=-1)
     along = torch.nn.functional.pad(lengths.cumsum(-1), (1, 0))
@@ -277,21 +277,21 @@ def make_paths(points: Tensor) -> Paths:
 
 
 def place_at(paths: Paths, along: Tensor) -> Tensor:
-    """Return the points at arc lengths, clamped to the ends. Shape: (num_worlds, 3)."""
+    """Return the points at arc lengths, clamped to the ends. Shape: (num_envs, 3)."""
     row, line = _segments_at(paths, along)
     rest = (torch.minimum(along, paths.lengths) - paths.along[row, line])[:, None]
     return paths.points[row, line] + rest * paths.directions[row, line]
 
 
 def direction_at(paths: Paths, along: Tensor) -> Tensor:
-    """Return the unit tangents at arc lengths. Shape: (num_worlds, 3)."""
+    """Return the unit tangents at arc lengths. Shape: (num_envs, 3)."""
     return paths.directions[_segments_at(paths, along)]
 
 
 def nearest(paths: Paths, position: Tensor, first: Tensor, last: Tensor) -> Tensor:
     """Return the arc lengths of the nearest points, between `first` and `last`, at least `first`.
 
-    Shapes: (num_worlds, 3) of the position, else (num_worlds,).
+    Shapes: (num_envs, 3) of the position, else (num_envs,).
     """
     low = torch.maximum(paths.along[:, :-1], first[:, None])
     high = torch.minimum(paths.along[:, 1:], last[:, None])
@@ -304,7 +304,7 @@ def nearest(paths: Paths, position: Tensor, first: Tensor, last: Tensor) -> Tens
 
 
 def distance_from(paths: Paths, position: Tensor) -> Tensor:
-    """Return the distances of positions from whole paths. Shape: (num_worlds,)."""
+    """Return the distances of positions from whole paths. Shape: (num_envs,)."""
     along = nearest(paths, position, torch.zeros_like(paths.lengths), paths.lengths)
     return (position - place_at(paths, along)).norm(dim=-1)
 

@@ -52,8 +52,8 @@ class Goals:
 
     modes: Modes
     """Of x (or roll), y (or pitch), heading and height."""
-    values: Tensor  # (num_worlds, 4) float64
-    drift: Tensor | None = None  # (num_worlds, 4) float64
+    values: Tensor  # (num_envs, 4) float64
+    drift: Tensor | None = None  # (num_envs, 4) float64
     """Rate of change of positions and headings, a second; 0 by default."""
 
     def __post_init__(self) -> None:
@@ -68,7 +68,7 @@ class Goals:
             raise InputError(f"modes={names}: the first two go together; give both the same")
         if self.values.dim() != 2 or self.values.shape[1] != len(ALLOWED):
             raise InputError(
-                f"goals of shape {tuple(self.values.shape)} are not (num_worlds, 4); give a number "
+                f"goals of shape {tuple(self.values.shape)} are not (num_envs, 4); give a number "
                 "for each axis"
             )
         if self.drift is not None and self.drift.shape != self.values.shape:
@@ -91,7 +91,7 @@ class Goals:
 
 
 def rotor_goals(rotors: Tensor) -> Goals:
-    """Return goals that set rotors directly. Shape: (num_worlds, 4)."""
+    """Return goals that set rotors directly. Shape: (num_envs, 4)."""
     return Goals((Mode.ROTOR, Mode.ROTOR, Mode.ROTOR, Mode.ROTOR), rotors)
 
 
@@ -109,7 +109,7 @@ class Moves:
         """Speed of the target for each move, metres a second. Shape: (moves, 4)."""
 
     def goals(self, body: FlightState, action: Tensor) -> Goals:
-        """Return the goals until the next action. `action`: (num_worlds,)."""
+        """Return the goals until the next action. `action`: (num_envs,)."""
         place = body.position[:, :2]
         wanted = body.reference.clone()
         wanted[:, :2] = place + (wanted[:, :2] - place).clamp(-self.lead, self.lead)
@@ -125,6 +125,6 @@ class Velocities:
         self.actions = ContinuousActions.of(settings)
 
     def goals(self, body: FlightState, action: Tensor) -> Goals:
-        """Return the goals until the next action. `action`: (num_worlds, 3)."""
+        """Return the goals until the next action. `action`: (num_envs, 3)."""
         height = body.reference[:, 3:]
         return Goals(self.MODES, torch.cat([self.actions.to_rates(action), height], -1))

@@ -30,7 +30,7 @@ class Dynamics(Protocol):
     def start(self, position: Tensor, seeds: Tensor | None = None) -> BodyState:
         """Return drones at the start of an episode; by default they are level and at rest.
 
-        Positions are metres, world frame, shape (num_worlds, 3), float64. Seeds, (num_worlds,),
+        Positions are metres, world frame, shape (num_envs, 3), float64. Seeds, (num_envs,),
         int64, are those of each episode's randomness; without them it has its mean.
         """
         return BodyState.at_rest(position)
@@ -40,7 +40,7 @@ class Dynamics(Protocol):
     ) -> BodyState:
         """Return the drones a control step later; `body` stays as it is.
 
-        `action` is one of `actions` for each, shape (num_worlds,), then that of `actions.entry`.
+        `action` is one of `actions` for each, shape (num_envs,), then that of `actions.entry`.
         `obstacles` are given if `needs_obstacles` and there are any.
         """
         ...

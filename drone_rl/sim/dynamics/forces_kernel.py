@@ -53,7 +53,7 @@ def forces(
     """Return what moves drones in tick number `tick` of a command with some goals, on the CPU.
 
     These are the drones, with rotors, air and controllers a tick later, neither moved nor touched;
-    and force without weight and torque, world frame, shape (num_worlds, 6), float64.
+    and force without weight and torque, world frame, shape (num_envs, 6), float64.
     """
     start_warp("cpu")
     after = FlightState(torch.empty_like(body.numbers))

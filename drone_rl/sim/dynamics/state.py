@@ -29,22 +29,22 @@ def heading_of(attitude: Tensor) -> Tensor:
 
 @dataclasses.dataclass
 class BodyState(Batch):
-    """The bodies of `num_worlds` drones. World frame (x forward, y left, z up), SI units."""
+    """The bodies of `num_envs` drones. World frame (x forward, y left, z up), SI units."""
 
-    position: Tensor  # (num_worlds, 3) float64
-    attitude: Tensor  # (num_worlds, 4) float64
+    position: Tensor  # (num_envs, 3) float64
+    attitude: Tensor  # (num_envs, 4) float64
     """Unit quaternion (w, x, y, z) that turns the body's frame into the world's."""
-    velocity: Tensor  # (num_worlds, 3) float64
-    angular_velocity: Tensor  # (num_worlds, 3) float64
+    velocity: Tensor  # (num_envs, 3) float64
+    angular_velocity: Tensor  # (num_envs, 3) float64
     """Radians a second; of drones in flight about the body's axes."""
 
     @property
     def is_lost(self) -> Tensor:
-        """Whether each drone's motion has diverged. Shape: (num_worlds,), bool."""
+        """Whether each drone's motion has diverged. Shape: (num_envs,), bool."""
         return torch.zeros(len(self.position), dtype=torch.bool, device=self.position.device)
 
     def moved(self, position: Tensor, attitude: Tensor | None = None) -> Self:
-        """Return the same at another position, (num_worlds, 3), and attitude, (num_worlds, 4)."""
+        """Return the same at another position, (num_envs, 3), and attitude, (num_envs, 4)."""
         attitude = self.attitude if attitude is None else attitude
         return dataclasses.replace(self, position=position, attitude=attitude)
 
@@ -61,7 +61,7 @@ class BodyState(Batch):
 class Obstacles:
     """Axis-aligned boxes of one size, as many in every environment. Metres."""
 
-    centers: Tensor  # (num_worlds, K, 3) float64
+    centers: Tensor  # (num_envs, K, 3) float64
     """Their middles; far below the ground where one is absent."""
     half_sizes: tuple[float, float, float]
 
@@ -79,16 +79,16 @@ NUMBERS = 37
 
 @dataclasses.dataclass
 class Contact(Batch):
-    """What `num_worlds` drones last touched. World frame, SI units."""
+    """What `num_envs` drones last touched. World frame, SI units."""
 
-    thing: Tensor  # (num_worlds,) int64
+    thing: Tensor  # (num_envs,) int64
     """An obstacle's number, `GROUND`, or `NOTHING` where nothing was touched in this episode."""
-    normal: Tensor  # (num_worlds, 3) float64
+    normal: Tensor  # (num_envs, 3) float64
     """Unit vector out of the thing."""
-    point: Tensor  # (num_worlds, 3) float64
-    depth: Tensor  # (num_worlds,) float64
+    point: Tensor  # (num_envs, 3) float64
+    depth: Tensor  # (num_envs,) float64
     """How far the ball around the drone reached into the thing, metres."""
-    time: Tensor  # (num_worlds,) float64
+    time: Tensor  # (num_envs,) float64
     """When, seconds of the episode."""
 
 
@@ -99,7 +99,7 @@ def _columns(first: int, count: int) -> Any:
 
 
 class FlightState(BodyState):
-    """`num_worlds` drones in flight: a row of numbers each, of which the attributes are views."""
+    """`num_envs` drones in flight: a row of numbers each, of which the attributes are views."""
 
     position = _columns(POSITION, 3)
     attitude = _columns(ATTITUDE, 4)
@@ -110,17 +110,17 @@ class FlightState(BodyState):
     reference: Tensor = _columns(REFERENCE, 4)
     """Target of the controller: x, y, heading, z; metres and radians. Shape: (N, 4)."""
     gust: Tensor = _columns(GUST, 3)
-    """Velocity of the air minus its mean, metres a second, world. Shape: (num_worlds, 3)."""
+    """Velocity of the air minus its mean, metres a second, world. Shape: (num_envs, 3)."""
 
     def __init__(self, numbers: Tensor) -> None:
-        """Take all numbers, see `POSITION` and following. Shape: (num_worlds, NUMBERS), float64."""
+        """Take all numbers, see `POSITION` and following. Shape: (num_envs, NUMBERS), float64."""
         self.numbers = numbers
 
     @classmethod
     def at_rest(
         cls, position: Tensor, attitude: Tensor | None = None, seeds: Tensor | None = None
     ) -> Self:
-        """See `BodyState`; they hold their position. `seeds` are those of gusts, (num_worlds,)."""
+        """See `BodyState`; they hold their position. `seeds` are those of gusts, (num_envs,)."""
         state = cls(position.new_zeros(len(position), NUMBERS))
         state.position[:] = position
         state.attitude[:] = position.new_tensor(LEVEL) if attitude is None else attitude
@@ -147,12 +147,12 @@ class FlightState(BodyState):
 
     @property
     def heading(self) -> Tensor:
-        """To the left of the world's x, radians. Shape: (num_worlds,)."""
+        """To the left of the world's x, radians. Shape: (num_envs,)."""
         return heading_of(self.attitude)
 
     @property
     def ticks(self) -> Tensor:
-        """Of physics in this episode, int64. Shape: (num_worlds,)."""
+        """Of physics in this episode, int64. Shape: (num_envs,)."""
         return self.numbers[:, TICKS].long()
 
     @property

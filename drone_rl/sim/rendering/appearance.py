@@ -13,9 +13,9 @@ from drone_rl.sim.rendering.scene import SemanticClass
 Color = tuple[float, float, float]
 """Red, green, blue in [0, 1]."""
 Colors = Color | Tensor
-"""One for all environments, or one each: shape (num_worlds, 3)."""
+"""One for all environments, or one each: shape (num_envs, 3)."""
 Scalars = float | Tensor
-"""One for all environments, or one each: shape (num_worlds,)."""
+"""One for all environments, or one each: shape (num_envs,)."""
 AXES = {"roll": (1.0, 0.0, 0.0), "pitch": (0.0, 1.0, 0.0), "yaw": (0.0, 0.0, 1.0)}
 """Axes that a camera rotates about, drone frame: x forward, y left, z up."""
 _LIGHTS = ("ambient", "sun", "sun_direction")
@@ -28,15 +28,15 @@ class Mounting:
     camera: str = "drone/front_center"
     """Full name in the model; other cameras keep their mounting."""
     offset: tuple[float, ...] | Tensor = (0.0, 0.0, 0.0)
-    """Metres, drone frame. Shape: (3,) or (num_worlds, 3)."""
+    """Metres, drone frame. Shape: (3,) or (num_envs, 3)."""
     turn: tuple[float, ...] | Tensor = (1.0, 0.0, 0.0, 0.0)
     """Rotation about the camera's position, as `offset`, quaternion (w, x, y, z). Shape: (*, 4)."""
     zoom: float | Tensor | None = None
-    """Magnification at the centre of the image. Shape: () or (num_worlds,)."""
+    """Magnification at the centre of the image. Shape: () or (num_envs,)."""
 
 
 def moved(mounting: Mounting | None, offset: Tensor, turn: Tensor) -> Mounting:
-    """Translate a camera, (num_worlds, 3), metres, then rotate it about itself, (num_worlds, 4)."""
+    """Translate a camera, (num_envs, 3), metres, then rotate it about itself, (num_envs, 4)."""
     own = mounting or Mounting()
     before = torch.as_tensor(own.turn, dtype=offset.dtype).to(offset.device)
     there = torch.as_tensor(own.offset, dtype=offset.dtype).to(offset.device)
@@ -89,19 +89,19 @@ class Distractors:
     """Distractors, the same for all environments or one set each."""
 
     places: Tensor
-    """Positions, metres, world frame. Shape: (num_worlds, count, 3) or (count, 3)."""
+    """Positions, metres, world frame. Shape: (num_envs, count, 3) or (count, 3)."""
     sizes: Tensor
-    """Edges or diameters, metres; in the model 1 m. Shape: (num_worlds, count) or (count,)."""
+    """Edges or diameters, metres; in the model 1 m. Shape: (num_envs, count) or (count,)."""
     colors: Tensor
     """Shape: as that of `places`."""
 
-    def expand(self, num_worlds: int) -> "Distractors":
+    def expand(self, num_envs: int) -> "Distractors":
         """Return them with a first dimension of environments."""
         count = self.places.shape[-2]
         return Distractors(
-            places=self.places.expand(num_worlds, count, 3),
-            sizes=self.sizes.expand(num_worlds, count),
-            colors=self.colors.expand(num_worlds, count, 3),
+            places=self.places.expand(num_envs, count, 3),
+            sizes=self.sizes.expand(num_envs, count),
+            colors=self.colors.expand(num_envs, count, 3),
         )
 
     def concat(self, other: "Distractors") -> "Distractors":
@@ -143,10 +143,10 @@ class Appearance:
         is_shaded = bool(torch.as_tensor(0 if self.shadows is None else self.shadows).any())
         return self.zenith is None and self.fog is None and not is_shaded and not self.textures
 
-    def lights(self, num_worlds: int) -> dict[str, Tensor]:
-        """Return the given lights by name, shapes (num_worlds, 3); directions have length 1."""
+    def lights(self, num_envs: int) -> dict[str, Tensor]:
+        """Return the given lights by name, shapes (num_envs, 3); directions have length 1."""
         given = {name: getattr(self, name) for name in _LIGHTS}
-        lights = {name: expand_color(v, num_worlds) for name, v in given.items() if v is not None}
+        lights = {name: expand_color(v, num_envs) for name, v in given.items() if v is not None}
         if "sun_direction" in lights:
             direction = lights["sun_direction"]
             lights["sun_direction"] = direction / direction.norm(dim=-1, keepdim=True)
@@ -165,14 +165,14 @@ class Appearance:
         return _select(self, worlds)
 
 
-def expand_color(value: Colors, num_worlds: int) -> Tensor:
-    """Return one colour or direction per environment. Shape: (num_worlds, 3), float64."""
-    return torch.as_tensor(value, dtype=torch.float64).expand(num_worlds, 3)
+def expand_color(value: Colors, num_envs: int) -> Tensor:
+    """Return one colour or direction per environment. Shape: (num_envs, 3), float64."""
+    return torch.as_tensor(value, dtype=torch.float64).expand(num_envs, 3)
 
 
-def expand_scalar(value: Scalars, num_worlds: int) -> Tensor:
-    """Return one number per environment. Shape: (num_worlds,), float64."""
-    return torch.as_tensor(value, dtype=torch.float64).expand(num_worlds)
+def expand_scalar(value: Scalars, num_envs: int) -> Tensor:
+    """Return one number per environment. Shape: (num_envs,), float64."""
+    return torch.as_tensor(value, dtype=torch.float64).expand(num_envs)
 
 
 _SHARED_DIMENSIONS = {

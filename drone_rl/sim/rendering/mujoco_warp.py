@@ -39,17 +39,17 @@ _LIGHTS = {"ambient": "light_ambient", "sun": "light_diffuse", "sun_direction": 
 
 
 class WarpRenderer:
-    """Renders environments by any camera of a scene, `num_worlds` at a time."""
+    """Renders environments by any camera of a scene, `num_envs` at a time."""
 
     def __init__(
-        self, scene: Scene, *, num_worlds: int, num_shards: int | None = None, device: str = "cpu"
+        self, scene: Scene, *, num_envs: int, num_shards: int | None = None, device: str = "cpu"
     ) -> None:
-        """See `RendererFactory`; batches larger than `num_worlds` are rendered in turn."""
+        """See `RendererFactory`; batches larger than `num_envs` are rendered in turn."""
         start_warp(device)
         self.scene = scene
         self.device = torch.device(device)
-        self._workers = WorkerPool(num_worlds, 1 if self.device.type == "cuda" else num_shards)
-        self._capacity = num_worlds
+        self._workers = WorkerPool(num_envs, 1 if self.device.type == "cuda" else num_shards)
+        self._capacity = num_envs
         self._shards: dict[View, list[Shard]] = {}
 
     def prepare(self, view: View) -> None:
@@ -143,12 +143,12 @@ class Shard:
 
     def render(self, poses: Poses, appearance: Appearance | None, out: Tensor) -> None:
         """Render the first rows of the buffers and copy them to `out`."""
-        num_worlds = len(poses)
-        self._qpos[:num_worlds] = torch.cat([poses.position, poses.attitude], dim=-1)
-        self._mocap_pos[:num_worlds] = poses.props
-        self._appearance.apply(appearance, num_worlds)
-        self.launch(num_worlds)
-        rows = self._pixels[:num_worlds]
+        num_envs = len(poses)
+        self._qpos[:num_envs] = torch.cat([poses.position, poses.attitude], dim=-1)
+        self._mocap_pos[:num_envs] = poses.props
+        self._appearance.apply(appearance, num_envs)
+        self.launch(num_envs)
+        rows = self._pixels[:num_envs]
         is_rgb = self._modality == "rgb"
         out.copy_(rows[..., :3].flip(-1) if is_rgb else rows)
         sky = None if appearance is None else appearance.colors.get(SemanticClass.SKY)
@@ -156,9 +156,9 @@ class Shard:
             color = (expand_color(sky, len(out)) * 255).to(out.device, torch.uint8)
             torch.where(rows[..., 3:] == 0, color[:, None, None], out, out=out)
 
-    def launch(self, num_worlds: int) -> None:
+    def launch(self, num_envs: int) -> None:
         """Render to the buffers; the first launch compiles or loads the kernels."""
-        self._data.nworld = num_worlds
+        self._data.nworld = num_envs
         with on_torch_stream(self._qpos.device):
             mjw.kinematics(self._model, self._data)
             mjw.camlight(self._model, self._data)
@@ -193,38 +193,38 @@ class ModelAppearance:
         self._plain = {name: values[:1].clone() for name, values in self._values.items()}
         self._is_applied = False
 
-    def apply(self, appearance: Appearance | None, num_worlds: int) -> None:
-        """Write the appearance of the first `num_worlds` environments; others get the scene's."""
+    def apply(self, appearance: Appearance | None, num_envs: int) -> None:
+        """Write the appearance of the first `num_envs` environments; others get the scene's."""
         if self._is_applied:
             for name, values in self._values.items():
                 values[:] = self._plain[name]
         self._is_applied = appearance is not None
         if appearance is not None:
-            self._write_colors(appearance, num_worlds)
+            self._write_colors(appearance, num_envs)
             if appearance.camera is not None:
-                self._mount(appearance.camera, num_worlds)
+                self._mount(appearance.camera, num_envs)
 
-    def _write_colors(self, appearance: Appearance, num_worlds: int) -> None:
+    def _write_colors(self, appearance: Appearance, num_envs: int) -> None:
         for semantic_class, color in appearance.colors.items():
             if semantic_class is not SemanticClass.SKY:
                 geoms = self._scene.geoms(semantic_class)
-                self._write("geom_rgba", geoms, expand_color(color, num_worlds)[:, None])
-        for name, value in appearance.lights(num_worlds).items():
+                self._write("geom_rgba", geoms, expand_color(color, num_envs)[:, None])
+        for name, value in appearance.lights(num_envs).items():
             self._write(_LIGHTS[name], slice(None), value[:, None])
         if appearance.distractors is not None:
-            distractors = appearance.distractors.expand(num_worlds)
+            distractors = appearance.distractors.expand(num_envs)
             geoms = self._scene.geoms(SemanticClass.DISTRACTOR)
             self._write("geom_rgba", geoms, distractors.colors)
             edges = self._plain["geom_size"][:, geoms].to(distractors.sizes)
             self._write("geom_size", geoms, distractors.sizes[..., None] * edges)
 
-    def _mount(self, mounting: Mounting, num_worlds: int) -> None:
+    def _mount(self, mounting: Mounting, num_envs: int) -> None:
         camera = [self._scene.camera(mounting.camera)]
         place, attitude = (self._plain[name][0, camera] for name in ("cam_pos", "cam_quat"))
         moved = place + torch.as_tensor(mounting.offset).to(place)
         turned = product(torch.as_tensor(mounting.turn).to(attitude), attitude)
         for name, value in (("cam_pos", moved), ("cam_quat", turned)):
-            self._write(name, camera, value.expand(num_worlds, value.shape[-1])[:, None])
+            self._write(name, camera, value.expand(num_envs, value.shape[-1])[:, None])
 
     def _write(self, name: str, where: list[int] | slice, value: Tensor) -> None:
         values = self._values[name]

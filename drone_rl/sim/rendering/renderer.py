@@ -22,9 +22,9 @@ from drone_rl.utils.errors import InputError
 class Poses(Batch):
     """Poses of drones, quaternions (w, x, y, z), and positions of the task's props. Metres."""
 
-    position: Tensor  # (num_worlds, 3)
-    attitude: Tensor  # (num_worlds, 4)
-    props: Tensor  # (num_worlds, num_props, 3)
+    position: Tensor  # (num_envs, 3)
+    attitude: Tensor  # (num_envs, 4)
+    props: Tensor  # (num_envs, num_props, 3)
 
 
 class Renderer(Protocol):
@@ -39,7 +39,7 @@ class Renderer(Protocol):
         """Render any number of environments, in the model's own appearance by default.
 
         Returns:
-            Images by modality. Shapes: (num_worlds, num_cameras, H, W, *). "rgb": uint8, 3 a pixel;
+            Images by modality. Shapes: (num_envs, num_cameras, H, W, *). "rgb": uint8, 3 a pixel;
             "gray": float32, equal to what the transform `GrayPixels` makes of RGB; "depth",
             "distance": float32, metres along the camera's axis or along the pixel's ray, 0 where
             nothing is hit; "segmentation": int32, geom index, -1 where nothing is hit; "normals":
@@ -58,11 +58,11 @@ class RendererFactory(Protocol):
     """Makes a renderer of a scene."""
 
     def __call__(
-        self, scene: Scene, *, num_worlds: int, num_shards: int | None, device: str
+        self, scene: Scene, *, num_envs: int, num_shards: int | None, device: str
     ) -> Renderer:
         """Make the renderer.
 
-        About `num_worlds` environments are rendered per call, on the device "cpu", "cuda" or
+        About `num_envs` environments are rendered per call, on the device "cpu", "cuda" or
         "cuda:N". `num_shards` worker threads split the batch; their number is the renderer's choice
         if None.
         """

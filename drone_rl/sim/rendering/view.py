@@ -60,10 +60,10 @@ class View:
                 )
 
     def new_images(
-        self, num_worlds: int, device: torch.device | str = "cpu"
+        self, num_envs: int, device: torch.device | str = "cpu"
     ) -> dict[Modality, Tensor]:
         """Allocate uninitialized images; see `Renderer.render` for their shapes."""
-        size = (num_worlds, len(self.cameras), self.height, self.width)
+        size = (num_envs, len(self.cameras), self.height, self.width)
         return {
             modality: torch.empty((*size, *pixel), dtype=dtype, device=device)
             for modality in self.modalities

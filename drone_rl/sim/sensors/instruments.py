@@ -46,29 +46,29 @@ _EXPONENT, _ATMOSPHERE_RADIUS = 5.255877, 6356766.0
 
 @dataclasses.dataclass
 class ImuReading(Batch):
-    """Readings of `num_worlds` drones. Body frame: x forward, y left, z up."""
+    """Readings of `num_envs` drones. Body frame: x forward, y left, z up."""
 
-    time: Tensor  # (num_worlds,) float64
+    time: Tensor  # (num_envs,) float64
     """When it was taken, seconds; minus infinity before the first."""
-    specific_force: Tensor  # (num_worlds, 3) float64
+    specific_force: Tensor  # (num_envs, 3) float64
     """Acceleration minus gravity, metres per second squared: 9.81 up at rest."""
-    angular_velocity: Tensor  # (num_worlds, 3) float64
+    angular_velocity: Tensor  # (num_envs, 3) float64
     """Radians per second about the body's axes."""
-    attitude: Tensor  # (num_worlds, 4) float64
+    attitude: Tensor  # (num_envs, 4) float64
     """The true attitude, as in AirSim: quaternion (w, x, y, z) from body to world."""
 
 
 @dataclasses.dataclass
 class ImuState(SensorState):
-    """State of `num_worlds` drones' accelerometers and gyroscopes."""
+    """State of `num_envs` drones' accelerometers and gyroscopes."""
 
-    time: Tensor  # (num_worlds,) float64
+    time: Tensor  # (num_envs,) float64
     """Of the last reading, seconds."""
-    velocity: Tensor  # (num_worlds, 3) float64
+    velocity: Tensor  # (num_envs, 3) float64
     """Of the drone at that time, metres per second, world frame."""
-    gyro_bias: Tensor  # (num_worlds, 3) float64
+    gyro_bias: Tensor  # (num_envs, 3) float64
     """Radians per second, body frame."""
-    accel_bias: Tensor  # (num_worlds, 3) float64
+    accel_bias: Tensor  # (num_envs, 3) float64
     """Metres per second squared, body frame."""
 
 
@@ -121,8 +121,8 @@ class Imu(Sensor[ImuState, ImuReading]):
 def specific_force(attitude: Tensor, before: Tensor, after: Tensor, seconds: Tensor) -> Tensor:
     """Return the mean specific force, m/s^2, body frame, while velocities changed.
 
-    Attitudes are quaternions (w, x, y, z), shape (num_worlds, 4). Velocities `before` and `after`
-    some seconds, more than 0, are in m/s, world frame, shape (num_worlds, 3).
+    Attitudes are quaternions (w, x, y, z), shape (num_envs, 4). Velocities `before` and `after`
+    some seconds, more than 0, are in m/s, world frame, shape (num_envs, 3).
     """
     acceleration = (after - before) / seconds[:, None]
     return body_from_world(attitude, acceleration + acceleration.new_tensor((0.0, 0.0, GRAVITY)))
@@ -130,19 +130,19 @@ def specific_force(attitude: Tensor, before: Tensor, after: Tensor, seconds: Ten
 
 @dataclasses.dataclass
 class MagnetometerReading(Batch):
-    """Readings of `num_worlds` drones."""
+    """Readings of `num_envs` drones."""
 
-    time: Tensor  # (num_worlds,) float64
+    time: Tensor  # (num_envs,) float64
     """When it was taken, seconds; minus infinity before the first."""
-    field: Tensor  # (num_worlds, 3) float64
+    field: Tensor  # (num_envs, 3) float64
     """Gauss, body frame: x forward, y left, z up."""
 
 
 @dataclasses.dataclass
 class MagnetometerState(SensorState):
-    """State of `num_worlds` drones' magnetometers."""
+    """State of `num_envs` drones' magnetometers."""
 
-    bias: Tensor  # (num_worlds, 3) float64
+    bias: Tensor  # (num_envs, 3) float64
     """Gauss, body frame."""
 
 
@@ -171,7 +171,7 @@ class Magnetometer(Sensor[MagnetometerState, MagnetometerReading]):
         return MagnetometerReading(time, rows)
 
     def field(self, position: Tensor) -> Tensor:
-        """Return Earth's field at world positions, gauss, world frame. Shape: (num_worlds, 3)."""
+        """Return Earth's field at world positions, gauss, world frame. Shape: (num_envs, 3)."""
         if self.settings.field == "constant":
             return position.new_tensor(CONSTANT).expand(len(position), 3)
         return dipole_field(geo_from_world(position, self.home))
@@ -201,19 +201,19 @@ class Fix(enum.IntEnum):
 
 @dataclasses.dataclass
 class GpsReading(Batch):
-    """Readings of `num_worlds` drones."""
+    """Readings of `num_envs` drones."""
 
-    time: Tensor  # (num_worlds,) float64
+    time: Tensor  # (num_envs,) float64
     """When it was taken, seconds; minus infinity before the first."""
-    place: Tensor  # (num_worlds, 3) float64
+    place: Tensor  # (num_envs, 3) float64
     """Latitude and longitude in degrees, altitude in metres."""
-    velocity: Tensor  # (num_worlds, 3) float64
+    velocity: Tensor  # (num_envs, 3) float64
     """Metres per second, world frame."""
-    error: Tensor  # (num_worlds,) float64
+    error: Tensor  # (num_envs,) float64
     """Stated horizontal and vertical error (eph and epv), metres."""
-    fix: Tensor  # (num_worlds,) int64
+    fix: Tensor  # (num_envs,) int64
     """One of `Fix`; none before the first reading."""
-    is_valid: Tensor  # (num_worlds,) bool
+    is_valid: Tensor  # (num_envs,) bool
     """Whether there is a reading yet."""
 
 
@@ -249,7 +249,7 @@ class Gps(Sensor[SensorState, GpsReading]):
         return GpsReading(time, rows[:, :3], rows[:, 3:6], error, fix, is_valid)
 
     def stated_error(self, seconds: Tensor) -> Tensor:
-        """Return the stated error in metres, some seconds after the start. Shape: (num_worlds,)."""
+        """Return the stated error in metres, some seconds after the start. Shape: (num_envs,)."""
         own = self.settings
         left = torch.exp(-seconds / own.error_time)
         return own.last_error + (own.first_error - own.last_error) * left
@@ -257,23 +257,23 @@ class Gps(Sensor[SensorState, GpsReading]):
 
 @dataclasses.dataclass
 class BarometerReading(Batch):
-    """Readings of `num_worlds` drones."""
+    """Readings of `num_envs` drones."""
 
-    time: Tensor  # (num_worlds,) float64
+    time: Tensor  # (num_envs,) float64
     """When it was taken, seconds; minus infinity before the first."""
-    pressure: Tensor  # (num_worlds,) float64
+    pressure: Tensor  # (num_envs,) float64
     """Pascals."""
-    altitude: Tensor  # (num_worlds,) float64
+    altitude: Tensor  # (num_envs,) float64
     """Metres above sea level, from the pressure and that at sea level."""
 
 
 @dataclasses.dataclass
 class BarometerState(SensorState):
-    """State of `num_worlds` drones' barometers."""
+    """State of `num_envs` drones' barometers."""
 
-    time: Tensor  # (num_worlds,) float64
+    time: Tensor  # (num_envs,) float64
     """Of the last reading, seconds."""
-    drift: Tensor  # (num_worlds, 1) float64
+    drift: Tensor  # (num_envs, 1) float64
     """Relative excess of pressure over the standard atmosphere's."""
 
 

@@ -17,20 +17,20 @@ _ROUNDING = 1e-6
 
 @dataclasses.dataclass
 class Samples(Batch):
-    """The latest readings of one sensor of `num_worlds` drones, the newest last."""
+    """The latest readings of one sensor of `num_envs` drones, the newest last."""
 
-    began: Tensor  # (num_worlds,) float64
+    began: Tensor  # (num_envs,) float64
     """When the sensor was switched on, seconds."""
-    count: Tensor  # (num_worlds,) int64
+    count: Tensor  # (num_envs,) int64
     """Readings that were due since then."""
-    times: Tensor  # (num_worlds, slots) float64
+    times: Tensor  # (num_envs, slots) float64
     """When each was taken, seconds; minus infinity for none."""
-    rows: Tensor  # (num_worlds, slots, width) float64
+    rows: Tensor  # (num_envs, slots, width) float64
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Sampling:
-    """When readings are taken and delivered. Times: seconds, shape (num_worlds,), float64.
+    """When readings are taken and delivered. Times: seconds, shape (num_envs,), float64.
 
     Reading k = 0, 1, ... is due `startup + k / rate` seconds after the start, and is taken at the
     first update from then on, so the mean rate is `rate` at any tick length. If several are due at
@@ -52,11 +52,11 @@ class Sampling:
         return Samples(time.clone(), torch.zeros_like(time, dtype=torch.int64), times, rows)
 
     def due(self, samples: Samples, time: Tensor) -> Tensor:
-        """Return where the next reading is due. Shape: (num_worlds,), bool."""
+        """Return where the next reading is due. Shape: (num_envs,), bool."""
         return self._count(samples, time) > samples.count
 
     def take(self, samples: Samples, time: Tensor, rows: Tensor) -> Samples:
-        """Append a reading `rows`, shape (num_worlds, width), float64, where one is due."""
+        """Append a reading `rows`, shape (num_envs, width), float64, where one is due."""
         count = self._count(samples, time)
         is_due = count > samples.count
         times = torch.cat([samples.times[:, 1:], time[:, None]], 1)
@@ -71,7 +71,7 @@ class Sampling:
     def read(self, samples: Samples, time: Tensor) -> tuple[Tensor, Tensor]:
         """Return the newest reading that is old enough to be delivered: its time and values.
 
-        Times, (num_worlds,), are minus infinity and values, (num_worlds, width), zeros for none.
+        Times, (num_envs,), are minus infinity and values, (num_envs, width), zeros for none.
         """
         latest = (time - self.latency + _ROUNDING / self.rate)[:, None]
         newest = ((samples.times <= latest).sum(1) - 1).clamp(min=0)
@@ -87,7 +87,7 @@ class Sampling:
 
 @dataclasses.dataclass
 class SensorState(Batch):
-    """State of one sensor of `num_worlds` drones."""
+    """State of one sensor of `num_envs` drones."""
 
     samples: Samples
 
@@ -111,7 +111,7 @@ class Sensor(abc.ABC, Generic[State, Reading]):
         return self._sample(state, body, time, generator) if is_due.any() else state
 
     def read(self, state: State, time: Tensor) -> Reading:
-        """Return the readings that are delivered at a time (seconds, shape (num_worlds,))."""
+        """Return the readings that are delivered at a time (seconds, shape (num_envs,))."""
         return self._reading(*self.sampling.read(state.samples, time))
 
     @abc.abstractmethod
@@ -127,7 +127,7 @@ class Sensor(abc.ABC, Generic[State, Reading]):
 
 
 def select(condition: Tensor, chosen: Tensor, other: Tensor) -> Tensor:
-    """Choose rows of two tensors. Shapes: (num_worlds,) and (num_worlds, *)."""
+    """Choose rows of two tensors. Shapes: (num_envs,) and (num_envs, *)."""
     return torch.where(condition.view(-1, *[1] * (chosen.ndim - 1)), chosen, other)
 
 
@@ -140,7 +140,7 @@ def normal(like: Tensor, generator: Generator) -> Tensor:
 def random_walk_step(
     value: Tensor, strength: float, time: float, seconds: Tensor, generator: Generator
 ) -> Tensor:
-    """Advance a random walk, shape (num_worlds, n), by some seconds, shape (num_worlds,).
+    """Advance a random walk, shape (num_envs, n), by some seconds, shape (num_envs,).
 
     `strength` is the standard deviation of the increment over `time` seconds.
     """

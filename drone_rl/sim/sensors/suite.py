@@ -16,21 +16,21 @@ from drone_rl.utils.seeding import Stream, torch_generator
 
 @dataclasses.dataclass
 class CollisionState(Batch):
-    """The last collision of `num_worlds` drones. World frame, SI units."""
+    """The last collision of `num_envs` drones. World frame, SI units."""
 
-    has_collided: Tensor  # (num_worlds,) bool
+    has_collided: Tensor  # (num_envs,) bool
     """Whether there was a contact that has not been read yet."""
     contact: Contact
     """The last one; reading does not clear it."""
-    position: Tensor  # (num_worlds, 3) float64
+    position: Tensor  # (num_envs, 3) float64
     """Of the drone at that time, metres."""
 
 
 @dataclasses.dataclass
 class SensorSuiteState(Batch):
-    """State of `num_worlds` drones' sensors."""
+    """State of `num_envs` drones' sensors."""
 
-    time: Tensor  # (num_worlds,) float64
+    time: Tensor  # (num_envs,) float64
     """Of the last update, seconds."""
     imu: instruments.ImuState
     barometer: instruments.BarometerState
@@ -95,7 +95,7 @@ class SensorSuite:
 
 
 def start_collisions(position: Tensor) -> CollisionState:
-    """Return the state of drones that have never collided. Shape: (num_worlds, 3), float64."""
+    """Return the state of drones that have never collided. Shape: (num_envs, 3), float64."""
     untouched = torch.zeros(len(position), dtype=torch.bool, device=position.device)
     numbers, zeros = torch.full_like(untouched, NOTHING, dtype=torch.int64), position.new_zeros
     nowhere, flat = zeros(position.shape), zeros(len(position))

@@ -55,7 +55,7 @@ def test_valid_mode_combinations_are_accepted(modes):
 
 
 def test_goals_and_drifts_of_wrong_shape_raise():
-    with pytest.raises(InputError, match=r"goals of shape \(4,\) are not \(num_worlds, 4\)"):
+    with pytest.raises(InputError, match=r"goals of shape \(4,\) are not \(num_envs, 4\)"):
         Goals(POSITIONS, FOUR[0])
     with pytest.raises(InputError, match=r"goals of shape \(1, 3\)"):
         Goals(POSITIONS, FOUR[:, :3])

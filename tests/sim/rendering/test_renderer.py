@@ -15,7 +15,7 @@ from drone_rl.utils.errors import InputError
 class OneColour:
     """Render all pixels in the color of the sky; only RGB is supported."""
 
-    def __init__(self, scene, *, num_worlds, num_shards, device):
+    def __init__(self, scene, *, num_envs, num_shards, device):
         self.scene, self.prepared, self.is_closed = scene, [], False
 
     def prepare(self, view):

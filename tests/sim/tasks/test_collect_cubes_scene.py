@@ -49,7 +49,7 @@ def test_info_matches_hand_computed_values():
 def test_first_environments_do_not_depend_on_batch_size():
     few, many = Worlds(2, TASK), Worlds(4, TASK)
     for worlds in (few, many):
-        number = worlds.num_worlds
+        number = worlds.num_envs
         worlds.reset(torch.arange(number), [world_random_state(1, i) for i in range(number)])
         worlds.close()
     assert torch.equal(few.state.cubes, many.state.cubes[:2])

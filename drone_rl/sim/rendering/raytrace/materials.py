@@ -46,33 +46,31 @@ class MaterialsEncoder:
         self._textures: dict[tuple[str, ...], dict[str, Any]] = {}
         self._last: tuple[Appearance | None, int, _Encoded] = (None, 1, (self._own, None))
 
-    def encode(self, appearance: Appearance | None, num_worlds: int) -> _Encoded:
+    def encode(self, appearance: Appearance | None, num_envs: int) -> _Encoded:
         """Return materials, and effects if the appearance has any."""
         if appearance is None:
             return self._own, None
-        if self._last[0] is not appearance or self._last[1] != num_worlds:
-            self._last = (appearance, num_worlds, self._encode(appearance, num_worlds))
+        if self._last[0] is not appearance or self._last[1] != num_envs:
+            self._last = (appearance, num_envs, self._encode(appearance, num_envs))
         return self._last[2]
 
-    def _encode(self, appearance: Appearance, num_worlds: int) -> _Encoded:
-        values = {
-            name: v.repeat(num_worlds, *[1] * (v.dim() - 1)) for name, v in self._plain.items()
-        }
+    def _encode(self, appearance: Appearance, num_envs: int) -> _Encoded:
+        values = {name: v.repeat(num_envs, *[1] * (v.dim() - 1)) for name, v in self._plain.items()}
         for semantic_class, color in appearance.colors.items():
-            colored = expand_color(color, num_worlds)
+            colored = expand_color(color, num_envs)
             if semantic_class is SemanticClass.SKY:
                 values["sky"][:] = colored
             else:
                 values["colors"][:, self._scene.geoms(semantic_class)] = colored[:, None]
         if appearance.distractors is not None:
-            colors = appearance.distractors.expand(num_worlds).colors.double()
+            colors = appearance.distractors.expand(num_envs).colors.double()
             values["colors"][:, self._scene.geoms(SemanticClass.DISTRACTOR)] = colors
-        for name, value in appearance.lights(num_worlds).items():
+        for name, value in appearance.lights(num_envs).items():
             values[_LIGHTS[name]][:] = value[:, None]
         zenith = appearance.zenith
-        zenith = values["sky"] if zenith is None else expand_color(zenith, num_worlds)
+        zenith = values["sky"] if zenith is None else expand_color(zenith, num_envs)
         if appearance.exposure is not None:
-            exposure = expand_scalar(appearance.exposure, num_worlds)
+            exposure = expand_scalar(appearance.exposure, num_envs)
             for name in ("ambient", "diffuse"):
                 values[name] *= exposure[:, None, None]
             values["sky"] = (values["sky"] * exposure[:, None]).clamp(max=1.0)
@@ -88,7 +86,7 @@ class MaterialsEncoder:
         return materials
 
     def encode_effects(self, appearance: Appearance, zenith: Tensor) -> structs.Effects:
-        """Return the effects; `zenith` holds colours in [0, 1], shape (num_worlds, 3)."""
+        """Return the effects; `zenith` holds colours in [0, 1], shape (num_envs, 3)."""
         count = len(zenith)
         names = tuple({n: 0 for t in appearance.textures.values() for n in t.images})
         texture = torch.full((count, self._scene.model.ngeom), -1, dtype=torch.int32)

@@ -52,7 +52,7 @@ class Raytracer:
     """Renders scenes of planes, boxes, balls, capsules, cylinders and ellipsoids."""
 
     def __init__(
-        self, scene: Scene, *, num_worlds: int, num_shards: int | None = None, device: str = "cpu"
+        self, scene: Scene, *, num_envs: int, num_shards: int | None = None, device: str = "cpu"
     ) -> None:
         """Prepare a scene; the first image loads the kernels. See `RendererFactory`.
 
@@ -63,7 +63,7 @@ class Raytracer:
         scenes.check_scene(scene)
         self.scene, self.device = scene, torch.device(device)
         is_cpu = self.device.type == "cpu"
-        self._launcher = CpuLauncher(num_worlds, num_shards) if is_cpu else GpuLauncher(device)
+        self._launcher = CpuLauncher(num_envs, num_shards) if is_cpu else GpuLauncher(device)
         self._frames, self._materials = scenes.Frames(scene), MaterialsEncoder(scene, device)
         self._views: dict[View, tuple[scenes.Cameras, structs.Geoms]] = {}
         self._poses = scenes.PoseBuffers(self.device)
@@ -119,8 +119,8 @@ class Raytracer:
 class CpuLauncher:
     """Launches the CPU kernels; each core renders one image at a time."""
 
-    def __init__(self, num_worlds: int, num_shards: int | None) -> None:
-        self._workers = WorkerPool(num_worlds, num_shards)
+    def __init__(self, num_envs: int, num_shards: int | None) -> None:
+        self._workers = WorkerPool(num_envs, num_shards)
         self._scratch: dict[tuple[int, int], structs.Scratch] = {}
 
     def launch(self, launch: Launch) -> None:

@@ -166,24 +166,24 @@ class Cameras:
         self._rays, self._cosines = wp.to_torch(arrays.rays), wp.to_torch(arrays.cosines)
         self._last: tuple[Mounting | None, int, structs.View] = (None, 0, encoded)
 
-    def encode(self, mounting: Mounting | None, num_worlds: int) -> structs.View:
+    def encode(self, mounting: Mounting | None, num_envs: int) -> structs.View:
         """Return the view for the kernels; the last mounting is cached by identity."""
         if mounting is None or mounting.camera not in self._view.cameras:
             return self._encoded
-        if self._last[0] is not mounting or self._last[1] != num_worlds:
-            self._last = (mounting, num_worlds, self._mount(mounting, num_worlds))
+        if self._last[0] is not mounting or self._last[1] != num_envs:
+            self._last = (mounting, num_envs, self._mount(mounting, num_envs))
         return self._last[2]
 
-    def _mount(self, mounting: Mounting, num_worlds: int) -> structs.View:
+    def _mount(self, mounting: Mounting, num_envs: int) -> structs.View:
         which = self._view.cameras.index(mounting.camera)
-        cameras: Any = np.tile(self._cameras, (num_worlds, 1))
+        cameras: Any = np.tile(self._cameras, (num_envs, 1))
         one = cameras[:, which]
         one["position"] += _array(mounting.offset)
         attitude = torch.tensor(one["attitude"]).double()
         turn = torch.as_tensor(mounting.turn, dtype=torch.float64).cpu()
         one["attitude"] = product(turn, attitude).numpy()
         rays, cosines = (
-            v.expand(num_worlds, *v.shape[1:]) if len(v) == 1 else torch.cat([v] * num_worlds)
+            v.expand(num_envs, *v.shape[1:]) if len(v) == 1 else torch.cat([v] * num_envs)
             for v in (self._rays, self._cosines)
         )
         if mounting.zoom is not None:
@@ -202,7 +202,7 @@ class Cameras:
         return encoded
 
     def _zoomed_rays(self, which: int, zoom: float | Tensor) -> Tensor:
-        """Directions through the same pixels. Shape: (num_worlds or 1, pixels, 3)."""
+        """Directions through the same pixels. Shape: (num_envs or 1, pixels, 3)."""
         rays = self._rays[which]
         flat = rays / -rays[:, 2:]
         factor = torch.as_tensor(zoom, dtype=torch.float32).to(self._device).reshape(-1, 1)

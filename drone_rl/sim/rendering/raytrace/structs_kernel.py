@@ -79,11 +79,11 @@ class Geoms:
 
 @struct
 class Poses:
-    """Poses of the frames. Metres, quaternions (w, x, y, z). Shape: (num_worlds, num_frames)."""
+    """Poses of the frames. Metres, quaternions (w, x, y, z). Shape: (num_envs, num_frames)."""
 
     positions: wp.array2d[wp.vec3]
     attitudes: wp.array[wp.vec4]
-    """Of the drones alone. Shape: (num_worlds,)."""
+    """Of the drones alone. Shape: (num_envs,)."""
     scales: wp.array2d[float]
     """Size of a frame's geoms relative to the model, or no array."""
 

@@ -27,7 +27,7 @@ APPEARANCE = Appearance(
 
 @pytest.mark.parametrize("modality", ["rgb", "depth", "segmentation"])
 def test_both_kernels_render_the_same_images(modality):
-    both = [Raytracer(scene(), num_worlds=32, num_shards=2) for _ in range(2)]
+    both = [Raytracer(scene(), num_envs=32, num_shards=2) for _ in range(2)]
     both[1]._launcher = GpuLauncher("cpu")
     poses = scattered(32, 0.4)
     ours, theirs = (render(r, view(modality), poses, APPEARANCE).double() for r in both)

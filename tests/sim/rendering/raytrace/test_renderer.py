@@ -75,7 +75,7 @@ def scattered(count, tilt):
 
 @pytest.fixture(scope="module")
 def both():
-    made = [kind(scene(), num_worlds=64, num_shards=2) for kind in (Raytracer, WarpRenderer)]
+    made = [kind(scene(), num_envs=64, num_shards=2) for kind in (Raytracer, WarpRenderer)]
     yield made
     for renderer in made:
         renderer.close()
@@ -149,7 +149,7 @@ def ball():
     <camera name="front" xyaxes="0 -1 0 0 0 1" fovy="90"/></body>
     <body mocap="true"><geom type="sphere" size="1"/></body></worldbody></mujoco>"""
     renderer = Raytracer(
-        scene(xml, (SemanticClass.DRONE, SemanticClass.TARGET), (-1, 0)), num_worlds=1
+        scene(xml, (SemanticClass.DRONE, SemanticClass.TARGET), (-1, 0)), num_envs=1
     )
     poses = Poses(
         torch.zeros(1, 3), torch.tensor([[1.0, 0, 0, 0]]), torch.tensor([[[5.0, 0.0, 0.0]]])
@@ -208,7 +208,7 @@ def test_distance_of_a_plane_at_grazing_angles_matches_geometry(both, height):
 @pytest.mark.parametrize("tilt", [0.2, 1.0])
 def test_gpu_launcher_on_a_cpu_renders_the_same_images(tilt, both):
     """The GPU kernels call the same functions in a different order."""
-    alike = Raytracer(scene(), num_worlds=1)
+    alike = Raytracer(scene(), num_envs=1)
     alike._launcher.close()
     alike._launcher = GpuLauncher("cpu")
     requested = View(cameras=("front", "rear"), height=20, width=30, modalities=MODALITIES)
@@ -223,7 +223,7 @@ def test_gpu_launcher_on_a_cpu_renders_the_same_images(tilt, both):
 @pytest.mark.gpu
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA GPU")
 def test_gpu_renders_the_same_images(both):
-    on_gpu = Raytracer(scene(), num_worlds=64, device="cuda")
+    on_gpu = Raytracer(scene(), num_envs=64, device="cuda")
     requested = View(cameras=("front", "rear"), height=30, width=40, modalities=MODALITIES)
     poses = scattered(64, 0.2)
     there = Poses(poses.position.cuda(), poses.attitude.cuda(), poses.props.cuda())
@@ -265,7 +265,7 @@ def test_unsupported_geoms_raise_with_their_name(old, new, message):
     field = '<asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/></asset><worldbody>'
     xml = XML.replace(old, new).replace("<worldbody>", field)
     with pytest.raises(InputError, match=message):
-        Raytracer(scene(xml), num_worlds=1).prepare(view())
+        Raytracer(scene(xml), num_envs=1).prepare(view())
 
 
 @pytest.mark.parametrize(
@@ -288,7 +288,7 @@ def test_unsupported_models_raise_and_recommend_mujoco_warp(geom, message):
     count = model.ngeom
     strange = Scene(model, (SemanticClass.OBSTACLE,) * count, (-1,) * count, (0.0, 0.0, 0.0))
     with pytest.raises(InputError, match=message) as refused:
-        Raytracer(strange, num_worlds=1)
+        Raytracer(strange, num_envs=1)
     assert str(refused.value).endswith("give renderer=mujoco_warp")
     assert "\n" not in str(refused.value)
 
@@ -296,4 +296,4 @@ def test_unsupported_models_raise_and_recommend_mujoco_warp(geom, message):
 def test_scene_without_light_raises():
     xml = "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
     with pytest.raises(InputError, match="no light"):
-        Raytracer(scene(xml, (SemanticClass.TARGET,), (-1,)), num_worlds=1)
+        Raytracer(scene(xml, (SemanticClass.TARGET,), (-1,)), num_envs=1)
