@@ -204,7 +204,7 @@ def _verdict(make: Callable[[], BasePolicy | Path], seed: int | None) -> bool:
 
 def _evaluation(make: Callable[[], BasePolicy | Path], seed: int | None) -> bool:
     done = evaluate(make(), episodes=EPISODES, baselines=False, seed=seed, progress=silent)
-    return done.flown["greedy"]["success"]["lower95"] > _GOOD
+    return done.figures["greedy"]["success"]["lower95"] > _GOOD
 
 
 def _conditions(make: Callable[[], BasePolicy | Path], seed: int | None) -> bool:

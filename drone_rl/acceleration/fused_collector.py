@@ -91,15 +91,15 @@ class FusedCollector:
         """Return the fused form of a collector, or the reasons why it is not supported."""
         reasons = [*_not_fused(direct.renderer), *_not_fused_policy(direct)]
         worlds = direct.renderer.worlds
-        flown = worlds.task.fused_rules(worlds.dynamics, worlds.num_envs)
-        if flown is None:
+        rules = worlds.task.fused_rules(worlds.dynamics, worlds.num_envs)
+        if rules is None:
             names = f"{type(worlds.task).__name__} with {type(worlds.dynamics).__name__}"
             reasons.append(f"task {names} is not fused")
-        if reasons or flown is None:
+        if reasons or rules is None:
             return Reasons(reasons)
         actor: Any = direct.actor
         network = PackedNetwork(actor.network, int(rollout_kernel.TOGETHER))
-        return cls(direct, network, flown, num_threads)
+        return cls(direct, network, rules, num_threads)
 
     def cache_activations(self) -> ActivationCache | None:
         """Keep the activations of all layers from now on, unless they are too many.

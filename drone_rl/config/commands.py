@@ -21,7 +21,7 @@ class FlightSettings(OnDevice):
     """Environments in a batch; bounds memory."""
 
     @property
-    def num_envs(self) -> int:
+    def batch_size(self) -> int:
         """Environments in a batch, at most as many as episodes."""
         return min(self.num_envs, self.episodes)
 

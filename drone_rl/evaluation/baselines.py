@@ -113,9 +113,9 @@ def run_baselines(
     env.load_state_dict(worlds)
     source = env.side_streams(torch.tensor([0]), _RANDOM_ACTIONS)[0]
     generator = torch.Generator(env.device).manual_seed(int(source.integers(2**63)))
-    flown = {}
+    results = {}
     for name in (*task.blind_baselines, "oracle"):
         env.load_state_dict(worlds)
-        flown[name] = run_episodes(env, make_baseline(name, task, generator, actions), episodes)
+        results[name] = run_episodes(env, make_baseline(name, task, generator, actions), episodes)
     env.close()
-    return flown
+    return results

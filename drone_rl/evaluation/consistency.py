@@ -52,9 +52,9 @@ def _rule(verdict: Mapping[str, Any]) -> Rule:
     strata = [name for name in _shares(verdict.get("greedy"), "greedy") if name != "all"]
     if set(strata) == set(SIDES):
         strata = list(SIDES)
-    flown = as_mapping(verdict.get("baselines"), "baselines")
-    blind = [name for name in flown if name != "oracle"]
-    if not 0 < len(strata) <= 8 or not 0 < len(blind) <= 32 or len(blind) == len(flown):
+    baselines = as_mapping(verdict.get("baselines"), "baselines")
+    blind = [name for name in baselines if name != "oracle"]
+    if not 0 < len(strata) <= 8 or not 0 < len(blind) <= 32 or len(blind) == len(baselines):
         raise InputError(
             f"verdict has {len(strata)} strata and {len(blind)} baselines; judge again"
         )
@@ -138,9 +138,9 @@ def _expected(
     verdict: Mapping[str, Any], name: str, rule: Rule
 ) -> tuple[Any, tuple[float, float], int]:
     """Expected value of a quantity, its range, and the number of values that it averages."""
-    greedy, flown, good = verdict["greedy"], verdict["baselines"], rule.good_share
-    ours, best = (of["success"]["share"] for of in (greedy, flown["oracle"]))
-    every, most = (of["shares"]["all"]["mean"] for of in (greedy, flown["oracle"]))
+    greedy, baselines, good = verdict["greedy"], verdict["baselines"], rule.good_share
+    ours, best = (of["success"]["share"] for of in (greedy, baselines["oracle"]))
+    every, most = (of["shares"]["all"]["mean"] for of in (greedy, baselines["oracle"]))
     episodes, what = greedy["episodes"], name.rpartition(" ")[2]
     if name == "success":
         return ours - good * best, (-good, 1.0), episodes
@@ -150,10 +150,10 @@ def _expected(
         stratum = greedy["shares"][what]
         return stratum["mean"], (0.0, 1.0), stratum["count"]
     if name.startswith("above "):
-        blind = flown[what]["shares"]["all"]["mean"]
+        blind = baselines[what]["shares"]["all"]["mean"]
         share = every - (1 - rule.poor_margin) * blind - rule.poor_margin * most
         return share, (-1.0, 1.0), episodes
-    return good * best - flown[what]["success"]["share"], (-1.0, good), episodes
+    return good * best - baselines[what]["success"]["share"], (-1.0, good), episodes
 
 
 def _check_kind(verdict: Mapping[str, Any], found: list[Quantity], rule: Rule) -> None:

@@ -32,7 +32,7 @@ class Evaluation:
 
     policy: BasePolicy
     settings: EvaluateSettings
-    flown: dict[str, dict[str, Any]]
+    figures: dict[str, dict[str, Any]]
     """Figures by name, see `drone_rl.evaluation.metrics.summarise`: "greedy", "sampled" and the
     baselines."""
     seed: RootSeed
@@ -44,26 +44,26 @@ class Evaluation:
     @property
     def success(self) -> float:
         """Success rate with the most probable actions."""
-        return self.flown["greedy"]["success"]["share"]
+        return self.figures["greedy"]["success"]["share"]
 
     def rows(self) -> list[list[str]]:
         """Return the figures as rows of text: a header, then one row per figure.
 
         Intervals are those of the policy only, so that the table fits a terminal.
         """
-        flown = self.flown.values()
+        figures = self.figures.values()
         terms = as_task(self.policy.task).vocabulary
-        rows = [["", *self.flown], *self._rates("success rate", [f["success"] for f in flown])]
-        for name in self.flown["greedy"]["shares"]:
+        rows = [["", *self.figures], *self._rates("success rate", [f["success"] for f in figures])]
+        for name in self.figures["greedy"]["shares"]:
             label = f"{terms.goals} {terms.reached}" if name == "all" else terms.side(name)
-            rows += self._rates(label, [f["shares"][name] for f in flown])
-        rows.append([f"mean {terms.goals}", *(f"{f['mean_goals']:.2f}" for f in flown)])
-        rows.append(["never reached", *(percent(f["never_reached"]["mean"]) for f in flown)])
-        for reason in self.flown["greedy"]["ends"]:
-            cells = (str(f["ends"][reason]["successes"]) for f in flown)
+            rows += self._rates(label, [f["shares"][name] for f in figures])
+        rows.append([f"mean {terms.goals}", *(f"{f['mean_goals']:.2f}" for f in figures)])
+        rows.append(["never reached", *(percent(f["never_reached"]["mean"]) for f in figures)])
+        for reason in self.figures["greedy"]["ends"]:
+            cells = (str(f["ends"][reason]["successes"]) for f in figures)
             rows.append([f"end: {reason.replace('_', ' ')}", *cells])
-        rows.append(["mean length", *(f"{f['mean_length']:.1f}" for f in flown)])
-        rows.append(["episodes", *(str(f["episodes"]) for f in flown)])
+        rows.append(["mean length", *(f"{f['mean_length']:.1f}" for f in figures)])
+        rows.append(["episodes", *(str(f["episodes"]) for f in figures)])
         return rows
 
     def _rates(self, label: str, figures: Sequence[Mapping[str, Any]]) -> list[list[str]]:
@@ -72,7 +72,7 @@ class Evaluation:
         known = ["-" if rate is None else percent(rate) for rate in rates]
         policy = [
             interval(figure) if name in ("greedy", "sampled") and rate is not None else ""
-            for name, rate, figure in zip(self.flown, rates, figures, strict=True)
+            for name, rate, figure in zip(self.figures, rates, figures, strict=True)
         ]
         return [[label, *known], ["  95% CI", *policy]]
 
@@ -83,7 +83,7 @@ class Evaluation:
             "policy": origin["policy"],
             **self.seed.as_dict(),
             **({"unlike": self.policy.unlike} if self.policy.unlike else {}),
-            **self.flown,
+            **self.figures,
             "rounding": self.rounding,
             **provenance(),
             "trained": origin["trained"] and origin["trained"]["progress"],
@@ -133,13 +133,13 @@ def evaluate(
         greedy, rounding = run_compared(env, actor, episodes)
         env.base_env.load_state_dict(state)
         progress("sampled actions", 1, steps)
-        flown = {"greedy": greedy, "sampled": run_episodes(env, actor, episodes, greedy=False)}
+        rollouts = {"greedy": greedy, "sampled": run_episodes(env, actor, episodes, greedy=False)}
     if settings.baselines:
         progress("baselines", 2, steps)
-        num_envs, device = settings.num_envs, settings.device
-        flown |= run_baselines(num_envs, policy.task, state, episodes, device, dynamics)
+        num_envs, device = settings.batch_size, settings.device
+        rollouts |= run_baselines(num_envs, policy.task, state, episodes, device, dynamics)
     progress("evaluated", steps, steps)
-    figures = {name: summarise(e) for name, e in flown.items()}
+    figures = {name: summarise(e) for name, e in rollouts.items()}
     return Evaluation(policy, settings, figures, seed, rounding and rounding.as_dict())
 
 
@@ -148,7 +148,7 @@ def held_out_environments(
 ) -> AbstractContextManager[tuple[Any, TensorDictModuleBase]]:
     """Return a context manager of environments that no training uses, and the policy's actor."""
     where: dict[str, Any] = {"device": settings.device, "renderer": settings.renderer}
-    return policy.flying(settings.num_envs, seed=seed.value, **where)
+    return policy.flying(settings.batch_size, seed=seed.value, **where)
 
 
 def _same(evidence: Evidence) -> str:

@@ -86,7 +86,7 @@ def judge_policy(
         base.load_state_dict(state)
         drawn = run_episodes(env, actor, episodes, greedy=False)
     base.load_state_dict(state)
-    rounding = check_rounding(env, actor, episodes, flown=greedy, log=log)
+    rounding = check_rounding(env, actor, episodes, greedy=greedy, log=log)
     baselines = run_baselines(
         env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
     )
@@ -171,10 +171,9 @@ def judge(
         "proof": None if claim is None else claim.as_evidence(greedy, rounding=rounding),
         "greedy": summarise(greedy),
         "sampled": None if sampled is None else summarise(sampled),
-        "baselines": {name: summarise(flown) for name, flown in baselines.items()},
+        "baselines": {name: summarise(of) for name, of in baselines.items()},
         "skill": {
-            name: mean_bounds(greedy.share - flown.share, -1.0, 1.0)
-            for name, flown in baselines.items()
+            name: mean_bounds(greedy.share - of.share, -1.0, 1.0) for name, of in baselines.items()
         },
         "drawing": None
         if sampled is None
@@ -213,7 +212,7 @@ def widen(
     observed = _observe_each(greedy, baselines, rule)
     others = [values[:0] for values in observed]
     if outcomes.episodes is not None:
-        beside = {name: flown[outcomes.owner] for name, flown in baselines.items()}
+        beside = {name: of[outcomes.owner] for name, of in baselines.items()}
         others = _observe_each(outcomes.episodes, beside, rule)
     widened = []
     for i, (quantity, values, ends) in enumerate(zip(found, observed, others, strict=True)):

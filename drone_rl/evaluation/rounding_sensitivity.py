@@ -70,7 +70,7 @@ def run_compared(
     state, log = base_env(env).state_dict(), StepLog()
     episodes = run_episodes(env, actor, num_episodes, log=log)
     base_env(env).load_state_dict(state)
-    return episodes, compare_implementations(env, actor, flown=episodes, log=log)
+    return episodes, compare_implementations(env, actor, greedy=episodes, log=log)
 
 
 def require_function(policy: BasePolicy, **how: Any) -> None:
@@ -92,12 +92,12 @@ def check_rounding(
     actor: TensorDictModuleBase,
     episodes: int,
     *,
-    flown: Episodes,
+    greedy: Episodes,
     log: StepLog,
 ) -> Rounding | None:
     """Run the first episodes again in PyTorch, with a bound on the rounding error at every frame.
 
-    They are compared with greedy episodes and their actions, `flown` and `log`, which started from
+    They are compared with greedy episodes and their actions, `greedy` and `log`, which started from
     the present state of the environments. Return None for an actor without a network.
 
     Raises:
@@ -108,7 +108,7 @@ def check_rounding(
         return None
     decide, is_bound = decider(network)
     arithmetic, is_exact = arithmetic_on(worlds_of(env).device)
-    episodes, before = min(episodes, len(flown)), base_env(env).state_dict()
+    episodes, before = min(episodes, len(greedy)), base_env(env).state_dict()
     checked, again = _run_checked(env, decide, network, episodes)
     # implementations of flight dynamics round differently, so frames are not the same
     is_counted = isinstance(network.actions, DiscreteActions) and isinstance(
@@ -119,7 +119,7 @@ def check_rounding(
         base_env(env).load_state_dict(before)
         compared, count = "PyTorch, in other batches", min(COMPARED, episodes)
         again, ends = _run_regrouped(env, network, count)
-    first = _first_differences(flown, ends, log.actions, again, count, is_counted=is_counted)
+    first = _first_differences(greedy, ends, log.actions, again, count, is_counted=is_counted)
     differing = {i: step for i, step in enumerate(first) if step is not None}
     unexplained = [i for i, step in differing.items() if not checked.explains(i, step)]
     if not RoundingBound.find(network):
@@ -140,14 +140,14 @@ def check_rounding(
 
 
 def compare_implementations(
-    env: EnvBase, actor: TensorDictModuleBase, *, flown: Episodes, log: StepLog
+    env: EnvBase, actor: TensorDictModuleBase, *, greedy: Episodes, log: StepLog
 ) -> Rounding | None:
     """Run the first episodes again by another implementation: the fused kernel if there is one.
 
-    Arguments, result and errors are those of `check_rounding`; `flown` was run in PyTorch.
+    Arguments, result and errors are those of `check_rounding`; `greedy` was run in PyTorch.
     """
-    state, count = base_env(env).state_dict(), min(COMPARED, len(flown))
-    found = check_rounding(env, actor, count, flown=flown, log=log)
+    state, count = base_env(env).state_dict(), min(COMPARED, len(greedy))
+    found = check_rounding(env, actor, count, greedy=greedy, log=log)
     if found is None:
         return None
     base_env(env).load_state_dict(state)
@@ -156,7 +156,7 @@ def compare_implementations(
     if again.implementation == log.implementation:
         return found
     first = _first_differences(
-        flown, ends, log.actions, again.actions, count, is_counted=is_counted
+        greedy, ends, log.actions, again.actions, count, is_counted=is_counted
     )
     differing = [i for i, at in enumerate(first) if at is not None]
     return dataclasses.replace(
@@ -168,7 +168,7 @@ def compare_implementations(
 
 
 def _first_differences(
-    flown: Episodes,
+    greedy: Episodes,
     ends: Episodes,
     actions: Sequence[Tensor],
     again: Sequence[Tensor],
@@ -180,7 +180,7 @@ def _first_differences(
     if is_counted:
         pairs = zip(actions[:count], again[:count], strict=True)
         return [first_difference(one, other) for one, other in pairs]
-    return [outcome_difference(flown, ends, i) for i in range(count)]
+    return [outcome_difference(greedy, ends, i) for i in range(count)]
 
 
 class _CheckingActor(TensorDictModuleBase):

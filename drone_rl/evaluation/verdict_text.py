@@ -115,7 +115,7 @@ def _every(evidence: Evidence) -> str:
 
 def best_baseline(evidence: Evidence, figure: Callable[[Evidence], float] | None = None) -> str:
     """Return the random or constant baseline that collects most, or with the greatest figure."""
-    figure = figure or (lambda flown: flown["shares"]["all"]["mean"])
+    figure = figure or (lambda figures: figures["shares"]["all"]["mean"])
     blind = {name: figure(f) for name, f in evidence["baselines"].items() if name != "oracle"}
     return max(blind, key=lambda name: blind[name])
 
@@ -160,15 +160,15 @@ def _kind(evidence: Evidence) -> str:
 
 
 def _trivial(evidence: Evidence) -> str:
-    baseline, flown = _most_successful(evidence), evidence["baselines"]
+    baseline, figures = _most_successful(evidence), evidence["baselines"]
     return (
         f"{_acting(baseline).capitalize()} does as well: it {_every(evidence)} in "
-        f"{_success(flown[baseline])} of episodes, this policy in {_success(evidence['greedy'])}."
+        f"{_success(figures[baseline])} of episodes, this policy in {_success(evidence['greedy'])}."
     )
 
 
 def _most_successful(evidence: Evidence) -> str:
-    return best_baseline(evidence, lambda flown: flown["success"]["share"])
+    return best_baseline(evidence, lambda figures: figures["success"]["share"])
 
 
 def _no_better(evidence: Evidence) -> str:
@@ -179,11 +179,11 @@ def _no_better(evidence: Evidence) -> str:
 
 
 def _open(evidence: Evidence) -> str:
-    flown, enough, terms = evidence["greedy"], evidence["enough"], terms_of(evidence)
+    greedy, enough, terms = evidence["greedy"], evidence["enough"], terms_of(evidence)
     more = f"about {enough:,} would do" if enough else "many times as many might not do"
     return (
-        f"This policy looks {_looks(evidence)}, but {flown['episodes']:,} episodes are too few to "
-        f"be certain ({more}): it {terms.reached} every {terms.goal} in {_success(flown)} of them."
+        f"This policy looks {_looks(evidence)}, but {greedy['episodes']:,} episodes are too few to "
+        f"be certain ({more}): it {terms.reached} every {terms.goal} in {_success(greedy)} of them."
     )
 
 
@@ -224,18 +224,18 @@ def _shares(evidence: Evidence) -> str:
 
 
 def _baselines(evidence: Evidence) -> str:
-    flown, best, terms = evidence["baselines"], best_baseline(evidence), terms_of(evidence)
+    figures, best, terms = evidence["baselines"], best_baseline(evidence), terms_of(evidence)
     return (
         f"From the same initial states it {terms.reaches} {_all(evidence['greedy'])} of all "
-        f"{terms.goals}, {_acting(best)} {_all(flown[best])} and the oracle "
-        f"{_all(flown['oracle'])}."
+        f"{terms.goals}, {_acting(best)} {_all(figures[best])} and the oracle "
+        f"{_all(figures['oracle'])}."
     )
 
 
 def _is_trivial(evidence: Evidence) -> bool:
-    flown = evidence["baselines"]
-    best = flown[_most_successful(evidence)]["success"]["share"]
-    return best > 0 and best >= evidence["good_share"] * flown["oracle"]["success"]["share"]
+    figures = evidence["baselines"]
+    best = figures[_most_successful(evidence)]["success"]["share"]
+    return best > 0 and best >= evidence["good_share"] * figures["oracle"]["success"]["share"]
 
 
 def _pointless(evidence: Evidence) -> str:

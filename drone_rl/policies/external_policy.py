@@ -49,13 +49,13 @@ class ExternalPolicy(BasePolicy):
     """The vehicle dynamics of the training."""
     actions: ActionSettings = MOVES_SETTINGS  # pyright: ignore[reportIncompatibleMethodOverride] (a field)
     """One action for each logit."""
-    flown: DynamicsSettings | None = None
+    used_dynamics: DynamicsSettings | None = None
     """Vehicle dynamics of the evaluation; those of the training by default."""
 
     @property
     def dynamics(self) -> DynamicsSettings:
         """The vehicle dynamics."""
-        return self.flown or self.own_dynamics
+        return self.used_dynamics or self.own_dynamics
 
     @property
     def task(self) -> BaseTaskSettings | Task[Any]:
@@ -81,9 +81,9 @@ class ExternalPolicy(BasePolicy):
         """Return the same policy with other dynamics, such as `in_dynamics(wind=(5, 0, 0))`."""
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
         with below("dynamics"):
-            flown = self.dynamics.replace(**changed)
-        flown.check_air()
-        return dataclasses.replace(self, flown=flown)
+            used_dynamics = self.dynamics.replace(**changed)
+        used_dynamics.check_air()
+        return dataclasses.replace(self, used_dynamics=used_dynamics)
 
     def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv:
         task: Any = self.task

@@ -62,10 +62,10 @@ class BasePolicy(abc.ABC):
     @property
     def unlike(self) -> dict[str, dict[str, Any]]:
         """Settings of `dynamics` that differ from its own: "own" and "flown" values by name."""
-        own, flown = self.own_dynamics.values(), self.dynamics.values()
+        own, used = self.own_dynamics.values(), self.dynamics.values()
         if self.dynamics.is_computer_vision:  # where nothing else counts
-            own, flown = ({"mode": of["mode"]} for of in (own, flown))
-        return {n: {"own": own[n], "flown": v} for n, v in flown.items() if own[n] != v}
+            own, used = ({"mode": of["mode"]} for of in (own, used))
+        return {n: {"own": own[n], "flown": v} for n, v in used.items() if own[n] != v}
 
     def in_appearance(self, appearance: AppearanceSettings) -> Self:
         """Return the same policy in scenes of another appearance.

@@ -143,8 +143,8 @@ def conditions(
     return shown
 
 
-def _success(flown: Mapping[str, Any]) -> str:
-    return f"{percent(flown['success']['share'])} succeed"
+def _success(result: Mapping[str, Any]) -> str:
+    return f"{percent(result['success']['share'])} succeed"
 
 
 def _strip(

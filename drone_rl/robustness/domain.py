@@ -49,7 +49,7 @@ class End:
 
     limit: float
     """The last strength at which the policy is certainly good."""
-    flown: list[tuple[float, bool]]
+    tested: list[tuple[float, bool]]
     """Tested strengths, and whether the policy is certainly good at each."""
     failed: float | None = None
     """The first strength of the outward search at which it is not; None if there is none."""
@@ -66,7 +66,7 @@ def walk(axis: Axis, sign: int, seed: int, is_good: Callable[[float, float], boo
 
     def at(strength: float, part: float) -> bool:
         good = is_good(strength, part)
-        end.flown.append((strength, good))
+        end.tested.append((strength, good))
         if good:
             end.limit = strength
         return good
@@ -92,13 +92,13 @@ def range_of(
     def value(strength: float) -> float | None:
         return finite(axis.value(strength, of))
 
-    flown = [(axis.position(s), value(s), good) for end in ends.values() for s, good in end.flown]
+    tested = [(axis.position(s), value(s), good) for end in ends.values() for s, good in end.tested]
     return {
         **{name: value(end.limit) for name, end in ends.items()},
-        **{f"{n}_open": e.failed is None if e.flown else None for n, e in ends.items()},
+        **{f"{n}_open": e.failed is None if e.tested else None for n, e in ends.items()},
         "positions": sorted(axis.position(end.limit) for end in ends.values()),
         "failed": failed,
-        "flown": [{"position": p, "value": v, "good": good} for p, v, good in sorted(flown)],
+        "flown": [{"position": p, "value": v, "good": good} for p, v, good in sorted(tested)],
     }
 
 
@@ -149,19 +149,19 @@ class Prober:
             return {"good": False, "bad": True, "refused": str(error)}
         subject, count = self._evaluator.subject, self._evaluator.episodes
         agent = PolicyAgent(subject.network, subject.transforms, count, examines_rounding=True)
-        flown = self._evaluator.run(condition, agent=agent).episodes
+        greedy = self._evaluator.run(condition, agent=agent).episodes
         if key not in self._baselines:  # appearance does not affect these baselines
             self._baselines[key] = self._evaluator.run_baselines(condition)
         rule = self.rule_at(part)
         baselines = {**self._baselines[key], "oracle": self._oracle}
         unknown = Outcomes(None, torch.empty(0, dtype=torch.int64), agent.is_fragile)
-        widened = widen(measure(flown, baselines, rule), flown, baselines, rule, unknown)
+        widened = widen(measure(greedy, baselines, rule), greedy, baselines, rule, unknown)
         found = dict(zip(rule.quantities, widened, strict=True))
         return {
             "good": is_surely_good(found, rule),
             "bad": Kind.GOOD not in _kinds(found, rule),
             "refused": None,
-            "success": float(flown.success.mean()),
+            "success": float(greedy.success.mean()),
             "worst": _worst(found, rule),
         }
 

@@ -250,8 +250,8 @@ def _check_axis(axis: Axis, along: Mapping[str, Any], of: Any, where: str) -> No
     known = (axis.group, axis.unit, finite(axis.value(axis.neutral, of)))
     is_own = (along["group"], along["unit"], along["neutral"]) == known
     strengths = [axis.strengths[level["number"] - 1] for level in levels]
-    flown = [(level["value"], level["position"]) for level in levels]
-    if not is_own or flown != [(axis.value(s, of), axis.position(s)) for s in strengths]:
+    tested = [(level["value"], level["position"]) for level in levels]
+    if not is_own or tested != [(axis.value(s, of), axis.position(s)) for s in strengths]:
         raise InputError(f"{where} has other strengths or units than drone-rl shifts flies")
     if any(not level["refused"] and MODES[0] not in level["modes"] for level in levels):
         raise InputError(f"{where} tells nothing of constant conditions")

@@ -49,8 +49,8 @@ def _ranges(e: Evidence) -> Mapping[str, Any]:
 
 def is_tested(e: Evidence, name: str) -> bool:
     """Return whether the strongest perturbation of an axis changed an image or an episode."""
-    flown = [v["modes"]["constant"] for v in e["axes"][name]["levels"] if v["refused"] is None]
-    return bool(flown) and not flown[-1]["unchanged"]
+    results = [v["modes"]["constant"] for v in e["axes"][name]["levels"] if v["refused"] is None]
+    return bool(results) and not results[-1]["unchanged"]
 
 
 def wide(e: Evidence) -> list[str]:
@@ -152,11 +152,11 @@ def _untested(e: Evidence) -> list[str]:
 
 
 def _together(e: Evidence) -> str:
-    flown, oracle = e["together"]["modes"]["constant"], e["together"]["oracle"]
+    result, oracle = e["together"]["modes"]["constant"], e["together"]["oracle"]
     other = "" if oracle is None else f", the oracle in {percent(oracle['share'])}"
     return (
         f"With {_every_axis(e)} at once, each at its third strength, it succeeds in "
-        f"{percent(flown['success']['share'])} of episodes{other}."
+        f"{percent(result['success']['share'])} of episodes{other}."
     )
 
 
@@ -255,8 +255,8 @@ def why_not(evidence: Evidence) -> str | None:
 def untested(evidence: Evidence) -> list[str]:
     """Return which of colours, light and sizes were not evaluated."""
     axes = evidence["shifts"]["axes"].values() if is_quoted(evidence) else ()
-    flown = {along["group"] for along in axes}
-    return [name for group, name in _OTHERS.items() if group not in flown]
+    tested = {along["group"] for along in axes}
+    return [name for group, name in _OTHERS.items() if group not in tested]
 
 
 def _quote(evidence: Evidence) -> str:

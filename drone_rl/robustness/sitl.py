@@ -116,15 +116,15 @@ def evaluate_in_the_loop(
     progress, loaded = progress or Bar(), as_policy(policy, outputs)
     root = drawn_seed or root_seed(seed)
     program = find_firmware(firmware)
-    flown: list[tuple[Episodes, SitlEpisode]] = []
+    results: list[tuple[Episodes, SitlEpisode]] = []
     with tempfile.TemporaryDirectory(prefix="betaflight-") as folder:
         for world in range(flights):
             progress(f"{loaded.name}: software in the loop", world, flights)
-            flown.append(
+            results.append(
                 _fly_or_restart(loaded, world, root.value, program, Path(folder), isolated)
             )
     progress("flown", flights, flights)
-    ended, episodes = zip(*flown, strict=True)
+    ended, episodes = zip(*results, strict=True)
     return SitlEvaluation(loaded.name, root, episodes, summarise(Episodes.joined(ended)))
 
 

@@ -106,8 +106,8 @@ class Suite:
             return self.oracle
         return self._evaluator.run(condition, agent=OracleAgent())
 
-    def _figures(self, flown: ConditionResult) -> dict[str, Any]:
-        episodes, plain = flown.episodes, self.plain.episodes
+    def _figures(self, result: ConditionResult) -> dict[str, Any]:
+        episodes, plain = result.episodes, self.plain.episodes
         task = episodes.task
         shares = {"all": mean_bounds(episodes.share)}
         for i, name in enumerate(task.strata):
@@ -119,7 +119,7 @@ class Suite:
             "paired": mcnemar(plain.success, episodes.success),
             "shares": shares,
             "ends": {end.name.lower(): ends[end] for end in task.ends if end != 0},
-            "unchanged": bool(torch.equal(flown.trace, self.plain.trace))
+            "unchanged": bool(torch.equal(result.trace, self.plain.trace))
             and bool(torch.equal(episodes.length, plain.length)),
         }
 
@@ -200,10 +200,10 @@ def success_area(levels: Iterable[dict[str, Any]], plain: float, mode: Mode) -> 
     return area(positions, shares)
 
 
-def _success(flown: ConditionResult | None) -> dict[str, Any] | None:
-    if flown is None:
+def _success(result: ConditionResult | None) -> dict[str, Any] | None:
+    if result is None:
         return None
-    success = flown.episodes.success
+    success = result.episodes.success
     return proportion(int(success.sum()), len(success))
 
 

@@ -39,9 +39,9 @@ class Confirmation:
         worlds.first_world = update * _NUM_ENVS
         env.set_seed(settings.seed)
         actor = make_actor(self._network, env.action_spec)
-        flown = run_episodes(env, actor, episodes, is_compiled=True)
+        greedy = run_episodes(env, actor, episodes, is_compiled=True)
         self.flights += episodes
-        self.succeeded = int(flown.success.sum())
+        self.succeeded = int(greedy.success.sum())
         return self.succeeded >= settings.trainer.confirm_share * episodes
 
     @functools.cached_property

@@ -146,10 +146,10 @@ def _outcomes_of(stated: Certificate, episodes: Episodes) -> NDArray[np.int64]:
 def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:
     """For each episode with a stated end, whether it ended so."""
     outcome = _outcomes_of(stated, greedy)
-    flown = zip(outcome, greedy.end_reason.tolist(), greedy.goals.reached.tolist(), strict=True)
+    ended = zip(outcome, greedy.end_reason.tolist(), greedy.goals.reached.tolist(), strict=True)
     return [
         (end, tuple(reached)) == (stated.outcomes[i].end, stated.outcomes[i].collected)
-        for i, end, reached in flown
+        for i, end, reached in ended
         if i < len(stated.outcomes)
     ]
 

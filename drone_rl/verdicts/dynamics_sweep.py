@@ -155,12 +155,12 @@ def changes_of(body: str, own: DynamicsSettings) -> Mapping[str, Any]:
 
 def rows(numbers: Evidence) -> list[list[str]]:
     """Return a table of texts: names of dynamics, then a row for each policy."""
-    bodies, flown = [str(body) for body in numbers["bodies"]], numbers["policies"]
+    bodies, verdicts = [str(body) for body in numbers["bodies"]], numbers["policies"]
     table = [["", *bodies]]
-    table += [[name, *(cell(found[body]) for body in bodies)] for name, found in flown.items()]
+    table += [[name, *(cell(found[body]) for body in bodies)] for name, found in verdicts.items()]
     if LOOPED not in numbers:
         return table
-    column = [LOOPED, *(sitl_cell(numbers[LOOPED][name]) for name in flown)]
+    column = [LOOPED, *(sitl_cell(numbers[LOOPED][name]) for name in verdicts)]
     return [[*row, text] for row, text in zip(table, column, strict=True)]
 
 
@@ -181,8 +181,8 @@ def sitl_cell(flights: Evidence) -> str:
 
 def left_out(numbers: Evidence) -> list[str]:
     """Return the reasons why there are no episodes with software in the loop, a line each."""
-    flown = numbers.get(LOOPED, {}).items()
-    return [f"{name}, {LOOPED}: {f['left_out']}" for name, f in flown if "left_out" in f]
+    looped = numbers.get(LOOPED, {}).items()
+    return [f"{name}, {LOOPED}: {f['left_out']}" for name, f in looped if "left_out" in f]
 
 
 def failure(verdict: Evidence) -> str:
@@ -205,9 +205,9 @@ def chart(numbers: Mapping[str, Any]) -> Figure:
     axes.axis("off")
     for x, body in enumerate(bodies):
         axes.text(x + 0.5, -0.25, body, ha="center", va="center", fontsize=10, color=_INK)
-    for y, (name, flown) in enumerate(policies.items()):
+    for y, (name, verdicts) in enumerate(policies.items()):
         axes.text(-0.05, y + 0.5, name, ha="right", va="center", fontsize=11, color=_INK)
-        cells = [_verdict_cell(flown[body]) for body in numbers["bodies"]]
+        cells = [_verdict_cell(verdicts[body]) for body in numbers["bodies"]]
         if looped:
             text = textwrap.fill(sitl_cell(looped[name]), 22)
             cells.append((_COLORS["none"], "..", [(0.5, text, 8.0, _INK)]))

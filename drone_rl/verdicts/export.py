@@ -175,19 +175,19 @@ contains its description.
 def _flights(verdict: Evidence) -> str:
     """Return a table of greedy and sampled actions, the best blind baseline, and the oracle."""
     best = best_baseline(verdict)
-    flown = {
+    columns = {
         "most probable actions": verdict["greedy"],
         "sampled actions": verdict["sampled"],
         f"best blind baseline ({best})": verdict["baselines"][best],
         "oracle": verdict["baselines"]["oracle"],
     }
-    flown = {name: flights for name, flights in flown.items() if flights is not None}
+    columns = {name: flights for name, flights in columns.items() if flights is not None}
     terms = terms_of(verdict)
-    successes = (rate(flights["success"], label="") for flights in flown.values())
-    rows = [["", *flown], [f"episodes with all {terms.goals}", *successes]]
+    successes = (rate(flights["success"], label="") for flights in columns.values())
+    rows = [["", *columns], [f"episodes with all {terms.goals}", *successes]]
     for side in verdict["greedy"]["shares"]:
         label = f"{terms.goals} {terms.reached}" if side == "all" else f"of those {side}"
-        rows.append([label, *(rate(f["shares"][side], label="") for f in flown.values())])
+        rows.append([label, *(rate(f["shares"][side], label="") for f in columns.values())])
     return _table(rows)
 
 

@@ -276,7 +276,7 @@ def _baseline(
 ) -> Iterator[tuple[EnvBase, TensorDictModuleBase]]:
     """Environments without images, and a baseline."""
     env = DroneEnv(
-        settings.num_envs,
+        settings.batch_size,
         task,
         seed=seed.value,
         stream=Stream.REPORT,

@@ -130,7 +130,7 @@ def check(
     loaded = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     weights, asked = loaded.state["policy"], loaded.in_task(**task).task if task else None
     check_same_policy(stated, loaded.description, weights, asked)
-    flown = dataclasses.replace(loaded, description=stated.description)
+    policy = dataclasses.replace(loaded, description=stated.description)
     findings = check_certificate(
         stated,
         weights,
@@ -140,7 +140,7 @@ def check(
         renderer=settings.renderer,
         tell=functools.partial(progress or Bar(), "flown"),
     )
-    return Check(path, flown, settings, stated, findings, seed)
+    return Check(path, policy, settings, stated, findings, seed)
 
 
 def _find(certificate: str | Path, outputs: str | Path) -> Path:

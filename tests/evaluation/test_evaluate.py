@@ -27,9 +27,17 @@ def test_an_evaluation_in_python(good):
         said.append((text, done, total))
 
     done = drone_rl.evaluate(good.in_task(num_cubes=2), episodes=6, num_envs=4, progress=note)
-    assert set(done.flown) == {"greedy", "sampled", "random", "forward", "left", "right", "oracle"}
-    assert done.flown["oracle"]["mean_goals"] == 2.0
-    assert done.success == done.flown["greedy"]["success"]["share"]
+    assert set(done.figures) == {
+        "greedy",
+        "sampled",
+        "random",
+        "forward",
+        "left",
+        "right",
+        "oracle",
+    }
+    assert done.figures["oracle"]["mean_goals"] == 2.0
+    assert done.success == done.figures["greedy"]["success"]["share"]
     assert done.as_dict()["trained"]["frames"] > 0
     assert said[0] == ("most probable actions", 0, 3)
     assert said[-1] == ("evaluated", 3, 3)
@@ -38,7 +46,7 @@ def test_an_evaluation_in_python(good):
 
 def test_without_baselines_there_are_none(good):
     done = drone_rl.evaluate(good, episodes=2, baselines=False, progress=silent)
-    assert set(done.flown) == {"greedy", "sampled"}
+    assert set(done.figures) == {"greedy", "sampled"}
 
 
 def test_the_table_of_an_evaluation(good):
@@ -104,10 +112,10 @@ def test_in_another_body_it_is_said_so(good, monkeypatch):
     done = drone_rl.evaluate(moved, episodes=2, num_envs=2, progress=silent)
     assert "dynamics.wind=[-5, 0, 0] instead of [0, 0, 0]" in str(done)
     assert done.as_dict()["unlike"]["wind"]["flown"] == [-5.0, 0.0, 0.0]
-    steps = done.flown["forward"]["mean_length"]  # against half a metre of wind a step
+    steps = done.figures["forward"]["mean_length"]  # against half a metre of wind a step
     assert (
         steps
-        > drone_rl.evaluate(good, episodes=2, num_envs=2, progress=silent).flown["forward"][
+        > drone_rl.evaluate(good, episodes=2, num_envs=2, progress=silent).figures["forward"][
             "mean_length"
         ]
     )

@@ -27,7 +27,7 @@ def examined(policy, is_compiled=True):
         env.base_env.load_state_dict(state)
         how = check_rounding if is_compiled else compare_implementations
         count = (EPISODES,) if is_compiled else ()
-        return how(env, actor, *count, flown=flown, log=log), flown, log
+        return how(env, actor, *count, greedy=flown, log=log), flown, log
 
 
 def with_unit(by_unit):

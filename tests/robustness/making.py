@@ -71,12 +71,14 @@ def found_to(axis, of, last, impossible=False):
     def value(strength):
         return finite(axis.value(strength, of))
 
-    every = sorted((axis.position(s), value(s), good) for e in ends.values() for s, good in e.flown)
+    every = sorted(
+        (axis.position(s), value(s), good) for e in ends.values() for s, good in e.tested
+    )
     about = {"good": False, "bad": True, "worst": None, "refused": None, "success": 0.5}
     about |= {"oracle": share(100 if impossible else 400, 400), "impossible": impossible}
     return {
         **{end: value(walked.limit) for end, walked in ends.items()},
-        **{f"{e}_open": w.failed is None if w.flown else None for e, w in ends.items()},
+        **{f"{e}_open": w.failed is None if w.tested else None for e, w in ends.items()},
         "positions": sorted(axis.position(walked.limit) for walked in ends.values()),
         "failed": [
             {"end": end, "value": value(walked.failed), **about}

@@ -47,7 +47,7 @@ def _missing(line: str) -> Claims:
 
 def _say_verdict(evidence: Evidence) -> Claims:
     verdict, terms, claims = evidence["verdict"], terms_of(evidence), Claims()
-    flown = verdict["greedy"]
+    greedy = verdict["greedy"]
     if verdict["certain"]:
         claims["summary.verdict"] = (
             f"{verdict['kind'].capitalize()}. The verdict is wrong with at most "
@@ -58,7 +58,7 @@ def _say_verdict(evidence: Evidence) -> Claims:
             f"Not certain: it looks {verdict['kind']}, but this evidence does not decide it."
         )
     claims["summary.success"] = (
-        f"{rate(flown['success'])} of {flown['episodes']:,} episodes, with every {terms.goal} "
+        f"{rate(greedy['success'])} of {greedy['episodes']:,} episodes, with every {terms.goal} "
         f"{terms.reached} by the most probable actions."
     )
     return claims

@@ -137,9 +137,9 @@ def _check_values(arrays: Mapping[str, NDArray], data: Mapping[str, NDArray], co
     for name in _FINITE & arrays.keys():
         if not np.isfinite(arrays[name]).all():
             raise InputError(f"{name} holds NaN or infinity")
-    flown = len(data.get("flights/episode", ()))  # each episode has at least one step
+    steps = len(data.get("flights/episode", ()))  # each episode has at least one step
     ends = 1 + len(arrays.get("places_points", ()))
-    limits = {"actions": count, "film_actions": count, "flights/episode": flown, **_INDICES}
+    limits = {"actions": count, "film_actions": count, "flights/episode": steps, **_INDICES}
     for given, most in ((data, limits), (arrays, {**limits, "places_ends": ends})):
         for name in most.keys() & given.keys():
             check_indices(given[name], max(1, most[name]), name)

@@ -100,12 +100,12 @@ def fly_course(drone: DroneInTheLoop, course: Course | None = None) -> CourseRep
     hover = _fly(drone, hold, course.hover)
     corners = square(above, course.side)
     follow = follow_path(make_paths(corners[None]), course.speed, settings)
-    flown = _fly(drone, follow, 4.0 * course.side / course.speed)
+    measured = _fly(drone, follow, 4.0 * course.side / course.speed)
     _fly(drone, hold, _SETTLING)
     land(drone, ground)
     counted = [m for m in hover if m.time >= hover[0].time + _SETTLING] or hover
-    positions = torch.from_numpy(np.stack([m.position for m in flown]))
-    errors = distance_from(make_paths(corners.repeat(len(flown), 1, 1)), positions).numpy()
+    positions = torch.from_numpy(np.stack([m.position for m in measured]))
+    errors = distance_from(make_paths(corners.repeat(len(measured), 1, 1)), positions).numpy()
     return CourseReport(
         hover_error_m=float(np.mean([np.linalg.norm(m.position - above) for m in counted])),
         path_error_m=float(errors.mean()),

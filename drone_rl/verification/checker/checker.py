@@ -199,20 +199,20 @@ def check_certificate(
     stated = drawn.outcome < len(certificate.outcomes)
     points, why = drawn.points[stated], drawn.why[stated]
     with closing(Simulator(certificate.description, weights, device, renderer)) as simulator:
-        flown = simulator.fly(points, tell)
-        some = np.arange(len(flown.end))[:: max(1, len(flown.end) // MOST_EXACT)]
+        rollouts = simulator.fly(points, tell)
+        some = np.arange(len(rollouts.end))[:: max(1, len(rollouts.end) // MOST_EXACT)]
         simulator.compute_in(torch.float64)
         exact = simulator.fly(points[some])
     outcomes = [certificate.outcomes[i] for i in drawn.outcome[stated]]
-    wrong = [i for i, outcome in enumerate(outcomes) if not ends_as_stated(outcome, flown, i)]
+    wrong = [i for i, outcome in enumerate(outcomes) if not ends_as_stated(outcome, rollouts, i)]
     rounded = _rounding_errors([outcomes[i] for i in some], exact, np.isin(some, wrong))
     steps = np.zeros_like(drawn.outcome)
-    steps[stated] = flown.steps
+    steps[stated] = rollouts.steps
     anywhere = drawn.why == ANYWHERE
     counts = find_wrong_step_counts(certificate.outcomes, drawn.outcome[anywhere], steps[anywhere])
     kept = [
         Contradiction(
-            str(why[i]), tuple(points[i].tolist()), _stated(outcomes[i]), _found(flown, i)
+            str(why[i]), tuple(points[i].tolist()), _stated(outcomes[i]), _found(rollouts, i)
         )
         for i in wrong[:MOST_KEPT]
     ]
@@ -236,15 +236,15 @@ def read_validated(
     return certificate
 
 
-def ends_as_stated(outcome: Outcome, flown: Rollouts, i: int) -> bool:
+def ends_as_stated(outcome: Outcome, rollouts: Rollouts, i: int) -> bool:
     """Return whether episode i ended as stated, after a stated number of steps."""
-    if flown.end[i] != outcome.end or tuple(flown.collected[i]) != outcome.collected:
+    if rollouts.end[i] != outcome.end or tuple(rollouts.collected[i]) != outcome.collected:
         return False
     if outcome.end == EndReason.STEP_LIMIT:
-        loops = flown.repeats[i] > (0 if outcome.loops else _JUST_BEGUN)
+        loops = rollouts.repeats[i] > (0 if outcome.loops else _JUST_BEGUN)
         if loops != outcome.loops:
             return False
-    return int(flown.steps[i]) in outcome.steps or missing_steps(outcome) > 0
+    return int(rollouts.steps[i]) in outcome.steps or missing_steps(outcome) > 0
 
 
 def _rounding_errors(
@@ -265,8 +265,8 @@ def _stated(outcome: Outcome) -> str:
     return f"{outcome}" if missing_steps(outcome) else f"{outcome}, steps: {steps}"
 
 
-def _found(flown: Rollouts, i: int) -> str:
-    end, collected = EndReason(flown.end[i]), tuple(map(bool, flown.collected[i]))
-    loops = end == EndReason.STEP_LIMIT and bool(flown.repeats[i])
+def _found(rollouts: Rollouts, i: int) -> str:
+    end, collected = EndReason(rollouts.end[i]), tuple(map(bool, rollouts.collected[i]))
+    loops = end == EndReason.STEP_LIMIT and bool(rollouts.repeats[i])
     as_outcome = Outcome(end, collected, loops, 0.0, {}, np.zeros((0, len(collected), 2)))
-    return f"{as_outcome}, steps: {flown.steps[i]}"
+    return f"{as_outcome}, steps: {rollouts.steps[i]}"
