@@ -225,11 +225,11 @@ def _draw_bars(
     """One bar per action, as long as it is probable; the chosen one in red."""
     chosen, names = int(actions.part(acted["action"][0])), actions.names
     logits = acted.get("logits", None)
-    wish = torch.eye(len(names))[chosen] if logits is None else actions.wish(logits[0])
+    probs = torch.eye(len(names))[chosen] if logits is None else actions.probabilities(logits[0])
     room = 960 // len(names)
     for i, action in enumerate(actions.order):
         x, y = 300 + room * i, _BOTTOM
-        share = float(wish[action])
+        share = float(probs[action])
         draw.text((x, y), f"{names[action]} {share:.2f}", _TEXT, font)
         color = _CHOSEN if action == chosen else _BAR
         most = room - 140

@@ -165,7 +165,7 @@ def visualise(
     optimize = ascent.pixels if settings.parameterisation == "pixel" else ascent.fourier
     reached = optimize(images)
     with torch.no_grad():
-        each = actions_of(network).wish(network(reached)).gather(1, action[:, None])[:, 0]
+        each = actions_of(network).probabilities(network(reached)).gather(1, action[:, None])[:, 0]
     by_action = (num_actions, settings.starts)
     return Attempts(
         images=reached.view(*by_action, *shape),
@@ -204,7 +204,7 @@ class _Ascent:
         """Return the quantity to maximize, on images shifted at random. Shape: (N,)."""
         actions, outputs = actions_of(self.network), self.network(self.jitter(images))
         if self.settings.objective == "probability":
-            return actions.wish(outputs).gather(1, self.action[:, None])[:, 0]
+            return actions.probabilities(outputs).gather(1, self.action[:, None])[:, 0]
         scores = actions.scores(outputs)
         return (scores - scores.mean(-1, keepdim=True)).gather(1, self.action[:, None])[:, 0]
 

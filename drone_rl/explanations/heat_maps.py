@@ -120,7 +120,7 @@ class Explainer:
     ) -> Callable[[Tensor], Tensor]:
         actions = actions_of(self.network)
         evaluated = self.network if network is None else network
-        make = actions.scores if objective == "logit" else actions.wish
+        make = actions.scores if objective == "logit" else actions.probabilities
         return lambda x: make(evaluated(x))
 
 

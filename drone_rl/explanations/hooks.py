@@ -86,7 +86,7 @@ def outputs(network: ImageNetwork, observations: Tensor) -> Tensor:
 @torch.no_grad()
 def probabilities(network: ImageNetwork, observations: Tensor) -> Tensor:
     """Return action probabilities (Eq. 9). Shape: (T, C, h, w) to (T, number of parts)."""
-    return actions_of(network).wish(outputs(network, observations))
+    return actions_of(network).probabilities(outputs(network, observations))
 
 
 def actions_of(network: nn.Module) -> Actions:

@@ -93,7 +93,7 @@ def replaced(
     for batch in (pixels @ masks.flatten(1).float().T > 0).nonzero().split(BATCH):
         frames, parts = batch.unbind(1)
         changed = torch.where(masks[parts, None], other[frames], observations[frames])
-        yield frames, parts, actions_of(network).wish(network(changed))
+        yield frames, parts, actions_of(network).probabilities(network(changed))
 
 
 def patch_effects(

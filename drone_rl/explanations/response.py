@@ -95,19 +95,19 @@ def response_map(
     seed: int | None = None,
 ) -> ResponseMap:
     """Evaluate the policy with one target at each place of `Task.grid`; `shrink` uses the seed."""
-    fields, wishes = _over_grid(
+    fields, probs = _over_grid(
         scenes,
         (num_forward, num_lateral),
         (seed, _RESPONSE),
         lambda state: probabilities(network, scenes.observe(state)),
     )
     alone = probabilities(network, scenes.observe(empty_scene(scenes)))[0]
-    needed = torch.from_numpy(fields["oracle"]).to(wishes.device)
+    needed = torch.from_numpy(fields["oracle"]).to(probs.device)
     return ResponseMap(
         **fields,
-        probabilities=wishes.cpu().numpy(),
+        probabilities=probs.cpu().numpy(),
         without_target=alone.cpu().numpy(),
-        blind=find_blind(scenes.actions, wishes, alone, needed).cpu().numpy(),
+        blind=find_blind(scenes.actions, probs, alone, needed).cpu().numpy(),
     )
 
 
@@ -156,15 +156,15 @@ def _between(places: Tensor, first: float, last: float) -> Tensor:
     return places[0] + step * steps
 
 
-def find_blind(actions: Actions, wishes: Tensor, alone: Tensor, needed: Tensor) -> Tensor:
+def find_blind(actions: Actions, probs: Tensor, alone: Tensor, needed: Tensor) -> Tensor:
     """Return where a turn is needed, not chosen, and the target has almost no effect. (Z, F, L).
 
-    `wishes` (Z, F, L, A) are action probabilities with a target there, `alone` (A,) those without
+    `probs` (Z, F, L, A) are action probabilities with a target there, `alone` (A,) those without
     one; `needed` (L,) is -1 where the needed action is unknown.
     """
-    unmoved = actions.distance(wishes, alone) < BLIND
+    unmoved = actions.distance(probs, alone) < BLIND
     needs_turn = (needed >= 0) & actions.turns(needed)
-    return unmoved & needs_turn & ~actions.agrees(actions.chosen(wishes), needed)
+    return unmoved & needs_turn & ~actions.agrees(actions.chosen(probs), needed)
 
 
 def outcome_map(
@@ -219,7 +219,7 @@ def asymmetry(
     """
     here = probabilities(network, observations)
     there = actions.mirror(probabilities(network, observations.flip(-1)))
-    signed = (actions.leaning(here) - actions.leaning(there)).double().cpu().numpy()
+    signed = (actions.prob_left(here) - actions.prob_left(there)).double().cpu().numpy()
     distance = actions.distance(here, there).double().cpu().numpy()
     worst = np.argsort(-distance, kind="stable")[:8]
     return {
@@ -232,7 +232,10 @@ def asymmetry(
 def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, Any]:
     """Compare a response map with its mirror image, which is the map read backwards."""
     here, there = response.probabilities, actions.mirror(response.probabilities[:, :, ::-1])
-    signed, distance = actions.leaning(here) - actions.leaning(there), actions.distance(here, there)
+    signed, distance = (
+        actions.prob_left(here) - actions.prob_left(there),
+        actions.distance(here, there),
+    )
     at = np.unravel_index(distance.argmax(), distance.shape)
     places = zip(("height", "forward", "lateral"), at, strict=True)
     return {

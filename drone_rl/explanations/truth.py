@@ -117,8 +117,8 @@ def deletion_insertion(trial: Trial, maps: Tensor, absent: Tensor) -> dict[str, 
     for share in SHARES:
         hottest = (rank < round(rank.shape[1] * rank.shape[2] * share))[:, None]
         for name, taken in (("deletion", hottest), ("insertion", ~hottest)):
-            wishes = probabilities(trial.network, torch.where(taken, absent, trial.observations))
-            curves[name].append(wishes.gather(1, actions[:, None])[:, 0])
+            probs = probabilities(trial.network, torch.where(taken, absent, trial.observations))
+            curves[name].append(probs.gather(1, actions[:, None])[:, 0])
     points = {n: torch.stack(curve, 1).double().numpy() for n, curve in curves.items()}
     found = {}
     for number, name in enumerate(actions_of(trial.network).names):

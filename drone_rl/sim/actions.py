@@ -1,7 +1,7 @@
-"""Sets of actions, and distances between wishes.
+"""Sets of actions, and distances between their probabilities.
 
-A *wish* is a network's output as shares of named *parts*, which add up to 1. Parts are the discrete
-actions, or kinds of continuous actions, such as "left"; a share is the probability of a part.
+A network's output gives the probabilities of named *parts*, which add up to 1. Parts are the
+discrete actions, or kinds of continuous actions, such as "left".
 """
 
 import abc
@@ -18,8 +18,8 @@ from torch import Tensor
 from drone_rl.utils import palette
 from drone_rl.utils.palette import Rgb
 
-Wish = TypeVar("Wish", Tensor, NDArray)
-"""One wish or a batch. Shape: (*, num_parts)."""
+Probs = TypeVar("Probs", Tensor, NDArray)
+"""Probabilities of the parts, or a batch of them. Shape: (*, num_parts)."""
 
 
 class Entry(NamedTuple):
@@ -33,7 +33,7 @@ class Entry(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Actions(abc.ABC):
-    """A set of actions and the numbered parts of a wish, which is a tensor or a NumPy array.
+    """A set of actions and its numbered parts; probabilities are a tensor or a NumPy array.
 
     An *action* is what dynamics take, shaped as `entry` says; a *part* is a number, int64. Raises a
     `ValueError` if a mirror image or opposite is not among the parts, or not mutual.
@@ -78,30 +78,30 @@ class Actions(abc.ABC):
         """All parts that lead to the left; their mirror images lead to the right."""
         return (self.left,)
 
-    def chosen(self, wish: Tensor) -> Tensor:
-        """Return the part with the largest share. Shape: (*)."""
-        return wish.argmax(-1)
+    def chosen(self, probs: Tensor) -> Tensor:
+        """Return the most probable part. Shape: (*)."""
+        return probs.argmax(-1)
 
-    def mirror(self, wish: Wish) -> Wish:
-        """Return the mirror image of a wish. Shape kept."""
-        return wish[..., list(self.mirrored)]
+    def mirror(self, probs: Probs) -> Probs:
+        """Return the probabilities of the mirror images. Shape kept."""
+        return probs[..., list(self.mirrored)]
 
-    def distance(self, wish: Wish, other: Wish) -> Wish:
+    def distance(self, probs: Probs, other: Probs) -> Probs:
         """Return the total variation: half the sum of the absolute differences. Shape: (*)."""
-        return 0.5 * abs(wish - other).sum(-1)  # pyright: ignore[reportReturnType] (of arrays and tensors)
+        return 0.5 * abs(probs - other).sum(-1)  # pyright: ignore[reportReturnType] (of arrays and tensors)
 
-    def leaning(self, wish: Wish) -> Wish:
-        """Return the share of parts to the left, 0 to 1. Shape: (*)."""
-        return wish[..., list(self.lefts)].sum(-1)  # pyright: ignore[reportReturnType] (of both)
+    def prob_left(self, probs: Probs) -> Probs:
+        """Return the probability of all parts to the left. Shape: (*)."""
+        return probs[..., list(self.lefts)].sum(-1)  # pyright: ignore[reportReturnType] (of both)
 
-    def opposition(self, wish: NDArray, other: NDArray) -> NDArray:
-        """Return how opposed two wishes are, 0 to 1; below 0 where the second leans left.
+    def opposition(self, probs: NDArray, other: NDArray) -> NDArray:
+        """Return how opposed two distributions are, 0 to 1; below 0 if the second prefers left.
 
         This is the smaller of the changes to the left and to the right, 0 if their signs differ.
-        It is 1 if one wish is certainly left and the other certainly right. Shape: (*).
+        It is 1 if one is certainly left and the other certainly right. Shape: (*).
         """
-        swing = wish - other
-        to_left, to_right = self.leaning(swing), -self.leaning(self.mirror(swing))
+        swing = probs - other
+        to_left, to_right = self.prob_left(swing), -self.prob_left(self.mirror(swing))
         agreed = np.sign(to_left) == np.sign(to_right)
         least = np.minimum(np.abs(to_left), np.abs(to_right))
         return np.where(agreed, np.sign(to_left) * least, 0.0)
@@ -152,12 +152,12 @@ class Actions(abc.ABC):
         """Names of the network's outputs."""
 
     @abc.abstractmethod
-    def wish(self, outputs: Tensor) -> Tensor:
-        """Return the wish of a network's outputs. (*, num_outputs) to (*, len(names))."""
+    def probabilities(self, outputs: Tensor) -> Tensor:
+        """Return the probabilities of the parts. (*, num_outputs) to (*, len(names))."""
 
     @abc.abstractmethod
     def scores(self, outputs: Tensor) -> Tensor:
-        """Return unbounded scores with which the shares of parts grow. Shapes as of `wish`."""
+        """Return unbounded scores that grow with the probabilities. Shapes likewise."""
 
     @abc.abstractmethod
     def greedy(self, outputs: Tensor) -> Tensor:
@@ -194,7 +194,7 @@ def _take(values: Sequence[int], part: Tensor) -> Tensor:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DiscreteActions(Actions):
-    """A few numbered actions; a wish holds the probability of each. See `Actions`."""
+    """A few numbered actions, each of which is a part. See `Actions`."""
 
     @property
     def entry(self) -> Entry:
@@ -206,7 +206,7 @@ class DiscreteActions(Actions):
         """The names of the actions, one logit each."""
         return self.names
 
-    def wish(self, outputs: Tensor) -> Tensor:
+    def probabilities(self, outputs: Tensor) -> Tensor:
         """Return the softmax of logits (Eq. 9)."""
         return outputs.softmax(-1)
 

@@ -4,7 +4,7 @@ An action is three numbers in [-1, 1]. Forward: 1 is full speed, -1 is none; sid
 the greatest speed or rate to the left, -1 to the right. Samples of normal distributions, see
 `normal_of`, are squashed by tanh.
 
-The parts of a wish are forward, left, right, and, where drones can turn, turn left and turn right.
+The parts are forward, left, right, and, where drones can turn, turn left and turn right.
 An action is left if it goes left at more than a third of full speed, and turns left at more than a
 third of the greatest rate. It counts half to each if it does both, and is forward if it does
 neither. A part's share is its probability, in closed form.
@@ -90,7 +90,7 @@ class ContinuousActions(Actions):
             self.speeds, dtype=torch.float64
         )
 
-    def wish(self, outputs: Tensor) -> Tensor:
+    def probabilities(self, outputs: Tensor) -> Tensor:
         """Return the probability of each part."""
         mean, deviation = normal_of(outputs)
         left, turn_left = _above((mean - _EDGE) / deviation)[..., SIDEWAYS:].unbind(-1)

@@ -47,18 +47,18 @@ def agreement(
     """Run a policy with sampled actions and compare another implementation at every step.
 
     The actor writes "logits"; `other` takes RGB images (N, H, W, 3), uint8, and returns
-    probabilities (N, A), see `Actions.wish`, on the CPU. Environments whose episode ends are reset.
+    `Actions.probabilities` (N, A) on the CPU. Environments whose episode ends are reset.
     """
     base: Any = env.base_env
     actions = worlds_of(env).dynamics.actions
-    wishes, others, state = [], [], env.reset()
+    probs, others, state = [], [], env.reset()
     with set_exploration_type(ExplorationType.RANDOM):
         for _ in range(steps):
             state = actor(state)
-            wishes.append(actions.wish(state["logits"]).cpu())
+            probs.append(actions.probabilities(state["logits"]).cpu())
             others.append(other(base.last_pixels.cpu()))
             state = env.step_and_maybe_reset(state)[1]
-    mine, its = torch.cat(wishes), torch.cat(others)
+    mine, its = torch.cat(probs), torch.cat(others)
     return Agreement(
         frames=len(mine),
         difference=float((mine - its).abs().max()),

@@ -184,19 +184,15 @@ def chances(
     progress = progress or Bar()
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
-    cubes_task = require_cubes(policy.description, "exact probabilities")
-    placed = (
-        _drawn(cubes_task, settings.placements, seed)
-        if cubes is None
-        else _given(cubes_task, cubes)
-    )
-    at_a_time = max(1, CELLS_AT_A_TIME // math.prod(shape_of(cubes_task)))
+    chosen = require_cubes(policy.description, "exact probabilities")
+    placed = _drawn(chosen, settings.placements, seed) if cubes is None else _given(chosen, cubes)
+    at_a_time = max(1, CELLS_AT_A_TIME // math.prod(shape_of(chosen)))
     parts = placed.split(min(at_a_time, PLACEMENTS_AT_A_TIME))
     with closing(policy.make_env(1, device=settings.device, renderer=settings.renderer)) as env:
         evaluator, found = NodeEvaluator(env, policy.make_network(settings.device)), []
         for part in parts:
             progress("placements", sum(map(len, found)), len(placed))
-            graph = explore(cubes_task, part)
+            graph = explore(chosen, part)
             found.append(propagate(graph, evaluator.on(graph)))
     progress("placements", len(placed), len(placed))
     return Chances(
@@ -216,13 +212,13 @@ def _bounded(
     """Return bounds around each placement, clipped to the positions where cubes may stand."""
     network, gap = policy.make_network(), ProveSettings.logit_gap
     found: list[SuccessBounds] = []
-    cubes_task = make_policy_spec(policy.description, network, gap, settings.renderer)
-    with closing(cubes_task):
-        bound = cubes_task.lattice.task.lateral_bound
+    spec = make_policy_spec(policy.description, network, gap, settings.renderer)
+    with closing(spec):
+        bound = spec.lattice.task.lateral_bound
         for i, aside in enumerate(placed[..., 1].numpy()):
             progress("bounds", i, len(placed))
             box = np.stack([aside - settings.within, aside + settings.within], -1)
-            found.append(bound_success(cubes_task, box.clip(-bound, bound), settings.parts))
+            found.append(bound_success(spec, box.clip(-bound, bound), settings.parts))
     progress("bounds", len(placed), len(placed))
     return tuple(found)
 

@@ -93,14 +93,14 @@ def test_an_outcome_is_flown_not_guessed(scenes):
 
 
 def test_blind_is_where_a_turn_is_called_for_and_nothing_changes():
-    wishes = np.array([[[IDLE, LEFT, IDLE, LEFT, [0.95, 0.0, 0.05]]]])
+    probs = np.array([[[IDLE, LEFT, IDLE, LEFT, [0.95, 0.0, 0.05]]]])
     needed = torch.tensor([1, 1, 0, 2, 2])
-    blind = find_blind(MOVES, torch.tensor(wishes), torch.tensor(IDLE), needed)
+    blind = find_blind(MOVES, torch.tensor(probs), torch.tensor(IDLE), needed)
     found = ResponseMap(
         height=np.array([0.0]),
         forward=np.array([5.0]),
         lateral=np.array([6.0, 3.0, 0.0, -3.0, -6.0]),
-        probabilities=wishes,
+        probabilities=probs,
         without_target=np.array(IDLE),
         oracle=needed.numpy(),
         stratum=np.array([0, 0, 1, 2, 2]),
@@ -127,9 +127,9 @@ def test_blind_is_where_a_turn_is_called_for_and_nothing_changes():
 def test_who_turns_to_the_side_where_he_is_to_go_is_not_blind():
     actions = ContinuousActions.of(SETTINGS)
     turns_left, turns_right = np.eye(5)[3], np.eye(5)[4]
-    for wish, is_blind in ((turns_left, False), (turns_right, True)):
-        wishes = torch.tensor(wish).view(1, 1, 1, 5)
-        assert find_blind(actions, wishes, wishes[0, 0, 0], torch.tensor([1])).item() is is_blind
+    for probs, is_blind in ((turns_left, False), (turns_right, True)):
+        probs = torch.tensor(probs).view(1, 1, 1, 5)
+        assert find_blind(actions, probs, probs[0, 0, 0], torch.tensor([1])).item() is is_blind
 
 
 def test_who_flies_straight_on_by_nature_is_blind_only_beyond_its_reach(scenes):

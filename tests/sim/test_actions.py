@@ -37,7 +37,7 @@ def test_recorded_actions_are_indices():
 
 def test_probabilities_are_the_softmax_of_outputs():
     outputs = torch.tensor([[0.0, 0.0, 0.0, 0.0, 4.0**0.5], [1.0, 2.0, 0.0, 0.0, 0.0]])
-    probs = FIVE.wish(outputs)
+    probs = FIVE.probabilities(outputs)
     torch.testing.assert_close(probs.sum(-1), torch.ones(2))
     assert probs[0, 4] / probs[0, 0] == pytest.approx(np.exp(2.0))
     assert FIVE.chosen(probs).tolist() == [4, 1]
@@ -51,7 +51,7 @@ def test_mirror_swaps_only_left_and_right(kind):
         [0, 0, 0, 1, 0],
     ]
     assert FIVE.mirror(FIVE.mirror(probs)).tolist() == probs.tolist()
-    assert FIVE.leaning(probs).tolist() == [probs[0, 2], 1.0]
+    assert FIVE.prob_left(probs).tolist() == [probs[0, 2], 1.0]
 
 
 @pytest.mark.parametrize("kind", [torch.tensor, np.array])

@@ -23,7 +23,7 @@ def test_opposition_sums_all_parts_that_lead_left():
     both = Both(**vars(FOUR))
     for kind in (torch.tensor, np.array):
         probs = kind([[0.5, 0.0, 0.25, 0.25]])
-        assert (FOUR.leaning(probs).tolist(), both.leaning(probs).tolist()) == (
+        assert (FOUR.prob_left(probs).tolist(), both.prob_left(probs).tolist()) == (
             [0.5],
             [0.75],
         )

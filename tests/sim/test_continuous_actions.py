@@ -53,10 +53,10 @@ def test_zero_outputs_mean_half_speed_ahead():
 
 def test_part_probabilities_match_hand_computed_ones():
     left, right = phi((0.5 - EDGE) / DEVIATION), phi((-0.5 - EDGE) / DEVIATION)
-    probs = STRAIGHT.wish(outputs(left=0.5))
+    probs = STRAIGHT.probabilities(outputs(left=0.5))
     assert probs.tolist() == pytest.approx([1 - left - right, left, right])
     turn = phi(-EDGE / DEVIATION)  # to either side
-    probs = ALL.wish(outputs(left=0.5))
+    probs = ALL.probabilities(outputs(left=0.5))
     both = [
         (1 - left - right) * (1 - 2 * turn),
         left * (1 - turn),
@@ -84,7 +84,9 @@ def test_part_probabilities_match_sampled_actions():
         ],
         -1,
     )
-    assert (shares.mean(0) - ALL.wish(given)).abs().max() < 0.007  # 4 standard errors of 0.5 / 316
+    assert (
+        shares.mean(0) - ALL.probabilities(given)
+    ).abs().max() < 0.007  # 4 standard errors of 0.5 / 316
 
 
 def test_uniform_actions_have_equal_parts():
@@ -108,10 +110,13 @@ def test_part_of_an_action():
 
 
 def test_mirrored_probabilities_equal_those_of_mirrored_means():
-    there = ALL.wish(outputs(0.5, -0.7, 0.2))
-    torch.testing.assert_close(ALL.mirror(ALL.wish(outputs(0.5, 0.7, -0.2))), there)
-    assert ALL.leaning(there) == there[1] + there[3]
-    assert STRAIGHT.leaning(STRAIGHT.wish(outputs())) == STRAIGHT.wish(outputs())[1]
+    there = ALL.probabilities(outputs(0.5, -0.7, 0.2))
+    torch.testing.assert_close(ALL.mirror(ALL.probabilities(outputs(0.5, 0.7, -0.2))), there)
+    assert ALL.prob_left(there) == there[1] + there[3]
+    assert (
+        STRAIGHT.prob_left(STRAIGHT.probabilities(outputs()))
+        == STRAIGHT.probabilities(outputs())[1]
+    )
 
 
 def test_left_and_turning_right_undo_each_other():
@@ -124,7 +129,7 @@ def test_left_and_turning_right_undo_each_other():
 
 def test_probabilities_and_scores_have_gradients():
     free = torch.tensor([0.3, -0.2, 0.4, 0.1, -0.5, 0.7], dtype=torch.float64, requires_grad=True)
-    assert torch.autograd.gradcheck(ALL.wish, free)
+    assert torch.autograd.gradcheck(ALL.probabilities, free)
     given = torch.tensor([[1.0, 2.0, 3.0, 9.0, 9.0, 9.0], [0.0, -1.0, 4.0, 9.0, 9.0, 9.0]])
     assert ALL.scores(given).tolist() == [[1.0, 2.0, -2.0, 3.0, -3.0], [0.0, -1.0, 1.0, 4.0, -4.0]]
     assert STRAIGHT.scores(given).tolist() == [[1.0, 2.0, -2.0], [0.0, -1.0, 1.0]]

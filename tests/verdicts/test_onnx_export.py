@@ -37,7 +37,9 @@ def test_programs_agree_on_what_speeds_are_for_the_most_part():
     env = make_env(4)
     network, actor = make_policy(env)
     transform, actions = on_pixels(env.transform), network.actions
-    found = agreement(env, actor, lambda frames: actions.wish(network(transform(frames))), 5)
+    found = agreement(
+        env, actor, lambda frames: actions.probabilities(network(transform(frames))), 5
+    )
     env.close()
     assert (found.frames, found.actions_differ) == (20, 0) and found.difference < 1e-6
 

@@ -125,12 +125,12 @@ def _draw_row(
     style: dict[str, Any] = {
         "extent": extent, "origin": "lower", "aspect": "auto", "interpolation": "nearest",
     }  # fmt: skip
-    *wishes, most, outcome = axes
-    for axis, action in zip(wishes, actions.order, strict=True):
+    *panels, most, outcome = axes
+    for axis, action in zip(panels, actions.order, strict=True):
         axis.imshow(probabilities[..., action], vmin=0, vmax=1, cmap="viridis", **style)
         axis.set_title(f"P({actions.names[action]})")
-    shades = ListedColormap([actions.css(action) for action in range(len(wishes))])
-    most.imshow(probabilities.argmax(-1), vmin=0, vmax=len(wishes) - 1, cmap=shades, **style)
+    shades = ListedColormap([actions.css(action) for action in range(len(panels))])
+    most.imshow(probabilities.argmax(-1), vmin=0, vmax=len(panels) - 1, cmap=shades, **style)
     most.set_title("most probable action")
     blind = arrays["response_blind"][layer]
     if blind.any():

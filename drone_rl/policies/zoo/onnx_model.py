@@ -37,8 +37,8 @@ class _FullPolicy(nn.Module):
 
     def forward(self, frames: Tensor) -> Tensor | tuple[Tensor, Tensor]:
         actions, outputs = self._network.actions, self._network(self._transform(frames))
-        wish = actions.wish(outputs)
-        return (wish, actions.greedy(outputs)) if self.has_action else wish
+        probs = actions.probabilities(outputs)
+        return (probs, actions.greedy(outputs)) if self.has_action else probs
 
 
 def make_onnx(
@@ -48,9 +48,9 @@ def make_onnx(
 
     The input is "frames", RGB of the camera, uint8 (N, H, W, 3) for any N from 1. The output is
     "probabilities", of each action, float32 (N, A). Of continuous actions they are those of their
-    parts, see `Actions.wish`, and a second output is "action", float32 (N, 3). The metadata are
-    JSON: the description by its keys, "actions", names in the order of the first output, and
-    `about`.
+    parts, see `Actions.probabilities`, and a second output is "action", float32 (N, 3). The
+    metadata are JSON: the description by its keys, "actions", names in the order of the first
+    output, and `about`.
 
     Raises:
         InputError: The policy needs more than one frame, ONNX does not support it, or a package is

@@ -92,7 +92,7 @@ def test_continuous_actions_are_outputs():
         outputs = network(on_pixels(description.make_transforms())(frames))
     assert set(found) == {"probabilities", "action"}
     expected = {
-        "probabilities": network.actions.wish(outputs),
+        "probabilities": network.actions.probabilities(outputs),
         "action": outputs[:, :3].div(3).tanh().mul(3).tanh(),
     }
     for name, values in expected.items():

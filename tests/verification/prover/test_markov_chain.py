@@ -20,11 +20,11 @@ from drone_rl.verification.prover.lattice import explore
 from drone_rl.verification.prover.markov_chain import NEGLIGIBLE, NodeEvaluator, Outcomes, propagate
 
 
-def constant(settings, cubes, *wish):
+def constant(settings, cubes, *probs):
     """The outcomes of a policy that sees nothing."""
     graph = explore(settings, cubes)
-    wishes = torch.tensor(wish, dtype=torch.float64)
-    return propagate(graph, lambda nodes: wishes.expand(len(nodes), 3))
+    probs = torch.tensor(probs, dtype=torch.float64)
+    return propagate(graph, lambda nodes: probs.expand(len(nodes), 3))
 
 
 def test_forward_alone_collects_what_stands_ahead(place):
@@ -79,20 +79,20 @@ def test_the_step_limit_by_hand(small, place):
 
 def test_back_and_forth_for_ever_is_the_step_limit(small, place):
     graph = explore(small, place(small, [0.0]))
-    wishes = torch.tensor([[0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]).double()
-    done = propagate(graph, lambda nodes: wishes[nodes])
+    probs = torch.tensor([[0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]).double()
+    done = propagate(graph, lambda nodes: probs[nodes])
     assert done.ends[0, EndReason.STEP_LIMIT, 0] == 1.0
     assert done.steps.tolist() == [300.0]
 
 
-def walked(settings, y, wish):
+def walked(settings, y, probs):
     """The same of one cube, written anew: a dictionary of places, floats and plain ifs."""
     now, ends, steps = {(0, 0, False): 1.0}, defaultdict(float), 0.0
     for step in range(1, settings.step_limit + 1):
         later = defaultdict(float)
         steps += sum(now.values())
         for (i, j, got), mass in now.items():
-            for (di, dj), p in zip([(1, 0), (0, 1), (0, -1)], wish, strict=True):
+            for (di, dj), p in zip([(1, 0), (0, 1), (0, -1)], probs, strict=True):
                 a, b = i + di, j + dj
                 is_near = abs(a - settings.first_distance) <= 1.65 and abs(b - y) <= 1.65
                 gets = got or (is_near and i <= settings.first_distance)
@@ -110,11 +110,11 @@ def walked(settings, y, wish):
     return ends, steps
 
 
-@pytest.mark.parametrize("wish", [(1 / 3, 1 / 3, 1 / 3), (0.05, 0.5, 0.45), (0.7, 0.05, 0.25)])
-def test_one_cube_against_a_programme_written_anew(place, wish):
+@pytest.mark.parametrize("probs", [(1 / 3, 1 / 3, 1 / 3), (0.05, 0.5, 0.45), (0.7, 0.05, 0.25)])
+def test_one_cube_against_a_programme_written_anew(place, probs):
     settings = TaskSettings(num_cubes=1, side_margin=3.0, step_limit=60)
-    ends, steps = walked(settings, 2.3, wish)
-    done = constant(settings, place(settings, [2.3]), *wish)
+    ends, steps = walked(settings, 2.3, probs)
+    done = constant(settings, place(settings, [2.3]), *probs)
     for reason in list(EndReason)[1:]:
         found = float(done.reasons[0, reason])
         assert found == pytest.approx(ends[reason.name.lower()], abs=1e-14), reason
@@ -133,7 +133,7 @@ def test_placements_are_joined_and_stay_apart(place):
 
 
 class Hotter(nn.Module):
-    """A network whose wishes are less decided, so that all that can happen does."""
+    """A network whose probs are less decided, so that all that can happen does."""
 
     def __init__(self, network, factor):
         super().__init__()
