@@ -110,7 +110,7 @@ def _render_appearance(env: DroneEnv) -> int:
     """Render every environment with its own appearance at 64x64 pixels."""
     every = torch.arange(env.worlds.num_envs)
     view = env.worlds.view(height=64, width=64)
-    return len(env.worlds.render(env.worlds.state, view, env.looks.drawn(every)))
+    return len(env.worlds.render(env.worlds.state, view, env.appearances.current(every)))
 
 
 def _render(worlds: Worlds, view: View | None = None) -> int:

@@ -107,7 +107,7 @@ class DirectRenderer:
         return TensorDict(entries, [size], device=device)
 
     def _pixels(self, state: State, rows: Tensor | None) -> Tensor:
-        frames = self.worlds.render(state, self.view, self.env.looks.drawn(rows))
+        frames = self.worlds.render(state, self.view, self.env.appearances.current(rows))
         if self.view.modalities == ("gray",):
             frames = frames[:, None]
         return self._transform(frames)

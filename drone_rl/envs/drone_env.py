@@ -22,7 +22,7 @@ from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.rendering import RendererFactory, check_device
 from drone_rl.sim.tasks import Task, as_task
-from drone_rl.sim.visual_randomization import Appearances
+from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream, get_state, set_state, side_stream, world_random_state
@@ -83,7 +83,9 @@ class DroneEnv(EnvBase):
         check_device(device)
         super().__init__(device=torch.device(device), batch_size=torch.Size([num_envs]))
         task = as_task(task)
-        self.looks = Appearances(appearance or MINIMAL, num_envs, device, task=task, camera=camera)
+        self.appearances = AppearanceSampler(
+            appearance or MINIMAL, num_envs, device, task=task, camera=camera
+        )
         self.worlds = Worlds(
             num_envs,
             task,
@@ -93,8 +95,8 @@ class DroneEnv(EnvBase):
             renderer=renderer,
             device=device,
             num_shards=num_shards,
-            appearance=self.looks.middle,
-            distractors=self.looks.distractors,
+            appearance=self.appearances.middle,
+            distractors=self.appearances.distractors,
         )
         self.pixels = pixels
         if pixels:
@@ -125,15 +127,15 @@ class DroneEnv(EnvBase):
 
     def running_state(self) -> dict[str, Any]:
         """Return the full state, which suffices to resume within episodes."""
-        looks = {"looks": self.looks.values} if self.looks.varies else {}
-        return {**self.state_dict(), "worlds": self.worlds.state.tensors(), **looks}
+        appearances = {"looks": self.appearances.values} if self.appearances.varies else {}
+        return {**self.state_dict(), "worlds": self.worlds.state.tensors(), **appearances}
 
     def load_running_state(self, state: Mapping[str, Any]) -> None:
         """Restore a `running_state` and render it; see `load_state_dict` for errors."""
         self.load_state_dict(dict(state))
         self.worlds.state = self.worlds.state.with_tensors(state["worlds"])
-        if self.looks.varies:
-            self.looks.load(state["looks"])
+        if self.appearances.varies:
+            self.appearances.load(state["looks"])
         self._render(self._indices(None))
 
     def side_streams(self, worlds: Tensor, *key: int) -> list[np.random.Generator]:
@@ -188,7 +190,7 @@ class DroneEnv(EnvBase):
         """Start episodes without rendering, by default all. Indices: (k,)."""
         worlds = self._indices(None) if worlds is None else worlds
         random_states = [self._random_states[i] for i in worlds.tolist()]
-        self.looks.reset(worlds, random_states)
+        self.appearances.reset(worlds, random_states)
         self.worlds.reset(worlds, random_states)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -207,7 +209,7 @@ class DroneEnv(EnvBase):
             return
         is_whole = len(worlds) == len(self._pixels)
         state = self.worlds.state if is_whole else self.worlds.state[worlds]
-        pixels = self.worlds.render(state, appearance=self.looks.drawn(worlds))
+        pixels = self.worlds.render(state, appearance=self.appearances.current(worlds))
         if is_whole:
             self._pixels = pixels
         else:

@@ -95,7 +95,7 @@ def view(policy: Policy, *, greedy: bool = True, seed: int = 0, **how: Any) -> N
         dynamics=worlds.dynamics,
         pixels=False,
         random_state=legacy_seed(seed),
-        appearance=base.looks.settings,
+        appearance=base.appearances.settings,
     )
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
 
@@ -180,7 +180,7 @@ def _caption(task: Task[Any], state: TensorDictBase, earned: float) -> str:
 
 def _look(base: DroneEnv) -> _Seen:
     """Render the first environment."""
-    worlds, look = base.worlds, base.looks.drawn()
+    worlds, look = base.worlds, base.appearances.current()
     five = worlds.view(_FIVE, height=STRIP_HEIGHT, width=(WIDTH + GAP) // len(_FIVE) - GAP)
     outside = render_chase(worlds, look, CHASE_HEIGHT, WIDTH)[0]
     strip = worlds.render_all(worlds.state, five, look)["rgb"][0]

@@ -124,9 +124,9 @@ class OracleAgent:
 
     knows_truth = True
 
-    def __init__(self, *, looks: bool = True) -> None:
-        """With `looks=False`, the oracle uses the positions of all cubes."""
-        self._looks = looks
+    def __init__(self, *, only_visible: bool = True) -> None:
+        """With `only_visible=False`, the oracle uses the positions of all cubes."""
+        self._only_visible = only_visible
 
     def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
         """See `Agent`."""
@@ -136,7 +136,7 @@ class OracleAgent:
         for action in context.pending:
             body = worlds.dynamics.step(body, action)
         info = worlds.info(dataclasses.replace(context.state, body=body))
-        if self._looks:
+        if self._only_visible:
             info["next_cube"] = self._first_visible(context, info["next_cube"])
         return rule.decide([info[name] for name in rule.reads], worlds.dynamics.actions), None
 

@@ -36,7 +36,7 @@ from drone_rl.robustness.perturbations import (
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State, as_task
-from drone_rl.sim.visual_randomization import Appearances
+from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import Stream, torch_generator, world_random_state
 from drone_rl.utils.settings import below
@@ -78,10 +78,10 @@ class PairedEvaluator:
         self.subject, self.episodes, self.seed = subject, episodes, seed
         task = as_task(subject.task)
         streams = [world_random_state(seed, i, Stream.SHIFTED) for i in range(episodes)]
-        self.looks = Appearances(
+        self.appearances = AppearanceSampler(
             subject.appearance, episodes, subject.device, task=task, camera=subject.camera
         )
-        self.looks.reset(torch.arange(episodes), streams)
+        self.appearances.reset(torch.arange(episodes), streams)
         self._drawn = torch.stack([task.sample(stream) for stream in streams])
         dynamics = make_dynamics(task.make_dynamics, subject.dynamics, subject.actions)
         self._seeds = draw_seeds(streams) if dynamics.is_random else None
@@ -108,7 +108,7 @@ class PairedEvaluator:
                 actions=self.subject.actions,
                 renderer=self.subject.renderer,
                 device=self.subject.device,
-                distractors=self.looks.distractors + condition.clutter,
+                distractors=self.appearances.distractors + condition.clutter,
             )
         return self._built[key]
 
@@ -185,19 +185,21 @@ class _Stage:
         self._faults = FaultPipeline(
             condition.faults, episodes, seed, hiding_only=agent.knows_truth
         )
-        self._own = None if evaluator.looks.varies else evaluator.looks.middle
-        self._full = scene_appearance(self.worlds.scene) if condition.looks else None
+        self._own = None if evaluator.appearances.varies else evaluator.appearances.middle
+        self._full = scene_appearance(self.worlds.scene) if condition.appearance_changes else None
         self._distractors = evaluator.distractor_places() if condition.clutter else None
 
     def context(self, state: State, active: Tensor, pending: list[Tensor]) -> StepContext:
         """Everything that the agent may use at the next step."""
-        looks, condition = self._evaluator.looks, self._condition
+        appearances, condition = self._evaluator.appearances, self._condition
         variation = [part.to(self.worlds.device)[active] for part in next(self._variations)]
-        own = looks.drawn(active) if looks.varies else self._own
+        own = appearances.current(active) if appearances.varies else self._own
         if self._full is not None:
             own = self._full if own is None else own.over(self._full)
         appearance = own
-        for part, by in zip((*condition.looks, *condition.mounts), variation, strict=True):
+        for part, by in zip(
+            (*condition.appearance_changes, *condition.mounts), variation, strict=True
+        ):
             appearance = part.change(appearance or Appearance(), by)
         if self._distractors is not None:
             things = task_things(self._evaluator.subject.task)

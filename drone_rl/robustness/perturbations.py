@@ -61,7 +61,7 @@ class Condition:
     """Settings of the task to replace."""
     camera: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """Settings of the camera to replace."""
-    looks: tuple[AppearanceChange, ...] = ()
+    appearance_changes: tuple[AppearanceChange, ...] = ()
     """Changes of colours and light; they need an appearance in which all is given."""
     mounts: tuple[AppearanceChange, ...] = ()
     """Changes of the camera's pose."""
@@ -74,15 +74,15 @@ class Condition:
 
     @property
     def dimensions(self) -> tuple[int, ...]:
-        """Numbers in the variation of each of the looks, then of the mounts."""
-        return tuple(part.dimensions for part in (*self.looks, *self.mounts))
+        """Numbers in the variation of each appearance change, then of the mounts."""
+        return tuple(part.dimensions for part in (*self.appearance_changes, *self.mounts))
 
     def __or__(self, other: Self) -> "Condition":
         """Combine two conditions; the other one's settings take precedence."""
         return Condition(
             task={**self.task, **other.task},
             camera={**self.camera, **other.camera},
-            looks=self.looks + other.looks,
+            appearance_changes=self.appearance_changes + other.appearance_changes,
             mounts=self.mounts + other.mounts,
             faults=self.faults + other.faults,
             delay=max(self.delay, other.delay),

@@ -183,7 +183,7 @@ def _domain(
         raise InputError(f"task={task.name} has no oracle to compare with; give domain=false")
     ranges: dict[str, Any] = {}
     with closing(PairedEvaluator(subject, settings.domain_episodes, seed.value)) as evaluator:
-        oracle = evaluator.run(Condition(), agent=OracleAgent(looks=False)).episodes
+        oracle = evaluator.run(Condition(), agent=OracleAgent(only_visible=False)).episodes
         prober = Prober(evaluator, oracle, settings.good_share, settings.possible_share)
         for axis in axes:
             tell(f"range of {axis.name}")

@@ -101,7 +101,7 @@ class Suite:
     def _fly_oracle(self, condition: Condition) -> ConditionResult:
         """Run the oracle without light, colours and noise, which do not affect it."""
         faults = tuple(fault for fault in condition.faults if fault.hides)
-        kept = dataclasses.replace(condition, looks=(), faults=faults)
+        kept = dataclasses.replace(condition, appearance_changes=(), faults=faults)
         if kept == Condition() and self.oracle is not None:
             return self.oracle
         return self._evaluator.run(condition, agent=OracleAgent())

@@ -23,7 +23,7 @@ from drone_rl.sim.rendering import Appearance, opengl
 from drone_rl.sim.rendering.opengl import OpenGlAppearance
 from drone_rl.sim.rendering.scene import Scene, SemanticClass
 from drone_rl.sim.tasks import State, Task, as_task
-from drone_rl.sim.visual_randomization import Appearances, things_of
+from drone_rl.sim.visual_randomization import AppearanceSampler, things_of
 
 _SKY = 0.69 * entities.DRAW_DISTANCE
 """Metres behind which there is nothing: MuJoCo's sky is a ball of 0.7 of the drawing distance."""
@@ -67,7 +67,7 @@ class ComposerTask(composer.Task):
         self.camera = camera or CameraSettings()
         self._sampler = self._opengl = None
         if appearance is not None and not appearance.is_minimal:
-            self._sampler = Appearances(appearance, 1, task=self.rules, camera=self.camera)
+            self._sampler = AppearanceSampler(appearance, 1, task=self.rules, camera=self.camera)
             distractors = self._sampler.distractors
         self._arena = entities.Field()
         model: Any = self._arena.mjcf_model
@@ -128,7 +128,7 @@ class ComposerTask(composer.Task):
         """Put the drone at its origin and the props where they are sampled."""
         if self._sampler is not None:
             self._sampler.reset(torch.arange(1), [random_state])
-            self.appearance = self._sampler.drawn() or self._sampler.middle
+            self.appearance = self._sampler.current() or self._sampler.middle
         self._begin(random_state)
         if self._flight is not None:
             self._flight.begin(physics, self.state.body)

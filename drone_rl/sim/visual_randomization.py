@@ -71,13 +71,13 @@ def draw_distractors(
     if not most or things is None:
         return []
     number = torch.arange(most)
-    count = _drawn(settings.distractors, source, ())
+    count = _uniform(settings.distractors, source, ())
     if isinstance(settings.distractors, tuple) and source is not None:
         count = source.randint(settings.distractors[0], most + 1)
-    begin, shift = _drawn((0.0, 1.0), source, ()), _drawn((-0.5, 0.5), source, (most,))
+    begin, shift = _uniform((0.0, 1.0), source, ()), _uniform((-0.5, 0.5), source, (most,))
     share = (begin + number // 2 * _TURN + number % 2 * 0.5 + shift / most) % 1.0
-    size = _drawn(settings.distractor_size, source, (most,))
-    away = _drawn(settings.distractor_distance, source, (most,)) + size / 2
+    size = _uniform(settings.distractor_size, source, (most,))
+    away = _uniform(settings.distractor_distance, source, (most,)) + size / 2
     height = size / 2 - HIDDEN_DEPTH * (number >= count)
     ahead = share * (things.first + things.last)
     places = stand(things, ahead, away, number % 2 == 0, height)
@@ -85,7 +85,7 @@ def draw_distractors(
     return torch.cat([places, size[:, None], colors], -1).flatten().tolist()
 
 
-def _drawn(value: Any, source: np.random.RandomState | None, shape: tuple[int, ...]) -> Tensor:
+def _uniform(value: Any, source: np.random.RandomState | None, shape: tuple[int, ...]) -> Tensor:
     low, high = value if isinstance(value, tuple) else (value, value)
     if low == high or source is None:
         return torch.full(shape, (low + high) / 2, dtype=torch.float64)
@@ -99,7 +99,7 @@ def _color(
     if given is None:
         turn = number + number // len(PALETTE)  # otherwise all of a kind have one colour
         return torch.tensor(PALETTE[turn % len(PALETTE)], dtype=torch.float64)
-    return torch.stack([_drawn(pair, source, ()) for pair in _pairs(given)])
+    return torch.stack([_uniform(pair, source, ()) for pair in _pairs(given)])
 
 
 _OBJECTS = (SemanticClass.TARGET, SemanticClass.OBSTACLE)
@@ -110,7 +110,7 @@ _OF_CAMERA = 7
 """Numbers of a camera mounting."""
 
 
-class Appearances:
+class AppearanceSampler:
     """Samples and keeps the appearance of each environment."""
 
     def __init__(
@@ -136,11 +136,13 @@ class Appearances:
         for name in {*(settings.ground_texture or ()), *(settings.object_texture or ())}:
             if name != NO_TEXTURE:
                 textures.load(name)
-        middle = self._draw(None)
-        self.varies = self._draw(np.random.RandomState(0)) != middle
+        middle = self._sample(None)
+        self.varies = self._sample(np.random.RandomState(0)) != middle
         """Whether appearances differ between episodes."""
         self.middle = (
-            None if settings.is_minimal else self._made(torch.tensor(middle, dtype=torch.float64))
+            None
+            if settings.is_minimal
+            else self._to_appearance(torch.tensor(middle, dtype=torch.float64))
         )
         """Appearance of imagined environments; None for the task's own."""
         self.values = torch.tensor([middle], dtype=torch.float64).repeat(num_envs, 1)
@@ -151,7 +153,7 @@ class Appearances:
         """Sample new appearances by indices, (k,); the given random streams are not advanced."""
         if not self.varies or not len(worlds):
             return
-        rows = [self._draw(_distractors(state)) for state in random_states]
+        rows = [self._sample(_appearance_stream(state)) for state in random_states]
         self.values = self.values.clone()
         self.values[worlds.cpu()] = torch.tensor(rows, dtype=torch.float64)
         self._now = None
@@ -160,23 +162,23 @@ class Appearances:
         """Restore saved `values`."""
         self.values, self._now = values.clone(), None
 
-    def drawn(self, worlds: Tensor | None = None) -> Appearance | None:
+    def current(self, worlds: Tensor | None = None) -> Appearance | None:
         """Return appearances by ordered indices, (k,), all by default; None if they never vary."""
         if not self.varies:
             return None
         if worlds is not None and len(worlds) < len(self.values):
-            return self._made(self.values[worlds.cpu()])
+            return self._to_appearance(self.values[worlds.cpu()])
         if self._now is None:
-            self._now = self._made(self.values)
+            self._now = self._to_appearance(self.values)
         return self._now
 
-    def _draw(self, source: np.random.RandomState | None) -> list[float]:
+    def _sample(self, source: np.random.RandomState | None) -> list[float]:
         # New numbers are sampled last, so that earlier ones keep their values.
-        look = _draw(self.settings, source)
-        return [*look, *draw_distractors(self.settings, self._things, source)]
+        own = _sample_numbers(self.settings, source)
+        return [*own, *draw_distractors(self.settings, self._things, source)]
 
-    def _made(self, values: Tensor) -> Appearance:
-        """Appearance of rows of `_draw`, or of one. Shape: (num_envs, *) or (*)."""
+    def _to_appearance(self, values: Tensor) -> Appearance:
+        """Appearance of rows of `_sample`, or of one. Shape: (num_envs, *) or (*)."""
         settings, values = self.settings, values.to(self._device)
         columns = iter(values.unbind(-1))
         number = functools.partial(next, columns)
@@ -232,8 +234,10 @@ class Appearances:
         return Distractors(places=rows[..., :3], sizes=rows[..., 3], colors=rows[..., 4:])
 
 
-def _draw(settings: AppearanceSettings, source: np.random.RandomState | None) -> list[float]:
-    """Numbers in the order in which `Appearances._made` reads them; middles without a source."""
+def _sample_numbers(
+    settings: AppearanceSettings, source: np.random.RandomState | None
+) -> list[float]:
+    """Return numbers as `AppearanceSampler._to_appearance` reads them; middles without a source."""
 
     def number(value: Any) -> float:
         if not isinstance(value, tuple):
@@ -254,15 +258,15 @@ def _draw(settings: AppearanceSettings, source: np.random.RandomState | None) ->
 
     s, fog = settings, settings.fog_visibility
     share = 0.5 if source is None or s.shadows in (0.0, 1.0) else source.uniform()
-    drawn = [number(s.sun_elevation), number(s.sun_azimuth), number(s.sun_strength)]
-    drawn += [*color(s.sun_color), number(s.ambient_strength), float(share <= s.shadows)]
-    drawn += [*color(s.sky_horizon), *color(s.sky_zenith or s.sky_horizon)]
-    drawn += [math.inf if fog is None else number(fog), *color(s.ground_color)]
-    drawn += [*color(s.object_color or (0.0, 0.0, 0.0)), number(s.exposure)]
-    drawn += [texture(s.ground_texture), number(s.ground_tile)]
-    drawn += [texture(s.object_texture), number(s.object_tile)]
+    numbers = [number(s.sun_elevation), number(s.sun_azimuth), number(s.sun_strength)]
+    numbers += [*color(s.sun_color), number(s.ambient_strength), float(share <= s.shadows)]
+    numbers += [*color(s.sky_horizon), *color(s.sky_zenith or s.sky_horizon)]
+    numbers += [math.inf if fog is None else number(fog), *color(s.ground_color)]
+    numbers += [*color(s.object_color or (0.0, 0.0, 0.0)), number(s.exposure)]
+    numbers += [texture(s.ground_texture), number(s.ground_tile)]
+    numbers += [texture(s.object_texture), number(s.object_tile)]
     camera = (*_pairs(s.camera_offset), *_pairs(s.camera_turn), s.camera_widening)
-    return [*drawn, *(float(_drawn(pair, source, ())) for pair in camera)]
+    return [*numbers, *(float(_uniform(pair, source, ())) for pair in camera)]
 
 
 def _pairs(value: Any) -> list[Any]:
@@ -270,7 +274,7 @@ def _pairs(value: Any) -> list[Any]:
     return [*zip(low, high, strict=True)]
 
 
-def _distractors(random_state: np.random.RandomState) -> np.random.RandomState:
+def _appearance_stream(random_state: np.random.RandomState) -> np.random.RandomState:
     """Return a stream seeded by another one, which is not advanced."""
     ahead = copy.deepcopy(random_state)
     return np.random.RandomState([_APART, *ahead.randint(0, 2**32, 4, dtype=np.uint32)])

@@ -245,7 +245,7 @@ def recheck_domain(
     }
     count = sum(map(len, tried.values())) + 1
     with closing(PairedEvaluator(subject, settings.domain_flights, seed.value)) as evaluator:
-        oracle = evaluator.run(Condition(), agent=OracleAgent(looks=False)).episodes
+        oracle = evaluator.run(Condition(), agent=OracleAgent(only_visible=False)).episodes
         prober = Prober(evaluator, oracle, settings.good_share, plain_part=1 / count)
         found = [contradicted(None, 0.0, "", prober.plain)]
         for axis, strengths in tried.items():

@@ -23,7 +23,7 @@ def envs(monkeypatch):
 
     def make_drone_env(num_envs, device, renderer="raytrace", appearance=None):
         env = SimpleNamespace(closed=False, renderer=renderer)
-        env.looks = SimpleNamespace(drawn=lambda worlds: [appearance] * len(worlds))
+        env.appearances = SimpleNamespace(current=lambda worlds: [appearance] * len(worlds))
         env.worlds = SimpleNamespace(state=None, policy_view=None, view=view, num_envs=num_envs)
         env.worlds.render_all = lambda state, view: {"rgb": "frames", "depth": "frames"}
         env.worlds.render = lambda state, view, looks: looks

@@ -199,10 +199,10 @@ def test_each_episode_has_its_own_appearance_and_the_same_scene():
         assert torch.equal(plain.worlds.state.cubes, foggy.worlds.state.cubes)
         assert (now["pixels"] != seen["pixels"]).double().mean() > 0.2
         assert torch.equal(now["pixels"][0], single["pixels"][0])
-        assert len(foggy.looks.values[:, 14].unique()) == 3
+        assert len(foggy.appearances.values[:, 14].unique()) == 3
         if episode == 0:
-            before = foggy.looks.values
-    assert not (foggy.looks.values[:, 14] == before[:, 14]).any()
+            before = foggy.appearances.values
+    assert not (foggy.appearances.values[:, 14] == before[:, 14]).any()
     for env in (plain, foggy, alone):
         env.close()
 
@@ -214,10 +214,10 @@ def test_appearance_lasts_for_an_episode_and_is_restored():
     other.reset()
     other.load_running_state(env.running_state())
     assert torch.equal(other.last_pixels, env.last_pixels)
-    looks = env.looks.values
+    looks = env.appearances.values
     env.reset(TensorDict({"_reset": torch.tensor([[True], [False]])}, [2]))
-    assert torch.equal(env.looks.values[1], looks[1])
-    assert not torch.equal(env.looks.values[0], looks[0])
+    assert torch.equal(env.appearances.values[1], looks[1])
+    assert not torch.equal(env.appearances.values[0], looks[0])
     env.close()
     other.close()
 

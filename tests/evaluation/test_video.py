@@ -59,7 +59,7 @@ def test_a_film_shows_the_world_as_it_was_drawn(make_pipeline):
     env.reset()
     seen = _look(env.base_env)
     assert seen.outside.shape == (532, 1280, 3) and seen.five.shape == (5, 144, 252, 3)
-    own = env.base_env.looks.drawn().colors[SemanticClass.GROUND][0]
+    own = env.base_env.appearances.current().colors[SemanticClass.GROUND][0]
     below = seen.five[4, -1, 0].double()  # the ground, in full light
     sun = 0.35 + 0.75 * 0.82
     assert below.tolist() == pytest.approx((255 * sun * own).tolist(), abs=3)

@@ -103,7 +103,7 @@ def test_another_appearance_changes_only_the_environment():
     assert other.in_task(num_cubes=1).description.appearance == fog
     assert policy.unlike == {} and other.in_appearance(MINIMAL).unlike == {}
     with policy.flying(1) as (plain, _), other.flying(1) as (hazy, _):
-        assert hazy.base_env.looks.settings == fog
+        assert hazy.base_env.appearances.settings == fog
         assert not torch.equal(plain.reset()["pixels"], hazy.reset()["pixels"])
     made = policy_from(lambda pixels: torch.zeros(len(pixels), 3), name="mine")
     with pytest.raises(InputError, match=r"policy=mine was made elsewhere.*leave appearance out"):

@@ -33,7 +33,7 @@ def test_it_is_as_good_as_luck_where_nothing_shows(evaluator):
     hidden = Condition(faults=(dead_rows(25),))  # of 25
     forward = float(evaluator.run_baselines(Condition())["forward"].success.mean())
     assert success(evaluator, hidden) == forward < 0.5
-    assert success(evaluator, hidden, looks=False) == 1.0
+    assert success(evaluator, hidden, only_visible=False) == 1.0
 
 
 def test_it_does_not_know_what_is_out_of_sight(evaluator):

@@ -27,7 +27,9 @@ def make_prober():
         evaluator = PairedEvaluator(of, episodes)
         beds.append(evaluator)
         return Prober(
-            evaluator, evaluator.run(Condition(), agent=OracleAgent(looks=False)).episodes, 0.9
+            evaluator,
+            evaluator.run(Condition(), agent=OracleAgent(only_visible=False)).episodes,
+            0.9,
         )
 
     yield make

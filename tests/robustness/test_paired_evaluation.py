@@ -79,7 +79,7 @@ def test_a_delayed_action_is_the_one_decided_so_many_steps_before(make_bed):
 
 
 def test_an_onset_changes_nothing_before_it(make_bed):
-    white = Condition(looks=(whiten((SemanticClass.TARGET,), 1.0),))
+    white = Condition(appearance_changes=(whiten((SemanticClass.TARGET,), 1.0),))
     evaluator = make_bed(
         subject(task=TaskSettings(num_cubes=2, first_distance=15.0, spacing=9.0)), 12
     )

@@ -9,7 +9,7 @@ from PIL import Image
 
 from drone_rl.config import MINIMAL, AppearanceSettings, PillarsSettings, TaskSettings
 from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.sim.visual_randomization import Appearances
+from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
@@ -30,20 +30,20 @@ def streams(count):
 
 
 def reset(settings, count):
-    looks = Appearances(settings, count)
+    looks = AppearanceSampler(settings, count)
     looks.reset(torch.arange(count), streams(count))
     return looks
 
 
 def test_minimal_appearance_is_none():
     looks = reset(MINIMAL, 3)
-    assert looks.drawn() is None and looks.middle is None and not looks.varies
+    assert looks.current() is None and looks.middle is None and not looks.varies
 
 
 def test_fixed_appearance_is_shared_by_all_environments():
     looks = reset(AppearanceSettings(sun_elevation=30.0, sun_azimuth=90.0, sun_strength=0.5), 3)
     look = looks.middle
-    assert looks.drawn() is None and not looks.varies
+    assert looks.current() is None and not looks.varies
     # sun on the left at 30 degrees: light points right and down
     wanted = [0.0, -math.sqrt(0.75), -0.5]
     assert look.sun_direction.tolist() == pytest.approx(wanted, abs=1e-9)
@@ -53,7 +53,7 @@ def test_fixed_appearance_is_shared_by_all_environments():
 
 
 def test_samples_fill_their_ranges():
-    look = reset(DRAWN, 400).drawn()
+    look = reset(DRAWN, 400).current()
     assert 50 <= look.fog.min() < 55 and 95 < look.fog.max() <= 100
     assert 160 < look.shadows.sum() < 240
     assert (look.zenith[:, 1:] == torch.tensor([0.5, 1.0])).all() and look.zenith[:, 0].std() > 0.2
@@ -64,7 +64,7 @@ def test_samples_fill_their_ranges():
 
 
 def test_middle_appearance_is_the_center_of_ranges():
-    middle = Appearances(DRAWN, 2).middle
+    middle = AppearanceSampler(DRAWN, 2).middle
     assert middle.fog == 75.0 and middle.zenith.tolist() == [0.5, 0.5, 1.0]
     assert middle.textures[SemanticClass.GROUND].choice == -1  # the first
 
@@ -80,13 +80,13 @@ def test_sampling_does_not_advance_the_environments_stream():
 
 def test_only_reset_environments_are_resampled():
     looks = reset(DRAWN, 3)
-    before, part = looks.values, looks.drawn(torch.tensor([2]))
+    before, part = looks.values, looks.current(torch.tensor([2]))
     looks.reset(torch.tensor([1]), [np.random.RandomState(9)])
     assert torch.equal(looks.values[[0, 2]], before[[0, 2]])
     assert not torch.equal(looks.values[1], before[1])
-    assert torch.equal(looks.drawn().fog[2:], part.fog)
+    assert torch.equal(looks.current().fog[2:], part.fog)
     looks.load(before)
-    assert torch.equal(looks.drawn().fog, before[:, 14])
+    assert torch.equal(looks.current().fog, before[:, 14])
 
 
 MOUNTED = DRAWN.replace(
@@ -103,7 +103,7 @@ def test_later_settings_do_not_change_earlier_samples():
 
 def test_camera_and_distractors_of_each_environment():
     looks = reset(MOUNTED, 50)
-    look = looks.drawn()
+    look = looks.current()
     forward, left, up = look.camera.offset.T
     assert -1 <= forward.min() < -0.8 and 0.8 < forward.max() <= 1
     assert (left == 0).all() and 0 <= up.min() < up.max() <= 0.5
@@ -111,7 +111,7 @@ def test_camera_and_distractors_of_each_environment():
     assert look.camera.turn.tolist() == [pytest.approx([half, 0, 0, half])] * 50
     assert look.camera.zoom is None and looks.distractors == 3
     assert look.distractors.places.shape == (50, 3, 3)
-    part = looks.drawn(torch.tensor([4, 7]))
+    part = looks.current(torch.tensor([4, 7]))
     assert torch.equal(part.distractors.places, look.distractors.places[[4, 7]])
     assert torch.equal(look[torch.tensor([4, 7])].distractors.colors, part.distractors.colors)
     assert looks.middle.distractors.expand(2).sizes.shape == (2, 3)
@@ -125,7 +125,7 @@ def test_wider_field_of_view_decreases_zoom():
 
 def test_impossible_settings_raise_at_construction():
     with pytest.raises(InputError, match="puts the camera into the ground"):
-        Appearances(AppearanceSettings(camera_offset=(0, 0, -5)), 1)
+        AppearanceSampler(AppearanceSettings(camera_offset=(0, 0, -5)), 1)
 
 
 @pytest.mark.parametrize("size", [None, (4097, 2)])
@@ -134,7 +134,7 @@ def test_textures_are_read_at_construction(tmp_path, size):
     if size:
         Image.new("RGB", size).save(path)
     with pytest.raises(InputError, match=r"ground\.png"):
-        Appearances(AppearanceSettings(object_texture=("none", str(path))), 1)
+        AppearanceSampler(AppearanceSettings(object_texture=("none", str(path))), 1)
 
 
 @pytest.mark.parametrize("task", [TaskSettings(), PillarsSettings()])
@@ -143,7 +143,7 @@ def test_defaults_equal_the_appearance_of_the_tasks(task):
     worlds = Worlds(2, task)
     worlds.reset(torch.arange(2), streams(2))
     plain = worlds.render(worlds.state)
-    worlds.appearance = Appearances(AppearanceSettings(fog_visibility=100_000.0), 2).middle
+    worlds.appearance = AppearanceSampler(AppearanceSettings(fog_visibility=100_000.0), 2).middle
     clear = worlds.render(worlds.state)
     assert (plain.int() - clear.int()).abs().max() <= 2 and not torch.equal(plain, clear)
     worlds.close()

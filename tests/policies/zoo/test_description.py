@@ -235,7 +235,7 @@ def test_appearance_is_written_unless_minimal():
     assert described.as_dict()["appearance"] == look
     assert parse(described.as_dict()) == described
     env = described.build_env(1, seed=0, device="cpu")
-    assert 20.0 <= env.base_env.looks.values[0, 14] <= 50.0
+    assert 20.0 <= env.base_env.appearances.values[0, 14] <= 50.0
     env.close()
     for wrong in ({**look, "fog_visibility": 0.0}, {"fog_visibility": 5.0}, 3):
         with pytest.raises(InputError, match="appearance"):

@@ -31,7 +31,7 @@ def test_model_has_the_sampled_appearance():
     for _ in range(2):
         env.reset()
         worlds.start()
-        look = worlds.looks.drawn()
+        look = worlds.appearances.current()
         model = env.physics.model
         places = worlds.worlds.poses(worlds.worlds.state, look).props[0].numpy()
         np.testing.assert_allclose(env.physics.data.mocap_pos, places, atol=1e-9)
@@ -85,7 +85,7 @@ def test_images_of_blocks_agree_with_the_ray_tracer(egl):
     ours.reset()
     for action in (0, 0, 1, 0):
         view = worlds.view(modality=("rgb", "segmentation"))
-        images = worlds.render_all(worlds.state, view, ours.looks.drawn())
+        images = worlds.render_all(worlds.state, view, ours.appearances.current())
         traced, seen = (images[name][0, 0].numpy() for name in view.modalities)
         drawn = timestep.observation["drone/front_center"].astype(int)
         assert np.abs(traced - drawn).mean() < 5

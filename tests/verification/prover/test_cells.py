@@ -16,10 +16,10 @@ class Drawn:
     """A renderer with an error in each pixel: colours are faces."""
 
     def __init__(self, error=(0.0, 0.0), ahead=4.0):
-        self.error, self.ahead, self.looks = error, ahead, 0
+        self.error, self.ahead, self.appearances = error, ahead, 0
 
     def render(self, left):
-        self.looks += len(left)
+        self.appearances += len(left)
         faces = [
             TINY.faces(self.ahead, left.astype(float) + e)[..., k] for k, e in enumerate(self.error)
         ]
