@@ -184,9 +184,9 @@ class ComposerTask(composer.Task):
 
     def _begin(self, random_state: np.random.RandomState) -> None:
         origin = torch.tensor([self.rules.origin], dtype=torch.float64)
-        drawn = self.rules.sample(random_state)
+        sampled = self.rules.sample(random_state)
         seeds = [draw_seeds([random_state])] if self.dynamics.is_random else []
-        self.state: State = self.rules.start(drawn[None], self.dynamics.start(origin, *seeds))
+        self.state: State = self.rules.start(sampled[None], self.dynamics.start(origin, *seeds))
         """State of the running episode, as a batch of one."""
         self._reward = 0.0
 

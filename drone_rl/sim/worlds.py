@@ -60,8 +60,8 @@ class Worlds:
         self._every = torch.arange(num_envs, device=self.device)
         self._make_renderer, self._num_shards = find_renderer(renderer), num_shards
         self.policy_view = self.view()
-        drawn = self.task.sample(np.random.RandomState(0))
-        self.state = self.start(torch.zeros_like(drawn).expand(num_envs, *drawn.shape).clone())
+        sampled = self.task.sample(np.random.RandomState(0))
+        self.state = self.start(torch.zeros_like(sampled).expand(num_envs, *sampled.shape).clone())
 
     @property
     def entries(self) -> Mapping[str, Entry]:
@@ -112,9 +112,9 @@ class Worlds:
             show_drone=show_drone,
         )
 
-    def start(self, drawn: Tensor, seeds: Tensor | None = None) -> State:
+    def start(self, sampled: Tensor, seeds: Tensor | None = None) -> State:
         """Return states at the start of episodes; see `Task.start` and `Dynamics.start`."""
-        return self.task.start(drawn, self.bodies(len(drawn), seeds)).to(self.device)
+        return self.task.start(sampled, self.bodies(len(sampled), seeds)).to(self.device)
 
     def bodies(self, count: int, seeds: Tensor | None = None) -> BodyState:
         """Return drones at the start of episodes, on the CPU; see `start`."""
@@ -125,9 +125,9 @@ class Worlds:
         """Start new episodes in environments, shape (k,), each from a random state."""
         if not len(worlds):
             return
-        drawn = torch.stack([self.task.sample(r) for r in random_states])
+        sampled = torch.stack([self.task.sample(r) for r in random_states])
         seeds = draw_seeds(random_states) if self.dynamics.is_random else None
-        self.state[worlds] = self.start(drawn, seeds)
+        self.state[worlds] = self.start(sampled, seeds)
 
     def step(self, worlds: Tensor, action: Tensor) -> Tensor:
         """Take actions, (k, *), in environments, (k,). Returns rewards, (k,), float64."""

@@ -155,8 +155,8 @@ class Magnetometer(Sensor[MagnetometerState, MagnetometerReading]):
 
     def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> MagnetometerState:
         shape, device = body.position.shape, generator.device
-        drawn = torch.rand(shape, dtype=torch.float64, generator=generator, device=device)
-        bias = self.settings.noise * self.settings.bias * (2 * drawn - 1).to(time.device)
+        sampled = torch.rand(shape, dtype=torch.float64, generator=generator, device=device)
+        bias = self.settings.noise * self.settings.bias * (2 * sampled - 1).to(time.device)
         return MagnetometerState(self.sampling.start(time, 3), bias)
 
     def _sample(

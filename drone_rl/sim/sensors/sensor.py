@@ -133,8 +133,8 @@ def select(condition: Tensor, chosen: Tensor, other: Tensor) -> Tensor:
 
 def normal(like: Tensor, generator: Generator) -> Tensor:
     """Sample standard normal numbers like a tensor; a CPU generator gives the same anywhere."""
-    drawn = torch.randn(like.shape, dtype=like.dtype, generator=generator, device=generator.device)
-    return drawn.to(like.device)
+    sampled = torch.randn(like.shape, dtype=like.dtype, generator=generator, device=generator.device)
+    return sampled.to(like.device)
 
 
 def random_walk_step(

@@ -3,7 +3,7 @@
 from drone_rl.sim.tasks.collect_cubes import CollectCubes as CollectCubes
 from drone_rl.sim.tasks.collect_cubes import FailureReplayTask as FailureReplayTask
 from drone_rl.sim.tasks.pillars import Pillars as Pillars
-from drone_rl.sim.tasks.task import DrawnState as DrawnState
+from drone_rl.sim.tasks.task import SampledState as SampledState
 from drone_rl.sim.tasks.task import EndReason as EndReason
 from drone_rl.sim.tasks.task import Goals as Goals
 from drone_rl.sim.tasks.task import Grid as Grid

@@ -127,18 +127,18 @@ class CollectCubes(PropTask[WorldState]):
         x = s.first_distance + s.spacing * np.arange(s.num_cubes)
         return torch.from_numpy(np.column_stack([x, offsets]))
 
-    def start(self, drawn: Tensor, body: BodyState | None = None) -> WorldState:
-        """Return states at the start of episodes, at rest by default; `drawn` are the cubes."""
+    def start(self, sampled: Tensor, body: BodyState | None = None) -> WorldState:
+        """Return states at the start of episodes, at rest by default; `sampled` are the cubes."""
         if body is None:
-            body = BodyState.at_rest(drawn.new_tensor(self.origin).repeat(len(drawn), 1))
-        no_cube = torch.zeros_like(drawn[..., 0], dtype=torch.bool)
+            body = BodyState.at_rest(sampled.new_tensor(self.origin).repeat(len(sampled), 1))
+        no_cube = torch.zeros_like(sampled[..., 0], dtype=torch.bool)
         state = WorldState(
             body=body,
-            cubes=drawn,
+            cubes=sampled,
             collected=no_cube,
             passed=no_cube.clone(),
             side=no_cube.long() - 1,
-            lateral=torch.full_like(drawn[..., 1], torch.nan),
+            lateral=torch.full_like(sampled[..., 1], torch.nan),
             steps=no_cube[:, 0].long(),
             end_reason=no_cube[:, 0].long(),
         )

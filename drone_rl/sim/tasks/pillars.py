@@ -125,22 +125,22 @@ class Pillars(common.PropTask[FieldState]):
         """Sample the y of the pillars of a field that can be crossed. Shape: (R, K), metres."""
         return torch.from_numpy(self.lanes.draw_field(random_state))
 
-    def start(self, drawn: Tensor, body: BodyState) -> FieldState:
-        """Return initial states; `drawn` is the sampled y of the pillars, (N, R, K)."""
+    def start(self, sampled: Tensor, body: BodyState) -> FieldState:
+        """Return initial states; `sampled` are the y of the pillars, (N, R, K)."""
         s = self.settings
-        row = torch.arange(drawn.shape[1], dtype=drawn.dtype, device=drawn.device)
-        x = (s.first_distance + s.spacing * row)[:, None].expand_as(drawn)
-        z = torch.full_like(drawn, 0.5 * s.height)
-        pillars = torch.stack([x, drawn, z], -1).flatten(1, 2)
-        none = torch.zeros(pillars.shape[:2], dtype=torch.bool, device=drawn.device)
+        row = torch.arange(sampled.shape[1], dtype=sampled.dtype, device=sampled.device)
+        x = (s.first_distance + s.spacing * row)[:, None].expand_as(sampled)
+        z = torch.full_like(sampled, 0.5 * s.height)
+        pillars = torch.stack([x, sampled, z], -1).flatten(1, 2)
+        none = torch.zeros(pillars.shape[:2], dtype=torch.bool, device=sampled.device)
         state = FieldState(
             body=body,
             pillars=pillars,
             present=~none,
             touched=none,
-            passed=none[:, : drawn.shape[1]].clone(),
-            side=none[:, : drawn.shape[1]].long() - 1,
-            gap=torch.full_like(drawn[..., 0], torch.nan),
+            passed=none[:, : sampled.shape[1]].clone(),
+            side=none[:, : sampled.shape[1]].long() - 1,
+            gap=torch.full_like(sampled[..., 0], torch.nan),
             steps=none[:, 0].long(),
             end_reason=none[:, 0].long(),
         )

@@ -42,10 +42,10 @@ class State(Batch):
 
 
 @dataclasses.dataclass
-class DrawnState(State):
+class SampledState(State):
     """The state of a task without a state class of its own."""
 
-    drawn: Tensor  # (N, *)
+    sampled: Tensor  # (N, *)
     """What `Task.sample` returned for each environment."""
 
 
@@ -81,7 +81,7 @@ class Goals(Batch):
     stratum: Tensor  # (n, C) int64
     """Where each stood when it came up, an index into `Task.strata`; -1 if it never did."""
     world: Tensor  # (n, k)
-    """What was drawn for each episode: identifies it whatever the drone did."""
+    """Initial conditions of the episode; equal values mean the same episode."""
 
 
 class OracleRule(NamedTuple):
@@ -148,7 +148,7 @@ class Task(abc.ABC, Generic[S]):
     """Where a goal can stand, from left to right: verdicts count each stratum separately."""
     blind_baselines: tuple[str, ...] = ("random", "forward", "left", "right")
     """Baselines that see nothing: "random", and actions that are always taken, by name."""
-    scored: tuple[str, ...] = ("drawn", "end_reason")
+    scored: tuple[str, ...] = ("sampled", "end_reason")
     """Entries of an episode's last information that `score` reads."""
     oracle: OracleRule | None = None
     """The best action given the true state; None if it is unknown."""
@@ -161,9 +161,9 @@ class Task(abc.ABC, Generic[S]):
     @property
     def entries(self) -> Mapping[str, Entry]:
         """Shapes and types of what `info` returns, for one environment."""
-        drawn = self.sample(np.random.RandomState(0))
+        sampled = self.sample(np.random.RandomState(0))
         return {
-            "drawn": Entry(tuple(drawn.shape), torch.float32),
+            "sampled": Entry(tuple(sampled.shape), torch.float32),
             "end_reason": Entry((1,), torch.int64, 0, len(self.ends) - 1),
         }
 
@@ -179,13 +179,13 @@ class Task(abc.ABC, Generic[S]):
     def sample(self, random_state: np.random.RandomState) -> Tensor:
         """Sample what is random about an episode, always of one shape."""
 
-    def start(self, drawn: Tensor, body: BodyState) -> S:
+    def start(self, sampled: Tensor, body: BodyState) -> S:
         """Return states at the start of episodes.
 
-        `drawn` is from `sample`, stacked, shape (N, *); `body` are the drones at `origin`.
+        `sampled` is from `sample`, stacked, shape (N, *); `body` are the drones at `origin`.
         """
-        zero = torch.zeros(len(drawn), dtype=torch.int64, device=drawn.device)
-        state: Any = DrawnState(body, zero, zero.clone(), drawn)
+        zero = torch.zeros(len(sampled), dtype=torch.int64, device=sampled.device)
+        state: Any = SampledState(body, zero, zero.clone(), sampled)
         return state
 
     @abc.abstractmethod
@@ -207,13 +207,13 @@ class Task(abc.ABC, Generic[S]):
 
     def info(self, state: S) -> dict[str, Tensor]:
         """Return the true state of each environment, as `entries` describes. Shapes: (N, *)."""
-        drawn: Tensor = getattr(state, "drawn")  # noqa: B009 (of `DrawnState`)
-        return {"drawn": drawn.float(), "end_reason": state.end_reason[:, None].clone()}
+        sampled: Tensor = getattr(state, "sampled")  # noqa: B009 (of `SampledState`)
+        return {"sampled": sampled.float(), "end_reason": state.end_reason[:, None].clone()}
 
     def score(self, info: Mapping[str, Tensor]) -> Goals:
         """Return the goals from the entries `scored` at the ends of episodes. Shapes: (n, *)."""
         is_reached = info["end_reason"] == self.success_end
-        return Goals(is_reached, is_reached.long() * 0, info["drawn"].flatten(1).double())
+        return Goals(is_reached, is_reached.long() * 0, info["sampled"].flatten(1).double())
 
     def classes(self, goals: Any) -> Iterator[tuple[str, str, Tensor]]:
         """Yield the classes of goals, from `score`, that failure tables count: by stratum.

@@ -84,7 +84,7 @@ class Minimal(Task):
         return torch.from_numpy(random_state.uniform(size=2))
 
     def step(self, state, body):
-        end = (body.position[:, 0] > state.drawn[:, 0]).long() * EndReason.SUCCESS
+        end = (body.position[:, 0] > state.sampled[:, 0]).long() * EndReason.SUCCESS
         steps = state.steps + 1
         return dataclasses.replace(state, body=body, steps=steps, end_reason=end), end.double()
 
