@@ -66,7 +66,7 @@ class WarpRenderer:
         if appearance is not None and not _is_supported(appearance):
             raise InputError(
                 "fog, shadows, textures, a sky of two colours, an exposure and other fields of "
-                "view can't be drawn by WarpRenderer; give renderer=raytrace"
+                "view can't be rendered by WarpRenderer; give renderer=raytrace"
             )
         view.check_modalities(self, SUPPORTED)
         images = view.new_images(len(poses), self.device)

@@ -55,7 +55,7 @@ class View:
             if modality not in supported:
                 known = ", ".join(name for name in MODALITIES if name in supported)
                 raise InputError(
-                    f"view {modality!r} can't be drawn by {type(renderer).__name__}; "
+                    f"view {modality!r} can't be rendered by {type(renderer).__name__}; "
                     f"ask for one of: {known}"
                 )
 

@@ -133,7 +133,8 @@ def select(condition: Tensor, chosen: Tensor, other: Tensor) -> Tensor:
 
 def normal(like: Tensor, generator: Generator) -> Tensor:
     """Sample standard normal numbers like a tensor; a CPU generator gives the same anywhere."""
-    sampled = torch.randn(like.shape, dtype=like.dtype, generator=generator, device=generator.device)
+    device = generator.device
+    sampled = torch.randn(like.shape, dtype=like.dtype, generator=generator, device=device)
     return sampled.to(like.device)
 
 

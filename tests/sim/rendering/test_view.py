@@ -55,5 +55,7 @@ def test_images_have_the_shape_and_type_of_their_modality(modality, shape, dtype
 def test_unsupported_modality_raises():
     VIEW.check_modalities(object(), {"rgb"})
     depth = dataclasses.replace(VIEW, modalities=("rgb", "depth"))
-    with pytest.raises(InputError, match=r"'depth' can't be drawn by object; ask for one of: rgb$"):
+    with pytest.raises(
+        InputError, match=r"'depth' can't be rendered by object; ask for one of: rgb$"
+    ):
         depth.check_modalities(object(), {"rgb"})
