@@ -1,4 +1,4 @@
-"""Steps environments without TorchRL, where only maps of pixels lie between them and the actor."""
+"""Step environments without TorchRL if all transforms are functions of the pixels."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any

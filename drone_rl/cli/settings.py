@@ -31,7 +31,7 @@ class CommandSettings(Settings):
         raise NotImplementedError
 
     def used_policy(self, folder: Path) -> str:
-        """Return what `policy=` takes for the policy that the command, now finished, acted on."""
+        """Return the argument `policy=` that selects the policy which the command used."""
         del folder
         which = getattr(self, "policy", None) or "latest"
         which = which if isinstance(which, str) else which[0]

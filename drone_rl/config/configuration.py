@@ -123,8 +123,8 @@ def locate(target: str) -> Any:
 def as_config(settings: Settings) -> dict[str, Any]:
     """Return settings as plain data.
 
-    A variant has its target as "_target_", several variants are named, and so is a task other than
-    the first, see `BaseTaskSettings.values`.
+    A variant has its target as "_target_", several variants are named. Tasks other than
+    collect_cubes contain their name, see `BaseTaskSettings.values`.
     """
     if isinstance(settings, BaseTaskSettings):
         return settings.values()

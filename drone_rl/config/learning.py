@@ -126,8 +126,7 @@ class Rollouts(Collector, target="rollouts"):
 
 
 LearningRate = Annotated[float, Real(0.0, 1e30, is_above=True)]
-"""Bounded so that a step is a number in float32, of which Adam's first takes ten times the rate;
-above that torch fails with an error of its own. Which rates make sense is for training to find."""
+"""Bounded because larger rates overflow float32 in Adam's first step."""
 
 
 class Optimizer(Variant):

@@ -1,8 +1,8 @@
 """The rule of the verdict: quantities, thresholds, and the kind in every corner of a box.
 
-The rule asks of each quantity only how many of its thresholds it exceeds: its level. The truth
-lies, with the probability that is asked for, within all quantities' intervals at once, a box. The
-thresholds cut the box into cells; the verdict is certain if every cell gets the same kind.
+The level of a quantity is the number of its thresholds that it exceeds; the levels decide the kind.
+The intervals of all quantities hold at once with the required probability. The verdict is certain
+if all levels within the intervals lead to the same kind.
 """
 
 import dataclasses
@@ -17,7 +17,7 @@ from drone_rl.utils.schema import Real
 
 NOT_CERTAIN = 13
 """Exit code if the episodes are too few to be certain of the kind."""
-NOT_PROVED = 16
+PROOF_MISSING = 16
 """Exit code if a proof for every placement is required and no certificate gives it."""
 NOT_COVERED = 17
 """Exit code if an operating domain is required in which the policy was not found to be good."""

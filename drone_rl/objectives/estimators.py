@@ -237,11 +237,11 @@ class BatchNormalised(_Discounted):
 
 @implements(Gae)
 class Advantages(GAE):
-    """Generalised advantage estimates, as `GAE` makes them of values that a batch holds.
+    """Generalised advantage estimates (TorchRL's `GAE`) from values that the batch contains.
 
     Reads "state_value", ("next", "state_value") and ("next", ...) "reward", "done", "terminated";
-    writes "advantage" and "value_target". Shapes: (*batch, T, 1). Beyond a step that is not
-    `terminated` the value of what follows counts, be the row cut there or not.
+    writes "advantage" and "value_target". Shapes: (*batch, T, 1). A step that is not
+    `terminated` is bootstrapped with the value of the next state, also at the end of a row.
     """
 
     def __init__(

@@ -117,7 +117,7 @@ class SeededCategorical(Categorical):
         return self.logits.argmax(-1)
 
 
-class StraightActor(ProbabilisticActor):
+class DirectActor(ProbabilisticActor):
     """A `ProbabilisticActor` that calls network and distribution directly.
 
     TensorDict's modules, which `get_dist` and everything else use, take longer than a small network
@@ -165,7 +165,7 @@ class StraightActor(ProbabilisticActor):
         return tensordict.set(head.out_keys[0], action)
 
 
-class CategoricalActor(StraightActor):
+class CategoricalActor(DirectActor):
     """An actor with discrete actions."""
 
 
@@ -176,7 +176,7 @@ def distribution_of(dtype: torch.dtype) -> type[SeededCategorical | SquashedNorm
 
 def make_actor(
     network: nn.Module, action_spec: TensorSpec, generator: torch.Generator | None = None
-) -> StraightActor:
+) -> DirectActor:
     """Return a stochastic policy: "pixels" to "logits" to "action" (chapter, Eq. 9).
 
     It samples by default and takes the most probable action, or of continuous ones the median,
@@ -188,7 +188,7 @@ def make_actor(
         generator: Source of the sampled actions; torch's global one by default.
     """
     kind = distribution_of(action_spec.dtype)
-    make = CategoricalActor if kind is SeededCategorical else StraightActor
+    make = CategoricalActor if kind is SeededCategorical else DirectActor
     in_keys = network.in_keys if isinstance(network, ImageNetwork) else ("pixels",)
     return make(
         TensorDictModule(network, in_keys=list(in_keys), out_keys=["logits"]),

@@ -162,8 +162,8 @@ class ActorCriticLearner(GradientLearner):
     """Values, advantages, then passes over minibatches, each a step of the optimizer.
 
     Values and log-probabilities are those of the policy and critic that an update begins with,
-    and are computed once. What follows a step is taken to be the next one of its row, unless the
-    row is cut there.
+    and are computed once. The next state of a step is that of the next step in its row, except
+    where an episode or the row ends.
     """
 
     model: ActorCritic

@@ -92,7 +92,7 @@ def learn(
         folder: The run's folder, locked by this process.
         state: Checkpoint to resume from, if any.
         callbacks: See `train`.
-        replay: Where episodes start, unless anywhere; not saved.
+        replay: Task that replays failures, instead of that of the settings; not saved.
 
     Returns:
         Why it stopped and how far it came, as in `result.json`.

@@ -67,7 +67,7 @@ class DomainRecheck:
         fitted = ", to which a policy could have been fitted" if self.seed_is_fixed else ""
         kind = "fixed" if self.seed_is_fixed else "fresh"
         return (
-            f"re-flown by {self.episodes:,} episodes at each of {self.count} strengths, ends of "
+            f"re-checked by {self.episodes:,} episodes at each of {self.count} strengths, ends of "
             f"the ranges and random ones ({kind} seed {self.seed}{fitted}); fewer than "
             f"{self.fewest:,} successes at one would have contradicted the file"
         )
@@ -99,14 +99,12 @@ class Coverage:
     def __str__(self) -> str:
         """Return a line for each axis that is not covered, or one for all."""
         if self.is_covered:
-            return f"covered: {', '.join(self.needs)}, each by itself, {self.reflown}"
+            return f"covered: {', '.join(self.needs)}, each alone, {self.reflown}"
         lines = [*self.lacking.values(), *filter(None, [self.against])]
         if self.reflown is not None:
             lines += self.reflown.contradictions
         elif not lines:
-            lines.append(
-                "the file says so, and no episode was flown to check it (domain_flights=0)"
-            )
+            lines.append("the file states it, and no episodes re-checked it (domain_flights=0)")
         return "\n".join(f"not covered: {line}" for line in lines)
 
 

@@ -17,7 +17,7 @@ from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, make_baseline
 from drone_rl.evaluation.evaluate import held_out_environments
 from drone_rl.evaluation.judge import Verdict, judge_policy
-from drone_rl.evaluation.rule import NOT_COVERED, NOT_PROVED, Rule
+from drone_rl.evaluation.rule import NOT_COVERED, PROOF_MISSING, Rule
 from drone_rl.evaluation.verdict_text import quantity_label
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
@@ -73,7 +73,7 @@ class Judgement:
                 verdict's own code; a required domain has to be covered, too.
         """
         if require == "proved" and not self.verdict.is_proved:
-            return NOT_PROVED
+            return PROOF_MISSING
         if self.coverage is not None and not self.coverage.is_covered:
             return NOT_COVERED
         is_proof_enough = require == "proved" and self.coverage is None
@@ -202,10 +202,10 @@ def judge_one(
     settings, seed = with_seed((settings or JudgeSettings()).replace(**changes), drawn_seed)
     progress = progress or Bar()
     progress("policy and baselines", 0, 1)
-    pilot = None if policy in BASELINES else as_policy(policy, outputs)
-    name = str(policy) if pilot is None or isinstance(policy, str | Path) else pilot.name
+    loaded = None if policy in BASELINES else as_policy(policy, outputs)
+    name = str(policy) if loaded is None or isinstance(policy, str | Path) else loaded.name
     claim = measured = coverage = None
-    if pilot is None:
+    if loaded is None:
         _refuse_files(name, certificate=certificate, shifts=shifts, require_domain=require_domain)
         if appearance is not None:
             raise InputError(f"policy={name} sees no images; leave appearance out")
@@ -214,18 +214,18 @@ def judge_one(
         moved.check_air()
         worlds = _baseline(name, TaskSettings(**changed), moved, settings, seed)
     else:
-        pilot = pilot.in_task(**(task or {}))
-        pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
-        pilot = pilot if appearance is None else pilot.in_appearance(appearance)
-        measured = find_domain(pilot, shifts, outputs)
-        coverage = require(pilot, require_domain, measured) if require_domain is not None else None
-        coverage = _reflown(pilot, coverage, measured, settings, seed)
+        loaded = loaded.in_task(**(task or {}))
+        loaded = loaded.in_dynamics(**dynamics) if dynamics else loaded
+        loaded = loaded if appearance is None else loaded.in_appearance(appearance)
+        measured = find_domain(loaded, shifts, outputs)
+        coverage = require(loaded, require_domain, measured) if require_domain is not None else None
+        coverage = _reflown(loaded, coverage, measured, settings, seed)
         where = {"device": settings.device, "renderer": settings.renderer}
         flights = settings.certificate_flights
-        claim = find_claim(pilot, certificate, flights=flights, seed=seed, **where)
-        worlds = held_out_environments(pilot, settings, seed)
-    draws, rule = settings.sampled and pilot is not None, Rule(good_share=settings.good_share)
-    known = {"claim": claim, "unlike": pilot and pilot.unlike, "rule": rule, "seed": seed}
+        claim = find_claim(loaded, certificate, flights=flights, seed=seed, **where)
+        worlds = held_out_environments(loaded, settings, seed)
+    draws, rule = settings.sampled and loaded is not None, Rule(good_share=settings.good_share)
+    known = {"claim": claim, "unlike": loaded and loaded.unlike, "rule": rule, "seed": seed}
     with worlds as (env, actor):
         verdict = judge_policy(env, actor, settings.episodes, sampled=draws, **known)
     progress("judged", 1, 1)
@@ -237,7 +237,7 @@ def judge_one(
 
 
 def _reflown(
-    pilot: BasePolicy,
+    loaded: BasePolicy,
     coverage: Coverage | None,
     measured: SavedShifts | None,
     settings: JudgeSettings,
@@ -247,7 +247,7 @@ def _reflown(
     numbers = None if measured is None else measured.numbers
     if coverage is None or numbers is None or not coverage.is_stated or not settings.domain_flights:
         return coverage
-    reflown = recheck_domain(pilot, coverage.needs, numbers, settings, seed)
+    reflown = recheck_domain(loaded, coverage.needs, numbers, settings, seed)
     return dataclasses.replace(coverage, reflown=reflown)
 
 

@@ -52,14 +52,13 @@ def say_places(evidence: Evidence) -> Claims:
         )
     if places["blind"] > 0:
         claims["places.blind"] = (
-            f"It is blind to {listed(blind)}: a turn is called for, and it goes "
-            f"{names[places['alone']]}, as with no cube in sight. Farther on it may see the cube "
-            "yet."
+            f"It is blind to {listed(blind)}: a turn is needed, and it goes "
+            f"{names[places['alone']]}, as without a cube. It may see the cube later."
         )
     if places["blind"] == 0:
         claims["places.sees"] = (
-            "Nowhere a turn is called for does it do just what it does with no cube in sight, "
-            "unless that is the turn."
+            "Wherever a turn is needed, the cube changes its action, or its action without a cube "
+            "is that turn."
         )
     return claims | _say_closeness(places)
 
@@ -108,8 +107,8 @@ def why_stopped(setting: str | None) -> str:
     if setting != "most_boxes":
         return "the proof was stopped"
     return (
-        "the proof was stopped, for more than most_boxes boxes were under way; begin anew with a "
-        "smaller most_combinations, which makes parts of fewer boxes"
+        "the proof stopped at most_boxes open boxes; restart it with a smaller most_combinations, "
+        "which divides it into smaller parts"
     )
 
 

@@ -66,7 +66,7 @@ def test_it_flies_the_first_worlds_of_evaluations(program, flown, monkeypatch):
     assert (success["successes"], success["trials"]) == (2, 2)
     assert success["lower95"] == pytest.approx(0.025**0.5)  # both of two, exactly
     assert str(done).splitlines()[-3:] == [
-        "2 of 2 succeeded (16% to 100%)",
+        "2 of 2 succeeded (95% CI 15.8 to 100.0%)",
         "Fixed seed 3: a policy could have been fitted to these environments.",
         "environments: seed 3 (fixed)",
     ]

@@ -76,7 +76,7 @@ def test_what_is_required_is_held_against_what_was_found(good, tmp_path, needs, 
     found = require(good, tmp_path / "needs.yaml", measured)
     assert [*found.lacking] == lacks and found.is_stated == (not lacks)
     assert not found.is_covered  # nothing was flown to check it
-    said = "blur: needed" if lacks else "the file says so, and no episode was flown to check it"
+    said = "blur: needed" if lacks else "the file states it, and no episodes re-checked it"
     assert str(found).startswith(f"not covered: {said}")
 
 
@@ -91,7 +91,7 @@ def test_a_verdict_tells_the_domain_and_may_speak_against_it(good, tmp_path):
     assert done.coverage.is_covered and "blur of up to 1 pixels" in done.domain
     assert done.domain.startswith(f"Read from {path}, dated 1970-01-01 0")
     assert "not measured again here: Good with" in done.domain
-    assert "re-flown by 30 episodes at each of 3 strengths" in str(done)
+    assert "re-checked by 30 episodes at each of 3 strengths" in str(done)
     assert len(str(done).splitlines()) == 4 and done.domain in done._repr_html_()
     assert done.as_dict()["required_domain"]["lacking"] == {}
     strict = drone_rl.judge(good, episodes=5, sampled=False, good_share=0.99, **told)

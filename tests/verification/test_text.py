@@ -21,8 +21,7 @@ def test_what_it_does_by_side():
 def test_blindness_is_told_of_the_sides_that_have_it():
     assert speak()["places.blind"] == (
         "It is blind to 75.00% of those on its left and 50.00% of those on its right: a turn is "
-        "called for, and it goes forward, as with no cube in sight. Farther on it may see the cube "
-        "yet."
+        "needed, and it goes forward, as without a cube. It may see the cube later."
     )
     assert set(speak(blind=0.0)) - set(speak()) == {"places.sees"}
 

@@ -46,7 +46,7 @@ def test_a_proof_that_was_stopped():
 def test_what_helps_a_proof_of_too_many_boxes():
     stopped = certificate(won=0.25, undecided=0.75, finished=False)
     stopped["found"]["stopped_by"] = "most_boxes"
-    assert "more than most_boxes boxes" in describe_proof(stopped)
+    assert "stopped at most_boxes open boxes" in describe_proof(stopped)
     assert "with a smaller most_combinations" in describe_proof(stopped)
     stopped["found"]["stopped_by"] = "limit_s"
     assert describe_proof(stopped).endswith("so far (the proof was stopped).")

@@ -31,7 +31,7 @@ class Dynamics(Protocol):
         """Return drones at the start of an episode; by default they are level and at rest.
 
         Positions are metres, world frame, shape (num_envs, 3), float64. Seeds, (num_envs,),
-        int64, are those of each episode's randomness; without them it has its mean.
+        int64, are those of each episode's random quantities, which otherwise have their mean.
         """
         return BodyState.at_rest(position)
 
