@@ -104,12 +104,12 @@ BENCHMARKS: dict[str, Benchmark] = {
     "size": Benchmark(lambda s: measure(), "main", (".", "conf")),
     "coverage": Benchmark(
         lambda s: bench_coverage(s.quick),
-        "truth",
+        "adversarial",
         ("utils/intervals", "evaluation", "benchmarks/coverage", "benchmarks/simulated_policies"),
     ),
     "sentences": Benchmark(
         lambda s: bench_sentences(),
-        "truth",
+        "adversarial",
         (
             *_CLAIMS,
             "benchmarks/sentences",
@@ -119,7 +119,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     ),
     "hostile": Benchmark(
         lambda s: bench_hostile(s.runs / "hostile"),
-        "truth",
+        "adversarial",
         (
             "utils",
             "policies/zoo",
@@ -148,7 +148,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     ),
     "injections": Benchmark(
         lambda s: bench_injections(s.runs / "injections"),
-        "truth",
+        "adversarial",
         (
             *_CLAIMS,
             "utils/display",
@@ -158,12 +158,12 @@ BENCHMARKS: dict[str, Benchmark] = {
     ),
     "accessibility": Benchmark(
         lambda s: bench_accessibility(s.runs / "accessibility", s.quick),
-        "truth",
+        "adversarial",
         ("explanations", "utils/display", "benchmarks/accessibility"),
     ),
     "gamed": Benchmark(
         lambda s: bench_gamed(s.runs / "gamed"),
-        "truth",
+        "adversarial",
         (
             *_JUDGING,
             "robustness",
@@ -175,7 +175,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     ),
     "maps": Benchmark(
         lambda s: bench_maps(s.runs, s.quick),
-        "truth",
+        "adversarial",
         (
             *_EXPLAINING,
             "benchmarks/maps",
@@ -185,32 +185,32 @@ BENCHMARKS: dict[str, Benchmark] = {
     ),
     "explain": Benchmark(
         lambda s: bench_explain(s.runs, s.quick),
-        "truth",
+        "adversarial",
         (*_EXPLAINING, "explanations/report", "conf", "benchmarks/explain"),
     ),
     "verdicts": Benchmark(
         lambda s: bench_verdicts(s.runs, s.device, s.quick),
-        "truth",
+        "adversarial",
         (*_JUDGING, "benchmarks/verdicts", "benchmarks/scripted_policies"),
     ),
     "fragile_honest": Benchmark(
         lambda s: bench_fragile_honest(s.runs / "fragile_honest", s.seeds, s.quick),
-        "truth",
+        "adversarial",
         (*_TRAINING, *_JUDGING, "conf", "benchmarks/fragile_honest"),
     ),
     "shifts": Benchmark(
         lambda s: bench_shifts(s.quick),
-        "truth",
+        "adversarial",
         (*_JUDGING, "robustness", "benchmarks/shifts"),
     ),
     "domain_axes": Benchmark(
         lambda s: bench_domain_axes(s.runs / "domain_axes", s.quick),
-        "truth",
+        "adversarial",
         (*_JUDGING, "robustness", "benchmarks/domain_axes"),
     ),
     "robust": Benchmark(
         lambda s: bench_robust(s.runs / "robust", s.seeds[:3], s.quick),
-        "truth",
+        "adversarial",
         (
             *_TRAINING,
             "evaluation",
@@ -222,34 +222,34 @@ BENCHMARKS: dict[str, Benchmark] = {
     ),
     "render_truth": Benchmark(
         lambda s: bench_render_truth(s.quick),
-        "truth",
+        "adversarial",
         ("sim/rendering", "benchmarks/render_truth", "benchmarks/random_scenes"),
     ),
-    "mutants": Benchmark(lambda s: bench_mutants(), "truth", ("benchmarks/mutants",)),
-    "docs": Benchmark(lambda s: measure_pages(), "truth", (".", "conf")),
+    "mutants": Benchmark(lambda s: bench_mutants(), "adversarial", ("benchmarks/mutants",)),
+    "docs": Benchmark(lambda s: measure_pages(), "adversarial", (".", "conf")),
     "sweeps": Benchmark(
         lambda s: bench_sweeps(s.runs, s.device, s.quick),
-        "many",
+        "parallel",
         (*_TRAINING, "sweeps", "conf", "benchmarks/sweeps"),
     ),
     "kills": Benchmark(
         lambda s: bench_kills(s.runs, s.device, s.quick),
-        "many",
+        "parallel",
         (*_TRAINING, "sweeps", "conf", "benchmarks/sweeps"),
     ),
     "ray": Benchmark(
         lambda s: bench_ray(s.runs, s.device, s.quick),
-        "many",
+        "parallel",
         (*_COLLECTING, "conf", "benchmarks/sweeps"),
     ),
     "prove": Benchmark(
         lambda s: bench_prove(s.runs / "prove", s.seeds, s.quick),
-        "proof",
+        "verification",
         (*_PROVING, "benchmarks/proving"),
     ),
     "tampering": Benchmark(
         lambda s: bench_tampering(s.runs / "tampering", s.quick),
-        "proof",
+        "verification",
         (
             *_PROVING,
             "benchmarks/tampering",
@@ -257,55 +257,57 @@ BENCHMARKS: dict[str, Benchmark] = {
             "benchmarks/tampered_consistent",
         ),
     ),
-    "places": Benchmark(lambda s: bench_places(s.quick), "proof", (*_PROVING, "benchmarks/places")),
+    "places": Benchmark(
+        lambda s: bench_places(s.quick), "verification", (*_PROVING, "benchmarks/places")
+    ),
     "exact_coverage": Benchmark(
         lambda s: bench_exact_coverage(s.runs / "exact_coverage", s.quick),
-        "proof",
+        "verification",
         (*_TRAINING, *_PROVING, "verdicts", "benchmarks/exact_coverage"),
     ),
     "provable": Benchmark(
         lambda s: bench_provable(s.runs / "provable", s.seeds[:3], s.quick),
-        "proof",
+        "verification",
         (*_TRAINING, *_PROVING, "conf", "benchmarks/proving"),
     ),
     "many_cubes": Benchmark(
         lambda s: bench_many_cubes(s.runs / "many_cubes", 1.0, s.quick),
-        "hours",
+        "long",
         (*_PROVING, "benchmarks/proving"),
     ),
     "pillars": Benchmark(
         lambda s: bench_pillars(s.runs / "pillars", s.seeds[:3], s.episodes, s.device, s.quick),
-        "guests",
+        "libraries",
         (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
     ),
     "revisions": Benchmark(
         lambda s: bench_revisions(s.runs / "revisions", s.quick),
-        "room",
+        "system",
         (*_TRAINING, "evaluation", "explanations", "cli", "conf", "benchmarks/revisions"),
     ),
     "mistakes": Benchmark(
         lambda s: bench_mistakes(s.runs / "mistakes"),
-        "truth",
+        "adversarial",
         ("cli", "config", "conf", "utils", "benchmarks/mistakes"),
     ),
     "startup": Benchmark(
         lambda s: bench_startup(s.runs / "startup", s.device, s.quick),
-        "room",
+        "system",
         (*_TRAINING, "verdicts", "config", "cli", "conf", "benchmarks/startup"),
     ),
     "onnx": Benchmark(
         lambda s: bench_onnx(s.runs / "onnx", s.quick),
-        "guests",
+        "libraries",
         (*_RENDERING, "policies", "evaluation", "verdicts/export", "benchmarks/onnx_export"),
     ),
     "peers": Benchmark(
         lambda s: bench_peers(s.runs / "peers", s.seeds[:3], s.episodes, s.quick),
-        "guests",
+        "libraries",
         (*_TRAINING, "config", "cli", "conf", "benchmarks/peers"),
     ),
     "gymnasium": Benchmark(
         lambda s: bench_gymnasium(s.batch_size, s.device, s.quick),
-        "guests",
+        "libraries",
         (*_RENDERING, "benchmarks/gymnasium"),
     ),
     "flight_speed": Benchmark(
@@ -336,9 +338,9 @@ BENCHMARKS: dict[str, Benchmark] = {
     ),
 }
 GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))
-"""Names of groups of benchmarks: main (speed and training), truth (correctness of claims), many
-(sweeps), proof, hours (long proofs), guests (third-party software), room (revisions and start-up
-time), flight (vehicle dynamics)."""
+"""Names of groups of benchmarks: main (speed and training), adversarial (correctness of claims),
+parallel (sweeps), verification, long (proofs of hours), libraries (third-party software), system
+(revisions and start-up time), flight (vehicle dynamics)."""
 
 
 def find_benchmarks(names: Iterable[str]) -> list[str]:

@@ -39,4 +39,4 @@ def test_policies_whose_verdict_depends_on_rounding_are_counted(
     }
     assert trained == [("seed_7", "seed=7"), ("seed_8", "seed=8")][: total - 2]
     assert sizes == {episodes}
-    assert BENCHMARKS["fragile_honest"].group == "truth"
+    assert BENCHMARKS["fragile_honest"].group == "adversarial"

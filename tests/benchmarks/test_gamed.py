@@ -8,4 +8,4 @@ def test_policies_that_are_judged_good_are_counted(monkeypatch, tmp_path):
     monkeypatch.setattr(gamed_memory, "cases", lambda folder: found)
     monkeypatch.setattr(gamed, "_MODULES", (gamed_memory,))
     assert gamed.bench_gamed(tmp_path) == {"gamed_verdicts": 1, "gamed_total": 2}
-    assert BENCHMARKS["gamed"].group == "truth"
+    assert BENCHMARKS["gamed"].group == "adversarial"

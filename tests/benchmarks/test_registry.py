@@ -11,9 +11,9 @@ from drone_rl.utils.errors import InputError
 def test_find_benchmarks_expands_groups_and_removes_duplicates():
     assert find_benchmarks([]) == []
     assert find_benchmarks(["solve", "render"]) == ["solve", "render"]
-    truth = [n for n, b in BENCHMARKS.items() if b.group == "truth"]
+    truth = [n for n, b in BENCHMARKS.items() if b.group == "adversarial"]
     others = [name for name in truth if name != "hostile"]
-    assert find_benchmarks(["hostile", "truth"]) == ["hostile", *others]
+    assert find_benchmarks(["hostile", "adversarial"]) == ["hostile", *others]
     assert not set(GROUPS) & set(BENCHMARKS)
 
 

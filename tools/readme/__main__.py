@@ -41,9 +41,9 @@ def make_blocks(root: Path) -> dict[str, str]:
     tables = {
         "main": MAIN,
         "flight": FLIGHT,
-        "truth": TRUTH,
-        "proof": PROOF,
-        "guests": LIBRARIES,
+        "adversarial": TRUTH,
+        "verification": PROOF,
+        "libraries": LIBRARIES,
     }
     return {
         **{name: make_table(rows, ledger.figures) for name, rows in tables.items()},

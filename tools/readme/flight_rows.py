@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from tools.readme.tables import Figures, Row
+from tools.readme.tables import Figures, Row, percent
 
 
 def _seconds(values: Sequence[float]) -> str:
@@ -10,7 +10,7 @@ def _seconds(values: Sequence[float]) -> str:
 
 
 def _lower(values: Sequence[float]) -> str:
-    return ", ".join(f"{value:.3f}" for value in values)
+    return ", ".join(map(percent, values))
 
 
 def _speed(f: Figures) -> str:
@@ -59,19 +59,19 @@ FLIGHT = (
         "`experiment=flight`: seconds from the start of the command until solved, 5 seeds; success "
         "rate in 1,000 episodes, lower end of the exact 95% CI",
         lambda f: _trained(f, "flight"),
-        "median 60; 0.95",
+        "median 60; 95%",
     ),
     Row(
         "flight_velocity",
         "the same for `experiment=flight_velocity`, 3 seeds",
         lambda f: _trained(f, "flight_velocity"),
-        "300; 0.95",
+        "300; 95%",
     ),
     Row(
         "flight_pillars",
         "the same for `experiment=flight_pillars`, 3 seeds",
         lambda f: _trained(f, "flight_pillars"),
-        "0.9",
+        "90%",
     ),
 )
 """Vehicle dynamics."""

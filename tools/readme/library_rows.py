@@ -2,7 +2,7 @@
 
 import statistics
 
-from tools.readme.tables import Figures, Row
+from tools.readme.tables import Figures, Row, percent
 
 
 def _peer_seconds(figures: Figures) -> str:
@@ -35,8 +35,8 @@ LIBRARIES = (
         "pillars",
         "task pillars: success rate in 1,000 held-out episodes, lower end of the exact 95% CI, "
         "3 seeds",
-        lambda f: ", ".join(f"{lower:.3f}" for lower in f["pillars_lower95"]),
-        "0.95",
+        lambda f: ", ".join(map(percent, f["pillars_lower95"])),
+        "95%",
     ),
     Row(
         "pillars",
@@ -47,8 +47,8 @@ LIBRARIES = (
     Row(
         "onnx",
         "greatest difference of a probability between the bundled policies and their ONNX models",
-        lambda f: f"{f['onnx_max_difference']:.1e} on {f['onnx_frames']:,} images",
-        "1e-5",
+        lambda f: f"{1e6 * f['onnx_max_difference']:.1f} millionths on {f['onnx_frames']:,} images",
+        "10 millionths",
     ),
     Row(
         "onnx",

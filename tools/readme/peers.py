@@ -10,7 +10,7 @@ _SHOWN = {
     "seconds": ".1f",
     "seconds_without_imports": ".1f",
     "frames": ",",
-    "success_lower95": ".3f",
+    "success_lower95": ".1%",
 }
 
 

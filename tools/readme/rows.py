@@ -3,7 +3,7 @@
 import statistics
 from collections.abc import Sequence
 
-from tools.readme.tables import Figures, Row
+from tools.readme.tables import Figures, Row, percent, seconds
 
 
 def _times(f: Figures) -> str:
@@ -35,10 +35,6 @@ def _known_maps(f: Figures) -> str:
     return f"{rate * total:.0f} of {total}"
 
 
-def _rates_failed(values: Sequence[float]) -> str:
-    return ", ".join(f"{value:.2g}" if value else "0" for value in values)
-
-
 def _seconds(values: Sequence[float]) -> str:
     return ", ".join(f"{value:.0f}" for value in values)
 
@@ -52,14 +48,14 @@ TRUTH = (
     Row(
         "coverage",
         "smallest coverage of all displayed 95% intervals, by enumeration and simulation",
-        lambda f: f"{f['interval_coverage_min']:.3f}",
-        "0.945",
+        lambda f: percent(f["interval_coverage_min"]),
+        "94.5%",
     ),
     Row(
         "coverage",
         "rate of certain but wrong verdicts, greatest of 42 simulated policies near the thresholds",
-        lambda f: f"{f['false_certain_rate']:.3f}",
-        "at most 0.05",
+        lambda f: percent(f["false_certain_rate"]),
+        "at most 5%",
     ),
     Row(
         "maps",
@@ -67,7 +63,7 @@ TRUTH = (
         lambda f: f"{f['placebo_maps_trusted']} of {f['placebo_maps_total']}",
         "0",
     ),
-    Row("maps", "networks with a known map whose true map is trusted", _known_maps, "0.9"),
+    Row("maps", "networks with a known map whose true map is trusted", _known_maps, "90%"),
     Row(
         "sentences",
         "injected changes of evidence that change or remove the sentence",
@@ -160,10 +156,10 @@ TRUTH = (
         "mutants",
         "fraction of sampled, non-equivalent mutants that are killed (run `make mutants` before)",
         lambda f: (
-            f"{f['mutation_score_at_first_sight']:.2f} for a new sample of "
-            f"{f['mutants_sampled']}; {f['mutation_score']:.2f} with tests for its survivors"
+            f"{percent(f['mutation_score_at_first_sight'])} for a new sample of "
+            f"{f['mutants_sampled']}; {percent(f['mutation_score'])} with tests for its survivors"
         ),
-        "0.9",
+        "90%",
     ),
     Row(
         "explain",
@@ -190,14 +186,14 @@ PROOF = (
     Row(
         "prove",
         "fraction of all placements from which the default policy fails, exact, 5 seeds",
-        lambda f: _rates_failed(f["proof_lost"]),
+        lambda f: ", ".join(map(percent, f["proof_lost"])),
         "",
     ),
     Row(
         "prove",
         "greatest undecided fraction of these proofs",
-        lambda f: f"{f['proof_undecided']:.1e}",
-        "1e-6",
+        lambda f: percent(f["proof_undecided"]),
+        "0.0001%",
     ),
     Row(
         "prove",
@@ -250,13 +246,13 @@ PROOF = (
     Row(
         "exact_coverage",
         "fraction of verdict intervals that contain the exact success rate",
-        lambda f: f"{f['verdict_coverage_exact']:.3f}",
-        "0.945",
+        lambda f: percent(f["verdict_coverage_exact"]),
+        "94.5%",
     ),
     Row(
         "many_cubes",
         "fraction decided within an hour, policy good: four cubes; five cubes",
-        lambda f: f"{f['proof_four']:.2g}; {f['proof_five']:.2g}",
+        lambda f: f"{percent(f['proof_four'])}; {percent(f['proof_five'])}",
         "",
     ),
 )
@@ -272,13 +268,13 @@ MAIN = (
     Row(
         "solve",
         "success rate in 1,000 held-out episodes, lower end of the exact 95% CI, worst of 5 seeds",
-        lambda f: f"{min(f['success_lower95']):.3f}",
-        "0.95",
+        lambda f: percent(min(f["success_lower95"])),
+        "95%",
     ),
     Row(
         "seeds",
         "20 other seeds: number that reach this mean; worst lower end of the 95% CI",
-        lambda f: f"{f['seeds_solved_of_20']}; {min(f['seeds_lower95']):.3f}",
+        lambda f: f"{f['seeds_solved_of_20']}; {percent(min(f['seeds_lower95']))}",
         "20",
     ),
     Row(
@@ -380,17 +376,17 @@ MAIN = (
         lambda f: f"{f['first_compile_s']:.0f} s; {f['first_compile_scaled_s']:.0f} s",
         "15 s",
     ),
-    Row("startup", "time of `import drone_rl`", lambda f: f"{f['import_s']:.2f} s", "0.3 s"),
+    Row("startup", "time of `import drone_rl`", lambda f: seconds(f["import_s"]), "0.3 s"),
     Row(
         "explain",
         "time of t-SNE with 600 frames; 10,000 frames",
-        lambda f: f"{f['tsne_600_s']:.1f} s; {f['tsne_10000_s']:.0f} s",
+        lambda f: f"{seconds(f['tsne_600_s'])}; {seconds(f['tsne_10000_s'])}",
         "5 s; 60 s",
     ),
     Row(
         "explain",
         "time of a response map, 41 x 31 positions",
-        lambda f: f"{f['response_map_s']:.1f} s",
+        lambda f: seconds(f["response_map_s"]),
         "3 s",
     ),
     Row(

@@ -1,5 +1,6 @@
 """Tables of the figures in docs/results.json: quantity, measured value, target, benchmark."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -18,6 +19,24 @@ class Row(NamedTuple):
     format: Callable[[Figures], str]
     """Formats the figures; if it raises a KeyError, the cell says that they are not measured."""
     target: str = ""
+
+
+def percent(share: float) -> str:
+    """Format a fraction in percent with one decimal, or with two digits if it is smaller."""
+    value = 100 * share
+    return f"{value:.1f}%" if value >= 1 else f"{_plain(value)}%"
+
+
+def seconds(value: float) -> str:
+    """Format seconds with two significant digits."""
+    return f"{_plain(value)} s"
+
+
+def _plain(value: float) -> str:
+    """Format a number with two significant digits and no exponent."""
+    rounded = float(f"{value:.2g}")
+    decimals = 0 if rounded == 0 else max(0, 1 - math.floor(math.log10(abs(rounded))))
+    return f"{rounded:,.{decimals}f}"
 
 
 def make_table(rows: Iterable[Row], figures: Figures) -> str:
@@ -67,7 +86,7 @@ def _revision(origin: Origin) -> str:
 def _short(value: Any) -> str:
     """Format a number, a string or a short list of them, or the size of a longer container."""
     if isinstance(value, float):
-        return f"{value:.4g}"
+        return f"{value:,.0f}" if abs(value) >= 1e4 else f"{value:.4g}"
     if isinstance(value, list) and len(value) <= 8 and not any(isinstance(v, dict) for v in value):
         return ", ".join(map(_short, value)) or "none"
     if isinstance(value, dict | list):
