@@ -16,7 +16,7 @@ def test_every_learner_has_a_row():
     lines = {line.split(" | ")[0]: line for line in table.splitlines()[2:]}
     assert len(lines) == 6
     assert lines["| drone_rl, PPO"].endswith(
-        "| 9.0; 10.0 | 5.0; 6.0 | 12,000; 9,000 | 0.996; 0.980 |"
+        "| 9.0; 10.0 | 5.0; 6.0 | 12,000; 9,000 | 99.6%; 98.0% |"
     )
     assert "12,000; 9,000 (1 not solved)" in lines["| TorchRL's Collector, REINFORCE"]
     assert "num_envs 32, steps 150, lr 0.003" in lines["| TorchRL's Collector, REINFORCE"]

@@ -17,7 +17,15 @@ from tools.readme.layers import draw_layers, list_packages
 from tools.readme.library_rows import LIBRARIES
 from tools.readme.rows import MAIN, PROOF, TRUTH
 from tools.readme.stale import report_ages
-from tools.readme.tables import UNKNOWN, Row, list_figures, list_origins, make_table
+from tools.readme.tables import (
+    UNKNOWN,
+    Row,
+    list_figures,
+    list_origins,
+    make_table,
+    percent,
+    seconds,
+)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +64,7 @@ def test_a_changed_figure_changes_the_pages(tmp_path):
     assert "| 1.23 times | 1.6 times | `sweeps` |" in pages["docs/results.md"]
     assert "| `sweep_speedup` | 1.234 | `sweeps` |" in pages["docs/results.md"]
     assert "| 87.6% | `drone-rl bench solve` |" in pages["README.md"]
-    assert "| 0.876 | 0.95 | `solve` |" in pages["docs/results.md"]
+    assert "| 87.6% | 95% | `solve` |" in pages["docs/results.md"]
 
 
 def test_only_blocks_are_replaced():
@@ -96,7 +104,6 @@ def test_headline_cells():
         "time_to_solve_s": [4.0, 5.25, 6.0],
         "success_lower95": [0.996, 0.991],
         "solve_over_best_peer": 0.598,
-        "raw_render_fps": 367638.2,
         "render_over_warp": {"25x64": 18.54, "64x64": 25.8},
         "gamed_verdicts": 1,
         "gamed_total": 34,
@@ -105,8 +112,8 @@ def test_headline_cells():
     assert cells == [
         "5.2",
         "99.1%",
-        "0.60",
-        "367,638; 18.5",
+        "0.60 times",
+        "18.5 times",
         "1 of 34",
         *[UNKNOWN] * 3,
     ]
@@ -142,10 +149,10 @@ def test_table_cells():
         "hostile_max_s": 1.94,
     }
     text = "".join(make_table(rows, figures) for rows in (MAIN, FLIGHT, TRUTH, PROOF, LIBRARIES))
-    assert "| 2.6e-06 on 40,000 images |" in text and "| 3 of 40,000 |" in text
+    assert "| 2.6 millionths on 40,000 images |" in text and "| 3 of 40,000 |" in text
     for cell in (
         "20 to 41, median 25",
-        "0.991",
+        "99.1%",
         "1024 MiB",
         "44 of 45 certain, 55 in total",
         "7.9%",
@@ -155,6 +162,19 @@ def test_table_cells():
     assert "| 26 of 27 |" in text
     for cell in ("1 of 34", "2 of 14", "0 of 1,234", "21 of 22", "1,000 MiB; 1.9 s"):
         assert f"| {cell} |" in text
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [(0.0, "0%"), (0.00079, "0.079%"), (0.009, "0.90%"), (0.9525, "95.2%"), (1.0, "100.0%")],
+)
+def test_percentages(share, text):
+    assert percent(share) == text
+
+
+@pytest.mark.parametrize(("value", "text"), [(0.0354, "0.035 s"), (1.29, "1.3 s"), (36.2, "36 s")])
+def test_seconds_have_two_significant_digits(value, text):
+    assert seconds(value) == text
 
 
 def test_layers_are_boxes_followed_by_forbidden_imports():
