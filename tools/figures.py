@@ -17,12 +17,13 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 MAPS, PLACEBOS = "tab:blue", "0.75"
 
 
-def plot_placebos(truth: Mapping[str, Any], path: Path) -> None:
+def plot_placebos(truth: Mapping[str, Any], path: Path, policy: str) -> None:
     """Plot how well each heat map and each placebo ranks the patches by their effect.
 
     Args:
         truth: "truth" of explanation.json.
         path: Path of the image.
+        policy: Name of the policy, for the title.
     """
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
@@ -43,6 +44,7 @@ def plot_placebos(truth: Mapping[str, Any], path: Path) -> None:
     axes.set(
         xlabel="rank correlation with the effect of each patch on the policy (95% CI)",
         xlim=(None, 1.1),
+        title=f"Do heat maps of policy {policy} show what it responds to?",
     )
     handles = [
         Patch(color=MAPS, label="heat maps of the policy"),
@@ -54,7 +56,7 @@ def plot_placebos(truth: Mapping[str, Any], path: Path) -> None:
 
 def _title(name: str) -> str:
     """Return a name as a label."""
-    text = name.replace("_", " ").replace("picture", "image").replace("grad cam", "Grad-CAM")
+    text = name.replace("_", " ").replace("grad cam", "Grad-CAM")
     return text[0].upper() + text[1:]
 
 
@@ -66,7 +68,8 @@ def main(arguments: list[str], docs: Path = DOCS) -> int:
             plot(found, docs / "peers.png")
         case ["placebos", folder]:
             (file,) = Path(folder).rglob("explanation.json")
-            plot_placebos(json.loads(file.read_text())["truth"], docs / "placebos.png")
+            found = json.loads(file.read_text())
+            plot_placebos(found["truth"], docs / "placebos.png", found["name"])
         case _:
             print("error: give peers, or placebos and a folder of drone-rl explain")
             return 2

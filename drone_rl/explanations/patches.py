@@ -181,9 +181,11 @@ def placebo_maps(
         "noise": torch.rand(count, height, width, generator=generator),
         "blob in the middle": blob(height, width, 0.5, 0.5).expand(count, -1, -1),
         "horizon": band(height, width, horizon_row(absent)).expand(count, -1, -1),
-        "picture - empty scene": differs,
-        "picture - empty scene, smoothed": smoothed(differs),
-        "size of the change": torch.stack([difference(observations, o) for o in others]).mean(0),
+        "difference to the empty scene": differs,
+        "difference to the empty scene, smoothed": smoothed(differs),
+        "mean difference to re-rendered patches": torch.stack(
+            [difference(observations, o) for o in others]
+        ).mean(0),
     }
 
 

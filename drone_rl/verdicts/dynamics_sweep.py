@@ -203,6 +203,8 @@ def chart(numbers: Mapping[str, Any]) -> Figure:
     axes = figure.subplots()
     axes.set(xlim=(-1, len(bodies)), ylim=(len(policies), -0.55))
     axes.axis("off")
+    note = "hatched, ?: not certain, because of too few episodes; in brackets: 95% CI"
+    figure.supxlabel(note, fontsize=8, color=_FAINT)
     for x, body in enumerate(bodies):
         axes.text(x + 0.5, -0.25, body, ha="center", va="center", fontsize=10, color=_INK)
     for y, (name, verdicts) in enumerate(policies.items()):
@@ -229,4 +231,4 @@ def _verdict_cell(verdict: Evidence) -> tuple[str, str | None, list[tuple[float,
         (0.45, rate(success, label=""), 9.5, _INK),
         (0.77, textwrap.fill(failure(verdict), 26), 7.0, _FAINT),
     ]
-    return color, None, lines
+    return color, None if verdict["certain"] else "//", lines

@@ -21,10 +21,10 @@ def test_placebos_by_hand():
     maps = placebo_maps(x, absent, [x + 1, x + 2])
     assert all(m.shape == (2, 6, 10) and (m >= 0).all() for m in maps.values())
     assert maps["ones"].unique().tolist() == [1.0]
-    assert maps["picture - empty scene"].nonzero().tolist() == [[1, 4, 7]]
-    assert maps["picture - empty scene"].max() == 3.0
-    assert maps["picture - empty scene, smoothed"][1].argmax() == 47
-    assert maps["size of the change"].unique().tolist() == [1.5]
+    assert maps["difference to the empty scene"].nonzero().tolist() == [[1, 4, 7]]
+    assert maps["difference to the empty scene"].max() == 3.0
+    assert maps["difference to the empty scene, smoothed"][1].argmax() == 47
+    assert maps["mean difference to re-rendered patches"].unique().tolist() == [1.5]
     assert horizon_row(absent) == 1.5
     assert maps["horizon"][0, :, 3].argsort(descending=True)[:2].sort().values.tolist() == [1, 2]
     torch.testing.assert_close(maps["blob in the middle"], maps["blob in the middle"].flip(1, 2))

@@ -234,7 +234,7 @@ def test_a_trial_of_a_policy_in_the_simulator(world, scenes, dataset):
     torch.testing.assert_close(
         made.observations, dataset.tensor("observations")[rows][: len(made.episode)]
     )
-    assert "size of the change" in made.placebos
+    assert "mean difference to re-rendered patches" in made.placebos
     with torch.no_grad():
         network.layers.logits.weight.zero_()
     blind = trust.make_trial(

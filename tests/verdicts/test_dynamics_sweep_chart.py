@@ -15,6 +15,7 @@ def cells(figure):
 def test_each_cell_has_the_colour_of_its_verdict():
     boxes = cells(chart(NUMBERS))
     assert [box.get_xy() for box in boxes] == [(0, 0), (1, 0)]
+    assert [box.get_hatch() for box in boxes] == [None, "//"]  # the second is not certain
     green, red = (to_hex(box.get_facecolor()) for box in boxes)
     assert (green, red) == (*(palette.css(palette.light(c)) for c in (palette.GOOD, palette.BAD)),)
 

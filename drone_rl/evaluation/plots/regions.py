@@ -15,6 +15,7 @@ from drone_rl.sim.vocabulary import ShownActions
 from drone_rl.utils.palette import INK, MUTED, css
 
 _LINE = 'fill="none" class="line"'
+_CLOSEST = "smallest difference of two logits"
 
 
 def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: ShownActions) -> Figure:
@@ -43,7 +44,7 @@ def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: Show
     axis.set_xlabel("metres to the left (+) or right (-)")
     axis.set_ylabel("metres ahead of the camera")
     axis.axhline(near, color=css(INK), lw=0.5)
-    axis.set_title("what it does about one cube that stands there")
+    axis.set_title("action for one cube at each position")
     handles = [Patch(color=names.css(a), label=f"goes {names.names[a]}") for a in names.order]
     if numbers["unseen"]:
         style = {"facecolor": css(MUTED), "edgecolor": "white", "hatch": "////"}
@@ -56,7 +57,7 @@ def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: Show
 
 
 def _mark(axis: Axes, numbers: Mapping[str, Any]) -> None:
-    """Mark the camera, the limits of flying straight on, and where the logits are closest."""
+    """Mark the camera, the limits of flying straight on, and the smallest difference of logits."""
     touch = numbers["touch_distance"]
     for y in (-touch, touch):
         label = "beyond: flying straight on misses it" if y < 0 else None
@@ -64,7 +65,10 @@ def _mark(axis: Axes, numbers: Mapping[str, Any]) -> None:
         axis.axvline(y, color=css(INK), ls=(0, (5, 4)), lw=0.8, label=label)
     axis.plot(0, 0, "^", color=css(INK), ms=11, clip_on=False, ls="", label="camera, looking up")
     at = numbers["least_gap_left"], numbers["least_gap_ahead"]
-    for color, width, label in (("white", 2, None), (css(INK), 1, "logits closest")):
+    for color, width, label in (
+        ("white", 2, None),
+        (css(INK), 1, _CLOSEST),
+    ):
         axis.plot(*at, "o", ms=11, mfc="none", mew=width, color=color, ls="", label=label)
 
 
@@ -117,14 +121,14 @@ def _scale(side: float, near: float, far: float, unit: float) -> list[str]:
 
 
 def _marks(numbers: Mapping[str, Any], unit: float) -> list[str]:
-    """Mark the camera and where the logits are closest."""
+    """Mark the camera and the smallest difference of logits."""
     x, y = -numbers["least_gap_left"], -numbers["least_gap_ahead"]
     circle = f'<circle cx="{x:.6g}" cy="{y:.6g}" r="{unit / 2:g}" {_LINE}'
     camera = f"M0 {-unit:g}L{0.7 * unit:g} {0.6 * unit:g}H{-0.7 * unit:g}Z"
     return [
         f'<path fill="currentColor" d="{camera}"><title>camera</title></path>',
         f'{circle} stroke="#fff" stroke-width=".12"/>',
-        f'{circle} stroke="#000" stroke-width=".05"><title>logits closest</title></circle>',
+        f'{circle} stroke="#000" stroke-width=".05"><title>{_CLOSEST}</title></circle>',
     ]
 
 
