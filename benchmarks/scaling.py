@@ -31,7 +31,7 @@ def bench_scaling(folder: Path, device: str, quick: bool) -> dict[str, Any]:
     cameras = [CameraSettings(width=64 * k, height=25 * k) for k in larger]
     steps = 5 if quick else 20
     series = {
-        "worlds": {n: _seconds(make_drone_env(n, device), steps, quick) for n in num_envs},
+        "environments": {n: _seconds(make_drone_env(n, device), steps, quick) for n in num_envs},
         "frames": {
             64 * k * steps: _seconds(make_drone_env(64, device), k * steps, quick)
             for k in ((1, 2, 3) if quick else (1, 2, 4, 8))
@@ -72,14 +72,13 @@ def _plot(series: dict[str, dict[int, float]], path: Path) -> None:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(14, 3.4), layout="constrained")
+    figure.suptitle("Time of a rollout of random actions, rendering included")
     for axes, (name, points) in zip(figure.subplots(1, len(series)), series.items(), strict=True):
         x, y = np.array(list(points)), np.array(list(points.values()))
         line = np.polyfit(x, y, 1)
         grid = np.linspace(0, x.max(), 50)
         axes.plot(grid, np.polyval(line, grid), color=css(MUTED), label="straight line")
         axes.plot(x, y, "o", color=css(INK), label="measured")
-        axes.set(
-            title=f"time against {name}", xlabel=name, ylabel="seconds", ylim=(0, 1.1 * y.max())
-        )
+        axes.set(xlabel=f"number of {name}", ylabel="seconds", ylim=(0, 1.1 * y.max()))
         axes.legend()
     figure.savefig(path, dpi=120)
