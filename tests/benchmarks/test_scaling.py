@@ -17,8 +17,8 @@ def test_times_are_measured_by_environments_frames_cubes_and_pixels(monkeypatch,
     monkeypatch.setattr(scaling, "make_drone_env", make_drone_env)
     monkeypatch.setattr(scaling, "_seconds", lambda env, steps, _: env[0] * env[1] * steps)
     found = bench_scaling(tmp_path, "cpu", quick=True)["scaling"]
-    assert found["worlds"]["sizes"] == [32, 64, 128]
-    assert found["worlds"]["seconds"] == [480, 960, 1920]
+    assert found["environments"]["sizes"] == [32, 64, 128]
+    assert found["environments"]["seconds"] == [480, 960, 1920]
     assert found["frames"]["sizes"] == [320, 640, 960]
     assert found["frames"]["r_squared"] == pytest.approx(1.0)
     assert found["cubes"]["sizes"] == [1, 4, 8]
