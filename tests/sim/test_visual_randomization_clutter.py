@@ -27,7 +27,7 @@ SOME = AppearanceSettings(
 
 def test_colors_are_neither_red_nor_brown():
     for red, green, blue in PALETTE:
-        assert 0.0 <= min(red, green, blue) and max(red, green, blue) <= 1.0
+        assert min(red, green, blue) >= 0.0 and max(red, green, blue) <= 1.0
         assert green > 0.4 or blue > 0.4
 
 

@@ -159,6 +159,13 @@ def test_a_run_that_failed_with_no_number_keeps_what_it_had(sweep):
     assert (failed.frames, failed.seconds, failed.entropy) == (1500, 3, None)
 
 
+def test_a_run_that_failed_before_its_first_update_has_nothing(sweep):
+    metrics = sweep.folder / "3" / "metrics.csv"
+    metrics.write_text(metrics.read_text().splitlines()[0] + "\n")
+    failed = read_rows(sweep)[3]
+    assert (failed.state, failed.frames, failed.seconds) == ("failed", 0, 0)
+
+
 def test_unreadable_metrics_are_damage_and_an_unreadable_result_must_be_made_again(sweep):
     (sweep.folder / "0" / "metrics.csv").write_text("frames\nrubbish\n")
     (sweep.folder / "1" / "result.json").write_text("{")
