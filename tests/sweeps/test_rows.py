@@ -143,6 +143,11 @@ def test_a_result_out_of_range_is_damaged(sweep, lie):
     assert read_rows(sweep)[0].state == "damaged"
 
 
+def test_a_perfect_reward_is_not_out_of_range(sweep):
+    rewrite(sweep, 0, running_reward=3.0)
+    assert read_rows(sweep)[0].state == "finished"
+
+
 @pytest.mark.parametrize(
     "line", ["400,3,1.5,0.5", "1500,3,4,0.5", "1500,3,nan,0.5", "inf,3,1.5,0.5", "1e300,3,1,1"]
 )
