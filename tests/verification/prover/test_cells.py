@@ -69,6 +69,9 @@ def test_pictures_within_a_band_are_found():
     cells = Cells(both, 4.0, 1.0, 3.0, Late())
     assert cells.pictures[:, 0].tolist() == [[0, 0], [1, 0], [1, 1]]
     assert (cells.first.tolist(), cells.last.tolist()) == ([0, 0, 2], [0, 2, 2])
+    two = Cells(both, 4.0, 1.0, 5.0, Late())  # a band at 2 m and one at 4 m
+    assert two.pictures[:, 0].tolist() == [[0, 0], [1, 0], [1, 1], [2, 1], [2, 2]]
+    assert (two.first.tolist(), two.last.tolist()) == ([0, 0, 2, 2, 4], [0, 2, 2, 4, 4])
 
 
 def test_a_renderer_that_is_a_little_off_gets_wider_bands():
