@@ -26,6 +26,8 @@ def test_usage_and_help(tmp_path):
         (["--version"], f"drone-rl {drone_rl_package.__version__}"),
         (["train", "--version"], f"drone-rl {drone_rl_package.__version__}"),
         (["-V"], f"drone-rl {drone_rl_package.__version__}"),
+        (["help"], USAGE),
+        (["help", "demo"], DEMO_USAGE),
         (["demo", "--help"], DEMO_USAGE),
         (["demo", "seed=1", "-h"], DEMO_USAGE),
     ],

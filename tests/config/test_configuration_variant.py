@@ -47,6 +47,8 @@ def test_an_unknown_name_without_a_module_is_refused():
 
 
 def test_a_registered_part_keeps_its_factory_with_values_of_the_users_own():
+    import drone_rl.policies.networks  # noqa: F401 (connects the settings with their factories)
+
     part = variant_of(Network, {"_target_": "mlp", "hidden": [4], "more": 1}, "network")
     assert part.values() == {"hidden": [4], "more": 1}
     assert type(part).factory is Mlp.factory is not None

@@ -165,6 +165,7 @@ def test_the_largest_failure(evidence, largest, text):
 def test_how_many_episodes_end(evidence):
     rows, largest = evidence["failures"]["rows"], evidence["failures"]["largest"]
     rows[2] = row("end", "step_limit", 120)
+    rows.append(row("cube", "second", 200))  # no end
     said = speak(evidence)["failures.largest"]
     assert said.endswith("(10.0%); 30.0% of all end at the step limit.")
     rows[2] = row("end", "step_limit", 16)  # at least 2% are not sure

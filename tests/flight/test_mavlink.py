@@ -48,6 +48,7 @@ def test_it_hovers_over_tcp(stubs):
         drone = climb(bridge, 8.0)
     assert drone.readings.position == pytest.approx([0.0, 0.0, 2.0], abs=0.05)
     assert (bridge.missed, bridge.is_armed) == (0, True)
+    assert (bridge.patience, bridge.answer_within, bridge.connect_within) == (5.0, 1.0, 30.0)
     stub.link.close()
     assert stub.heard["HIL_SENSOR"] == 2000
     assert stub.heard["HIL_GPS"] == 80

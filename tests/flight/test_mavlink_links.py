@@ -23,6 +23,7 @@ def terminal():
 def test_serial_links_change_no_byte(terminal):
     far, name = terminal
     link = SerialLink(name)
+    assert link.patience == 1.0
     every = bytes(range(256))
     link.write(every)
     assert os.read(far, 1024) == every

@@ -11,7 +11,7 @@ from drone_rl.utils.errors import InputError
 
 gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
 sb3 = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
-from drone_rl.policies.sb3 import Sb3Logits  # noqa: E402 (after the skip)
+from drone_rl.policies.sb3 import Sb3Logits, _channels_first  # noqa: E402 (after the skip)
 
 
 class StaticEnv(gymnasium.Env):
@@ -103,3 +103,10 @@ def test_model_without_action_probabilities_raises():
     model = sb3.DQN("MlpPolicy", StaticEnv(FLOATS), buffer_size=10)
     with pytest.raises(InputError, match=r"^the policy of DQN gives no logits of a single image"):
         Sb3Logits(model)
+
+
+def test_the_smaller_end_of_a_shape_is_the_channels():
+    assert _channels_first((40, 48, 3)) == (3, 40, 48)
+    assert _channels_first((3, 40, 48)) == (3, 40, 48)
+    assert _channels_first((3, 5, 3)) == (3, 5, 3)  # either; as it is
+    assert _channels_first((40, 48)) is None

@@ -1,10 +1,12 @@
 import itertools
 
 import pytest
+import torch
 
 from drone_rl.config import PillarsSettings
 from drone_rl.robustness.axes import AXES, GROUPS, check_axes, find_axes
 from drone_rl.robustness.shifts_text import NAMES
+from drone_rl.sim.rendering.appearance import Appearance
 from drone_rl.utils.errors import InputError
 from tests.robustness.subjects import subject
 
@@ -59,3 +61,13 @@ def test_a_task_of_which_no_size_is_known():
     with pytest.raises(InputError, match="axis=object_size is not for task=other"):
         find_axes(["object_size"], other)
     assert "object_size" not in [a.name for a in find_axes(None, other)]
+
+
+@pytest.mark.parametrize(
+    ("name", "offset"), [("camera_height", [0.0, 0.0, 0.5]), ("camera_sideways", [0.0, 0.5, 0.0])]
+)
+def test_a_moved_camera_moves_along_one_axis(name, offset):
+    (mount,) = AXES[name].make(0.5, subject()).mounts
+    camera = mount.change(Appearance(), torch.ones(1, 1, dtype=torch.float64)).camera
+    assert camera.offset.tolist() == [offset]
+    assert camera.turn.tolist() == [[1.0, 0.0, 0.0, 0.0]]

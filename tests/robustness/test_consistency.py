@@ -6,7 +6,7 @@ import pytest
 
 import drone_rl
 from benchmarks.evidence import changed
-from drone_rl.robustness.consistency import check_counts, check_probe, check_range
+from drone_rl.robustness.consistency import _is_same, check_counts, check_probe, check_range
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.errors import InputError
 from tests.robustness.making import owned, share, shifts_of
@@ -75,3 +75,9 @@ def test_a_strength_has_to_agree_with_itself(change, message):
     check_probe(found, 400, "here")
     with pytest.raises(InputError, match=message):
         check_probe({**found, **change}, 400, "here")
+
+
+def test_numbers_are_compared_up_to_rounding():
+    assert _is_same(0.1 + 0.2, 0.3) and _is_same(None, None)
+    assert not _is_same(0.3, 0.301)
+    assert not _is_same(None, 0.3) and not _is_same(0.3, None)

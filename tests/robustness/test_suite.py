@@ -30,6 +30,7 @@ def test_mcnemar_by_hand():
     mixed = mcnemar(torch.tensor([1, 1, 1, 0.0]), torch.tensor([0, 0, 0, 1.0]))
     assert mixed == {"lost": 3, "gained": 1, "p": pytest.approx(2 * 5 / 16)}
     assert mcnemar(before, before)["p"] == 1.0
+    assert mcnemar(torch.tensor([1, 0.0]), torch.tensor([0.0, 1]))["p"] == 1.0  # not 2 * 3/4
 
 
 def test_the_area_under_a_curve_by_hand():
@@ -51,6 +52,9 @@ def test_an_axis_by_its_strengths(suite):
     assert figures["paired"]["gained"] == 0  # what is smaller is hit less often
     assert figures["success"]["share"] == pytest.approx(plain - lost / 20)
     assert figures["difference"]["mean"] == pytest.approx(-lost / 20)
+    shares = figures["shares"]
+    assert set(shares) == {"all", "left", "ahead", "right"}
+    assert shares["left"]["mean"] == shares["right"]["mean"] == 0.0 < shares["ahead"]["mean"]
     assert sum(figures["ends"].values()) == figures["success"]["trials"] == 20
     assert found["plain"]["oracle"]["share"] == 1.0 and small["impossible"] is False
     drifting = found["axes"]["object_color"]["levels"][1]["modes"]["drifting"]

@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 import torch
@@ -129,3 +131,11 @@ def test_unmoved_drone_keeps_the_exact_position(env):
     assert env.task._found(env.physics) is body
     env.task.drone.set_pose(env.physics, body.position[0].numpy() + 0.5)
     assert (env.task._found(env.physics).position - body.position == 0.5).all()
+
+
+def test_a_turned_drone_has_the_new_attitude(env):
+    env.reset()
+    body, half = env.task.state.body, math.radians(45.0) / 2
+    turned = [math.cos(half), 0.0, 0.0, math.sin(half)]
+    env.task.drone.set_pose(env.physics, body.position[0].numpy(), turned)
+    assert env.task._found(env.physics).attitude[0].tolist() == pytest.approx(turned)

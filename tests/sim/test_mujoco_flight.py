@@ -118,6 +118,7 @@ def test_both_simulators_bounce_off_a_pillar():
     for state in (both.here, both.there):
         contact = state.contact
         assert contact.thing.tolist() == [0]
+        assert 0.5 < float(contact.time) <= 2.1  # seconds, of 700 ticks
         np.testing.assert_allclose(contact.normal[0], (-1, 0, 0), atol=1e-3)
         face = 4.0 - both.half[0]
         np.testing.assert_allclose(contact.point[0], (face, 0.0, 2.0), atol=0.1)

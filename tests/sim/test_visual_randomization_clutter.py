@@ -25,6 +25,12 @@ SOME = AppearanceSettings(
 )
 
 
+def test_colors_are_neither_red_nor_brown():
+    for red, green, blue in PALETTE:
+        assert min(red, green, blue) >= 0.0 and max(red, green, blue) <= 1.0
+        assert green > 0.4 or blue > 0.4
+
+
 def drawn(settings, seed):
     source = None if seed is None else np.random.RandomState(seed)
     return torch.tensor(draw_distractors(settings, CUBES.things, source)).reshape(-1, WIDTH)

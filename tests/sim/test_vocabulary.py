@@ -2,7 +2,7 @@ import dataclasses
 
 import pytest
 
-from drone_rl.sim.vocabulary import CUBES, MOST, terms_of
+from drone_rl.sim.vocabulary import CUBES, MOST, some_cubes, terms_of
 from drone_rl.utils.errors import InputError
 
 
@@ -10,6 +10,15 @@ def test_vocabulary_round_trip_and_default():
     assert terms_of({}) == CUBES
     other = dataclasses.replace(CUBES, goal="post", sides={"near": "close by"})
     assert terms_of({"terms": other.as_dict()}) == other
+
+
+@pytest.mark.parametrize(
+    ("count", "words"), [(1, "one cube"), (2, "two cubes"), (4, "four cubes"), (5, "five cubes"),
+    (6, "6 cubes")],
+)  # fmt: skip
+def test_cubes_are_counted_in_words(count, words):
+    task = {"num_cubes": count, "cube_size": 2.5, "lateral_bound": 6.0, "vertical_bound": 0.0}
+    assert some_cubes(task) == f"{words} of 2.5 m, up to 6 m to either side and 0 m up or down"
 
 
 def test_phrases():

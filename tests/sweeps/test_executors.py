@@ -8,6 +8,7 @@ import pytest
 from drone_rl.sweeps.executors import LocalExecutor, RayExecutor, SlurmExecutor, finish_run
 from drone_rl.sweeps.manifest import quoted, read_failure, read_result
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.provenance import num_cores
 
 pytestmark = pytest.mark.usefixtures("fake_training")
 
@@ -78,6 +79,8 @@ def test_clusters_of_this_machine(make_runs, tmp_path, cluster):
 def test_at_least_one_job():
     with pytest.raises(InputError, match="num_jobs=0"):
         LocalExecutor(0)
+    assert LocalExecutor(1).num_jobs == 1
+    assert LocalExecutor().num_jobs == num_cores()
 
 
 def test_folders_with_odd_names_reach_the_program_whole(make_runs):

@@ -60,6 +60,7 @@ def test_runs_that_were_never_solved_are_open_triangles_at_what_they_had(sweep):
     ]
     assert axes.lines[2].get_color() != axes.lines[3].get_color() == figures.COLORS["poor"]
     assert [text.get_text() for text in axes.texts] == ["2/2", "0/2"]
+    assert axes.get_ylim() == (0, 1.2 * 2000)
 
 
 def test_costs_are_seen_beside_a_panel_without_any(begin_sweep):

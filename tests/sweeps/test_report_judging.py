@@ -41,6 +41,9 @@ def test_a_checkpoint_that_is_not_that_of_the_result_is_refused(trained):
     (trained / "result.json").write_text(json.dumps({**result, "frames": 7}))
     with pytest.raises(InputError, match=r"frame 7; resume with"):
         judge_run(trained, 4, "cpu")
+    (trained / "result.json").write_text(json.dumps({**result, "frames": 10**6}))
+    with pytest.raises(InputError, match=r"frame 1000000; resume with"):
+        judge_run(trained, 4, "cpu")
     (trained / "result.json").unlink()
     with pytest.raises(InputError, match=r"no result\.json"):
         judge_run(trained, 4, "cpu")

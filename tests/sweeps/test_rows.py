@@ -143,6 +143,11 @@ def test_a_result_out_of_range_is_damaged(sweep, lie):
     assert read_rows(sweep)[0].state == "damaged"
 
 
+def test_a_perfect_reward_is_not_out_of_range(sweep):
+    rewrite(sweep, 0, running_reward=3.0)
+    assert read_rows(sweep)[0].state == "finished"
+
+
 @pytest.mark.parametrize(
     "line", ["400,3,1.5,0.5", "1500,3,4,0.5", "1500,3,nan,0.5", "inf,3,1.5,0.5", "1e300,3,1,1"]
 )
@@ -157,6 +162,13 @@ def test_a_run_that_failed_with_no_number_keeps_what_it_had(sweep):
         file.write("3,1500,3,nan,nan\n")
     failed = read_rows(sweep)[3]
     assert (failed.frames, failed.seconds, failed.entropy) == (1500, 3, None)
+
+
+def test_a_run_that_failed_before_its_first_update_has_nothing(sweep):
+    metrics = sweep.folder / "3" / "metrics.csv"
+    metrics.write_text(metrics.read_text().splitlines()[0] + "\n")
+    failed = read_rows(sweep)[3]
+    assert (failed.state, failed.frames, failed.seconds) == ("failed", 0, 0)
 
 
 def test_unreadable_metrics_are_damage_and_an_unreadable_result_must_be_made_again(sweep):

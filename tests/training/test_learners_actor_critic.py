@@ -102,6 +102,13 @@ def gradient(learner, steps, name="loss_objective"):
     return learner.network.layers[-1].weight.grad.clone()
 
 
+def test_metrics_are_means_over_minibatches(make_learner, batch):
+    learner = make_learner(A2CLoss)
+    steps = learner.estimate(batch)
+    loss = float(learner._losses(steps.reshape(-1).copy())["loss_critic"])
+    assert learner.update(steps)["loss/loss_critic"] == pytest.approx(loss)
+
+
 @pytest.mark.parametrize("kind", [A2CLoss, ClipPPOLoss])
 def test_gradient_before_the_first_step_is_the_policy_gradient(make_learner, batch, kind):
     """It is -mean(A grad log p), as all ratios are 1; for linear logits, x (onehot - p)."""

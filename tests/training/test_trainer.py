@@ -228,6 +228,8 @@ def test_update_has_the_expected_metrics(make_trainer):
     at = At(-1, None)
     run(make_trainer(callbacks=[at], max_grad_norm=1e-3))
     names = {"train/reward", "train/running_reward", "train/length", "loss/loss_actor"}
-    assert names | {"loss/entropy", "loss/grad_norm", "time/frames_per_second"} <= set(
-        at.metrics[0]
-    )
+    assert names | {"loss/entropy", "loss/grad_norm"} <= set(at.metrics[0])
+    for metrics in at.metrics:
+        seconds = metrics["time/collect_s"] + metrics["time/learn_s"]
+        frames = metrics["time/frames_per_second"] * seconds
+        assert frames == pytest.approx(round(frames), abs=1e-6) and frames > 1

@@ -44,3 +44,10 @@ def test_figures_of_version_0_1_get_their_present_names():
     present = {"frames": 5, "running_reward": 2.5, "train/reward": 1, "train/running_reward": 2}
     assert list(with_present_names(older).items()) == list(present.items())
     assert with_present_names(present) == present
+
+
+def test_values_are_counted_one_by_one(monkeypatch):
+    monkeypatch.setattr("drone_rl.utils.readers.YAML_VALUES", 4)
+    assert parse_yaml("[1, 2, 3]", "x") == [1, 2, 3]  # and the list itself
+    with pytest.raises(InputError, match="more than 4 values"):
+        parse_yaml("[1, 2, 3, 4]", "x")

@@ -9,6 +9,7 @@ import drone_rl
 from drone_rl.config.commands import JudgeSettings
 from drone_rl.evaluation.rule import Rule
 from drone_rl.robustness.axes import AXES
+from drone_rl.robustness.domain import Prober
 from drone_rl.utils.intervals import mean_bounds
 from drone_rl.utils.seeding import RootSeed
 from drone_rl.verdicts.coverage import _strengths, recheck_domain
@@ -69,6 +70,20 @@ def test_with_fewer_successes_it_would_have_been_contradicted(good, monkeypatch)
         return mean_bounds(values, -0.9, 1.0, confidence)["upper95"]
 
     assert upper(found.fewest) > 0 >= upper(found.fewest - 1)
+
+
+def test_all_strengths_share_the_error_probability(good, monkeypatch):
+    parts = []
+
+    class Noted(Prober):
+        def probe(self, condition, part):
+            parts.append(part)
+            return super().probe(condition, part)
+
+    monkeypatch.setattr("drone_rl.verdicts.coverage.Prober", Noted)
+    few = FEW.replace(domain_flights=2)
+    recheck_domain(good, {"blur": need(high=0.5)}, shifts_of(good), few, SEED)
+    assert parts == [0.25] * 4  # without perturbation, at the end, and at two random strengths
 
 
 @pytest.mark.parametrize("name", list(AXES))

@@ -43,7 +43,7 @@ def test_what_to_type(line, message):
 
 
 def test_settings_and_options_of_hydra_are_accepted():
-    words = ["-m", "seed=0,1", "--config-dir", "my", "--cfg", "job", "~logger", "+a.b=1", "a='b c'"]
+    words = ["-m", "seed=0,1", "--config-dir", "my", "--cfg", "job", "~x", "+a.b=1", "a='b c'"]
     check_words("train", conf_dir(), [*words, "--config-dir=my", "x=[1,2]", "y='[', ']'"])
 
 

@@ -114,3 +114,10 @@ def test_the_key_names_each_region_once(truth):
     (axis,) = draw(heat_chart, truth)
     texts = [text.get_text() for text in axis.figure.legends[0].get_texts()]
     assert texts == ["next cube", "other cubes", "drone", "ground", "sky"]
+
+
+def test_a_map_without_heat_says_so(truth):
+    for shares in truth["heat"]["grad_cam"].values():
+        shares["share"]["mean"] = 0.0
+    (text,) = draw(heat_chart, truth)[0].texts
+    assert (text.get_text(), text.get_position()) == ("no heat", (0.5, 1))

@@ -7,6 +7,7 @@ from drone_rl.flight.commands.command import hold
 from drone_rl.flight.commands.drone import Drone
 from drone_rl.flight.commands.state import LandedState
 from drone_rl.sim.dynamics.control import rotor_goals
+from drone_rl.utils.errors import InputError
 
 
 @pytest.fixture
@@ -41,6 +42,23 @@ def test_it_flies_when_it_climbs_and_has_landed_when_it_lies_still(drone):
         drone._fly(None, 7)
     assert not drone._is_flying
     assert drone.state.collision.thing == "ground"
+
+
+def test_idle_rotors_do_not_take_off(drone, hovering):
+    drone.body = hovering((0, 0, 9))
+    drone.body.velocity[0, 2] = 1.0
+    drone.body.rotors[:] = 0.05
+    drone._update_landed()
+    assert not drone._is_flying
+    drone.body.rotors[:] = 0.15
+    drone._update_landed()
+    assert drone._is_flying
+
+
+def test_seeds_have_31_bits(quadrotor):
+    Drone(quadrotor, seed=2**31 - 1)
+    with pytest.raises(InputError, match="seed=2147483648"):
+        Drone(quadrotor, seed=2**31)
 
 
 def test_a_still_drone_in_the_air_has_not_landed(drone, hovering):

@@ -21,6 +21,13 @@ def rows(*values):
     return torch.tensor(values, dtype=torch.float64)
 
 
+def test_a_repeated_last_point_does_not_change_the_braking(hovering):
+    body, level, up = hovering((0, 0, 1)), [8.0, 0.0, 1.0], [0.0, 0.0, 9.0]
+    for point, braking in ((level, 1.8), (up, 0.5)):
+        for points in ([point], [point, point]):
+            assert PathCommand(body, rows(points), 2.0, 60.0).braking.tolist() == [braking]
+
+
 def test_automatic_lookahead():
     assert lookahead_of(2.0) == pytest.approx(1.2)
     assert lookahead_of(2.0, adaptive=0.0) == pytest.approx(1.6)

@@ -1,5 +1,7 @@
 """Comparison with the reference drone in double precision, and the end of a tick."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -74,6 +76,11 @@ def test_drone_on_the_ground_keeps_its_tilt_under_thrust():
     strong, weak = (drone.push(state, doubles((share,) * 4)) for share in (0.62, 0.5))
     assert float(strong.attitude[0, 1]) > 0.09
     assert weak.attitude.tolist() == [[1, 0, 0, 0]]
+    w, z = math.cos(math.radians(30.0)), math.sin(math.radians(30.0))  # heading 60 degrees
+    c, s = math.cos(0.1), math.sin(0.1)
+    state.attitude[:] = doubles((w * c, w * s, z * s, z * c))
+    level = drone.push(state, doubles((0.5,) * 4)).attitude[0].tolist()
+    assert level == pytest.approx([w, 0.0, 0.0, z], abs=1e-6)
 
 
 def test_fast_drone_hits_obstacles():

@@ -96,6 +96,8 @@ def test_base_class_has_defaults():
     info = step["next", "info"]
     assert step.shape[1] == 1 and step["next", "terminated"].all()
     task = Minimal()
+    reasons = task.entries["end_reason"]
+    assert (reasons.low, reasons.high) == (0, EndReason.STEP_LIMIT)
     goals = task.score({name: info[name][:, 0] for name in task.scored})
     assert goals.reached.all() and goals.world.shape == (3, 2)
     (by, value, of) = next(iter(task.classes(goals)))

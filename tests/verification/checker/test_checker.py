@@ -101,6 +101,14 @@ def test_ends_by_hand(end, collected, repeats, loops, steps, right):
     assert ends_as_stated(stated, flown, 0) is right
 
 
+@pytest.mark.parametrize("stated", [EndReason.FRONT_BOUNDARY, EndReason.SIDE_BOUNDARY])
+@pytest.mark.parametrize("ended", [EndReason.FRONT_BOUNDARY, EndReason.SIDE_BOUNDARY, LIMIT])
+def test_another_end_is_not_as_stated(stated, ended):
+    outcome = Outcome(stated, (False,), False, 0.5, {30: 0.5}, np.zeros((0, 1, 2)))
+    flown = Rollouts(*map(np.array, ([int(ended)], [[False]], [30], [0])))
+    assert ends_as_stated(outcome, flown, 0) is (stated == ended)
+
+
 def test_many_contradictions_take_few_lines():
     one = Contradiction("inside", (1.0, 2.0), "a", "b")
     found = Findings(("lie",), (one,) * 30, 5000, {"inside": 9000})

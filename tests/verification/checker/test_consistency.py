@@ -21,6 +21,13 @@ def test_a_twentieth_of_the_steps_may_be_left_open(two_halves):
         assert (lies(two_halves) == []) == accepted
 
 
+def test_steps_may_add_up_to_their_share_up_to_rounding(one_sided):
+    won = one_sided["outcomes"][0]
+    for excess, accepted in ((1e-13, True), (1e-9, False)):
+        won["steps"] = {"20": won["share"] * (1 + excess)}
+        assert (lies(one_sided) == []) == accepted
+
+
 def test_a_rare_outcome_may_leave_its_steps_open(one_sided):
     """As one between boxes of which it is not certain by which way they ended."""
     won, lost = one_sided["outcomes"]

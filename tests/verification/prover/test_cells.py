@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.cells import Cells
+from drone_rl.verification.prover.cells import Cells, _bands, _middle_faces
 from drone_rl.verification.prover.cube_images import CameraModel
 
 TINY = CameraModel(
@@ -69,6 +69,9 @@ def test_pictures_within_a_band_are_found():
     cells = Cells(both, 4.0, 1.0, 3.0, Late())
     assert cells.pictures[:, 0].tolist() == [[0, 0], [1, 0], [1, 1]]
     assert (cells.first.tolist(), cells.last.tolist()) == ([0, 0, 2], [0, 2, 2])
+    two = Cells(both, 4.0, 1.0, 5.0, Late())  # a band at 2 m and one at 4 m
+    assert two.pictures[:, 0].tolist() == [[0, 0], [1, 0], [1, 1], [2, 1], [2, 2]]
+    assert (two.first.tolist(), two.last.tolist()) == ([0, 0, 2, 2, 4], [0, 2, 2, 4, 4])
 
 
 def test_a_renderer_that_is_a_little_off_gets_wider_bands():
@@ -99,3 +102,28 @@ def test_a_part_of_a_row_shows_what_the_row_does_there():
         theirs = whole.pictures[whole.first[at + k] : whole.last[at + k] + 1]
         assert np.array_equal(mine, theirs)
     assert len(some.pictures) == some.last[-1] + 1
+
+
+class Borders:
+    """Borders at 1 and 5 m, each known up to 0.1 m; the faces are the positions themselves."""
+
+    def borders(self, ahead):
+        return np.array([1.0, 5.0]), np.array([0.1, 0.1])
+
+    def rounding(self, places):
+        return 0.0 * places
+
+    def faces(self, ahead, positions):
+        return positions
+
+
+@pytest.mark.parametrize(
+    ("lowest", "highest", "count"),
+    [(0.0, 6.0, 2), (1.0, 5.0, 2), (1.05, 4.0, 1), (1.2, 4.95, 1), (1.2, 4.8, 0)],
+)
+def test_bands_that_an_interval_ends_in_belong_to_it(lowest, highest, count):
+    assert len(_bands(Borders(), 3.0, lowest, highest, 1.0)) == count
+
+
+def test_the_faces_of_a_cell_are_those_of_its_middle():
+    assert _middle_faces(Borders(), 3.0, np.array([0.0, 2.0, 3.0, 7.0])).tolist() == [1.0, 5.0]

@@ -13,6 +13,7 @@ from drone_rl.verification.prover.cube_images import (
     RIGHT_SIDE,
     UNIT,
     CameraModel,
+    _packed,
 )
 
 
@@ -27,6 +28,11 @@ def tiny():
         widest=20.0,
         bound=6.0,
     )
+
+
+def test_each_colour_is_a_number_of_its_own():
+    colors = np.array([[1, 2, 3], [3, 2, 1], [0, 0, 255], [255, 0, 0]], np.uint8)
+    assert _packed(colors).tolist() == [0x030201, 0x010203, 0xFF0000, 0x0000FF]
 
 
 def test_slopes_of_the_default_camera():

@@ -51,3 +51,8 @@ def test_textures_are_stored_once(sceneries):
     first = encoded.texels.numpy()[count : count + 256]
     red, green, blue = (load("bricks")[0, :, i] for i in range(3))
     assert np.array_equal(first, red + 256 * green.astype(int) + 65536 * blue.astype(int))
+
+
+def test_exposure_scales_the_zenith_up_to_white(sceneries):
+    _, effects = sceneries.encode(Appearance(zenith=(0.2, 0.5, 0.8), exposure=1.5), 1)
+    assert effects.zenith.numpy().tolist() == [[76, 191, 255]]

@@ -1,5 +1,7 @@
 """Bounds of geoms in the image contain all visible pixels and little more."""
 
+import itertools
+
 import numpy as np
 import pytest
 import warp as wp
@@ -25,9 +27,10 @@ def find_visible(
     part[0] = bounding_rectangle(job, view_geom(job, scene, 0, placed), wp.vec3())
 
 
-def found(position, size=(1.0, 1.0, 1.0)):
+def found(position, size=(1.0, 1.0, 1.0), attitude=(1.0, 0.0, 0.0, 0.0)):
     """Return first and last column and row."""
     scene = geoms(-6.0)
+    scene.attitude = wp.array([attitude], dtype=wp.vec4, device="cpu")
     scene.position = wp.array([position], dtype=wp.vec3, device="cpu")
     scene.reach = wp.array([size], dtype=wp.vec3, device="cpu")
     part = wp.zeros(1, dtype=wp.vec4i, device="cpu")
@@ -51,6 +54,15 @@ def test_geoms_out_of_view_have_empty_bounds(position):
 
 def test_box_around_the_camera_covers_the_image():
     assert found((0.0, 0.0, 0.0)) == [0, SIZE, 0, SIZE]
+
+
+@pytest.mark.parametrize("corner", itertools.product((-1.0, 1.0), repeat=3))
+def test_box_with_a_single_corner_behind_the_camera_covers_the_image(corner):
+    """The corner is turned to the back, 0.13 m behind the camera, which is inside of the box."""
+    unit = np.array(corner) / np.sqrt(3.0)
+    turn = np.array([1.0 + unit[2], *np.cross(unit, [0.0, 0.0, 1.0])])
+    attitude = (turn / np.linalg.norm(turn)).tolist()
+    assert found((0.0, 0.0, -1.6), attitude=attitude) == [0, SIZE, 0, SIZE]
 
 
 def test_box_beside_the_camera_covers_a_part():

@@ -29,6 +29,19 @@ def test_shadow_blocks_only_the_first_light():
     np.testing.assert_allclose(out.numpy()[1], [0.35, 0.15, 0.15], atol=1e-6)
 
 
+def test_a_light_behind_a_surface_does_not_darken_it():
+    material = materials()
+    material.ambient = array([[[0.1] * 3, [0.05] * 3]], wp.vec3)
+    material.diffuse = array([[[0.5] * 3, [0.2] * 3]], wp.vec3)
+    material.direction = array([[[0.0, -0.6, -0.8], [0.0, 0.0, 1.0]]], wp.vec3)
+    out = wp.zeros(2, dtype=wp.vec3, device="cpu")
+    wp.launch(light, 1, inputs=[material, out], device="cpu")
+    np.testing.assert_allclose(out.numpy(), [[0.55] * 3, [0.15] * 3], atol=1e-6)
+    material.direction = array([[[0.0, 0.6, 0.8], [0.0, 0.0, 1.0]]], wp.vec3)
+    wp.launch(light, 1, inputs=[material, out], device="cpu")
+    np.testing.assert_allclose(out.numpy(), [[0.15] * 3] * 2, atol=1e-6)
+
+
 @wp.kernel(enable_backward=False)
 def cover(
     geom_view: structs_kernel.GeomView, face: int, normal: wp.vec3, out: wp.array[TextureMap]
