@@ -20,7 +20,7 @@ from tests.verification.checker.making import of_every_place
     ],
 )
 def test_verdicts_are_exit_statuses(in_process, tmp_path, policy, status, verdict):
-    done = in_process("verdict", f"policy={policy}", "episodes=300", "hydra.run.dir=v")
+    done = in_process("verdict", f"policy={policy}", "episodes=300", "seed=0", "hydra.run.dir=v")
     assert done.returncode == status, done.stderr
     assert json.loads((tmp_path / "v" / "verdict.json").read_text())["kind"] == verdict
     assert done.stdout.startswith(verdict)

@@ -10,8 +10,10 @@ from unittest.mock import patch
 import jinja2
 import pytest
 import torch
+from hydra.core.config_store import ConfigStore
 
 import drone_rl.explanations
+from drone_rl.cli.hydra import composition
 from drone_rl.config import TASKS
 from drone_rl.explanations import explain, report
 from drone_rl.explanations.report import page as report_page
@@ -99,6 +101,7 @@ def workplace(tmp_path, monkeypatch):
     with patch.dict(TASKS), patch.dict(MAKERS):  # a page's tasks are registered until its end
         yield tmp_path
     report_page._environment.cache_clear()
+    forget_choices()
     torch.set_num_threads(threads)
     for name in set(sys.modules) - known:
         if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
@@ -107,6 +110,16 @@ def workplace(tmp_path, monkeypatch):
     types_of.cache_clear()
     gc.collect()
     gc.unfreeze()
+
+
+def forget_choices():
+    """Remove the parts of plug-ins from Hydra's groups; built-in parts have files instead."""
+    stored = ConfigStore.instance().repo
+    for group in ("task", *composition.PARTS, *composition.SEVERAL):
+        nodes = stored.get(group, {})
+        for name in [name for name in nodes if name.endswith(".yaml")]:
+            if not name.startswith("base_"):
+                del nodes[name]
 
 
 def show(value):
