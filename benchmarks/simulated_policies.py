@@ -19,7 +19,7 @@ from drone_rl.evaluation.judge import estimate, observe
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.rule import Kind, Quantity, Rule, decide, kinds_within
 from drone_rl.sim.tasks import CollectCubes, Goals
-from drone_rl.sim.tasks.collect_cubes import Side
+from drone_rl.sim.tasks.collect_cubes import EndReason, Side
 
 L, A, R = Side
 Type = tuple[tuple[Side, ...], tuple[int, ...], bool]
@@ -223,6 +223,6 @@ def _episode(sides: tuple[Side, ...], hits: Any) -> Episodes:
             stratum=side,
             world=torch.zeros(1, 1),
         ),
-        end_reason=torch.ones(1, dtype=torch.int64),
+        end_reason=torch.tensor([_TASK.success_end if all(hits) else EndReason.STEP_LIMIT]),
         length=torch.ones(1, dtype=torch.int64),
     )

@@ -18,7 +18,9 @@ def test_find_benchmarks_expands_groups_and_removes_duplicates():
 
 
 def test_the_error_for_an_unknown_name_lists_the_known_names():
-    with pytest.raises(InputError, match=r"'speed' is unknown; use some of: main, truth.*render"):
+    with pytest.raises(
+        InputError, match=r"'speed' is unknown; use some of: main, adversarial.*render"
+    ):
         find_benchmarks(["render", "speed"])
 
 

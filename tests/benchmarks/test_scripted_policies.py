@@ -16,17 +16,17 @@ EPISODES = 400
 NONE, RIGHT, LEFT = "none of these", "one-sided (right)", "one-sided (left)"
 TRIVIAL = "good, but trivial"
 CERTAIN, OPEN = True, False
-BASELINES = "acting at random 29% and the oracle 100%"
+BASELINES = "acting at random 29.1% and the oracle 100%"
 WANTED = {
     "all cubes": ("good", CERTAIN, ["does its task", "at most 0.9%", BASELINES]),
     "all cubes, slowly": ("good", CERTAIN, ["in 100% of episodes", "at most 0.9%"]),
-    "first cube only, then straight on": (NONE, CERTAIN, ["at the second cube", "(73%)"]),
+    "first cube only, then straight on": (NONE, CERTAIN, ["at the second cube", "(72.8%)"]),
     "first cube only, then leaves": (
         "poor",
         CERTAIN,
         [
-            "hardly better than acting at random. It collects 54% of the cubes on its left, 51%",
-            f"collects 33% of all cubes, {BASELINES}",
+            "hardly better than acting at random. It collects 53.7% of the cubes on its left, ",
+            f"collects 33.3% of all cubes, {BASELINES}",
             "at the second cube: in all 400 episodes; 100% of all end outside the field",
         ],
     ),
@@ -36,7 +36,11 @@ WANTED = {
         CERTAIN,
         ["third cube: in all 400 episodes; 100% of all end at the step limit"],
     ),
-    "dithers at far first cubes": (NONE, CERTAIN, ["4 to 6 m", "32% of all end at the step limit"]),
+    "dithers at far first cubes": (
+        NONE,
+        CERTAIN,
+        ["4 to 6 m", "31.5% of all end at the step limit"],
+    ),
     "dodges cubes ahead": (
         NONE,
         CERTAIN,
@@ -45,10 +49,10 @@ WANTED = {
             "fails most with cubes ahead",
         ],
     ),
-    "dodges 35% of the cubes ahead": (NONE, CERTAIN, ["67% of those ahead", "with cubes ahead"]),
+    "dodges 35% of the cubes ahead": (NONE, CERTAIN, ["67.2% of those ahead", "with cubes ahead"]),
     "sees 4 m sideways": (NONE, CERTAIN, ["with cubes 4 to 6 m to its side: in all 221 episodes"]),
     "sees 2.5 m sideways": (NONE, OPEN, ["with cubes 4 to 6 m to its side: in all"]),
-    "blind to higher cubes": (NONE, CERTAIN, ["with cubes higher than itself", "(82%)"]),
+    "blind to higher cubes": (NONE, CERTAIN, ["with cubes higher than itself", "(82.4%)"]),
     "blind to much lower cubes": (NONE, CERTAIN, ["with cubes lower than itself"]),
     "blind on its left": (RIGHT, CERTAIN, ["can't be trusted with cubes on its left", "0% of the"]),
     "blind on its right": (LEFT, CERTAIN, ["can't be trusted with cubes on its right"]),
@@ -64,7 +68,7 @@ WANTED = {
         OPEN,
         ["looks good, but 400 episodes are too few", "second cube", "outside the field"],
     ),
-    "loses one episode in 50": ("good", CERTAIN, ["98% of episodes", "second cube: in 9 of 400"]),
+    "loses one episode in 50": ("good", CERTAIN, ["97.8% of episodes", "second cube: in 9 of 400"]),
     "leaves when the first cube is far": (
         "good",
         OPEN,
@@ -73,23 +77,23 @@ WANTED = {
     "all or nothing, nine in ten": (
         "good",
         OPEN,
-        ["first cube: in 32 of 400", "8% of all end"],
+        ["first cube: in 32 of 400", "; 8.0% of all end"],
     ),
     "misses the last cube in one of ten": (
         "good",
         OPEN,
         ["third cube: in 32 of 400 episodes"],
     ),
-    "leaves at once, every other time": (NONE, OPEN, ["first cube", "50% of all end outside"]),
-    "sure of nothing": ("good", CERTAIN, ["most probable actions", "in 17% of episodes, not in"]),
+    "leaves at once, every other time": (NONE, OPEN, ["first cube", "50.5% of all end outside"]),
+    "sure of nothing": ("good", CERTAIN, ["most probable actions", "in 17.0% of episodes, not in"]),
     "turns the wrong way": (
         "poor",
         CERTAIN,
         ["no better than acting at random", "collects 0% of all cubes"],
     ),
     "finds one cube of ten beside it": ("poor", CERTAIN, ["hardly better than acting", BASELINES]),
-    "finds one cube of three beside it": (NONE, CERTAIN, ["36% of the cubes on its left"]),
-    "all of five cubes": ("good", CERTAIN, ["flying straight on 27%"]),
+    "finds one cube of three beside it": (NONE, CERTAIN, ["36.3% of the cubes on its left"]),
+    "all of five cubes": ("good", CERTAIN, ["flying straight on 27.5%"]),
     "asleep at the fifth cube": (NONE, CERTAIN, ["fifth cube: in all 400", "at the step limit"]),
     "all cubes where none stand aside": (
         TRIVIAL,
@@ -100,12 +104,12 @@ WANTED = {
     "straight on in a narrow field": (
         "poor",
         CERTAIN,
-        ["no better than flying straight on", "straight on 55%"],
+        ["no better than flying straight on", "straight on 55.0%"],
     ),
     "straight on among large cubes": (
         "poor",
         CERTAIN,
-        ["no better than flying straight on", "straight on 49%"],
+        ["no better than flying straight on", "straight on 49.0%"],
     ),
     "no time for all cubes": (
         NONE,

@@ -55,7 +55,7 @@ def test_verdict_does_not_depend_on_the_wrapping(network):
 def test_sampled_actions_equal_those_of_the_network(network):
     few = {"episodes": 6, "num_envs": 6, "seed": 0, "progress": silent}
     own, found = drone_rl.evaluate("good", **few), drone_rl.evaluate(network, **few)
-    assert found.used_dynamics == own.used_dynamics
+    assert found.figures == own.figures
     verdict = found.as_dict()
     assert (verdict["policy"], verdict["trained"]) == ("SmallCNN", None)
 

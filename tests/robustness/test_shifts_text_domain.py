@@ -87,10 +87,10 @@ def test_fog_is_needed_up_to_none():
 def test_what_new_episodes_say_against_a_file():
     probed = {"bad": True, "refused": None, "success": 0.5}
     assert contradicted("blur", 1.0, "pixels", probed) == (
-        "blur at 1 pixels: 50% of new episodes succeed, so the policy is certainly not good there; "
-        "the file states that it is"
+        "blur at 1 pixels: 50.0% of new episodes succeed, so the policy is certainly not good "
+        "there; the file states that it is"
     )
-    assert contradicted(None, 0.0, "", probed).startswith("without perturbation: 50% of new epis")
+    assert contradicted(None, 0.0, "", probed).startswith("without perturbation: 50.0% of new epis")
     refused = contradicted("blur", 1.0, "pixels", {"bad": True, "refused": "too large"})
     assert refused == "blur at 1 pixels: the task does not allow it (too large)"
 

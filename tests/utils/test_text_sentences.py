@@ -15,7 +15,13 @@ def test_only_what_the_evidence_allows_is_said():
 
 @pytest.mark.parametrize(
     ("share", "text"),
-    [(0.0, "0%"), (0.001, "less than 1%"), (0.5, "50%"), (0.999, "more than 99%"), (1.0, "100%")],
+    [
+        (0.0, "0%"),
+        (0.0004, "less than 0.1%"),
+        (0.5, "50.0%"),
+        (0.9996, "more than 99.9%"),
+        (1.0, "100%"),
+    ],
 )
 def test_nearly_all_is_not_all(share, text):
     assert percent(share) == text

@@ -11,7 +11,7 @@ NUMBERS = {
 
 def test_a_success_rate_is_no_verdict():
     """Of 4 of 5, exactly: 28% to 99%."""
-    assert sitl_cell({"success": proportion(4, 5)}) == "no verdict: 4 of 5 (28 to 99)"
+    assert sitl_cell({"success": proportion(4, 5)}) == "no verdict: 4 of 5 (28.4 to 99.5%)"
 
 
 def test_a_column_for_episodes_with_software_in_the_loop():
@@ -19,7 +19,7 @@ def test_a_column_for_episodes_with_software_in_the_loop():
     assert rows(NUMBERS) == [head, good, poor]
     assert rows({**NUMBERS, LOOPED: FLIGHTS}) == [
         [*head, "software in the loop"],
-        [*good, "no verdict: 4 of 5 (28 to 99)"],
+        [*good, "no verdict: 4 of 5 (28.4 to 99.5%)"],
         [*poor, "left out"],
     ]
 

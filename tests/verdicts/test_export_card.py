@@ -38,7 +38,7 @@ def test_greedy_flights_alone_have_no_column_of_drawn_ones():
 def test_the_largest_failure_comes_first_and_those_that_never_happened_are_left_out():
     found = lines()
     at = found.index("| fails first at | episodes | of | rate |")
-    assert found[at + 2] == "| cube: first | 31 | 400 | 0.750 (0.700 to 0.800) |"
+    assert found[at + 2] == "| cube: first | 31 | 400 | 75.0% (70.0 to 80.0) |"
     assert found[at + 3].startswith("| end: step_limit | 4 | 400 |")
     assert found[at + 4] == ""
 
