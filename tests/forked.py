@@ -56,10 +56,14 @@ def run_forked(code, *args, cwd, stdout=None, environment=None):
     return subprocess.CompletedProcess(args, status, printed.get("stdout"), printed["stderr"])
 
 
-def run_module_forked(command, *, check=False, env=None, **_):
-    """Stand in for `subprocess.run` of `python -m MODULE ARGUMENT ...` in this folder."""
-    _, option, module, *args = command
-    assert option == "-m", command
+_run = subprocess.run
+
+
+def run_module_forked(command, *, check=False, env=None, **options):
+    """Stand in for `subprocess.run`: fork for `python -m MODULE ARGUMENT ...` in this folder."""
+    if command[1] != "-m":  # a program that a library asks about the machine, such as uname
+        return _run(command, check=check, env=env, **options)
+    _, _, module, *args = command
     code = f"import runpy; runpy.run_module({module!r}, run_name='__main__', alter_sys=True)"
     done = run_forked(code, *args, cwd=os.getcwd(), environment=env)
     if check and done.returncode:

@@ -14,6 +14,7 @@ from benchmarks.commands import train
 from benchmarks.peers.plot import plot
 from benchmarks.peers.program import success_lower95
 from benchmarks.peers.settings import OURS, THEIRS
+from drone_rl.training.run_folder import Training
 
 Measured = dict[str, Any]
 
@@ -47,7 +48,10 @@ def bench_peers(folder: Path, seeds: Sequence[int], episodes: int, quick: bool) 
         for name, measure in trainings.items():
             for key, value in measure(seed=seed).items():
                 found[name].setdefault(key, []).append(value)
-    plot(found, folder.parent.parent / "peers.png")
+    plot(
+        {name: values.pop("curve") for name, values in found.items()},
+        folder.parent.parent / "peers.png",
+    )
     means = {name: statistics.mean(values["seconds"]) for name, values in found.items()}
     best = min(means[name] for name in THEIRS)
     return {"peers": found, "solve_over_best_peer": means["reinforce"] / best}
@@ -77,14 +81,21 @@ def train_ours(arguments: Sequence[str], *, seed: int, episodes: int, folder: Pa
         seed: Seed of environments, weights and actions.
         episodes: Number of held-out episodes; 0 for no evaluation.
         folder: Folder of the runs.
+
+    Returns:
+        As `benchmarks.peers.program` prints. The curve includes the time for writing files in that
+        of the start.
     """
     run = folder / str(seed)
     seconds, result = train(run, *arguments, f"seed={seed}")
+    columns, start = Training(run, "", result).metrics(), seconds - result["seconds"]
+    ends = [start + at for at in columns["seconds"]]
     found = {
         "seconds": seconds,
         "seconds_without_imports": result["seconds"],
         "frames": result["frames"],
         "is_solved": result["reason"] == "solved",
+        "curve": [*zip(ends, columns["train/running_reward"], strict=True)],
     }
     return found | ({"success_lower95": success_lower95(run, episodes)} if episodes else {})
 

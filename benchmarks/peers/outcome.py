@@ -4,6 +4,8 @@ import dataclasses
 
 from drone_rl.policies.external_policy import ExternalPolicy
 
+Curve = list[tuple[float, float]]
+"""Seconds and running mean of episode rewards, after each batch."""
 TARGET, DECAY = 2.97, 0.99
 """Target and decay of the running mean of episode rewards, which starts at 0."""
 
@@ -15,6 +17,7 @@ class PeerTraining:
     is_solved: bool
     """Whether the running mean has reached the target."""
     frames: int
-    running_reward: float
+    history: Curve
+    """Seconds since the epoch and running mean of episode rewards, after each batch."""
     policy: ExternalPolicy
     """The trained policy, for evaluation in held-out environments."""

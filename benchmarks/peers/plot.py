@@ -1,45 +1,41 @@
-"""Bar chart of the training times."""
+"""Learning curves of the compared learners over time."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
-from benchmarks.peers.settings import LABELS, THEIRS
-from drone_rl.utils.palette import EMPTY, INK, MUTED, css
+from benchmarks.peers.outcome import TARGET, Curve
+from benchmarks.peers.settings import LABELS, OURS
+from drone_rl.utils.palette import BAD, FAINT, FORWARD, GOOD, LEFT, MUTED, RIGHT, css
 
-COLORS = {
-    "start and imports": css(EMPTY),
-    "training, ours": css(INK),
-    "training, others": css(MUTED),
-}
-_SEED: dict[str, Any] = {"mfc": "white", "mec": "black", "markersize": 5}
+COLORS = dict(zip(LABELS, (RIGHT, GOOD, FORWARD, LEFT, BAD, MUTED), strict=True))
+"""Color of each learner."""
 
 
-def plot(found: Mapping[str, Mapping[str, list[Any]]], path: Path) -> None:
-    """Plot a bar for each learner and a dot for each seed.
+def plot(curves: Mapping[str, Sequence[Curve]], path: Path) -> None:
+    """Plot the running reward over seconds since the start of the process, a line for each seed.
+
+    A dot ends each line. Third-party learners have dashed lines.
 
     Args:
-        found: "peers" of `bench_peers`.
+        curves: By name of the learner, the learning curve for each seed.
         path: Path of the image.
     """
     from matplotlib.figure import Figure
-    from matplotlib.patches import Patch
 
-    figure = Figure(figsize=(9, 3.6), layout="constrained")
-    axes, names = figure.subplots(), list(found)
-    for i, name in enumerate(names):
-        seconds, trained = (found[name][k] for k in ("seconds", "seconds_without_imports"))
-        whole, training = sum(seconds) / len(seconds), sum(trained) / len(trained)
-        kind = "training, others" if name in THEIRS else "training, ours"
-        axes.barh(i, whole - training, color=COLORS["start and imports"])
-        axes.barh(i, training, left=whole - training, color=COLORS[kind])
-        axes.plot(seconds, [i] * len(seconds), "o", **_SEED)
-        if not all(found[name]["is_solved"]):
-            axes.text(whole, i, "  not all solved", va="center")
-    axes.set_yticks(range(len(names)), [LABELS[name] for name in names])
-    axes.invert_yaxis()
-    axes.set(xlabel="seconds from the start of the process until it is solved", xlim=(0, None))
-    handles: list[Any] = [Patch(color=color, label=label) for label, color in COLORS.items()]
-    handles += axes.plot([], [], "o", **_SEED, label="each seed")
-    figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False)
+    figure = Figure(figsize=(9, 4), layout="constrained")
+    axes = figure.subplots()
+    axes.axhline(TARGET, color=css(FAINT), linewidth=1)
+    axes.text(0.1, TARGET, f"solved: {TARGET}", color=css(FAINT), va="bottom")
+    for name, of_seeds in curves.items():
+        color, style = css(COLORS[name]), "-" if name in OURS else "--"
+        for number, curve in enumerate(of_seeds):
+            seconds, rewards = zip(*curve, strict=True)
+            label = None if number else LABELS[name]
+            axes.plot(seconds, rewards, style, color=color, linewidth=1.6, label=label)
+            axes.plot(seconds[-1], rewards[-1], "o", color=color, markersize=5)
+    axes.set_title("Learning curves, imports included (one line per seed)", loc="left")
+    axes.set(xlabel="seconds since the start of the process", xlim=(0, None), ylim=(0, 3.25))
+    axes.set_ylabel("cubes per episode (running mean)")
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.legend(loc="outside right center", frameon=False)
     figure.savefig(path, dpi=120)

@@ -3,8 +3,8 @@
     python -m benchmarks.peers.program sb3_ppo --seed 100 --started "$(date +%s.%N)"
 
 It prints one line of JSON: "seconds" from the start of the process until solved,
-"seconds_without_imports", "frames", "is_solved", and, if `--episodes` is given, "success_lower95"
-in held-out greedy episodes.
+"seconds_without_imports", "frames", "is_solved", the learning "curve", and, with `--episodes`,
+"success_lower95" in held-out greedy episodes.
 """
 
 import argparse
@@ -56,11 +56,13 @@ def measure(arguments: Sequence[str]) -> dict[str, Any]:
     imported = time.time()
     done = train(options.seed, max_frames=options.max_frames, **settings)
     solved = time.time()
+    started = began if options.started is None else options.started
     found = {
-        "seconds": solved - (began if options.started is None else options.started),
+        "seconds": solved - started,
         "seconds_without_imports": solved - imported,
         "frames": done.frames,
         "is_solved": done.is_solved,
+        "curve": [(at - started, reward) for at, reward in done.history],
     }
     if options.episodes:
         found["success_lower95"] = success_lower95(done.policy, options.episodes)

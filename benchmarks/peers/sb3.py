@@ -1,5 +1,6 @@
 """Train Stable-Baselines3's algorithms with the default network until the task is solved."""
 
+import time
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
@@ -11,7 +12,7 @@ from stable_baselines3 import A2C, PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
-from benchmarks.peers.outcome import DECAY, TARGET, PeerTraining
+from benchmarks.peers.outcome import DECAY, TARGET, Curve, PeerTraining
 from drone_rl.config.transforms import Gray, Standardize, Transform
 from drone_rl.envs.gymnasium.environments import DroneWorlds
 from drone_rl.envs.sb3.worlds import Sb3Worlds
@@ -40,6 +41,7 @@ class Solved(BaseCallback):
         super().__init__()
         self.target, self.decay = target, decay
         self.running_reward, self.episodes = 0.0, 0
+        self.history: Curve = []
         self._earned = np.zeros(1)
 
     @property
@@ -54,6 +56,9 @@ class Solved(BaseCallback):
         self.running_reward = running_mean(self.running_reward, ended, self.decay)
         self.episodes += len(ended)
         self._earned = np.where(done, 0.0, self._earned)
+
+    def _on_rollout_end(self) -> None:
+        self.history.append((time.time(), self.running_reward))
 
     def _on_step(self) -> bool:
         self.count(self.locals["rewards"], self.locals["dones"])
@@ -98,6 +103,7 @@ def train_sb3(
         **settings,
     )
     model.learn(max_frames, callback=solved)
+    solved.history.append((time.time(), solved.running_reward))
     batch = worlds.batch
     env.close()
     policy = policy_from(
@@ -107,4 +113,4 @@ def train_sb3(
         transforms=TRANSFORMS,
         name=f"sb3 {algorithm}",
     )
-    return PeerTraining(solved.is_reached, model.num_timesteps, solved.running_reward, policy)
+    return PeerTraining(solved.is_reached, model.num_timesteps, solved.history, policy)

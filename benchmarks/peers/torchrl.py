@@ -30,7 +30,7 @@ def train_torchrl(
     done = _example().train(seed=seed, target=target, max_frames=max_frames, **settings)
     reached = done.running_reward >= target
     policy = policy_from(done.network, name="torchrl's Collector")
-    return PeerTraining(reached, done.frames, done.running_reward, policy)
+    return PeerTraining(reached, done.frames, done.history, policy)
 
 
 def _example() -> ModuleType:

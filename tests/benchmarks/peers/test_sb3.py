@@ -37,8 +37,12 @@ def test_training_stops_at_frames_or_target_and_returns_a_policy(algorithm, sett
     settings = {"num_envs": 4, **settings}
     done = train_sb3(algorithm, 3, max_frames=64, **settings)
     again = train_sb3(algorithm, 3, max_frames=64, **settings)
-    assert (done.is_solved, done.running_reward) == (False, again.running_reward)
+    assert (done.is_solved, [r for _, r in done.history]) == (False, [r for _, r in again.history])
     assert done.frames >= 64
+    times = [at for at, _ in done.history]
+    assert len(times) == 1 + done.frames // (4 * settings.get("n_steps", 5)) and times == sorted(
+        times
+    )
     ours, theirs = (t.policy.make_network() for t in (done, again))
     weights = zip(ours.parameters(), theirs.parameters(), strict=True)
     assert all(one.equal(other) for one, other in weights)
