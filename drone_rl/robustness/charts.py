@@ -21,8 +21,8 @@ _OTHERS = {
     "onset": (css(FAINT), ":", "from step 20 on"),
 }
 _SCALE = 3
-_LABEL = 190
-"""Width of the names next to strips, pixels."""
+_TILES, _GAP, _HEADING = 3, 8, 28
+"""Images in a row of a strip, pixels between them, and height of its heading."""
 
 
 def chart(numbers: Mapping[str, Any]) -> Figure:
@@ -120,7 +120,7 @@ def _value(value: float | None) -> str:
 def strips(
     numbers: Mapping[str, Any], pictures: Mapping[str, Sequence[NDArray | None]]
 ) -> Image.Image:
-    """Arrange camera images at each strength, one row per axis, with success rates.
+    """Arrange camera images at each strength with success rates, one axis below the other.
 
     `numbers` are those of `shifts.json`; `pictures` are by axis, without perturbation and at each
     strength. Shapes: (H, W, 3).
@@ -150,13 +150,10 @@ def _success(result: Mapping[str, Any]) -> str:
 def _strip(
     numbers: Mapping[str, Any], name: str, pictures: Sequence[NDArray | None]
 ) -> Image.Image:
-    along, shown = numbers["axes"][name], conditions(numbers, name, pictures)
-    cells = [titled(picture, caption) for caption, picture in shown.items()]
-    strip = gridded(cells, len(cells), gap=8)
-    height = strip.height
-    canvas = Image.new("RGB", (_LABEL + 6 * (cells[0].width + 8), height + 6), PAPER)
-    canvas.paste(strip, (_LABEL, 0))
-    pen = ImageDraw.Draw(canvas)
-    pen.multiline_text((4, height // 2 - 16), NAMES[name], INK, ImageFont.load_default(15))
-    pen.text((4, height // 2 + 6), along["unit"], MUTED, ImageFont.load_default(13))
+    tiles = [titled(picture, text) for text, picture in conditions(numbers, name, pictures).items()]
+    grid = gridded(tiles, _TILES, gap=_GAP)
+    canvas = Image.new("RGB", (_TILES * (tiles[0].width + _GAP), grid.height + _HEADING + 6), PAPER)
+    canvas.paste(grid, (0, _HEADING))
+    heading = f"{NAMES[name]} ({numbers['axes'][name]['unit']})"
+    ImageDraw.Draw(canvas).text((2, 4), heading, INK, ImageFont.load_default(16))
     return canvas

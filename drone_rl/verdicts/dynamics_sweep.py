@@ -22,7 +22,7 @@ from drone_rl.utils.palette import BAD, EMPTY, FAINT, GOOD, INK, ONE_SIDED, css,
 from drone_rl.utils.progress import Bar, Progress, silent
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import BODIES, Evidence, interval, rate, say, seed_line
+from drone_rl.utils.text import BODIES, Evidence, interval, percent, rate, say, seed_line
 from drone_rl.verdicts.judge import judge
 
 LOOPED = "software in the loop"
@@ -37,7 +37,7 @@ _COLORS = {
     "none": css(light(EMPTY)),
 }
 _INK, _FAINT = css(INK), css(FAINT)
-_WIDTH, _HEIGHT = 1.75, 0.95
+_WIDTH, _HEIGHT = 1.35, 1.1
 """Inches of a cell."""
 
 
@@ -198,21 +198,24 @@ def chart(numbers: Mapping[str, Any]) -> Figure:
     """
     policies, looped = numbers["policies"], numbers.get(LOOPED, {})
     bodies = [*numbers["bodies"], *([LOOPED] if looped else [])]
-    size = (_WIDTH * (len(bodies) + 1), _HEIGHT * len(policies) + 0.6)
+    size = (_WIDTH * (len(bodies) + 1), _HEIGHT * len(policies) + 0.9)
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.subplots()
     axes.set(xlim=(-1, len(bodies)), ylim=(len(policies), -0.55))
     axes.axis("off")
-    note = "hatched, ?: not certain, because of too few episodes; in brackets: 95% CI"
-    figure.supxlabel(note, fontsize=8, color=_FAINT)
+    heading = "Verdict, success rate with 95% CI, and where most failures occur"
+    axes.set_title(heading, loc="left", fontsize=11, color=_INK)
+    note = "hatched, ?: too few episodes to be certain"
+    figure.supxlabel(note, fontsize=9, color=_FAINT)
     for x, body in enumerate(bodies):
-        axes.text(x + 0.5, -0.25, body, ha="center", va="center", fontsize=10, color=_INK)
+        text = textwrap.fill(body, 16)
+        axes.text(x + 0.5, -0.25, text, ha="center", va="center", fontsize=10, color=_INK)
     for y, (name, verdicts) in enumerate(policies.items()):
         axes.text(-0.05, y + 0.5, name, ha="right", va="center", fontsize=11, color=_INK)
         cells = [_verdict_cell(verdicts[body]) for body in numbers["bodies"]]
         if looped:
-            text = textwrap.fill(sitl_cell(looped[name]), 22)
-            cells.append((_COLORS["none"], "..", [(0.5, text, 8.0, _INK)]))
+            text = textwrap.fill(sitl_cell(looped[name]), 17)
+            cells.append((_COLORS["none"], "..", [(0.5, text, 8.5, _INK)]))
         for x, (color, hatch, lines) in enumerate(cells):
             axes.add_patch(Rectangle((x, y), 1, 1, fc=color, ec="white", lw=2, hatch=hatch))
             for height, text, points, ink in lines:
@@ -227,8 +230,9 @@ def _verdict_cell(verdict: Evidence) -> tuple[str, str | None, list[tuple[float,
     kind, success = verdict["kind"], verdict["greedy"]["success"]
     color = _COLORS.get(kind) or _COLORS.get(kind.split()[0], _COLORS["none"])
     lines = [
-        (0.2, f"{kind}{'' if verdict['certain'] else ' ?'}", 9.0, _INK),
-        (0.45, rate(success, label=""), 9.5, _INK),
-        (0.77, textwrap.fill(failure(verdict), 26), 7.0, _FAINT),
+        (0.17, f"{kind}{'' if verdict['certain'] else ' ?'}", 9.0, _INK),
+        (0.38, percent(success["share"]), 11.0, _INK),
+        (0.57, interval(success), 8.5, _INK),
+        (0.81, textwrap.fill(failure(verdict), 24), 7.0, _FAINT),
     ]
     return color, None if verdict["certain"] else "//", lines

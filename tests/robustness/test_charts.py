@@ -31,7 +31,7 @@ def test_nothing_is_called_good_without_a_search():
 
 def test_strips_show_what_was_flown():
     one = strips(SHIFTS, {"sun": PICTURES})
-    assert one.height >= 25 * 3 and one.width > 6 * 64 * 3
+    assert one.height >= 25 * 3 and one.width > 3 * 64 * 3
     two = strips(SHIFTS, {"sun": PICTURES, "blur": [*PICTURES[:3], None, *PICTURES[4:]]})
     assert two.height == 2 * one.height
     counts = {color: count for count, color in one.convert("L").getcolors()}
@@ -52,12 +52,18 @@ def test_ticks_stand_in_the_order_of_places_also_where_less_is_worse():
 
 def test_a_strip_by_the_pixel():
     shown = np.asarray(strips(SHIFTS, {"sun": PICTURES}))
-    assert shown.shape == (22 + 3 * 25 + 6, 190 + 6 * (3 * 64 + 8), 3)
+    assert shown.shape == (28 + 22 + 3 * 25 + 6, 3 * (3 * 64 + 8), 3)
     ink = (shown == INK).all(-1)
-    assert ink[32:50, :190].any()  # the name, in the middle of the row
+    assert ink[4:24, :300].any()  # name and unit, above the images
     for number, level in enumerate((0, 40, 200)):  # with nothing different, then strengths 1 and 5
-        left = 190 + number * 200
-        assert (shown[22:97, left : left + 192] == level).all()
+        left = number * 200
+        assert (shown[50:125, left : left + 192] == level).all()
+    six = changed(
+        SHIFTS, {"axes.sun.levels": [{**SHIFTS["axes"]["sun"]["levels"][0], "number": n, "value": n}
+        for n in range(1, 6)]})  # fmt: skip
+    second = np.asarray(strips(six, {"sun": PICTURES}))
+    assert second.shape == (28 + 2 * 97 + 8 + 6, 600, 3)
+    assert (second[28 + 97 + 8 + 22 :][:75, :192] == 120).all()  # strength 3, in the second row
 
 
 def test_a_chart_of_each_axis_and_their_legend():
