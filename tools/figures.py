@@ -1,8 +1,7 @@
 """Figures of the documentation that no command writes.
 
-`python -m tools.figures peers` plots the training times in docs/results.json, which `drone-rl bench
-peers` measures. `python -m tools.figures placebos FOLDER` plots the tests of the heat maps in a
-folder of `drone-rl explain`.
+`python -m tools.figures placebos FOLDER` plots the tests of the heat maps in a folder of `drone-rl
+explain`.
 """
 
 import json
@@ -11,10 +10,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.peers.plot import plot
+from drone_rl.utils.palette import INK, MUTED, css
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-MAPS, PLACEBOS = "tab:blue", "0.75"
+MAPS, PLACEBOS = css(INK), css(MUTED)
 
 
 def plot_placebos(truth: Mapping[str, Any], path: Path, policy: str) -> None:
@@ -35,7 +34,7 @@ def plot_placebos(truth: Mapping[str, Any], path: Path, policy: str) -> None:
     for row, (name, found) in enumerate({**methods, **placebos}.items()):
         score, color = found["score"], MAPS if name in methods else PLACEBOS
         ends = [score["mean"] - score["lower95"]], [score["upper95"] - score["mean"]]
-        axes.barh(row, score["mean"], color=color, xerr=ends, ecolor="0.3", capsize=2)
+        axes.barh(row, score["mean"], color=color, xerr=ends, ecolor="0.55", capsize=2)
         if found.get("trusted"):
             axes.text(score["upper95"], row, "  passed all tests", va="center")
     axes.set_yticks(range(len(methods) + len(placebos)), [*methods, *placebos])
@@ -63,15 +62,12 @@ def _title(name: str) -> str:
 def main(arguments: list[str], docs: Path = DOCS) -> int:
     """Write a figure to docs/ and return the exit status."""
     match arguments:
-        case ["peers"]:
-            found = json.loads((docs / "results.json").read_text())["peers"]
-            plot(found, docs / "peers.png")
         case ["placebos", folder]:
             (file,) = Path(folder).rglob("explanation.json")
             found = json.loads(file.read_text())
             plot_placebos(found["truth"], docs / "placebos.png", found["name"])
         case _:
-            print("error: give peers, or placebos and a folder of drone-rl explain")
+            print("error: give placebos and a folder of drone-rl explain")
             return 2
     return 0
 

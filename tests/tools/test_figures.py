@@ -5,7 +5,6 @@ import json
 import pytest
 from PIL import Image
 
-from tools.docs.blocks import ROOT
 from tools.figures import main
 
 SCORE = {"mean": 0.3, "lower95": 0.1, "upper95": 0.5}
@@ -26,13 +25,7 @@ def test_placebos_are_plotted_from_an_explanation(tmp_path):
     assert Image.open(tmp_path / "placebos.png").size == (900, 504)
 
 
-def test_training_times_are_plotted_from_the_results(tmp_path):
-    (tmp_path / "results.json").write_bytes((ROOT / "docs" / "results.json").read_bytes())
-    assert main(["peers"], tmp_path) == 0
-    assert Image.open(tmp_path / "peers.png").size == (1080, 432)
-
-
 @pytest.mark.parametrize("arguments", [[], ["placebos"], ["none"]])
 def test_unknown_figures_are_an_error(arguments, capsys):
     assert main(arguments) == 2
-    assert "give peers, or placebos" in capsys.readouterr().out
+    assert "give placebos" in capsys.readouterr().out

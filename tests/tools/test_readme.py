@@ -9,7 +9,15 @@ import pytest
 from benchmarks.benchmark import Benchmark
 from benchmarks.ledger import Ledger, Origin, digest_code, make_origin
 from benchmarks.registry import BENCHMARKS
-from tools.readme.__main__ import PAGES, ROOT, keep, main, make_blocks, make_files
+from tools.readme.__main__ import (
+    PAGES,
+    ROOT,
+    keep,
+    keep_plots,
+    main,
+    make_blocks,
+    make_files,
+)
 from tools.readme.blocks import marked_blocks, replace_blocks
 from tools.readme.flight_rows import FLIGHT
 from tools.readme.headlines import HEADLINES, make_headlines
@@ -276,3 +284,15 @@ def test_newer_figures_replace_only_those_of_their_benchmarks(measured, tmp_path
 def test_an_unknown_argument_is_an_error(capsys):
     assert main(["fresh"]) == 2
     assert "'fresh' is unknown" in capsys.readouterr().err
+
+
+def test_plots_of_benchmarks_that_have_run_are_kept(tmp_path):
+    measured, docs = tmp_path / "bench", tmp_path / "docs"
+    for folder in (measured, docs):
+        folder.mkdir()
+    (measured / "peers.png").write_bytes(b"new")
+    (docs / "peers.png").write_bytes(b"old")
+    (docs / "scaling.png").write_bytes(b"old")
+    assert keep_plots(measured, docs) == ["peers.png"]
+    assert (docs / "peers.png").read_bytes() == b"new"
+    assert (docs / "scaling.png").read_bytes() == b"old"

@@ -1,5 +1,6 @@
 """`python -m tools.readme [keep | stale]`: see the package."""
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from tools.readme.tables import list_figures, list_origins, make_table
 
 ROOT = Path(__file__).resolve().parents[2]
 MEASURED = ROOT / "outputs" / "bench" / "results.json"
+PLOTS = ("peers.png", "scaling.png")
 PAGES = (
     "README.md",
     "docs/design.md",
@@ -83,6 +85,14 @@ def keep(source: Path, target: Path) -> list[str]:
     return list(measured.origins)
 
 
+def keep_plots(source: Path, target: Path) -> list[str]:
+    """Copy the plots of benchmarks that the documentation shows; return their names."""
+    found = [name for name in PLOTS if (source / name).exists()]
+    for name in found:
+        shutil.copyfile(source / name, target / name)
+    return found
+
+
 def main(arguments: list[str]) -> int:
     """Run the command and return the exit status."""
     if arguments == ["stale"]:
@@ -94,7 +104,8 @@ def main(arguments: list[str]) -> int:
         print(f"error: {given!r} is unknown; use keep, stale or no argument", file=sys.stderr)
         return 2
     if arguments:
-        print("kept:", ", ".join(keep(MEASURED, ROOT / "docs" / "results.json")))
+        kept = keep(MEASURED, ROOT / "docs" / "results.json")
+        print("kept:", ", ".join([*kept, *keep_plots(MEASURED.parent, ROOT / "docs")]))
     for path, content in make_files(ROOT).items():
         (ROOT / path).write_text(content)
     return 0
