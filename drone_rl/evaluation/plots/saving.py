@@ -37,6 +37,8 @@ def save_drawn(drawn: Image.Image | Figure | NDArray, path: Path) -> str:
     The path is without suffix. See `report.explanation.Drawn`.
     """
     if isinstance(drawn, (Image.Image, Figure)):
+        if isinstance(drawn, Figure):
+            _lay_out(drawn)
         content = to_png(drawn)
         path.with_name(path.name + ".png").write_bytes(content)
         if isinstance(drawn, Image.Image):
@@ -71,6 +73,15 @@ def to_png(picture: Image.Image | Figure) -> bytes:
     else:
         picture.save(buffer, "png", optimize=True)
     return buffer.getvalue()
+
+
+def _lay_out(figure: Figure) -> None:
+    """Lay out a chart once; otherwise matplotlib does so, and draws it twice, for each format."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        figure.set_dpi(_DPI)
+        engine.execute(figure)
+        figure.set_layout_engine(None)
 
 
 def _to_svg(figure: Figure) -> bytes:
