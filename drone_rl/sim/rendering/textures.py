@@ -12,7 +12,7 @@ from PIL import Image
 
 from drone_rl.utils.errors import InputError
 
-MOST_PIXELS = 4096
+MAX_PIXELS = 4096
 """Of an image, each way."""
 _FORMATS = ("PNG", "JPEG")
 _SIDE = 256
@@ -74,7 +74,7 @@ def load(name: str) -> NDArray[np.uint8]:
             raise FileNotFoundError(path)
         with Image.open(path, formats=_FORMATS) as image:
             width, height = image.size
-            is_small = max(width, height) <= MOST_PIXELS
+            is_small = max(width, height) <= MAX_PIXELS
             side = 2 ** math.ceil(math.log2(max(width, height)))
             square = image.convert("RGB").resize((side, side)) if is_small else None
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
@@ -85,7 +85,7 @@ def load(name: str) -> NDArray[np.uint8]:
     if square is None:
         raise InputError(
             f"texture={name!r} has {width}x{height} pixels; give an image of at most "
-            f"{MOST_PIXELS} each way"
+            f"{MAX_PIXELS} each way"
         )
     return np.asarray(square)
 
