@@ -168,8 +168,8 @@ def expose(gain: float) -> AppearanceChange:
 
 
 def fog(visibility: float) -> AppearanceChange:
-    """Set the visibility in metres, see `Appearance.fog`."""
-    return AppearanceChange(lambda look, _: dataclasses.replace(look, fog=visibility))
+    """Set the visibility in metres, see `Appearance.fog_visibility`."""
+    return AppearanceChange(lambda look, _: dataclasses.replace(look, fog_visibility=visibility))
 
 
 def mount(

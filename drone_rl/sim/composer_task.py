@@ -235,7 +235,7 @@ class ComposerTask(composer.Task):
         self._physics = physics
 
     def _in_fog(self, image: np.ndarray, random_state: np.random.RandomState) -> np.ndarray:
-        if self.appearance is None or self.appearance.fog is None:
+        if self.appearance is None or self.appearance.fog_visibility is None:
             return image
         model, camera = self._physics.model, self.drone.front_center.full_identifier
         number = model.name2id(camera, "camera")

@@ -190,7 +190,7 @@ class AppearanceSampler:
         sun = number()[..., None] * color()
         ambient = number()[..., None].expand(sun.shape)
         shadows, horizon = number(), color()
-        zenith, fog = color(), number()
+        zenith, visibility = color(), number()
         ground, objects, exposure = color(), color(), number()
         colors = {SemanticClass.SKY: horizon, SemanticClass.GROUND: ground}
         if settings.object_color is not None:
@@ -208,7 +208,7 @@ class AppearanceSampler:
             sun=sun,
             sun_direction=torch.stack(direction, -1),
             zenith=None if settings.sky_zenith is None else zenith,
-            fog=None if settings.fog_visibility is None else fog,
+            fog_visibility=None if settings.fog_visibility is None else visibility,
             shadows=shadows if settings.shadows else None,
             exposure=None if settings.exposure == 1.0 else exposure,
             textures={of: cover for of, cover in covers.items() if cover is not None},

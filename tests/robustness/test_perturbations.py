@@ -22,9 +22,9 @@ def test_each_world_has_its_share_of_it():
 
 
 def test_the_look_is_otherwise_the_same():
-    own = Appearance(colors={SemanticClass.GROUND: (0.1, 0.2, 0.3)}, fog=50.0)
+    own = Appearance(colors={SemanticClass.GROUND: (0.1, 0.2, 0.3)}, fog_visibility=50.0)
     look = mount(degrees=5.0).change(own, SWAY)
-    assert (look.colors, look.fog) == (own.colors, 50.0)
+    assert (look.colors, look.fog_visibility) == (own.colors, 50.0)
 
 
 @pytest.mark.parametrize("renderer", ["raytrace", "mujoco_warp"])

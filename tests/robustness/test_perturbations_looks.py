@@ -50,7 +50,7 @@ def test_the_sun_sinks_where_it_stood():
 def test_exposure_multiplies_what_there_was_and_fog_is_as_told():
     assert expose(2.0).change(PLAIN, NONE).exposure == 2.0
     assert expose(2.0).change(dataclasses.replace(PLAIN, exposure=0.75), NONE).exposure == 1.5
-    assert fog(40.0).change(PLAIN, NONE).fog == 40.0
+    assert fog(40.0).change(PLAIN, NONE).fog_visibility == 40.0
 
 
 def test_the_look_of_a_scene_is_all_given_and_draws_the_same():

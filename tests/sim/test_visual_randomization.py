@@ -48,13 +48,13 @@ def test_fixed_appearance_is_shared_by_all_environments():
     wanted = [0.0, -math.sqrt(0.75), -0.5]
     assert look.sun_direction.tolist() == pytest.approx(wanted, abs=1e-9)
     assert look.sun.tolist() == [0.5] * 3 and look.ambient.tolist() == [0.35] * 3
-    assert look.fog is None and look.zenith is None and look.is_plain
+    assert look.fog_visibility is None and look.zenith is None and look.is_plain
     assert set(look.colors) == {SemanticClass.SKY, SemanticClass.GROUND}
 
 
 def test_samples_fill_their_ranges():
     look = reset(DRAWN, 400).current()
-    assert 50 <= look.fog.min() < 55 and 95 < look.fog.max() <= 100
+    assert 50 <= look.fog_visibility.min() < 55 and 95 < look.fog_visibility.max() <= 100
     assert 160 < look.shadows.sum() < 240
     assert (look.zenith[:, 1:] == torch.tensor([0.5, 1.0])).all() and look.zenith[:, 0].std() > 0.2
     assert torch.allclose(look.sun_direction[:, 2], torch.tensor(-0.5, dtype=torch.float64))
@@ -65,7 +65,7 @@ def test_samples_fill_their_ranges():
 
 def test_middle_appearance_is_the_center_of_ranges():
     middle = AppearanceSampler(DRAWN, 2).middle
-    assert middle.fog == 75.0 and middle.zenith.tolist() == [0.5, 0.5, 1.0]
+    assert middle.fog_visibility == 75.0 and middle.zenith.tolist() == [0.5, 0.5, 1.0]
     assert middle.textures[SemanticClass.GROUND].choice == -1  # the first
 
 
@@ -84,9 +84,9 @@ def test_only_reset_environments_are_resampled():
     looks.reset(torch.tensor([1]), [np.random.RandomState(9)])
     assert torch.equal(looks.values[[0, 2]], before[[0, 2]])
     assert not torch.equal(looks.values[1], before[1])
-    assert torch.equal(looks.current().fog[2:], part.fog)
+    assert torch.equal(looks.current().fog_visibility[2:], part.fog_visibility)
     looks.load(before)
-    assert torch.equal(looks.current().fog, before[:, 14])
+    assert torch.equal(looks.current().fog_visibility, before[:, 14])
 
 
 MOUNTED = DRAWN.replace(

@@ -70,14 +70,14 @@ def test_indexed_and_whole_batches_step_alike():
 
 
 def test_combined_appearance_is_cached():
-    worlds = Worlds(1, TaskSettings(), appearance=Appearance(fog=50.0))
+    worlds = Worlds(1, TaskSettings(), appearance=Appearance(fog_visibility=50.0))
     dark = Appearance(exposure=0.5)
     look = worlds._combine(dark)
-    assert look is not None and (look.fog, look.exposure) == (50.0, 0.5)
+    assert look is not None and (look.fog_visibility, look.exposure) == (50.0, 0.5)
     assert worlds._combine(dark) is look
     assert worlds._combine(None) is worlds.appearance
     bright = worlds._combine(Appearance(exposure=2.0))
-    assert bright is not None and (bright.fog, bright.exposure) == (50.0, 2.0)
+    assert bright is not None and (bright.fog_visibility, bright.exposure) == (50.0, 2.0)
     worlds.appearance = None
     changed = worlds._combine(dark)
-    assert changed is not None and (changed.fog, changed.exposure) == (None, 0.5)
+    assert changed is not None and (changed.fog_visibility, changed.exposure) == (None, 0.5)

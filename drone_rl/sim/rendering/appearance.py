@@ -123,8 +123,8 @@ class Appearance:
     """Direction in which the sun's light travels, world frame; need not have length 1."""
     zenith: Colors | None = None
     """Colour of the sky overhead, blended with that of the horizon by the elevation's sine."""
-    fog: Scalars | None = None
-    """Visibility in metres: the distance at which 95% of the contrast to the horizon is lost
+    fog_visibility: Scalars | None = None
+    """Metres: the distance at which 95% of the contrast to the horizon is lost
     (meteorological optical range, WMO-No. 8). Infinite for clear air."""
     shadows: Scalars | None = None
     """Whether solids cast shadows in sunlight: 1 or 0."""
@@ -141,7 +141,8 @@ class Appearance:
     def is_plain(self) -> bool:
         """Whether every face and the whole sky have one colour: no effects."""
         is_shaded = bool(torch.as_tensor(0 if self.shadows is None else self.shadows).any())
-        return self.zenith is None and self.fog is None and not is_shaded and not self.textures
+        is_foggy, has_zenith = self.fog_visibility is not None, self.zenith is not None
+        return not (has_zenith or is_foggy or is_shaded or self.textures)
 
     def lights(self, num_envs: int) -> dict[str, Tensor]:
         """Return the given lights by name, shapes (num_envs, 3); directions have length 1."""
@@ -176,7 +177,7 @@ def expand_scalar(value: Scalars, num_envs: int) -> Tensor:
 
 
 _SHARED_DIMENSIONS = {
-    **dict.fromkeys(("fog", "shadows", "exposure", "size", "choice", "zoom"), 0),
+    **dict.fromkeys(("fog_visibility", "shadows", "exposure", "size", "choice", "zoom"), 0),
     **{"places": 2, "sizes": 1},
 }
 """Dimensions of a field's tensor that is shared by all environments; 1 where not listed."""

@@ -153,7 +153,7 @@ def apply_fog(
     Depth is in metres along the camera's axis, shape (height, width). `fovy` is the vertical field
     of view in degrees, `sky` the distance in metres at which the sky begins.
     """
-    visibility = np.inf if appearance.fog is None else float(appearance.fog)
+    visibility = float(np.inf if appearance.fog_visibility is None else appearance.fog_visibility)
     if visibility == np.inf:
         return image
     height, width = depth.shape

@@ -35,12 +35,12 @@ def test_lights_can_differ_by_environment():
 
 def test_over_prefers_own_values():
     below = Appearance(
-        colors={SemanticClass.SKY: RED, SemanticClass.GROUND: RED}, fog=50.0, shadows=1
+        colors={SemanticClass.SKY: RED, SemanticClass.GROUND: RED}, fog_visibility=50.0, shadows=1
     )
-    above = Appearance(colors={SemanticClass.SKY: (0.0, 0.0, 1.0)}, fog=10.0)
+    above = Appearance(colors={SemanticClass.SKY: (0.0, 0.0, 1.0)}, fog_visibility=10.0)
     both = above.over(below)
     assert both.colors == {SemanticClass.SKY: (0.0, 0.0, 1.0), SemanticClass.GROUND: RED}
-    assert (both.fog, both.shadows, both.sun) == (10.0, 1, None)
+    assert (both.fog_visibility, both.shadows, both.sun) == (10.0, 1, None)
     assert above.over(None) is above
     assert Appearance(shadows=0).over(below).shadows == 0
 
@@ -48,10 +48,12 @@ def test_over_prefers_own_values():
 def test_numbers_and_textures_are_sliced():
     texture = Texture(images=("grid",), size=2.0, choice=torch.tensor([0, -1, 0]))
     appearance = Appearance(
-        fog=torch.tensor([1.0, 2.0, 3.0]), textures={SemanticClass.GROUND: texture}, exposure=2.0
+        fog_visibility=torch.tensor([1.0, 2.0, 3.0]),
+        textures={SemanticClass.GROUND: texture},
+        exposure=2.0,
     )
     part = appearance[1:]
-    assert part.fog.tolist() == [2.0, 3.0] and part.exposure == 2.0
+    assert part.fog_visibility.tolist() == [2.0, 3.0] and part.exposure == 2.0
     assert part.textures[SemanticClass.GROUND].choice.tolist() == [-1, 0]
     assert part.textures[SemanticClass.GROUND].size == 2.0
 
@@ -61,4 +63,4 @@ def test_only_flat_colors_are_plain():
         colors={SemanticClass.SKY: RED}, shadows=torch.zeros(3), exposure=2.0
     ).is_plain
     assert not Appearance(shadows=torch.tensor([0, 1])).is_plain
-    assert not Appearance(zenith=RED).is_plain and not Appearance(fog=1.0).is_plain
+    assert not Appearance(zenith=RED).is_plain and not Appearance(fog_visibility=1.0).is_plain

@@ -36,7 +36,7 @@ def test_gpu_renders_the_same_as_cpu():
     assert float(difference.float().mean()) < 0.5
 
 
-@pytest.mark.parametrize("look", [{"fog": 50.0}, {"exposure": 2.0}, {"shadows": 1}])
+@pytest.mark.parametrize("look", [{"fog_visibility": 50.0}, {"exposure": 2.0}, {"shadows": 1}])
 def test_unsupported_appearances_raise(look):
     worlds = started(renderer=WarpRenderer, num_shards=1, appearance=Appearance(**look))
     with pytest.raises(InputError, match="give renderer=raytrace"):

@@ -60,7 +60,7 @@ def test_minimal_appearance_keeps_the_model():
 
 
 def test_fog_matches_hand_computed_colors():
-    look = Appearance(colors={SemanticClass.SKY: (1.0, 0.0, 0.0)}, fog=10.0)
+    look = Appearance(colors={SemanticClass.SKY: (1.0, 0.0, 0.0)}, fog_visibility=10.0)
     image = np.full((1, 1, 3), 100, np.uint8)
     for depth, share in ((0.0, 0.0), (10.0, 0.95), (5.0, 1 - 0.05**0.5), (90.0, 0.0)):
         fogged = apply_fog(image, np.full((1, 1), depth), look, 90.0, 80.0)
@@ -101,7 +101,9 @@ def test_images_of_blocks_agree_with_the_ray_tracer(egl):
 
 def test_fog_grows_with_the_distance_along_each_ray():
     """Two rows of four pixels, 90 degrees high: rays through (+-1.5, +-0.5) and (+-0.5, +-0.5)."""
-    look = Appearance(colors={SemanticClass.SKY: (0.5, 0.5, 0.5)}, fog=10.0, exposure=2.0)
+    look = Appearance(
+        colors={SemanticClass.SKY: (0.5, 0.5, 0.5)}, fog_visibility=10.0, exposure=2.0
+    )
     fogged = apply_fog(np.zeros((2, 4, 3), np.uint8), np.full((2, 4), 5.0), look, 90.0, 80.0)
     near, far = (int(255 * (1 - 0.05 ** (0.5 * d**0.5))) for d in (1.5, 3.5))
     assert fogged[..., 0].tolist() == [[far, near, near, far]] * 2

@@ -1,4 +1,4 @@
-"""The ray tracer on a CPU with effects: sky gradient, fog, shadows and textures.
+"""The ray tracer on a CPU with effects: it casts shadows; `spans_kernel` applies the others.
 
 Solids cast shadows of the sun, the scene's first light, each within the rectangle of pixels around
 it and its shadow; planes cast none. Training without effects need not compile this module.

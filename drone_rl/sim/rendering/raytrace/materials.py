@@ -97,11 +97,12 @@ class MaterialsEncoder:
             chosen = expand_scalar(cover.choice, count).long()
             texture[:, geoms] = number[chosen][:, None].int()
             tiles[:, geoms] = (1.0 / expand_scalar(cover.size, count))[:, None].float()
-        fog = math.inf if appearance.fog is None else appearance.fog
+        visibility = appearance.fog_visibility
+        visibility = math.inf if visibility is None else visibility
         shadows = 0 if appearance.shadows is None else appearance.shadows
         values = {
             "zenith": (zenith * 255).floor().float(),
-            "fog": (_EXTINCTION / expand_scalar(fog, count)).float(),
+            "extinction": (_EXTINCTION / expand_scalar(visibility, count)).float(),
             "shadows": expand_scalar(shadows, count).int(),
             "texture": texture,
             "tiles": tiles,

@@ -149,7 +149,7 @@ def _color_geom(
     light = structs.SurfaceLight()
     light.lit = wp.cw_mul(own, lit)
     light.shaded = wp.cw_mul(own, shaded)
-    light.fog = effects.fog[world % effects.fog.shape[0]]
+    light.extinction = effects.extinction[world % effects.extinction.shape[0]]
     light.horizon = materials.sky[world % materials.sky.shape[0]]
     row = world % effects.texture.shape[0]
     texture = effects.texture[row, geom]

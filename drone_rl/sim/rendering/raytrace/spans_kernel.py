@@ -89,7 +89,7 @@ def shade_sky(
 
 
 _FADE = """
-    const float power = wp::max(-1.44269504f * fog * far[i], -120.0f);
+    const float power = wp::max(-1.44269504f * extinction * far[i], -120.0f);
     const int whole = (int)(power - 0.5f);
     const float part = power - (float)whole;
     union { int bits; float number; } two;
@@ -97,13 +97,13 @@ _FADE = """
     const float clear = two.number * (1.0f + part * (0.69314718f + part * (0.24022651f + part
         * (0.05550411f + part * (0.00961813f + part * 0.00133336f)))));
 """
-"""Fog: the fraction `clear` of a colour that passes, e^(-fog distance), by a polynomial."""
+"""Fog: the fraction `clear` of a colour that passes, e^(-extinction distance), by a polynomial."""
 _READ = """
 const float *const far = job.nearest.data;
 const int *const dark = job.dark.data;
 wp::vec_t<3, unsigned char> *const colors = job.colors.data;
 const wp::vec_t<3, float> lit = light.lit, shaded = light.shaded, horizon = light.horizon;
-const float fog = light.fog;
+const float extinction = light.extinction;
 """
 """Loads everything before the first write, which C++ must assume to alias."""
 _WRITE = """

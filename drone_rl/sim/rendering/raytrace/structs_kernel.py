@@ -106,8 +106,8 @@ class Effects:
 
     zenith: wp.array[wp.vec3]
     """Of the sky overhead, 0 to 255; `Materials.sky` is at the horizon."""
-    fog: wp.array[float]
-    """Extinction per metre; 0 for clear air."""
+    extinction: wp.array[float]
+    """Of fog, per metre; 0 for clear air."""
     shadows: wp.array[int]
     """Whether the first light casts shadows."""
     texture: wp.array2d[int]
@@ -168,11 +168,11 @@ class PixelValue:
 
 @struct
 class SurfaceLight:
-    """Colours, 0 to 255 or more, of a surface in the sun and in shadow, and `Effects.fog`."""
+    """Colours, 0 to 255 or more, of a surface in the sun and in shadow, and its fog."""
 
     lit: wp.vec3
     shaded: wp.vec3
-    fog: float
+    extinction: float
     horizon: wp.vec3
 
 

@@ -25,7 +25,7 @@ def renderer(request):
 @pytest.mark.parametrize("modality", ["rgb", "depth", "distance", "segmentation", "normals"])
 @pytest.mark.parametrize("camera", ["down", "ahead"])
 def test_effects_of_zero_strength_change_nothing(renderer, camera, modality):
-    nothing = Appearance(zenith=(0.2, 0.4, 0.6), fog=math.inf)
+    nothing = Appearance(zenith=(0.2, 0.4, 0.6), fog_visibility=math.inf)
     plain, drawn = (render(renderer, a, camera=camera, modality=modality) for a in (None, nothing))
     assert (plain.double() - drawn.double()).abs().max() <= (1 if modality == "rgb" else 0)
 
@@ -43,13 +43,15 @@ def test_sky_blends_from_horizon_to_zenith(renderer):
 @pytest.mark.parametrize("visibility", [10.0, 20.0])
 def test_fog_leaves_5_percent_of_the_contrast_at_its_visibility(renderer, visibility):
     colors = {**WHITE, SemanticClass.SKY: (0.0, 0.2, 0.4)}
-    image = render(renderer, Appearance(colors=colors, fog=visibility, **EVEN))[0].double()
+    image = render(renderer, Appearance(colors=colors, fog_visibility=visibility, **EVEN))[
+        0
+    ].double()
     aside = (2.5 + 0.125) / 10  # of the tested pixel, relative to its depth
     clear = 0.05 ** (10 * math.sqrt(1 + aside**2 + 0.0125**2) / visibility)
     wanted = [clear * 255 + (1 - clear) * sky for sky in (0, 51, 102)]
     assert image[20, 30].tolist() == pytest.approx(wanted, abs=1)
     plain = render(renderer, None, modality="depth")
-    foggy = render(renderer, Appearance(fog=visibility), modality="depth")
+    foggy = render(renderer, Appearance(fog_visibility=visibility), modality="depth")
     assert torch.equal(plain, foggy)
 
 
@@ -101,7 +103,7 @@ def test_distant_texture_is_its_mean(renderer):
 
 def test_each_environment_has_its_own_appearance(renderer):
     appearance = Appearance(
-        fog=torch.tensor([math.inf, 20.0, math.inf]),
+        fog_visibility=torch.tensor([math.inf, 20.0, math.inf]),
         shadows=torch.tensor([0, 0, 1]),
         textures={
             SemanticClass.GROUND: Texture(
@@ -120,7 +122,9 @@ def test_each_environment_has_its_own_appearance(renderer):
 
 def test_gray_equals_the_luma_of_rgb(renderer):
     appearance = Appearance(
-        fog=30.0, shadows=1, textures={SemanticClass.TARGET: Texture(images=("noise",), size=1.0)}
+        fog_visibility=30.0,
+        shadows=1,
+        textures={SemanticClass.TARGET: Texture(images=("noise",), size=1.0)},
     )
     rgb, gray = (render(renderer, appearance, modality=of) for of in ("rgb", "gray"))
     assert torch.equal(gray, to_gray(rgb))

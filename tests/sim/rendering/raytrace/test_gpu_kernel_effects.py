@@ -16,7 +16,7 @@ from tests.sim.rendering.raytrace.test_renderer import (
 
 APPEARANCE = Appearance(
     zenith=(0.1, 0.2, 0.6),
-    fog=60.0,
+    fog_visibility=60.0,
     shadows=1,
     textures={
         SemanticClass.GROUND: Texture(images=("grid",), size=3.0),

@@ -29,13 +29,18 @@ def sceneries():
 def test_effects_default_to_none(sceneries):
     encoded = sceneries.encode_effects(Appearance(), ZENITH)
     assert encoded.zenith.numpy().tolist() == [[51, 127, 255], [0, 0, 0]]
-    assert encoded.fog.numpy().tolist() == [0, 0] and encoded.shadows.numpy().tolist() == [0, 0]
+    assert encoded.extinction.numpy().tolist() == [0, 0] and encoded.shadows.numpy().tolist() == [
+        0,
+        0,
+    ]
     assert (encoded.texture.numpy() == -1).all() and len(encoded.sides) == 0
 
 
 def test_fog_is_encoded_as_extinction_per_meter(sceneries):
-    encoded = sceneries.encode_effects(Appearance(fog=torch.tensor([100.0, math.inf])), ZENITH)
-    assert encoded.fog.numpy().tolist() == pytest.approx([math.log(20) / 100, 0.0])
+    encoded = sceneries.encode_effects(
+        Appearance(fog_visibility=torch.tensor([100.0, math.inf])), ZENITH
+    )
+    assert encoded.extinction.numpy().tolist() == pytest.approx([math.log(20) / 100, 0.0])
 
 
 def test_textures_are_stored_once(sceneries):

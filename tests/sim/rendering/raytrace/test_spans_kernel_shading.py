@@ -29,12 +29,12 @@ def shade(
         shade_textured(job, 0, count, light, cover, texels)
 
 
-def shaded(what, rays, nearest=None, dark=None, texels=(0,), cover=None, fog=0.0):
+def shaded(what, rays, nearest=None, dark=None, texels=(0,), cover=None, extinction=0.0):
     count, job, light = len(rays), Job(), SurfaceLight()
     job.colors = wp.zeros(count, dtype=wp.vec3ub, device="cpu")
     job.rays, job.nearest = array(rays, wp.vec3), array(nearest or [1.0] * count, float)
     job.dark = array(dark or [0] * count, int)
-    light.lit, light.shaded, light.horizon, light.fog = LIT, SHADED, HORIZON, fog
+    light.lit, light.shaded, light.horizon, light.extinction = LIT, SHADED, HORIZON, extinction
     given = [job, light, cover or TextureMap(), array(texels, wp.uint32), what]
     wp.launch(shade, 1, inputs=given, device="cpu")
     return job.colors.numpy().tolist()
@@ -54,7 +54,7 @@ def test_flat_face_is_lit_or_dark_and_clipped():
 def test_fog_attenuates_exponentially(metres):
     clear = np.exp(-0.05 * metres)
     wanted = clear * np.array([200, 100, 255]) + (1 - clear) * np.array([50, 60, 70])
-    (found,) = shaded(1, [(0, 0, -1)], [metres], fog=0.05)
+    (found,) = shaded(1, [(0, 0, -1)], [metres], extinction=0.05)
     assert np.abs(np.array(found) - wanted).max() <= 1
 
 
