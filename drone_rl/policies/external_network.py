@@ -1,4 +1,4 @@
-"""Third-party callables from frames to logits, as networks."""
+"""Third-party networks: callables from frames to logits."""
 
 import copy
 from collections.abc import Callable
@@ -14,12 +14,12 @@ from drone_rl.utils.errors import InputError
 
 Logits = Callable[[Any], Any]
 """From a batch of frames to logits (N, number of actions), a tensor or an array."""
-_REPEATS = 1e-5
-"""Largest difference between logits of the same frame from a deterministic network."""
+_TOLERANCE = 1e-5
+"""Largest difference of the logits of one frame between two calls of a deterministic network."""
 
 
 class ExternalNetwork(ImageNetwork):
-    """A copy of a torch module in evaluation mode, or an unchanged callable.
+    """A network around a third-party callable; a PyTorch module is copied in evaluation mode.
 
     Raises:
         InputError: It does not accept such frames, does not return one logit for each action, or
@@ -48,8 +48,8 @@ class ExternalNetwork(ImageNetwork):
         self.in_shape, self.actions = tuple(in_shape), actions
         self._takes_bytes = takes_bytes
         self._logits = _copied(logits).to(device) if isinstance(logits, nn.Module) else logits
-        self._factor = torch.ones(self.num_actions, device=device)
-        self._shift = torch.zeros(self.num_actions, device=device)
+        self._logit_factor = torch.ones(self.num_actions, device=device)
+        self._logit_bias = torch.zeros(self.num_actions, device=device)
         image = torch.full((1, *self.in_shape), 0.5, device=device, requires_grad=True)
         try:
             found = self(image)
@@ -62,9 +62,9 @@ class ExternalNetwork(ImageNetwork):
                 f"the network can't take images of shape {shown} ({what}); give the camera and "
                 "transforms that it was trained with"
             ) from error
-        if not torch.allclose(found, self(image), atol=_REPEATS):
+        if not torch.allclose(found, self(image), atol=_TOLERANCE):
             raise InputError(
-                "the network gives different logits for the same image; give a deterministic one"
+                "the network returned different logits for one image; give a deterministic network"
             )
         self.is_differentiable = _depends(found, image)
 
@@ -76,27 +76,28 @@ class ExternalNetwork(ImageNetwork):
     def forward(self, pixels: Tensor) -> Tensor:
         """See `ImageNetwork`; raise an `InputError` if the result is not finite logits."""
         flat = pixels.reshape(-1, *self.in_shape)
-        made = self._logits(self._given(flat))
+        outputs = self._logits(self._given(flat))
         wanted, names = (len(flat), self.num_actions), ", ".join(self.actions.output_names)
-        if not isinstance(made, Tensor | np.ndarray):
+        if not isinstance(outputs, Tensor | np.ndarray):
             raise InputError(
-                f"the network gives a {type(made).__name__}; give a callable that gives logits of "
-                f"shape {wanted}, one of each of {names}"
+                f"the network returned a {type(outputs).__name__}; give a callable that returns "
+                f"logits of shape {wanted}, one for each of {names}"
             )
-        logits = torch.as_tensor(made).to(flat.device, flat.dtype)
+        logits = torch.as_tensor(outputs).to(flat.device, flat.dtype)
         if tuple(logits.shape) != wanted:
             raise InputError(
-                f"the network gives logits of shape {tuple(logits.shape)}; give one that gives "
-                f"{wanted}, one of each of {names}"
+                f"the network returned logits of shape {tuple(logits.shape)}; give one that "
+                f"returns {wanted}, one for each of {names}"
             )
         if not torch.isfinite(logits).all():
-            raise InputError("the network gives logits that are not finite; give another network")
-        logits = logits * self._factor + self._shift
+            raise InputError("the network returned logits that are not finite; give another one")
+        logits = logits * self._logit_factor + self._logit_bias
         return logits.reshape(*pixels.shape[:-3], self.num_actions)
 
     def rescale(self, factor: Tensor, shift: Tensor) -> None:
         """See `ImageNetwork`; the callable itself does not change."""
-        self._factor, self._shift = self._factor * factor, self._shift * factor + shift
+        self._logit_factor = self._logit_factor * factor
+        self._logit_bias = self._logit_bias * factor + shift
 
     def _given(self, flat: Tensor) -> Tensor:
         if not self._takes_bytes:
@@ -122,5 +123,5 @@ def _copied(module: nn.Module) -> nn.Module:
 def _depends(logits: Tensor, image: Tensor) -> bool:
     if not logits.requires_grad:
         return False
-    (slope,) = torch.autograd.grad(logits.sum(), image, allow_unused=True)
-    return slope is not None
+    (gradient,) = torch.autograd.grad(logits.sum(), image, allow_unused=True)
+    return gradient is not None

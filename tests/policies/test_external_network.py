@@ -80,13 +80,13 @@ def test_module_is_copied_in_eval_mode():
         (nn.Linear(7, 3), r"can't take images of shape \(1, 1, 2, 4\) \(RuntimeError: .*\); give "
          "the camera and transforms that it was trained with"),
         (lambda x: x.fly(), "can't take images of .*AttributeError: 'Tensor' object has no"),
-        (lambda x: left_half(x)[:, :2], r"gives logits of shape \(1, 2\); give one that gives "
-         r"\(1, 3\), one of each of forward, left, right"),
-        (lambda x: left_half(x).argmax(-1), r"gives logits of shape \(1,\); give one that"),
-        (lambda x: (left_half(x), x), "gives a tuple; give a callable that gives logits of shape"),
-        (lambda x: None, "gives a NoneType; give a callable"),
-        (lambda x: left_half(x) / 0 * 0, "gives logits that are not finite"),
-        (lambda x: torch.rand(len(x), 3), "gives different logits for the same image"),
+        (lambda x: left_half(x)[:, :2], r"returned logits of shape \(1, 2\); give one that returns "
+         r"\(1, 3\), one for each of forward, left, right"),
+        (lambda x: left_half(x).argmax(-1), r"returned logits of shape \(1,\); give one that"),
+        (lambda x: (left_half(x), x), "returned a tuple; give a callable that returns logits of"),
+        (lambda x: None, "returned a NoneType; give a callable"),
+        (lambda x: left_half(x) / 0 * 0, "returned logits that are not finite"),
+        (lambda x: torch.rand(len(x), 3), "returned different logits for one image"),
     ],
 )  # fmt: skip
 def test_invalid_logits_raise(logits, message):
