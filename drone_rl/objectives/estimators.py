@@ -59,7 +59,8 @@ class ReturnEstimator(Transform, abc.ABC):
                 `returns.scale_to_unit`. By default as in the settings of this estimator.
             reward_key: Entry with the rewards.
             done_key: Entry with the end flags.
-            out_key: Entry that is written.
+            out_key: Entry that is written, under one name for all estimators. With a baseline, as
+                in the default `LeaveOneOut`, it holds advantages, scaled if `scale` is set.
         """
         read, written = [reward_key, done_key], [out_key]
         super().__init__(in_keys=read, out_keys=written, in_keys_inv=read, out_keys_inv=written)

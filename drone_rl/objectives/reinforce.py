@@ -15,13 +15,13 @@ from drone_rl.utils.errors import InputError
 class ReinforceLoss(LossModule):
     """-sum_t g_t log pi(a_t | s_t), reduced over the batch (chapter, Eq. 15).
 
-    The returns g_t come from a return estimator; the stored action is scored, never a new one.
-    `reduction="sum"` adds the steps up, as Algorithm 4 does for one episode; over the number of
-    episodes (Eq. 12) that is unbiased where the returns are. `reduction="mean"` divides by the
-    number of steps, which depends on the actions: episodes of batches with long ones count less.
-    That turns the expected gradient, less the larger the batch: with unscaled `leave_one_out` by
-    3.8 degrees with 2 episodes, 0.1 with 64, measured as in `objectives.returns`. Scaled as well,
-    as is the default of training, 10.7 degrees with 3 episodes, 3.9 with 8, 0.5 with 32.
+    The returns g_t come from a return estimator, the actions a_t from the batch.
+
+    With `reduction="sum"`, divided by the number of episodes (Eq. 12), the gradient is unbiased if
+    the returns are. With "mean" it is biased, because the number of steps depends on the actions:
+    the expected gradient turns by 3.8 degrees with 2 episodes, 0.1 with 64 (`leave_one_out` without
+    `scale`, measured as in `objectives.returns`). With `scale` too, the default of training, it
+    turns by 10.7 degrees with 3 episodes, 3.9 with 8, 0.5 with 32.
 
     The output's `loss_*` entries add up to what is to be back-propagated; the others are detached.
 
@@ -38,7 +38,7 @@ class ReinforceLoss(LossModule):
         action: NestedKey = "action"
         """The stored action."""
         return_to_go: NestedKey = "return_to_go"
-        """What a return estimator wrote. Shape: (*batch, 1)."""
+        """Written by a return estimator; often an advantage, see there. Shape: (*batch, 1)."""
 
     tensor_keys: _AcceptedKeys  # pyright: ignore[reportIncompatibleMethodOverride]
     default_keys = _AcceptedKeys
