@@ -91,8 +91,8 @@ def register_returns(name: str) -> Callable[[F], F]:
 def register_learner(name: str) -> Callable[[F], F]:
     """Decorate a class or function to register it as a learner, selected by `objective=NAME`.
 
-    It is called as `factory(settings, components, **own)`, with the training's settings and the
-    result of `drone_rl.training.components.make_collector`, and returns a
+    It is called as `factory(settings, parts, **own)`, with the settings of the training run and
+    the result of `drone_rl.training.components.make_collector`, and returns a
     `drone_rl.training.learners.Learner`. See `register_network` for errors.
     """
     return lambda factory: _register(Objective, name, factory, 2)
@@ -101,8 +101,8 @@ def register_learner(name: str) -> Callable[[F], F]:
 def register_collector(name: str) -> Callable[[F], F]:
     """Decorate a class or function to register it as a collector.
 
-    It is called as `factory(settings, task, **own)`, with the training's settings and the task to
-    collect from (None for the task of the settings), and returns a
+    It is called as `factory(settings, replay, **own)`, with the settings of the training run and
+    the task that replays failures (None for the task of the settings), and returns a
     `drone_rl.training.components.Components`. See `register_network` for errors.
     """
     return lambda factory: _register(Collector, name, factory, 2)

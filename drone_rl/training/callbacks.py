@@ -24,7 +24,7 @@ from drone_rl.utils.schema import shown
 
 @dataclasses.dataclass
 class Progress:
-    """How far a training is."""
+    """Progress of a training run."""
 
     frames: int = 0
     episodes: int = 0
@@ -224,7 +224,7 @@ class ProgressCallback(Callback):
 
 
 class ForwardProgress(Callback):
-    """Forward the progress of a training to a `drone_rl.utils.progress.Progress`."""
+    """Forward the progress of a training run to a `drone_rl.utils.progress.Progress`."""
 
     def __init__(self, progress: Report) -> None:
         self.progress = progress

@@ -1,4 +1,4 @@
-"""Components of a training that its collectors and learners share."""
+"""Components of a training run, which its collectors and learners share."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -36,7 +36,7 @@ class Components(NamedTuple):
 
 
 def joined(collector: Any, groups: Sequence[Group]) -> Components:
-    """Return the components of a training whose groups are in this process."""
+    """Return the components of a training run whose groups are in this process."""
     generators = {f"actions_{i}": group.generator for i, group in enumerate(groups)}
     return Components(collector, groups[0].network, generators)
 
@@ -63,7 +63,7 @@ def make_collector(settings: TrainSettings, replay: FailureReplayTask | None = N
         InputError: There is no such device, or an extra isn't installed.
     """
     check_device(settings.device)
-    return settings.collector.make(settings, replay)
+    return settings.collector.make(settings, replay)  # by default `train.threaded_collector`
 
 
 def learning_actor(settings: TrainSettings, parts: Components) -> Any:

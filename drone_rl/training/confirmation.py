@@ -17,7 +17,7 @@ _NUM_ENVS = 250
 
 
 class Confirmation:
-    """Evaluate the policy of a training greedily, in environments that it never learns from.
+    """Evaluate a policy in training greedily, in environments that it never learns from.
 
     A policy with sampled actions may leave loops that its most probable actions never leave. So it
     may solve its task in training and fail most episodes afterwards.

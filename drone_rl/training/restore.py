@@ -1,4 +1,4 @@
-"""Checks that a saved state fits a training, before any of it is loaded."""
+"""Check that a saved state fits a training run, before any of it is loaded."""
 
 import copy
 import math
@@ -16,7 +16,7 @@ MAY_DIFFER = ("lr", "initial_lr", "_last_lr", "base_lrs")
 
 
 def check_fits(saved: Any, own: Any, where: str) -> None:
-    """Check that a saved state has the structure of the training's own; None fits anything.
+    """Check that a saved state has the structure of the run's `own`; None fits anything.
 
     Raises:
         InputError: A name, type, shape or length differs, or a number is not finite; the message
@@ -89,6 +89,6 @@ def _check_tensor(saved: Any, own: Tensor, where: str) -> None:
 
 def _misfit(where: str, what: str) -> InputError:
     return InputError(
-        f"the checkpoint does not fit this training: {where} {what}; go on from the checkpoint of "
+        f"the checkpoint does not fit this run: {where} {what}; resume from the checkpoint of "
         "a run with these settings, or start a new run"
     )

@@ -1,4 +1,4 @@
-"""A run's folder: what a training reads from it, writes to it and returns."""
+"""The folder of a training run: its files and its result."""
 
 import dataclasses
 import enum
@@ -46,7 +46,7 @@ _NONE_YET = float("-inf")
 
 @dataclasses.dataclass(frozen=True)
 class Training:
-    """Result of a training."""
+    """Result of a training run."""
 
     folder: Path
     reason: str
@@ -153,7 +153,7 @@ def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Tra
 
 
 def hand_on_signal(training: Training) -> Training:
-    """Raise the signal that stopped a training again, now that its state is saved.
+    """Raise the signal that stopped a training run again, now that its state is saved.
 
     Returns `training` if there was no signal, or if the caller's own handler returns. Ctrl-C raises
     a KeyboardInterrupt and no subclass: Python exits by SIGINT, as shells expect, for it alone.
@@ -168,7 +168,7 @@ def hand_on_signal(training: Training) -> Training:
         return training
     remedy = f"drone_rl.train(folder={str(training.folder)!r}, resume=True)"
     stop = (
-        KeyboardInterrupt(f"training stopped, its state is saved; go on with {remedy}")
+        KeyboardInterrupt(f"training stopped, its state is saved; resume with {remedy}")
         if number == signal.SIGINT
         else SystemExit(128 + number)
     )

@@ -1,4 +1,4 @@
-"""The whole training: environment, policy, collector, returns, loss, optimizer, loop.
+"""A whole training run: environment, policy, collector, returns, loss, optimizer, loop.
 
 `drone-rl train` and `drone_rl.train` run this file; `examples/train_with_torchrl.py` is a plain
 script of the same components. A critic and Ray workers are in `variants.py`, files in
@@ -98,7 +98,7 @@ def learn(
         Why it stopped and how far it came, as in `result.json`.
 
     Raises:
-        InputError: The checkpoint is of another training, or learning broke down.
+        InputError: The checkpoint is of another training run, or learning broke down.
     """
     run, limits = RunFolder(folder), settings.trainer
     largest_reward = as_task(settings.task).largest_reward
@@ -108,7 +108,7 @@ def learn(
     parts = components.make_collector(settings, replay)
     confirmation = Confirmation(settings, parts.network) if limits.confirm_episodes else None
     checkpoints = run.checkpoints(settings)
-    learner = settings.objective.make(settings, parts)
+    learner = settings.objective.make(settings, parts)  # by default `reinforce_learner`, below
     trainer = Trainer(
         collector=parts.collector,
         learner=learner,

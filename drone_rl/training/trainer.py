@@ -1,4 +1,4 @@
-"""State of a training: batches, progress, metrics, signals, callbacks."""
+"""State of a training run: batches, progress, metrics, signals, callbacks."""
 
 import contextlib
 import dataclasses
@@ -82,8 +82,8 @@ class Trainer:
             for batch in batches:
                 trainer.finish_update(batch, learner.update(batch))
 
-    `state_dict` returns the full state between two updates. On a CPU, a training that resumes from
-    it ends with the same parameters, bit for bit, as one that never stopped.
+    `state_dict` returns the full state between two updates. On a CPU, a run that resumes from it
+    ends with the same parameters, bit for bit, as one that never stopped.
     """
 
     collector: Any
@@ -128,7 +128,7 @@ class Trainer:
 
     @contextlib.contextmanager
     def running(self) -> Iterator[Iterator[TensorDictBase]]:
-        """Provide the batches of a training; pass each with its metrics to `finish_update`.
+        """Provide the batches of a training run; pass each with its metrics to `finish_update`.
 
         The batches end when the task is solved, the budget is spent or a signal arrives. Ctrl-C and
         SIGTERM let the current update finish, so that nothing is lost; a second signal acts at
@@ -191,7 +191,7 @@ class Trainer:
 
     @property
     def _estimator(self) -> ReturnEstimator | None:
-        """The collector's return estimator, if it has one: its state is part of the training's."""
+        """The collector's return estimator, if it has one: its state is part of the run's."""
         postproc = getattr(self.collector, "postproc", None)
         return postproc if isinstance(postproc, ReturnEstimator) else None
 
@@ -265,12 +265,12 @@ class Trainer:
         """Resume from a `state_dict`, which may come from an untrusted file.
 
         Raises:
-            InputError: It is not the state of such a training.
+            InputError: It is not the state of such a training run.
         """
         own = self.state_dict()
         for key in own:
             if key not in state:
-                raise InputError(f"the checkpoint has no {key}, so no training can go on from it")
+                raise InputError(f"the checkpoint has no {key}, so no run can resume from it")
         self.learner.check_state(state)
         for key in ("collector", "estimator", "generators", "torch_rng", "progress"):
             if key in own:
@@ -287,6 +287,6 @@ class Trainer:
         except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise InputError(
-                f"the checkpoint does not fit this training ({reason}); go on from one of a run "
+                f"the checkpoint does not fit this run ({reason}); resume from that of a run "
                 "with these settings, or start a new run"
             ) from None

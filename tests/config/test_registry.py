@@ -108,12 +108,12 @@ def test_a_return_estimator(registered):
 
 def test_a_learner_and_a_collector_get_the_settings_of_the_training(registered):
     @register_learner("mine")
-    def learner(settings, collecting, *, alpha: float = 0.5):
-        return settings, collecting, alpha
+    def learner(settings, parts, *, alpha: float = 0.5):
+        return settings, parts, alpha
 
     @register_collector("theirs")
-    def collector(settings, task, *, patience: int = 3):
-        return settings, task, patience
+    def collector(settings, replay, *, patience: int = 3):
+        return settings, replay, patience
 
     registered(learner), registered(collector)
     training = TrainSettings(

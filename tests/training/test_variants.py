@@ -223,14 +223,14 @@ def test_invalid_environment_states_raise(trained, tmp_path, where):
     for key in path:
         part = part[key]
     part[name] = value
-    refused(trained, tmp_path, state, rf"worlds\.{where}.* {message}.*; go on from the checkpoint")
+    refused(trained, tmp_path, state, rf"worlds\.{where}.* {message}.*; resume from the checkpoint")
 
 
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
         ("critic", {}, "critic has other names"),
-        ("minibatches", torch.zeros(5056, dtype=torch.uint8), "does not fit this training"),
+        ("minibatches", torch.zeros(5056, dtype=torch.uint8), "does not fit this run"),
         ("minibatches", 3, "minibatches is not of shape"),
         ("collector", {"collectors": []}, "is not a list of 2"),
     ],
