@@ -48,21 +48,21 @@ class FusedCollector:
         self,
         direct: DirectCollector,
         network: PackedNetwork,
-        worlds: Any,
+        rules: Any,
         num_threads: int,
     ) -> None:
         self._direct, actor = direct, direct.actor
         assert isinstance(actor, CategoricalActor)
         self._actor = actor
         renderer = self._renderer = direct.renderer
-        self._network, self._worlds = network, worlds
+        self._network, self._rules = network, rules
         count, view = renderer.worlds.num_envs, renderer.view
         self._workers = WorkerPool(count, num_threads)
         raytracer: Any = renderer.worlds.renderer
         camera: Any = rollout_kernel.CameraView()
         inputs = raytracer.kernel_inputs(view, self._workers.size)
         camera.view, camera.geoms, camera.materials, camera.scratch = inputs
-        camera.poses = worlds.poses
+        camera.poses = rules.poses
         camera.mean, camera.deviation = _mean_and_deviation(renderer)
         self._camera = camera
         shape = (self._workers.size, network.workspace_size)
@@ -83,7 +83,7 @@ class FusedCollector:
         self._cache: ActivationCache | None = None
         self._logits = torch.empty(0, num_actions)
         self._owner = getattr(self._actor.network, "owner", "the policy")
-        self._kernel = rollout_kernel.make_kernel(*worlds.functions)
+        self._kernel = rollout_kernel.make_kernel(*rules.functions)
         load_kernels(self._kernel.module)
 
     @classmethod
@@ -118,7 +118,7 @@ class FusedCollector:
         load_kernels(self._kernel.module).result()
         self._renderer.env.start()
         state: Any = self._renderer.worlds.state
-        self._worlds.begin(state)
+        self._rules.begin(state)
         if self._cache is not None:
             self._cache.clear()
         self._network.update()
@@ -143,7 +143,7 @@ class FusedCollector:
 
     def _run(self, num_envs: int) -> tuple[Tensor, dict[str, Tensor]]:
         """Return the environment of each step, episode after episode, and what the kernel wrote."""
-        taken, reasons = self._worlds.steps[:num_envs], self._worlds.end_reasons[:num_envs]
+        taken, reasons = self._rules.steps[:num_envs], self._rules.end_reasons[:num_envs]
         is_observed = self._direct.keep_observations
         seen = ("pixels", "logits") if is_observed else ()
         names, parts = ("action", "reward", "end_reason", *seen), []
@@ -183,11 +183,11 @@ class FusedCollector:
             # of no rows if there is not enough memory
             rollout.outputs = wp.from_torch(self._cache.outputs[first:last])
 
-        def work(member: int, first: int, last: int) -> None:
-            inputs = [first, last, member, rollout, self._worlds.flights]
+        def run_span(member: int, first: int, last: int) -> None:
+            inputs = [first, last, member, rollout, self._rules.arrays]
             wp.launch(self._kernel, 1, inputs=inputs, device="cpu")
 
-        self._workers.map_spans(0, num_envs, work)
+        self._workers.map_spans(0, num_envs, run_span)
 
     def _written(self, lengths: Tensor) -> tuple[Tensor, Tensor]:
         """Return environment and row of each step, from the steps of each environment."""

@@ -62,7 +62,7 @@ GIMBAL = FLYING.replace(camera_mount="gimbal")
 @pytest.mark.parametrize("dynamics", [None, Quadrotor(FLYING), Quadrotor(GIMBAL)])
 def test_fused_episodes_equal_their_replay_by_torchrl_bit_for_bit(dynamics):
     kept = [REASON, ("next", "info", "collected"), ("next", "info", "drone")]
-    collector = make(keep=kept, dynamics=dynamics)
+    collector = make(next_keys=kept, dynamics=dynamics)
     assert isinstance(collector.source, FusedCollector)
     env = DroneEnv(5, SHORT, dynamics=dynamics)
     env = with_transforms(env, [GrayPixels(), StandardizePixels()])
@@ -98,7 +98,7 @@ def test_resize_to_the_same_size_changes_nothing():
 
 
 def test_kernel_reports_the_same_info_as_a_replay():
-    brief, replayed = make(), make(keep=[REASON, ("next", "info", "drone")])
+    brief, replayed = make(), make(next_keys=[REASON, ("next", "info", "drone")])
     for _ in range(2):
         one, other = brief.collect(), replayed.collect()
         for key in one.keys(True, True):
@@ -348,13 +348,13 @@ def test_environments_with_fog_fall_back(visibility):
 def test_kernel_ends_the_episode_of_a_lost_drone():
     """One of five drones is lost from the start."""
     collector = make(dynamics=Quadrotor(FLYING))
-    begin = collector.source._worlds.begin
+    begin = collector.source._rules.begin
 
     def lose(state):
         state.body.numbers[2, LOST] = 1.0
         begin(state)
 
-    collector.source._worlds.begin = lose
+    collector.source._rules.begin = lose
     batch = collector.collect()
     lengths = batch["collector", "traj_ids"].bincount()
     assert lengths[2] == 1 and (lengths[[0, 1, 3, 4]] > 1).all()

@@ -13,7 +13,7 @@ from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transfor
 from drone_rl.policies import SmallCNN, make_actor
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.tasks import CollectCubes
-from drone_rl.sim.tasks.collect_cubes_kernel import Flights, FlyingCubes, move, place
+from drone_rl.sim.tasks.collect_cubes_kernel import EnvArrays, FusedCubes, move, place
 
 INFO = ("next", "info", "collected")
 start_warp("cpu")
@@ -63,12 +63,12 @@ def test_standardization_equals_the_transform_bit_for_bit():
 
 
 @wp.func
-def half_move(flights: Flights, world: int, action: int) -> float:
-    return move(flights, world, action) * 0.5
+def half_move(envs: EnvArrays, env: int, action: int) -> float:
+    return move(envs, env, action) * 0.5
 
 
-class HalfFlying(FlyingCubes):
-    functions = (Flights, place, half_move)
+class HalfCubes(FusedCubes):
+    functions = (EnvArrays, place, half_move)
 
 
 class Half(CollectCubes):
@@ -77,7 +77,7 @@ class Half(CollectCubes):
         return new, 0.5 * reward
 
     def fused_rules(self, dynamics, num_envs):
-        return HalfFlying(self.settings, dynamics, num_envs)
+        return HalfCubes(self.settings, dynamics, num_envs)
 
 
 @pytest.mark.parametrize("task", [CollectCubes, Half])
@@ -87,7 +87,7 @@ def test_kernel_runs_the_rules_of_the_task(task):
     generator = torch.Generator().manual_seed(0)
     network = SmallCNN(shape, 3, channels=(4,), hidden=(8,), generator=generator)
     actor = make_actor(network, env.action_spec, generator)
-    collector = EpisodeCollector(env, actor, acceleration="fused", keep=[INFO])
+    collector = EpisodeCollector(env, actor, acceleration="fused", next_keys=[INFO])
     assert isinstance(collector.source, FusedCollector)
     for _ in range(3):
         batch = collector.collect()

@@ -15,10 +15,10 @@ from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.entities import Cube
 from drone_rl.sim.tasks.collect_cubes_kernel import (
     EndReason,
-    FlyingCubes,
-    judge_all,
+    FusedCubes,
     launch,
     start_all,
+    step_all,
 )
 from drone_rl.sim.tasks.common import (
     PropTask,
@@ -153,13 +153,13 @@ class CollectCubes(PropTask[WorldState]):
         new = dataclasses.replace(state, body=body, steps=state.steps + 1, end_reason=end, **copies)
         reward = torch.empty(len(state), dtype=torch.float64, device=new.steps.device)
         others = (body.is_lost, new.steps, new.end_reason, reward)
-        launch(judge_all, self.settings, new, *others)
+        launch(step_all, self.settings, new, *others)
         return new, reward
 
-    def fused_rules(self, dynamics: Dynamics, num_envs: int) -> FlyingCubes | None:
+    def fused_rules(self, dynamics: Dynamics, num_envs: int) -> FusedCubes | None:
         """See `Task.fused_rules`."""
-        if type(self).step is CollectCubes.step and FlyingCubes.supports(dynamics):
-            return FlyingCubes(self.settings, dynamics, num_envs)
+        if type(self).step is CollectCubes.step and FusedCubes.supports(dynamics):
+            return FusedCubes(self.settings, dynamics, num_envs)
         return None
 
     def info(self, state: WorldState) -> dict[str, Tensor]:

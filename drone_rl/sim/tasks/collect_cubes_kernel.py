@@ -137,7 +137,7 @@ def _end_reason(
 
 
 @wp.kernel
-def judge_all(
+def step_all(
     bounds: Bounds,
     drones: wp.array[wp.vec3d],
     places: wp.array2d[wp.vec3d],
@@ -183,7 +183,7 @@ def make_bounds(settings: TaskSettings) -> Bounds:
 
 
 def launch(kernel: Any, settings: TaskSettings, state: Any, *others: Tensor) -> None:
-    """Run `judge_all` or `start_all`, with its `others`, (N,), and write a `WorldState`."""
+    """Run `step_all` or `start_all`, with its `others`, (N,), and write a `WorldState`."""
     device = state.cubes.device
     start_warp(str(device))
     vectors = [
@@ -201,8 +201,8 @@ def launch(kernel: Any, settings: TaskSettings, state: Any, *others: Tensor) -> 
 
 
 @wp.struct
-class Flights:
-    """Environments of the fused episode kernel. Metres, world frame."""
+class EnvArrays:
+    """Arrays of environments for the fused episode kernel. Metres, world frame."""
 
     drones: wp.array[wp.vec3d]
     cubes: Cubes
@@ -214,39 +214,39 @@ class Flights:
 
 
 @wp.func
-def place(flights: Flights, world: int, poses: Poses) -> None:
+def place(envs: EnvArrays, env: int, poses: Poses) -> None:
     """Write the poses of drone and cubes for the renderer; only flying drones have attitudes."""
-    poses.positions[world, DRONE_FRAME] = wp.vec3(flights.drones[world])
-    if is_flying(flights.fleet):
-        poses.attitudes[world] = camera_attitude(flights.fleet, world)
-    for cube in range(flights.cubes.places.shape[1]):
-        at = flights.cubes.places[world, cube]
-        if not is_present(flights.cubes, world, cube):
+    poses.positions[env, DRONE_FRAME] = wp.vec3(envs.drones[env])
+    if is_flying(envs.fleet):
+        poses.attitudes[env] = camera_attitude(envs.fleet, env)
+    for cube in range(envs.cubes.places.shape[1]):
+        at = envs.cubes.places[env, cube]
+        if not is_present(envs.cubes, env, cube):
             at[2] = at[2] - wp.float64(HIDDEN_DEPTH)
-        poses.positions[world, DRONE_FRAME + 1 + cube] = wp.vec3(at)
+        poses.positions[env, DRONE_FRAME + 1 + cube] = wp.vec3(at)
 
 
 @wp.func
-def move(flights: Flights, world: int, action: int) -> float:
+def move(envs: EnvArrays, env: int, action: int) -> float:
     """Move a drone by its dynamics and apply the rules. Returns the reward."""
-    drone = flights.drones[world]
+    drone = envs.drones[env]
     lost = bool(False)
-    if is_flying(flights.fleet):
-        drone = fly_move(flights.fleet, world, action)
-        lost = is_lost(flights.fleet, world)
+    if is_flying(envs.fleet):
+        drone = fly_move(envs.fleet, env, action)
+        lost = is_lost(envs.fleet, env)
     else:
-        drone = drone + flights.moves[action]
-    flights.drones[world] = drone
-    flights.steps[world] = flights.steps[world] + 1
-    outcome = step(flights.cubes, world, drone, flights.steps[world], lost)
-    flights.end_reasons[world] = outcome.end_reason
+        drone = drone + envs.moves[action]
+    envs.drones[env] = drone
+    envs.steps[env] = envs.steps[env] + 1
+    outcome = step(envs.cubes, env, drone, envs.steps[env], lost)
+    envs.end_reasons[env] = outcome.end_reason
     return float(outcome.reward)
 
 
-class FlyingCubes:
-    """Arrays that the fused kernel reads: `flights`, `poses`, `steps` and `end_reasons`."""
+class FusedCubes:
+    """State of environments for the fused kernel: `arrays`, `poses`, `steps` and `end_reasons`."""
 
-    functions = (Flights, place, move)
+    functions = (EnvArrays, place, move)
     """Warp structure of the states; functions that write poses and that step an environment."""
 
     def __init__(self, settings: TaskSettings, dynamics: Dynamics, num_envs: int) -> None:
@@ -255,7 +255,7 @@ class FlyingCubes:
         self._drones = torch.zeros(num_envs, 3, dtype=torch.float64)
         self.steps = torch.zeros(num_envs, dtype=torch.int32)
         self.end_reasons = torch.zeros(num_envs, dtype=torch.int32)
-        cubes, self.flights, self.poses = Cubes(), Flights(), Poses()
+        cubes, self.arrays, self.poses = Cubes(), EnvArrays(), Poses()
         cubes.bounds = make_bounds(settings)
         self.state = SimpleNamespace(cubes=torch.zeros(*shape, 3, dtype=torch.float64))
         """The cubes, named as in `WorldState`."""
@@ -265,15 +265,15 @@ class FlyingCubes:
             values = torch.zeros(shape, dtype=kind)
             setattr(self.state, name, values)
             setattr(cubes, name, wp.from_torch(values))
-        self.flights.cubes = cubes
-        self.flights.drones = wp.from_torch(self._drones, dtype=wp.vec3d)
-        self.flights.steps = wp.from_torch(self.steps)
-        self.flights.end_reasons = wp.from_torch(self.end_reasons)
+        self.arrays.cubes = cubes
+        self.arrays.drones = wp.from_torch(self._drones, dtype=wp.vec3d)
+        self.arrays.steps = wp.from_torch(self.steps)
+        self.arrays.end_reasons = wp.from_torch(self.end_reasons)
         if isinstance(dynamics, ComputerVision):
-            self.flights.moves = wp.from_torch(dynamics.moves.contiguous(), dtype=wp.vec3d)
+            self.arrays.moves = wp.from_torch(dynamics.moves.contiguous(), dtype=wp.vec3d)
         quadrotor = dynamics if isinstance(dynamics, Quadrotor) else None
         self._numbers = torch.zeros(num_envs if quadrotor else 0, NUMBERS, dtype=torch.float64)
-        self.flights.fleet = make_fleet(quadrotor, self._numbers)
+        self.arrays.fleet = make_fleet(quadrotor, self._numbers)
         places = torch.zeros(num_envs, 1 + DRONE_FRAME + settings.num_cubes, 3)
         self.poses.positions = wp.from_torch(places, dtype=wp.vec3)
         attitudes = torch.tensor(LEVEL).repeat(num_envs, 1)

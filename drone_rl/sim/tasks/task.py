@@ -196,7 +196,7 @@ class Task(abc.ABC, Generic[S]):
         """
 
     def fused_rules(self, dynamics: Dynamics, num_envs: int) -> Any:
-        """Return arrays for the fused episode kernel, such as `FlyingCubes`, or None."""
+        """Return arrays for the fused episode kernel, such as `FusedCubes`, or None."""
 
     def places(self, state: S) -> Tensor:
         """Return where the props are, metres; below the ground if absent. Shape: (N, P, 3)."""

@@ -12,8 +12,8 @@ from drone_rl.sim.rendering.raytrace.structs_kernel import Poses
 from drone_rl.sim.tasks import CollectCubes, Pillars
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.sim.tasks.collect_cubes_kernel import (
-    Flights,
-    FlyingCubes,
+    EnvArrays,
+    FusedCubes,
     move,
     place,
 )
@@ -26,12 +26,12 @@ WORLDS = 60
 
 @wp.kernel(enable_backward=False)
 def step(
-    flights: Flights, poses: Poses, actions: wp.array(dtype=int), rewards: wp.array(dtype=float)
+    envs: EnvArrays, poses: Poses, actions: wp.array(dtype=int), rewards: wp.array(dtype=float)
 ) -> None:
-    world = wp.tid()
-    if flights.end_reasons[world] == 0:
-        rewards[world] = move(flights, world, actions[world])
-        place(flights, world, poses)
+    env = wp.tid()
+    if envs.end_reasons[env] == 0:
+        rewards[env] = move(envs, env, actions[env])
+        place(envs, env, poses)
 
 
 @pytest.mark.parametrize(
@@ -47,16 +47,16 @@ def test_random_episodes_follow_the_reference_rules(settings, ends):
     task = TaskSettings(**settings)
     worlds, draws = Worlds(WORLDS, task), torch.Generator().manual_seed(0)
     worlds.reset(torch.arange(WORLDS), [RandomState(i) for i in range(WORLDS)])
-    flying = worlds.task.fused_rules(worlds.dynamics, WORLDS)
-    flying.begin(worlds.state)
-    places = wp.to_torch(flying.poses.positions)
+    fused = worlds.task.fused_rules(worlds.dynamics, WORLDS)
+    fused.begin(worlds.state)
+    places = wp.to_torch(fused.poses.positions)
     state, going, seen = worlds.state, torch.arange(WORLDS), set()
     rewards = torch.zeros(WORLDS)
     while len(going):
         chances = torch.tensor([0.7, 0.2, 0.1] if len(going) % 2 else [0.7, 0.1, 0.2])
         actions = chances.multinomial(WORLDS, replacement=True, generator=draws)
         inputs = [wp.from_torch(actions.int()), wp.from_torch(rewards)]
-        wp.launch(step, WORLDS, inputs=[flying.flights, flying.poses, *inputs], device="cpu")
+        wp.launch(step, WORLDS, inputs=[fused.arrays, fused.poses, *inputs], device="cpu")
         before, moved = state, worlds.dynamics.step(state.body, actions[going])
         state, reward = worlds.advance(state, actions[going])
         expected, earned = reference_step(task, before, moved)
@@ -64,12 +64,12 @@ def test_random_episodes_follow_the_reference_rules(settings, ends):
         for name, value in expected.items():
             torch.testing.assert_close(getattr(state, name), value, rtol=0, atol=0, equal_nan=True)
         assert torch.equal(rewards[going].double(), reward)
-        assert torch.equal(wp.to_torch(flying.flights.drones)[going], state.drone)
+        assert torch.equal(wp.to_torch(fused.arrays.drones)[going], state.drone)
         for name in ("collected", "passed", "side", "lateral"):
-            found, expected = getattr(flying.state, name)[going], getattr(state, name)
+            found, expected = getattr(fused.state, name)[going], getattr(state, name)
             torch.testing.assert_close(found, expected, rtol=0, atol=0, equal_nan=True)
-        assert torch.equal(flying.steps[going].long(), state.steps)
-        assert torch.equal(flying.end_reasons[going].long(), state.end_reason)
+        assert torch.equal(fused.steps[going].long(), state.steps)
+        assert torch.equal(fused.end_reasons[going].long(), state.end_reason)
         assert torch.equal(places[going, 1], state.drone.float())
         assert torch.equal(places[going, 2:], worlds.task.places(state).float())
         assert not places[:, 0].any()
@@ -84,17 +84,17 @@ def test_kernel_state_starts_from_a_copy_of_the_environments():
     worlds = Worlds(2, settings)
     cubes = torch.tensor([[[15.0, 1.0, 3.0], [24.0, -2.0, 3.5]], [[15.0, 0.0, 3.0]] * 2])
     worlds.state = worlds.start(cubes.double())
-    flying = FlyingCubes(settings, worlds.dynamics, 3)
-    for values in (flying.steps, flying.end_reasons, flying.state.collected):
+    fused = FusedCubes(settings, worlds.dynamics, 3)
+    for values in (fused.steps, fused.end_reasons, fused.state.collected):
         values.fill_(1)  # left by a previous batch
-    flying.begin(worlds.state)
-    assert wp.to_torch(flying.flights.drones)[:2].tolist() == [[0.0, 0.0, 3.0]] * 2
-    assert torch.equal(flying.state.cubes[:2], cubes.double())
-    assert not flying.state.collected[:2].any() and flying.state.collected[2].all()
-    assert flying.steps.tolist() == flying.end_reasons.tolist() == [0, 0, 1]
-    wp.to_torch(flying.flights.drones).fill_(7.0)
+    fused.begin(worlds.state)
+    assert wp.to_torch(fused.arrays.drones)[:2].tolist() == [[0.0, 0.0, 3.0]] * 2
+    assert torch.equal(fused.state.cubes[:2], cubes.double())
+    assert not fused.state.collected[:2].any() and fused.state.collected[2].all()
+    assert fused.steps.tolist() == fused.end_reasons.tolist() == [0, 0, 1]
+    wp.to_torch(fused.arrays.drones).fill_(7.0)
     assert worlds.state.drone[0].tolist() == [0.0, 0.0, 3.0]
-    assert wp.to_torch(flying.poses.attitudes)[0].tolist() == [1.0, 0.0, 0.0, 0.0]
+    assert wp.to_torch(fused.poses.attitudes)[0].tolist() == [1.0, 0.0, 0.0, 0.0]
 
 
 def test_other_rules_and_moves_are_unsupported():
