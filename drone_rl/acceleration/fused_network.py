@@ -15,9 +15,9 @@ from drone_rl.acceleration.layers_kernel import WIDTH
 from drone_rl.acceleration.packed_layers import (
     Order,
     PackedLayer,
-    as_products,
+    as_geometries,
     odd_lines,
-    outputs_at,
+    output_offsets,
     packed_layers,
     unsupported,
 )
@@ -29,7 +29,8 @@ MAX_WEIGHTS = 2**20
 """Larger networks do not fit into a core's cache, and torch is as fast."""
 ACTIVATIONS = "activations"
 """Entry of a batch: the handle of each step's activations in an `ActivationCache`."""
-GradientsOf = Literal["weights", "pixels"]
+Wrt = Literal["weights", "pixels"]
+"""What gradients are computed with respect to."""
 
 
 class ActivationCache:
@@ -69,9 +70,9 @@ class ActivationCache:
         return rows + self.generation * len(self.outputs)
 
     def find(self, handles: Tensor, weights: Tensor, observations: Tensor) -> Tensor | None:
-        """Return the rows of activations by their handles (k,), or None unless all are valid.
+        """Return the rows of the activations with these handles (k,), or None if one is invalid.
 
-        Handles are invalid if the packed weights or the observations, (k, *), have changed.
+        Handles are invalid once the packed weights or the observations, (k, *), have changed.
         """
         rows = handles - self.generation * len(self.outputs)
         is_valid = (rows >= 0) & (rows < len(self.outputs))
@@ -101,15 +102,15 @@ class FusedNetwork(ImageNetwork):
         network: PolicyNetwork,
         num_threads: int = 1,
         *,
-        of: GradientsOf = "weights",
+        wrt: Wrt = "weights",
         cache: ActivationCache | None = None,
     ) -> None:
         super().__init__()
         self.network, self.in_shape, self.actions = network, network.in_shape, network.actions
         self._num_threads, self._cache = num_threads, cache
-        self._of: GradientsOf = of
+        self._wrt: Wrt = wrt
         self.in_keys = ("pixels",) if cache is None else ("pixels", ACTIVATIONS)
-        self._work: _Work | None = None
+        self._engine: _Engine | None = None
         load_kernels(gradients_kernel)
 
     @classmethod
@@ -118,7 +119,7 @@ class FusedNetwork(ImageNetwork):
         network: nn.Module,
         num_threads: int = 1,
         *,
-        of: GradientsOf = "weights",
+        wrt: Wrt = "weights",
         cache: Callable[[], ActivationCache | None] = lambda: None,
     ) -> Self | Reasons:
         """Return the fused network, or the reasons why the kernel does not support the network.
@@ -126,32 +127,32 @@ class FusedNetwork(ImageNetwork):
         Args:
             network: Network from pixels to logits.
             num_threads: Threads that share the observations; it affects the rounding of sums.
-            of: Differentiate by the weights or the pixels. For pixels, the weights are read once.
+            wrt: Differentiate with respect to the weights, or to the pixels with fixed weights.
             cache: Called if the network is supported; see `FusedCollector.cache_activations`.
         """
         reasons = unsupported(network)
-        if not reasons and of == "pixels" and not packed_layers(network)[0].has_transpose:
+        if not reasons and wrt == "pixels" and not packed_layers(network)[0].has_transpose:
             reasons.append(f"the first layer's inputs are not a multiple of {WIDTH}")
         num_weights = sum(p.numel() for p in network.parameters())
         if num_weights > MAX_WEIGHTS:
             reasons.append(f"{num_weights} weights are more than {MAX_WEIGHTS}")
         if reasons or not isinstance(network, PolicyNetwork):
             return Reasons(reasons)
-        return cls(network, num_threads, of=of, cache=cache())
+        return cls(network, num_threads, wrt=wrt, cache=cache())
 
     def forward(self, pixels: Tensor, activations: Tensor | None = None) -> Tensor:
         """Return the logits of pixels (*, C, H, W).
 
         `activations` are handles of the observations' activations in the cache. Shape: (*,).
         """
-        if self._work is None:
+        if self._engine is None:
             layers = packed_layers(self.network)
-            self._work = _Work(layers, self._num_threads, self._cache, self._of)
+            self._engine = _Engine(layers, self._num_threads, self._cache, self._wrt)
         self.network.check(pixels)
         flat = pixels.reshape(-1, math.prod(self.in_shape))
         handles = None if activations is None else activations.reshape(-1)
-        learning = self._work.parameters if self._of == "weights" else ()
-        logits = _Logits.apply(self._work, flat, handles, *learning)
+        learning = self._engine.parameters if self._wrt == "weights" else ()
+        logits = _Logits.apply(self._engine, flat, handles, *learning)
         return logits.reshape(*pixels.shape[:-3], -1)
 
 
@@ -167,57 +168,60 @@ class _Activations(NamedTuple):
 class _Logits(torch.autograd.Function):
     @staticmethod
     def forward(
-        ctx: Any, work: "_Work", pixels: Tensor, handles: Tensor | None, *parameters: Tensor
+        ctx: Any, engine: "_Engine", pixels: Tensor, handles: Tensor | None, *parameters: Tensor
     ) -> Tensor:
-        ctx.work, ctx.is_learning = work, bool(parameters)
+        ctx.engine, ctx.is_learning = engine, bool(parameters)
         ctx.pixels = pixels.detach()  # Warp reads .grad, about which torch warns
-        ctx.made = work.compute(ctx.pixels, handles)
-        return work.logits(ctx.made)
+        ctx.saved = engine.compute(ctx.pixels, handles)
+        return engine.logits(ctx.saved)
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, grad_output: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        if ctx.made is None:
+        if ctx.saved is None:
             raise RuntimeError("a second backward pass is impossible: activations were released")
-        made, ctx.made = ctx.made, None
-        gradients = ctx.work.gradients(ctx.pixels, made, grad_output)
+        saved, ctx.saved = ctx.saved, None
+        gradients = ctx.engine.gradients(ctx.pixels, saved, grad_output)
         return (None, None, None, *gradients) if ctx.is_learning else (None, *gradients, None)
 
 
-class _Work:
-    """Packed layers and the buffers of both passes."""
+class _Engine:
+    """Run both passes in threads, with packed layers and their buffers."""
 
     def __init__(
         self,
         layers: Sequence[PackedLayer],
         num_threads: int,
         cache: ActivationCache | None,
-        of: GradientsOf,
+        wrt: Wrt,
     ) -> None:
         load_kernels(gradients_kernel).result()
-        self._layers, self._cache, self._is_fixed = layers, cache, of == "pixels"
+        self._layers, self._cache, self._is_fixed = layers, cache, wrt == "pixels"
         self._workers = WorkerPool(num_threads, num_threads)
         self._order = order = Order(layers)
-        self._weights = torch.zeros(order.weights_at[-1])
-        self._back = torch.zeros(order.back_at[-1])
-        made_at = outputs_at(layers)
-        self._logits_at, self._size = made_at[-2:]
+        self._weights = torch.zeros(order.weight_offsets[-1])
+        self._transposed = torch.zeros(order.transposed_offsets[-1])
+        offsets = output_offsets(layers)
+        self._logits_offset, self._size = offsets[-2:]
         params = self._params = PackedParams()
-        params.products = as_products(
-            [0, at, 0, *layer.geometry, int(layer is not layers[-1])]
-            for layer, at in zip(layers, order.weights_at, strict=False)
+        params.geometries = as_geometries(
+            {"weights_offset": at, **layer.geometry, "is_rectified": int(layer is not layers[-1])}
+            for layer, at in zip(layers, order.weight_offsets, strict=False)
         )
-        params.transposed = as_products(
-            _transposed(layer, at) for layer, at in zip(layers, order.back_at, strict=False)
+        params.transposed = as_geometries(
+            {"weights_offset": at, **_transposed(layer)}
+            for layer, at in zip(layers, order.transposed_offsets, strict=False)
         )
-        params.weights, params.back = wp.from_torch(self._weights), wp.from_torch(self._back)
-        params.made_at = wp.from_torch(torch.tensor(made_at, dtype=torch.int32))
+        params.weights = wp.from_torch(self._weights)
+        params.transposed_weights = wp.from_torch(self._transposed)
+        params.output_offsets = wp.from_torch(torch.tensor(offsets, dtype=torch.int32))
         params.num_convolutions = sum(layer.is_convolution for layer in layers)
-        stride = odd_lines(self._logits_at - made_at[params.num_convolutions - 1])
+        stride = odd_lines(self._logits_offset - offsets[params.num_convolutions - 1])
         params.inputs_stride = stride
         self._gradients = torch.empty(self._workers.size, *self._weights.shape)
-        most = max(v.num_inputs * v.geometry[0] for v in layers if v.is_convolution)
-        sizes = {"deltas": int(BLOCK) * self._size, "inputs": int(BLOCK) * stride, "patches": most}
+        numbers = (v.num_inputs * math.prod(v.output_shape) for v in layers if v.is_convolution)
+        sizes = {"deltas": int(BLOCK) * self._size, "inputs": int(BLOCK) * stride}
+        sizes["patches"] = max(numbers)
         self._workspaces = [Workspace() for _ in range(self._workers.size)]
         for workspace, gradients in zip(self._workspaces, self._gradients, strict=True):
             for name, size in sizes.items():
@@ -225,7 +229,7 @@ class _Work:
             workspace.gradients = wp.from_torch(gradients[: 0 if self._is_fixed else None])
         self._spare: Tensor | None = None
         """Buffer to reuse for outputs; allocating one takes longer than evaluating a layer."""
-        order.pack(self._weights, self._back)
+        order.pack(self._weights, self._transposed)
 
     @property
     def parameters(self) -> list[Tensor]:
@@ -235,52 +239,54 @@ class _Work:
     def compute(self, pixels: Tensor, handles: Tensor | None) -> _Activations:
         """Return the outputs of all layers, from the cache if they are there."""
         if not self._is_fixed:
-            self._order.pack(self._weights, self._back)
+            self._order.pack(self._weights, self._transposed)
         if self._cache is not None and handles is not None:
             rows = self._cache.find(handles, self._weights, pixels)
             if rows is not None:
                 outputs = self._cache.outputs.view(-1)
                 return _Activations(outputs, rows, self._cache.generation)
         size, spare, self._spare = len(pixels) * self._size, self._spare, None
-        made = torch.empty(size) if spare is None or len(spare) < size else spare
+        outputs = torch.empty(size) if spare is None or len(spare) < size else spare
         batch: Any = Batch()
-        batch.frames, batch.made = wp.from_torch(pixels), wp.from_torch(made)
+        batch.frames, batch.outputs = wp.from_torch(pixels), wp.from_torch(outputs)
 
-        def work(member: int, first: int, last: int) -> None:
+        def run_span(member: int, first: int, last: int) -> None:
             del member
             inputs = [first, last, self._params, batch]
             wp.launch(gradients_kernel.forward, 1, inputs=inputs, device="cpu")
 
-        self._workers.map_spans(0, len(pixels), work)
-        return _Activations(made, torch.arange(len(pixels), dtype=torch.int32), None)
+        self._workers.map_spans(0, len(pixels), run_span)
+        return _Activations(outputs, torch.arange(len(pixels), dtype=torch.int32), None)
 
-    def logits(self, made: _Activations) -> Tensor:
+    def logits(self, saved: _Activations) -> Tensor:
         """Return the outputs of the last layer. Shape: (num_observations, num_actions)."""
-        last = self._logits_at + torch.arange(len(self._layers[-1].layer.weight))
-        return made.outputs.take(made.rows[:, None].long() * self._size + last)
+        last = self._logits_offset + torch.arange(len(self._layers[-1].layer.weight))
+        return saved.outputs.take(saved.rows[:, None].long() * self._size + last)
 
-    def gradients(self, pixels: Tensor, made: _Activations, grad_output: Tensor) -> list[Tensor]:
-        """Return the gradient of each parameter, or of the pixels; `made` may be overwritten."""
-        if self._cache is not None and made.generation not in (None, self._cache.generation):
+    def gradients(self, pixels: Tensor, saved: _Activations, grad_output: Tensor) -> list[Tensor]:
+        """Return gradients with respect to parameters or pixels; later calls may reuse `saved`."""
+        if self._cache is not None and saved.generation not in (None, self._cache.generation):
             raise RuntimeError("a batch was collected between the forward and the backward pass")
         self._gradients.zero_()
         grad_pixels = torch.empty_like(pixels) if self._is_fixed else torch.empty(0, 0)
         batch: Any = Batch()
-        batch.frames, batch.made = wp.from_torch(pixels), wp.from_torch(made.outputs)
-        batch.rows, batch.grad_frames = wp.from_torch(made.rows), wp.from_torch(grad_pixels)
+        batch.frames, batch.outputs = wp.from_torch(pixels), wp.from_torch(saved.outputs)
+        batch.rows, batch.grad_frames = wp.from_torch(saved.rows), wp.from_torch(grad_pixels)
         batch.grad_output = wp.from_torch(grad_output.contiguous())
 
-        def work(member: int, first: int, last: int) -> None:
+        def run_span(member: int, first: int, last: int) -> None:
             inputs = [first, last, self._params, batch, self._workspaces[member]]
             wp.launch(gradients_kernel.backward, 1, inputs=inputs, device="cpu")
 
-        self._workers.map_spans(0, len(pixels), work)
-        if made.generation is None:
-            self._spare = made.outputs
+        self._workers.map_spans(0, len(pixels), run_span)
+        if saved.generation is None:
+            self._spare = saved.outputs
         return [grad_pixels] if self._is_fixed else self._order.unpack(self._gradients.sum(0))
 
 
-def _transposed(layer: PackedLayer, weights_at: int) -> list[int]:
-    """Return the fields of the product that maps gradients of outputs to those of patches."""
+def _transposed(layer: PackedLayer) -> dict[str, int]:
+    """Return the geometry that maps gradients with respect to outputs to those of the patches."""
     outs, size = layer.num_outs, layer.num_inputs
-    return [0, weights_at, 0, layer.geometry[0], 1, outs, 0, 1, outs, 0, size, size, 0]
+    patches = {"num_patches": math.prod(layer.output_shape), "patches_per_row": 1}
+    kernel = {"row_stride": outs, "kernel_rows": 1, "kernel_row_length": outs}
+    return {**patches, **kernel, "num_outs": size, "output_stride": size}

@@ -31,7 +31,7 @@ def infer(
             run_convolutions(layers, frames[first + row], workspace, row)
         run_linear(layers, workspace, count)
         for row in range(count):
-            at = layers.logits_at + row * layers.num_outs
+            at = layers.logits_offset + row * layers.logits_stride
             for action in range(logits.shape[1]):
                 logits[first + row, action] = workspace[at + action]
 

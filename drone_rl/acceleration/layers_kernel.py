@@ -10,76 +10,77 @@ computed next to it.
 import warp as wp
 
 WIDTH = 16
-"""Outputs that are computed together: numbers of outputs are rounded up to a multiple of it."""
+"""Number of outputs that are computed together. Layers are padded to a multiple of it."""
 
 # As arguments of a function, vectors make the compiler use 512-bit registers where there are any;
 # otherwise it takes two of 256 bits for each, at half the speed.
-NUMBERS = """
+PREAMBLE = """
 #pragma clang fp contract(fast)
 #pragma clang diagnostic ignored "-Wpsabi"
 typedef float numbers __attribute__((vector_size(64)));
 typedef float anywhere __attribute__((vector_size(64), aligned(4)));
-auto add = [](numbers sum, float by, numbers given) __attribute__((always_inline)) {
-    return sum + by * given;
+auto add = [](numbers sum, float by, numbers values) __attribute__((always_inline)) {
+    return sum + by * values;
 };
+const int num_patches = g.num_patches, columns = g.patches_per_row, num_outs = g.num_outs;
+const int row_stride = g.row_stride, column_stride = g.column_stride;
+const int kernel_rows = g.kernel_rows, length = g.kernel_row_length;
+const int kernel_row_stride = g.kernel_row_stride, panel = 16 * (1 + kernel_rows * length);
+const float* input = inputs.data + g.input_offset;
 """
-"""Sixteen numbers at a time, for functions in C++."""
+"""Sixteen numbers at a time, and the geometry `g` of a layer, for functions in C++."""
 
 _TILES = (
-    NUMBERS
+    PREAMBLE
     + """
-const int rows = g.rows, columns = g.columns, down = g.down, across = g.across;
-const int lines = g.lines, length = g.length, next_line = g.next_line, num_outs = g.num_outs;
-const float* input = given.data + g.given_at;
-float* output = made.data + g.made_at;
-const int panel = 16 * (1 + lines * length);
-auto tile = [&](auto* shape, int row, int outs) __attribute__((always_inline)) {
-    constexpr int ROWS = sizeof(*shape) / sizeof((*shape)[0]);
+float* output = outputs.data + g.output_offset;
+auto tile = [&](auto* shape, int patch, int outs) __attribute__((always_inline)) {
+    constexpr int PATCHES = sizeof(*shape) / sizeof((*shape)[0]);
     constexpr int PARTS = sizeof((*shape)[0]) / sizeof(numbers);
-    numbers sums[ROWS][PARTS];
-    const float* from[ROWS];
-    const float* now = weights.data + g.weights_at + outs / 16 * panel;
-    int column = row % columns;
-    const float* first = input + row / columns * down + column * across;
+    numbers sums[PATCHES][PARTS];
+    const float* from[PATCHES];
+    const float* now = weights.data + g.weights_offset + outs / 16 * panel;
+    int column = patch % columns;
+    const float* first = input + patch / columns * row_stride + column * column_stride;
     #pragma unroll
-    for (int r = 0; r < ROWS; ++r) {
+    for (int r = 0; r < PATCHES; ++r) {
         from[r] = first;
         bool is_last = ++column == columns;
-        first += is_last ? down - (columns - 1) * across : across;
+        first += is_last ? row_stride - (columns - 1) * column_stride : column_stride;
         column = is_last ? 0 : column;
         #pragma unroll
         for (int p = 0; p < PARTS; ++p) sums[r][p] = *(const anywhere*)(now + p * panel);
     }
-    for (int line = 0; line < lines; ++line) {
+    for (int row = 0; row < kernel_rows; ++row) {
         for (int i = 0; i < length; ++i) {
             now += 16;
             #pragma unroll
-            for (int r = 0; r < ROWS; ++r) {
+            for (int r = 0; r < PATCHES; ++r) {
                 #pragma unroll
                 for (int p = 0; p < PARTS; ++p)
                     sums[r][p] = add(sums[r][p], from[r][i], *(const anywhere*)(now + p * panel));
             }
         }
         #pragma unroll
-        for (int r = 0; r < ROWS; ++r) from[r] += next_line;
+        for (int r = 0; r < PATCHES; ++r) from[r] += kernel_row_stride;
     }
     #pragma unroll
-    for (int r = 0; r < ROWS; ++r) {
+    for (int r = 0; r < PATCHES; ++r) {
         #pragma unroll
         for (int p = 0; p < PARTS; ++p) {
             numbers sum = sums[r][p];
             if (g.is_rectified) sum = sum > 0.0f ? sum : numbers{};
-            *(anywhere*)(output + (row + r) * g.made_down + outs + p * 16) = sum;
+            *(anywhere*)(output + (patch + r) * g.output_stride + outs + p * 16) = sum;
         }
     }
 };
 auto cover = [&](auto* many, auto* one, int outs) __attribute__((always_inline)) {
-    constexpr int ROWS = sizeof(*many) / sizeof(*one);
-    int row = 0;
-    for (; row + ROWS <= rows; row += ROWS) tile(many, row, outs);
-    for (; row < rows; ++row) tile(one, row, outs);
+    constexpr int PATCHES = sizeof(*many) / sizeof(*one);
+    int patch = 0;
+    for (; patch + PATCHES <= num_patches; patch += PATCHES) tile(many, patch, outs);
+    for (; patch < num_patches; ++patch) tile(one, patch, outs);
 };
-// As many as there are registers for: 32 of 16 numbers, or 16 of 8.
+// Tiles that fill the vector registers: 32 of 16 floats with AVX-512, otherwise 16 of 8.
 int outs = 0;
 #ifdef __AVX512F__
 typedef numbers eight_by_two[8][2];
@@ -96,40 +97,36 @@ for (; outs < num_outs; outs += 16) cover((many_by_one*)nullptr, (one_by_one*)nu
 
 
 @wp.struct
-class Product:
+class LayerGeometry:
     """Geometry of a layer: a matrix product whose rows are patches of a frame, or vectors."""
 
-    given_at: int
-    """Offset of the inputs."""
-    weights_at: int
-    """Offset of the weights."""
-    made_at: int
-    """Offset of the outputs."""
-    rows: int
-    """Patches, or vectors."""
-    columns: int
-    """Patches in a line of patches; rows are a multiple of it."""
-    down: int
-    """Stride from a line of patches to the next."""
-    across: int
-    """Stride from a patch to the next of its line."""
-    lines: int
-    """Lines of a patch."""
-    length: int
-    """Numbers in a line of a patch."""
-    next_line: int
-    """Stride from a line of a patch to the next."""
+    input_offset: int
+    weights_offset: int
+    output_offset: int
+    num_patches: int
+    """Patches, or vectors of a linear layer; a multiple of `patches_per_row`."""
+    patches_per_row: int
+    row_stride: int
+    """Stride between two rows of patches."""
+    column_stride: int
+    """Stride between two patches of a row."""
+    kernel_rows: int
+    """Rows of a patch."""
+    kernel_row_length: int
+    """Numbers in a row of a patch."""
+    kernel_row_stride: int
+    """Stride between two rows of a patch."""
     num_outs: int
-    """Outputs of a row, a multiple of `WIDTH`."""
-    made_down: int
-    """Stride from the outputs of a row to those of the next."""
+    """Outputs of a patch with padding, a multiple of `WIDTH`."""
+    output_stride: int
+    """Stride between the outputs of two patches."""
     is_rectified: int
     """Whether outputs below 0 become 0."""
 
 
 @wp.func_native(_TILES)
 def multiply(
-    given: wp.array[float], weights: wp.array[float], made: wp.array[float], g: Product
+    inputs: wp.array[float], weights: wp.array[float], outputs: wp.array[float], g: LayerGeometry
 ) -> None:
     """Compute a layer.
 
@@ -139,12 +136,12 @@ def multiply(
 
 
 @wp.func_native("""
-const float* from = given.data + given_at;
-float* to = made.data + made_at;
+const float* from = source.data + source_at;
+float* to = target.data + target_at;
 for (int i = 0; i < size; ++i) to[i] = from[i];
 """)
 def copy(
-    given: wp.array[float], given_at: int, made: wp.array[float], made_at: int, size: int
+    source: wp.array[float], source_at: int, target: wp.array[float], target_at: int, size: int
 ) -> None:
     """Copy numbers."""
     ...
@@ -152,20 +149,20 @@ def copy(
 
 @wp.struct
 class Layers:
-    """A network: convolutions, of one frame after the other, then layers of several at once."""
+    """A network: convolutions run frame by frame, linear layers on several frames at once."""
 
-    products: wp.array[Product]
+    geometries: wp.array[LayerGeometry]
     """One for each layer; offsets are those in a workspace."""
     weights: wp.array[float]
     num_convolutions: int
     features_size: int
-    """Numbers that the convolutions make of a frame."""
-    logits_at: int
+    """Size of the convolutions' output for one frame."""
+    logits_offset: int
     """Offset of the logits in a workspace."""
-    num_outs: int
-    """Stride from the logits of a frame to those of the next."""
-    outputs_at: wp.array[int]
-    """Offset of each layer where the outputs of all layers of a frame are saved."""
+    logits_stride: int
+    """Stride between the logits of two frames."""
+    output_offsets: wp.array[int]
+    """Offset of each layer in the saved outputs of a frame."""
 
 
 @wp.func
@@ -177,22 +174,22 @@ def run_convolutions(
     `row` is its number among the frames whose linear layers are computed together.
     """
     for layer in range(layers.num_convolutions):
-        p = layers.products[layer]
+        geometry = layers.geometries[layer]
         if layer == layers.num_convolutions - 1:
-            p.made_at += row * layers.features_size
+            geometry.output_offset += row * layers.features_size
         if layer == 0:
-            multiply(frame, layers.weights, workspace, p)
+            multiply(frame, layers.weights, workspace, geometry)
         else:
-            multiply(workspace, layers.weights, workspace, p)
+            multiply(workspace, layers.weights, workspace, geometry)
 
 
 @wp.func
 def run_linear(layers: Layers, workspace: wp.array[float], count: int) -> None:
     """Compute the linear layers of the first `count` frames."""
-    for layer in range(layers.num_convolutions, layers.products.shape[0]):
-        p = layers.products[layer]
-        p.rows = count
-        multiply(workspace, layers.weights, workspace, p)
+    for layer in range(layers.num_convolutions, layers.geometries.shape[0]):
+        geometry = layers.geometries[layer]
+        geometry.num_patches = count
+        multiply(workspace, layers.weights, workspace, geometry)
 
 
 @wp.func
@@ -206,8 +203,9 @@ def save_outputs(
 ) -> None:
     """Copy the outputs of layers `first` to `last` - 1 of one frame out of the workspace."""
     for layer in range(first, last):
-        p = layers.products[layer]
-        size = p.rows * p.num_outs
+        geometry = layers.geometries[layer]
+        size = geometry.num_patches * geometry.num_outs
+        offset = geometry.output_offset
         if layer >= layers.num_convolutions - 1:
-            p.made_at += row * size
-        copy(workspace, p.made_at, outputs, layers.outputs_at[layer], size)
+            offset += row * size
+        copy(workspace, offset, outputs, layers.output_offsets[layer], size)

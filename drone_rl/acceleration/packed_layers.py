@@ -1,6 +1,6 @@
 """A network laid out for kernels, see `layers_kernel`."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate
 from typing import Any, NamedTuple
 
@@ -9,7 +9,7 @@ import torch
 import warp as wp
 from torch import Tensor, nn
 
-from drone_rl.acceleration.layers_kernel import WIDTH, Layers, Product
+from drone_rl.acceleration.layers_kernel import WIDTH, LayerGeometry, Layers
 from drone_rl.policies.networks import PolicyNetwork, Weighted
 
 
@@ -30,14 +30,14 @@ class PackedLayer(NamedTuple):
         return isinstance(self.layer, nn.Conv2d)
 
     @property
-    def places(self) -> tuple[int, int]:
+    def output_shape(self) -> tuple[int, int]:
         """Rows and columns of outputs."""
         (height, width, _), (high, wide) = self.shape, self.kernel
         return (height - high) // self.stride + 1, (width - wide) // self.stride + 1
 
     @property
     def num_outs(self) -> int:
-        """Outputs of each place, with padding."""
+        """Outputs of each patch, with padding."""
         return -(-len(self.layer.weight) // WIDTH) * WIDTH
 
     @property
@@ -51,22 +51,29 @@ class PackedLayer(NamedTuple):
         return self.num_inputs % WIDTH == 0
 
     @property
-    def num_made(self) -> int:
-        """Outputs for each frame."""
-        rows, columns = self.places
+    def output_size(self) -> int:
+        """Outputs for each frame, with padding."""
+        rows, columns = self.output_shape
         return rows * columns * self.num_outs
 
     @property
-    def geometry(self) -> list[int]:
-        """Fields of `Product` from `rows` to `made_down`."""
+    def geometry(self) -> dict[str, int]:
+        """Fields of `LayerGeometry` without offsets and `is_rectified`."""
         _, width, channels = self.shape
         high, wide = self.kernel
-        rows, columns = self.places
-        across, line = self.stride * channels, width * channels
-        is_all = self.kernel == self.shape[:2]
-        down = self.num_inputs if is_all else self.stride * line
-        patch = [1, self.num_inputs, 0] if is_all else [high, wide * channels, line]
-        return [rows * columns, columns, down, across, *patch, self.num_outs, self.num_outs]
+        rows, columns = self.output_shape
+        is_whole, line = self.kernel == self.shape[:2], width * channels
+        return {
+            "num_patches": rows * columns,
+            "patches_per_row": columns,
+            "row_stride": self.num_inputs if is_whole else self.stride * line,
+            "column_stride": self.stride * channels,
+            "kernel_rows": 1 if is_whole else high,
+            "kernel_row_length": self.num_inputs if is_whole else wide * channels,
+            "kernel_row_stride": 0 if is_whole else line,
+            "num_outs": self.num_outs,
+            "output_stride": self.num_outs,
+        }
 
     @property
     def parameters(self) -> tuple[Tensor, Tensor]:
@@ -84,9 +91,9 @@ class PackedLayer(NamedTuple):
         last = first + weight.numel()
         order = torch.zeros(1 + self.num_inputs, self.num_outs, dtype=torch.int32)
         order[0, :outs] = torch.arange(last, last + len(bias))
-        by_place = order[1:].view(*self.kernel, self.shape[2], self.num_outs)
+        by_pixel = order[1:].view(*self.kernel, self.shape[2], self.num_outs)
         numbers = torch.arange(first, last).view(outs, *inner)
-        by_place[:, :, : self.channels, :outs] = numbers.permute(2, 3, 1, 0)
+        by_pixel[:, :, : self.channels, :outs] = numbers.permute(2, 3, 1, 0)
         return order
 
 
@@ -95,41 +102,41 @@ class Order:
 
     def __init__(self, layers: Sequence[PackedLayer]) -> None:
         self._layers = layers
-        first, there, back = 1, [], []
+        first, packed, transposed = 1, [], []
         for layer in layers:
             order = layer.order(first)
-            there.append(in_panels(order))
+            packed.append(in_panels(order))
             unbiased = torch.cat([order.new_zeros(1, layer.num_inputs), order[1:].T])
-            back.append(in_panels(unbiased) if layer.has_transpose else order[:0, 0])
+            transposed.append(in_panels(unbiased) if layer.has_transpose else order[:0, 0])
             first += sum(parameter.numel() for parameter in layer.parameters)
-        self._there, self._back = torch.cat(there), torch.cat(back)
-        self._home = torch.empty(first, dtype=torch.int32)
-        self._home[self._there.long()] = torch.arange(len(self._there), dtype=torch.int32)
-        self.weights_at = list(accumulate(map(len, there), initial=0))
+        self._packed, self._transposed = torch.cat(packed), torch.cat(transposed)
+        self._unpacked = torch.empty(first, dtype=torch.int32)
+        self._unpacked[self._packed.long()] = torch.arange(len(self._packed), dtype=torch.int32)
+        self.weight_offsets = list(accumulate(map(len, packed), initial=0))
         """Offsets of the layers in the packed weights, and the size of these."""
-        self.back_at = list(accumulate(map(len, back), initial=0))
+        self.transposed_offsets = list(accumulate(map(len, transposed), initial=0))
         """The same of the transposed weights."""
 
     @torch.no_grad()
-    def pack(self, weights: Tensor, back: Tensor | None = None) -> None:
+    def pack(self, weights: Tensor, transposed: Tensor | None = None) -> None:
         """Write the packed weights, and the transposed ones without biases."""
         parameters = [p.flatten() for layer in self._layers for p in layer.parameters]
         flat = torch.cat([weights.new_zeros(1), *parameters])
-        torch.index_select(flat, 0, self._there, out=weights)
-        if back is not None:
-            torch.index_select(flat, 0, self._back, out=back)
+        torch.index_select(flat, 0, self._packed, out=weights)
+        if transposed is not None:
+            torch.index_select(flat, 0, self._transposed, out=transposed)
 
     def unpack(self, gradients: Tensor) -> list[Tensor]:
         """Return the gradient of each weight and bias from that of the packed weights."""
-        flat = gradients.index_select(0, self._home[1:])
+        flat = gradients.index_select(0, self._unpacked[1:])
         parameters = [p for layer in self._layers for p in layer.parameters]
         parts = flat.split([p.numel() for p in parameters])
         return [part.view(p.shape) for part, p in zip(parts, parameters, strict=True)]
 
 
-def outputs_at(layers: Sequence[PackedLayer]) -> list[int]:
+def output_offsets(layers: Sequence[PackedLayer]) -> list[int]:
     """Return the offset of each layer in the outputs of a frame, and the size of these."""
-    begins = list(accumulate((odd_lines(layer.num_made) for layer in layers), initial=0))
+    begins = list(accumulate((odd_lines(layer.output_size) for layer in layers), initial=0))
     return [*begins[:-1], odd_lines(begins[-1])]
 
 
@@ -144,11 +151,12 @@ def in_panels(by_row: Tensor) -> Tensor:
     return by_row.view(len(by_row), -1, WIDTH).transpose(0, 1).flatten()
 
 
-def as_products(rows: Iterable[Iterable[int]]) -> Any:
-    """Return an array of `Product`, from the fields of each in order."""
-    kind: Any = Product
-    fields = np.array([tuple(row) for row in rows], kind.numpy_dtype())
-    return wp.array(fields, dtype=kind, device="cpu")
+def as_geometries(layers: Iterable[Mapping[str, int]]) -> Any:
+    """Return an array of `LayerGeometry` from the fields of each layer; 0 for missing ones."""
+    kind: Any = LayerGeometry
+    dtype = np.dtype(kind.numpy_dtype())
+    rows = [tuple(fields.get(name, 0) for name in dtype.names or ()) for fields in layers]
+    return wp.array(np.array(rows, dtype), dtype=kind, device="cpu")
 
 
 def unsupported(network: nn.Module) -> list[str]:
@@ -187,7 +195,7 @@ def packed_layers(network: nn.Module) -> list[PackedLayer]:
             stride = int(layer.stride[0]) if is_convolution else 1
             one = PackedLayer(layer, channels, shape, (high, wide), stride)
             packed.append(one)
-            (height, width), channels = one.places, len(layer.weight)
+            (height, width), channels = one.output_shape, len(layer.weight)
             padded = one.num_outs
     return packed
 
@@ -211,26 +219,27 @@ class PackedNetwork:
         """Pack a network, see `unsupported`, for linear layers of `num_frames` frames at once."""
         packed = packed_layers(network)
         self._order = Order(packed)
-        self.weights = torch.zeros(self._order.weights_at[-1])
+        self.weights = torch.zeros(self._order.weight_offsets[-1])
         """Packed weights."""
-        rows, given_at, made_at = [], 0, 0
-        for i, (layer, weights_at) in enumerate(zip(packed, self._order.weights_at, strict=False)):
+        geometries, inputs, outputs = [], 0, 0
+        for i, (layer, weights) in enumerate(zip(packed, self._order.weight_offsets, strict=False)):
             is_last = i == len(packed) - 1
-            rows.append([given_at, weights_at, made_at, *layer.geometry, int(not is_last)])
+            offsets = {"input_offset": inputs, "weights_offset": weights, "output_offset": outputs}
+            geometries.append({**offsets, **layer.geometry, "is_rectified": int(not is_last)})
             is_alone = not is_last and packed[i + 1].is_convolution
-            given_at = made_at
-            made_at += layer.num_made * (1 if is_alone else num_frames)
-        self.workspace_size = made_at
+            inputs = outputs
+            outputs += layer.output_size * (1 if is_alone else num_frames)
+        self.workspace_size = outputs
         """Numbers of the buffer that kernels need."""
         layers: Any = Layers()
-        layers.products = as_products(rows)
+        layers.geometries = as_geometries(geometries)
         layers.weights = wp.from_torch(self.weights)
         layers.num_convolutions = sum(layer.is_convolution for layer in packed)
         layers.features_size = packed[layers.num_convolutions].num_inputs
-        layers.logits_at, layers.num_outs = given_at, packed[-1].num_outs
-        *offsets, self.num_outputs = outputs_at(packed)
+        layers.logits_offset, layers.logits_stride = inputs, packed[-1].num_outs
+        *offsets, self.num_outputs = output_offsets(packed)
         """Numbers of the outputs of all layers of a frame."""
-        layers.outputs_at = wp.from_torch(torch.tensor(offsets, dtype=torch.int32))
+        layers.output_offsets = wp.from_torch(torch.tensor(offsets, dtype=torch.int32))
         self.layers = layers
         """For kernels."""
         self.num_actions = len(packed[-1].layer.weight)

@@ -142,7 +142,7 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
         layers = rollout.layers
         workspace = rollout.workspaces[worker]
         num_actions = rollout.logits.shape[1]
-        at = int(layers.logits_at)
+        at = int(layers.logits_offset)
         running = int(0)
         for env in range(first, last):
             if envs.end_reasons[env] == 0:
@@ -154,9 +154,9 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
                 rollout.rewards[row] = move(envs, env, action)
                 rollout.end_reasons[row] = envs.end_reasons[env]
                 if rollout.outputs.shape[0] > 0:
-                    linear, end = layers.num_convolutions, layers.products.shape[0]
+                    linear, end = layers.num_convolutions, layers.geometries.shape[0]
                     save_outputs(layers, linear, end, workspace, running, rollout.outputs[row])
-                at += layers.num_outs
+                at += layers.logits_stride
                 running += 1
 
     @wp.kernel(module="unique", module_options=_OPTIONS)

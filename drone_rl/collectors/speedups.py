@@ -99,7 +99,7 @@ def accelerated_gradients(
     network: nn.Module,
     num_threads: int = 1,
     *,
-    of: Literal["weights", "pixels"] = "weights",
+    wrt: Literal["weights", "pixels"] = "weights",
     cache: "Callable[[], ActivationCache | None]" = lambda: None,
 ) -> nn.Module:
     """Return the network with fused forward and backward pass if that is supported, else itself.
@@ -109,7 +109,7 @@ def accelerated_gradients(
     package = _package()
     if package is None:
         return network
-    found = package.FusedNetwork.try_create(network, num_threads, of=of, cache=cache)
+    found = package.FusedNetwork.try_create(network, num_threads, wrt=wrt, cache=cache)
     return network if isinstance(found, Reasons) else found
 
 

@@ -160,7 +160,7 @@ def visualise(
     start = statistics.low + (statistics.high - statistics.low) * starts
     images = start.repeat(num_actions, 1, 1, 1)
     action = torch.arange(num_actions).repeat_interleave(settings.starts)
-    quick = accelerated_gradients(network, of="pixels") or network
+    quick = accelerated_gradients(network, wrt="pixels") or network
     ascent = _Ascent(quick, action, statistics, settings, generator)
     optimize = ascent.pixels if settings.parameterisation == "pixel" else ascent.fourier
     reached = optimize(images)

@@ -106,7 +106,7 @@ class Explainer:
 
     def _integrated(self, observations: Tensor, actions: Tensor) -> Tensor:
         """Return the path integral. Shape: (T, C, H, W)."""
-        quick = accelerated_gradients(self.network, of="pixels")
+        quick = accelerated_gradients(self.network, wrt="pixels")
         method = IntegratedGradients(self._forward("probability", quick))
 
         def attribute(x: Tensor, a: Tensor) -> Tensor:

@@ -13,7 +13,7 @@ from tests.policies.halves import draw_weights, forward_backward, halves, make_n
 
 
 def test_odd_patch_sizes_have_no_gradient_of_images():
-    found = FusedNetwork.try_create(make_network((1, 26, 41), patch=5), of="pixels")
+    found = FusedNetwork.try_create(make_network((1, 26, 41), patch=5), wrt="pixels")
     assert found == ("the first layer's inputs are not a multiple of 16",)
     assert isinstance(FusedNetwork.try_create(make_network((1, 26, 41), patch=5)), FusedNetwork)
 
@@ -79,7 +79,7 @@ def test_images_of_another_shape_raise():
 
 def test_network_for_images_keeps_its_initial_weights():
     network, images = make_network(), halves(5, 1, 12, 20)
-    fused = FusedNetwork.try_create(network, of="pixels")
+    fused = FusedNetwork.try_create(network, wrt="pixels")
     first = fused(images)
     draw_weights(network)
     assert torch.equal(fused(images), first)

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
-from drone_rl.acceleration.packed_layers import outputs_at, packed_layers
+from drone_rl.acceleration.packed_layers import output_offsets, packed_layers
 from tests.policies.halves import draw_weights, forward_backward, halves, make_network
 
 
@@ -41,7 +41,7 @@ def test_gradients_equal_torch(shape, options, num_threads):
 )
 def test_gradients_of_images_equal_torch(shape, options):
     network = make_network(shape, **options)
-    fused = FusedNetwork.try_create(network, of="pixels")
+    fused = FusedNetwork.try_create(network, wrt="pixels")
     images, weights = halves(70, *shape).requires_grad_(), halves(70, 3)
     expected, found = (
         torch.autograd.grad((by(images) * weights).sum(), images)[0] for by in (network, fused)
@@ -63,19 +63,19 @@ def test_gradients_of_images_equal_torch(shape, options):
 )
 def test_gradients_from_cached_outputs_in_any_order_equal_torch(first, last):
     network = make_network((1, 12, 20), channels=(5, 6), hidden=(9, 7))
-    known = ActivationCache(100, outputs_at(packed_layers(network))[-1])
+    known = ActivationCache(100, output_offsets(packed_layers(network))[-1])
     fused = FusedNetwork.try_create(network, 2, cache=lambda: known)
     images, weights = halves(70, 1, 12, 20), halves(last - first, 3)
     fused(images)  # packs the weights; nothing is cached yet
-    work = fused._work
-    outputs = work.compute(images.flatten(1), None).outputs.view(-1, known.outputs.shape[1])
+    engine = fused._engine
+    outputs = engine.compute(images.flatten(1), None).outputs.view(-1, known.outputs.shape[1])
     rows = torch.randperm(100)[:70]
     known.clear()
     known.outputs.fill_(3.0)  # any other row would give wrong gradients
     known.outputs[rows] = outputs[:70]
-    handles = known.add(rows, work._weights.clone(), images)[first:last]
+    handles = known.add(rows, engine._weights.clone(), images)[first:last]
     some = images[first:last]
-    assert known.find(handles, work._weights, some) is not None
+    assert known.find(handles, engine._weights, some) is not None
     logits, expected = forward_backward(network, network, some, weights)
     found, gradients = forward_backward(network, lambda x: fused(x, handles), some, weights)
     torch.testing.assert_close(found, logits)

@@ -31,8 +31,8 @@ def infer(packed, images, num_actions):
     given = wp.from_torch(images.flatten(1).contiguous())
     inputs = [packed.layers, given, wp.from_torch(workspace), count]
     wp.launch(infer_kernel, 1, inputs=inputs, device="cpu")
-    outs = packed.layers.num_outs
-    logits = workspace[packed.layers.logits_at :][: count * outs].view(count, outs)
+    outs = packed.layers.logits_stride
+    logits = workspace[packed.layers.logits_offset :][: count * outs].view(count, outs)
     assert not logits[:, num_actions:].any()
     return logits[:, :num_actions]
 

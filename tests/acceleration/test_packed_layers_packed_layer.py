@@ -8,7 +8,7 @@ from drone_rl.acceleration.packed_layers import (
     PackedLayer,
     in_panels,
     odd_lines,
-    outputs_at,
+    output_offsets,
     packed_layers,
 )
 from drone_rl.policies import SmallCNN
@@ -22,19 +22,21 @@ def small():
 def test_geometry_matches_hand_computed_values():
     _, (conv, hidden, logits) = small()
     # 2x2 positions; the row stride is 4 rows of 8 pixels, the column stride 4 pixels
-    assert conv.geometry == [4, 2, 32, 4, 4, 4, 8, 16, 16]
+    names = ("num_patches", "patches_per_row", "row_stride", "column_stride", "kernel_rows")
+    names += ("kernel_row_length", "kernel_row_stride", "num_outs", "output_stride")
+    assert conv.geometry == dict(zip(names, (4, 2, 32, 4, 4, 4, 8, 16, 16), strict=True))
     # 2x2 positions of 16 channels
-    assert hidden.geometry == [1, 1, 64, 16, 1, 64, 0, 16, 16]
-    assert logits.geometry == [1, 1, 16, 16, 1, 16, 0, 16, 16]
-    assert [layer.num_made for layer in (conv, hidden, logits)] == [64, 16, 16]
+    assert hidden.geometry == dict(zip(names, (1, 1, 64, 16, 1, 64, 0, 16, 16), strict=True))
+    assert logits.geometry == dict(zip(names, (1, 1, 16, 16, 1, 16, 0, 16, 16), strict=True))
+    assert [layer.output_size for layer in (conv, hidden, logits)] == [64, 16, 16]
     assert [layer.is_convolution for layer in (conv, hidden, logits)] == [True, False, False]
 
 
 def test_outputs_take_an_odd_number_of_cache_lines():
     assert [odd_lines(n) for n in (1, 16, 17, 32, 33, 1792)] == [16, 16, 48, 48, 48, 1808]
     _, layers = small()
-    assert outputs_at(layers) == [0, 80, 96, 112]  # five cache lines, one and one
-    assert outputs_at(layers[:2]) == [0, 80, 112]  # five and one, and an empty one
+    assert output_offsets(layers) == [0, 80, 96, 112]  # five cache lines, one and one
+    assert output_offsets(layers[:2]) == [0, 80, 112]  # five and one, and an empty one
 
 
 def test_order_matches_hand_computed_indices():
@@ -56,8 +58,11 @@ def test_panels_hold_sixteen_columns_each():
 def test_unpacking_inverts_packing():
     network, layers = small()
     order = Order(layers)
-    weights, back = torch.full((order.weights_at[-1],), 7.0), torch.full((order.back_at[-1],), 7.0)
-    order.pack(weights, back)
+    weights, transposed = (
+        torch.full((order.weight_offsets[-1],), 7.0),
+        torch.full((order.transposed_offsets[-1],), 7.0),
+    )
+    order.pack(weights, transposed)
     parameters = [p.detach() for layer in layers for p in layer.parameters]
     assert {p.data_ptr() for p in parameters} == {p.data_ptr() for p in network.parameters()}
     for unpacked, parameter in zip(order.unpack(weights), parameters, strict=True):
@@ -69,12 +74,17 @@ def test_unpacking_inverts_packing():
 def test_backward_weights_are_transposed():
     _, layers = small()
     order = Order(layers)
-    weights, back = torch.zeros(order.weights_at[-1]), torch.zeros(order.back_at[-1])
-    order.pack(weights, back)
+    weights, transposed = (
+        torch.zeros(order.weight_offsets[-1]),
+        torch.zeros(order.transposed_offsets[-1]),
+    )
+    order.pack(weights, transposed)
     for i, layer in list(enumerate(layers))[1:]:
-        there = weights[order.weights_at[i] : order.weights_at[i + 1]]
+        there = weights[order.weight_offsets[i] : order.weight_offsets[i + 1]]
         there = there.view(-1, 1 + layer.num_inputs, WIDTH)  # a panel
-        turned = back[order.back_at[i] : order.back_at[i + 1]].view(-1, 1 + layer.num_outs, WIDTH)
+        turned = transposed[order.transposed_offsets[i] : order.transposed_offsets[i + 1]].view(
+            -1, 1 + layer.num_outs, WIDTH
+        )
         assert not turned[:, 0].any()
         by_row = there.transpose(0, 1).reshape(1 + layer.num_inputs, -1)[1:]
         assert torch.equal(turned[:, 1:].transpose(0, 1).reshape(layer.num_outs, -1), by_row.T)
