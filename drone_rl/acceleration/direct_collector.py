@@ -1,4 +1,4 @@
-"""Step environments without TorchRL if all transforms are functions of the pixels."""
+"""Step environments without TorchRL, if all transforms are stateless."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -27,7 +27,7 @@ class DirectCollector:
         renderer: DirectRenderer,
         actor: TensorDictModuleBase,
         action_key: NestedKey,
-        extra: Iterable[NestedKey] = (),
+        actor_keys: Iterable[NestedKey] = (),
         keep_observations: bool = True,
     ) -> None:
         """See `collectors.speedups.accelerated_collector`."""
@@ -35,15 +35,15 @@ class DirectCollector:
         self.keep_observations = keep_observations
         self.reasons = Reasons()
         """Why the collector is not fused; empty if it need not be."""
-        self._extra = tuple(extra)
+        self._actor_keys = tuple(actor_keys)
 
     @property
     def name(self) -> str:
-        """For the log."""
+        """Name in the log."""
         return f"direct collector: {self.reasons}" if self.reasons else "direct collector"
 
     def cache_activations(self) -> ActivationCache | None:
-        """Return None: torch keeps no activations of acting."""
+        """Return None: PyTorch discards the activations of the forward pass."""
         return None
 
     def collect(self, num_envs: int) -> TensorDictBase:
@@ -55,8 +55,8 @@ class DirectCollector:
         rows: list[Tensor] = []
         steps: list[Entries] = []
         while len(active):
-            acted = self.actor(renderer.look(state, active))
-            keys = (self.action_key, *self._extra)
+            acted = self.actor(renderer.observe(state, active))
+            keys = (self.action_key, *self._actor_keys)
             keys = acted.keys(True, True) if self.keep_observations else keys
             step: Entries = {key: acted.get(key) for key in keys}
             state, reward = renderer.worlds.advance(state, acted.get(self.action_key))
@@ -73,7 +73,7 @@ class DirectCollector:
 
 
 def _join(steps: list[Entries], rows: list[Tensor], num_envs: int) -> TensorDictBase:
-    """Copy time-major steps once into episode after episode. Shape: (T_total,)."""
+    """Return the steps of all episodes, one episode after the other. Shape: (T_total,)."""
     env_of_step = torch.cat(rows)
     lengths = env_of_step.bincount(minlength=num_envs)
     first = lengths.cumsum(0) - lengths
@@ -89,8 +89,8 @@ def _join(steps: list[Entries], rows: list[Tensor], num_envs: int) -> TensorDict
     return batch.set(("collector", "traj_ids"), traj_ids)
 
 
-class DirectStream:
-    """Step all environments continually, with the same result as `TorchrlStream`, bit for bit."""
+class DirectStepper:
+    """Step all environments continually, with the same result as `TorchrlStepper`, bit for bit."""
 
     name = "direct collector"
 
@@ -99,40 +99,40 @@ class DirectStream:
         self._pixels: Tensor | None = None
 
     def observe(self) -> TensorDictBase:
-        """See `TorchrlStream`."""
+        """See `TorchrlStepper`."""
         if self._pixels is None:
             self._renderer.env.start()
-            self._pixels = self._look()
+            self._pixels = self._render()
         return TensorDict({"pixels": self._pixels}, [len(self._pixels)], device=self._pixels.device)
 
-    def _look(self) -> Tensor:
-        return self._renderer.look(self._renderer.worlds.state).get("pixels")
+    def _render(self) -> Tensor:
+        return self._renderer.observe(self._renderer.worlds.state).get("pixels")
 
     def step(self, action: Tensor) -> Entries:
-        """See `TorchrlStream`."""
+        """See `TorchrlStepper`."""
         worlds = self._renderer.worlds
         worlds.state, reward = worlds.advance(worlds.state, action)
         entries, _ = self._renderer.entries(worlds.state, reward)
-        self._pixels = self._look()
+        self._pixels = self._render()
         return entries | {("next", "pixels"): self._pixels}
 
     def restart(self, ended: Tensor) -> None:
-        """See `TorchrlStream`."""
+        """See `TorchrlStepper`."""
         rows = ended.flatten().nonzero()[:, 0]
         self._renderer.env.start(rows)
-        fresh = self._renderer.look(self._renderer.worlds.state[rows], rows).get("pixels")
+        fresh = self._renderer.observe(self._renderer.worlds.state[rows], rows).get("pixels")
         self._pixels = self.observe().get("pixels").index_copy(0, rows, fresh)
 
     def forget(self) -> None:
-        """See `TorchrlStream`."""
+        """See `TorchrlStepper`."""
         self._pixels = None
 
     def state_dict(self) -> dict[str, Any]:
-        """See `TorchrlStream`; only the environments have a state."""
+        """See `TorchrlStepper`; only the environments have a state."""
         self.observe()
         return {"worlds": self._renderer.env.running_state(), "transforms": {}, "carried": {}}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """See `TorchrlStream`."""
+        """See `TorchrlStepper`."""
         self._renderer.env.load_running_state(state["worlds"])
-        self._pixels = self._look()
+        self._pixels = self._render()

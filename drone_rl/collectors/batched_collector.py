@@ -23,7 +23,7 @@ class BatchedCollector(BaseCollector):
         actor: TensorDictModuleBase,
         *,
         total_frames: int = -1,
-        keep: Iterable[NestedKey] = (("next", "info", "end_reason"),),
+        next_keys: Iterable[NestedKey] = (("next", "info", "end_reason"),),
         postproc: Callable[[TensorDictBase], TensorDictBase] | None = None,
     ) -> None:
         """Connect an environment and a policy.
@@ -32,8 +32,8 @@ class BatchedCollector(BaseCollector):
             env: A batch of environments; an `InputError` for any other.
             actor: Writes the action.
             total_frames: Stop before a batch once this many frames were collected; -1 for never.
-            keep: Entries kept in addition to observations, what the actor writes, reward and end
-                flags, as far as the environment has them.
+            next_keys: ("next", ...) entries to keep in addition to reward and end flags, as far as
+                the environment has them.
             postproc: Applied to each batch, such as a return estimator.
         """
         if len(env.batch_size) != 1:
@@ -53,7 +53,7 @@ class BatchedCollector(BaseCollector):
             ("next", *((key,) if isinstance(key, str) else key))
             for key in env.observation_spec.keys(True, True)
         }
-        self._kept = (*(("next", key) for key in flags), *(k for k in keep if k in observable))
+        self._kept = (*(("next", key) for key in flags), *(k for k in next_keys if k in observable))
 
     @property
     def base_env(self) -> Any:
@@ -93,7 +93,7 @@ class BatchedCollector(BaseCollector):
     def _maybe_fallback_update(
         self, policy_or_weights: Any = None, *, model_id: str | None = None
     ) -> None:
-        """Implement `update_policy_weights_`, for another such actor or its weights."""
+        """Copy the weights of an actor, or given ones; called by `update_policy_weights_`."""
         if policy_or_weights is None:
             return
         if isinstance(policy_or_weights, TensorDictBase):

@@ -39,7 +39,7 @@ class EpisodeCollector(BatchedCollector):
         actor: TensorDictModuleBase,
         *,
         keep_observations: bool = True,
-        noted: Iterable[NestedKey] = (),
+        actor_keys: Iterable[NestedKey] = (),
         acceleration: Acceleration = "direct",
         num_threads: int = 1,
         **kwargs: Any,
@@ -49,19 +49,20 @@ class EpisodeCollector(BatchedCollector):
         Args:
             env: A batch of environments that honours TorchRL's "_step" masks.
             actor: Writes the action.
-            keep_observations: Whether to keep what the actor reads and writes.
-            noted: Entries that the actor writes, kept even without observations.
+            keep_observations: Whether to keep all entries that the actor reads and writes.
+            actor_keys: Entries that the actor reads or writes, to keep in addition to the action.
             acceleration: The fastest implementation that may be used, if it is supported.
             num_threads: Of the fused kernel; no result depends on it.
             kwargs: See `BatchedCollector`, also for errors.
         """
         super().__init__(env, actor, **kwargs)
-        what = {"kept": self._kept, "extra": noted, "keep_observations": keep_observations}
-        found = accelerated_collector(env, actor, acceleration, num_threads=num_threads, **what)
+        options: dict[str, Any] = {"next_keys": self._kept, "actor_keys": actor_keys}
+        options["keep_observations"] = keep_observations
+        found = accelerated_collector(env, actor, acceleration, num_threads=num_threads, **options)
         self.source: FusedCollector | DirectCollector | SteppingCollector = (
-            SteppingCollector(env, actor, found, **what) if isinstance(found, Reasons) else found
+            SteppingCollector(env, actor, found, **options) if isinstance(found, Reasons) else found
         )
-        """What runs the episodes."""
+        """Implementation that runs the episodes."""
 
     @torch.no_grad()
     def collect(self, num_envs: int | None = None) -> TensorDictBase:
@@ -109,15 +110,15 @@ class SteppingCollector:
         actor: TensorDictModuleBase,
         reasons: Reasons,
         *,
-        kept: Iterable[NestedKey],
-        extra: Iterable[NestedKey] = (),
+        next_keys: Iterable[NestedKey],
+        actor_keys: Iterable[NestedKey] = (),
         keep_observations: bool = True,
     ) -> None:
         """See `accelerated_collector`; the reasons are why there is no faster collector."""
         self.reasons = reasons
         self._env = _OneEpisode(env)
         self._actor = _ActiveOnly(actor, self._env)
-        self._kept = (env.action_key, *kept, *extra)
+        self._kept = (env.action_key, *next_keys, *actor_keys)
         self._keep_observations = keep_observations
         self._collector = Collector(
             self._env,
@@ -131,11 +132,11 @@ class SteppingCollector:
 
     @property
     def name(self) -> str:
-        """For the log."""
+        """Name in the log."""
         return f"stepping collector: {self.reasons}"
 
     def cache_activations(self) -> None:
-        """Return None: torch keeps no activations of acting."""
+        """Return None: PyTorch discards the activations of the forward pass."""
 
     def collect(self, num_envs: int) -> TensorDictBase:
         """Run an episode in each of the first environments; trajectories count from 0."""

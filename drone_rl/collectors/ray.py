@@ -28,7 +28,7 @@ _log = logging.getLogger(__name__)
 
 
 class RemoteEpisodes(BaseCollector):
-    """Runs in a worker: an `EpisodeCollector` that receives its parameters and its state."""
+    """Run an `EpisodeCollector` in a worker, with the parameters and state of each request."""
 
     def __init__(self, create_env_fn: Sequence[Callable[[], Parts]], **unused: object) -> None:
         super().__init__()
@@ -65,7 +65,7 @@ class RemoteEpisodes(BaseCollector):
 
     def set_seed(self, seed: int, static_seed: bool = False) -> int:
         """Raise an error: the seed is part of the settings."""
-        raise NotImplementedError
+        raise NotImplementedError("a worker's seed comes from its settings; set `seed` there")
 
     def shutdown(self, *args: object, **kwargs: object) -> None:
         """Close the environment."""
@@ -93,12 +93,12 @@ class RayEpisodeCollector:
         """Start the workers.
 
         Args:
-            makers: Each makes one worker's collector, over disjoint environments; sent to it.
+            makers: One function for each worker, sent to it; makes its collector.
             actor: The policy that learns, in this process.
             network: Its network.
-            address: Of the cluster; None starts one on this machine.
+            address: Address of the cluster; None starts one on this machine.
             num_cpus: Cores of a worker.
-            max_lost_workers: How many may be replaced before the training stops.
+            max_lost_workers: Number of workers that may be replaced before training stops.
             device: Device of the batches.
             postproc: Applied to each joined batch, such as a return estimator.
 
@@ -118,7 +118,7 @@ class RayEpisodeCollector:
         return self._pool.remote_collectors
 
     def cache_activations(self) -> None:
-        """Return None: activations do not travel between processes."""
+        """Return None: workers do not send activations."""
 
     def __iter__(self) -> Iterator[TensorDictBase]:
         """Yield batches without end."""
@@ -170,7 +170,8 @@ class RayEpisodeCollector:
         if self._left == 0:
             raise InputError(
                 f"{self._max_lost + 1} Ray workers were lost, the last one by: "
-                f"{' '.join(str(error).split())[:200]}; see to the cluster, then go on with resume="
+                f"{' '.join(str(error).split())[:200]}; check the cluster, then resume with "
+                "resume=FOLDER"
             ) from error
         self._left -= 1
         _log.warning("Ray worker %d was lost; another runs its unfinished episodes", number)
@@ -204,7 +205,7 @@ def _start(
             f"more than the cluster's {cores:g} cores; lower one of them"
         )
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # it misses a policy that it need not send
+        warnings.simplefilter("ignore", UserWarning)  # about a policy to send, which is not needed
         pool = RayCollector(
             list(makers),
             collector_class=RemoteEpisodes,  # pyright: ignore[reportArgumentType]

@@ -11,21 +11,21 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.collectors.batched_collector import BatchedCollector
-from drone_rl.collectors.speedups import accelerated_stream
+from drone_rl.collectors.speedups import accelerated_stepper
 from drone_rl.envs.direct_renderer import Entries, Reasons
 from drone_rl.utils.errors import InputError
 
 if TYPE_CHECKING:
-    from drone_rl.acceleration import DirectStream
+    from drone_rl.acceleration import DirectStepper
 
 
 class RolloutCollector(BatchedCollector):
     """Iterate over batches of the next `num_steps` steps of every environment: (num_envs, T).
 
-    An environment whose episode ends starts another at once. Its row continues with that one, while
-    ("next", ...) holds the last observation of the old one, so that a critic can bootstrap where a
-    row is cut. ("next", "episode_reward") and ("next", "step_count"), as TorchRL's `RewardSum` and
-    `StepCounter` write them, count from the start of an episode, even in an earlier batch.
+    An environment resets when its episode ends, and its row continues with the next episode.
+    ("next", ...) holds the last observation of the old one, from which a critic can bootstrap.
+    ("next", "episode_reward") and ("next", "step_count") count from the start of an episode, even
+    in an earlier batch, as TorchRL's `RewardSum` and `StepCounter` do.
     """
 
     def __init__(
@@ -36,9 +36,9 @@ class RolloutCollector(BatchedCollector):
             raise InputError(f"num_steps={num_steps} is out of range; give 1 or more")
         super().__init__(env, actor, **kwargs)
         self.num_steps = num_steps
-        found = accelerated_stream(env, self._observed, self._kept)
-        self._stream: DirectStream | TorchrlStream = (
-            TorchrlStream(env, self._observed, self._kept, found)
+        found = accelerated_stepper(env, self._observed, self._kept)
+        self._stepper: DirectStepper | TorchrlStepper = (
+            TorchrlStepper(env, self._observed, self._kept, found)
             if isinstance(found, Reasons)
             else found
         )
@@ -47,8 +47,8 @@ class RolloutCollector(BatchedCollector):
 
     @property
     def name(self) -> str:
-        """What steps the environments, for the log."""
-        return self._stream.name
+        """Name of the stepper in the log."""
+        return self._stepper.name
 
     @torch.no_grad()
     def collect(self) -> TensorDictBase:
@@ -63,7 +63,7 @@ class RolloutCollector(BatchedCollector):
             ended = step["next", "done"]
             if bool(ended.any()):
                 self._reward, self._steps = self._reward * ~ended, self._steps * ~ended
-                self._stream.restart(ended)
+                self._stepper.restart(ended)
                 episodes += int(ended.sum())
         batch = TensorDict({}, [*self.env.batch_size, self.num_steps], device=self.env.device)
         for key, value in steps.items():
@@ -72,9 +72,9 @@ class RolloutCollector(BatchedCollector):
 
     def _step(self) -> Entries:
         """Take one step; return the kept entries."""
-        acted = self.actor(self._stream.observe())
+        acted = self.actor(self._stepper.observe())
         step: Entries = {key: acted.get(key) for key in acted.keys(True, True)}
-        step |= self._stream.step(acted.get(self.env.action_key))
+        step |= self._stepper.step(acted.get(self.env.action_key))
         self._reward = self._reward + step["next", self.env.reward_key]
         self._steps = self._steps + 1
         sums = {"episode_reward": self._reward, "step_count": self._steps}
@@ -82,7 +82,7 @@ class RolloutCollector(BatchedCollector):
 
     def set_seed(self, seed: int, static_seed: bool = False) -> int:
         """See `BatchedCollector.set_seed`; all episodes restart."""
-        self._stream.forget()
+        self._stepper.forget()
         self._reward, self._steps = torch.zeros_like(self._reward), torch.zeros_like(self._steps)
         return super().set_seed(seed, static_seed=static_seed)
 
@@ -91,7 +91,7 @@ class RolloutCollector(BatchedCollector):
         return {
             "frames": self.frames,
             "episodes": self.episodes,
-            **self._stream.state_dict(),
+            **self._stepper.state_dict(),
             "episode_reward": self._reward,
             "step_count": self._steps,
         }
@@ -99,25 +99,25 @@ class RolloutCollector(BatchedCollector):
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
         """Resume within the episodes of a `state_dict`; observations are rendered again."""
         self.frames, self.episodes = state_dict["frames"], state_dict["episodes"]
-        self._stream.load_state_dict(state_dict)
+        self._stepper.load_state_dict(state_dict)
         self._reward = state_dict["episode_reward"].to(self._reward, copy=True)
         self._steps = state_dict["step_count"].to(self._steps, copy=True)
 
 
-class TorchrlStream:
-    """Steps all environments of any batch by `env.step`; each restarts when its episode ends."""
+class TorchrlStepper:
+    """Step all environments by `env.step`; the caller calls `restart` when episodes end."""
 
     def __init__(
         self,
         env: EnvBase,
         observed: Iterable[NestedKey],
-        kept: Iterable[NestedKey],
+        next_keys: Iterable[NestedKey],
         reasons: Reasons,
     ) -> None:
-        """See `accelerated_stream`; the reasons are why there is no faster stream."""
+        """See `accelerated_stepper`; the reasons are why there is no faster stepper."""
         self.name = f"stepping collector: {reasons}"
-        """For the log."""
-        self._env, self._observed, self._kept = env, tuple(observed), tuple(kept)
+        """Name in the log."""
+        self._env, self._observed, self._kept = env, tuple(observed), tuple(next_keys)
         read = {key if isinstance(key, str) else key[0] for key in self._observed}
         # copying entries that no step reads makes each step of TorchRL slower
         self._dropped = {*env.done_keys, *({env.reward_key, "info"} - read)}

@@ -1,7 +1,6 @@
-"""Uses `drone_rl.acceleration` if it is installed and supports a configuration.
+"""Use `drone_rl.acceleration` if it is installed and supports a configuration.
 
-This is the only module that imports that package. Whatever it does not support is left to TorchRL
-and torch.
+This is the only module that imports that package. TorchRL and PyTorch do what it does not support.
 """
 
 import importlib
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from drone_rl.acceleration import (
         ActivationCache,
         DirectCollector,
-        DirectStream,
+        DirectStepper,
         FusedCollector,
     )
 
@@ -45,8 +44,8 @@ def accelerated_collector(
     actor: TensorDictModuleBase,
     acceleration: Acceleration,
     *,
-    kept: Iterable[NestedKey],
-    extra: Iterable[NestedKey] = (),
+    next_keys: Iterable[NestedKey],
+    actor_keys: Iterable[NestedKey] = (),
     keep_observations: bool = True,
     num_threads: int = 1,
 ) -> "FusedCollector | DirectCollector | Reasons":
@@ -56,9 +55,9 @@ def accelerated_collector(
         env: A batch of environments.
         actor: The policy.
         acceleration: The fastest implementation that may be used.
-        kept: ("next", ...) entries to keep of each step.
-        extra: Entries that the actor writes, kept in addition to the action.
-        keep_observations: Whether to keep observations and everything that the actor writes.
+        next_keys: ("next", ...) entries to keep of each step.
+        actor_keys: Entries that the actor reads or writes, to keep in addition to the action.
+        keep_observations: Whether to keep all entries that the actor reads and writes.
         num_threads: Threads of the fused kernel; no result depends on it.
     """
     if acceleration == "none":
@@ -66,10 +65,10 @@ def accelerated_collector(
     package = _package()
     if package is None:
         return MISSING
-    renderer = DirectRenderer.try_create(env, actor.in_keys, kept)
+    renderer = DirectRenderer.try_create(env, actor.in_keys, next_keys)
     if isinstance(renderer, Reasons):
         return renderer
-    direct = package.DirectCollector(renderer, actor, env.action_key, extra, keep_observations)
+    direct = package.DirectCollector(renderer, actor, env.action_key, actor_keys, keep_observations)
     if acceleration == "direct":
         return direct
     found = package.FusedCollector.try_create(direct, num_threads)
@@ -79,20 +78,20 @@ def accelerated_collector(
     return found
 
 
-def accelerated_stream(
-    env: EnvBase, observed: Sequence[NestedKey], kept: Iterable[NestedKey]
-) -> "DirectStream | Reasons":
+def accelerated_stepper(
+    env: EnvBase, observed: Sequence[NestedKey], next_keys: Iterable[NestedKey]
+) -> "DirectStepper | Reasons":
     """Return an object that steps environments without TorchRL, or the reasons why there is none.
 
-    `observed` are the entries that the actor reads, `kept` the ("next", ...) entries of each step.
+    `observed` are the entries that the actor reads, `next_keys` the ("next", ...) entries to keep.
     """
     package = _package()
     if package is None:
         return MISSING
     if tuple(observed) != ("pixels",):
         return Reasons([f"the policy reads {', '.join(map(str, observed))} instead of pixels"])
-    renderer = DirectRenderer.try_create(env, observed, kept)
-    return renderer if isinstance(renderer, Reasons) else package.DirectStream(renderer)
+    renderer = DirectRenderer.try_create(env, observed, next_keys)
+    return renderer if isinstance(renderer, Reasons) else package.DirectStepper(renderer)
 
 
 def accelerated_gradients(

@@ -90,7 +90,7 @@ class DirectRenderer:
         reasons += [f"entry {key} needs a step of TorchRL" for key in kept if key not in known]
         return Reasons(reasons) if reasons else cls(base, transforms, observed, kept)
 
-    def look(self, state: State, rows: Tensor | None = None) -> TensorDictBase:
+    def observe(self, state: State, rows: Tensor | None = None) -> TensorDictBase:
         """Return the actor's input for states of environments `rows`, (k,); default: all."""
         size, device = len(state.steps), state.steps.device
         entries: Entries = {}

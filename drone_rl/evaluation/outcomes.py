@@ -107,7 +107,7 @@ def enumerate_outcomes(renderer: DirectRenderer, decide: Decide, worlds: Tensor)
     is_open = torch.zeros_like(owner, dtype=torch.bool)
     ends, owners = [], []
     while len(owner):
-        possible = decide(renderer.look(state, worlds[owner]).get("pixels")).possible
+        possible = decide(renderer.observe(state, worlds[owner]).get("pixels")).possible
         row, action = possible.nonzero().unbind(-1)
         state, owner = state[row], owner[row]
         state, _ = simulated.advance(state, action)

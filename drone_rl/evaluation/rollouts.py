@@ -55,7 +55,7 @@ def episode_batches(
     env: EnvBase,
     actor: TensorDictModuleBase,
     num_episodes: int,
-    noted: tuple[str, ...] = (),
+    actor_keys: tuple[str, ...] = (),
     *,
     keep: tuple[str, ...] | None = None,
     greedy: bool = True,
@@ -69,7 +69,7 @@ def episode_batches(
         env: A batch of environments.
         actor: The policy.
         num_episodes: How many.
-        noted: Entries to keep of those that the actor reads or writes, besides the action.
+        actor_keys: Entries that the actor reads or writes, to keep in addition to the action.
         keep: Entries of ("next", "info") to keep; by default what `final_episodes` needs.
         greedy: Whether to take the most probable action instead of sampling one.
         is_compiled: Whether to use the fused kernel if it supports the policy.
@@ -81,9 +81,9 @@ def episode_batches(
     collector = EpisodeCollector(
         env,
         actor,
-        keep=tuple(("next", "info", name) for name in keep),
+        next_keys=tuple(("next", "info", name) for name in keep),
         keep_observations=False,
-        noted=noted,
+        actor_keys=actor_keys,
         acceleration="fused" if is_compiled else "direct",
         num_threads=num_cores(),
     )

@@ -115,8 +115,7 @@ def collect(
     Only observations are rendered. `meta` is the origin of the policy.
     """
     worlds = worlds_of(env)
-    keep = (("next", "info", "end_reason"),)
-    collector = EpisodeCollector(env, _WithTruth(actor, (*worlds.task.entries, *_POSE)), keep=keep)
+    collector = EpisodeCollector(env, _WithTruth(actor, (*worlds.task.entries, *_POSE)))
     batches = []
     with set_exploration_type(ExplorationType.RANDOM):
         while collector.episodes < num_episodes or collector.frames < num_frames:

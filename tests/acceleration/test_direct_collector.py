@@ -35,13 +35,13 @@ def make_env(*transforms, task=SHORT, **kwargs):
     return with_transforms(DroneEnv(5, task, **kwargs), transforms)
 
 
-def collector(acceleration, task, keep=(REASON,), look=None):
+def collector(acceleration, task, next_keys=(REASON,), look=None):
     env = make_env(GrayPixels(), StandardizePixels(), task=task, appearance=look)
     generator = torch.Generator().manual_seed(0)
     shape = tuple(env.observation_spec["pixels"].shape[1:])
     network = SmallCNN(shape, 3, channels=(4,), hidden=(8,), generator=generator)
     actor = make_actor(network, env.action_spec, generator)
-    made = EpisodeCollector(env, actor, keep=keep, acceleration=acceleration)
+    made = EpisodeCollector(env, actor, next_keys=next_keys, acceleration=acceleration)
     is_stepping = isinstance(made.source, SteppingCollector)
     assert is_stepping is (acceleration == "none")
     return made
@@ -55,8 +55,8 @@ def collector(acceleration, task, keep=(REASON,), look=None):
     ],
 )
 def test_direct_and_stepping_batches_are_identical(task, worlds, look):
-    keep = (REASON, ("next", "info", "drone"))
-    collectors = [collector(how, task, keep, look) for how in ("direct", "none")]
+    next_keys = (REASON, ("next", "info", "drone"))
+    collectors = [collector(how, task, next_keys, look) for how in ("direct", "none")]
     lengths = set()
     for _ in range(3):  # random streams continue identically
         one, other = (each.collect(worlds) for each in collectors)
@@ -73,7 +73,7 @@ def test_continuous_actions_of_direct_and_stepping_batches_are_identical():
     for acceleration in ("fused", "none"):
         env = make_continuous_env(5)
         actor = make_policy(env)[1]
-        made = EpisodeCollector(env, actor, keep=(REASON,), acceleration=acceleration)
+        made = EpisodeCollector(env, actor, next_keys=(REASON,), acceleration=acceleration)
         is_direct = isinstance(made.source, DirectCollector)
         assert is_direct is (acceleration == "fused")
         collectors.append(made)
@@ -140,7 +140,7 @@ def test_policies_that_read_the_true_state_are_supported(name):
         env = DroneEnv(3, SHORT, seed=5, pixels=False)
         actor = make_baseline(name, env.worlds.task, torch.Generator().manual_seed(3))
         collector = EpisodeCollector(
-            env, actor, keep=KEPT, keep_observations=False, acceleration=acceleration
+            env, actor, next_keys=KEPT, keep_observations=False, acceleration=acceleration
         )
         assert collector.source.name.startswith("direct" if acceleration == "direct" else "step")
         batches.append(collector.collect())

@@ -65,7 +65,7 @@ def test_postproc_receives_each_batch(make):
 
 def test_only_existing_entries_are_kept(make):
     keep = (("next", "info", "cubes"), ("next", "wind"))
-    batch = make(keep=keep).collect()
+    batch = make(next_keys=keep).collect()
     assert ("next", "info", "cubes") in batch.keys(True)
     assert ("next", "wind") not in batch.keys(True)
 

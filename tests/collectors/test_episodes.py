@@ -59,7 +59,7 @@ class Scripted(EnvBase):
 def scripted(**kwargs):
     """Return a collector whose actor returns the frame number as action."""
     actor = TensorDictModule(lambda f: f[:, 0].long(), in_keys=["frame"], out_keys=["action"])
-    return EpisodeCollector(Scripted(), actor, **{"keep": (("next", "frame"),), **kwargs})
+    return EpisodeCollector(Scripted(), actor, **{"next_keys": (("next", "frame"),), **kwargs})
 
 
 def test_every_frame_appears_once_in_order_with_its_action():
@@ -105,7 +105,7 @@ def test_nested_entries_are_read_and_kept_as_leaves():
     actor = TensorDictModule(
         lambda f: (f[:, 0].long(), f + 1), in_keys=["frame"], out_keys=["action", ("note", "more")]
     )
-    batch = EpisodeCollector(Scripted(), actor, keep=()).collect()
+    batch = EpisodeCollector(Scripted(), actor, next_keys=()).collect()
     assert torch.equal(batch["note", "more"], batch["frame"] + 1)
     assert batch["frame"][:, 0].tolist() == [0, 1, 2, 100, 200, 201]
 
@@ -138,7 +138,7 @@ def test_second_shutdown_has_no_effect():
 
 @pytest.fixture
 def collector(make_pipeline):
-    return EpisodeCollector(*make_pipeline(5, task=SHORT), keep=TRUTH)
+    return EpisodeCollector(*make_pipeline(5, task=SHORT), next_keys=TRUTH)
 
 
 def test_batch_contains_complete_episodes(collector):
@@ -214,7 +214,7 @@ def test_stops_at_total_frames(make_pipeline):
 @pytest.fixture
 def seeing(make_pipeline):
     """Return a collector whose policy reads the true state; three environments, no rendering."""
-    return EpisodeCollector(DroneEnv(3, SHORT, pixels=False), oracle_policy(SHORT), keep=TRUTH)
+    return EpisodeCollector(DroneEnv(3, SHORT, pixels=False), oracle_policy(SHORT), next_keys=TRUTH)
 
 
 def test_policy_inputs_are_available_and_kept(seeing):
@@ -287,14 +287,14 @@ def test_unbatched_environment_raises(make_pipeline):
 
 def test_missing_entries_are_not_kept():
     keep = (("next", "info", "end_reason"), ("next", "frame"))
-    batch = scripted(keep=keep).collect()
+    batch = scripted(next_keys=keep).collect()
     assert set(batch["next"].keys()) == {"reward", "done", "terminated", "frame"}
 
 
 def test_implements_the_torchrl_collector_interface(seeing):
     assert isinstance(seeing, BaseCollector)
     alone = DroneEnv(3, SHORT, pixels=False)
-    other = EpisodeCollector(alone, oracle_policy(SHORT), keep=TRUTH)
+    other = EpisodeCollector(alone, oracle_policy(SHORT), next_keys=TRUTH)
     assert torch.equal(seeing.next()["action"], other.collect()["action"])
     with pytest.raises(TypeError, match="not known beforehand"):
         len(seeing)

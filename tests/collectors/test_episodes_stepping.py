@@ -22,7 +22,7 @@ def make(num_envs=5, **settings):
     generator = torch.Generator().manual_seed(0)
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,), generator=generator)
     actor = make_actor(network, env.action_spec, generator)
-    return SteppingCollector(env, actor, Reasons(["a reason"]), kept=KEPT, **settings), env
+    return SteppingCollector(env, actor, Reasons(["a reason"]), next_keys=KEPT, **settings), env
 
 
 def test_source_names_the_reason():
@@ -71,7 +71,7 @@ def test_outer_exploration_type_is_respected():
 
 
 def test_observations_are_omitted_and_extra_entries_kept():
-    collector, _ = make(keep_observations=False, extra=("logits",))
+    collector, _ = make(keep_observations=False, actor_keys=("logits",))
     batch = collector.collect(5)
     assert set(batch.keys()) == {"action", "logits", "next", "collector"}
     assert len(batch["logits"]) == len(batch)

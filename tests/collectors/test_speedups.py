@@ -10,7 +10,7 @@ from drone_rl.acceleration import (
     ActivationCache,
     BatchedInference,
     DirectCollector,
-    DirectStream,
+    DirectStepper,
     FusedCollector,
     FusedNetwork,
 )
@@ -38,14 +38,14 @@ def test_collectors_step_by_torchrl_if_the_package_is_missing(missing):
         name = "stepping collector: drone_rl.acceleration is not installed"
         assert collector.source.name == name
         assert collector.collect()["next", "done"].sum() == 2
-    assert speedups.accelerated_stream(env, ["pixels"], []) == speedups.MISSING
+    assert speedups.accelerated_stepper(env, ["pixels"], []) == speedups.MISSING
     env.close()
 
 
 def test_disabled_acceleration_is_the_reason():
     env = with_transforms(DroneEnv(2, TASK), [GrayPixels()])
     actor = make_actor(SmallCNN((1, 25, 64), 3), env.action_spec)
-    found = speedups.accelerated_collector(env, actor, "none", kept=KEPT)
+    found = speedups.accelerated_collector(env, actor, "none", next_keys=KEPT)
     assert found == ("acceleration is off",)
     env.close()
 
@@ -54,18 +54,18 @@ def test_collector_is_fused_direct_or_rejected_with_reasons():
     env = with_transforms(DroneEnv(2, TASK), [GrayPixels()])
     actor = make_actor(SmallCNN((1, 25, 64), 3), env.action_spec)
     find = speedups.accelerated_collector
-    assert isinstance(find(env, actor, "fused", kept=KEPT), FusedCollector)
-    assert isinstance(find(env, actor, "direct", kept=KEPT), DirectCollector)
-    found = find(env, make_actor(MLP((1, 25, 64), 3), env.action_spec), "fused", kept=KEPT)
+    assert isinstance(find(env, actor, "fused", next_keys=KEPT), FusedCollector)
+    assert isinstance(find(env, actor, "direct", next_keys=KEPT), DirectCollector)
+    found = find(env, make_actor(MLP((1, 25, 64), 3), env.action_spec), "fused", next_keys=KEPT)
     assert isinstance(found, DirectCollector) and found.reasons == ("network MLP is not fused",)
-    assert isinstance(speedups.accelerated_stream(env, ["pixels"], KEPT), DirectStream)
+    assert isinstance(speedups.accelerated_stepper(env, ["pixels"], KEPT), DirectStepper)
     summed = with_transforms(DroneEnv(2, TASK), [GrayPixels(), RewardSum()])
     reasons = ("transform RewardSum is not fused",)
     assert (
-        find(summed, make_actor(SmallCNN((1, 25, 64), 3), env.action_spec), "fused", kept=KEPT)
+        find(summed, make_actor(SmallCNN((1, 25, 64), 3), env.action_spec), "fused", next_keys=KEPT)
         == reasons
     )
-    assert speedups.accelerated_stream(summed, ["pixels"], KEPT) == reasons
+    assert speedups.accelerated_stepper(summed, ["pixels"], KEPT) == reasons
     env.close()
     summed.close()
 

@@ -10,7 +10,7 @@ from torchrl.envs.utils import check_env_specs
 
 from drone_rl.collectors import EpisodeCollector, RolloutCollector
 from drone_rl.collectors.episodes import SteppingCollector
-from drone_rl.collectors.rollouts import TorchrlStream
+from drone_rl.collectors.rollouts import TorchrlStepper
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.envs import (
     Blur,
@@ -210,7 +210,7 @@ def test_collectors_resume_bit_for_bit(how, kind, tmp_path):
 def test_faults_are_not_treated_as_per_image_transforms(kind):
     episodes, rollouts = (collector(kind, how)[0] for how in (EpisodeCollector, RolloutCollector))
     assert isinstance(episodes.source, SteppingCollector)
-    assert isinstance(rollouts._stream, TorchrlStream)
+    assert isinstance(rollouts._stepper, TorchrlStepper)
 
 
 def test_saved_state_resumes_within_an_episode():

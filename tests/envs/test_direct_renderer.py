@@ -31,7 +31,7 @@ def test_gray_is_rendered_directly_with_the_same_result(first, modality):
     renderer = DirectRenderer.try_create(env, ["pixels"], KEPT)
     assert renderer.view.modalities == (modality,)
     seen = env.reset()["pixels"]
-    assert torch.equal(renderer.look(env.base_env.worlds.state)["pixels"], seen)
+    assert torch.equal(renderer.observe(env.base_env.worlds.state)["pixels"], seen)
     env.close()
 
 
@@ -44,7 +44,7 @@ def test_resize_to_the_camera_size_is_skipped(size, kept):
     assert [type(t) for t in renderer.after] == [Resize, StandardizePixels][-kept:]
     seen = env.reset()["pixels"]
     assert seen.shape == (2, 1, 25, 64)
-    assert torch.equal(renderer.look(env.base_env.worlds.state)["pixels"], seen)
+    assert torch.equal(renderer.observe(env.base_env.worlds.state)["pixels"], seen)
     plain = with_transforms(DroneEnv(2, SHORT, camera), [GrayPixels(), StandardizePixels()])
     assert torch.equal(plain.reset()["pixels"], seen) is (kept == 1)
     for each in (env, plain):
