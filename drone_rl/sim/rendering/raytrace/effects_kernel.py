@@ -54,8 +54,8 @@ def _cast_shadows(job: structs.Job, sun: wp.vec3) -> None:
     for geom in range(job.geom_views.shape[0]):
         caster = job.geom_views[geom]
         if caster.kind != PLANE:
-            way = sun * shadow_length(job, caster, ground, sun)
-            part = bounding_rectangle(job, caster, way)
+            shadow = sun * shadow_length(job, caster, ground, sun)
+            part = bounding_rectangle(job, caster, shadow)
             light = wp.transpose(caster.axes) @ sun
             row = part[2]
             while row < part[3]:

@@ -62,17 +62,17 @@ def view_geom(job: Job, geoms: Geoms, geom: int, poses: Poses) -> GeomView:
 
 
 @wp.func
-def bounding_rectangle(job: Job, geom_view: GeomView, way: wp.vec3) -> wp.vec4i:
-    """Return the pixels that can show a geom or its shadow, which ends `way` (world frame) away.
+def bounding_rectangle(job: Job, geom_view: GeomView, shadow: wp.vec3) -> wp.vec4i:
+    """Return the pixels that can show a geom or its shadow: first and last+1 column, then rows.
 
-    Returns first and last+1 column, first and last+1 row. A zero `way` stands for no shadow.
+    `shadow` leads from the geom to the end of its shadow, world frame; zero for no shadow.
     """
-    back = wp.transpose(geom_view.into)
-    centre = -(back @ geom_view.eye)
-    swept = back @ (wp.transpose(geom_view.axes) @ way)
-    sides = back @ wp.diag(geom_view.reach)
+    to_camera = wp.transpose(geom_view.into)
+    centre = -(to_camera @ geom_view.eye)
+    swept = to_camera @ (wp.transpose(geom_view.axes) @ shadow)
+    sides = to_camera @ wp.diag(geom_view.reach)
     bits = int(3)
-    if wp.length_sq(way) > 0.0:
+    if wp.length_sq(shadow) > 0.0:
         bits = 4
     lowest = wp.vec2(FAR_AWAY, FAR_AWAY)
     highest = wp.vec2(-FAR_AWAY, -FAR_AWAY)
