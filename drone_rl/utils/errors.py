@@ -27,5 +27,5 @@ def extra(module: str, name: str, setting: str) -> Any:
     except ImportError as error:
         raise InputError(
             f"{setting} needs {module}, which isn't installed; "
-            f"install it with pip install 'drone-rl[{name}]'"
+            f"install it with pip install -e '.[{name}]' in the checkout"
         ) from error

@@ -104,7 +104,7 @@ def test_parts_that_do_not_go_together(in_process, told, remedy):
 )
 def test_an_extra_that_is_not_installed(in_process, monkeypatch, module, extra, args):
     monkeypatch.setitem(sys.modules, module, None)
-    assert f"pip install 'drone-rl[{extra}]'" in error_line(in_process("train", *args))
+    assert f"pip install -e '.[{extra}]'" in error_line(in_process("train", *args))
 
 
 def test_a_logger_whose_package_is_missing(in_process, monkeypatch, tmp_path):

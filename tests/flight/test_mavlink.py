@@ -116,6 +116,6 @@ def test_nobody_there(stubs):
 def test_without_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "pymavlink.dialects.v20.common", None)
     link = TcpLink(0)
-    with pytest.raises(InputError, match=r"pip install 'drone-rl\[hil\]'"):
+    with pytest.raises(InputError, match=r"pip install -e '\.\[hil\]'"):
         MavlinkBridge(link)
     link.close()

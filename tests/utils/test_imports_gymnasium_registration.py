@@ -92,7 +92,7 @@ def test_without_gymnasium_one_line_tells_what_to_install():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     (line,) = done.stdout.splitlines()
-    assert line.endswith("install it with pip install 'drone-rl[gym]'")
+    assert line.endswith("install it with pip install -e '.[gym]' in the checkout")
 
 
 def test_the_names_of_modules_are_right():

