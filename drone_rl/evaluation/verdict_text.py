@@ -40,8 +40,8 @@ def _fraction(evidence: Evidence) -> str:
     share, lost, undecided = (proof[name] for name in ("share", "lost", "undecided"))
     so_far = "" if proof["finished"] else " so far, for the proof was stopped"
     text = (
-        f"A certificate states{so_far}: with its most probable actions it collects {cubes} from a "
-        f"share of {exact(share)} of all placements; from "
+        f"A certificate states{so_far}: with its most probable actions it collects {cubes} from "
+        f"{exact(share)} of all placements; from "
         f"{exact(lost, is_all=share == undecided == 0)} it does not"
     )
     if undecided:

@@ -44,9 +44,9 @@ def all_cubes(count: int) -> str:
 
 
 def exact(share: float, is_all: bool = False) -> str:
-    """Return a rate with nine digits; 1 only if it is exactly 1."""
-    text = f"{share:.9g}"
-    return text if is_all or text != "1" else "more than 0.999999999"
+    """Return a rate in percent with nine digits; 100% only if it is exactly 1."""
+    text = f"{100 * share:.9g}%"
+    return text if is_all or text != "100%" else "more than 99.9999999%"
 
 
 Evidence = Mapping[str, Any]

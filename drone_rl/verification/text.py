@@ -89,14 +89,14 @@ def describe_proof(certificate: Mapping[str, Any]) -> str:
     cubes = all_cubes(task["num_cubes"])
     outcomes, undecided = certificate["outcomes"], certificate["undecided"]
     success = sum(o["share"] for o in outcomes if o["end"] == "all_cubes")
+    text = f"Proved: with its most probable actions it collects {cubes} from"
     if not undecided["boxes"] and all(o["end"] == "all_cubes" for o in outcomes):
-        return f"Proved: greedy, it collects {cubes} from every placement."
+        return f"{text} every placement."
     lost = sum(o["share"] for o in outcomes if o["end"] != "all_cubes")
     lost = exact(lost, is_all=not success and not undecided["boxes"])
-    text = f"Proved: greedy, it collects {cubes} from a share of {exact(success)} of all placements"
-    text += f" and does not from a share of {lost}"
+    text += f" {exact(success)} of all placements; from {lost} it does not"
     if undecided["boxes"]:
-        text += f"; a share of {exact(undecided['share'], is_all=not outcomes)} are undecided"
+        text += f", and {exact(undecided['share'], is_all=not outcomes)} are undecided"
     if not certificate["finished"]:
         text += f" so far ({why_stopped(certificate['found'].get('stopped_by'))})"
     return text + "."
@@ -118,5 +118,5 @@ def found(search: Mapping[str, Any]) -> str:
     if search["losing"] is None:
         return f"{text} failed"
     losing, undecided = exact(search["losing"]), exact(search["undecided"])
-    text += f" failed; proof in {search['proof_s']:.0f} s: fails from a share of {losing}"
-    return f"{text}, undecided a share of {undecided}"
+    text += f" failed; proof in {search['proof_s']:.0f} s: fails from {losing} of all placements"
+    return f"{text}, {undecided} undecided"

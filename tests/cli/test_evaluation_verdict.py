@@ -38,7 +38,7 @@ def good():
     ("undecided", "status", "words"),
     [
         (False, 0, "A certificate states for every"),
-        (True, 16, "from a share of 0.75 of all placem"),
+        (True, 16, "from 75% of all placem"),
     ],
 )
 def test_a_proof_can_be_required(in_process, tmp_path, good, undecided, status, words):

@@ -27,34 +27,34 @@ def test_every_placement():
 def test_the_exact_share():
     lost = speak(1, every=False, share=0.6375, lost=0.3625)
     assert lost["proof.share"] == (
-        "A certificate states: with its most probable actions it collects the cube from a share "
-        "of 0.6375 of all placements; from 0.3625 it does not."
+        "A certificate states: with its most probable actions it collects the cube from "
+        "63.75% of all placements; from 36.25% it does not."
     )
     assert "proof.every" not in lost
     some = speak(every=False, share=0.5, lost=0.25, undecided=0.25, finished=False)
     assert some["proof.share"] == (
         "A certificate states so far, for the proof was stopped: with its most probable actions "
-        "it collects all 3 cubes from a share of 0.5 of all placements; from 0.25 it "
-        "does not, and 0.25 is undecided."
+        "it collects all 3 cubes from 50% of all placements; from 25% it "
+        "does not, and 25% is undecided."
     )
 
 
 @pytest.mark.parametrize("share", [1 - 1e-12, 1.0])
 def test_nearly_all_is_never_all(share):
     text = speak(every=False, share=share, undecided=1e-12)["proof.share"]
-    assert "a share of more than 0.999999999 of all" in text
-    assert "from 0 it does not, and 1e-12 is undecided" in text
+    assert "from more than 99.9999999% of all" in text
+    assert "from 0% it does not, and 1e-10% is undecided" in text
 
 
 def test_all_is_said_to_be_all():
     text = speak(every=False, share=0.0, lost=1.0)["proof.share"]
-    assert "a share of 0 of all placements; from 1 it does not." in text
+    assert "from 0% of all placements; from 100% it does not." in text
     text = speak(every=False, share=0.0, undecided=1.0, finished=False)["proof.share"]
-    assert "from 0 it does not, and 1 is undecided." in text
+    assert "from 0% it does not, and 100% is undecided." in text
     text = speak(every=False, share=1e-12, lost=1.0)["proof.share"]
-    assert "from more than 0.999999999 it does not" in text
+    assert "from more than 99.9999999% it does not" in text
     text = speak(every=False, lost=1e-12, share=0.0, undecided=1.0)["proof.share"]
-    assert "and more than 0.999999999 is undecided" in text
+    assert "and more than 99.9999999% is undecided" in text
 
 
 def test_what_was_not_re_checked_or_too_little_is_no_proof():

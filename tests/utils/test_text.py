@@ -42,13 +42,13 @@ def test_cubes():
 
 def test_nearly_all_is_never_all():
     assert [exact(share) for share in (0.0, 1e-12, 0.25, 1 / 3)] == [
-        "0", "1e-12", "0.25", "0.333333333",
+        "0%", "1e-10%", "25%", "33.3333333%",
     ]  # fmt: skip
-    assert exact(1 - 1e-9) == "0.999999999"
+    assert exact(1 - 1e-9) == "99.9999999%"
     for share in (1 - 1e-10, 1 - 1e-16, 1.0, 1 + 1e-12):  # whose digits, or the sum's, are too few
-        assert exact(share) == "more than 0.999999999"
-    assert exact(1 - 1e-16, is_all=True) == "1"
-    assert exact(0.5, is_all=True) == "0.5"
+        assert exact(share) == "more than 99.9999999%"
+    assert exact(1 - 1e-16, is_all=True) == "100%"
+    assert exact(0.5, is_all=True) == "50%"
 
 
 def test_percentages_with_one_decimal_are_never_rounded_to_nothing_or_all():

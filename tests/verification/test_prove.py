@@ -40,7 +40,7 @@ def test_a_policy_that_collects_from_everywhere(tmp_path):
 
 def test_it_shows_itself(proof):
     text = str(proof)
-    assert "front boundary" in text and "0.6375" in text and "Proved: greedy" in text
+    assert "front boundary" in text and "0.6375" in text and "Proved: with" in text
     assert "<table" in proof._repr_html_()
 
 

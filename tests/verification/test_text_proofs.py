@@ -21,7 +21,7 @@ def certificate(won=1.0, undecided=0.0, finished=True, cubes=3):
 def test_all_placements():
     assert (
         describe_proof(certificate())
-        == "Proved: greedy, it collects all 3 cubes from every placement."
+        == "Proved: with its most probable actions it collects all 3 cubes from every placement."
     )
     assert "the cube from every" in describe_proof(certificate(cubes=1))
 
@@ -30,12 +30,12 @@ def test_all_placements():
 def test_what_is_undecided_is_never_proved(undecided):
     text = describe_proof(certificate(won=1 - undecided, undecided=undecided))
     assert "every placement" not in text
-    assert f"{undecided:.9g} are undecided" in text
+    assert f"{100 * undecided:.9g}% are undecided" in text
 
 
 def test_shares():
     text = describe_proof(certificate(won=0.75))
-    assert "from a share of 0.75 of all placements and does not from a share of 0.25." in text
+    assert "collects all 3 cubes from 75% of all placements; from 25% it does not." in text
 
 
 def test_a_proof_that_was_stopped():
@@ -54,15 +54,15 @@ def test_what_helps_a_proof_of_too_many_boxes():
 
 def test_nearly_all_is_never_all_and_all_is():
     nearly = describe_proof(certificate(won=1 - 1e-12, undecided=1e-12))
-    assert "from a share of more than 0.999999999 of all placements" in nearly
-    assert "does not from a share of 1." in describe_proof(certificate(won=0.0))
+    assert "from more than 99.9999999% of all placements" in nearly
+    assert "; from 100% it does not." in describe_proof(certificate(won=0.0))
     lost = describe_proof(certificate(won=1e-12))
-    assert "from a share of 1e-12 of all placements" in lost
-    assert "does not from a share of more than 0.999999999." in lost
+    assert "from 1e-10% of all placements" in lost
+    assert "from more than 99.9999999% it does not." in lost
     stopped = describe_proof(certificate(won=0.0, undecided=1.0, finished=False))
-    assert "from a share of 0; a share of 1 are undecided so far" in stopped
+    assert "from 0% it does not, and 100% are undecided so far" in stopped
     begun = describe_proof(certificate(won=1e-12, undecided=1 - 1e-12, finished=False))
-    assert "a share of more than 0.999999999 are undecided so far" in begun
+    assert "more than 99.9999999% are undecided so far" in begun
 
 
 def test_what_a_training_found():
@@ -70,6 +70,6 @@ def test_what_a_training_found():
     assert found(search) == "at frame 20,000: 3 of 4,000 flights failed"
     proof = {"losing": 0.25, "undecided": 1e-7, "proof_s": 61.6}
     assert found(search | proof) == (
-        "at frame 20,000: 3 of 4,000 flights failed; proof in 62 s: fails from a share of 0.25, "
-        "undecided a share of 1e-07"
+        "at frame 20,000: 3 of 4,000 flights failed; proof in 62 s: fails from 25% of all "
+        "placements, 1e-05% undecided"
     )
