@@ -90,7 +90,7 @@ class Trainer:
     """Iterates over batches, as TorchRL's collectors do; has `state_dict` and `load_state_dict`.
     The caller shuts it down."""
     learner: Learner
-    """Learns from the batches."""
+    """Learns from the batches in the caller's loop; its state is saved and restored here."""
     callbacks: Sequence[Callback] = dataclasses.field(default_factory=list)
     """Called after every update, in order."""
     generators: Mapping[str, torch.Generator] = dataclasses.field(default_factory=dict)
