@@ -111,6 +111,13 @@ def test_headline_cells():
     figures = {
         "time_to_solve_s": [4.0, 5.25, 6.0],
         "success_lower95": [0.996, 0.991],
+        "peers": {
+            "reinforce": {"seconds": [6.0, 5.0]},
+            "a2c": {"seconds": [8.0]},
+            "sb3_ppo": {"seconds": [9.0, 9.4]},
+            "sb3_a2c": {"seconds": [13.0]},
+            "torchrl": {"seconds": [15.0]},
+        },
         "solve_over_best_peer": 0.598,
         "render_over_warp": {"25x64": 18.54, "64x64": 25.8},
         "gamed_verdicts": 1,
@@ -120,8 +127,8 @@ def test_headline_cells():
     assert cells == [
         "5.2",
         "99.1%",
-        "0.60 times",
-        "18.5 times",
+        "5.5 s / 9.2 s = 0.60",
+        "18.5",
         "1 of 34",
         *[UNKNOWN] * 3,
     ]
