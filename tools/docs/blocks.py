@@ -33,7 +33,7 @@ class Block:
     @property
     def status(self) -> int:
         """Exit status that the command's comment states, otherwise 0."""
-        stated = re.search(r"#.*\bexit status (\d+)(?! unless| if)", self.code)
+        stated = re.search(r"#.*\bexit status (\d+)\b(?! unless| if)", self.code)
         return int(stated[1]) if stated and self.kind == COMMAND else 0
 
 

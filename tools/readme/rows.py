@@ -120,37 +120,52 @@ TRUTH = (
     ),
     Row(
         "render_truth",
-        "images compared with OpenGL, random scenes: pixels off edges with another geom; geoms "
-        "of more than 30 pixels with IoU of at least 0.98, smallest IoU; greatest difference of "
-        "depth, mm; of color, levels of 255",
+        "images of random scenes compared with OpenGL: pixels off edges with another geom",
+        lambda f: f"{f['render_truth_inner_wrong']} in {f['render_truth_scenes']} scenes",
+        "0",
+    ),
+    Row(
+        "render_truth",
+        "the same: geoms of more than 30 pixels with IoU of at least 0.98; smallest IoU",
         lambda f: (
-            f"{f['render_truth_inner_wrong']}; {f['render_truth_overlapping']} of "
-            f"{f['render_truth_geoms']}, {f['render_truth_least_overlap']:.3f}; "
-            f"{f['render_truth_depth_mm']:.2f}; {f['render_truth_rgb']}, in "
-            f"{f['render_truth_scenes']} scenes"
+            f"{f['render_truth_overlapping']} of {f['render_truth_geoms']}; "
+            f"{f['render_truth_least_overlap']:.3f}"
         ),
-        "0; all; 1; 2",
+        "all",
+    ),
+    Row(
+        "render_truth",
+        "the same: greatest difference of depth; of color, levels of 255",
+        lambda f: f"{f['render_truth_depth_mm']:.2f} mm; {f['render_truth_rgb']}",
+        "1 mm; 2",
     ),
     Row(
         "shifts",
         "seconds to evaluate a policy under ten groups of perturbations, five strengths each, 200 "
-        "episodes; mean area under the curve of success rate over strength, policy good",
-        lambda f: (
-            f"{f['shift_suite_s']:.0f} with {f['shift_suite_axes']} axes; {f['shift_area']:.2f}"
-        ),
+        "episodes",
+        lambda f: f"{f['shift_suite_s']:.0f} with {f['shift_suite_axes']} axes",
         "480",
+    ),
+    Row(
+        "shifts",
+        "mean area under the curve of success rate over strength, policy good",
+        lambda f: f"{f['shift_area']:.2f}",
     ),
     Row(
         "robust",
         "gain of `experiment=robust` over the default in success rate, percentage points, 3 seeds: "
-        "under groups of perturbations without randomization in training; under all groups; loss "
-        "under training conditions",
+        "under groups of perturbations without randomization in training",
+        lambda f: f"{f['robust_gain_points']:+.1f} of at most {f['robust_room_points']:.1f}",
+        "+15",
+    ),
+    Row(
+        "robust",
+        "the same under all groups; loss under training conditions",
         lambda f: (
-            f"{f['robust_gain_points']:+.1f} of at most "
-            f"{f['robust_room_points']:.1f}; {f['robust_gain_all_kinds_points']:+.1f}; "
+            f"{f['robust_gain_all_kinds_points']:+.1f}; "
             f"{round(f['robust_cost_points'], 1) + 0.0:.1f}"
         ),
-        "+15; -; at most 1",
+        "-; at most 1",
     ),
     Row(
         "mutants",
