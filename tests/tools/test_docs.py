@@ -81,6 +81,19 @@ def test_blocks_are_found_in_their_order(write, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("comment", "status"),
+    [
+        ("exit status 15: not all succeed", 15),
+        ("exit status 17 unless good", 0),
+        ("exit status 0 if the certificate holds, else 14", 0),
+    ],
+)
+def test_the_expected_exit_status_is_that_of_the_comment(write, tmp_path, comment, status):
+    (block,) = read_blocks(write(f"```sh\nls    # {comment}\n```\n"), tmp_path)
+    assert block.status == status
+
+
+@pytest.mark.parametrize(
     ("text", "why"),
     [("```sh\nls\n", "not closed"), ("```text\n1\n```\n", "nothing"), ("  ```sh\n", "fence")],
 )
