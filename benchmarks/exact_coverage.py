@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.learning import Threads
+from drone_rl.config.learning import Episodes
 from drone_rl.config.training import TrainerSettings
 from drone_rl.evaluation.judge import judge_policy
 from drone_rl.policies.policy import Policy, load_policy
@@ -126,7 +126,7 @@ def _policies(folder: Path, quick: bool) -> Iterator[tuple[str, Policy]]:
         train(
             folder=run,
             task=TaskSettings(num_cubes=1),
-            collector=Threads(num_envs=16),
+            collector=Episodes(num_envs=16),
             trainer=TrainerSettings(
                 total_episodes=STAGES[-1], target_share=None, checkpoint_interval_s=0.0
             ),

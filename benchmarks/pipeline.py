@@ -16,7 +16,7 @@ from drone_rl.config import (
     DynamicsSettings,
     TaskSettings,
 )
-from drone_rl.config.learning import Threads
+from drone_rl.config.learning import Episodes
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies import PolicyNetwork, SmallCNN, make_actor
@@ -29,7 +29,9 @@ def default_collector(
     num_envs: int, device: str, dynamics: DynamicsSettings = COMPUTER_VISION
 ) -> ThreadedCollector:
     """Return the collector of `drone-rl train` with an untrained policy."""
-    settings = TrainSettings(collector=Threads(num_envs=num_envs), device=device, dynamics=dynamics)
+    settings = TrainSettings(
+        collector=Episodes(num_envs=num_envs), device=device, dynamics=dynamics
+    )
     collector = make_collector(settings).collector
     assert isinstance(collector, ThreadedCollector)
     return collector

@@ -33,8 +33,8 @@ class RewardToGo(_Discounted, target="reward_to_go"):
     """Discounted return (Eq. 14; the original's variant 2)."""
 
 
-class Standardised(_Discounted, target="standardised"):
-    """Discounted return, standardised over each episode (Algorithm 4; variant 0)."""
+class Standardized(_Discounted, target="standardized"):
+    """Discounted return, standardized over each episode (Algorithm 4; variant 0)."""
 
 
 class SuccessScaled(_Discounted, target="success_scaled"):
@@ -61,7 +61,7 @@ class LeaveOneOut(_Discounted, target="leave_one_out"):
     gamma: Rate = 0.95
 
 
-class BatchNormalised(_Discounted, target="batch_normalised"):
+class BatchNormalized(_Discounted, target="batch_normalized"):
     """Discounted return, normalised over the batch."""
 
 
@@ -89,7 +89,7 @@ class Collector(Variant):
         return {}
 
 
-class Episodes(Collector):
+class CompleteEpisodes(Collector):
     """Batches of complete episodes."""
 
     compiled: bool = True
@@ -97,11 +97,11 @@ class Episodes(Collector):
     faster on a CPU. It samples actions in another order: results for a seed depend on it."""
 
 
-class Threads(Episodes, target="threads"):
+class Episodes(CompleteEpisodes, target="episodes"):
     """Batches of complete episodes from threads of this process."""
 
 
-class Ray(Episodes, target="ray"):
+class Ray(CompleteEpisodes, target="ray"):
     """Batches of complete episodes from workers on a Ray cluster."""
 
     num_threads: Annotated[int, Whole(1, unit="workers")] = 2

@@ -18,6 +18,7 @@ from drone_rl.config.learning import (
     Adam,
     Collector,
     Constant,
+    Episodes,
     Gae,
     LeaveOneOut,
     Objective,
@@ -26,7 +27,6 @@ from drone_rl.config.learning import (
     Returns,
     Rollouts,
     Scheduler,
-    Threads,
 )
 from drone_rl.config.networks import Network, SmallCnn
 from drone_rl.config.transforms import DEFAULT_TRANSFORMS, Transform
@@ -55,7 +55,7 @@ class TrainerSettings(Settings):
     """Weight of the old value in the running mean, per episode: 0.99 averages about 100."""
     max_grad_norm: Annotated[float, Real(0.0, is_above=True)] | None = None
     """Clip the gradient to this norm; none for no clipping."""
-    minibatch_frames: Annotated[int, Whole(1, unit="frames")] = 1024
+    chunk_frames: Annotated[int, Whole(1, unit="frames")] = 1024
     """Frames in one forward and backward pass; bounds memory. Sums are rounded by it."""
     compiled: bool = True
     """Compute gradients in a fused kernel if it supports the network, which is faster on a CPU.
@@ -93,7 +93,7 @@ class TrainSettings(Settings):
     """Optimizer."""
     scheduler: Scheduler = Constant()
     """Learning-rate schedule."""
-    collector: Collector = Threads()
+    collector: Collector = Episodes()
     """Collector."""
     trainer: TrainerSettings = TrainerSettings()
     """Length of the training."""

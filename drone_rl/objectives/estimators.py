@@ -143,13 +143,13 @@ class RewardToGo(_Discounted):
         return returns.reward_to_go(reward, done, self.gamma)
 
 
-@implements(settings.Standardised)
-class Standardised(_Discounted):
-    """Discounted return, standardised over each episode (Algorithm 4)."""
+@implements(settings.Standardized)
+class Standardized(_Discounted):
+    """Discounted return, standardized over each episode (Algorithm 4)."""
 
     def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
-        """See `returns.standardised`."""
-        return returns.standardised(reward, done, self.gamma)
+        """See `returns.standardized`."""
+        return returns.standardized(reward, done, self.gamma)
 
 
 @implements(settings.LinearRamp)
@@ -227,13 +227,13 @@ class LeaveOneOut(_Discounted):
         return returns.leave_one_out(reward, done, self.gamma)
 
 
-@implements(settings.BatchNormalised)
-class BatchNormalised(_Discounted):
+@implements(settings.BatchNormalized)
+class BatchNormalized(_Discounted):
     """Discounted return, normalised over the batch."""
 
     def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
-        """See `returns.batch_normalised`."""
-        return returns.batch_normalised(reward, done, self.gamma)
+        """See `returns.batch_normalized`."""
+        return returns.batch_normalized(reward, done, self.gamma)
 
 
 @implements(Gae)

@@ -4,7 +4,7 @@ Every function takes `reward` and `done` of shape (*batch, T, 1), time in dimens
 episodes: no return crosses a `done`, and the last step of every row must be one. A flat batch
 (T, 1) of episodes one after the other and a batch (N, T, 1) are equivalent.
 
-The original study has five variants, `advantage_type` 0 to 4: `standardised`, `linear_ramp`,
+The original study has five variants, `advantage_type` 0 to 4: `standardized`, `linear_ramp`,
 `reward_to_go`, `success_scaled` and `time_baseline`. They are implemented as they were meant: an
 episode of constant return standardises to zero instead of dividing by zero, and the baselines of
 `time_baseline` and `leave_one_out` never contain the episode that they are subtracted from.
@@ -53,7 +53,7 @@ def reward_to_go(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
     return _unpad(_discount(padded, gamma), lengths, reward)
 
 
-def standardised(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
+def standardized(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
     """Discounted return, (g - mean) / std over each episode (Algorithm 4, line 2; footnote 5).
 
     The deviation is the population's; an episode of constant return gets zeros. Mean and deviation
@@ -117,11 +117,11 @@ def leave_one_out(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
     return _unpad(returns - baseline, lengths, reward)
 
 
-def batch_normalised(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
+def batch_normalized(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
     """Discounted return, (g - mean) / std over the whole batch; zeros if it is constant.
 
     Mean and deviation contain the episode itself, so this is biased, less the larger the batch: by
-    10.9 degrees with 2 episodes, 1.9 with 8; with a single one it is `standardised`.
+    10.9 degrees with 2 episodes, 1.9 with 8; with a single one it is `standardized`.
     """
     returns = reward_to_go(reward, done, gamma)
     centred = returns - returns.mean()

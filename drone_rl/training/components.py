@@ -7,7 +7,7 @@ import torch
 from torchrl.envs import TransformedEnv
 
 from drone_rl.collectors.speedups import accelerated_gradients
-from drone_rl.config.learning import Episodes, Ray
+from drone_rl.config.learning import CompleteEpisodes, Ray
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies import PolicyNetwork, make_actor
 from drone_rl.sim.rendering.devices import check_device
@@ -52,7 +52,7 @@ def group_sizes(settings: TrainSettings) -> list[int]:
 def episode_options(settings: TrainSettings, num_threads: int) -> dict[str, Any]:
     """Return the arguments of `EpisodeCollector`; a fused kernel uses `num_threads`."""
     chosen = settings.collector
-    fused = isinstance(chosen, Episodes) and chosen.compiled
+    fused = isinstance(chosen, CompleteEpisodes) and chosen.compiled
     return {"acceleration": "fused" if fused else "none", "num_threads": num_threads}
 
 

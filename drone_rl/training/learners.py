@@ -13,6 +13,7 @@ from torch.nn.utils import clip_grads_with_norm_, get_total_norm
 from torchrl.objectives import A2CLoss, ClipPPOLoss
 
 from drone_rl.collectors import take_rows
+from drone_rl.config.training import TrainerSettings
 from drone_rl.objectives import Advantages, ReinforceLoss
 from drone_rl.policies import ActorCritic
 from drone_rl.policies.critic import LOG_PROB, PIXELS, VALUE
@@ -121,9 +122,9 @@ class ReinforceLearner(GradientLearner):
 
     loss: ReinforceLoss
     """Gives the `loss_*` terms of a batch, as a mean over its steps or a sum."""
-    minibatch_frames: int = 512
-    """Gradients are accumulated over chunks of this size, which bounds memory; sums are rounded by
-    it in their last places."""
+    chunk_frames: int = TrainerSettings.chunk_frames
+    """Frames per forward and backward pass. Gradients are accumulated over chunks, so this bounds
+    memory and affects only rounding."""
 
     @property
     def in_keys(self) -> Sequence[NestedKey]:
@@ -148,7 +149,7 @@ class ReinforceLearner(GradientLearner):
         is_sum = self.loss.reduction == "sum"
         self.optimizer.zero_grad()
         try:
-            terms = accumulate(steps, self.loss, self.minibatch_frames, is_sum=is_sum)
+            terms = accumulate(steps, self.loss, self.chunk_frames, is_sum=is_sum)
             norm = descend(self.optimizer, self.network.named_parameters(), self.max_grad_norm)
         except NotANumberError:
             self.optimizer.zero_grad()
@@ -178,8 +179,8 @@ class ActorCriticLearner(GradientLearner):
     """Passes over a batch."""
     minibatch_size: int | None = None
     """Approximate number of steps for one step of the optimizer; None for all."""
-    chunk_frames: int = 512
-    """Steps in one forward and backward pass; changes nothing but memory."""
+    chunk_frames: int = TrainerSettings.chunk_frames
+    """See `ReinforceLearner`."""
     in_keys: ClassVar[Sequence[NestedKey]] = (
         *(PIXELS, "action", LOG_PROB, VALUE),
         *(ADVANTAGE, TARGET, ENTROPY),

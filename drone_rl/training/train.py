@@ -14,7 +14,7 @@ import torch
 from torchrl.envs import Compose, TransformedEnv
 
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
-from drone_rl.config.learning import Reinforce, Threads
+from drone_rl.config.learning import Episodes, Reinforce
 from drone_rl.config.registry import implements
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
@@ -135,7 +135,7 @@ def learn(
     return run_folder.result_of(trainer, largest_reward, confirmation)
 
 
-@implements(Threads)
+@implements(Episodes)
 def threaded_collector(
     settings: TrainSettings, replay: FailureReplayTask | None = None
 ) -> Components:
@@ -195,5 +195,5 @@ def reinforce_learner(settings: TrainSettings, parts: Components, **own: Any) ->
         optimizer=optimizer,
         scheduler=settings.scheduler.make(optimizer),
         max_grad_norm=limits.max_grad_norm,
-        minibatch_frames=limits.minibatch_frames,
+        chunk_frames=limits.chunk_frames,
     )

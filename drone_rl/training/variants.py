@@ -63,7 +63,7 @@ def actor_critic_learner(
         generator=torch_generator(settings.seed, Stream.MINIBATCHES),
         scheduler=settings.scheduler.make(optimizer),
         max_grad_norm=settings.trainer.max_grad_norm,
-        chunk_frames=settings.trainer.minibatch_frames,
+        chunk_frames=settings.trainer.chunk_frames,
         **objective.passes,
     )
     parts.collector.postproc = learner.estimate

@@ -13,7 +13,7 @@ from typing import Any
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.readers import read_yaml
 from drone_rl.utils.schema import Kind, Several, Text, shown
-from drone_rl.utils.settings import FORMER_NAMES
+from drone_rl.utils.settings import FORMER_CHOICES, FORMER_NAMES
 
 _OF_ONE_FOLDER = re.compile(r"\+{0,2}(resume|trial|paths(\.\w+)?)")
 """Overrides of a run's folder and sweep, which do not affect training; a run can be moved."""
@@ -61,12 +61,16 @@ COMMAND: Kind = _Command()
 """Kind (see `schema`) of a training command."""
 
 
-_FORMER = re.compile(rf"^(\+{{0,2}}|~)({'|'.join(FORMER_NAMES)})(?=[.=@]|$)")
+_FORMER = re.compile(rf"^(\+{{0,2}}|~)({'|'.join(map(re.escape, FORMER_NAMES))})(?=[.=@]|$)")
 
 
 def with_present_name(override: str) -> str:
-    """Return an override of a training under the present name of its setting."""
-    return _FORMER.sub(lambda found: found[1] + FORMER_NAMES[found[2]], override)
+    """Return an override with the current names of its setting and choices."""
+    override = _FORMER.sub(lambda found: found[1] + FORMER_NAMES[found[2]], override)
+    for choice, current in FORMER_CHOICES.items():
+        group, _, former = choice.partition("=")
+        override = re.sub(rf"^(\+{{0,2}}{group}=.*?)\b{former}\b", rf"\1{current}", override)
+    return override
 
 
 def check_harmless(override: str, where: str) -> str:

@@ -17,8 +17,17 @@ from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.schema import Flag, Instance, Kind, Maybe, Record, Text, as_mapping
 
 S = TypeVar("S", bound="Settings")
-FORMER_NAMES = {"optimiser": "optimizer"}
-"""Former names of settings, accepted as arguments, on command lines and in files."""
+FORMER_NAMES = {"optimiser": "optimizer", "trainer.minibatch_frames": "trainer.chunk_frames"}
+"""Former names of settings, the latest last. Command lines, arguments and files may have them."""
+FORMER_CHOICES = {
+    "collector=threads": "episodes",
+    "scheduler=none": "constant",
+    "returns=standardised": "standardized",
+    "returns=batch_normalised": "batch_normalized",
+    "appearance=randomised": "randomized",
+}
+"""Former names of choices, accepted in the same places."""
+_FORMER_FIELDS = {k.rpartition(".")[2]: v.rpartition(".")[2] for k, v in FORMER_NAMES.items()}
 
 
 class _Frozen:
@@ -55,7 +64,7 @@ class Settings(_Frozen):
         dataclasses.dataclass(frozen=True, kw_only=True)(cls)
         for name, field in fields.items():
             setattr(cls, name, field)
-        if not cls.__dataclass_fields__.keys().isdisjoint(FORMER_NAMES.values()):
+        if not cls.__dataclass_fields__.keys().isdisjoint(_FORMER_FIELDS.values()):
             _accept_former_names(cls)
         del cls.__setattr__, cls.__delattr__
 
@@ -118,9 +127,23 @@ def check_names(cls: type[Settings], given: Mapping[str, Any], prefix: str = "")
 
 
 def present_names(cls: type[Settings], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values of settings under the present names, see `FORMER_NAMES`."""
-    known = kinds_of(cls)
-    return {k if k in known else FORMER_NAMES.get(k, k): value for k, value in given.items()}
+    """Return values of settings under the current names, see `FORMER_NAMES`, at all levels."""
+    types, found = types_of(cls), {}
+    for given_name, value in given.items():
+        current = _FORMER_FIELDS.get(given_name)
+        name = current if current in types and given_name not in types else given_name
+        found[name] = _present_value(name, types.get(name), value)
+    return found
+
+
+def _present_value(name: str, hint: Any, value: Any) -> Any:
+    if isinstance(value, str):
+        return FORMER_CHOICES.get(f"{name}={value}", value)
+    if not isinstance(value, Mapping) or not isinstance(hint, type):
+        return value
+    if "_target_" in value:
+        value = {**value, "_target_": _present_value(name, str, value["_target_"])}
+    return present_names(hint, value) if issubclass(hint, Settings) else value
 
 
 def _accept_former_names(cls: type[Settings]) -> None:
@@ -132,8 +155,9 @@ def _accept_former_names(cls: type[Settings]) -> None:
         construct(self, **present_names(type(self), given))
 
     setattr(cls, "__init__", accepting)  # noqa: B010
-    for former, present in FORMER_NAMES.items():
-        setattr(cls, former, property(operator.attrgetter(present)))
+    for former, current in _FORMER_FIELDS.items():
+        if current in cls.__dataclass_fields__:
+            setattr(cls, former, property(operator.attrgetter(current)))
 
 
 @contextlib.contextmanager

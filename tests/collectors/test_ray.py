@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.learning import Ray, Threads
+from drone_rl.config.learning import Episodes, Ray
 from drone_rl.config.training import TrainSettings
 from drone_rl.training.components import make_collector
 from drone_rl.training.trainer import episode_rewards
@@ -38,7 +38,7 @@ def on_ray():
 
 @pytest.fixture
 def on_threads():
-    collector = build(Threads(num_envs=6, num_threads=2))
+    collector = build(Episodes(num_envs=6, num_threads=2))
     yield collector
     collector.shutdown()
 

@@ -5,6 +5,7 @@ import pytest
 from drone_rl.config.configuration import as_config, from_config
 from drone_rl.config.learning import (
     A2c,
+    Episodes,
     Gae,
     LeaveOneOut,
     Objective,
@@ -12,7 +13,6 @@ from drone_rl.config.learning import (
     Ray,
     Reinforce,
     Rollouts,
-    Threads,
 )
 from drone_rl.config.training import TrainSettings
 from drone_rl.utils.errors import InputError
@@ -32,7 +32,7 @@ def test_what_is_given_stays():
     assert (again.collector.num_envs, again.returns.gamma) == (5, 0.5)
 
 
-@pytest.mark.parametrize("collector", [Threads(), Ray()])
+@pytest.mark.parametrize("collector", [Episodes(), Ray()])
 def test_batches_without_next_observations_are_no_good_to_a_critic(collector):
     message = r"^objective=ppo does not go with .* of collector; give collector=rollouts$"
     with pytest.raises(InputError, match=message):

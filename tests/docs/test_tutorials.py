@@ -29,7 +29,7 @@ RULES = read_rules()
 PAGES = [page for page in find_pages() if any(b.kind == PYTHON for b in read_blocks(page))]
 SHORT = (
     "trainer=drone_rl.TrainerSettings(total_frames=1500, checkpoint_interval_s=0.0), "
-    "collector=drone_rl.config.learning.Threads(num_envs=8)"
+    "collector=drone_rl.config.learning.Episodes(num_envs=8)"
 )
 _MAIN = {
     "judge(training.policy)": "judge(training.policy, episodes=8)",

@@ -18,12 +18,12 @@ from torchrl.data import Categorical
 from torchrl.modules import ProbabilisticActor
 
 from drone_rl.objectives import (
-    BatchNormalised,
+    BatchNormalized,
     LeaveOneOut,
     LinearRamp,
     ReinforceLoss,
     RewardToGo,
-    Standardised,
+    Standardized,
     SuccessScaled,
     TimeBaseline,
     TotalReward,
@@ -190,12 +190,12 @@ def test_default_approaches_a_multiple_of_the_gradient():
     np.testing.assert_allclose(found, 1 / (1.5 * rms), rtol=0.02)
 
 
-def test_standardised_is_biased_for_any_batch_size():
-    assert np.abs(expected_update(EVEN, Standardised(1.0), 1)).max() < 1e-6  # no gradient
+def test_standardized_is_biased_for_any_batch_size():
+    assert np.abs(expected_update(EVEN, Standardized(1.0), 1)).max() < 1e-6  # no gradient
     skewed = (0.9, 0.1)
     exact = exact_gradient(skewed, 0.95).numpy()
     for episodes in (1, 2):
-        found = expected_update(skewed, Standardised(0.95), episodes)
+        found = expected_update(skewed, Standardized(0.95), episodes)
         assert angle(found, exact) == pytest.approx(38.69, abs=0.01)
 
 
@@ -220,9 +220,9 @@ def test_success_scaled_is_risk_seeking():
     assert (two + nothing) / 2 > sure
 
 
-def test_bias_of_batch_normalised_decreases_with_batch_size():
+def test_bias_of_batch_normalized_decreases_with_batch_size():
     exact = exact_gradient(EVEN, 0.95).numpy()
-    alone = expected_update((0.9, 0.1), BatchNormalised(0.95), 1)
-    np.testing.assert_allclose(alone, expected_update((0.9, 0.1), Standardised(0.95), 1), atol=1e-6)
-    degrees = [angle(expected_update(EVEN, BatchNormalised(0.95), n), exact) for n in (2, 3)]
+    alone = expected_update((0.9, 0.1), BatchNormalized(0.95), 1)
+    np.testing.assert_allclose(alone, expected_update((0.9, 0.1), Standardized(0.95), 1), atol=1e-6)
+    degrees = [angle(expected_update(EVEN, BatchNormalized(0.95), n), exact) for n in (2, 3)]
     assert degrees == pytest.approx([10.87, 8.96], abs=0.01)

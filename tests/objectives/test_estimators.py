@@ -75,12 +75,12 @@ def test_time_baseline_stores_the_mean_over_episodes():
 PURE = {
     "TotalReward": lambda r, d: returns.total_reward(r, d),
     "RewardToGo": lambda r, d: returns.reward_to_go(r, d, 0.7),
-    "Standardised": lambda r, d: returns.standardised(r, d, 0.7),
+    "Standardized": lambda r, d: returns.standardized(r, d, 0.7),
     "LinearRamp": lambda r, d: returns.linear_ramp(r, d),
     "SuccessScaled": lambda r, d: returns.success_scaled(r, d, 0.7, 2.0),
     "TimeBaseline": lambda r, d: returns.time_baseline(r, d, 0.7, torch.zeros(0)),
     "LeaveOneOut": lambda r, d: returns.leave_one_out(r, d, 0.7),
-    "BatchNormalised": lambda r, d: returns.batch_normalised(r, d, 0.7),
+    "BatchNormalized": lambda r, d: returns.batch_normalized(r, d, 0.7),
 }
 
 

@@ -10,7 +10,7 @@ from torchrl.modules import RandomPolicy
 
 from drone_rl import objectives
 from drone_rl.config.learning import Gae, Returns
-from drone_rl.objectives import BatchNormalised, RewardToGo, TimeBaseline, TotalReward
+from drone_rl.objectives import BatchNormalized, RewardToGo, TimeBaseline, TotalReward
 from drone_rl.utils.errors import InputError
 from tests.three_state import ThreeStateEnv
 
@@ -85,7 +85,7 @@ def test_unfinished_tail_is_masked_and_ignored():
     assert batch["collector", "mask"].tolist() == [[True, True, False], [True, True, True]]
     batch = TotalReward()(rows(*CUT))
     assert batch["return_to_go"][..., 0].tolist() == [[2.0, 2.0, 0.0], [5.0, 5.0, 5.0]]
-    scaled = BatchNormalised(0.5)(rows(*CUT))["return_to_go"][..., 0]
+    scaled = BatchNormalized(0.5)(rows(*CUT))["return_to_go"][..., 0]
     assert float(scaled[0, 2]) == 0.0
     assert float(scaled.sum()) == pytest.approx(0.0, abs=1e-6)
     assert float(scaled.square().sum()) == pytest.approx(5.0)  # five steps are valid

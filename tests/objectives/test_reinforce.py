@@ -94,7 +94,7 @@ def test_algorithm_4_matches_a_hand_computed_step():
     network, actor = make(features=1)
     reward = torch.tensor([[0.0], [0.0], [1.0]])
     done = torch.tensor([[False], [False], [True]])
-    normalised = returns.standardised(reward, done, 0.5)
+    normalised = returns.standardized(reward, done, 0.5)
     root = 14**0.5
     torch.testing.assert_close(normalised[:, 0], torch.tensor([-4 / root, -1 / root, 5 / root]))
     batch = TensorDict(

@@ -31,17 +31,17 @@ def test_reward_to_go_special_cases():
     check(returns.reward_to_go(REWARD, DONE, 1.0), [2, 2, 1, 1, 1, 0.0])
 
 
-def test_standardised():
+def test_standardized():
     # first episode: mean 0.84375, deviations -.21875 .40625 -.34375 .15625, variance .0888672
     std = 0.0888671875**0.5
     first = [-0.21875 / std, 0.40625 / std, -0.34375 / std, 0.15625 / std]
-    check(returns.standardised(REWARD, DONE, 0.5), [*first, 1.0, -1.0])
+    check(returns.standardized(REWARD, DONE, 0.5), [*first, 1.0, -1.0])
 
 
-def test_standardised_of_a_constant_is_zero():
+def test_standardized_of_a_constant_is_zero():
     reward = torch.zeros(3, 1)
     done = torch.tensor([[False], [True], [True]])
-    assert returns.standardised(reward, done, 0.9).tolist() == [[0.0], [0.0], [0.0]]
+    assert returns.standardized(reward, done, 0.9).tolist() == [[0.0], [0.0], [0.0]]
 
 
 def test_linear_ramp():
@@ -64,14 +64,14 @@ def test_leave_one_out():
     check(returns.leave_one_out(REWARD, DONE, 0.5), [-0.375, 1.25, 0.5, 1.0, 0.375, -1.25])
 
 
-def test_batch_normalised():
+def test_batch_normalized():
     # mean 4.375 / 6, mean square 4.203125 / 6: (return - mean) / deviation
     mean = 4.375 / 6
     std = (4.203125 / 6 - mean**2) ** 0.5
-    values = returns.batch_normalised(REWARD, DONE, 0.5)
+    values = returns.batch_normalized(REWARD, DONE, 0.5)
     check(values, [(g - mean) / std for g in TO_GO])
     assert values[1] == values.max() > 1.2 and values[5] == values.min() < -1.7
-    constant = returns.batch_normalised(torch.ones(3, 1), torch.ones(3, 1).bool(), 0.5)
+    constant = returns.batch_normalized(torch.ones(3, 1), torch.ones(3, 1).bool(), 0.5)
     assert constant.tolist() == [[0.0], [0.0], [0.0]]
 
 
@@ -81,9 +81,9 @@ def test_rounding_errors_are_not_scaled_up(gap, counts):
     reward = 1 + torch.tensor([[0.0], [gap]], dtype=torch.float64)
     done = torch.ones(2, 1, dtype=torch.bool)
     expected = torch.tensor([[-1.0], [1.0]]) * counts
-    values = returns.batch_normalised(reward, done, 0.0)
+    values = returns.batch_normalized(reward, done, 0.0)
     torch.testing.assert_close(values, expected, atol=0.05, rtol=0)
-    values = returns.standardised(reward, torch.tensor([[False], [True]]), 0.0)
+    values = returns.standardized(reward, torch.tensor([[False], [True]]), 0.0)
     torch.testing.assert_close(values, expected, atol=0.05, rtol=0)
     scaled = returns.scale_to_unit(torch.tensor([[-gap], [gap]]))
     torch.testing.assert_close(scaled, expected)
@@ -114,16 +114,16 @@ def test_mean_by_time():
 ESTIMATORS = {
     "total_reward": lambda r, d: returns.total_reward(r, d),
     "reward_to_go": lambda r, d: returns.reward_to_go(r, d, 0.9),
-    "standardised": lambda r, d: returns.standardised(r, d, 0.9),
+    "standardized": lambda r, d: returns.standardized(r, d, 0.9),
     "linear_ramp": lambda r, d: returns.linear_ramp(r, d),
     "success_scaled": lambda r, d: returns.success_scaled(r, d, 0.9, 3.0),
     "time_baseline": lambda r, d: returns.time_baseline(r, d, 0.9, torch.tensor([0.3, 0.2])),
     "leave_one_out": lambda r, d: returns.leave_one_out(r, d, 0.9),
-    "batch_normalised": lambda r, d: returns.batch_normalised(r, d, 0.9),
+    "batch_normalized": lambda r, d: returns.batch_normalized(r, d, 0.9),
 }
 
 
-ALONE = ["total_reward", "reward_to_go", "standardised", "linear_ramp", "success_scaled"]
+ALONE = ["total_reward", "reward_to_go", "standardized", "linear_ramp", "success_scaled"]
 """Estimators that treat each episode separately; `time_baseline` is another."""
 HOMOGENEOUS = ["total_reward", "reward_to_go", "linear_ramp", "leave_one_out"]
 EPISODES = st.lists(
@@ -185,7 +185,7 @@ def test_scaling_rewards_scales_returns_or_changes_nothing(episodes, factor):
     for name in HOMOGENEOUS:
         found, plain = ESTIMATORS[name](factor * reward, done), ESTIMATORS[name](reward, done)
         torch.testing.assert_close(found, factor * plain, atol=1e-5, rtol=1e-5)
-    for name in ("standardised", "batch_normalised"):
+    for name in ("standardized", "batch_normalized"):
         found, plain = ESTIMATORS[name](factor * reward, done), ESTIMATORS[name](reward, done)
         torch.testing.assert_close(found, plain, atol=1e-3, rtol=1e-3)
 
@@ -218,8 +218,8 @@ def test_leave_one_out_is_the_scaled_deviation_from_the_mean(episodes):
 
 @given(EPISODES)
 @QUICK
-def test_standardised_has_mean_0_and_deviation_1_or_is_zero(episodes):
-    for values in split(returns.standardised(*flat(episodes), 0.9), episodes):
+def test_standardized_has_mean_0_and_deviation_1_or_is_zero(episodes):
+    for values in split(returns.standardized(*flat(episodes), 0.9), episodes):
         square = sum(v * v for v in values) / len(values)
         assert sum(values) == pytest.approx(0, abs=1e-3)
         assert square == pytest.approx(1, abs=1e-3) or set(values) == {0.0}
@@ -267,6 +267,6 @@ def test_rounding_threshold_is_zero():
     assert just.square().mean().sqrt() == torch.tensor(returns.ROUNDING)  # exact in float32
     ends, one = torch.tensor([[True], [True]]), torch.tensor([[False], [True]])
     assert returns.scale_to_unit(just).tolist() == [[0.0], [0.0]]
-    assert returns.batch_normalised(just, ends, 0.0).tolist() == [[0.0], [0.0]]
-    assert returns.standardised(just, one, 0.0).tolist() == [[0.0], [0.0]]
+    assert returns.batch_normalized(just, ends, 0.0).tolist() == [[0.0], [0.0]]
+    assert returns.standardized(just, one, 0.0).tolist() == [[0.0], [0.0]]
     assert returns.scale_to_unit(2 * just).tolist() == [[-1.0], [1.0]]

@@ -49,7 +49,7 @@ class Bandit:
 def make_trainer():
     """Return a factory of trainers with a REINFORCE learner; arguments include its settings."""
 
-    def build(seed=0, *, max_grad_norm=None, minibatch_frames=512, **kwargs):
+    def build(seed=0, *, max_grad_norm=None, chunk_frames=512, **kwargs):
         network = nn.Linear(4, 2)
         nn.init.normal_(network.weight, generator=torch.Generator().manual_seed(seed))
         nn.init.zeros_(network.bias)
@@ -65,7 +65,7 @@ def make_trainer():
                 optimizer=optimizer,
                 scheduler=torch.optim.lr_scheduler.StepLR(optimizer, 2, 0.9),
                 max_grad_norm=max_grad_norm,
-                minibatch_frames=minibatch_frames,
+                chunk_frames=chunk_frames,
             ),
             generators={"actions": actions},
             **settings,

@@ -15,7 +15,7 @@ from drone_rl.utils.errors import InputError
 def test_minibatch_gradients_sum_to_the_batch_gradient(make_trainer, reduction):
     gradients = []
     for size in (10_000, 3):
-        trainer = make_trainer(minibatch_frames=size)
+        trainer = make_trainer(chunk_frames=size)
         learner = trainer.learner
         learner.loss.reduction = reduction
         learner.optimizer.step, learner.scheduler = lambda: None, None
@@ -27,7 +27,7 @@ def test_minibatch_gradients_sum_to_the_batch_gradient(make_trainer, reduction):
 @pytest.mark.parametrize("size", [1, 3, 7, 10_000])
 def test_every_frame_is_used_once(make_trainer, size):
     """The loss reads every frame of the batch once, in order."""
-    trainer = make_trainer(minibatch_frames=size)
+    trainer = make_trainer(chunk_frames=size)
     learner, batch = trainer.learner, trainer.collector.collect()
     learned = []
 
@@ -49,7 +49,7 @@ def test_every_frame_is_used_once(make_trainer, size):
 def test_loss_terms_are_summed_over_minibatches(make_trainer, reduction):
     terms = []
     for size in (10_000, 3):
-        trainer = make_trainer(minibatch_frames=size)
+        trainer = make_trainer(chunk_frames=size)
         trainer.learner.loss.reduction = reduction
         terms.append(trainer.learner.update(trainer.collector.collect()))
     assert terms[0] == pytest.approx(terms[1], rel=1e-4, abs=1e-6)
@@ -125,7 +125,7 @@ def test_masked_steps_do_not_change_the_update(make_trainer):
     """In two rows of 3 steps, 2 steps have no known return; the update uses the other 4."""
     weights = []
     for pieces in (True, False):
-        learner = make_trainer(minibatch_frames=2).learner
+        learner = make_trainer(chunk_frames=2).learner
         pixels = torch.arange(24.0).reshape(6, 4) / 24
         done = torch.tensor([0, 0, 1, 1, 0, 0]).bool()[:, None]
         reward = torch.tensor([0.0, 1.0, 1.0, 3.0, 5.0, 7.0])[:, None]

@@ -10,7 +10,7 @@ import yaml
 
 import drone_rl
 from drone_rl.config import DynamicsSettings, TaskSettings
-from drone_rl.config.learning import Threads
+from drone_rl.config.learning import Episodes
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.training import Callback
 from drone_rl.utils.errors import InputError
@@ -19,7 +19,7 @@ from tests.forked import run_forked
 
 TINY = TrainSettings(
     task=TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60),
-    collector=Threads(num_envs=4),
+    collector=Episodes(num_envs=4),
     trainer=TrainerSettings(total_frames=300),
 )
 

@@ -14,7 +14,7 @@ from drone_rl.acceleration.fused_collector import FusedCollector
 from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import FlightSettings
-from drone_rl.config.learning import A2c, Gae, Ppo, Rollouts, Sgd, Threads
+from drone_rl.config.learning import A2c, Episodes, Gae, Ppo, Rollouts, Sgd
 from drone_rl.config.networks import SmallCnn
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.config.transforms import EpisodeReward, Gray, Stack
@@ -60,7 +60,7 @@ def test_every_objective_has_its_learner():
 def test_kernel_gradients_give_the_same_updates_as_torch():
     learned = {}
     for is_compiled in (True, False):
-        limits = TrainerSettings(compiled=is_compiled, minibatch_frames=40)
+        limits = TrainerSettings(compiled=is_compiled, chunk_frames=40)
         settings = TrainSettings(task=TASK, trainer=limits, optimizer=Sgd(lr=1.0))
         made = make_collector(settings)
         learner = settings.objective.make(settings, made)
@@ -68,7 +68,7 @@ def test_kernel_gradients_give_the_same_updates_as_torch():
         assert isinstance(network, FusedNetwork) is is_compiled
         before = [p.detach().clone() for p in made.network.parameters()]
         batch = next(iter(made.collector))
-        assert len(batch) > 2 * limits.minibatch_frames
+        assert len(batch) > 2 * limits.chunk_frames
         learner.update(batch)
         made.collector.shutdown()
         learned[is_compiled] = [
@@ -84,8 +84,8 @@ def test_kernel_gradients_give_the_same_updates_as_torch():
     [
         ({}, True),
         ({"trainer": TrainerSettings(compiled=False)}, False),
-        ({"collector": Threads(num_envs=4, num_threads=2)}, False),
-        ({"collector": Threads(compiled=False)}, False),
+        ({"collector": Episodes(num_envs=4, num_threads=2)}, False),
+        ({"collector": Episodes(compiled=False)}, False),
         ({"network": SmallCnn(hidden=(600,))}, False),  # too many weights for the kernel
         ({"objective": Ppo(), "collector": Rollouts(), "returns": Gae()}, False),
     ],
@@ -113,7 +113,7 @@ def test_cached_activations_are_used_and_give_the_same_update(monkeypatch):
             return taken[-1] if is_known else None
 
         monkeypatch.setattr(ActivationCache, "find", note)
-        settings = TrainSettings(task=TASK, trainer=TrainerSettings(minibatch_frames=40))
+        settings = TrainSettings(task=TASK, trainer=TrainerSettings(chunk_frames=40))
         made = make_collector(settings)
         learner, batches = settings.objective.make(settings, made), iter(made.collector)
         for _ in range(3):
@@ -277,7 +277,7 @@ def test_advantages_equal_torchrls_gae(is_ours):
 
 def test_collector_without_next_observations_raises(monkeypatch, tmp_path):
     """It is user-defined, so the settings cannot detect it."""
-    collector = type("Mine", (Threads,), {"is_known": False, "target": Threads.target})
+    collector = type("Mine", (Episodes,), {"is_known": False, "target": Episodes.target})
     settings = TINY.replace(collector=collector(num_envs=2))
     with pytest.raises(InputError, match=r"no entry \('next', 'pixels'\).*collector=rollouts$"):
         drone_rl.train(settings, folder=tmp_path, progress=silent)

@@ -117,5 +117,24 @@ def test_former_names_in_a_file_are_read_as_the_present_ones(noted):
     assert taken_over(noted(older), ["optimizer.amsgrad=false", "optimizer.lr=1"]) == [
         *("optimizer=sgd", "seed=1")
     ]
-    for other in ("network.optimiser=1", "optimisers=1", "x.optimiser.lr=1"):
+    for other in (
+        *("network.optimiser=1", "optimisers=1", "x.optimiser.lr=1", "minibatch_frames=1"),
+        *("trainer_minibatch_frames=1", "name=standardised", "returns=standardised_2"),
+    ):
         assert with_present_name(other) == other
+
+
+@pytest.mark.parametrize(
+    ("former", "current"),
+    [
+        ("trainer.minibatch_frames=8", "trainer.chunk_frames=8"),
+        ("++trainer.minibatch_frames=8", "++trainer.chunk_frames=8"),
+        ("returns=standardised", "returns=standardized"),
+        ("+returns=gae,batch_normalised", "+returns=gae,batch_normalized"),
+        ("appearance=randomised", "appearance=randomized"),
+        ("scheduler=none", "scheduler=constant"),
+    ],
+)
+def test_former_names_of_nested_settings_and_choices(former, current):
+    assert with_present_name(former) == current
+    assert with_present_name(current) == current

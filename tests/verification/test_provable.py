@@ -11,7 +11,7 @@ import torch
 import drone_rl
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings
-from drone_rl.config.learning import Threads
+from drone_rl.config.learning import Episodes
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.training import Callback
 from drone_rl.utils.errors import InputError
@@ -21,7 +21,7 @@ from drone_rl.verification.prove import Proof
 
 TINY = TrainSettings(
     task=TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60),
-    collector=Threads(num_envs=4),
+    collector=Episodes(num_envs=4),
     trainer=TrainerSettings(total_frames=3000, target_share=0.01, confirm_episodes=0),
 )
 HOW = ProvableSettings(rounds=3, frames=200, share=1.0, margin=0.25, flights=0)

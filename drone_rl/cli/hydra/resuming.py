@@ -14,7 +14,7 @@ from drone_rl.sweeps.manifest import is_sweep, quoted, sweep_name
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import refuse_links, write_atomically
 from drone_rl.utils.overrides import must_be_typed, taken_over, with_present_name
-from drone_rl.utils.settings import FORMER_NAMES
+from drone_rl.utils.settings import FORMER_CHOICES, FORMER_NAMES
 
 
 def present(overrides: Sequence[str]) -> list[str]:
@@ -23,6 +23,17 @@ def present(overrides: Sequence[str]) -> list[str]:
     return [re.sub(r"^(\+{0,2}|~)policy(?=[.=])", r"\1network", o) for o in named]
 
 
+_RENAMED = [
+    *(
+        (rf"^({choice.partition('=')[0]}=.*?)\b{current}\b", rf"\1{choice.partition('=')[2]}")
+        for choice, current in FORMER_CHOICES.items()
+    ),
+    *(
+        (rf"^(\+{{0,2}}|~){re.escape(current)}(?=[.=@])", rf"\1{former}")
+        for former, current in reversed(FORMER_NAMES.items())
+    ),
+]
+"""Patterns of current names in overrides and the former names, the latest first."""
 _FOLDER = "hydra.sweep.dir=${paths.outputs}/${hydra.job.config_name}/multiruns/"
 _WRITE_NOTHING = ("hydra.output_subdir=null", "++hydra.job_logging.handlers.file.delay=true")
 """Keep Hydra from writing settings before they are checked, and from opening a log."""
@@ -58,12 +69,13 @@ def complete(overrides: Sequence[str]) -> list[str]:
 
 def _sweep_folder(typed: Sequence[str]) -> str:
     """Return the folder's name, or that of the same sweep begun under former names of settings."""
-    older = [*typed]
-    for former, name in FORMER_NAMES.items():
-        older = [re.sub(rf"^(\+{{0,2}}|~){name}(?=[.=@])", rf"\1{former}", o) for o in older]
+    older, names = [*typed], [sweep_name(typed)]
+    for current, former in _RENAMED:
+        older = [re.sub(current, former, o) for o in older]
+        names.append(sweep_name(older))
     outputs = [o.partition("=")[2] for o in typed if o.startswith("paths.outputs=")]
-    begun = Path((outputs or ["outputs"])[-1]) / "train" / "multiruns" / sweep_name(older)
-    return begun.name if begun.is_dir() else sweep_name(typed)
+    sweeps = Path((outputs or ["outputs"])[-1]) / "train" / "multiruns"
+    return next((name for name in reversed(names) if (sweeps / name).is_dir()), names[0])
 
 
 def check_folder(resume: str, folder: Path) -> None:

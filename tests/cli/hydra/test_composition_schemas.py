@@ -172,7 +172,7 @@ def test_original_is_algorithm_4(settings):
     told = settings("train", "experiment=original")
     assert told.collector.num_envs == 1
     assert told.objective.reduction == "sum"
-    assert told.returns.name == "standardised"
+    assert told.returns.name == "standardized"
     assert (told.optimizer.target, told.optimizer.lr) == ("torch.optim.SGD", 1e-4)
     assert (told.scheduler.step_size, told.scheduler.gamma) == (5, 0.99)
     assert round(3 * told.trainer.target_share, 2) == 2.99
@@ -190,7 +190,7 @@ def test_an_objective_brings_what_it_needs_unless_that_is_given(objective, setti
     told = settings("train", "returns.lmbda=0.5", f"objective={objective}", "collector.num_envs=8")
     assert (told.returns.lmbda, told.collector.num_envs) == (0.5, 8)
     composed = config("train", [f"objective={objective}", "collector=episodes"])
-    assert composed.collector._target_ == "threads"
+    assert composed.collector._target_ == "episodes"
 
 
 def test_a_pipeline_keeps_its_order(settings):

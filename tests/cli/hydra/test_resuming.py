@@ -111,3 +111,19 @@ def test_a_sweep_goes_on_in_the_folder_with_the_former_name(tmp_path, monkeypatc
     assert complete(typed)[-1].endswith(f"/multiruns/{older}")
     assert complete(["-m", "optimiser.lr=1,2"])[-1] == complete(typed)[-1]
     assert "optimizer.lr" in complete([*typed, "paths.outputs=elsewhere"])[-1]
+
+
+@pytest.mark.parametrize(
+    ("former", "current"),
+    [
+        ("trainer.minibatch_frames=8,9", "trainer.chunk_frames=8,9"),
+        ("returns=gae,standardised", "returns=gae,standardized"),
+    ],
+)
+def test_a_sweep_with_former_names_goes_on_in_its_folder(tmp_path, monkeypatch, former, current):
+    monkeypatch.chdir(tmp_path)
+    older = sweep_name(["-m", "optimizer.lr=1", former])
+    assert older not in complete(["-m", "optimizer.lr=1", current])[-1]
+    (tmp_path / "outputs" / "train" / "multiruns" / older).mkdir(parents=True)
+    for override in (former, current):
+        assert complete(["-m", "optimizer.lr=1", override])[-1].endswith(f"/multiruns/{older}")
