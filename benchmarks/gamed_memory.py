@@ -18,7 +18,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from benchmarks.gamed_case import GamedCase
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import TaskSettings
-from drone_rl.config.commands import FlightSettings
+from drone_rl.config.commands import HeldOutSettings
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import TrainSettings
 from drone_rl.evaluation.evaluate import evaluate
@@ -230,7 +230,7 @@ def _choice(make: Callable[[], Path], seed: int | None) -> bool:
 def _card(make: Callable[[], Path], seed: int | None) -> bool:
     path = make()
     target = path.with_name("exported.safetensors")
-    export(load_policy(path), target, FlightSettings(episodes=EPISODES, seed=seed))
+    export(load_policy(path), target, HeldOutSettings(episodes=EPISODES, seed=seed))
     return read_policy(target)["verdict"]["exit_code"] == 0
 
 

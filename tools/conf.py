@@ -104,11 +104,10 @@ def make_text(path: Path, settings: type[Settings]) -> str:
 
 
 def _comment(words: str, indent: str = "") -> list[str]:
-    """A description as lines of a comment, with YAML's word for none."""
-    text = re.sub(r"\bnone\b(?= (for|of|keeps|takes|starts|accepts|requires))", "null", words)
+    """A description as lines of a comment."""
     start = f"{indent}# "
     return textwrap.wrap(
-        text, 100, initial_indent=start, subsequent_indent=start, break_on_hyphens=False
+        words, 100, initial_indent=start, subsequent_indent=start, break_on_hyphens=False
     )
 
 

@@ -7,11 +7,12 @@ from typing import Annotated, Any
 
 import drone_rl
 from drone_rl.cli.settings import CommandSettings, RolloutCommandSettings, finish
-from drone_rl.config import AppearanceSettings, RendererName
+from drone_rl.config import AppearanceSettings
+from drone_rl.config.camera import DeviceSettings
 from drone_rl.config.commands import (
     BodiesSettings,
     EvaluateSettings,
-    FlightSettings,
+    HeldOutSettings,
     JudgeSettings,
     ShiftSettings,
 )
@@ -24,11 +25,11 @@ from drone_rl.utils.text import seed_line
 _log = logging.getLogger(__name__)
 
 
-class SeenCommandSettings(RolloutCommandSettings):
+class AppearanceCommandSettings(RolloutCommandSettings):
     """Settings of a command in which the appearance can be changed."""
 
     appearance: AppearanceSettings | None = None
-    """Appearance of the scenes (see conf/appearance); none for that of the policy's training."""
+    """Appearance of the scenes (see conf/appearance); null for that of the policy's training."""
 
     def load_policy(self) -> Any:
         """Return the policy with the changes of task, dynamics and appearance."""
@@ -36,7 +37,7 @@ class SeenCommandSettings(RolloutCommandSettings):
         return policy if self.appearance is None else policy.in_appearance(self.appearance)
 
 
-class EvaluateCommand(SeenCommandSettings, EvaluateSettings):
+class EvaluateCommand(AppearanceCommandSettings, EvaluateSettings):
     """Settings of `drone-rl evaluate`."""
 
     videos: Annotated[int, Whole(0, unit="episodes")] = 2
@@ -67,7 +68,7 @@ class EvaluateCommand(SeenCommandSettings, EvaluateSettings):
         return 0, done.success
 
 
-class PlayCommand(SeenCommandSettings):
+class PlayCommand(AppearanceCommandSettings, DeviceSettings):
     """Settings of `drone-rl play`."""
 
     episodes: Annotated[int, Whole(1, unit="episodes")] = 3
@@ -78,10 +79,6 @@ class PlayCommand(SeenCommandSettings):
     """Root of the environments' random streams."""
     viewer: bool = False
     """Whether to open dm_control's viewer, which needs a display, instead of recording."""
-    device: str = "cpu"
-    """Device of renderer and policy: cpu, cuda or cuda:N."""
-    renderer: RendererName = "raytrace"
-    """Renderer: raytrace, this package's ray tracer, or mujoco_warp, MuJoCo Warp's."""
 
     def run(self, folder: Path) -> tuple[int, None]:
         """Record videos of a policy; return the exit status."""
@@ -96,18 +93,18 @@ class PlayCommand(SeenCommandSettings):
         return 0, None
 
 
-class VerdictCommand(SeenCommandSettings, JudgeSettings):
+class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
     """Settings of `drone-rl verdict`."""
 
     certificate: str | None = None
-    """Certificate file to quote; none takes the one next to the policy, if it matches:
+    """Certificate file to quote; null takes the one next to the policy, if it matches:
     certificate.json in the folder of a run, NAME.certificate.json next to NAME.safetensors."""
     require: Annotated[str, OneOf(("good", "proved"))] | None = None
-    """Requirement for exit status 0: good, the policy is certainly good; proved, a certificate
-    proves success from every placement and rollouts re-checked it, otherwise 16; null, any certain
-    kind has its own exit status."""
+    """good: exit status 0 only if the policy is certainly good. proved: 0 only if a certificate
+    proves success from every placement and rollouts re-checked it, else 16. null: one exit status
+    for each kind."""
     shifts: str | None = None
-    """File shifts.json to quote; none takes the one next to the policy, otherwise the newest under
+    """File shifts.json to quote; null takes the one next to the policy, otherwise the newest under
     outputs/shifts of this network and task."""
     require_domain: str | None = None
     """Operating domain in which the policy must be good, otherwise exit status 17: a YAML or JSON
@@ -131,7 +128,7 @@ class ShiftsCommand(RolloutCommandSettings, ShiftSettings):
 
     def run(self, folder: Path) -> tuple[int, float]:
         """Measure robustness; return the exit status and the mean success over strengths."""
-        chosen, given = self.narrowed(ShiftSettings), self.shared()
+        chosen, given = self.as_base(ShiftSettings), self.shared()
         done = drone_rl.shifts(self.policy, chosen, dynamics=self.dynamics, **given, progress=log)
         finish(done, folder, "shifts.json, shifts.png and strips.png")
         return 0, done.area
@@ -141,38 +138,39 @@ class BodiesCommand(CommandSettings, BodiesSettings):
     """Settings of `drone-rl bodies`."""
 
     def run(self, folder: Path) -> tuple[int, int]:
-        """Judge policies with several vehicles; return the exit status and the verdicts' number."""
-        chosen = self.narrowed(BodiesSettings)
+        """Judge policies under several dynamics; return the exit status and number of verdicts."""
+        chosen = self.as_base(BodiesSettings)
         done = drone_rl.bodies(settings=chosen, outputs=self.paths.outputs, progress=silent)
         finish(done, folder, "bodies.json, bodies.png and bodies.svg")
         return 0, sum(map(len, done.numbers["policies"].values()))
 
 
-class ExportCommand(CommandSettings, FlightSettings):
+class ExportCommand(CommandSettings, HeldOutSettings):
     """Settings of `drone-rl export`."""
 
     policy: str = "latest"
-    """Policy: a .pt file, the folder of a run, or latest."""
+    """Policy: a .pt or .safetensors file, the folder of a run, latest, or a shipped policy's
+    name."""
     name: Annotated[str, FileName()] = "policy"
     """Name of the files, without extension."""
     format: Annotated[str, OneOf(("safetensors", "onnx"))] = "safetensors"
     """safetensors with a model card, or onnx, an ONNX model of RGB image to action
     probabilities."""
     command: Annotated[str, COMMAND] | None = None
-    """Training command for the card; none takes the run's own settings."""
+    """Training command for the card; null takes the run's own settings."""
     certificate: str | None = None
-    """Certificate file for the card; none takes the one next to the policy, if it matches."""
+    """Certificate file for the card; null takes the one next to the policy, if it matches."""
     shifts: str | None = None
-    """File shifts.json for the card; none takes the one next to the policy, otherwise the newest
+    """File shifts.json for the card; null takes the one next to the policy, otherwise the newest
     under outputs/shifts of this network and task."""
 
     def check(self) -> None:
-        """Reject results for the card with an ONNX model, which has no card."""
+        """Reject settings of the model card for an ONNX model, which has none."""
         for name in ("certificate", "shifts"):
             if self.format == "onnx" and getattr(self, name) is not None:
                 raise InputError(
-                    f"{name} is for the card, which format=onnx has not; leave it out or use "
-                    "format=safetensors"
+                    f"{name} applies only to the model card, which format=onnx does not write; "
+                    "leave it out or give format=safetensors"
                 )
 
     def run(self, folder: Path) -> tuple[int, str]:

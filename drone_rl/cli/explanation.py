@@ -25,7 +25,7 @@ class ExplainCommand(CommandSettings, ExplainSettings):
     """Environments in a batch; bounds memory."""
     require: Annotated[str, OneOf(tuple(Kind))] | None = None
     """Kind of verdict to require, such as good; other kinds end with exit status 10 to 13 or 18.
-    none accepts all kinds."""
+    null accepts all kinds."""
     task: TaskChanges = no_changes()
     """Changes of the policy's task settings (see conf/task), as in task.num_cubes=5."""
     dynamics: DynamicsChanges = no_changes()
@@ -36,7 +36,7 @@ class ExplainCommand(CommandSettings, ExplainSettings):
         loaded = [drone_rl.load_policy(p, outputs=self.paths.outputs) for p in self.policy]
         done = drone_rl.explain(
             [p.in_task(**self.task).in_dynamics(**self.dynamics) for p in loaded],
-            self.narrowed(ExplainSettings),
+            self.as_base(ExplainSettings),
             folder=folder,
             num_envs=self.num_envs,
             outputs=self.paths.outputs,

@@ -10,7 +10,7 @@ import drone_rl
 from drone_rl.config.commands import PathsSettings
 from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.utils.files import trained_policies
-from drone_rl.utils.overrides import with_present_name
+from drone_rl.utils.overrides import with_current_name
 from drone_rl.utils.settings import Settings
 
 _log = logging.getLogger(__name__)
@@ -25,7 +25,7 @@ class CommandSettings(Settings):
     @classmethod
     def prepare(cls, overrides: Sequence[str]) -> list[str]:
         """Translate former names on a command line before Hydra composes it."""
-        return [re.sub(r"^checkpoint=", "policy=", with_present_name(o)) for o in overrides]
+        return [re.sub(r"^checkpoint=", "policy=", with_current_name(o)) for o in overrides]
 
     def run(self, folder: Path) -> tuple[int, object]:
         """Run the command; return the exit status and the value that a sweep maximises."""

@@ -17,11 +17,11 @@ class SweepReportCommand(CommandSettings):
     folder: str = "latest"
     """Folder of the sweep, or latest for the newest one."""
     picture: str | None = None
-    """PNG file of verdicts, one-sided policies and entropies to write, too; none for none."""
+    """Path of a PNG chart of verdicts, one-sided policies and entropies to write; null for none."""
     judge: bool = False
     """Whether to repeat the verdict on each finished run's last.pt with the current rule."""
     episodes: Annotated[int, Whole(1, unit="episodes")] = 200
-    """Episodes of such a verdict, in environments for selection."""
+    """Episodes of each of these verdicts, in environments for selection."""
     device: str = "cpu"
     """Device of these episodes: cpu, cuda or cuda:N."""
 
@@ -46,6 +46,6 @@ class SweepReportCommand(CommandSettings):
         print(report.terminal_lines(summary))
         if self.picture is not None:
             report.write_picture(sweep, Path(self.picture))
-            _log.info("picture: %s", self.picture)
+            _log.info("written: %s", self.picture)
         _log.info("written: %s", page)
         return 0, None

@@ -36,11 +36,11 @@ class TrainCommand(CommandSettings, TrainSettings):
     logger: Annotated[tuple[Logger, ...], Several(Instance(Logger), 0, 16)] = (Tensorboard(),)
     """Loggers in addition to metrics.csv."""
     resume: str | None = None
-    """Folder of a run to resume with its own settings; none starts a new one."""
+    """Folder of a run to resume with its own settings; null starts a new one."""
     provable: ProvableSettings = ProvableSettings()
     """Training until a proof succeeds."""
     trial: Annotated[int, Whole(0)] | None = None
-    """Number of this run in a search, which hydra/sweeper=optuna sets; none for no search."""
+    """Number of this run in a search, which hydra/sweeper=optuna sets; null for no search."""
 
     @classmethod
     def prepare(cls, overrides: Sequence[str]) -> list[str]:
@@ -60,7 +60,7 @@ class TrainCommand(CommandSettings, TrainSettings):
             train = functools.partial(drone_rl.train_until_proved, how=self.provable)
         try:
             done = train(
-                self.narrowed(TrainSettings),
+                self.as_base(TrainSettings),
                 folder=folder,
                 resume=self.resume is not None,
                 callbacks=_callbacks(self, folder),

@@ -22,7 +22,7 @@ class ProveCommand(PolicyCommandSettings, ProveSettings):
 
     def run(self, folder: Path) -> tuple[int, float]:
         """Verify a policy; return the exit status and the fraction of placements with success."""
-        chosen = self.narrowed(ProveSettings)
+        chosen = self.as_base(ProveSettings)
         proof = drone_rl.prove(self.policy, chosen, folder=folder, **self.shared())
         print(proof)
         _log.info("written: %s", folder / "certificate.json")
@@ -38,16 +38,16 @@ class CheckCommand(CommandSettings, CheckSettings):
     """Certificate: a file of drone-rl prove, or latest for the newest one."""
     policy: str | None = None
     """Policy of the certificate, as a file, the folder of a run, latest, or a shipped policy's
-    name; none takes the shipped policy that the certificate names."""
+    name; null takes the shipped policy that the certificate names."""
     task: TaskChanges = no_changes()
-    """Settings that the certificate's task must have, as in task.num_cubes=5; none accepts any."""
+    """Settings that the certificate's task must have, as in task.num_cubes=5; by default any."""
 
     def run(self, folder: Path) -> tuple[int, bool]:
         """Check a certificate; return the exit status and whether it is accepted."""
         done = drone_rl.check(
             self.certificate,
             self.policy,
-            self.narrowed(CheckSettings),
+            self.as_base(CheckSettings),
             task=self.task,
             outputs=self.paths.outputs,
             progress=silent,
@@ -60,8 +60,8 @@ class PlacesCommand(PolicyCommandSettings, PlacesSettings):
     """Settings of `drone-rl places`."""
 
     def run(self, folder: Path) -> tuple[int, float]:
-        """Map the outcome by cube position; return the exit status and the blind fraction."""
-        chosen = self.narrowed(PlacesSettings)
+        """Map actions by cube position; return the exit status and the fraction of missed turns."""
+        chosen = self.as_base(PlacesSettings)
         done = drone_rl.places(self.policy, chosen, **self.shared(), progress=silent)
         finish(done, folder, "places.json, places.png and places.svg")
         return 0, done.numbers["blind"]
@@ -71,12 +71,12 @@ class ChainCommand(PolicyCommandSettings, ChanceSettings):
     """Settings of `drone-rl chain`."""
 
     cubes: Annotated[tuple[float, ...], Several(Real(-10_000.0, 10_000.0, unit="m"), 0, 100)] = ()
-    """Lateral positions of the cubes of one placement, metres to the left, nearest first; none:
-    held-out placements."""
+    """Lateral positions of the cubes of one placement, metres to the left, nearest first; []
+    for held-out placements."""
 
     def run(self, folder: Path) -> tuple[int, float]:
         """Compute outcome probabilities; return the exit status and the success probability."""
-        chosen, cubes = self.narrowed(ChanceSettings), self.cubes or None
+        chosen, cubes = self.as_base(ChanceSettings), self.cubes or None
         done = drone_rl.chances(self.policy, cubes, chosen, **self.shared(), progress=silent)
         finish(done, folder / "chances.json")
         return 0, done.success

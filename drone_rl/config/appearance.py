@@ -3,17 +3,17 @@
 from typing import Annotated, Any
 
 from drone_rl.config.camera import FRONT, CameraSettings
-from drone_rl.config.task import Color, Things
+from drone_rl.config.task import Color, ObjectRegion
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Listed, Real, Several, Span, Whole
 from drone_rl.utils.settings import Settings
 
-Number = float | tuple[float, float]
+NumberOrRange = float | tuple[float, float]
 """A number, or a range that is sampled uniformly."""
-Tint = Color | tuple[Color, Color]
+ColorOrRange = Color | tuple[Color, Color]
 """Red, green, blue from 0 to 1, or a range of each."""
 Triple = tuple[float, float, float]
-Triples = Triple | tuple[Triple, Triple]
+TripleOrRange = Triple | tuple[Triple, Triple]
 """Three numbers, or a range of each."""
 Names = str | tuple[str, ...]
 """A name or several; stored as a tuple."""
@@ -34,54 +34,54 @@ class AppearanceSettings(Settings):
     The defaults are the tasks' own appearance.
     """
 
-    sun_elevation: Annotated[Number, Span(Real(1.0, 90.0, unit="degrees"))] = 55.2
+    sun_elevation: Annotated[NumberOrRange, Span(Real(1.0, 90.0, unit="degrees"))] = 55.2
     """Height of the sun above the horizon, in degrees."""
-    sun_azimuth: Annotated[Number, Span(Real(-360.0, 360.0, unit="degrees"))] = 127.9
+    sun_azimuth: Annotated[NumberOrRange, Span(Real(-360.0, 360.0, unit="degrees"))] = 127.9
     """Direction of the sun in degrees: 0 is straight ahead, 90 to the left."""
-    sun_strength: Annotated[Number, _Light] = 0.75
+    sun_strength: Annotated[NumberOrRange, _Light] = 0.75
     """Sunlight on a surface that faces the sun; its sum with ambient light should be about 1."""
-    sun_color: Annotated[Tint, _Tint] = (1.0, 1.0, 1.0)
+    sun_color: Annotated[ColorOrRange, _Tint] = (1.0, 1.0, 1.0)
     """Red, green, blue of the sun's light."""
-    ambient_strength: Annotated[Number, _Light] = 0.35
+    ambient_strength: Annotated[NumberOrRange, _Light] = 0.35
     """Ambient light, equal from all directions."""
     shadows: Annotated[float, Real(0.0, 1.0)] = 0.0
-    """Fraction of episodes in which the sun casts shadows."""
-    sky_horizon: Annotated[Tint, _Tint] = (0.62, 0.74, 0.92)
+    """Probability that the sun casts shadows in an episode."""
+    sky_horizon: Annotated[ColorOrRange, _Tint] = (0.62, 0.74, 0.92)
     """Colour of the sky at the horizon, and of fog."""
-    sky_zenith: Annotated[Tint, _Tint] | None = None
-    """Colour of the sky overhead; none for that of the horizon."""
+    sky_zenith: Annotated[ColorOrRange, _Tint] | None = None
+    """Colour of the sky overhead; null for that of the horizon."""
     fog_visibility: (
-        Annotated[Number, Span(Real(0.0, 100_000.0, is_above=True, unit="m"))] | None
+        Annotated[NumberOrRange, Span(Real(0.0, 100_000.0, is_above=True, unit="m"))] | None
     ) = None
-    """Distance at which fog reduces contrast to 5%, in metres; none for clear air."""
-    ground_color: Annotated[Tint, _Tint] = (0.5, 0.54, 0.48)
+    """Distance at which fog reduces contrast to 5%, in metres; null for clear air."""
+    ground_color: Annotated[ColorOrRange, _Tint] = (0.5, 0.54, 0.48)
     """Colour of the ground."""
-    object_color: Annotated[Tint, _Tint] | None = None
-    """Colour of targets and obstacles; none for the task's own."""
+    object_color: Annotated[ColorOrRange, _Tint] | None = None
+    """Colour of targets and obstacles; null for the task's own."""
     ground_texture: Annotated[Names, _Textures] | None = None
     """Texture of the ground: checker, grid, bricks, noise, an image file, or a list of these and
-    none, each equally likely."""
-    ground_tile: Annotated[Number, _Tile] = 4.0
+    none (no texture), each equally likely; null for no texture."""
+    ground_tile: Annotated[NumberOrRange, _Tile] = 4.0
     """Edge length of a tile of the ground texture, in metres."""
     object_texture: Annotated[Names, _Textures] | None = None
     """Texture of targets and obstacles; the same values as for the ground."""
-    object_tile: Annotated[Number, _Tile] = 2.0
+    object_tile: Annotated[NumberOrRange, _Tile] = 2.0
     """Edge length of a tile of the object texture, in metres."""
     distractors: Annotated[int | tuple[int, int], Span(Whole(0, 64, "distractors"))] = 0
     """Number of distractors: boxes, balls and cylinders to the sides."""
-    distractor_size: Annotated[Number, Span(Real(0.1, 50.0, unit="m"))] = (1.0, 4.0)
+    distractor_size: Annotated[NumberOrRange, Span(Real(0.1, 50.0, unit="m"))] = (1.0, 4.0)
     """Edge length or diameter of each distractor, in metres."""
-    distractor_color: Annotated[Tint, _Tint] | None = None
-    """Colour of each distractor; none for six colours in turn."""
-    distractor_distance: Annotated[Number, Span(Real(0.1, 200.0, unit="m"))] = (2.0, 14.0)
+    distractor_color: Annotated[ColorOrRange, _Tint] | None = None
+    """Colour of each distractor; null for six colours in turn."""
+    distractor_distance: Annotated[NumberOrRange, Span(Real(0.1, 200.0, unit="m"))] = (2.0, 14.0)
     """Lateral distance of each distractor from the area of targets and obstacles, in metres."""
-    camera_offset: Annotated[Triples, _Place] = (0.0, 0.0, 0.0)
+    camera_offset: Annotated[TripleOrRange, _Place] = (0.0, 0.0, 0.0)
     """Offset of the policy's camera from its default place: forward, left, up, in metres."""
-    camera_turn: Annotated[Triples, _Turn] = (0.0, 0.0, 0.0)
-    """Rotation of the camera, in degrees: roll (to the right), pitch (down), yaw (to the left)."""
-    camera_widening: Annotated[Number, Span(Real(-160.0, 160.0, unit="degrees"))] = 0.0
-    """Degrees added to the horizontal field of view of the camera's settings."""
-    exposure: Annotated[Number, Span(Real(0.01, 100.0))] = 1.0
+    camera_turn: Annotated[TripleOrRange, _Turn] = (0.0, 0.0, 0.0)
+    """Roll, pitch, yaw of the camera in degrees; positive: right side down, down, to the left."""
+    camera_widening: Annotated[NumberOrRange, Span(Real(-160.0, 160.0, unit="degrees"))] = 0.0
+    """Degrees added to `camera.horizontal_fov`; negative values narrow the field of view."""
+    exposure: Annotated[NumberOrRange, Span(Real(0.01, 100.0))] = 1.0
     """Factor by which the camera multiplies all colours."""
 
     @property
@@ -101,7 +101,7 @@ _NARROWEST, _WIDEST = 1.0, 170.0
 
 
 def check_appearance(
-    settings: AppearanceSettings, camera: CameraSettings, things: Things | None, task: str
+    settings: AppearanceSettings, camera: CameraSettings, things: ObjectRegion | None, task: str
 ) -> None:
     """Check that appearance, camera and object positions (None if unknown) are compatible.
 

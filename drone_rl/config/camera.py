@@ -7,16 +7,16 @@ from drone_rl.utils.schema import OneOf, Real, Whole
 from drone_rl.utils.settings import Settings
 
 FRONT = (0.4, 0.0, 0.0)
-"""Where it sits on the drone. Metres, drone frame: x forward, y left, z up."""
+"""Position of the policy's camera on the drone. Metres, drone frame: x forward, y left, z up."""
 
 
 class CameraSettings(Settings):
-    """The picture that the policy's camera takes."""
+    """Settings of the policy's camera."""
 
     width: Annotated[int, Whole(1, 1024, "pixels")] = 64
-    """Pixels across."""
+    """Width of the image in pixels."""
     height: Annotated[int, Whole(1, 1024, "pixels")] = 25
-    """Pixels down."""
+    """Height of the image in pixels."""
     horizontal_fov: Annotated[float, Real(1.0, 170.0, unit="degrees")] = 135.0
     """Horizontal field of view in degrees."""
 
@@ -31,17 +31,17 @@ RENDERERS = ("raytrace", "mujoco_warp")
 """Names of the renderers, see `drone_rl.sim.rendering.renderer`."""
 
 RendererName = Annotated[str, OneOf(RENDERERS)]
-"""A setting that chooses one."""
+"""Type of a setting that selects a renderer."""
 
 
-class Rendered(Settings):
+class RendererSettings(Settings):
     """Settings of a command that renders images."""
 
     renderer: RendererName = "raytrace"
     """Renderer: raytrace, this package's ray tracer, or mujoco_warp, MuJoCo Warp's."""
 
 
-class OnDevice(Rendered):
+class DeviceSettings(RendererSettings):
     """Settings of a command that renders images and evaluates policies."""
 
     device: str = "cpu"

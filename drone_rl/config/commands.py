@@ -3,13 +3,13 @@
 from typing import Annotated, Any
 
 from drone_rl.config import ActionSettings, CameraSettings, DynamicsSettings
-from drone_rl.config.camera import OnDevice, Rendered
+from drone_rl.config.camera import DeviceSettings, RendererSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Listed, Maybe, OneOf, Real, Several, Whole
 from drone_rl.utils.settings import Settings
 
 
-class FlightSettings(OnDevice):
+class HeldOutSettings(DeviceSettings):
     """Settings of held-out episodes."""
 
     episodes: Annotated[int, Whole(1, unit="episodes")] = 1000
@@ -26,14 +26,14 @@ class FlightSettings(OnDevice):
         return min(self.num_envs, self.episodes)
 
 
-class EvaluateSettings(FlightSettings):
+class EvaluateSettings(HeldOutSettings):
     """Settings of an evaluation."""
 
     baselines: bool = True
     """Evaluate the random and constant baselines and the oracle, too."""
 
 
-class JudgeSettings(FlightSettings):
+class JudgeSettings(HeldOutSettings):
     """Settings of a verdict."""
 
     episodes: Annotated[int, Whole(1, unit="episodes")] = 400
@@ -92,11 +92,11 @@ class BodiesSettings(JudgeSettings):
 MODES = ("constant", "drifting", "onset")
 
 
-class ShiftSettings(OnDevice):
+class ShiftSettings(DeviceSettings):
     """Settings of robustness tests."""
 
     axes: Annotated[Any, Maybe(Listed("axis"))] = None
-    """Axes or groups of axes, as in axes=[sun,fog]; none for all axes of the task."""
+    """Axes or groups of axes, as in axes=[sun,fog]; null for all axes of the task."""
     strengths: Annotated[tuple[int, ...], Several(Whole(1, 5), 1, 5)] = (1, 2, 3, 4, 5)
     """Strengths to test of the five of each axis, in rising order."""
     modes: Annotated[tuple[str, ...], Several(OneOf(MODES), 1, 3)] = MODES
@@ -126,7 +126,7 @@ class ShiftSettings(OnDevice):
             )
 
 
-class GymnasiumSettings(OnDevice):
+class GymnasiumSettings(DeviceSettings):
     """Options of `gymnasium.make`; no command has them, so that no file of conf/ does."""
 
     observations: Annotated[str, OneOf(("pixels", "state"))] = "pixels"
@@ -138,14 +138,14 @@ class GymnasiumSettings(OnDevice):
     actions: ActionSettings = ActionSettings()
     """Actions of the policy."""
     render_mode: Annotated[str, OneOf(("rgb_array",))] | None = None
-    """Return value of `render`: none, or rgb_array for images of the drone from behind."""
+    """Return value of `render`: None, or rgb_array for images of the drone from behind."""
 
 
 class BenchSettings(Settings):
     """Settings of the benchmarks."""
 
     only: Annotated[tuple[str, ...], Listed("benchmark")] | None = None
-    """Names of benchmarks or of groups of them; none for all without a result of this revision."""
+    """Names of benchmarks or of groups of them; null for all without a result of this revision."""
     quick: bool = False
     """Run a short version of each benchmark with rough results."""
     seeds: Annotated[tuple[int, ...], Several(Whole(0), 1, 1000)] = (0, 1, 2, 3, 4)
@@ -169,7 +169,7 @@ class PathsSettings(Settings):
     """Folder under which each command creates its own folder."""
 
 
-class CheckSettings(OnDevice):
+class CheckSettings(DeviceSettings):
     """Settings of a certificate check."""
 
     flights: Annotated[int, Whole(1, 10_000_000, "rollouts")] = 2000
@@ -179,7 +179,7 @@ class CheckSettings(OnDevice):
     printed and recorded."""
 
 
-class ChanceSettings(OnDevice):
+class ChanceSettings(DeviceSettings):
     """Settings of exact success probabilities under sampled actions."""
 
     placements: Annotated[int, Whole(1, unit="placements")] = 100
@@ -193,7 +193,7 @@ class ChanceSettings(OnDevice):
     """Cells of such a box: more cells give tighter bounds and take longer."""
 
 
-class ProveSettings(Rendered):
+class ProveSettings(RendererSettings):
     """Settings of a proof."""
 
     logit_gap: Annotated[float, Real(0.0, 1.0)] = 1e-4
@@ -201,7 +201,7 @@ class ProveSettings(Rendered):
     compared: Annotated[int, Whole(1, 10_000_000, "images")] = 4_000
     """Random images for which renderer and closed form must agree before the proof begins."""
     limit_s: Annotated[float, Real(0.0, unit="s")] | None = None
-    """Seconds after which the proof stops and can be resumed; none for no limit."""
+    """Seconds after which the proof stops and can be resumed; null for no limit."""
     save_interval_s: Annotated[float, Real(0.0, unit="s")] = 30.0
     """Seconds between saved states, from which a killed proof resumes."""
     most_boxes: Annotated[int, Whole(1, unit="boxes")] = 2_000_000
@@ -210,7 +210,7 @@ class ProveSettings(Rendered):
     """Cached combinations of images; proofs of more cubes are split into parts."""
 
 
-class PlacesSettings(Rendered):
+class PlacesSettings(RendererSettings):
     """Settings of the decision map over the positions of one cube."""
 
     nearest: Annotated[float, Real(0.0, 1000.0, unit="m")] = 2.5
@@ -252,4 +252,4 @@ class ProvableSettings(Settings):
     most_boxes: Annotated[int, Whole(1, unit="boxes")] = 20_000
     """Most failures that a round replays: the largest boxes of a proof."""
     limit_s: Annotated[float, Real(0.0, unit="s")] | None = None
-    """Seconds after which a proof stops and its failures so far are replayed; none for no limit."""
+    """Seconds after which a proof stops and its failures so far are replayed; null for no limit."""

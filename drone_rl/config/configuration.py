@@ -20,11 +20,11 @@ from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.schema import as_mapping, shown
 from drone_rl.utils.settings import (
     Settings,
-    below,
     check_names,
+    current_names,
     kinds_of,
     plain,
-    present_names,
+    prefixed_errors,
     snake_case,
     types_of,
 )
@@ -93,8 +93,8 @@ class Variant(Settings):
             if isinstance(name, str) and name in variants:
                 return variants[name]
         raise InputError(
-            f"{where}={shown(name)} is not registered; there are: {', '.join(variants)}; if it is "
-            "a part of your own, give plugins=[MODULE] with the module that registers it"
+            f"{where}={shown(name)} is not registered; valid names: {', '.join(variants)}; if it "
+            "is a part of your own, give plugins=[MODULE] with the module that registers it"
             f"{did_you_mean(name, variants)}"
         )
 
@@ -146,13 +146,13 @@ def from_config(cls: type[S], config: Any, where: str = "") -> S:
     Raises:
         InputError: A name is unknown or a value invalid; the message begins with its place.
     """
-    given = present_names(cls, as_mapping(config, where or "settings"))
+    given = current_names(cls, as_mapping(config, where or "settings"))
     prefix = f"{where}." if where else ""
     check_names(cls, given, prefix)
     values = {name: _read(types_of(cls)[name], given[name], prefix + name) for name in given}
     if not where:
         return cls(**values)
-    with below(where):
+    with prefixed_errors(where):
         return cls(**values)
 
 
@@ -172,7 +172,7 @@ def variant_of(part: type[Variant], config: Any, where: str) -> Variant:
         known = part.named(target, f"{where}._target_")
     if known is not part and values.keys() <= kinds_of(known).keys():
         return from_config(known, values, where)
-    with below(where):
+    with prefixed_errors(where):
         return _unregistered(known, target, values)
 
 
@@ -260,7 +260,7 @@ class Changes:
         for name in given:
             if name not in self.types:
                 known, meant = ", ".join(self.types), did_you_mean(name, self.types)
-                raise InputError(f"{where}.{name} is unknown; there are: {known}{meant}")
+                raise InputError(f"{where}.{name} is unknown; valid names: {known}{meant}")
         given = {name: v for name, v in given.items() if v is not None}
         if self.of is None:
             return given

@@ -79,10 +79,11 @@ class Collector(Variant):
     """Settings of a collector."""
 
     num_envs: Annotated[int, Whole(1, unit="environments")] = 16
-    """Environments, each with one episode or with as many steps as the others in a batch."""
+    """Environments. A batch is one complete episode of each; with collector=rollouts it is a fixed
+    number of steps of each."""
     num_threads: Annotated[int, Whole(1, unit="threads")] = 1
     """Groups of environments that are collected in parallel, each by its own thread or worker. Each
-    samples actions from its own stream: results for a seed depend on it."""
+    samples actions from its own stream, so results for a seed differ."""
 
     def arguments(self) -> dict[str, Any]:
         """Return nothing: the factory takes the settings of the whole training."""
@@ -94,7 +95,7 @@ class CompleteEpisodes(Collector):
 
     compiled: bool = True
     """Run whole episodes in one fused kernel if it supports task, camera and network, which is much
-    faster on a CPU. It samples actions in another order: results for a seed depend on it."""
+    faster on a CPU. It samples actions in a different order, so results for a seed differ."""
 
 
 class Episodes(CompleteEpisodes, target="episodes"):
@@ -105,10 +106,10 @@ class Ray(CompleteEpisodes, target="ray"):
     """Batches of complete episodes from workers on a Ray cluster."""
 
     num_threads: Annotated[int, Whole(1, unit="workers")] = 2
-    """Workers, each with its part of the environments and its own stream of actions: results for a
-    seed depend on it."""
+    """Workers, each with its part of the environments and its own stream of actions, so results for
+    a seed differ."""
     address: str | None = None
-    """Address of the cluster, such as auto or ray://host:10001; none starts one on this machine."""
+    """Address of the cluster, such as auto or ray://host:10001; null starts one on this machine."""
     num_cpus: Annotated[float, Real(0.0, is_above=True, unit="cores")] = 1.0
     """Cores that a worker takes of the cluster."""
     max_lost_workers: Annotated[int, Whole(0, unit="workers")] = 10
@@ -141,7 +142,7 @@ class Adam(Optimizer, target="torch.optim.Adam"):
 
 
 class Sgd(Optimizer, target="torch.optim.SGD"):
-    """Plain stochastic gradient ascent (Eq. 13)."""
+    """Plain SGD (Eq. 13 as descent on the negative objective)."""
 
     lr: LearningRate = 1e-4
     """Learning rate; the original study's."""
@@ -173,7 +174,7 @@ Weight = Annotated[float, Real(0.0)]
 
 
 class Objective(Variant):
-    """Settings of a loss and its learner, which `make` builds from a training's components."""
+    """Settings of a loss and its learner."""
 
     needs: ClassVar[Mapping[str, Variant]] = {}
     """Other parts that the objective requires, and selects unless they are given."""

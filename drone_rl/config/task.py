@@ -12,12 +12,12 @@ from drone_rl.utils.settings import Settings
 Length = Annotated[float, Real(0.001, 10_000.0, unit="m")]
 Bound = Annotated[float, Real(0.0, 10_000.0, unit="m")]
 Color = Annotated[tuple[float, float, float], Several(Real(0.0, 1.0), 3, 3)]
-FIRST = "collect_cubes"
-"""The task of files that name none."""
+DEFAULT_TASK = "collect_cubes"
+"""Task of files that do not name one."""
 
 
-class Things(NamedTuple):
-    """Where targets and obstacles are, so that distractors keep their distance. Metres."""
+class ObjectRegion(NamedTuple):
+    """Region of targets and obstacles, which distractors are placed outside. Metres."""
 
     size: float
     """Edge of one, seen from above."""
@@ -34,19 +34,19 @@ class Things(NamedTuple):
 
 
 class BaseTaskSettings(Settings):
-    """Base class of a task's settings."""
+    """Settings of a task: scene, rewards and ends of episodes."""
 
     name: ClassVar[str]
     """Name of the task in files."""
 
     @property
-    def things(self) -> Things | None:
+    def things(self) -> ObjectRegion | None:
         """Positions of targets and obstacles; None if unknown."""
         return None
 
     def values(self) -> dict[str, Any]:
-        """See `Settings.values`; a task other than `FIRST` has its name."""
-        named = {} if self.name == FIRST else {"name": self.name}
+        """See `Settings.values`; a task other than `DEFAULT_TASK` has its name."""
+        named = {} if self.name == DEFAULT_TASK else {"name": self.name}
         return {**named, **super().values()}
 
 
@@ -65,8 +65,8 @@ def add_task(settings: S) -> S:
 def settings_of(name: object, where: str = "task.name") -> type[BaseTaskSettings]:
     """Return the class of a task's settings; `where` is the setting's name for messages."""
     if not isinstance(name, str) or name not in TASKS:
-        meant = did_you_mean(name, TASKS)
-        raise InputError(f"{where}={shown(name)} is unknown; there are: {', '.join(TASKS)}{meant}")
+        known = ", ".join(TASKS) + did_you_mean(name, TASKS)
+        raise InputError(f"{where}={shown(name)} is unknown; valid names: {known}")
     return TASKS[name]
 
 
@@ -76,7 +76,7 @@ def named_settings(data: Any, where: str) -> tuple[type[BaseTaskSettings], Mappi
     A mapping without "name" describes the first task. See `settings_of` for errors.
     """
     given = dict(as_mapping(data, where))
-    return settings_of(given.pop("name", FIRST), f"{where}.name"), given
+    return settings_of(given.pop("name", DEFAULT_TASK), f"{where}.name"), given
 
 
 def read_task(data: Any, where: str) -> BaseTaskSettings:
@@ -90,11 +90,11 @@ class TaskSettings(BaseTaskSettings):
     """The cubes, the drone's moves and the boundaries. Lengths in metres.
 
     World frame: x forward, y left, z up; the drone starts at x = y = 0. The defaults are the
-    original study's. It does not state the sizes of cube and drone: with these a uniformly random
-    policy collects about as much as it did there (0.84 cubes).
+    original study's, except the sizes of cube and drone, which it does not state. With these, a
+    uniformly random policy collects about as many cubes as in the study (0.84).
     """
 
-    name: ClassVar[str] = FIRST
+    name: ClassVar[str] = DEFAULT_TASK
     num_cubes: Annotated[int, Whole(1, 100, "cubes")] = 3
     """Cubes placed in every episode."""
     first_distance: Length = 15.0
@@ -143,11 +143,11 @@ class TaskSettings(BaseTaskSettings):
         return self.lateral_bound + self.side_margin
 
     @property
-    def things(self) -> Things:
+    def things(self) -> ObjectRegion:
         """The cubes."""
         first, last = self.first_distance, self.last_distance
         color, bound = self.cube_color, self.lateral_bound
-        return Things(self.cube_size, color, bound, first, last, self.altitude)
+        return ObjectRegion(self.cube_size, color, bound, first, last, self.altitude)
 
     def check(self) -> None:
         """Reject tasks that can't be simulated or solved."""
@@ -203,7 +203,7 @@ class PillarsSettings(BaseTaskSettings):
     width: Length = 1.0
     """Edge of a pillar's square cross-section."""
     spread: Length = 8.0
-    """Pillars stand uniformly with |y| at most this; who leaves that range is out of bounds."""
+    """Pillars are placed uniformly with |y| at most this; beyond, the drone is out of bounds."""
     height: Length = 6.0
     """Height of a pillar."""
     pillar_color: Color = (0.25, 0.16, 0.12)
@@ -247,11 +247,11 @@ class PillarsSettings(BaseTaskSettings):
         return self.last_distance + self.finish_margin
 
     @property
-    def things(self) -> Things:
+    def things(self) -> ObjectRegion:
         """The pillars."""
         first, last = self.first_distance, self.last_distance
         color, bound = self.pillar_color, self.spread
-        return Things(self.width, color, bound, first, last, self.altitude)
+        return ObjectRegion(self.width, color, bound, first, last, self.altitude)
 
     def check(self) -> None:
         """Reject fields that can't be simulated or crossed."""
@@ -279,9 +279,9 @@ class PillarsSettings(BaseTaskSettings):
             )
         if sum(self._is_open(row) for row in self._rows()) < _LEAST_OPEN:
             raise InputError(
-                f"density={self.density} makes fields too dense to cross: of {_TRIED} rows, next "
-                "to none leave a way through; give a lower density, a smaller width or a larger "
-                "spread"
+                f"density={self.density} makes fields too dense to cross: fewer than {_LEAST_OPEN} "
+                f"of {_TRIED} sampled rows have a gap; give a lower density, a smaller width or a "
+                "larger spread"
             )
 
     def _rows(self) -> Iterator[list[float]]:

@@ -38,28 +38,30 @@ MOST_TRANSFORMS = 16
 
 
 class TrainerSettings(Settings):
-    """Settings of the length of a training."""
+    """Settings of the training loop: stopping rule, gradients, threads, checkpoints."""
 
     total_frames: Annotated[int, Whole(1, unit="frames")] = 2_000_000
     """Stop once this many frames were collected."""
     total_episodes: Annotated[int, Whole(1, unit="episodes")] | None = None
-    """Stop once this many episodes were collected; none for no limit."""
+    """Stop once this many episodes were collected; null for no limit."""
     target_share: Annotated[float, Real(0.0, 1.0, is_above=True)] | None = 0.99
-    """Stop once the running mean reaches this share of the greatest reward; none for never."""
+    """Stop once the running reward reaches this fraction of the task's `largest_reward`; null
+    disables this rule."""
     confirm_episodes: Annotated[int, Whole(0, unit="episodes")] = 200
-    """Greedy episodes in other scenes that must confirm a policy at the target before training
-    stops; 0 for none."""
+    """Greedy episodes in other environments that must confirm the policy before `target_share`
+    stops the training; 0 skips the confirmation."""
     confirm_share: Annotated[float, Real(0.0, 1.0)] = 1.0
     """Fraction of these episodes that must reach every goal."""
     running_decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.99
     """Weight of the old value in the running mean, per episode: 0.99 averages about 100."""
     max_grad_norm: Annotated[float, Real(0.0, is_above=True)] | None = None
-    """Clip the gradient to this norm; none for no clipping."""
+    """Clip the gradient to this norm; null for no clipping."""
     chunk_frames: Annotated[int, Whole(1, unit="frames")] = 1024
-    """Frames in one forward and backward pass; bounds memory. Sums are rounded by it."""
+    """Frames per forward and backward pass. Gradients are accumulated over chunks, so this bounds
+    memory and affects only rounding."""
     compiled: bool = True
     """Compute gradients in a fused kernel if it supports the network, which is faster on a CPU.
-    Sums have another order: results for a seed depend on it."""
+    It sums in a different order, so results for a seed differ."""
     num_threads: Annotated[int, Whole(1, unit="threads")] = 2
     """Threads of the learner; results depend on their number through rounding."""
     checkpoint_interval_s: Annotated[float, Real(0.0, unit="s")] = 15.0
@@ -96,7 +98,7 @@ class TrainSettings(Settings):
     collector: Collector = Episodes()
     """Collector."""
     trainer: TrainerSettings = TrainerSettings()
-    """Length of the training."""
+    """Training loop: stopping rule, gradients, threads, checkpoints."""
     seed: Annotated[int, Whole(0)] = 0
     """Root of all random streams: scenes, actions, initial weights."""
     device: str = "cpu"
@@ -104,13 +106,13 @@ class TrainSettings(Settings):
     renderer: RendererName = "raytrace"
     """Renderer: raytrace, this package's ray tracer, or mujoco_warp, MuJoCo Warp's."""
     evaluate_after: Annotated[int, Whole(0, unit="episodes")] = 0
-    """Episodes, in environments for selection, of the verdict on last.pt at the end; 0 for none."""
+    """Episodes of the final verdict on last.pt, in environments for selection; 0 for no verdict."""
 
     def check(self) -> None:
         """Refuse parts that don't work together."""
         if self.renderer != "raytrace" and not self.appearance.is_minimal:
             raise InputError(
-                f"renderer={self.renderer} draws the minimal appearance alone; give "
+                f"renderer={self.renderer} supports only appearance=minimal; give "
                 "renderer=raytrace or appearance=minimal"
             )
         self.dynamics.check_air()
@@ -120,15 +122,14 @@ class TrainSettings(Settings):
             given = getattr(self, name)
             if given.is_known and not isinstance(given, type(part)):
                 raise InputError(
-                    f"objective={objective} does not go with these settings of {name}; give "
-                    f"{name}={part.name}"
+                    f"objective={objective} requires {name}={part.name}, got {name}={given.name}"
                 )
         for name, kind in {"returns": Gae, "collector": Rollouts}.items():
             part = getattr(self, name)
             if isinstance(part, kind) and name not in needs:
                 raise InputError(
-                    f"{name}={part.name} is for a critic, which objective={objective} lacks; give "
-                    f"objective=ppo or a2c, or another {name}"
+                    f"{name}={part.name} requires a critic, which objective={objective} does not "
+                    f"have; set objective=ppo or a2c, or choose a different value of {name}"
                 )
 
     def replace(self, **changes: Any) -> Self:
@@ -142,7 +143,7 @@ class TrainSettings(Settings):
 
 
 _NEEDS = re.compile(r"([a-z][\w.-]*) (?:could not be imported|is not installed|is required)")
-"""What TorchRL's loggers say of a package that they miss."""
+"""Pattern of the messages of TorchRL's loggers about a missing package."""
 
 
 class Logger(Variant):
@@ -155,10 +156,10 @@ class Logger(Variant):
         except ImportError as error:  # TorchRL raises it without the name of the package
             words = _NEEDS.match(str(error).lower())
             package = (error.name or (words and words[1]) or "").partition(".")[0]
-            remedy = f"pip install {package}" if package else "pip install with what it needs"
+            remedy = f" (pip install {package})" if package else ""
             raise InputError(
-                f"logger _target_={self.target} can't be made ({error}); install what it needs: "
-                f"{remedy}, or choose another logger"
+                f"logger _target_={self.target} can't be made ({error}); install the package that "
+                f"it needs{remedy}, or choose another logger"
             ) from error
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 from drone_rl.config.configuration import Variant
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Several, Whole
-from drone_rl.utils.settings import below
+from drone_rl.utils.settings import prefixed_errors
 
 
 class Frame(NamedTuple):
@@ -21,16 +21,16 @@ class Transform(Variant):
     """Settings of a transform."""
 
     needs: ClassVar[str] = ""
-    """Required input: "bytes" for RGB bytes of the camera, "floats", or any."""
+    """Required input: "bytes" (RGB of the camera), "floats", or "" for both."""
 
     def output(self, frame: Frame) -> Frame | None:
-        """Return shape and type of the transformed image; None if they require a call.
+        """Return shape and type of the output; None if only a call of the transform shows them.
 
         Raises:
             InputError: The transform can't process images of this shape and type.
         """
         if self.needs == "bytes" and (frame.is_float or frame.shape[-1] != 3):
-            raise InputError(f"the transform {self.name} needs the camera's own RGB; put it first")
+            raise InputError(f"the transform {self.name} needs the camera's bytes; put it first")
         if self.needs == "floats" and not frame.is_float:
             raise InputError(f"the transform {self.name} needs floats; put gray before it")
         return self._transformed(frame)
@@ -177,7 +177,7 @@ class DeadRows(Fault, target="dead_rows"):
             raise InputError(f"rows={list(self.rows)} names a row twice; name each once")
 
     def _transformed(self, frame: Frame) -> Frame:
-        with below(f"transforms.{self.name}"):
+        with prefixed_errors(f"transforms.{self.name}"):
             self.check_height(frame.shape[-2])
         return frame
 
@@ -185,11 +185,11 @@ class DeadRows(Fault, target="dead_rows"):
         """Raise an `InputError` if an image of this height has too few rows."""
         if max(self.rows, default=0) >= height:
             raise InputError(
-                f"rows={list(self.rows)} of an image of {height} rows; give at most {height - 1}"
+                f"rows={list(self.rows)}: the image has {height} rows; give at most {height - 1}"
             )
         if self.count + len(self.rows) > height:
             raise InputError(
-                f"count={self.count} of an image of {height} rows, of which {len(self.rows)} are "
+                f"count={self.count}: the image has {height} rows, of which {len(self.rows)} are "
                 f"always dead; give at most {height - len(self.rows)}"
             )
 
@@ -212,6 +212,6 @@ class Shift(Fault, target="shift"):
     """Image shift that is constant within an episode, as from a misaligned camera."""
 
     down: Annotated[int, Whole(0, 1023, "pixels")] = 4
-    """Largest shift up or down; shifts are uniformly distributed."""
+    """Largest vertical shift, up or down; shifts are uniformly distributed."""
     across: Annotated[int, Whole(0, 1023, "pixels")] = 6
-    """Largest shift to the left or right."""
+    """Largest horizontal shift, to the left or right."""

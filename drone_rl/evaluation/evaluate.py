@@ -8,7 +8,7 @@ from typing import Any
 
 from tensordict.nn import TensorDictModuleBase
 
-from drone_rl.config.commands import EvaluateSettings, FlightSettings
+from drone_rl.config.commands import EvaluateSettings, HeldOutSettings
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.baselines import run_baselines
 from drone_rl.evaluation.metrics import summarise
@@ -144,7 +144,7 @@ def evaluate(
 
 
 def held_out_environments(
-    policy: BasePolicy, settings: FlightSettings, seed: RootSeed
+    policy: BasePolicy, settings: HeldOutSettings, seed: RootSeed
 ) -> AbstractContextManager[tuple[Any, TensorDictModuleBase]]:
     """Return a context manager of environments that no training uses, and the policy's actor."""
     where: dict[str, Any] = {"device": settings.device, "renderer": settings.renderer}

@@ -26,9 +26,9 @@ class ExplainSettings(Settings):
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
     """A good policy succeeds in more than this fraction of the oracle's episodes."""
     layer: str | None = None
-    """Layer whose features t-SNE embeds; none for the last one before the logits."""
+    """Layer whose features t-SNE embeds; null for the last one before the logits."""
     grad_cam_layer: str | None = None
-    """Layer of Grad-CAM; none for the last convolution's nonlinearity."""
+    """Layer of Grad-CAM; null for the last convolution's nonlinearity."""
     perplexity: Annotated[float, Real(1.0, unit="neighbours")] = 30.0
     """Perplexity of t-SNE."""
     seed: Annotated[int, Whole(0)] | None = None

@@ -29,7 +29,7 @@ from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.settings import Settings, below
+from drone_rl.utils.settings import Settings, prefixed_errors
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,13 +74,13 @@ class ExternalPolicy(BasePolicy):
                 raise InputError(f"task.{min(changes)} is unknown; the task has no settings")
             return self
         changed = Changes(type(self.task)).read(changes, "task")
-        with below("task"):
+        with prefixed_errors("task"):
             return dataclasses.replace(self, own_task=self.task.replace(**changed))
 
     def in_dynamics(self, **changes: Any) -> "ExternalPolicy":
         """Return the same policy with other dynamics, such as `in_dynamics(wind=(5, 0, 0))`."""
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
-        with below("dynamics"):
+        with prefixed_errors("dynamics"):
             used_dynamics = self.dynamics.replace(**changed)
         used_dynamics.check_air()
         return dataclasses.replace(self, used_dynamics=used_dynamics)

@@ -39,7 +39,7 @@ from drone_rl.sim.tasks import State, as_task
 from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import Stream, torch_generator, world_random_state
-from drone_rl.utils.settings import below
+from drone_rl.utils.settings import prefixed_errors
 
 _CLUTTER = 1000
 """Number of the distractors' random stream; those of faults begin at 1."""
@@ -89,9 +89,9 @@ class PairedEvaluator:
 
     def settings(self, condition: Condition) -> tuple[BaseTaskSettings, CameraSettings]:
         """Return task and camera under a condition; a setting out of range is an `InputError`."""
-        with below("task"):
+        with prefixed_errors("task"):
             task = self.subject.task.replace(**condition.task)
-        with below("camera"):
+        with prefixed_errors("camera"):
             camera = self.subject.camera.replace(**condition.camera)
         return task, camera
 

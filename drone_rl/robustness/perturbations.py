@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import BaseTaskSettings
-from drone_rl.config.task import Things
+from drone_rl.config.task import ObjectRegion
 from drone_rl.envs import fault_models
 from drone_rl.envs.fault_models import FaultModel, Sample
 from drone_rl.sim.rendering import Appearance, Distractors, Scene
@@ -195,7 +195,7 @@ def elevation(direction: Colors) -> float:
     return math.degrees(math.atan2(-z, math.hypot(x, y)))
 
 
-def task_things(settings: BaseTaskSettings) -> Things:
+def task_things(settings: BaseTaskSettings) -> ObjectRegion:
     """Return where a task's objects are, their size and colour; an `InputError` without any."""
     if settings.things is None:
         raise InputError(f"axes=distractors is not for task={settings.name}; leave it out of axes")
@@ -208,7 +208,7 @@ def as_bright(color: Sequence[float]) -> tuple[float, ...]:
     return tuple(min(1.0, wanted / has * c) for c in _BLUE)
 
 
-def sample_distractors(things: Things, num_envs: int, generator: torch.Generator) -> Tensor:
+def sample_distractors(things: ObjectRegion, num_envs: int, generator: torch.Generator) -> Tensor:
     """Sample positions of distractors next to the area of the task, metres, world frame.
 
     Shape: (num_envs, MOST, 3), float64.
@@ -220,7 +220,7 @@ def sample_distractors(things: Things, num_envs: int, generator: torch.Generator
     return stand(things, ahead, near + sampled[..., 1] * (far - near), is_left, things.altitude)
 
 
-def clutter(appearance: Appearance | None, things: Things, places: Tensor) -> Appearance:
+def clutter(appearance: Appearance | None, things: ObjectRegion, places: Tensor) -> Appearance:
     """Add distractors of the size, height and luminance of the task's objects.
 
     Their places are in metres, world frame. Shape: (num_envs, count, 3).

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from drone_rl.config import AppearanceSettings, BaseTaskSettings, CameraSettings
 from drone_rl.config.appearance import NO_TEXTURE, Names, check_appearance
-from drone_rl.config.task import Things
+from drone_rl.config.task import ObjectRegion
 from drone_rl.sim.rendering import Appearance, Distractors, Mounting, Texture, textures
 from drone_rl.sim.rendering.appearance import product, turned, zoom_for_fov
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -37,7 +37,7 @@ _TURN = (5**0.5 - 1) / 2
 """The step, as a fraction of the path, that leaves the most even gaps."""
 
 
-def things_of(task: Any) -> Things | None:
+def things_of(task: Any) -> ObjectRegion | None:
     """Return where the props of a task, or of its settings, stand; None if unknown."""
     settings = task if isinstance(task, BaseTaskSettings) else getattr(task, "settings", None)
     return getattr(settings, "things", None)
@@ -50,7 +50,7 @@ def most_distractors(settings: AppearanceSettings) -> int:
 
 
 def stand(
-    things: Things, ahead: Tensor, aside: Tensor, is_left: Tensor, height: float | Tensor
+    things: ObjectRegion, ahead: Tensor, aside: Tensor, is_left: Tensor, height: float | Tensor
 ) -> Tensor:
     """Return positions next to the path, metres, world frame. Shape: (*, 3), float64.
 
@@ -61,7 +61,7 @@ def stand(
 
 
 def draw_distractors(
-    settings: AppearanceSettings, things: Things | None, source: np.random.RandomState | None
+    settings: AppearanceSettings, things: ObjectRegion | None, source: np.random.RandomState | None
 ) -> list[float]:
     """Sample `WIDTH` numbers of each distractor, left and right of the path of the task's props.
 

@@ -16,9 +16,9 @@ from drone_rl.utils.files import parse_json, read_bytes, read_json, refuse_links
 from drone_rl.utils.limits import RESULT_BYTES, SWEEP_BYTES
 from drone_rl.utils.overrides import COMMAND, MOST_OVERRIDES, check_harmless
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.readers import with_present_names
+from drone_rl.utils.readers import with_current_names
 from drone_rl.utils.schema import Maybe, Plain, Record, Several, Text, Whole, as_mapping, shown
-from drone_rl.utils.settings import present_names
+from drone_rl.utils.settings import current_names
 
 FORMAT = "drone_rl sweep"
 MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s", "renderer")
@@ -92,7 +92,7 @@ def read_result(folder: Path) -> dict[str, Any] | None:
         reason = Text(100).read(result.get("reason"), "reason")
     except InputError:
         return None
-    return None if reason.startswith("SIG") else with_present_names(result)
+    return None if reason.startswith("SIG") else with_current_names(result)
 
 
 def read_failure(run: Run) -> str | None:
@@ -162,7 +162,7 @@ def read_sweep(folder: Path) -> Sweep:
         if len({run.folder for run in runs}) < len(runs):
             raise InputError("two runs have the same folder, so that one result would count twice")
         given = as_mapping(content["settings"], "settings")
-        settings = present_names(TrainSettings, given)
+        settings = current_names(TrainSettings, given)
         return Sweep(folder, content["command"], settings, runs)
     except InputError as error:
         raise InputError(

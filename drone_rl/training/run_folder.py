@@ -25,7 +25,7 @@ from drone_rl.utils.files import remove_leftovers, write_atomically
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import Real
-from drone_rl.utils.settings import kinds_of, present_names
+from drone_rl.utils.settings import current_names, kinds_of
 
 MAY_CHANGE = (
     "trainer.total_frames",
@@ -178,7 +178,7 @@ def hand_on_signal(training: Training) -> Training:
 
 def _own(config: Mapping[str, Any]) -> dict[str, Any]:
     """Return the training settings of a checkpoint."""
-    given = present_names(TrainSettings, config)
+    given = current_names(TrainSettings, config)
     return {k: v for k, v in given.items() if k in kinds_of(TrainSettings)}
 
 

@@ -64,7 +64,7 @@ COMMAND: Kind = _Command()
 _FORMER = re.compile(rf"^(\+{{0,2}}|~)({'|'.join(map(re.escape, FORMER_NAMES))})(?=[.=@]|$)")
 
 
-def with_present_name(override: str) -> str:
+def with_current_name(override: str) -> str:
     """Return an override with the current names of its setting and choices."""
     override = _FORMER.sub(lambda found: found[1] + FORMER_NAMES[found[2]], override)
     for choice, current in FORMER_CHOICES.items():
@@ -74,7 +74,7 @@ def with_present_name(override: str) -> str:
 
 
 def check_harmless(override: str, where: str) -> str:
-    """Return an override under its present name if it is safe to copy into a shell.
+    """Return an override under its current name if it is safe to copy into a shell.
 
     Raises:
         InputError: It refers to code, a Hydra setting or the value of another setting.
@@ -85,7 +85,7 @@ def check_harmless(override: str, where: str) -> str:
         raise InputError(
             f"{where} sets {shown(text)}, which is not a plain setting; remove it from the file"
         )
-    return with_present_name(text)
+    return with_current_name(text)
 
 
 def read_overrides(folder: Path) -> list[str]:

@@ -34,11 +34,11 @@ NAMES_OF_0_1 = {
     "train/cubes": "train/reward",
     "num_cubes": "largest_reward",
 }
-"""Names of figures in results, metrics and checkpoints of version 0.1, and the present names."""
+"""Names of figures in results, metrics and checkpoints of version 0.1, and the current names."""
 
 
-def with_present_names(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return figures under their present names, whichever version wrote them."""
+def with_current_names(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return figures under their current names, whichever version wrote them."""
     return {NAMES_OF_0_1.get(name, name): value for name, value in figures.items()}
 
 

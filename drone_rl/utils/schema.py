@@ -168,13 +168,18 @@ class FileName:
 
 @dataclasses.dataclass(frozen=True)
 class Maybe:
-    """A value of some kind, or none."""
+    """A value of some kind, or None."""
 
     kind: Kind
 
     def read(self, value: Any, where: str) -> Any:
         """See `Kind`."""
-        return None if value is None else self.kind.read(value, where)
+        try:
+            return None if value is None else self.kind.read(value, where)
+        except InputError:
+            if isinstance(value, str) and value.lower() == "none":
+                raise InputError(f"{where}={value}: type null (None in Python)") from None
+            raise
 
 
 @dataclasses.dataclass(frozen=True)
@@ -233,10 +238,13 @@ class Listed:
         items = [value] if isinstance(value, str) else value
         is_list = isinstance(items, list | tuple) and 0 < len(items) <= self.most
         if not is_list or len({*map(str, items)}) < len(items):
-            raise InputError(
-                f"{where}={shown(value)} must name a {self.what}, or a list of them, each once"
-            )
+            raise InputError(f"{where}={shown(value)} must name {self.words}, each once")
         return tuple(Text().read(item, where) for item in items)
+
+    @property
+    def words(self) -> str:
+        """The allowed values in words."""
+        return f"{'an' if self.what[0] in 'aeiou' else 'a'} {self.what} or a list of them"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -253,7 +261,7 @@ class Record:
         for key in value:
             if key not in self.fields:
                 raise InputError(
-                    f"{where}.{shown(key)} is unknown; there are: {', '.join(self.fields) or '-'}"
+                    f"{where}.{shown(key)} is unknown; valid names: {', '.join(self.fields) or '-'}"
                 )
         for key in self.fields:
             if key not in value and key not in self.optional:

@@ -45,8 +45,8 @@ class _Frozen:
 class Settings(_Frozen):
     """Values that are checked before anything is built; each subclass is a frozen dataclass.
 
-    A field is annotated with its type and its kind, as in `Annotated[int, Whole(1, 100)]`; of true
-    or false, texts and other settings the type alone is enough.
+    A field is annotated with its type and its kind, as in `Annotated[int, Whole(1, 100)]`; for
+    `bool`, `str` and nested settings the type is enough.
 
     Raises:
         InputError: A value is of another type or out of bounds, or the values don't go together.
@@ -56,8 +56,8 @@ class Settings(_Frozen):
     def __init_subclass__(cls, **kwargs: Any) -> None:
         """Make the subclass a frozen dataclass with keyword arguments.
 
-        A subclass may repeat `@dataclasses.dataclass(frozen=True)`: the decorator finds the fields
-        as they were written, and no methods that it refuses to replace.
+        A subclass may repeat `@dataclasses.dataclass(frozen=True)`: the fields are restored as they
+        were written, and the methods that the decorator refuses to replace are removed.
         """
         super().__init_subclass__(**kwargs)
         fields = {name: f for name, f in vars(cls).items() if isinstance(f, dataclasses.Field)}
@@ -79,7 +79,7 @@ class Settings(_Frozen):
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with other values; raise an `InputError` for unknown or invalid ones."""
-        changes = present_names(type(self), changes)
+        changes = current_names(type(self), changes)
         check_names(type(self), changes)
         return dataclasses.replace(self, **changes)
 
@@ -91,11 +91,11 @@ class Settings(_Frozen):
             InputError: See `Settings`; the message begins with `where`.
         """
         values = Record(kinds_of(cls)).read(data, where)
-        with below(where):
+        with prefixed_errors(where):
             return cls(**values)
 
-    def narrowed(self, cls: type[S]) -> S:
-        """Return the settings of a base class."""
+    def as_base(self, cls: type[S]) -> S:
+        """Return these settings as an instance of a base class, without the fields it lacks."""
         return cls(**{field.name: getattr(self, field.name) for field in dataclasses.fields(cls)})
 
     def values(self) -> dict[str, Any]:
@@ -118,32 +118,32 @@ def types_of(cls: type[Settings]) -> Mapping[str, Any]:
 
 
 def check_names(cls: type[Settings], given: Mapping[str, Any], prefix: str = "") -> None:
-    """Raise an `InputError` for names that are no settings; it lists those that exist."""
+    """Raise an `InputError` with the valid names if a name is not one of them."""
     known = kinds_of(cls)
     for name in given:
         if name not in known:
             meant = did_you_mean(name, known)
-            raise InputError(f"{prefix}{name} is unknown; there are: {', '.join(known)}{meant}")
+            raise InputError(f"{prefix}{name} is unknown; valid names: {', '.join(known)}{meant}")
 
 
-def present_names(cls: type[Settings], given: Mapping[str, Any]) -> dict[str, Any]:
+def current_names(cls: type[Settings], given: Mapping[str, Any]) -> dict[str, Any]:
     """Return values of settings under the current names, see `FORMER_NAMES`, at all levels."""
     types, found = types_of(cls), {}
     for given_name, value in given.items():
         current = _FORMER_FIELDS.get(given_name)
         name = current if current in types and given_name not in types else given_name
-        found[name] = _present_value(name, types.get(name), value)
+        found[name] = _current_value(name, types.get(name), value)
     return found
 
 
-def _present_value(name: str, hint: Any, value: Any) -> Any:
+def _current_value(name: str, hint: Any, value: Any) -> Any:
     if isinstance(value, str):
         return FORMER_CHOICES.get(f"{name}={value}", value)
     if not isinstance(value, Mapping) or not isinstance(hint, type):
         return value
     if "_target_" in value:
-        value = {**value, "_target_": _present_value(name, str, value["_target_"])}
-    return present_names(hint, value) if issubclass(hint, Settings) else value
+        value = {**value, "_target_": _current_value(name, str, value["_target_"])}
+    return current_names(hint, value) if issubclass(hint, Settings) else value
 
 
 def _accept_former_names(cls: type[Settings]) -> None:
@@ -152,7 +152,7 @@ def _accept_former_names(cls: type[Settings]) -> None:
 
     @functools.wraps(construct)
     def accepting(self: Settings, **given: Any) -> None:
-        construct(self, **present_names(type(self), given))
+        construct(self, **current_names(type(self), given))
 
     setattr(cls, "__init__", accepting)  # noqa: B010
     for former, current in _FORMER_FIELDS.items():
@@ -161,7 +161,7 @@ def _accept_former_names(cls: type[Settings]) -> None:
 
 
 @contextlib.contextmanager
-def below(where: str) -> Iterator[None]:
+def prefixed_errors(where: str) -> Iterator[None]:
     """Prefix errors about settings, such as "num_cubes=0 ..." with "task." if that is `where`."""
     try:
         yield

@@ -102,7 +102,7 @@ def bodies(
         raise InputError("policies=[] is empty; give at least one policy")
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise InputError(f"two policies are called {twice}; give each once, or rename a file")
-    shared = settings.narrowed(JudgeSettings)
+    shared = settings.as_base(JudgeSettings)
     found: dict[str, dict[str, Any]] = {}
     steps = len(loaded) * (len(settings.bodies) + bool(settings.loop_flights))
     for policy in loaded:

@@ -8,7 +8,7 @@ from typing import Any
 
 from safetensors import SafetensorError
 
-from drone_rl.config.commands import FlightSettings
+from drone_rl.config.commands import HeldOutSettings
 from drone_rl.evaluation.evaluate import held_out_environments
 from drone_rl.evaluation.judge import judge_policy
 from drone_rl.evaluation.verdict_text import best_baseline, is_quoted
@@ -33,7 +33,7 @@ from drone_rl.verdicts.coverage import find_domain
 def export(
     policy: Policy,
     target: Path,
-    settings: FlightSettings,
+    settings: HeldOutSettings,
     *,
     command: str | None = None,
     certificate: str | Path | None = None,

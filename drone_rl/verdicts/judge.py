@@ -11,7 +11,7 @@ from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
 from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
-from drone_rl.config.commands import FlightSettings, JudgeSettings
+from drone_rl.config.commands import HeldOutSettings, JudgeSettings
 from drone_rl.config.configuration import Changes
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, make_baseline
@@ -271,7 +271,7 @@ def _baseline(
     name: str,
     task: TaskSettings,
     dynamics: DynamicsSettings,
-    settings: FlightSettings,
+    settings: HeldOutSettings,
     seed: RootSeed,
 ) -> Iterator[tuple[EnvBase, TensorDictModuleBase]]:
     """Environments without images, and a baseline."""

@@ -72,7 +72,7 @@ def test_settings_import_nothing_heavy():
 
 def test_the_other_renderer_draws_the_minimal_look_alone():
     look = AppearanceSettings(fog_visibility=50.0)
-    with pytest.raises(InputError, match=r"^renderer=mujoco_warp draws the minimal appearance"):
+    with pytest.raises(InputError, match=r"^renderer=mujoco_warp supports only appearance=minimal"):
         TrainSettings(renderer="mujoco_warp", appearance=look)
     assert TrainSettings(appearance=look).replace(seed=1).appearance is look
     given = from_config(TrainSettings, {"appearance": {"fog_visibility": 50.0}})

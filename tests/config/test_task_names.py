@@ -9,7 +9,7 @@ def test_plain_data_names_its_task_or_is_cube_collection():
         assert read_task(settings.values(), "task") == settings
     assert "name" not in TaskSettings().values()
     with pytest.raises(
-        InputError, match=r"task\.name='walls' is unknown; there are: collect_cubes"
+        InputError, match=r"task\.name='walls' is unknown; valid names: collect_cubes"
     ):
         read_task({"name": "walls"}, "task")
     with pytest.raises(InputError, match=r"task\.'num_cubes' is unknown"):

@@ -15,11 +15,11 @@ def refuse(error):
 @pytest.mark.parametrize(
     ("error", "remedy"),
     [
-        (ImportError("wandb could not be imported"), "pip install wandb,"),
-        (ImportError("MLFlow is not installed"), "pip install mlflow,"),
-        (ImportError("Ray is required for RayLogger. Install it"), "pip install ray,"),
-        (ModuleNotFoundError("No module named 'a.b'", name="a.b"), "pip install a,"),
-        (ImportError("broken"), "install what it needs"),
+        (ImportError("wandb could not be imported"), "(pip install wandb), or"),
+        (ImportError("MLFlow is not installed"), "(pip install mlflow), or"),
+        (ImportError("Ray is required for RayLogger. Install it"), "(pip install ray), or"),
+        (ModuleNotFoundError("No module named 'a.b'", name="a.b"), "(pip install a), or"),
+        (ImportError("broken"), "install the package that it needs, or"),
     ],
 )
 def test_a_missing_package_is_one_line_that_names_it(monkeypatch, error, remedy):

@@ -5,7 +5,7 @@ import dataclasses
 from drone_rl.config.configuration import as_config, from_config
 from drone_rl.config.learning import BatchNormalized, Constant, Episodes, Sgd, Standardized
 from drone_rl.config.training import TrainerSettings, TrainSettings
-from drone_rl.utils.settings import Settings, present_names
+from drone_rl.utils.settings import Settings, current_names
 
 SGD = TrainSettings(optimizer=Sgd(lr=0.5))
 
@@ -30,10 +30,10 @@ def test_nested_settings_may_have_former_names():
     config = as_config(chunked)
     older = {**config["trainer"], "minibatch_frames": config["trainer"].pop("chunk_frames")}
     assert from_config(TrainSettings, {"trainer": older}) == chunked
-    found = present_names(TrainSettings, {"trainer": {"minibatch_frames": 7}, "seed": 1})
+    found = current_names(TrainSettings, {"trainer": {"minibatch_frames": 7}, "seed": 1})
     assert found == {"trainer": {"chunk_frames": 7}, "seed": 1}
     other = {"network": {"minibatch_frames": 7}, "minibatch_frames": 1, "x": {"y": 1}}
-    assert present_names(TrainSettings, other) == other
+    assert current_names(TrainSettings, other) == other
 
 
 def test_choices_may_have_former_names():
@@ -44,19 +44,19 @@ def test_choices_may_have_former_names():
     older |= {"returns": {"_target_": "batch_normalised"}}
     read = from_config(TrainSettings, older)
     assert read == TrainSettings(collector=Episodes(num_envs=2), returns=BatchNormalized(), seed=3)
-    assert present_names(TrainSettings, older) == {
+    assert current_names(TrainSettings, older) == {
         "collector": {"_target_": "episodes", "num_envs": 2},
         "returns": {"_target_": "batch_normalized"},
         "seed": 3,
     }
     other = {"network": {"_target_": "threads"}, "device": "none", "collector": {"_target_": 3}}
-    assert present_names(TrainSettings, other) == other
+    assert current_names(TrainSettings, other) == other
 
 
 def test_a_users_own_setting_of_that_name_stays():
     class Mine(Settings):
         optimiser: str = "x"
 
-    assert present_names(Mine, {"optimiser": "y"}) == {"optimiser": "y"}
+    assert current_names(Mine, {"optimiser": "y"}) == {"optimiser": "y"}
     assert Mine().replace(optimiser="y").optimiser == "y"
     assert [field.name for field in dataclasses.fields(Mine)] == ["optimiser"]

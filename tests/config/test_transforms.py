@@ -50,9 +50,9 @@ def test_faults_are_those_by_chance_or_with_memory():
 @pytest.mark.parametrize(
     ("name", "frame", "message"),
     [
-        ("gray", Frame((3, 25, 64), True), "gray needs the camera's own RGB"),
-        ("gray", Frame((25, 64, 3), True), "gray needs the camera's own RGB"),
-        ("rgb", Frame((25, 64, 1)), "rgb needs the camera's own RGB"),
+        ("gray", Frame((3, 25, 64), True), "gray needs the camera's bytes"),
+        ("gray", Frame((25, 64, 3), True), "gray needs the camera's bytes"),
+        ("rgb", Frame((25, 64, 1)), "rgb needs the camera's bytes"),
         ("chromaticity", Frame((4, 25, 64), True), "chromaticity needs three colors"),
         ("chromaticity", Frame((2, 25, 64), True), "chromaticity needs three colors"),
         ("chromaticity", Frame((3, 25, 64)), "chromaticity needs three colors"),

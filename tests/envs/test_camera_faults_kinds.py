@@ -157,9 +157,12 @@ def test_repr_shows_parameters():
         (lambda: LateFrames(17), r"^frames=17 is out of range; give a whole number from 0 to 16"),
         (lambda: Shift(-1), r"^down=-1 is out of range; give a whole number from 0 to 1023"),
         (lambda: Shift(0, 2000), r"^across=2000 is out of range"),
-        (lambda: film(DeadRows(9), steps=1), r"^count=9 of an image of 8 rows.*; give at most 8"),
+        (
+            lambda: film(DeadRows(9), steps=1),
+            r"^count=9: the image has 8 rows.*; give at most 8",
+        ),
         (lambda: film(DeadRows(7, (0, 1)), steps=1), r"of which 2 are always dead; .* at most 6"),
-        (lambda: film(DeadRows(0, (8,)), steps=1), r"^rows=\[8\] of an image .* give at most 7"),
+        (lambda: film(DeadRows(0, (8,)), steps=1), r"^rows=\[8\]: the image .* give at most 7"),
         (
             lambda: Blur()._apply_transform(torch.zeros(2, 2, 3, dtype=torch.uint8)),
             "Blur got torch.uint8 images; put it after gray or rgb",

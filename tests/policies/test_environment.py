@@ -53,7 +53,7 @@ def test_task_is_selected_by_name():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"task": "pillar"}, "task='pillar' is unknown; there are: collect_cubes, pillars"),
+        ({"task": "pillar"}, "task='pillar' is unknown; valid names: collect_cubes, pillars"),
         ({"task": 3}, "task=3 is no task; give one of collect_cubes, pillars"),
         ({"camera": "tiny"}, "camera='tiny' is no CameraSettings; give a CameraSettings"),
         ({"dynamics": "simple_flight"}, "dynamics='simple_flight' is no DynamicsSettings"),

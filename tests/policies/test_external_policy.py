@@ -154,7 +154,7 @@ def test_network_attributes_define_transforms():
         (nn.Linear(9, 3), {}, r"the network can't take images of shape \(1, 1, 25, 64\)"),
         (lambda x: left(x)[:, :2], {}, r"the network returned logits of shape \(1, 2\); give one"),
         (left, {"transforms": [Resize()]}, "the transform resize needs floats; put gray before"),
-        (left, {"transforms": [Gray(), Gray()]}, "the transform gray needs the camera's own RGB"),
+        (left, {"transforms": [Gray(), Gray()]}, "the transform gray needs the camera's bytes"),
     ],
 )
 def test_mismatched_arguments_raise_at_construction(given, options, message):

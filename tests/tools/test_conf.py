@@ -15,7 +15,7 @@ def test_the_generated_files_are_current(capsys):
 
 class Some(Settings):
     rate: Annotated[float, Real(0.0)] = 1e-5
-    """Learning rate; none for the default."""
+    """Learning rate; null for the default."""
     name: str | None = None
     """Name."""
     is_on: bool = True
@@ -36,7 +36,7 @@ def test_a_generated_file_keeps_its_head(tmp_path):
 def test_describe_writes_descriptions_above_settings():
     head = "# drone-rl some: an example.\ndefaults:\n  - base_some\n\n"
     descriptions = {
-        "rate": "Learning rate; none for no learning.",
+        "rate": "Learning rate; null for no learning.",
         "blur": "Blur.",
         "blur.width": "Width.",
     }

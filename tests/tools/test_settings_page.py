@@ -14,6 +14,7 @@ from drone_rl.utils.settings import Settings, kinds_of
 from tools.readme.__main__ import ROOT
 from tools.readme.settings import (
     first_comment,
+    list_choices,
     list_commands,
     list_parts,
     list_presets,
@@ -34,7 +35,7 @@ class Sea(Settings):
     """How deep, |z| below
     the surface."""
     tides: Annotated[tuple[int, ...], Several(Whole(0, unit="hours"), 2, 2)] | None = None
-    """When it is high; none for never."""
+    """When it is high; null for never."""
     wind: Annotated[str, OneOf(("none", "storm"))] = "none"
     """How it blows."""
     is_salty: bool = True
@@ -53,7 +54,7 @@ def test_a_row_has_allowed_values_unit_default_and_meaning():
         "| `sea.depth` | a number above 0 up to 11000 | m | `100.0` | "
         "How deep, &#124;z&#124; below the surface. |",
         "| `sea.tides` | 2 values, each a whole number of 0 or more; or null | hours | `null` | "
-        "When it is high; none for never. |",
+        "When it is high; null for never. |",
         "| `sea.wind` | `none` or `storm` |  | `none` | How it blows. |",
         "| `sea.is_salty` | true or false |  | `true` | Whether. |",
     ]
@@ -102,6 +103,24 @@ def test_commands_link_to_their_groups():
         "| `transforms` | [transforms](#transforms) |  | `gray`, `resize`, `standardize`" in train
     )
     assert "changes to the policy's [task](#task)" in list_commands()
+
+
+def test_choices_are_the_files_of_a_group(tmp_path):
+    for path in (
+        "train.yaml",
+        "task/b.yaml",
+        "task/a.yaml",
+        "hydra/x.yaml",
+        "hydra/sweeper/c.yaml",
+    ):
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).touch()
+    assert list_choices(tmp_path).splitlines()[2:] == [
+        *("| `hydra/sweeper` | `c` |", "| `task` | `a`, `b` |")
+    ]
+    assert "| `camera` | `frame`, `large`, `medium`, `small`, `tiny` |" in list_choices(
+        ROOT / "conf"
+    )
 
 
 def test_presets_are_described_by_their_first_comment(tmp_path):

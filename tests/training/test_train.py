@@ -101,7 +101,7 @@ def test_resuming_with_other_settings_raises(trained):
         ({"task": {"num_cubes": 1}}, r"task=\(dict\) is no BaseTaskSettings"),
         ({"returns": 3}, "returns=3 is no Returns"),
         ({"transforms": (3,)}, r"transforms\[0\]=3 is no Transform"),
-        ({"wind": 3}, "wind is unknown; there are: task, appearance, dynamics, actions, camera"),
+        ({"wind": 3}, "wind is unknown; valid names: task, appearance, dynamics, actions, camera"),
     ],
 )
 def test_invalid_arguments_are_named(change, message, tmp_path):

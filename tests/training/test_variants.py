@@ -13,7 +13,7 @@ import drone_rl
 from drone_rl.acceleration.fused_collector import FusedCollector
 from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
 from drone_rl.config import TaskSettings
-from drone_rl.config.commands import FlightSettings
+from drone_rl.config.commands import HeldOutSettings
 from drone_rl.config.learning import A2c, Episodes, Gae, Ppo, Rollouts, Sgd
 from drone_rl.config.networks import SmallCnn
 from drone_rl.config.training import TrainerSettings, TrainSettings
@@ -200,7 +200,7 @@ def test_policy_can_be_judged_and_exported(trained, tmp_path):
     assert set(state["policy"]) == set(trained.policy.description.expected_weights())
     judged = drone_rl.judge(trained.policy, episodes=4, progress=silent)
     assert judged.verdict.sentence
-    export(trained.policy, tmp_path / "mine.safetensors", FlightSettings(episodes=4))
+    export(trained.policy, tmp_path / "mine.safetensors", HeldOutSettings(episodes=4))
     there = drone_rl.load_policy(tmp_path / "mine.safetensors").state["policy"]
     assert_same(dict(there), dict(state["policy"]))
 

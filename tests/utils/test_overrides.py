@@ -10,7 +10,7 @@ from drone_rl.utils.overrides import (
     must_be_typed,
     read_overrides,
     taken_over,
-    with_present_name,
+    with_current_name,
 )
 
 
@@ -121,7 +121,7 @@ def test_former_names_in_a_file_are_read_as_the_present_ones(noted):
         *("network.optimiser=1", "optimisers=1", "x.optimiser.lr=1", "minibatch_frames=1"),
         *("trainer_minibatch_frames=1", "name=standardised", "returns=standardised_2"),
     ):
-        assert with_present_name(other) == other
+        assert with_current_name(other) == other
 
 
 @pytest.mark.parametrize(
@@ -136,5 +136,5 @@ def test_former_names_in_a_file_are_read_as_the_present_ones(noted):
     ],
 )
 def test_former_names_of_nested_settings_and_choices(former, current):
-    assert with_present_name(former) == current
-    assert with_present_name(current) == current
+    assert with_current_name(former) == current
+    assert with_current_name(current) == current

@@ -3,7 +3,7 @@
 import pytest
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.readers import parse_yaml, read_yaml, with_present_names
+from drone_rl.utils.readers import parse_yaml, read_yaml, with_current_names
 
 
 def test_plain_data_comes_back(tmp_path):
@@ -42,8 +42,8 @@ def test_what_is_refused_in_one_line(text, message):
 def test_figures_of_version_0_1_get_their_present_names():
     older = {"frames": 5, "running_cubes": 2.5, "train/cubes": 1, "train/running_cubes": 2}
     present = {"frames": 5, "running_reward": 2.5, "train/reward": 1, "train/running_reward": 2}
-    assert list(with_present_names(older).items()) == list(present.items())
-    assert with_present_names(present) == present
+    assert list(with_current_names(older).items()) == list(present.items())
+    assert with_current_names(present) == present
 
 
 def test_values_are_counted_one_by_one(monkeypatch):

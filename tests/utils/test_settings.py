@@ -7,7 +7,7 @@ import pytest
 
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Several, Text, Whole
-from drone_rl.utils.settings import Settings, below, kinds_of, plain, snake_case, types_of
+from drone_rl.utils.settings import Settings, kinds_of, plain, prefixed_errors, snake_case, types_of
 
 
 class Inner(Settings):
@@ -81,7 +81,7 @@ def test_values_take_their_types():
         ({"name": 5}, "name=5 is no text"),
         ({"inner": 3}, "inner=3 is no Inner"),
         ({"is_on": True}, "size=None needs a value"),
-        ({"unheard": 1}, "unheard is unknown; there are: count, size"),
+        ({"unheard": 1}, "unheard is unknown; valid names: count, size"),
     ],
 )
 def test_mistakes_begin_with_the_name(change, message):
@@ -98,12 +98,13 @@ def test_settings_read_from_a_file_are_complete():
 
 
 def test_what_was_added_is_left_out_where_it_is_not_known():
-    assert More(count=3, extra="y").narrowed(Outer) == Outer(count=3)
-    assert type(More().narrowed(Outer)) is Outer
+    assert More(count=3, extra="y").as_base(Outer) == Outer(count=3)
+    assert type(More().as_base(Outer)) is Outer
 
 
 def test_the_place_is_put_before_the_name():
-    with pytest.raises(InputError, match=r"^a\.b\.x=10 "), below("a"), below("b"):
+    failing = pytest.raises(InputError, match=r"^a\.b\.x=10 ")
+    with failing, prefixed_errors("a"), prefixed_errors("b"):
         Inner(x=10)
 
 

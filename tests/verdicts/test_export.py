@@ -6,7 +6,7 @@ import json
 import pytest
 
 import drone_rl
-from drone_rl.config.commands import FlightSettings
+from drone_rl.config.commands import HeldOutSettings
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sweeps.manifest import Run, Sweep
 from drone_rl.utils.errors import InputError
@@ -64,7 +64,7 @@ def test_what_an_exported_file_says_of_its_origin_goes_on(checkpoint):
     assert found == (said["command"], said["chosen"])
 
 
-FEW = FlightSettings(episodes=4)
+FEW = HeldOutSettings(episodes=4)
 ONE = {"num_cubes": 1}
 """A task with short episodes."""
 

@@ -15,7 +15,13 @@ from tools.readme.notebook import make_notebook
 from tools.readme.peers import make_peers
 from tools.readme.robust import make_robust
 from tools.readme.rows import MAIN, PROOF, TRUTH
-from tools.readme.settings import list_commands, list_groups, list_parts, list_presets
+from tools.readme.settings import (
+    list_choices,
+    list_commands,
+    list_groups,
+    list_parts,
+    list_presets,
+)
 from tools.readme.stale import report_ages
 from tools.readme.tables import list_figures, list_origins, make_table
 
@@ -56,6 +62,7 @@ def make_blocks(root: Path) -> dict[str, str]:
         "origins": list_origins(ledger, BENCHMARKS),
         "packages": list_packages(contracts, root / "drone_rl"),
         "layers": draw_layers(contracts),
+        "choices": list_choices(root / "conf"),
         "groups": list_groups(),
         "parts": list_parts(),
         "commands": list_commands(),

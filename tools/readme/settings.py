@@ -15,7 +15,7 @@ from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL
 from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.config import TASKS, BaseTaskSettings
 from drone_rl.config.configuration import Changes, Variant
-from drone_rl.utils.schema import Flag, Instance, Kind, Listed, Maybe, OneOf, Several, Span
+from drone_rl.utils.schema import Flag, Instance, Kind, Maybe, OneOf, Several, Span
 from drone_rl.utils.settings import Settings, kinds_of, plain
 
 BAR = "&#124;"
@@ -51,6 +51,16 @@ def list_commands() -> str:
     for name in COMMANDS:
         lines += [f"### drone-rl {name}", make_table(find_command(name))]
     return "\n\n".join(lines)
+
+
+def list_choices(conf: Path) -> str:
+    """Return a table of the groups of conf/ and their choices, the names of their files."""
+    folders = {path.parent for path in conf.glob("**/*.yaml")} - {conf, conf / "hydra"}
+    rows = ["| group | choices |", "| --- | --- |"]
+    for folder in sorted(folders, key=str):
+        names = ", ".join(f"`{path.stem}`" for path in sorted(folder.glob("*.yaml")))
+        rows.append(f"| `{folder.relative_to(conf)}` | {names} |")
+    return "\n".join(rows)
 
 
 def list_presets(conf: Path) -> str:
@@ -135,8 +145,6 @@ def _may_be(kind: Kind) -> str:
             return f"changes to the policy's {_link(kind.of or BaseTaskSettings)}"
         case OneOf():
             return " or ".join(f"`{name}`" for name in kind.names)
-        case Listed():
-            return f"a {kind.what} or a list of them"
         case Flag():
             return "true or false"
     return getattr(kind, "words", "a text")

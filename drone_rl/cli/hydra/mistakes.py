@@ -266,6 +266,10 @@ def _several(command: Command, override: Override, text: str) -> InputError:
 def _wrong_value(config: DictConfig, key: str, value: Any, text: str, reason: str) -> InputError:
     """Return the error about a value of the wrong type, for OmegaConf's `reason`."""
     name, now = text.partition("=")[0], OmegaConf.select(config, key)
+    if str(value).lower() == "none":
+        with contextlib.suppress(OmegaConfBaseException):
+            OmegaConf.update(config, key, None)  # fails unless the setting may be null
+            return InputError(f"{text} does not fit; type {name}=null")
     found = _TYPE.search(reason)
     expected = _EXPECTED.get(found[1].lower(), "") if found else ""
     if isinstance(now, DictConfig):

@@ -13,13 +13,13 @@ from omegaconf import OmegaConf
 from drone_rl.sweeps.manifest import is_sweep, quoted, sweep_name
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import refuse_links, write_atomically
-from drone_rl.utils.overrides import must_be_typed, taken_over, with_present_name
+from drone_rl.utils.overrides import must_be_typed, taken_over, with_current_name
 from drone_rl.utils.settings import FORMER_CHOICES, FORMER_NAMES
 
 
-def present(overrides: Sequence[str]) -> list[str]:
+def translate_former(overrides: Sequence[str]) -> list[str]:
     """Translate former names in trainings: `policy=mlp` to `network=mlp`, and `FORMER_NAMES`."""
-    named = map(with_present_name, overrides)
+    named = map(with_current_name, overrides)
     return [re.sub(r"^(\+{0,2}|~)policy(?=[.=])", r"\1network", o) for o in named]
 
 
@@ -47,7 +47,7 @@ def complete(overrides: Sequence[str]) -> list[str]:
     Raises:
         InputError: There is no run at `resume=FOLDER`, or its settings are unclear.
     """
-    typed = present(overrides)
+    typed = translate_former(overrides)
     if is_sweep(typed):
         is_named = any(o.startswith("hydra.sweep.dir=") for o in typed)
         return typed if is_named else [*typed, _FOLDER + _sweep_folder(typed)]
@@ -61,7 +61,7 @@ def complete(overrides: Sequence[str]) -> list[str]:
         raise InputError(f"resume={folder} has no checkpoints/last.pt; give the folder of a run")
     refuse_links(folder)
     former = [re.sub(r"^(\+{0,2}|~)network(?=[.=])", r"\1policy", o) for o in typed]
-    kept = present(taken_over(folder, [*typed, *former]))
+    kept = translate_former(taken_over(folder, [*typed, *former]))
     plain = [_resume(folder) if o.startswith("resume=") else o for o in typed]
     own = ["hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}", *_WRITE_NOTHING]
     return [*kept, *plain, *own]

@@ -196,6 +196,6 @@ def _make_task(task: Chosen, changes: Mapping[str, Any]) -> Task[Any]:
     for name in changes:
         if name not in known:
             there = ", ".join((*kinds_of(GymnasiumSettings), *known))
-            raise InputError(f"{name} is unknown; there are: {there}")
+            raise InputError(f"{name} is unknown; valid names: {there}")
     made: Any = chosen.replace(**changes) if changes else chosen
     return as_task(made)

@@ -14,7 +14,7 @@ from drone_rl.utils.checkpoint import check_weights, load_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.overrides import COMMAND
-from drone_rl.utils.readers import with_present_names
+from drone_rl.utils.readers import with_current_names
 from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
 
 MOST_HEADER = 2**20
@@ -186,4 +186,4 @@ def _inner(metadata: Mapping[str, Any], key: str) -> Any:
 
 
 def _progress_of(progress: Any) -> dict[str, Any]:
-    return with_present_names(as_mapping(progress, "progress"))
+    return with_current_names(as_mapping(progress, "progress"))

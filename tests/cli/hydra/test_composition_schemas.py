@@ -93,7 +93,7 @@ def test_every_setting_of_every_choice_is_typed(chosen, config):
 )
 def test_every_choice_of_what_a_policy_is_builds(group, name, settings):
     frame = ["camera=frame"] if name == "original" else []  # whose rows are of that frame
-    told = settings("train", f"{group}={name}", *frame).narrowed(TrainSettings)
+    told = settings("train", f"{group}={name}", *frame).as_base(TrainSettings)
     described = describe(told)
     env = described.build_env(1, seed=0, device="cpu")
     network = described.build_network(torch.Generator().manual_seed(0))
@@ -128,7 +128,7 @@ def test_every_optimizer_and_schedule_builds_and_steps(group, name, settings):
 
 @pytest.mark.parametrize(("group", "name"), files("experiment", "sweep"))
 def test_every_experiment_and_sweep_composes_and_describes_a_policy(group, name, settings):
-    told = settings("train", f"{group}={name}").narrowed(TrainSettings)
+    told = settings("train", f"{group}={name}").as_base(TrainSettings)
     assert describe(told).network.name
 
 
@@ -184,7 +184,7 @@ def test_original_is_algorithm_4(settings):
 def test_an_objective_brings_what_it_needs_unless_that_is_given(objective, settings, config):
     brought = settings("train", f"objective={objective}")
     in_python = TrainSettings().replace(objective=brought.objective)
-    assert brought.narrowed(TrainSettings) == in_python
+    assert brought.as_base(TrainSettings) == in_python
     for name, part in brought.objective.needs.items():
         assert getattr(brought, name) == part
     told = settings("train", "returns.lmbda=0.5", f"objective={objective}", "collector.num_envs=8")
@@ -232,7 +232,7 @@ def test_typos_in_dynamics_die_when_composing(override, config):
 def test_a_training_in_another_body_composes_and_describes_a_policy(settings):
     told = settings("train", "dynamics=quadrotor", "dynamics.wind=[5,0,0]", "actions.move_speed=2")
     assert told.dynamics == DynamicsSettings(mode="simple_flight", wind=(5.0, 0.0, 0.0))
-    described = describe(told.narrowed(TrainSettings))
+    described = describe(told.as_base(TrainSettings))
     assert (described.dynamics, described.actions.move_speed) == (told.dynamics, 2.0)
     assert settings("train", "dynamics=quadrotor", "dynamics.mode=computer_vision") == settings(
         "train"

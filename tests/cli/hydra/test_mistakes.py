@@ -76,6 +76,9 @@ def test_whole_numbers_may_have_an_exponent(override, number):
     [
         ("seed=x", "seed=x does not fit; type a whole number, such as seed=0"),
         ("seed=null", "seed=null does not fit; type another value, such as seed=0"),
+        ("seed=none", "seed=none does not fit; type a whole number, such as seed=0"),
+        ("trainer.total_episodes=none", "=none does not fit; type trainer.total_episodes=null$"),
+        ("trainer.max_grad_norm=None", "=None does not fit; type trainer.max_grad_norm=null$"),
         (
             "optimizer.lr=x",
             "optimizer.lr=x does not fit; type a number, such as optimizer.lr=0.001",

@@ -151,7 +151,7 @@ def test_rgb_array_list_is_supported(make):
     ("options", "message"),
     [
         ({"render_mode": "ansi"}, "render_mode='ansi' is unknown; give rgb_array"),
-        ({"wind": 1}, "wind is unknown; there are: .*observations"),
+        ({"wind": 1}, "wind is unknown; valid names: .*observations"),
         ({"num_cubes": "two"}, "num_cubes='two' is out of range"),
     ],
 )

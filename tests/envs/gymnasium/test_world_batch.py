@@ -38,13 +38,13 @@ def test_options_set_task_and_camera(task):
     [
         (
             {"num_cube": 2},
-            "num_cube is unknown; there are: .*observations, camera, .*, num_cubes, ",
+            "num_cube is unknown; valid names: .*observations, camera, .*, num_cubes, ",
         ),
         ({"num_cubes": 0}, "num_cubes=0 is out of range"),
         ({"step_limit": 5}, "step_limit=5 ends every episode"),
         ({"observations": "depth"}, "observations='depth' is unknown; give pixels, state"),
         ({"render_mode": "human"}, "render_mode='human' is unknown; give rgb_array"),
-        ({"camera": {"fov": 3}}, "camera.fov is unknown; there are: width"),
+        ({"camera": {"fov": 3}}, "camera.fov is unknown; valid names: width"),
         ({"camera": {"width": 0}}, "camera.width=0 is out of range"),
         ({"camera": 64}, "camera=64 is no CameraSettings; give one"),
         ({"device": "tpu"}, "device=tpu is unknown"),
@@ -57,7 +57,7 @@ def test_invalid_options_are_named(options, message):
 
 def test_task_without_settings_rejects_task_options():
     assert WorldBatch(1, Posts(), {}).worlds.task.name == "posts"
-    with pytest.raises(InputError, match=r"^num_cubes is unknown; there are: .*observations"):
+    with pytest.raises(InputError, match=r"^num_cubes is unknown; valid names: .*observations"):
         WorldBatch(1, Posts(), {"num_cubes": 2})
 
 

@@ -137,12 +137,12 @@ def test_image_shape_is_predicted(camera, transforms, shape):
         (
             "transforms",
             [GRAY, {**DEAD, "count": 26}],
-            r"^transforms\.dead_rows\.count=26 of an image of 25 rows",
+            r"^transforms\.dead_rows\.count=26: the image has 25 rows",
         ),
         (
             "transforms",
             [GRAY, {**DEAD, "rows": [25]}],
-            r"^transforms\.dead_rows\.rows=\[25\] of an image of 25 rows",
+            r"^transforms\.dead_rows\.rows=\[25\]: the image has 25 rows",
         ),
         (
             "transforms",

@@ -23,7 +23,7 @@ def test_invalid_settings_raise():
     assert as_task(task) is task
     assert isinstance(as_task("pillars"), Pillars)
     assert as_task("collect_cubes").settings == TaskSettings()
-    with pytest.raises(InputError, match="task='pillar' is unknown; there are: collect_cubes, p"):
+    with pytest.raises(InputError, match="task='pillar' is unknown; valid names: collect_cubes, p"):
         as_task("pillar")
     with pytest.raises(InputError, match=r"task=\(dict\) is no task; give one of collect_cubes"):
         as_task({"num_cubes": 1})
