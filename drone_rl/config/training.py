@@ -53,7 +53,7 @@ class TrainerSettings(Settings):
     confirm_share: Annotated[float, Real(0.0, 1.0)] = 1.0
     """Fraction of these episodes that must reach every goal."""
     running_decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.99
-    """Weight of the old value in the running mean, per episode: 0.99 averages about 100."""
+    """Weight of the old value in the running reward, per episode: 0.99 averages about 100."""
     max_grad_norm: Annotated[float, Real(0.0, is_above=True)] | None = None
     """Clip the gradient to this norm; null for no clipping."""
     chunk_frames: Annotated[int, Whole(1, unit="frames")] = 1024

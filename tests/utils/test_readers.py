@@ -39,7 +39,7 @@ def test_what_is_refused_in_one_line(text, message):
     assert "\n" not in str(error.value)
 
 
-def test_figures_of_version_0_1_get_their_present_names():
+def test_figures_of_version_0_1_get_their_current_names():
     older = {"frames": 5, "running_cubes": 2.5, "train/cubes": 1, "train/running_cubes": 2}
     present = {"frames": 5, "running_reward": 2.5, "train/reward": 1, "train/running_reward": 2}
     assert list(with_current_names(older).items()) == list(present.items())
