@@ -20,5 +20,5 @@ def test_plain_data_names_its_task_or_is_cube_collection():
 
 @pytest.mark.parametrize("name", [3, None, ["pillars"], "pillars\n"])
 def test_a_name_is_a_known_text(name):
-    with pytest.raises(InputError, match="is unknown; there are"):
+    with pytest.raises(InputError, match="is unknown; valid names"):
         settings_of(name)
