@@ -130,7 +130,7 @@ def current_names(cls: type[Settings], given: Mapping[str, Any]) -> dict[str, An
     """Return values of settings under the current names, see `FORMER_NAMES`, at all levels."""
     types, found = types_of(cls), {}
     for given_name, value in given.items():
-        current = _FORMER_FIELDS.get(given_name)
+        current = _FORMER_FIELDS.get(given_name, "")
         name = current if current in types and given_name not in types else given_name
         found[name] = _current_value(name, types.get(name), value)
     return found
