@@ -13,7 +13,13 @@ from drone_rl.acceleration.fused_collector import FusedCollector
 from drone_rl.acceleration.fused_network import FusedNetwork
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.collectors.episodes import SteppingCollector
-from drone_rl.config import AppearanceSettings, DynamicsSettings, PillarsSettings, TaskSettings
+from drone_rl.config import (
+    AppearanceSettings,
+    CameraSettings,
+    DynamicsSettings,
+    PillarsSettings,
+    TaskSettings,
+)
 from drone_rl.envs import (
     CropRows,
     DroneEnv,
@@ -59,14 +65,52 @@ def make(
 GIMBAL = FLYING.replace(camera_mount="gimbal")
 
 
-@pytest.mark.parametrize("dynamics", [None, Quadrotor(FLYING), Quadrotor(GIMBAL)])
-def test_fused_episodes_equal_their_replay_by_torchrl_bit_for_bit(dynamics):
+DYNAMICS = (None, Quadrotor(FLYING), Quadrotor(GIMBAL))
+TRANSFORMS = (
+    lambda camera: [GrayPixels()],
+    lambda camera: [GrayPixels(), StandardizePixels()],
+    lambda camera: [
+        GrayPixels(),
+        Resize(height=camera.height, width=camera.width),
+        StandardizePixels(),
+    ],
+)
+NETWORKS = (
+    {"channels": (4,), "hidden": ()},
+    {"channels": (4, 3), "hidden": (8,)},
+    {"channels": (2,), "hidden": (8, 5), "patch": 8},
+)
+WORLDS = (
+    (SHORT, CameraSettings()),
+    (SHORT.replace(vertical_bound=1.0), CameraSettings(width=40, height=24)),
+    (SHORT.replace(num_cubes=1, lateral_bound=3.0), CameraSettings(horizontal_fov=80.0)),
+)
+
+
+@pytest.mark.parametrize("first", range(3))
+@pytest.mark.parametrize("second", range(3))
+def test_fused_episodes_equal_their_replay_by_torchrl_bit_for_bit(first, second):
+    """Nine combinations contain each pair of values of two of the four parts once."""
+    dynamics, transforms = DYNAMICS[first], TRANSFORMS[second]
+    task, camera = WORLDS[(first + second) % 3]
+
+    def make_env():
+        env = DroneEnv(5, task, dynamics=dynamics, camera=camera)
+        return with_transforms(env, transforms(camera))
+
     kept = [REASON, ("next", "info", "collected"), ("next", "info", "drone")]
-    collector = make(next_keys=kept, dynamics=dynamics)
+    generator, env, acting = torch.Generator().manual_seed(0), make_env(), make_env()
+    shape, sizes = (
+        tuple(env.observation_spec["pixels"].shape[1:]),
+        NETWORKS[(first + 2 * second) % 3],
+    )
+    network = SmallCNN(shape, 3, **sizes, generator=generator)
+    with torch.no_grad():
+        network.layers.logits.weight.mul_(100)
+    actor = make_actor(network, env.action_spec, generator)
+    collector = EpisodeCollector(acting, actor, acceleration="fused", next_keys=kept)
     assert isinstance(collector.source, FusedCollector)
-    env = DroneEnv(5, SHORT, dynamics=dynamics)
-    env = with_transforms(env, [GrayPixels(), StandardizePixels()])
-    for _ in range(3):
+    for _ in range(2):
         batch, state = collector.collect(), env.reset()
         ids = batch["collector", "traj_ids"]
         episodes = [batch[ids == i] for i in ids.unique()]
@@ -87,7 +131,7 @@ def test_fused_episodes_equal_their_replay_by_torchrl_bit_for_bit(dynamics):
         assert batch["next", "done"].sum() == 5
         network = collector.actor.module[0].module
         assert torch.allclose(network(batch["pixels"]), batch["logits"], atol=1e-5)
-    assert collector.episodes == 15 and collector.frames > 15
+    assert collector.episodes == 10 and collector.frames > 10
 
 
 def test_resize_to_the_same_size_changes_nothing():
