@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.tampered_inconsistent import Change, Data, largest
 from drone_rl.policies.policy import load_policy
 from drone_rl.verification.checker.certificate import fingerprint
-from drone_rl.verification.checker.consistency import MOST_MISSING, volume
+from drone_rl.verification.checker.consistency import MAX_MISSING, volume
 
 _TAIL = 1000
 """Length of a box divided by the length of the part that moves to another outcome."""
@@ -32,7 +32,7 @@ def _updated(move_boxes: Callable[[Data], None]) -> Change:
         usual = [steps for outcome in before["outcomes"] for steps in outcome["steps"].items()]
         for outcome in data["outcomes"]:
             total = sum(outcome["steps"].values())
-            if not (1 - MOST_MISSING) * outcome["share"] < total <= outcome["share"]:
+            if not (1 - MAX_MISSING) * outcome["share"] < total <= outcome["share"]:
                 outcome["steps"] = _scaled(outcome["steps"] or dict(usual), outcome["share"])
         data["outcomes"] = [outcome for outcome in data["outcomes"] if outcome["boxes"]]
         return data
@@ -42,7 +42,7 @@ def _updated(move_boxes: Callable[[Data], None]) -> Change:
 
 def _scaled(steps: Mapping[str, float], share: float) -> dict[str, float]:
     """Scale the fractions of numbers of steps so that their sum is almost a share."""
-    factor = (1 - MOST_MISSING / 2) * share / (sum(steps.values()) or 1.0)
+    factor = (1 - MAX_MISSING / 2) * share / (sum(steps.values()) or 1.0)
     return {number: factor * one for number, one in steps.items()}
 
 

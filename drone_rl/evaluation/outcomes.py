@@ -11,16 +11,16 @@ from drone_rl.evaluation.metrics import Episodes
 from drone_rl.policies.rounding import Decide
 from drone_rl.sim.tasks import State
 
-MOST_FRAGILE = 0.02
+MAX_FRAGILE = 0.02
 """Largest fraction of fragile frames with which a verdict can be certain. Honest policies have at
 most 0.002."""
-MOST_FRAGILE_EPISODES = 0.25
+MAX_FRAGILE_EPISODES = 0.25
 """The same of episodes with a fragile frame. Honest policies have at most 0.06."""
-MOST_UNEXPLAINED = 0.04
+MAX_UNEXPLAINED = 0.04
 """Largest fraction of episodes that may end differently in another implementation if there is no
 bound on rounding, actions are continuous, or drones have flight dynamics. Otherwise an episode may
 take other actions only after a fragile frame."""
-MOST = 64
+MAX_BRANCHES = 64
 """Branches per episode; the outcome of an episode with more is left open."""
 
 
@@ -64,10 +64,10 @@ class Rounding:
         """Whether too much is fragile or unexplained for any verdict to be certain."""
         if not self.frames:
             return False
-        allowed = 0.0 if self.is_bound else MOST_UNEXPLAINED
+        allowed = 0.0 if self.is_bound else MAX_UNEXPLAINED
         return (
-            self.fragile > MOST_FRAGILE * self.frames
-            or int(self.is_fragile.sum()) > MOST_FRAGILE_EPISODES * len(self.is_fragile)
+            self.fragile > MAX_FRAGILE * self.frames
+            or int(self.is_fragile.sum()) > MAX_FRAGILE_EPISODES * len(self.is_fragile)
             or self.unexplained > allowed * self.compared_episodes
         )
 
@@ -80,11 +80,11 @@ class Rounding:
             "frames": self.frames,
             "fragile": self.fragile,
             "fragile_rate": self.fragile / max(1, self.frames),
-            "threshold": MOST_FRAGILE,
+            "threshold": MAX_FRAGILE,
             "episodes": len(self.is_fragile),
             "fragile_episodes": fragile,
             "fragile_episodes_rate": fragile / max(1, len(self.is_fragile)),
-            "threshold_episodes": MOST_FRAGILE_EPISODES,
+            "threshold_episodes": MAX_FRAGILE_EPISODES,
             "open_episodes": int(self.outcomes.is_open.sum()),
             "compared": self.compared,
             "compared_episodes": self.compared_episodes,
@@ -117,7 +117,7 @@ def enumerate_outcomes(renderer: DirectRenderer, decide: Decide, worlds: Tensor)
         kept = _distinct(state, owner, ~is_over)
         state, owner = state[kept], owner[kept]
         ended = torch.cat(owners).bincount(minlength=count)
-        is_open |= (owner.bincount(minlength=count) + ended) > MOST
+        is_open |= (owner.bincount(minlength=count) + ended) > MAX_BRANCHES
         going = (~is_open[owner]).nonzero()[:, 0]
         state, owner = state[going], owner[going]
     episodes = [

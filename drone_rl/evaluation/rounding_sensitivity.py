@@ -14,8 +14,8 @@ from drone_rl.envs import worlds_of
 from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.outcomes import (
-    MOST_FRAGILE_EPISODES,
-    MOST_UNEXPLAINED,
+    MAX_FRAGILE_EPISODES,
+    MAX_UNEXPLAINED,
     Outcomes,
     Rounding,
     enumerate_outcomes,
@@ -255,7 +255,7 @@ def _run_checked(
         finals.append(final_episodes(env, batch))
         worlds = torch.tensor([bool(f.any()) for f in fragile[first:]]).nonzero()[:, 0]
         if is_counted and len(worlds):
-            if len(worlds) > MOST_FRAGILE_EPISODES * len(lengths):
+            if len(worlds) > MAX_FRAGILE_EPISODES * len(lengths):
                 found = Outcomes(None, worlds[:0], torch.ones_like(worlds, dtype=torch.bool))
             elif not isinstance(renderer, Reasons):
                 found = enumerate_outcomes(renderer, decide, worlds.to(env.device))
@@ -315,7 +315,7 @@ def _require_function_of_frames(
         pairs = zip(log.actions, again.actions, strict=False)
         first = enumerate(first_difference(a, b) for a, b in pairs)
         other = [i for i, at in first if at is not None and not checked.explains(i, at)]
-        if isinstance(network.actions, DiscreteActions) and len(other) > MOST_UNEXPLAINED * count:
+        if isinstance(network.actions, DiscreteActions) and len(other) > MAX_UNEXPLAINED * count:
             raise InputError(
                 f"{network.owner} acts by more than the frame: evaluated {how} it takes other "
                 f"actions in {len(other)} of {count} episodes; {REMEDY}"

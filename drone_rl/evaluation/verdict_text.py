@@ -6,7 +6,7 @@ from typing import Any
 from drone_rl.sim.vocabulary import terms_of
 from drone_rl.utils.text import Evidence, Sentence, all_cubes, exact, fixed_seed, listed, percent
 
-MOST_WRONG = 0.01
+MAX_WRONG = 0.01
 """Largest fraction of placements with a wrong statement, with 95% confidence."""
 FREQUENT = 0.02
 """Fraction of episodes above which an end is mentioned."""
@@ -32,7 +32,7 @@ def is_stated(evidence: Evidence) -> bool:
 def is_proved(evidence: Evidence) -> bool:
     """Return whether it does, and enough rollouts from fresh placements re-checked it."""
     bound = evidence["proof"].get("wrong_at_most") if is_stated(evidence) else None
-    return bound is not None and bound <= MOST_WRONG
+    return bound is not None and bound <= MAX_WRONG
 
 
 def _fraction(evidence: Evidence) -> str:
@@ -69,7 +69,7 @@ def _checked(proof: Evidence) -> str:
         f"{fitted}: all ended as it states, so that with 95% confidence it is wrong about at most "
         f"{100 * bound:.2g}% of the placements"
     )
-    if bound > MOST_WRONG:
+    if bound > MAX_WRONG:
         return f"{text}, which is too much for a proof."
     return f"{text} (to prove it again, run drone-rl prove)."
 

@@ -44,7 +44,7 @@ MapOf = Callable[[ImageNetwork, Tensor, Tensor], Tensor]
 ERROR_RATE = 0.05  # probability that any method is trusted whose maps do not depend on the policy
 FRAMES_AN_EPISODE = 10  # frames of an episode that are tested, evenly spaced
 WEIGHT_SEEDS = 5  # shuffled policies whose maps are compared with the policy's, pixel by pixel
-MOST_ALIKE = 0.5  # from this correlation with maps of shuffled weights on, a map ignores them
+MAX_CORRELATION = 0.5  # from this correlation with maps of shuffled weights on, a map ignores them
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -260,7 +260,7 @@ def _failed(result: dict[str, Any]) -> list[str]:
     is_passed = {
         "placebos": all((b["lower"] or 0.0) > 0.0 for b in result["placebos"].values()),
         "pointing": (result["pointing"]["lower"] or 0.0) > 0.0,
-        "likeness": upper is not None and max(upper, *seeds) < MOST_ALIKE,
+        "likeness": upper is not None and max(upper, *seeds) < MAX_CORRELATION,
     }
     return [name for name, passed in is_passed.items() if not passed]
 

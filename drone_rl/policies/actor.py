@@ -31,8 +31,8 @@ class RandomSource:
         return self
 
 
-MOST = 1 - 1e-6
-"""Size of an action; float32 hardly tells those above from 1, whose density is unknown."""
+MAX_ACTION = 1 - 1e-6
+"""Largest magnitude of an action; tanh in float32 can return 1, where atanh is infinite."""
 _NODES = 32
 
 
@@ -69,11 +69,11 @@ class SquashedNormal(Distribution):
         generator = None if self._source is None else self._source.generator
         shape = (*sample_shape, *self.loc.shape)
         draw = torch.randn(shape, generator=generator, device=self.loc.device)
-        return (self.loc + self.scale * draw).tanh().clamp(-MOST, MOST)
+        return (self.loc + self.scale * draw).tanh().clamp(-MAX_ACTION, MAX_ACTION)
 
     def log_prob(self, value: Tensor) -> Tensor:
-        """Return the log-density of actions (*, n), which are clamped to `MOST`."""
-        number = torch.atanh(value.clamp(-MOST, MOST))
+        """Return the log-density of actions (*, n), which are clamped to `MAX_ACTION`."""
+        number = torch.atanh(value.clamp(-MAX_ACTION, MAX_ACTION))
         square = ((number - self.loc) / self.scale) ** 2
         normal = -0.5 * square - self.scale.log() - 0.5 * math.log(2 * math.pi)
         return (normal - _log_slope(number)).sum(-1)

@@ -25,7 +25,7 @@ DRIFT = 0.1
 """Standard deviation of a step of a drifting perturbation, as a fraction of its strength."""
 ONSET_STEP = 20
 """Step at which a perturbation begins in mode "onset": between the first cubes."""
-MOST = 16
+MAX_DISTRACTORS = 16
 """Largest number of distractors."""
 _BLUE = (0.2, 0.4, 1.0)
 _AWAY = (2.0, 10.0)
@@ -211,10 +211,10 @@ def as_bright(color: Sequence[float]) -> tuple[float, ...]:
 def sample_distractors(things: ObjectRegion, num_envs: int, generator: torch.Generator) -> Tensor:
     """Sample positions of distractors next to the area of the task, metres, world frame.
 
-    Shape: (num_envs, MOST, 3), float64.
+    Shape: (num_envs, MAX_DISTRACTORS, 3), float64.
     """
     near, far = _AWAY
-    sampled = torch.rand(num_envs, MOST, 3, generator=generator, dtype=torch.float64)
+    sampled = torch.rand(num_envs, MAX_DISTRACTORS, 3, generator=generator, dtype=torch.float64)
     ahead = things.first / 2 + sampled[..., 0] * things.last
     is_left = sampled[..., 2].round().bool()
     return stand(things, ahead, near + sampled[..., 1] * (far - near), is_left, things.altitude)

@@ -42,7 +42,7 @@ from drone_rl.verification.checker.certificate import fingerprint
 
 FORMAT = "drone_rl shifts"
 FORMAT_VERSION = 2
-_MOST_PICTURE = 2**22
+_MAX_IMAGE_LENGTH = 2**22
 """Largest number of characters of one image."""
 
 
@@ -272,7 +272,7 @@ def _check_domain(numbers: Mapping[str, Any], of: Any) -> None:
 
 
 def _read_strip(value: Any, shape: tuple[int, int, int], name: str) -> list[NDArray | None]:
-    texts = Several(Maybe(Text(_MOST_PICTURE)), 6, 6).read(value, f"pictures.{name}")
+    texts = Several(Maybe(Text(_MAX_IMAGE_LENGTH)), 6, 6).read(value, f"pictures.{name}")
     if texts[0] is None:
         raise InputError(f"pictures.{name} does not show the world as it is")
     return [None if t is None else unpacked(t, shape, f"pictures.{name}") for t in texts]

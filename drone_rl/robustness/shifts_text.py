@@ -15,7 +15,7 @@ TABLE: Mapping[str, Mapping[str, Any]] = tomllib.loads(
 """Axes by name; `axes.toml` documents the entries."""
 NAMES: Mapping[str, str] = {name: axis["label"] for name, axis in TABLE.items()}
 """Axes by name, in reports."""
-MOST_NAMED = 6
+MAX_NAMED = 6
 """Largest number of axes that a sentence names."""
 
 
@@ -163,7 +163,7 @@ def _together(e: Evidence) -> str:
 def _every_axis(e: Evidence) -> str:
     """All axes by name, or their number if there are many."""
     names = [NAMES[name] for name in e["axes"]]
-    return listed(names) if len(names) <= MOST_NAMED else f"all {len(names)} axes of the table"
+    return listed(names) if len(names) <= MAX_NAMED else f"all {len(names)} axes of the table"
 
 
 SHIFTS = (
@@ -278,7 +278,7 @@ def _quote(evidence: Evidence) -> str:
 def _axes(shifts: Evidence) -> str:
     names = [NAMES[name] for name in shifts["axes"]]
     count = plural(len(names), "axis", "axes")
-    return f"{count} ({listed(names)})" if len(names) <= MOST_NAMED else count
+    return f"{count} ({listed(names)})" if len(names) <= MAX_NAMED else count
 
 
 QUOTED = (

@@ -32,7 +32,7 @@ MARKERS = dict(zip(COLORS, ("o", "D", "s", "v", "P", "X"), strict=True))
 MAX_PANELS = 6
 LOG_FROM = 3.0
 """Ratio of the greatest to the least value from which the axis is logarithmic."""
-MOST_LABELS = 7
+MAX_LABELS = 7
 """Greatest number of tick labels."""
 UNIFORM = float(np.log(len(SHOWN_MOVES.names)))
 """Entropy of the uniform distribution over the moves, nats."""
@@ -245,7 +245,7 @@ def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:
 def _labels(axes: Axes, places: Sequence[float], names: Sequence[str]) -> list[str]:
     """Return tick labels; a label that would overlap the previous one is empty."""
     at = np.log(places) if axes.get_xscale() == "log" else np.asarray(places)
-    least = np.ptp(at) / MOST_LABELS
+    least = np.ptp(at) / MAX_LABELS
     labels: list[str] = [""] * len(names)
     last = -np.inf
     for i in np.argsort(at, kind="stable"):

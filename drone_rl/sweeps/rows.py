@@ -19,7 +19,7 @@ from drone_rl.utils.readers import NAMES_OF_0_1, TablesAllowance, read_table
 from drone_rl.utils.schema import Real, Whole
 
 Array = NDArray[np.float64]
-_MOST = 1e15
+_MAX_VALUE = 1e15
 """Upper bound of every figure of a run."""
 _ROUNDING = 1e-6
 LAST_UPDATES = 20
@@ -195,7 +195,7 @@ def _check_curve(curve: tuple[Array, Array]) -> None:
     frames, shares = curve
     if not (np.isfinite(frames).all() and (np.diff(frames, prepend=0.0) >= 0).all()):
         raise InputError("metrics.csv: frames decrease or are not finite")
-    if not (np.abs(shares) < _MOST).all() or (shares > 1 + _ROUNDING).any():
+    if not (np.abs(shares) < _MAX_VALUE).all() or (shares > 1 + _ROUNDING).any():
         raise InputError("metrics.csv: a reward is not finite or above the greatest one")
 
 
@@ -206,7 +206,7 @@ def _read_metrics(
     rows = _metrics_columns(folder / "metrics.csv", allowance)
     frames, rewards, seconds, entropies = rows.T
     had = (float(frames[-1]), float(seconds[-1])) if len(rows) else (0.0, 0.0)
-    if not all(0 <= value < _MOST for value in had):
+    if not all(0 <= value < _MAX_VALUE for value in had):
         raise InputError("metrics.csv: frames or seconds are out of range")
     last = entropies[-LAST_UPDATES:]
     last = last[last != _EMPTY]

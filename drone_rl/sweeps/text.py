@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from drone_rl.utils.text import Evidence, Sentence, percent, plural
 
-FEWEST = 6
+MIN_RUNS = 6
 """Fewest runs whose median has an exact 95% interval."""
 STILL = 0.01
 """Entropy in nats below which a policy is practically deterministic."""
@@ -36,7 +36,7 @@ def counts(summary: Evidence) -> dict[str, int]:
         "ended": len(runs) - summary["unfinished"],
         "solved": solved,
         "unsolved": summary["finished"] + summary["failed"] - solved,
-        "few": sum(0 < readable(group) < FEWEST for group in groups),
+        "few": sum(0 < readable(group) < MIN_RUNS for group in groups),
         "censored": sum(group["frames_to_solve"]["more_than"] is not None for group in groups),
         "left": kinds.count("one-sided (left)"),
         "right": kinds.count("one-sided (right)"),
@@ -117,9 +117,9 @@ SENTENCES = (
     ),
     _if_any(
         "runs.few",
-        f"a setting has some ended runs, but fewer than {FEWEST}",
+        f"a setting has some ended runs, but fewer than {MIN_RUNS}",
         "few",
-        f"{{n}} of {{settings}} settings with fewer than {FEWEST} ended runs: their medians have "
+        f"{{n}} of {{settings}} settings with fewer than {MIN_RUNS} ended runs: their medians have "
         "no valid interval, so that none is shown.",
     ),
     _if_any(
@@ -205,16 +205,16 @@ SENTENCES = (
     ),
     _if_any(
         "curves.band",
-        f"a setting with {FEWEST} ended runs or more",
-        lambda e: any(readable(group) >= FEWEST for group in e["groups"]),
+        f"a setting with {MIN_RUNS} ended runs or more",
+        lambda e: any(readable(group) >= MIN_RUNS for group in e["groups"]),
         "Thick line: the median over runs; band: its exact pointwise 95% interval by order "
         "statistics.",
     ),
     _if_any(
         "curves.runs",
-        f"a setting with fewer than {FEWEST} ended runs",
+        f"a setting with fewer than {MIN_RUNS} ended runs",
         "few",
-        f"Thin lines: single runs, where fewer than {FEWEST} have ended.",
+        f"Thin lines: single runs, where fewer than {MIN_RUNS} have ended.",
     ),
     _if_any(
         "curves.ends",
@@ -292,7 +292,7 @@ SENTENCES = (
         "a run has ended",
         "ended",
         "Fractions are of all runs that ended, with exact (Clopper-Pearson) 95% intervals; "
-        f"medians of at least {FEWEST} runs have intervals by order statistics.",
+        f"medians of at least {MIN_RUNS} runs have intervals by order statistics.",
     ),
 )
 """The sentences on a whole sweep."""

@@ -30,8 +30,8 @@ from drone_rl.utils.seeding import RootSeed
 
 RANDOM = 2
 """Number of random strengths within each range, in addition to its ends."""
-MOST_LOOKED_AT = 100
-"""Largest number of results of `drone-rl shifts` to read."""
+MAX_FILES = 100
+"""Largest number of files of `drone-rl shifts` to read."""
 Need = Mapping[str, float | None]
 """Of an axis, "low" and "high"; None for the value without perturbation."""
 _KEYS = ("low", "high", "unit")
@@ -141,7 +141,7 @@ def find_domain(
     folder = Path(outputs) / "shifts"
     there = [*folder.glob("runs/*/shifts.json"), *folder.glob("multiruns/*/*/shifts.json")]
     found = None
-    for path in sorted(there, key=lambda p: p.stat().st_mtime, reverse=True)[:MOST_LOOKED_AT]:
+    for path in sorted(there, key=lambda p: p.stat().st_mtime, reverse=True)[:MAX_FILES]:
         with suppress(InputError):  # of another policy
             measured = read_shifts(path, *of)
             if measured.has_ranges:

@@ -19,7 +19,7 @@ from drone_rl.utils.files import write_atomically
 from drone_rl.utils.seeding import root_seed
 from drone_rl.verdicts.export import origin_of
 
-MOST_DIFFERENCE = 1e-5
+MAX_DIFFERENCE = 1e-5
 """Largest allowed difference of a probability from PyTorch's."""
 _WORLDS, _STEPS = 100, 100
 """Numbers of environments and steps of the comparison: 10,000 images."""
@@ -96,10 +96,10 @@ def export_onnx(
     sound = dataclasses.replace(policy, description=policy.description.without_faults())
     with sound.flying(_WORLDS, seed=root_seed(seed).value) as (env, actor):
         found = agreement(env, actor, model, _STEPS)
-    if not found.difference <= MOST_DIFFERENCE:
+    if not found.difference <= MAX_DIFFERENCE:
         raise InputError(
             f"the ONNX model of policy {policy.name} returns probabilities that differ by up to "
-            f"{found.difference:.2g} from the policy's, more than {MOST_DIFFERENCE:g}; export it "
+            f"{found.difference:.2g} from the policy's, more than {MAX_DIFFERENCE:g}; export it "
             "with format=safetensors"
         )
     try:

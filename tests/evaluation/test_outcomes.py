@@ -2,7 +2,7 @@ import torch
 
 import drone_rl
 from drone_rl.envs.direct_renderer import DirectRenderer
-from drone_rl.evaluation.outcomes import MOST, enumerate_outcomes
+from drone_rl.evaluation.outcomes import MAX_BRANCHES, enumerate_outcomes
 from drone_rl.policies.rounding import Decisions
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import EndReason
@@ -48,4 +48,4 @@ def test_two_possible_first_actions_give_all_ends_of_both():
 def test_too_many_branches_are_left_open():
     found = ends(lambda x: torch.ones(len(x), 3, dtype=torch.bool))
     assert found.is_open.all()
-    assert len(found.owner) <= 4 * MOST
+    assert len(found.owner) <= 4 * MAX_BRANCHES

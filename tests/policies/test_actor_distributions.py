@@ -6,7 +6,7 @@ import torch
 from torch.distributions import Independent, Normal, TransformedDistribution
 from torch.distributions.transforms import TanhTransform
 
-from drone_rl.policies.actor import MOST, RandomSource, SquashedNormal
+from drone_rl.policies.actor import MAX_ACTION, RandomSource, SquashedNormal
 from drone_rl.sim.continuous_actions import normal_of
 
 OUTPUTS = torch.tensor(
@@ -50,10 +50,10 @@ def test_log_prob_is_finite_at_the_bounds():
     given = SquashedNormal(OUTPUTS.float().requires_grad_())
     for bound in (-1.0, 1.0):
         density = given.log_prob(torch.full((2, 3), bound))
-        assert torch.equal(density, given.log_prob(torch.full((2, 3), bound * MOST)))
+        assert torch.equal(density, given.log_prob(torch.full((2, 3), bound * MAX_ACTION)))
         assert torch.isfinite(density).all()
     far = SquashedNormal(torch.full((10_000, 6), 50.0)).sample()
-    assert far.abs().max() <= MOST and far.dtype == torch.float32
+    assert far.abs().max() <= MAX_ACTION and far.dtype == torch.float32
 
 
 def test_gradients_equal_the_analytic_ones():

@@ -5,7 +5,7 @@ from drone_rl.config import CameraSettings, PillarsSettings, TaskSettings
 from drone_rl.robustness.agents import OracleAgent
 from drone_rl.robustness.paired_evaluation import PairedEvaluator
 from drone_rl.robustness.perturbations import (
-    MOST,
+    MAX_DISTRACTORS,
     Condition,
     as_bright,
     clutter,
@@ -33,7 +33,7 @@ def test_they_are_blue_and_as_bright():
 
 def test_they_stand_beside_the_way():
     places = sample_distractors(CUBES.things, 500, torch.Generator().manual_seed(0))
-    assert places.shape == (500, MOST, 3)
+    assert places.shape == (500, MAX_DISTRACTORS, 3)
     x, y, z = places.flatten(0, 1).T
     assert 7.5 <= x.min() < 8 and 40 < x.max() <= 7.5 + 33
     assert 8 <= y.abs().min() < 8.1 and 15.9 < y.abs().max() <= 16

@@ -150,7 +150,7 @@ def test_the_limit_is_one_in_a_hundred_thousand(tmp_path, monkeypatch, added, is
 
 def test_a_place_for_an_onnx_model_that_is_none(tmp_path, monkeypatch):
     monkeypatch.setattr(exporting, "_STEPS", 3)
-    monkeypatch.setattr(exporting, "MOST_DIFFERENCE", 2.0)
+    monkeypatch.setattr(exporting, "MAX_DIFFERENCE", 2.0)
     monkeypatch.setattr(exporting, "make_onnx", lambda *_: b"a model")
     monkeypatch.setattr(exporting, "open_onnx", lambda _: lambda f: torch.zeros(len(f), 3))
     with pytest.raises(InputError, match=r"nowhere/m\.onnx can't be written"):

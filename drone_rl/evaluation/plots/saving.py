@@ -19,7 +19,7 @@ Rows = Sequence[Sequence[Any]]
 """A table, heading first."""
 _DPI = 90
 """Pixels per inch of a chart."""
-_MOST_PIXELS = 2**25
+_MAX_PIXELS = 2**25
 """Largest size of a chart."""
 FRAMES_PER_SECOND = 8
 """Of videos."""
@@ -67,7 +67,7 @@ def to_png(picture: Image.Image | Figure) -> bytes:
     buffer = io.BytesIO()
     if isinstance(picture, Figure):
         width, height = (_DPI * picture.get_size_inches()).tolist()
-        if not width * height <= _MOST_PIXELS:
+        if not width * height <= _MAX_PIXELS:
             raise ValueError(f"a chart has {width:.0f} x {height:.0f} pixels")
         picture.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
     else:

@@ -147,7 +147,7 @@ LEFT_OUT_PART = Part(
 
 
 KINDS = ("contradiction", "justified", "unknown")
-MOST_PAIRS = 4  # pairs of each kind that are shown
+MAX_PAIRS = 4  # pairs of each kind that are shown
 
 
 def say_dataset(evidence: Evidence) -> Claims:
@@ -224,7 +224,7 @@ def say_loops(evidence: Evidence) -> Claims:
 def pairs(explanation: Explanation, kind: str) -> dict[str, Image.Image]:
     """Return images of the worst pairs of a kind, left and right in turn, by caption."""
     listed = explanation.numbers["contradictions"]["list"]
-    shown = [pair for pair in listed if pair["kind"] == kind][:MOST_PAIRS]
+    shown = [pair for pair in listed if pair["kind"] == kind][:MAX_PAIRS]
     return {
         f"pair {i}, frame {pair[side]}: more {side}": images.probed_frame(
             explanation.data, pair[side], f"frame {pair[side]}: more {side}", explanation.actions

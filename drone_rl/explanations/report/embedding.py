@@ -13,7 +13,7 @@ from drone_rl.evaluation.plots.saving import Rows, to_png, to_uri
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.utils.text import Claims, Evidence, listed, percent
 
-MOST_THUMBNAILS = 900  # if there are more frames, an evenly spaced selection is shown
+MAX_THUMBNAILS = 900  # if there are more frames, an evenly spaced selection is shown
 CELLS_A_THUMBNAIL = 2.2  # empty cells show where clusters end
 ASPECT = 1.5  # width to height of a map of thumbnails
 TILES_ACROSS = 30  # frames in a row of the sprite, as map.js cuts it
@@ -53,7 +53,7 @@ def tsne_map(explanation: Explanation, which: str) -> Image.Image:
 def shown_frames(explanation: Explanation) -> NDArray:
     """Return the frames that get a thumbnail. Shape: (N,)."""
     count = len(explanation.data["actions"])
-    return np.unique(np.linspace(0, count - 1, min(count, MOST_THUMBNAILS)).astype(int))
+    return np.unique(np.linspace(0, count - 1, min(count, MAX_THUMBNAILS)).astype(int))
 
 
 def cells(explanation: Explanation, which: str) -> NDArray:

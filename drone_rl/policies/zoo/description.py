@@ -39,11 +39,11 @@ from drone_rl.utils.settings import Settings
 
 FORMAT = "drone_rl policy"
 FORMAT_VERSION = 2
-MOST_PARAMETERS = 2**24
+MAX_PARAMETERS = 2**24
 """Of a network: 64 MiB."""
-MOST_PIXELS = 2**18
+MAX_PIXELS = 2**18
 """Of a camera's frame."""
-MOST_NUMBERS = 2**20
+MAX_NUMBERS = 2**20
 """Of one image after any transform."""
 _KEYS = ("format", "format_version", "task", "camera", "transforms", "network")
 _OPTIONAL: dict[str, tuple[type[Settings], Settings]] = {
@@ -78,16 +78,15 @@ class PolicyDescription:
         """Check that it can be built with bounded memory."""
         self.dynamics.check_air()
         pixels = self.camera.width * self.camera.height
-        if pixels > MOST_PIXELS:
-            raise InputError(f"camera has {pixels} pixels; give at most {MOST_PIXELS}")
+        if pixels > MAX_PIXELS:
+            raise InputError(f"camera has {pixels} pixels; give at most {MAX_PIXELS}")
         if not self.input.is_float:
             raise InputError("the network needs floats; add a transform such as gray")
         expected = self.expected_weights()
         count = sum(value.numel() for value in expected.values())
-        if count > MOST_PARAMETERS:
+        if count > MAX_PARAMETERS:
             raise InputError(
-                f"the network has {count} parameters; give sizes that make at most "
-                f"{MOST_PARAMETERS}"
+                f"the network has {count} parameters; give sizes that make at most {MAX_PARAMETERS}"
             )
 
     @property
@@ -96,10 +95,10 @@ class PolicyDescription:
         frame = Frame((self.camera.height, self.camera.width, 3))
         for transform in self.transforms:
             frame = output_of(transform, frame)
-            if math.prod(frame.shape) > MOST_NUMBERS:
+            if math.prod(frame.shape) > MAX_NUMBERS:
                 raise InputError(
                     f"the transform {transform.name} makes images of shape {frame.shape}; give "
-                    f"sizes that make at most {MOST_NUMBERS} numbers"
+                    f"sizes that make at most {MAX_NUMBERS} numbers"
                 )
         return frame
 

@@ -9,7 +9,7 @@ import torch
 from safetensors import SafetensorError
 from safetensors.torch import load, save
 
-from drone_rl.policies.zoo.description import FORMAT, MOST_PARAMETERS, parse
+from drone_rl.policies.zoo.description import FORMAT, MAX_PARAMETERS, parse
 from drone_rl.utils.checkpoint import check_weights, load_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
@@ -17,7 +17,7 @@ from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.readers import with_current_names
 from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
 
-MOST_HEADER = 2**20
+MAX_HEADER = 2**20
 """Bytes of the header of an exported file."""
 _ENTRY = {"dtype", "shape", "data_offsets"}
 """Keys of each tensor in a safetensors header."""
@@ -142,7 +142,7 @@ def exported_bytes(
 
 def load_exported(path: Path) -> dict[str, Any]:
     """Read an exported policy, see `read_policy`."""
-    content = read_bytes(path, 8 + MOST_HEADER + 4 * MOST_PARAMETERS)
+    content = read_bytes(path, 8 + MAX_HEADER + 4 * MAX_PARAMETERS)
     try:
         return _exported(content)
     except InputError as error:
@@ -151,7 +151,7 @@ def load_exported(path: Path) -> dict[str, Any]:
 
 def _exported(content: bytes) -> dict[str, Any]:
     size = int.from_bytes(content[:8], "little")
-    if not 2 <= size <= min(MOST_HEADER, len(content) - 8):
+    if not 2 <= size <= min(MAX_HEADER, len(content) - 8):
         raise InputError("it is not in the safetensors format, or damaged")
     header = as_mapping(parse_json(content[8 : 8 + size], "its header"), "header")
     metadata = as_mapping(header.get("__metadata__", {}), "metadata")

@@ -22,13 +22,13 @@ from drone_rl.verification.requirements import require_cubes
 
 FORMAT = "drone_rl certificate"
 FORMAT_VERSION = 1
-MOST_BOXES = 2**17
-MOST_CORNERS = 2**20  # corners of all boxes together
-MOST_CUBES = 8
-MOST_OUTCOMES = 2**11
-MOST_STEPS = 20_000  # step counts of all outcomes together
-LEAST_BORDER = 2.0**-100  # metres. Smallest nonzero |border|; bounds the bits of exact sums.
-MOST_BORDER = 2.0**20  # metres. Largest |border|
+MAX_BOXES = 2**17
+MAX_CORNERS = 2**20  # corners of all boxes together
+MAX_CUBES = 8
+MAX_OUTCOMES = 2**11
+MAX_STEPS = 20_000  # step counts of all outcomes together
+MIN_BORDER = 2.0**-100  # metres. Smallest nonzero |border|; bounds the bits of exact sums.
+MAX_BORDER = 2.0**20  # metres. Largest |border|
 _NO_ENDS = (EndReason.RUNNING, EndReason.LOST_CONTROL)  # no control is lost in computer-vision mode
 _ENDS = tuple(end.name.lower() for end in EndReason if end not in _NO_ENDS)
 _DIGITS = len(str(10**5))
@@ -102,17 +102,17 @@ def parse_certificate(data: Any) -> Certificate:
             f"its task has vertical_bound={task.vertical_bound} and lateral_bound="
             f"{task.lateral_bound}; certificates require 0 and more than 0"
         )
-    if task.num_cubes > MOST_CUBES:
-        raise InputError(f"num_cubes={task.num_cubes} is out of range; give at most {MOST_CUBES}")
+    if task.num_cubes > MAX_CUBES:
+        raise InputError(f"num_cubes={task.num_cubes} is out of range; give at most {MAX_CUBES}")
     cubes = task.num_cubes
     outcomes = tuple(
         _read_outcome(one, f"outcomes[{i}]", cubes) for i, one in enumerate(read["outcomes"])
     )
     undecided = _read_boxes(read["undecided"]["boxes"], "undecided.boxes", cubes)
-    if (steps := sum(len(outcome.steps) for outcome in outcomes)) > MOST_STEPS:
-        raise InputError(f"it has {steps} step counts; give at most {MOST_STEPS}")
+    if (steps := sum(len(outcome.steps) for outcome in outcomes)) > MAX_STEPS:
+        raise InputError(f"it has {steps} step counts; give at most {MAX_STEPS}")
     count = sum(len(outcome.boxes) for outcome in outcomes) + len(undecided)
-    if count > (most := min(MOST_BOXES, MOST_CORNERS >> cubes)):
+    if count > (most := min(MAX_BOXES, MAX_CORNERS >> cubes)):
         raise InputError(f"it has {count} boxes; give at most {most} for {cubes} cubes")
     return Certificate(
         name=read["policy"]["name"],
@@ -130,7 +130,7 @@ _SHARE = schema.Real(0.0, 1.0)
 _OUTCOME = schema.Record(
     {
         "end": schema.OneOf(_ENDS),
-        "collected": schema.Several(schema.Flag(), 1, MOST_CUBES),
+        "collected": schema.Several(schema.Flag(), 1, MAX_CUBES),
         "loops": schema.Flag(),
         "share": _SHARE,
         "steps": _LATER,
@@ -145,7 +145,7 @@ _WHOLE = schema.Record(
         "policy": schema.Record(
             {"name": schema.Text(), "weights": schema.Text(64), "description": schema.Plain(1000)}
         ),
-        "outcomes": schema.Several(_OUTCOME, 0, MOST_OUTCOMES),
+        "outcomes": schema.Several(_OUTCOME, 0, MAX_OUTCOMES),
         "undecided": schema.Record({"share": _SHARE, "boxes": _LATER}),
         "finished": schema.Flag(),
         "stated": schema.Record(
@@ -203,9 +203,9 @@ def _read_boxes(value: Any, where: str, cubes: int) -> NDArray[np.float64]:
     if not np.isfinite(boxes).all():
         raise InputError(f"{where} contains a number that is not finite; {shape}")
     size = abs(boxes)
-    if ((size < LEAST_BORDER) & (size > 0)).any() or (size > MOST_BORDER).any():
+    if ((size < MIN_BORDER) & (size > 0)).any() or (size > MAX_BORDER).any():
         raise InputError(
-            f"{where} has a border below {LEAST_BORDER:.1g} m or above {MOST_BORDER:.1g} m; {shape}"
+            f"{where} has a border below {MIN_BORDER:.1g} m or above {MAX_BORDER:.1g} m; {shape}"
         )
     empty = np.flatnonzero((boxes[..., 0] >= boxes[..., 1]).any(1))
     if len(empty):

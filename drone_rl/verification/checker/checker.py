@@ -32,11 +32,11 @@ from drone_rl.verification.checker.consistency import (
 from drone_rl.verification.checker.sampling import ANYWHERE, BORDER, INSIDE, sample_placements
 from drone_rl.verification.requirements import require_cubes
 
-MOST_TOLD = 20  # contradictions printed
-MOST_EXACT = 200  # episodes repeated with the network in float64, about
-MOST_KEPT = 1000  # contradictions kept
-MOST_AT_ONCE = 1024  # episodes per batch
-MOST_PIXELS = 2**22  # pixels per batch of images
+MAX_PRINTED = 20  # contradictions printed
+MAX_EXACT = 200  # episodes repeated with the network in float64, about
+MAX_KEPT = 1000  # contradictions kept
+MAX_AT_ONCE = 1024  # episodes per batch
+MAX_PIXELS = 2**22  # pixels per batch of images
 _JUST_BEGUN = 2  # repetitions up to which a loop may count as one or not
 ProgressCallback = Callable[[int, int], None]  # called with the number done, and of all
 
@@ -73,8 +73,8 @@ class Findings:
 
     def lines(self) -> list[str]:
         """Return each finding in one line."""
-        lines = [*self.inconsistencies, *map(str, self.contradictions[:MOST_TOLD])]
-        more = self.contradicted - min(len(self.contradictions), MOST_TOLD)
+        lines = [*self.inconsistencies, *map(str, self.contradictions[:MAX_PRINTED])]
+        more = self.contradicted - min(len(self.contradictions), MAX_PRINTED)
         return [*lines, f"and {more} flights more ended otherwise than stated"] if more else lines
 
     def as_dict(self) -> dict[str, Any]:
@@ -109,7 +109,7 @@ class Simulator:
         renderer: str = "raytrace",
     ) -> None:
         pixels = described.camera.width * described.camera.height
-        self.at_once = max(1, min(MOST_AT_ONCE, MOST_PIXELS // pixels))
+        self.at_once = max(1, min(MAX_AT_ONCE, MAX_PIXELS // pixels))
         count = min(self.at_once, 64)
         self._env = described.build_env(count, seed=0, device=device, renderer=renderer)
         self._worlds = worlds_of(self._env)
@@ -200,7 +200,7 @@ def check_certificate(
     points, why = drawn.points[stated], drawn.why[stated]
     with closing(Simulator(certificate.description, weights, device, renderer)) as simulator:
         rollouts = simulator.fly(points, tell)
-        some = np.arange(len(rollouts.end))[:: max(1, len(rollouts.end) // MOST_EXACT)]
+        some = np.arange(len(rollouts.end))[:: max(1, len(rollouts.end) // MAX_EXACT)]
         simulator.compute_in(torch.float64)
         exact = simulator.fly(points[some])
     outcomes = [certificate.outcomes[i] for i in drawn.outcome[stated]]
@@ -214,7 +214,7 @@ def check_certificate(
         Contradiction(
             str(why[i]), tuple(points[i].tolist()), _stated(outcomes[i]), _found(rollouts, i)
         )
-        for i in wrong[:MOST_KEPT]
+        for i in wrong[:MAX_KEPT]
     ]
     count = {kind: int((why == kind).sum()) for kind in (INSIDE, BORDER, ANYWHERE)}
     return Findings((*rounded, *counts), tuple(kept), len(wrong), count)

@@ -84,8 +84,8 @@ def _around(
             yield place, count
 
 
-MOST_MISSING = 0.05  # largest fraction of the stated placements without a stated number of steps
-FEWEST_STATED = 1e-3  # fraction of placements from which on an outcome must state a number of steps
+MAX_MISSING = 0.05  # largest fraction of the stated placements without a stated number of steps
+MIN_STATED = 1e-3  # fraction of placements from which on an outcome must state a number of steps
 TOLERANCE = 1e-12  # relative error of a stated fraction from summing floats
 
 
@@ -119,11 +119,11 @@ def missing_steps(outcome: Outcome) -> float:
 def _missing(certificate: Certificate) -> Iterator[str]:
     """Yield missing numbers of steps, which no simulation could refute."""
     for i, outcome in enumerate(certificate.outcomes):
-        if not outcome.steps and outcome.share > FEWEST_STATED:
+        if not outcome.steps and outcome.share > MIN_STATED:
             yield f"outcome {i} ({outcome}) states no number of steps"
     stated = sum(outcome.share for outcome in certificate.outcomes)
     missing = sum(map(missing_steps, certificate.outcomes))
-    if missing > MOST_MISSING * stated:
+    if missing > MAX_MISSING * stated:
         yield f"numbers of steps are left open for a share of {missing:.6g} of all placements"
 
 

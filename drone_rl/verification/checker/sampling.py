@@ -15,7 +15,7 @@ Indices = NDArray[np.intp]  # shape: (points,) or (boxes,)
 
 CORNER_INSET = 1e-9  # metres by which corners are moved inwards
 BORDER_OFFSET = 1e-4  # metres from a border to the points on both sides
-_MOST_WORK = 2**31  # comparisons in the search for borders
+_MAX_WORK = 2**31  # comparisons in the search for borders
 
 
 def sample_inside(boxes: Boxes, count: int, rng: np.random.Generator) -> Points:
@@ -45,7 +45,7 @@ def sample_borders(
 ) -> Points:
     """Return at most `count` points on both sides of faces between boxes of different groups."""
     boxes, sizes = np.concatenate(groups), np.array([len(group) for group in groups])
-    tries = max(1, min(4 * count, _MOST_WORK // (4 * boxes.size)))
+    tries = max(1, min(4 * count, _MAX_WORK // (4 * boxes.size)))
     some = rng.choice(np.flatnonzero(sizes), tries)
     chosen = boxes[(sizes.cumsum() - sizes)[some] + rng.integers(sizes[some])]
     row, axis = np.arange(tries), rng.integers(boxes.shape[1], size=tries)

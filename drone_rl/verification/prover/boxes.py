@@ -17,8 +17,8 @@ E = TypeVar("E")
 Sides = Sequence[NDArray[np.float64]]  # borders of a grid's cells along each axis
 
 AT_ONCE = 1_000_000  # cells of a grid; bounds memory
-MOST_GRIDS = 1_000  # bounds the time to about half a minute
-_MOST_PAIRS = 10_000_000  # pairs of boxes compared at a time; bounds memory
+MAX_GRIDS = 1_000  # bounds the time to about half a minute
+_MAX_PAIRS = 10_000_000  # pairs of boxes compared at a time; bounds memory
 
 
 def all_placements(bound: float, num_cubes: int) -> Boxes:
@@ -68,7 +68,7 @@ def merge(boxes: NDArray[_Number]) -> NDArray[_Number]:
     return boxes
 
 
-def union(boxes: Boxes, most: int = MOST_GRIDS) -> Boxes:
+def union(boxes: Boxes, most: int = MAX_GRIDS) -> Boxes:
     """Return the union of boxes as disjoint boxes; unchanged if it takes more than `most` grids."""
     if len(boxes) < 2:
         return boxes
@@ -78,7 +78,7 @@ def union(boxes: Boxes, most: int = MOST_GRIDS) -> Boxes:
     return merge(boxes) if found is None else found
 
 
-def complement(boxes: Boxes, space: Boxes, most: int = MOST_GRIDS) -> Boxes | None:
+def complement(boxes: Boxes, space: Boxes, most: int = MAX_GRIDS) -> Boxes | None:
     """Return the part of a space, shape (1, n, 2), outside all boxes, as disjoint boxes.
 
     None if it takes more than `most` grids.
@@ -160,7 +160,7 @@ def resolve_forks(
 def _meets(boxes: Boxes, others: Boxes) -> NDArray[np.bool_]:
     """Return which boxes intersect any of the others."""
     found = np.zeros(len(boxes), bool)
-    step = max(1, _MOST_PAIRS // max(1, len(others)))
+    step = max(1, _MAX_PAIRS // max(1, len(others)))
     for begin in range(0, len(boxes), step):
         some = boxes[begin : begin + step, None]
         is_apart = (some[..., 0] >= others[..., 1]) | (some[..., 1] <= others[..., 0])

@@ -145,7 +145,7 @@ def _least(y: float, reach: float) -> float:
     return least
 
 
-MOST_NODES = 2**24  # reachable or not, per placement; bounds memory
+MAX_NODES = 2**24  # reachable or not, per placement; bounds memory
 
 
 @dataclasses.dataclass
@@ -249,10 +249,10 @@ def shape_of(settings: TaskSettings) -> Shape:
     ahead = math.ceil(settings.front_bound / settings.step_length) + 2
     aside = 2 * (math.ceil(settings.side_bound / settings.step_length) + 1) + 1
     shape = ahead, aside, 2**settings.num_cubes
-    if math.prod(shape) > MOST_NODES:
+    if math.prod(shape) > MAX_NODES:
         raise InputError(
             f"num_cubes={settings.num_cubes} and step_length={settings.step_length} give "
-            f"{math.prod(shape):.2g} nodes per placement, more than {MOST_NODES:.2g}; give fewer "
+            f"{math.prod(shape):.2g} nodes per placement, more than {MAX_NODES:.2g}; give fewer "
             "cubes or longer steps"
         )
     return shape

@@ -23,7 +23,7 @@ from drone_rl.verification.prover.policy_spec import PolicySpec
 
 MIN_PROBABILITY = 1e-18  # nodes less probable than this at every step are not evaluated
 NEGLIGIBLE = 1e-15  # sum of the probabilities of running episodes at which propagation stops
-MOST_ROUNDING = 0.1  # largest rounding error of a logit; typical policies have about 0.01
+MAX_ROUNDING = 0.1  # largest rounding error of a logit; typical policies have about 0.01
 ROUNDING = 1e-9  # bound on the float64 error of several hundred steps
 BATCH = 1000  # images rendered at a time; bounds memory
 _FEW = 256
@@ -159,19 +159,19 @@ class NodeEvaluator:
         return torch.cat(logits).double().softmax(-1).cpu()
 
     def _check_rounding(self, pixels: Tensor) -> None:
-        """Raise InputError if rounding may change a logit by more than `MOST_ROUNDING`."""
+        """Raise InputError if rounding may change a logit by more than `MAX_ROUNDING`."""
         if self._rounding is None:
             return
         _, error = self._rounding.together(pixels)
-        if bool((error <= MOST_ROUNDING).all()):  # a probability changes by no more than its logit
+        if bool((error <= MAX_ROUNDING).all()):  # a probability changes by no more than its logit
             return
         for part in pixels.split(_FEW):
             most = float(self._rounding.errors(part).max())
-            if not most <= MOST_ROUNDING:
+            if not most <= MAX_ROUNDING:
                 raise InputError(
                     f"rounding can change a logit of the policy by {most:.3g}, so its action "
                     f"probabilities depend on the order of summation; give a policy with at most "
-                    f"{MOST_ROUNDING:g}"
+                    f"{MAX_ROUNDING:g}"
                 )
 
 

@@ -132,7 +132,7 @@ def one_thread() -> Iterator[None]:
 
 
 PICTURES = 3  # approximate number of images per border: beside it, and within its band
-MOST_PARTS = 1_000  # a task with more would take days
+MAX_PARTS = 1_000  # a task with more would take days
 
 
 def pictures_of_each(spec: PolicySpec) -> list[int]:
@@ -162,7 +162,7 @@ def partition_placements(spec: PolicySpec, most: int) -> Boxes:
     for cube in reversed(range(len(counts))):
         left = math.prod(n / s for n, s in zip(counts, strips, strict=True))
         strips[cube] = min(counts[cube], max(1, math.ceil(left / most)))
-    if math.prod(strips) > MOST_PARTS:
+    if math.prod(strips) > MAX_PARTS:
         raise InputError(
             f"task.num_cubes={len(counts)} gives about {total:.0e} combinations of images in "
             f"{math.prod(strips):,} parts, which takes days; give fewer cubes, a smaller "

@@ -29,7 +29,7 @@ FORMAT_VERSION = 1
 _COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band", "decided")
 _SETS = ("waiting", "ended", "ways", "forked", "parts", "part", "done", "undecided")
 _DAMAGE = (ValueError, TypeError, LookupError, ArithmeticError, AttributeError)  # of damaged files
-_MOST = 2**40  # bound on every integer in a row
+_MAX_INTEGER = 2**40  # bound on every integer in a row
 _NOWHERE = (-1, 0, 0)  # stands for an unknown ending
 
 _Row = tuple[int, ...]
@@ -211,7 +211,7 @@ def _unpacked(name: str, state: dict[str, NDArray], shape: tuple[int, ...]) -> _
     if not len(counts):
         return []
     check_indices(counts, 1 + len(boxes), f"{name}_counts")
-    check_indices(abs(rows), _MOST, f"{name}_rows")
+    check_indices(abs(rows), _MAX_INTEGER, f"{name}_rows")
     is_sound = boxes.dtype == np.float64 and bool(np.isfinite(boxes).all())
     if boxes.shape != (counts.sum(), *shape) or not is_sound:
         raise ValueError(f"{name} are {boxes.dtype} of shape {boxes.shape}")

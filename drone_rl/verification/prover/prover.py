@@ -24,9 +24,9 @@ from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.lattice import AHEAD, LEFT, RIGHT, Ending, LatticeState
 from drone_rl.verification.prover.policy_spec import PolicySpec, partition_placements
 
-MOST_STATED = 20_000
+MAX_STATED = 20_000
 """Boxes stated for a part in progress; their complement takes a few times as many."""
-MOST_ROWS = 20_000  # rows of the action table cut at a time
+MAX_ROWS = 20_000  # rows of the action table cut at a time
 MARGIN = 2.0  # metres by which a table extends beyond what is needed: drones move sideways
 COARSE = 0.5  # metres to which forks record the positions of cubes that are gone
 
@@ -176,7 +176,7 @@ class Prover:
             return
         spans = self._fill(table, seen)
         found: dict[int, list[Boxes]] = defaultdict(list)
-        for owner, ranges, bits in runs(table, spans, MOST_ROWS):
+        for owner, ranges, bits in runs(table, spans, MAX_ROWS):
             pieces = boxes[owner]
             for k, cube in enumerate(cubes):
                 limits = table.cells[k].limits + y
@@ -275,7 +275,7 @@ def so_far(known: Ended, part: Boxes) -> Findings:
     kind = np.array([kinds.index(ending) for ending, _ in known])[owner]
     order = np.lexsort((-volumes(boxes), kind))
     rank = ragged(np.bincount(kind))[1]
-    largest = order[np.argsort(rank, kind="stable")][:MOST_STATED]
+    largest = order[np.argsort(rank, kind="stable")][:MAX_STATED]
     while (left := complement(boxes[largest], part)) is None:
         largest = largest[: len(largest) // 2]
     stated = {key: [boxes[largest[owner[largest] == i]]] for i, key in enumerate(known)}

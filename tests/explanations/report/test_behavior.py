@@ -1,5 +1,5 @@
 from drone_rl.evaluation.plots.images import probed_frame
-from drone_rl.explanations.report.behavior import FLAWS_PART, MOST_PAIRS, pairs
+from drone_rl.explanations.report.behavior import FLAWS_PART, MAX_PAIRS, pairs
 
 
 def listed(*kinds):
@@ -13,9 +13,9 @@ def test_kinds_without_a_pair_are_not_drawn(make_explanation):
 
 
 def test_the_first_few_pairs_are_shown_left_beside_right(make_explanation):
-    explanation = make_explanation(listed(*["unknown"] * (MOST_PAIRS + 3)))
+    explanation = make_explanation(listed(*["unknown"] * (MAX_PAIRS + 3)))
     shown = pairs(explanation, "unknown")
-    assert len(shown) == 2 * MOST_PAIRS
+    assert len(shown) == 2 * MAX_PAIRS
     assert [*shown][:2] == ["pair 1, frame 1: more left", "pair 1, frame 2: more right"]
     tile = probed_frame(explanation.data, 1, "frame 1: more left")
     assert list(shown["pair 1, frame 1: more left"].getdata()) == list(tile.getdata())

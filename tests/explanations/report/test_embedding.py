@@ -3,7 +3,7 @@ import pytest
 from PIL import Image
 
 from drone_rl.explanations.report.embedding import (
-    MOST_THUMBNAILS,
+    MAX_THUMBNAILS,
     PART,
     cells,
     points,
@@ -22,8 +22,8 @@ def explanation(make_explanation):
 
 def test_no_more_frames_are_shown_than_fit(make_explanation):
     assert shown_frames(make_explanation()).tolist() == list(range(12))
-    many = shown_frames(make_explanation(frames=2 * MOST_THUMBNAILS + 1))
-    assert (len(many), many[0], many[-1]) == (MOST_THUMBNAILS, 0, 2 * MOST_THUMBNAILS)
+    many = shown_frames(make_explanation(frames=2 * MAX_THUMBNAILS + 1))
+    assert (len(many), many[0], many[-1]) == (MAX_THUMBNAILS, 0, 2 * MAX_THUMBNAILS)
     assert set(np.diff(many)) == {2, 3} or set(np.diff(many)) == {2}
 
 

@@ -76,10 +76,10 @@ def test_a_missing_claim_is_refused(one_sided):
 
 def test_sizes_are_bounded(one_sided, write, monkeypatch):
     path = write(one_sided)
-    monkeypatch.setattr(module, "MOST_BOXES", 2)
+    monkeypatch.setattr(module, "MAX_BOXES", 2)
     with pytest.raises(InputError, match="it has 3 boxes; give at most 2 for 1 cubes"):
         read_certificate(path)
-    monkeypatch.setattr(module, "MOST_STEPS", 1)
+    monkeypatch.setattr(module, "MAX_STEPS", 1)
     with pytest.raises(InputError, match="step counts; give at most 1"):
         read_certificate(path)
     monkeypatch.setattr(module, "CERTIFICATE_VALUES", 3)

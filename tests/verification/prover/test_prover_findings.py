@@ -52,7 +52,7 @@ def test_the_largest_part_is_what_the_others_leave():
 @pytest.mark.parametrize(("most", "stated"), [(100, [3, 1]), (3, [2, 1]), (2, [1, 1]), (1, [1, 0])])
 def test_the_largest_boxes_of_a_part_under_way(most, stated, monkeypatch):
     """Of each ending in turn, the largest first; all else of the part is undecided."""
-    monkeypatch.setattr(module, "MOST_STATED", most)
+    monkeypatch.setattr(module, "MAX_STATED", most)
     known = {("won", 7): [line([0, 1], [3, 6])], ("won", 9): [line([7, 9])]}
     found = so_far(known | {("lost", 2): [line([6, 7])]}, line([0, 12]))
     assert [len(found.endings.get(e, ())) for e in ("won", "lost")] == stated
