@@ -14,7 +14,7 @@ from typing import Any
 from drone_rl.config import TaskSettings
 from drone_rl.config.learning import Episodes
 from drone_rl.config.training import TrainerSettings
-from drone_rl.evaluation.judge import judge_policy
+from drone_rl.evaluation.verdict import judge_policy
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.training import Callback
 from drone_rl.training.callbacks import OngoingTraining

@@ -22,7 +22,7 @@ from drone_rl.config.commands import HeldOutSettings
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import TrainSettings
 from drone_rl.evaluation.evaluate import evaluate
-from drone_rl.evaluation.judge import judge_for_selection
+from drone_rl.evaluation.verdict import judge_for_selection
 from drone_rl.policies import MLP
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import ExternalPolicy, policy_from

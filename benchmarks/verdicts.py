@@ -18,10 +18,10 @@ from benchmarks.scripted_policies import SCRIPTS, Script, ScriptedPolicy
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, run_baselines
-from drone_rl.evaluation.judge import judge
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.evaluation.rule import NOT_CERTAIN, Kind
+from drone_rl.evaluation.verdict import judge
 from drone_rl.utils.seeding import Stream
 
 SHIPPED = ("good", "poor", "right_and_forward")

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from drone_rl.evaluation.judge import judge_policy
 from drone_rl.evaluation.rule import Rule
+from drone_rl.evaluation.verdict import judge_policy
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.actions import Actions

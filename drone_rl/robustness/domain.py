@@ -20,10 +20,10 @@ from typing import Any
 
 import torch
 
-from drone_rl.evaluation.judge import measure, widen
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.outcomes import Outcomes
 from drone_rl.evaluation.rule import Kind, Quantity, Rule, kinds_within
+from drone_rl.evaluation.verdict import measure, widen
 from drone_rl.robustness.agents import OracleAgent, PolicyAgent, has_oracle
 from drone_rl.robustness.axes import Axis
 from drone_rl.robustness.paired_evaluation import PairedEvaluator

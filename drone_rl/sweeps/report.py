@@ -123,7 +123,7 @@ def judge_run(
         InputError: The run has no result, or its last checkpoint is unusable or does not belong to
             the result.
     """
-    from drone_rl.evaluation.judge import judge_for_selection  # imports torch
+    from drone_rl.evaluation.verdict import judge_for_selection  # imports torch
 
     with folder_lock(folder):
         result = read_result(folder)

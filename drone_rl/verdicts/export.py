@@ -10,7 +10,7 @@ from safetensors import SafetensorError
 
 from drone_rl.config.commands import HeldOutSettings
 from drone_rl.evaluation.evaluate import held_out_environments
-from drone_rl.evaluation.judge import judge_policy
+from drone_rl.evaluation.verdict import judge_policy
 from drone_rl.evaluation.verdict_text import best_baseline, is_quoted
 from drone_rl.policies.policy import Policy
 from drone_rl.policies.zoo import certificate_path, shifts_path

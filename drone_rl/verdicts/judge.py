@@ -16,8 +16,8 @@ from drone_rl.config.configuration import Changes
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, make_baseline
 from drone_rl.evaluation.evaluate import held_out_environments
-from drone_rl.evaluation.judge import Verdict, judge_policy
 from drone_rl.evaluation.rule import NOT_COVERED, PROOF_MISSING, Rule
+from drone_rl.evaluation.verdict import Verdict, judge_policy
 from drone_rl.evaluation.verdict_text import quantity_label
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy

@@ -8,8 +8,8 @@ import torch
 from benchmarks.scripted_policies import SCRIPTS, ScriptedPolicy
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import run_baselines
-from drone_rl.evaluation.judge import judge
 from drone_rl.evaluation.rollouts import run_episodes
+from drone_rl.evaluation.verdict import judge
 from drone_rl.utils.seeding import RootSeed, Stream
 
 EPISODES = 400

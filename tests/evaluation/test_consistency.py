@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.evidence import changed
 from drone_rl.evaluation.consistency import check_verdict
-from drone_rl.evaluation.judge import judge
+from drone_rl.evaluation.verdict import judge
 from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.utils.errors import InputError
 

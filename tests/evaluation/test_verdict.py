@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import constant_policy, oracle_policy
-from drone_rl.evaluation.judge import judge, judge_policy, measure, observe
 from drone_rl.evaluation.outcomes import Outcomes, Rounding
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.evaluation.rule import Kind, Rule
+from drone_rl.evaluation.verdict import judge, judge_policy, measure, observe
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.utils.intervals import mean_bounds, proportion
@@ -253,7 +253,7 @@ def test_a_policy_is_flown_greedily_and_with_drawn_actions_in_the_same_worlds(mo
         flown.append((how.get("greedy", True), episodes, env.state_dict()))
         return run_episodes(env, actor, episodes, **how)
 
-    monkeypatch.setattr("drone_rl.evaluation.judge.run_episodes", run)
+    monkeypatch.setattr("drone_rl.evaluation.verdict.run_episodes", run)
     task = TaskSettings(num_cubes=1)
     env = DroneEnv(2, task, pixels=False)
     before = env.state_dict()

@@ -3,7 +3,7 @@
 import pytest
 
 import drone_rl
-from drone_rl.evaluation.judge import judge_for_selection
+from drone_rl.evaluation.verdict import judge_for_selection
 from drone_rl.policies.policy import Policy
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
