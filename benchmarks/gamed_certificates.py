@@ -17,7 +17,7 @@ from drone_rl.policies.zoo import certificate_path, shifts_path
 from drone_rl.robustness.axes import find_axes
 from drone_rl.robustness.domain import Prober
 from drone_rl.robustness.paired_evaluation import PairedEvaluator
-from drone_rl.robustness.shifts import make_policy_spec, shifts
+from drone_rl.robustness.shifts import make_evaluated_policy, shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verdicts.judge import judge
@@ -163,7 +163,7 @@ def forged_shifts(policy: Policy, folder: Path) -> dict[str, Any]:
         level |= {"oracle": data["plain"]["oracle"], "impossible": False, "refused": None}
         level["modes"] = {"constant": {**won, "unchanged": False}}
     along["areas"] = {"constant": 1.0}
-    subject = make_policy_spec(policy, ShiftSettings())
+    subject = make_evaluated_policy(policy, ShiftSettings())
     (axis,) = find_axes([_AXIS], subject)
     with closing(PairedEvaluator(subject, 1, data["settings"]["seed"])) as evaluator:
         prober = _ForgedProber(evaluator)

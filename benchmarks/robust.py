@@ -18,8 +18,8 @@ from drone_rl.config.commands import ShiftSettings
 from drone_rl.policies.policy import load_policy
 from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.robustness.axes import AXES, GROUPS, find_axes
-from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
-from drone_rl.robustness.shifts import make_policy_spec
+from drone_rl.robustness.paired_evaluation import EvaluatedPolicy, PairedEvaluator
+from drone_rl.robustness.shifts import make_evaluated_policy
 from drone_rl.training.run_folder import last_of, settings_of
 
 DEFAULT, ALL = "default", "all"
@@ -106,9 +106,11 @@ def success_rates(
     return {Path(name): shares for name, shares in found.items()}
 
 
-def _plain_spec(run: Path, settings: ShiftSettings) -> PolicySpec:
+def _plain_spec(run: Path, settings: ShiftSettings) -> EvaluatedPolicy:
     """Return a policy with minimal appearance and without the camera faults of its training."""
-    return dataclasses.replace(make_policy_spec(load_policy(run), settings), appearance=MINIMAL)
+    return dataclasses.replace(
+        make_evaluated_policy(load_policy(run), settings), appearance=MINIMAL
+    )
 
 
 def _row(shares: Mapping[str, float], untouched: Sequence[str]) -> dict[str, float]:

@@ -10,7 +10,7 @@ from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.robustness.agents import Agent, OracleAgent, PolicyAgent
 from drone_rl.robustness.axes import AXES, GROUPS, Axis
-from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
+from drone_rl.robustness.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.robustness.perturbations import Condition
 from drone_rl.utils.intervals import proportion
 
@@ -94,7 +94,7 @@ PLAIN = "plain"
 
 def compare(
     evaluator: PairedEvaluator,
-    subjects: Mapping[str, PolicySpec],
+    subjects: Mapping[str, EvaluatedPolicy],
     axes: Iterable[Axis],
     *,
     possible_share: float = 0.9,

@@ -21,7 +21,7 @@ from drone_rl.evaluation.baselines import BASELINES, run_baselines
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.evaluation.rule import NOT_CERTAIN, Kind
-from drone_rl.evaluation.verdict import judge
+from drone_rl.evaluation.verdict import apply_rule
 from drone_rl.utils.seeding import Stream
 
 SHIPPED = ("good", "poor", "right_and_forward")
@@ -81,7 +81,9 @@ def _verdict(script: Script, episodes: int, seed: int) -> dict[str, Any]:
     task = script.settings
     env = _make_env(task, seed)
     policy = ScriptedPolicy(script, torch.Generator().manual_seed(seed))
-    return judge(run_episodes(env, policy, episodes), _baselines(task, episodes, seed)).as_dict()
+    return apply_rule(
+        run_episodes(env, policy, episodes), _baselines(task, episodes, seed)
+    ).as_dict()
 
 
 @functools.cache

@@ -35,7 +35,7 @@ MUTABLE = {
     "training.trainer:Trainer",
     "verification.provable:Journal",
     "verification.prover.lattice:Graph",
-    "verification.prover.prover:Findings",
+    "verification.prover.prover:ProofFindings",
 }
 """Data classes below drone_rl that are not frozen; batches of tensors are exempt."""
 KEYWORD_ONLY = ("drone_rl.config.", "drone_rl.cli.")

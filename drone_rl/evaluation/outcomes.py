@@ -25,7 +25,7 @@ MAX_BRANCHES = 64
 
 
 @dataclasses.dataclass(frozen=True)
-class Outcomes:
+class OutcomeSet:
     """Possible outcomes of episodes."""
 
     episodes: Episodes | None
@@ -49,7 +49,7 @@ class Rounding:
     """Frames in which rounding can change the action."""
     is_fragile: Tensor
     """Episodes with such a frame. Shape: (n,), bool."""
-    outcomes: Outcomes
+    outcomes: OutcomeSet
     """Possible ends of these; `owner` and `is_open` index all n episodes."""
     compared: str
     """Implementation that ran the episodes again."""
@@ -95,7 +95,7 @@ class Rounding:
 
 
 @torch.no_grad()
-def enumerate_outcomes(renderer: DirectRenderer, decide: Decide, worlds: Tensor) -> Outcomes:
+def enumerate_outcomes(renderer: DirectRenderer, decide: Decide, worlds: Tensor) -> OutcomeSet:
     """Run episodes from their starts, with every possible action wherever there are several.
 
     The renderer is in the state at the start of the episodes. The policy has discrete actions and
@@ -123,7 +123,7 @@ def enumerate_outcomes(renderer: DirectRenderer, decide: Decide, worlds: Tensor)
     episodes = [
         Episodes.ended(simulated.task, simulated.info(end), end.steps) for end in ends if len(end)
     ]
-    return Outcomes(
+    return OutcomeSet(
         Episodes.joined(episodes) if episodes else None, torch.cat(owners).cpu(), is_open.cpu()
     )
 

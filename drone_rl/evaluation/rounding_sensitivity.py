@@ -16,7 +16,7 @@ from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.outcomes import (
     MAX_FRAGILE_EPISODES,
     MAX_UNEXPLAINED,
-    Outcomes,
+    OutcomeSet,
     Rounding,
     enumerate_outcomes,
 )
@@ -211,7 +211,7 @@ class _Checked:
     episodes: Episodes
     fragile: list[Tensor]
     """By episode, which frames are fragile. Shapes: (T,), bool."""
-    followed: list[tuple[int, Outcomes, Tensor]] | None
+    followed: list[tuple[int, OutcomeSet, Tensor]] | None
     """By batch: its first episode, the outcomes of its fragile ones, and which these are. None if
     they cannot be enumerated."""
 
@@ -224,11 +224,11 @@ class _Checked:
         """Episodes with a fragile frame. Shape: (n,), bool."""
         return torch.tensor([bool(f.any()) for f in self.fragile])
 
-    def outcomes(self) -> Outcomes:
+    def outcomes(self) -> OutcomeSet:
         """Possible outcomes of all episodes."""
         nobody = torch.empty(0, dtype=torch.int64)
         if self.followed is None:
-            return Outcomes(None, nobody, self.is_fragile)
+            return OutcomeSet(None, nobody, self.is_fragile)
         is_open = torch.zeros_like(self.is_fragile)
         ends, owners = [], []
         for first, found, worlds in self.followed:
@@ -237,8 +237,8 @@ class _Checked:
                 ends.append(found.episodes)
                 owners.append(first + worlds[found.owner])
         if not ends:
-            return Outcomes(None, nobody, is_open)
-        return Outcomes(Episodes.joined(ends), torch.cat(owners), is_open)
+            return OutcomeSet(None, nobody, is_open)
+        return OutcomeSet(Episodes.joined(ends), torch.cat(owners), is_open)
 
 
 def _run_checked(
@@ -256,7 +256,7 @@ def _run_checked(
         worlds = torch.tensor([bool(f.any()) for f in fragile[first:]]).nonzero()[:, 0]
         if is_counted and len(worlds):
             if len(worlds) > MAX_FRAGILE_EPISODES * len(lengths):
-                found = Outcomes(None, worlds[:0], torch.ones_like(worlds, dtype=torch.bool))
+                found = OutcomeSet(None, worlds[:0], torch.ones_like(worlds, dtype=torch.bool))
             elif not isinstance(renderer, Reasons):
                 found = enumerate_outcomes(renderer, decide, worlds.to(env.device))
             else:
@@ -275,7 +275,7 @@ def _run_second_best(
     before: dict[str, Any],
     fragile: Sequence[Tensor],
     worlds: Tensor,
-) -> Outcomes:
+) -> OutcomeSet:
     """Run a batch again with the second best action in fragile frames.
 
     For policies whose observations cannot be rendered from a state alone. The two rollouts are all
@@ -289,7 +289,7 @@ def _run_second_best(
     again = cast(Tensor, batch["fragile"]).cpu().split([len(a) for a in log.actions])
     pairs = [(only_index(fragile[i]), only_index(again[i])) for i in worlds.tolist()]
     is_open = torch.tensor([one is None or one != other for one, other in pairs])
-    return Outcomes(final_episodes(env, batch)[worlds], torch.arange(len(worlds)), is_open)
+    return OutcomeSet(final_episodes(env, batch)[worlds], torch.arange(len(worlds)), is_open)
 
 
 def _run_regrouped(

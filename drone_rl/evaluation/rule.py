@@ -58,7 +58,7 @@ KINDS = ("good", "good, but trivial", "one-sided", "poor", "none of these")
 
 
 SIDES = ("left", "ahead", "right")
-"""Strata of cube collection."""
+"""Strata of cube collection, as in `sim.tasks.common`, which imports torch."""
 BLIND_BASELINES = ("random", "forward", "left", "right")
 """Its random and constant baselines."""
 TOLERANCE = 1e-9

@@ -14,7 +14,7 @@ from torchrl.envs import EnvBase
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.baselines import run_baselines
 from drone_rl.evaluation.metrics import Episodes, failure_table, summarise
-from drone_rl.evaluation.outcomes import Outcomes, Rounding
+from drone_rl.evaluation.outcomes import OutcomeSet, Rounding
 from drone_rl.evaluation.rollouts import StepLog, base_env, run_episodes
 from drone_rl.evaluation.rounding_sensitivity import check_rounding
 from drone_rl.evaluation.rule import NOT_CERTAIN, Kind, Quantity, Rule, decide, kinds_within
@@ -28,7 +28,7 @@ MANY = (2, 3, 5, 10, 20, 50, 100)
 """Multiples of the number of episodes for which certainty is extrapolated."""
 
 
-class Claim(Protocol):
+class CertificateClaim(Protocol):
     """A certificate of the policy; `drone_rl.verdicts.certificate` has the implementation."""
 
     def as_evidence(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
@@ -76,7 +76,7 @@ def judge_policy(
     """Run so many episodes of a policy and of each baseline, and apply the rule.
 
     Initial states are the same. `sampled` also runs the policy with sampled actions; `known` are
-    the arguments "rule", "claim", "unlike" and "seed" of `judge`.
+    the arguments "rule", "claim", "unlike" and "seed" of `apply_rule`.
     """
     base, worlds = base_env(env), worlds_of(env)
     state = base.state_dict()
@@ -90,7 +90,7 @@ def judge_policy(
     baselines = run_baselines(
         env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
     )
-    return judge(greedy, baselines, sampled=drawn, rounding=rounding, **known)
+    return apply_rule(greedy, baselines, sampled=drawn, rounding=rounding, **known)
 
 
 def judge_for_selection(
@@ -116,13 +116,13 @@ def judge_for_selection(
         return verdict.as_dict(), policy.state["progress"]
 
 
-def judge(
+def apply_rule(
     greedy: Episodes,
     baselines: Mapping[str, Episodes],
     *,
     rule: Rule | None = None,
     sampled: Episodes | None = None,
-    claim: Claim | None = None,
+    claim: CertificateClaim | None = None,
     unlike: Mapping[str, Any] | None = None,
     seed: RootSeed | None = None,
     rounding: Rounding | None = None,
@@ -202,7 +202,7 @@ def widen(
     greedy: Episodes,
     baselines: Mapping[str, Episodes],
     rule: Rule,
-    outcomes: Outcomes,
+    outcomes: OutcomeSet,
 ) -> tuple[Quantity, ...]:
     """Widen the intervals of `measure` to include all outcomes that rounding makes possible.
 

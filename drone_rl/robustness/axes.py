@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 from drone_rl.envs.fault_models import dead_rows, late_frames, noise, out_of_focus
-from drone_rl.robustness.paired_evaluation import PolicySpec
+from drone_rl.robustness.paired_evaluation import EvaluatedPolicy
 from drone_rl.robustness.perturbations import (
     Condition,
     expose,
@@ -62,17 +62,17 @@ class Axis:
     """Strength of no perturbation."""
     strengths: tuple[float, ...]
     """Five, weakest first; on both sides of the neutral one if the axis has two ends."""
-    make: Callable[[float, PolicySpec], Condition]
+    make: Callable[[float, EvaluatedPolicy], Condition]
     """The condition of a strength; raises InputError if it is not for the task."""
-    value: Callable[[float, PolicySpec], float] = lambda strength, _: strength
+    value: Callable[[float, EvaluatedPolicy], float] = lambda strength, _: strength
     """A strength in the axis's unit; differs where strengths are relative to the policy."""
-    own: Callable[[PolicySpec], float] | None = None
+    own: Callable[[EvaluatedPolicy], float] | None = None
     """The neutral strength of a policy, if it is not the same for all."""
     scale: Scale = LINEAR
     whole: bool = False
     """Whether only whole numbers are strengths."""
 
-    def of(self, subject: PolicySpec) -> "Axis":
+    def of(self, subject: EvaluatedPolicy) -> "Axis":
         """Return the axis with the policy's own neutral strength."""
         return self if self.own is None else dataclasses.replace(self, neutral=self.own(subject))
 
@@ -85,7 +85,7 @@ class Axis:
         """By end of a range of values, "low" and "high", the sign of its position."""
         return {"low": -1, "high": 1} if self.scale.rises else {"low": 1, "high": -1}
 
-    def strength(self, value: float, subject: PolicySpec) -> float:
+    def strength(self, value: float, subject: EvaluatedPolicy) -> float:
         """Return the strength that has this value for a policy: the inverse of affine `value`."""
         if not math.isfinite(value):
             return value
@@ -113,14 +113,14 @@ _THINGS = (SemanticClass.TARGET, SemanticClass.OBSTACLE)
 _SIZES = {"collect_cubes": "cube_size", "pillars": "width"}
 
 
-def _size(subject: PolicySpec) -> str:
+def _size(subject: EvaluatedPolicy) -> str:
     name = subject.task.name
     if name not in _SIZES:
         raise InputError(f"axis=object_size is not for task={name}; leave it out of axes")
     return _SIZES[name]
 
 
-def _rendered(subject: PolicySpec, condition: Condition) -> Condition:
+def _rendered(subject: EvaluatedPolicy, condition: Condition) -> Condition:
     if subject.renderer != "raytrace":
         raise InputError(
             f"renderer={subject.renderer} can't draw fog and exposure; give axes without fog and "
@@ -129,7 +129,7 @@ def _rendered(subject: PolicySpec, condition: Condition) -> Condition:
     return condition
 
 
-def _cluttered(subject: PolicySpec, count: int) -> Condition:
+def _cluttered(subject: EvaluatedPolicy, count: int) -> Condition:
     task_things(subject.task)
     return Condition(clutter=count)
 
@@ -139,19 +139,19 @@ def _middle(value: float | tuple[float, float]) -> float:
     return sum(value) / 2 if isinstance(value, tuple) else value
 
 
-def _field_of_view(change: float, subject: PolicySpec) -> float:
+def _field_of_view(change: float, subject: EvaluatedPolicy) -> float:
     return subject.camera.horizontal_fov + change
 
 
-def _times(setting: str, factor: float, subject: PolicySpec) -> float:
+def _times(setting: str, factor: float, subject: EvaluatedPolicy) -> float:
     return factor * getattr(subject.task, setting)
 
 
-def _turned(turn: str) -> Callable[[float, PolicySpec], Condition]:
+def _turned(turn: str) -> Callable[[float, EvaluatedPolicy], Condition]:
     return lambda s, _: Condition(mounts=(mount(turn=turn, degrees=s),))
 
 
-_MAKE: dict[str, Callable[[float, PolicySpec], Condition]] = {
+_MAKE: dict[str, Callable[[float, EvaluatedPolicy], Condition]] = {
     "object_color": lambda s, _: Condition(appearance_changes=(tint(_THINGS, s),)),
     "object_white": lambda s, _: Condition(appearance_changes=(whiten(_THINGS, s),)),
     "floor_color": lambda s, _: Condition(appearance_changes=(tint((SemanticClass.GROUND,), s),)),
@@ -175,12 +175,12 @@ _MAKE: dict[str, Callable[[float, PolicySpec], Condition]] = {
     "step_length": lambda s, of: Condition(task={"step_length": _times("step_length", s, of)}),
     "action_delay": lambda s, _: Condition(delay=round(s)),
 }
-_VALUE: dict[str, Callable[[float, PolicySpec], float]] = {
+_VALUE: dict[str, Callable[[float, EvaluatedPolicy], float]] = {
     "field_of_view": _field_of_view,
     "object_size": lambda s, of: _times(_size(of), s, of),
     "step_length": lambda s, of: _times("step_length", s, of),
 }
-_OWN: dict[str, Callable[[PolicySpec], float]] = {
+_OWN: dict[str, Callable[[EvaluatedPolicy], float]] = {
     "sun": lambda of: _middle(of.appearance.sun_elevation),
     "fog": lambda of: _middle(of.appearance.fog_visibility or math.inf),
 }
@@ -213,7 +213,7 @@ def check_axes(names: Iterable[str]) -> None:
             raise InputError(f"axes={name} is unknown; give some of: {known}")
 
 
-def find_axes(names: Iterable[str] | None, subject: PolicySpec) -> list[Axis]:
+def find_axes(names: Iterable[str] | None, subject: EvaluatedPolicy) -> list[Axis]:
     """Return axes by name or by group, by default all that the task has, in the order of `AXES`.
 
     Raises:
@@ -229,7 +229,7 @@ def find_axes(names: Iterable[str] | None, subject: PolicySpec) -> list[Axis]:
     return [axis.of(subject) for axis in found]
 
 
-def _is_for(axis: Axis, subject: PolicySpec) -> bool:
+def _is_for(axis: Axis, subject: EvaluatedPolicy) -> bool:
     try:
         return bool(axis.make(axis.strengths[0], subject))
     except InputError:

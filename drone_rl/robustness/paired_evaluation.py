@@ -46,7 +46,7 @@ _CLUTTER = 1000
 
 
 @dataclasses.dataclass(frozen=True)
-class PolicySpec:
+class EvaluatedPolicy:
     """A policy with its task, camera, transforms and dynamics."""
 
     network: ImageNetwork
@@ -73,7 +73,7 @@ class ConditionResult:
 class PairedEvaluator:
     """Runs agents under conditions; episode i starts in the same state under each of them."""
 
-    def __init__(self, subject: PolicySpec, episodes: int, seed: int = 0) -> None:
+    def __init__(self, subject: EvaluatedPolicy, episodes: int, seed: int = 0) -> None:
         """Sample the initial states of so many environments, one episode each."""
         self.subject, self.episodes, self.seed = subject, episodes, seed
         task = as_task(subject.task)

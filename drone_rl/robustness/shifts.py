@@ -24,7 +24,7 @@ from drone_rl.robustness.agents import OracleAgent
 from drone_rl.robustness.axes import AXES, Axis, check_axes, find_axes
 from drone_rl.robustness.charts import chart, strips
 from drone_rl.robustness.domain import Prober
-from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
+from drone_rl.robustness.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.robustness.perturbations import Condition, Mode
 from drone_rl.robustness.shifts_file import FORMAT, FORMAT_VERSION
 from drone_rl.robustness.shifts_text import SHIFTS, is_tested, rows
@@ -126,7 +126,7 @@ def shifts(
     loaded = loaded.in_dynamics(**dynamics) if dynamics else loaded
     begin = time.perf_counter()
     require_function(loaded, seed=seed.value, device=settings.device, renderer=settings.renderer)
-    subject = make_policy_spec(loaded, settings)
+    subject = make_evaluated_policy(loaded, settings)
     axes = find_axes(settings.axes, subject)
     total = len(axes) * (len(settings.strengths) + settings.domain) + 1
     done = itertools.count()
@@ -171,7 +171,7 @@ def ranges_of(numbers: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 def _domain(
-    subject: PolicySpec,
+    subject: EvaluatedPolicy,
     axes: Sequence[Axis],
     settings: ShiftSettings,
     seed: RootSeed,
@@ -191,7 +191,7 @@ def _domain(
     return {"plain": prober.plain, "ranges": ranges}
 
 
-def make_policy_spec(policy: BasePolicy, settings: ShiftSettings) -> PolicySpec:
+def make_evaluated_policy(policy: BasePolicy, settings: ShiftSettings) -> EvaluatedPolicy:
     """Return the policy with its task, camera and transforms.
 
     Raises:
@@ -212,4 +212,4 @@ def make_policy_spec(policy: BasePolicy, settings: ShiftSettings) -> PolicySpec:
     described = getattr(policy, "description", None)  # only policies from files have one
     look = MINIMAL if described is None else described.appearance
     where, moved = (settings.device, settings.renderer), (policy.dynamics, policy.actions)
-    return PolicySpec(network, task, camera, transforms, look, *where, *moved)
+    return EvaluatedPolicy(network, task, camera, transforms, look, *where, *moved)

@@ -81,7 +81,7 @@ def read_shifts(
             itself.
     """
     content = read_bytes(path, SHIFTS_BYTES)
-    policy: Any = described  # has what axes read of a PolicySpec
+    policy: Any = described  # has what axes read of an EvaluatedPolicy
     try:
         data = dict(as_mapping(parse_json(content, "it"), "it"))
         pictures = as_mapping(data.pop("pictures", None), "pictures")

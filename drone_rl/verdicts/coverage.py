@@ -16,7 +16,7 @@ from drone_rl.policies.zoo import shifts_path
 from drone_rl.robustness.agents import OracleAgent
 from drone_rl.robustness.axes import AXES, Axis, find_axes
 from drone_rl.robustness.domain import Prober
-from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
+from drone_rl.robustness.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.robustness.perturbations import Condition
 from drone_rl.robustness.shifts_file import SavedShifts, read_shifts
 from drone_rl.robustness.shifts_text import contradicted, lacking, needed_range
@@ -233,10 +233,10 @@ def recheck_domain(
     `domain_flights` and `good_share`. `seed` is the root of the random streams of the sample and of
     its environments.
     """
-    from drone_rl.robustness.shifts import make_policy_spec  # slow to import: it draws charts
+    from drone_rl.robustness.shifts import make_evaluated_policy  # slow to import: it draws charts
 
     how = ShiftSettings(device=settings.device, renderer=settings.renderer)
-    subject, rng = make_policy_spec(policy, how), np.random.default_rng(seed.value)
+    subject, rng = make_evaluated_policy(policy, how), np.random.default_rng(seed.value)
     tried = {
         axis: [*_strengths(axis, subject, needs[axis.name], numbers, rng)]
         for axis in find_axes(needs, subject)
@@ -266,7 +266,7 @@ def recheck_domain(
 
 def _strengths(
     axis: Axis,
-    subject: PolicySpec,
+    subject: EvaluatedPolicy,
     need: Need,
     numbers: Mapping[str, Any],
     rng: np.random.Generator,

@@ -22,7 +22,7 @@ from drone_rl.verification.checker.certificate import (
     check_same_policy,
     read_certificate,
 )
-from drone_rl.verification.checker.checker import Findings, check_certificate
+from drone_rl.verification.checker.checker import CheckFindings, check_certificate
 
 REFUSED = 14  # exit status for a refused certificate
 
@@ -38,7 +38,7 @@ class Check:
     settings: CheckSettings
     certificate: Certificate = dataclasses.field(repr=False)
     """The statements."""
-    findings: Findings
+    findings: CheckFindings
     seed: RootSeed
     """Root seed of the simulated placements."""
 

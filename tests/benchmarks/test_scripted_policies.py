@@ -9,7 +9,7 @@ from benchmarks.scripted_policies import SCRIPTS, ScriptedPolicy
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import run_baselines
 from drone_rl.evaluation.rollouts import run_episodes
-from drone_rl.evaluation.verdict import judge
+from drone_rl.evaluation.verdict import apply_rule
 from drone_rl.utils.seeding import RootSeed, Stream
 
 EPISODES = 400
@@ -146,7 +146,7 @@ def test_kind_certainty_and_sentence(name):
     kind, certain, phrases = WANTED[name]
     task = SCRIPTS[name].settings
     sampled = run(name, greedy=False) if SCRIPTS[name].confidence < 1 else None
-    verdict = judge(run(name), baselines(task), sampled=sampled, seed=UNKNOWN)
+    verdict = apply_rule(run(name), baselines(task), sampled=sampled, seed=UNKNOWN)
     assert (verdict.kind.value, verdict.certain) == (kind, certain), verdict.sentence
     assert all(phrase in verdict.sentence for phrase in phrases), verdict.sentence
     assert 2 <= verdict.sentence.count(". ") + 1 <= 5, verdict.sentence

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.evidence import changed
 from drone_rl.evaluation.consistency import check_verdict
-from drone_rl.evaluation.verdict import judge
+from drone_rl.evaluation.verdict import apply_rule
 from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.utils.errors import InputError
 
@@ -22,7 +22,7 @@ def judged(make_episodes, make_baselines):
     def judged(hits, number=400, **kwargs):
         sides = [LAYOUTS[i % 4] for i in range(number)]
         episodes = make_episodes(sides, [[hits(i, s) for s in row] for i, row in enumerate(sides)])
-        verdict = judge(episodes, make_baselines(episodes), sampled=episodes, **kwargs)
+        verdict = apply_rule(episodes, make_baselines(episodes), sampled=episodes, **kwargs)
         return json.loads(json.dumps(verdict.as_dict()))
 
     return judged

@@ -5,7 +5,7 @@ import torch
 
 import drone_rl
 from drone_rl.evaluation import rounding_sensitivity
-from drone_rl.evaluation.outcomes import Outcomes
+from drone_rl.evaluation.outcomes import OutcomeSet
 from drone_rl.evaluation.rollouts import StepLog, run_episodes
 from drone_rl.evaluation.rounding_sensitivity import (
     check_rounding,
@@ -109,7 +109,7 @@ def test_frames_are_tried_in_batches_of_many_sizes():
 
 def test_outcomes_of_several_batches_are_numbered_by_episode(make_episodes):
     ends = make_episodes([[0], [1]], [[True], [False]])
-    found = Outcomes(ends, torch.tensor([1, 0]), torch.tensor([False, True]))
+    found = OutcomeSet(ends, torch.tensor([1, 0]), torch.tensor([False, True]))
     fragile = [torch.tensor([False])] * 8
     batches = [(0, found, torch.tensor([0, 2])), (4, found, torch.tensor([1, 3]))]
     outcomes = rounding_sensitivity._Checked(ends, fragile, batches).outcomes()

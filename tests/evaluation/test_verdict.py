@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import constant_policy, oracle_policy
-from drone_rl.evaluation.outcomes import Outcomes, Rounding
+from drone_rl.evaluation.outcomes import OutcomeSet, Rounding
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.evaluation.rule import Kind, Rule
-from drone_rl.evaluation.verdict import judge, judge_policy, measure, observe
+from drone_rl.evaluation.verdict import apply_rule, judge_policy, measure, observe
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.utils.intervals import mean_bounds, proportion
@@ -32,7 +32,7 @@ def judged(make_episodes, make_baselines):
     def judged(hits, number=400, **kwargs):
         sides = [LAYOUTS[i % 4] for i in range(number)]
         episodes = make_episodes(sides, [[hits(i, s) for s in row] for i, row in enumerate(sides)])
-        return judge(episodes, make_baselines(episodes), **kwargs)
+        return apply_rule(episodes, make_baselines(episodes), **kwargs)
 
     return judged
 
@@ -129,7 +129,7 @@ def test_more_of_the_same_is_known_better(make_episodes, make_baselines):
 
 def test_what_was_not_offered_is_no_failure(make_episodes, make_baselines):
     episodes = make_episodes([[AHEAD, AHEAD]] * 400, [[1, 1]] * 400)
-    verdict = judge(episodes, make_baselines(episodes))
+    verdict = apply_rule(episodes, make_baselines(episodes))
     assert (verdict.kind, verdict.certain) == (Kind.TRIVIAL, True)
     assert verdict.evidence["greedy"]["shares"]["left"]["mean"] is None
     assert "0%" not in verdict.sentence.replace("100%", "")
@@ -146,7 +146,7 @@ def test_a_task_that_a_baseline_solves_is_trivial(
     """Of 400 episodes the policy succeeds in all; flying straight needs 360 to be good, too."""
     sides = [[AHEAD, AHEAD if i < solved else LEFT] for i in range(400)]
     episodes = make_episodes(sides, [[1, 1]] * 400)
-    verdict = judge(episodes, make_baselines(episodes))
+    verdict = apply_rule(episodes, make_baselines(episodes))
     assert (verdict.kind, verdict.certain, verdict.exit_code) == (kind, certain, status)
     trivial = "Flying straight on does as well: it collects every cube in 100% of episodes"
     assert verdict.sentence.startswith(trivial) == (solved == 400)
@@ -169,16 +169,16 @@ def test_other_worlds_are_no_baseline(make_episodes, make_baselines):
     ours = make_episodes([[LEFT, LEFT]] * 2, [[1, 1]] * 2)
     theirs = make_episodes([[RIGHT, LEFT]] * 2, [[1, 1]] * 2)
     with pytest.raises(ValueError, match="different initial states"):
-        judge(ours, make_baselines(theirs))
+        apply_rule(ours, make_baselines(theirs))
     with pytest.raises(ValueError, match="different initial states"):
-        judge(ours, make_baselines(ours), sampled=ours[:1])
+        apply_rule(ours, make_baselines(ours), sampled=ours[:1])
 
 
 def test_one_other_world_is_enough_to_be_no_baseline(make_episodes, make_baselines):
     ours = make_episodes([[LEFT, LEFT]] * 3, [[1, 1]] * 3)
     theirs = make_episodes([[LEFT, LEFT]] * 2 + [[RIGHT, LEFT]], [[1, 1]] * 3)
     with pytest.raises(ValueError, match="different initial states"):
-        judge(ours, make_baselines(theirs))
+        apply_rule(ours, make_baselines(theirs))
 
 
 def test_sampled_flights_are_compared_pair_by_pair(judged, make_episodes):
@@ -226,7 +226,7 @@ def test_a_mirrored_flight_gets_the_mirrored_kind(make_episodes, make_baselines,
     baselines = make_baselines(ours)
     theirs = {name: mirrored(flown) for name, flown in baselines.items()}
     theirs["left"], theirs["right"] = theirs["right"], theirs["left"]
-    verdict, reflected = judge(ours, baselines), judge(mirrored(ours), theirs)
+    verdict, reflected = apply_rule(ours, baselines), apply_rule(mirrored(ours), theirs)
     assert reflected.kind is verdict.kind.mirrored
     assert reflected.certain == verdict.certain
 
@@ -280,13 +280,13 @@ def rounded(make_episodes, make_baselines):
             frames=16_000,
             fragile=16_000 if excessive else number,
             is_fragile=torch.arange(400) < number,
-            outcomes=Outcomes(lost, owner, opened),
+            outcomes=OutcomeSet(lost, owner, opened),
             compared="fused kernel",
             compared_episodes=50,
             differing=0,
             unexplained=0,
         )
-        return judge(flown, make_baselines(flown), rounding=rounding)
+        return apply_rule(flown, make_baselines(flown), rounding=rounding)
 
     return rounded
 

@@ -5,7 +5,7 @@ import torch
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.envs import GrayPixels
 from drone_rl.policies import ImageNetwork
-from drone_rl.robustness.paired_evaluation import PolicySpec
+from drone_rl.robustness.paired_evaluation import EvaluatedPolicy
 
 TASK = TaskSettings(num_cubes=1, first_distance=8.0, front_margin=4.0)
 
@@ -41,7 +41,7 @@ SMALL = CameraSettings(width=16, height=5)
 
 
 def subject(network=None, task=TASK, transforms=None, camera=SMALL):
-    return PolicySpec(
+    return EvaluatedPolicy(
         network or Steering(),
         task,
         camera,

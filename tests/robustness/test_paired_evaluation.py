@@ -8,7 +8,7 @@ from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs.fault_models import late_frames
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
+from drone_rl.robustness.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.robustness.perturbations import ONSET_STEP, Condition, Mode, whiten
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks.collect_cubes import EndReason
@@ -34,7 +34,7 @@ def test_with_nothing_different_flights_are_those_of_the_environment(make_bed):
     policy = drone_rl.load_policy("poor")
     network, described = policy.make_network().eval(), policy.description
     evaluator = make_bed(
-        PolicySpec(network, policy.task, described.camera, described.make_transforms()), 6
+        EvaluatedPolicy(network, policy.task, described.camera, described.make_transforms()), 6
     )
     flown = evaluator.run(Condition()).episodes
     with policy.flying(6, stream=Stream.SHIFTED) as (env, actor):
@@ -132,7 +132,7 @@ def test_flights_in_another_body_are_those_of_the_environment(make_bed):
     policy = drone_rl.load_policy("good").in_dynamics(mode="simple_flight", wind=[1, 0, 0], gusts=1)
     network, described = policy.make_network().eval(), policy.description
     pipeline = described.make_transforms()
-    told = PolicySpec(network, policy.task, described.camera, pipeline, dynamics=gusty)
+    told = EvaluatedPolicy(network, policy.task, described.camera, pipeline, dynamics=gusty)
     flown = make_bed(told, 3).run(Condition()).episodes
     with policy.flying(3, stream=Stream.SHIFTED) as (env, actor):
         expected = run_episodes(env, actor, 3)

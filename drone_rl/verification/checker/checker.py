@@ -58,7 +58,7 @@ class Contradiction:
 
 
 @dataclasses.dataclass(frozen=True)
-class Findings:
+class CheckFindings:
     """The result of a check."""
 
     inconsistencies: tuple[str, ...]  # impossible or refuted statements, without single episodes
@@ -182,7 +182,7 @@ def check_certificate(
     device: str = "cpu",
     renderer: str = "raytrace",
     tell: ProgressCallback = lambda done, total: None,
-) -> Findings:
+) -> CheckFindings:
     """Check a certificate of a policy with these weights, see `check_same_policy`.
 
     An inconsistent certificate is refused without simulation. Else up to `flights` episodes are
@@ -194,7 +194,7 @@ def check_certificate(
     """
     lies = tuple(find_inconsistencies(certificate))
     if lies:
-        return Findings(lies, (), 0, {})
+        return CheckFindings(lies, (), 0, {})
     drawn = sample_placements(certificate, flights, np.random.default_rng(seed))
     stated = drawn.outcome < len(certificate.outcomes)
     points, why = drawn.points[stated], drawn.why[stated]
@@ -217,7 +217,7 @@ def check_certificate(
         for i in wrong[:MAX_KEPT]
     ]
     count = {kind: int((why == kind).sum()) for kind in (INSIDE, BORDER, ANYWHERE)}
-    return Findings((*rounded, *counts), tuple(kept), len(wrong), count)
+    return CheckFindings((*rounded, *counts), tuple(kept), len(wrong), count)
 
 
 def read_validated(

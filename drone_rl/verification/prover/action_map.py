@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from drone_rl.sim.actions import MOVES, Move
+from drone_rl.sim.tasks.common import SIDES
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.action_table import workers
 from drone_rl.verification.prover.arrangement import SAME, Arrangement, Pieces, Window, arrange
@@ -29,7 +30,6 @@ from drone_rl.verification.prover.cube_images import NOTHING, UNIT, CameraModel
 
 RenderFaces = Callable[[NDArray[np.uint8]], Tensor]  # faces to the network's input (N, C, H, W)
 
-SIDES = ("left", "ahead", "right")  # flying straight on misses a cube to the left or right
 NEEDED = (Move.LEFT, Move.FORWARD, Move.RIGHT)  # the action that a cube on each side requires
 UNSEEN, BLIND = "unseen", "blind"
 _DIGITS = 14  # slopes of mirrored rows are rounded differently
@@ -43,7 +43,9 @@ class ActionMap:
     window: Window
     arrangement: Arrangement
     places: NDArray[np.float64]  # a point of each cell, metres ahead and left. Shape: (cells, 2)
-    areas: NDArray[np.float64]  # area of each cell, m^2, by `SIDES`. Shape: (cells, 3)
+    areas: NDArray[
+        np.float64
+    ]  # area of each cell, m^2, by side of the cube, see `SIDES`. Shape: (cells, 3)
     action: NDArray[np.int64]  # argmax action. Shape: (cells,)
     gap: NDArray[np.float64]  # gap of the two highest logits. Shape: (cells,)
     is_unseen: NDArray[np.bool_]  # whether no pixel shows the cube. Shape: (cells,)

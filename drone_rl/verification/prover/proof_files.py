@@ -22,7 +22,7 @@ from drone_rl.utils.files import write_atomically
 from drone_rl.utils.limits import ARRAYS_BYTES, check_indices
 from drone_rl.verification.prover.boxes import Boxes, volumes
 from drone_rl.verification.prover.lattice import Ending, LatticeState
-from drone_rl.verification.prover.prover import Findings, Prover, combine
+from drone_rl.verification.prover.prover import ProofFindings, Prover, combine
 
 FORMAT = "drone_rl certificate"
 FORMAT_VERSION = 1
@@ -143,8 +143,8 @@ def load(prover: Prover, path: Path, proof_id: str, most: int = ARRAYS_BYTES) ->
         ((_, parts),), ((_, part),) = sets["parts"], sets["part"]
         ((_, left),) = sets["undecided"]
         _check(part, waiting, [*ended, *ways, *forked])
-        done = [Findings({_ending(row): b}, left[:0], {}) for row, b in sets["done"]]
-        done = combine([Findings({}, left, _steps(state)), *done])
+        done = [ProofFindings({_ending(row): b}, left[:0], {}) for row, b in sets["done"]]
+        done = combine([ProofFindings({}, left, _steps(state)), *done])
     except _DAMAGE as error:
         raise InputError(
             f"{path} is not a saved proof state ({error}); delete it to start again"

@@ -34,7 +34,7 @@ Ended = Mapping[tuple[Ending, int], Sequence[Boxes]]  # disjoint, by number of s
 
 
 @dataclasses.dataclass
-class Findings:
+class ProofFindings:
     """What is known of disjoint sets of placements."""
 
     endings: dict[Ending, Boxes]
@@ -61,7 +61,7 @@ class Prover:
         self.spec, self.lattice = spec, spec.lattice
         self.parts = partition_placements(spec, most_combinations)  # not yet started
         self.part = self.parts[:0]  # in progress, if any
-        self.done = Findings({}, self.parts[:0], {})  # findings of the parts before
+        self.done = ProofFindings({}, self.parts[:0], {})  # findings of the parts before
         self.waiting: dict[LatticeState, list[Boxes]] = defaultdict(list)
         self.ended: dict[tuple[Ending, int], list[Boxes]] = defaultdict(list)
         """Of the part in progress, by number of steps."""
@@ -115,17 +115,17 @@ class Prover:
         self.waiting[place].append(boxes)
         self.boxes_under_way += len(boxes)
 
-    def findings(self) -> Findings:
+    def findings(self) -> ProofFindings:
         """Return what is known of all placements, without forks of the part in progress."""
         task = self.lattice.task
-        found = [self.done, so_far(self.ended, self.part), Findings({}, self.parts, {})]
+        found = [self.done, so_far(self.ended, self.part), ProofFindings({}, self.parts, {})]
         return simplified(combine(found), all_placements(task.lateral_bound, task.num_cubes))
 
     def _finish_part(self) -> None:
         """Resolve the forks of a finished part and clear its records."""
         endings = {e: union(np.concatenate(b)) for e, b in self.fork_ends.items() if e}
         unknown, num_cubes = self.fork_ends.get(None, []), self.lattice.task.num_cubes
-        forks = Findings(*resolve_forks(self.forked, endings, unknown, num_cubes), {})
+        forks = ProofFindings(*resolve_forks(self.forked, endings, unknown, num_cubes), {})
         found = combine([ended(self.ended, self.part[:0]), forks])
         self.done = combine([self.done, simplified(found, self.part)])
         self.decided = self.done.decided
@@ -253,22 +253,22 @@ def _hull(boxes: Boxes) -> NDArray[np.float64]:
     return np.stack([boxes[..., 0].min(0), boxes[..., 1].max(0)], -1)
 
 
-def ended(known: Ended, none: Boxes) -> Findings:
+def ended(known: Ended, none: Boxes) -> ProofFindings:
     """Return the findings of placements followed to their end without forks."""
-    found = [Findings({}, none, {})]
+    found = [ProofFindings({}, none, {})]
     for (ending, steps), parts in known.items():
         volume = float(volumes(boxes := np.concatenate(parts)).sum())
-        found.append(Findings({ending: boxes}, none, {ending: {steps: volume}}))
+        found.append(ProofFindings({ending: boxes}, none, {ending: {steps: volume}}))
     return combine(found)
 
 
-def so_far(known: Ended, part: Boxes) -> Findings:
+def so_far(known: Ended, part: Boxes) -> ProofFindings:
     """Return the largest boxes of each ending of a part in progress; the rest counts as undecided.
 
     Many cubes give millions of boxes, which nobody could check one by one.
     """
     if not known:
-        return Findings({}, part, {})
+        return ProofFindings({}, part, {})
     each = [np.concatenate(parts) for parts in known.values()]
     boxes, owner = np.concatenate(each), np.repeat(range(len(each)), [len(b) for b in each])
     kinds = list(dict.fromkeys(ending for ending, _ in known))
@@ -279,10 +279,10 @@ def so_far(known: Ended, part: Boxes) -> Findings:
     while (left := complement(boxes[largest], part)) is None:
         largest = largest[: len(largest) // 2]
     stated = {key: [boxes[largest[owner[largest] == i]]] for i, key in enumerate(known)}
-    return combine([ended(stated, part[:0]), Findings({}, left, {})])
+    return combine([ended(stated, part[:0]), ProofFindings({}, left, {})])
 
 
-def combine(some: Sequence[Findings]) -> Findings:
+def combine(some: Sequence[ProofFindings]) -> ProofFindings:
     """Combine the findings of disjoint placements."""
     endings: dict[Ending, list[Boxes]] = defaultdict(list)
     steps: dict[Ending, dict[int, float]] = defaultdict(lambda: defaultdict(float))
@@ -293,14 +293,14 @@ def combine(some: Sequence[Findings]) -> Findings:
         for ending, volume in found.steps.items():
             for count, more in volume.items():
                 steps[ending][count] += more
-    return Findings(
+    return ProofFindings(
         {ending: np.concatenate(boxes) for ending, boxes in endings.items()},
         np.concatenate([found.undecided for found in some]),
         dict(steps),
     )
 
 
-def simplified(found: Findings, space: Boxes) -> Findings:
+def simplified(found: ProofFindings, space: Boxes) -> ProofFindings:
     """Reduce the boxes of a whole space: one ending becomes the complement of the others."""
     endings = {ending: merge(boxes) for ending, boxes in found.endings.items()}
     left = merge(found.undecided)
@@ -309,4 +309,4 @@ def simplified(found: Findings, space: Boxes) -> Findings:
         holes = np.concatenate([left, *(b for e, b in endings.items() if e != usual)])
         if (rest := complement(holes, space)) is not None:
             endings[usual] = min(endings[usual], rest, key=len)
-    return Findings(endings, left, found.steps)
+    return ProofFindings(endings, left, found.steps)

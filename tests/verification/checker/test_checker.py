@@ -5,8 +5,8 @@ import drone_rl
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.checker.certificate import Outcome, parse_certificate
 from drone_rl.verification.checker.checker import (
+    CheckFindings,
     Contradiction,
-    Findings,
     Rollouts,
     check_certificate,
     ends_as_stated,
@@ -111,7 +111,7 @@ def test_another_end_is_not_as_stated(stated, ended):
 
 def test_many_contradictions_take_few_lines():
     one = Contradiction("inside", (1.0, 2.0), "a", "b")
-    found = Findings(("lie",), (one,) * 30, 5000, {"inside": 9000})
+    found = CheckFindings(("lie",), (one,) * 30, 5000, {"inside": 9000})
     assert len(found.lines()) == 22
     assert str(one) in found.lines()[1] and "y=[1.0, 2.0]" in str(one)
     assert found.lines()[-1] == "and 4980 flights more ended otherwise than stated"

@@ -6,7 +6,7 @@ import pytest
 from drone_rl.verification.prover import prover as module
 from drone_rl.verification.prover.boxes import volumes
 from drone_rl.verification.prover.prover import (
-    Findings,
+    ProofFindings,
     combine,
     ended,
     simplified,
@@ -28,9 +28,9 @@ def test_what_is_followed_to_its_end():
 
 def test_parts_put_together():
     some = [
-        Findings({"won": line([0, 1])}, line([1, 2]), {"won": {3: 1.0}}),
-        Findings({"won": line([2, 4]), "lost": line()}, line(), {"won": {3: 2.0, 4: 0.5}}),
-        Findings({}, line([4, 9]), {}),
+        ProofFindings({"won": line([0, 1])}, line([1, 2]), {"won": {3: 1.0}}),
+        ProofFindings({"won": line([2, 4]), "lost": line()}, line(), {"won": {3: 2.0, 4: 0.5}}),
+        ProofFindings({}, line([4, 9]), {}),
     ]
     found = combine(some)
     assert {e: b.tolist() for e, b in found.endings.items()} == {"won": [[[0, 1]], [[2, 4]]]}
@@ -40,12 +40,12 @@ def test_parts_put_together():
 
 def test_the_largest_part_is_what_the_others_leave():
     won = line(*[[i, i + 1] for i in range(0, 9, 2)], [1, 2], [3, 4], [5, 6])
-    found = Findings({"won": won, "lost": line([7, 8])}, line(), {"won": {1: 8.0}})
+    found = ProofFindings({"won": won, "lost": line([7, 8])}, line(), {"won": {1: 8.0}})
     simple = simplified(found, line([0, 9]))
     assert sorted(simple.endings["won"].tolist()) == [[[0, 7]], [[8, 9]]]
     assert simple.endings["lost"].tolist() == [[[7, 8]]]
     assert not len(simple.undecided) and simple.steps == {"won": {1: 8.0}}
-    nothing = simplified(Findings({}, line([0, 4], [4, 9]), {}), line([0, 9]))
+    nothing = simplified(ProofFindings({}, line([0, 4], [4, 9]), {}), line([0, 9]))
     assert nothing.undecided.tolist() == [[[0, 9]]] and not nothing.endings
 
 
