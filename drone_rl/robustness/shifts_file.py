@@ -228,7 +228,7 @@ def _refuse_another(
     stated = numbers["network"]["weights"]
     if stated != (own := fingerprint(weights)):
         raise InputError(
-            f"it is of a network with the hash {stated[:12]}..., the policy's has {own[:12]}..."
+            f"it is for a network with hash {stated[:12]}..., but the policy's has {own[:12]}..."
         )
     of, mine = parse(numbers["network"]["description"]).as_dict(), described.as_dict()
     for part in ("task", *_PARTS):

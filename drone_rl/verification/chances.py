@@ -53,7 +53,7 @@ class Chances:
     """Placements, metres, world frame, nearest cube first."""
     outcomes: Outcomes
     """For each placement."""
-    pictures: int
+    num_images: int
     """Number of images rendered."""
     within: float = 0.0
     """Half-width of the boxes around each placement that the bounds cover, metres."""
@@ -102,7 +102,7 @@ class Chances:
             "task": self.policy.task.values(),
             **({} if self.seed is None else self.seed.as_dict()),
             "success": self.success,
-            "pictures": self.pictures,
+            "pictures": self.num_images,
             "placements": [self._placement(i) for i in range(len(self.cubes))],
             **provenance(),
         }
@@ -199,7 +199,7 @@ def chances(
         policy,
         placed,
         Outcomes.joined(found),
-        evaluator.pictures,
+        evaluator.num_images,
         settings.within,
         _bounded(policy, placed, settings, progress) if settings.within else (),
         seed if cubes is None else None,

@@ -118,7 +118,7 @@ def places(
         return spec.compositor.see(spec.compositor.paint_one(shown, len(faces)))
 
     with one_thread(), closing(spec):
-        progress("comparing the renderer's pictures")
+        progress("comparing the renderer's images")
         compared = spec.images.check(
             settings.compared, np.random.RandomState(legacy_seed(fresh_seed()))
         )

@@ -145,7 +145,7 @@ def _prove(
         boxes = settings.most_boxes * policy.description.task.values()["num_cubes"]
         load(prover, state, known, most=max(ARRAYS_BYTES, _BYTES_PER_SIDE * boxes))
     begin = time.monotonic()
-    stopped = _go_on(prover, settings, progress, state, known)
+    stopped = _advance(prover, settings, progress, state, known)
     seconds = time.monotonic() - begin
     found = certify(policy.name, policy.description, weights, prover, seconds, stopped)
     found |= provenance()
@@ -156,7 +156,7 @@ def _prove(
     return Proof(found, folder)
 
 
-def _go_on(
+def _advance(
     prover: Prover, settings: ProveSettings, progress: Progress, state: Path | None, known: str
 ) -> str | None:
     """Advance a proof, saving it regularly; return the setting that stops it, if one does."""
@@ -168,10 +168,10 @@ def _go_on(
         if time.monotonic() > until or prover.boxes_under_way > settings.most_boxes:
             stopped = "limit_s" if time.monotonic() > until else "most_boxes"
             break
-        place = prover.advance()
+        visited = prover.advance()
         done = prover.decided / total
-        text = f"step {place.ahead} of {last}, {done:.1%} decided, {prover.pictures:,} pictures"
-        at = min(place.ahead, last - 1)
+        text = f"step {visited.ahead} of {last}, {done:.1%} decided, {prover.num_images:,} images"
+        at = min(visited.ahead, last - 1)
         if count := len(prover.parts):
             text, at = f"{text}, {plural(count, 'part')} to come", int(done * last)
         progress(text, at, last)

@@ -78,7 +78,7 @@ def _say_closeness(places: Evidence) -> Claims:
     if places["in_doubt"] > 0:
         claims["places.doubt"] = (
             f"At most {exact_percent(places['in_doubt'])} of the places lie so near to a border "
-            "between two pictures that the renderer, by rounding, may show the other one."
+            "between two images that the renderer, by rounding, may show the other one."
         )
     return claims
 

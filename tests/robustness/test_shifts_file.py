@@ -45,7 +45,7 @@ def test_without_ranges_there_is_no_domain(read):
 
 
 def test_of_another_network_or_task_it_is_refused(read, good):
-    with pytest.raises(InputError, match="of a network with the hash"):
+    with pytest.raises(InputError, match="for a network with hash"):
         read(policy=drone_rl.load_policy("poor"))
     with pytest.raises(InputError, match="of another task"):
         read(policy=good.in_task(num_cubes=2))

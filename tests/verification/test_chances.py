@@ -46,7 +46,7 @@ def test_of_placements_that_are_given(several, tmp_path):
         assert sum(e["probability"] for e in ends) == pytest.approx(1.0, abs=1e-12)
         collected = sum(e["probability"] for e in ends if e["collected"] == [True])
         assert collected == pytest.approx(placement["success"], abs=1e-12)
-    assert kept["pictures"] == done.pictures > 100
+    assert kept["pictures"] == done.num_images > 100
     assert "seed" not in kept and "seed" not in str(done)
 
 

@@ -93,7 +93,7 @@ def test_the_policy_must_be_known(path, truth):
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"policy": "good"}, "the certificate is of a network with the hash"),
+        ({"policy": "good"}, "the certificate is for a network with hash"),
         ({"task": {"num_cubes": 2}}, "another task: num_cubes=1, not 2"),
         ({"task": {"num_cubes": 0}}, r"task\.num_cubes=0"),
         ({"flights": 0}, "flights=0 is out of range"),

@@ -1,4 +1,4 @@
-"""The exact map of a small policy against the simulator's own pictures."""
+"""The exact map of a small policy against the simulator's own images."""
 
 import json
 import xml.etree.ElementTree as ElementTree

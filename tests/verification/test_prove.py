@@ -87,7 +87,7 @@ def test_parts_to_come_are_told():
         "good", task=narrow, compared=1, most_combinations=400, most_boxes=1,
         progress=lambda text, *_: told.append(text),
     )  # fmt: skip
-    assert told[0].endswith(" pictures, 1 part to come")
+    assert told[0].endswith(" images, 1 part to come")
     assert "with a smaller most_combinations" in told[-1] and told[-1] in str(stopped)
     assert stopped.undecided == pytest.approx(1.0)
 

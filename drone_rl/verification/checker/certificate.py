@@ -41,8 +41,8 @@ class Outcome:
     end: EndReason  # why the episodes end
     collected: tuple[bool, ...]  # whether each cube is collected by then
     loops: bool  # whether the drone oscillates until the step limit
-    share: float  # stated fraction of the volume of all placements
-    steps: Mapping[int, float]  # fractions by number of steps; the rest is not stated
+    share: float  # fraction of the volume of all placements
+    steps: Mapping[int, float]  # fraction by number of steps; they may sum to less than `share`
     boxes: NDArray[np.float64]
     """Metres to the left of each cube, lowest and highest. Shape: (boxes, cubes, 2)."""
 
@@ -100,7 +100,7 @@ def parse_certificate(data: Any) -> Certificate:
     if task.vertical_bound != 0 or task.lateral_bound == 0:
         raise InputError(
             f"its task has vertical_bound={task.vertical_bound} and lateral_bound="
-            f"{task.lateral_bound}; certificates require 0 and more than 0"
+            f"{task.lateral_bound}; certificates require vertical_bound=0 and lateral_bound above 0"
         )
     if task.num_cubes > MAX_CUBES:
         raise InputError(f"num_cubes={task.num_cubes} is out of range; give at most {MAX_CUBES}")
@@ -195,7 +195,7 @@ def _read_boxes(value: Any, where: str, cubes: int) -> NDArray[np.float64]:
     numbers = [value]
     for length in (None, cubes, 2):
         if not all(type(part) is list and length in (None, len(part)) for part in numbers):
-            raise InputError(f"{where} has another shape; {shape}")
+            raise InputError(f"{where} has the wrong shape; {shape}")
         numbers = list(chain.from_iterable(numbers))
     if not {*map(type, numbers)} <= {int, float}:
         raise InputError(f"{where} contains values other than numbers; {shape}")
@@ -205,7 +205,8 @@ def _read_boxes(value: Any, where: str, cubes: int) -> NDArray[np.float64]:
     size = abs(boxes)
     if ((size < MIN_BORDER) & (size > 0)).any() or (size > MAX_BORDER).any():
         raise InputError(
-            f"{where} has a border below {MIN_BORDER:.1g} m or above {MAX_BORDER:.1g} m; {shape}"
+            f"{where} contains a border whose magnitude is above {MAX_BORDER:.1g} m, or below "
+            f"{MIN_BORDER:.1g} m and not 0; {shape}"
         )
     empty = np.flatnonzero((boxes[..., 0] >= boxes[..., 1]).any(1))
     if len(empty):
@@ -229,7 +230,7 @@ def check_same_policy(
     weights: Mapping[str, torch.Tensor],
     task: BaseTaskSettings | None = None,
 ) -> None:
-    """Check that a certificate is for this policy and task, and that the policy can have one.
+    """Check that a certificate is for this policy and task, and that the policy can be verified.
 
     The task in `described` is ignored. Without `task`, any task is accepted.
 
@@ -240,8 +241,8 @@ def check_same_policy(
     require_cubes(described, "certificates")
     if certificate.weights != (own := fingerprint(weights)):
         raise InputError(
-            f"the certificate is of a network with the hash {certificate.weights[:12]}..., the "
-            f"policy's has {own[:12]}...; set policy to the file that was proved"
+            f"the certificate is for a network with hash {certificate.weights[:12]}..., but the "
+            f"policy's network has {own[:12]}...; set policy to the file that was proved"
         )
     stated, own_parts = certificate.description.as_dict(), described.as_dict()
     for part in ("appearance", "dynamics", "actions", "camera", "transforms", "network"):
@@ -253,6 +254,6 @@ def check_same_policy(
     if task is not None and certificate.task != task:
         name = next(n for n, v in task.values().items() if certificate.task.values()[n] != v)
         raise InputError(
-            f"the certificate is of another task: {name}={getattr(certificate.task, name)}, not "
+            f"the certificate is for another task: {name}={getattr(certificate.task, name)}, not "
             f"{getattr(task, name)}; prove the policy in that task"
         )

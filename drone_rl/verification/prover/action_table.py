@@ -41,11 +41,11 @@ class ActionTable:
         self.cells = list(cells)
         self.table = np.zeros([len(c) for c in reversed(self.cells)], np.uint8)
         """Bits of the possible actions, 0 if unknown. The nearest cube is last."""
-        self.pictures = 0  # number of network evaluations
+        self.num_images = 0  # number of network evaluations
         self._gaps = [np.inf]
         self._bounds, self._painter = bounds, compositor
-        self._ranges = [ImageRanges(torch.from_numpy(c.pictures)) for c in self.cells]
-        self._known = np.zeros([len(c.pictures) for c in reversed(self.cells)], np.uint8)
+        self._ranges = [ImageRanges(torch.from_numpy(c.images)) for c in self.cells]
+        self._known = np.zeros([len(c.images) for c in reversed(self.cells)], np.uint8)
         """The same for each combination of images."""
         self._record = record
         self._hidden = [
@@ -67,7 +67,7 @@ class ActionTable:
     def fill(self, spans: NDArray[np.int64]) -> None:
         """Compute the table within spans, shape (N, cubes, 2)."""
         unknown = _open(self.table, spans[self._is_unknown(spans)])
-        tasks = _open(self._known, self._pictures_of(unknown))
+        tasks = _open(self._known, self._images_of(unknown))
         stack = [tasks] if len(tasks) else []
         while stack:
             tasks = stack.pop()
@@ -107,7 +107,7 @@ class ActionTable:
             is_unknown[i] = (self.table[_slices(spans[i])] == 0).any()
         return is_unknown
 
-    def _pictures_of(self, blocks: NDArray) -> NDArray:
+    def _images_of(self, blocks: NDArray) -> NDArray:
         """Convert ranges of cells and bands to ranges of their images."""
         ends = [
             np.stack([c.first[blocks[:, k, 0]], c.last[blocks[:, k, 1]]], -1)
@@ -117,10 +117,10 @@ class ActionTable:
 
     def _gather(self, block: NDArray) -> None:
         """Combine the actions of images into those of cells and bands."""
-        (pictures,) = self._pictures_of(block[None])
-        found = self._known[_slices(pictures)]
+        (images,) = self._images_of(block[None])
+        found = self._known[_slices(images)]
         for axis, (cells, span, seen) in enumerate(
-            zip(self.cells[::-1], block[::-1], pictures[::-1], strict=True)
+            zip(self.cells[::-1], block[::-1], images[::-1], strict=True)
         ):
             cell = np.arange(span[0], span[1] + 1)
             ranges = np.stack([cells.first[cell], cells.last[cell] + 1], -1) - seen[0]
@@ -133,7 +133,7 @@ class ActionTable:
         self, work: Callable[[NDArray], NDArray[np.uint8]], blocks: NDArray
     ) -> NDArray[np.uint8]:
         """Evaluate parts of the blocks in several threads."""
-        self.pictures += len(blocks)
+        self.num_images += len(blocks)
         if len(blocks) <= ALONE:
             return work(blocks) if len(blocks) else np.zeros(0, np.uint8)
         parts = np.array_split(blocks, max(-(-len(blocks) // CHUNK), num_cores()))
@@ -155,9 +155,9 @@ class ActionTable:
     def _decide(self, combinations: NDArray) -> NDArray[np.uint8]:
         """Return the possible actions of single images, given by their indices."""
         index = torch.from_numpy(combinations)
-        shown = [(r.part, r.pictures[index[:, k]]) for k, r in enumerate(self._ranges)]
-        pictures = self._painter.see(self._painter.paint_one(shown, len(index)))
-        bits, gaps = self._bounds.decide(pictures)
+        shown = [(r.part, r.images[index[:, k]]) for k, r in enumerate(self._ranges)]
+        images = self._painter.see(self._painter.paint_one(shown, len(index)))
+        bits, gaps = self._bounds.decide(images)
         self._gaps.append(float(gaps.min()))
         return bits.numpy()
 
@@ -229,9 +229,9 @@ def _alike(near: Cells, far: Cells, part: Crop) -> NDArray[np.int64]:
     `part` is the crop of the further cube. Returns the first of the neighbours that differ only
     where the nearer cube is visible. Shape: (images of the nearer cube, images of the further one).
     """
-    behind = far.pictures[:, *part].reshape(len(far.pictures), -1)
+    behind = far.images[:, *part].reshape(len(far.images), -1)
     changes = (behind[1:] != behind[:-1]).astype(np.float32)
-    is_open = near.pictures[:, *part].reshape(len(near.pictures), -1) == NOTHING
+    is_open = near.images[:, *part].reshape(len(near.images), -1) == NOTHING
     is_new = is_open.astype(np.float32) @ changes.T > 0
     first = np.zeros((len(is_new), len(behind)), np.int64)
     first[:, 1:] = np.where(is_new, np.arange(1, len(behind)), 0)

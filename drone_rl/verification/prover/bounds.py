@@ -89,22 +89,22 @@ class NetworkBounds:
         return least, self._error(largest).clamp(min=self.gap)
 
     @torch.no_grad()
-    def decide(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
+    def decide(self, images: Tensor) -> tuple[Tensor, Tensor]:
         """Return the bits of the possible actions of images, and the gap of the top two logits."""
-        logits = self._answers(pictures)
+        logits = self._answers(images)
         highest = logits.topk(2).values
         lead = logits[:, self._first] - logits[:, self._second]
-        bits = self._bits(lead > self._gap(pictures))
+        bits = self._bits(lead > self._gap(images))
         rows = (bits & (bits - 1) != 0).nonzero()[:, 0]
         if len(rows):  # bounds of single images are tighter than the common one
-            losers = ~self._rounding.decide(pictures[rows]).possible
+            losers = ~self._rounding.decide(images[rows]).possible
             clear = losers[:, self._second] & (lead[rows] > self.gap)
             bits[rows] = self._bits(clear)
         return bits, highest[:, 0] - highest[:, 1]
 
-    def _gap(self, pictures: Tensor) -> Tensor:
+    def _gap(self, images: Tensor) -> Tensor:
         """Return the lead that is certain for all images seen so far. Shape: (pairs,)."""
-        lower, upper = pictures.amin(0, keepdim=True), pictures.amax(0, keepdim=True)
+        lower, upper = images.amin(0, keepdim=True), images.amax(0, keepdim=True)
         if self._hull is not None:
             lowest, highest, gap = self._hull
             if not bool(((lower < lowest) | (upper > highest)).any()):
@@ -193,7 +193,7 @@ class Compositor:
         """Added to the background, which counts only where the cube may leave it visible."""
 
     def paint(
-        self, cubes: Sequence[tuple[Crop, Tensor, Tensor]], num_pictures: int
+        self, cubes: Sequence[tuple[Crop, Tensor, Tensor]], num_images: int
     ) -> tuple[Tensor, Tensor]:
         """Return lower and upper bounds of images. Shapes: (N, height, width).
 
@@ -201,9 +201,9 @@ class Compositor:
             cubes: For each cube, nearest first: the crop outside which it is never visible; bit
                 masks of the possible faces of each pixel in each case, shape (cases, rows,
                 columns), uint8; the case of each image, shape (N,).
-            num_pictures: N.
+            num_images: N.
         """
-        lower = self._background.repeat(num_pictures, 1, 1)
+        lower = self._background.repeat(num_images, 1, 1)
         upper = lower.clone()
         for part, masks, case in reversed(cubes):
             index = masks.int()
@@ -213,42 +213,42 @@ class Compositor:
             high.sub_(shut).clamp_min_(self._highest[index].index_select(0, case))
         return lower, upper
 
-    def paint_one(self, cubes: Sequence[tuple[Crop, Tensor]], num_pictures: int) -> Tensor:
+    def paint_one(self, cubes: Sequence[tuple[Crop, Tensor]], num_images: int) -> Tensor:
         """Return known images. Shape: (N, height, width).
 
         As `paint`, but with each cube's faces, shape (N, rows, columns), uint8.
         """
-        pictures = self._background.repeat(num_pictures, 1, 1)
+        images = self._background.repeat(num_images, 1, 1)
         for part, faces in reversed(cubes):
             shade = self._shades[faces.int()]
-            behind = pictures[:, *part]
+            behind = images[:, *part]
             behind.copy_(torch.where(faces == NOTHING, behind, shade))
-        return pictures
+        return images
 
-    def see(self, pictures: Tensor) -> Tensor:
+    def see(self, images: Tensor) -> Tensor:
         """Return the network's input. Shape: (N, height, width) to (N, C, H, W)."""
-        return pictures[:, None] if self._rest is None else self._rest(pictures[:, None])
+        return images[:, None] if self._rest is None else self._rest(images[:, None])
 
 
 class ImageRanges:
     """The images of one cube in order; each range of them is looked up in two steps."""
 
-    def __init__(self, pictures: Tensor) -> None:
+    def __init__(self, images: Tensor) -> None:
         """Prepare masks of ranges of power-of-two length, from faces (images, height, width)."""
-        shown = pictures.any(0)
+        shown = images.any(0)
         rows, columns = shown.any(1).nonzero(), shown.any(0).nonzero()
         self.part = (
             slice(int(rows.min()), int(rows.max()) + 1) if len(rows) else slice(0, 0),
             slice(int(columns.min()), int(columns.max()) + 1) if len(rows) else slice(0, 0),
         )
         """Crop outside which the cube is never visible."""
-        self.pictures = pictures = pictures[:, *self.part].contiguous()
-        masks = torch.bitwise_left_shift(torch.ones_like(pictures), pictures)
+        self.images = images = images[:, *self.part].contiguous()
+        masks = torch.bitwise_left_shift(torch.ones_like(images), images)
         self._levels = [masks]
         while len(masks) > (reach := 1 << (len(self._levels) - 1)):
             masks = masks[:-reach] | masks[reach:]
             self._levels.append(masks)
-        self._doubts = np.full((len(pictures), len(pictures)), -1, np.int32)
+        self._doubts = np.full((len(images), len(images)), -1, np.int32)
         """By first and last image; -1 where not yet counted."""
 
     def of(self, ranges: NDArray) -> tuple[Tensor, Tensor]:
@@ -267,11 +267,11 @@ class ImageRanges:
 
     def _code(self, ranges: NDArray) -> NDArray[np.int64]:
         """Return a unique number for each range."""
-        return ranges[:, 0] * len(self.pictures) + ranges[:, 1]
+        return ranges[:, 0] * len(self.images) + ranges[:, 1]
 
     def _masks(self, code: NDArray[np.int64]) -> Tensor:
         """Return the possible faces of pixels over ranges. Shape: (N, rows, columns)."""
-        first, last = np.divmod(code, len(self.pictures))
+        first, last = np.divmod(code, len(self.images))
         levels = np.frexp(last - first + 1)[1] - 1
         masks = self._levels[0].new_empty(len(code), *self._levels[0].shape[1:])
         for level in np.unique(levels):

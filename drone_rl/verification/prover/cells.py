@@ -62,7 +62,7 @@ class Cells:
         for inner, after in zip(between, pure[1:], strict=True):
             begins += [begins[-1], begins[-1] + 1 + len(inner)]
             parts += [inner, after[None]]
-        self.pictures = np.concatenate(parts)  # faces, (distinct images, height, width)
+        self.images = np.concatenate(parts)  # faces, (distinct images, height, width)
         self.first = np.array(begins)  # first and last possible image of each cell or band
         self.last = np.array([begins[min(i + i % 2, len(begins) - 1)] for i in range(len(begins))])
 
@@ -76,7 +76,7 @@ class Cells:
         some = copy.copy(self)
         some.limits = self.limits[first : last + 2]
         begin, end = self.first[first], self.last[last]
-        some.pictures = self.pictures[begin : end + 1]
+        some.images = self.images[begin : end + 1]
         some.first = self.first[first : last + 1] - begin
         some.last = self.last[first : last + 1] - begin
         return some
@@ -144,15 +144,15 @@ def _within(
         between = np.stack([(a + middle) / 2, middle, (middle + b) / 2], -1)
         left = np.concatenate([a[:, None], between, b[:, None]], -1)
         drawn = np.concatenate([first[:, None], _render(renderer, between), last[:, None]], 1)
-    band, where, pictures = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    band, where, images = (np.concatenate(parts) for parts in zip(*found, strict=True))
     order = np.lexsort((where, band))
     is_inner = band[order][1:] == band[order][:-1]  # the last of a band is that of its end
     inner = order[:-1][is_inner]
     counts = np.bincount(band[inner], minlength=len(bands))
-    return np.split(renderer.read(pictures[inner]), np.cumsum(counts)[:-1])
+    return np.split(renderer.read(images[inner]), np.cumsum(counts)[:-1])
 
 
 def _render(renderer: CubeView, left: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Render several positions per band. Shape: (bands, places) to (bands, places, ...)."""
-    pictures = renderer.render(left.reshape(-1))
-    return pictures.reshape(*left.shape, *pictures.shape[1:])
+    images = renderer.render(left.reshape(-1))
+    return images.reshape(*left.shape, *images.shape[1:])

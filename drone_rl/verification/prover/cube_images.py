@@ -148,7 +148,7 @@ class CubeImages:
         near = task.first_distance - camera_ahead() - 2 * task.cube_size
         steps = max(0, int(near / task.step_length))
         left = np.array([0.0, 2 * task.cube_size, -2 * task.cube_size])
-        pictures = self.render(
+        images = self.render(
             np.broadcast_to(left[:, None], (3, task.num_cubes)).copy(),
             np.array([[steps, 0]] * 3),
             np.arange(task.num_cubes) != 0,
@@ -156,7 +156,7 @@ class CubeImages:
         ahead = self._lattice.cubes[0] - steps * task.step_length - camera_ahead()
         faces = camera.faces(ahead, left)
         for face in (FRONT, LEFT_SIDE, RIGHT_SIDE):
-            shown = pictures[torch.from_numpy(faces == face)]
+            shown = images[torch.from_numpy(faces == face)]
             if not len(shown) or (shown != shown[0]).any():
                 raise InputError(
                     "a face of a cube has more than one colour, so its image has no closed form; "
@@ -170,10 +170,10 @@ class CubeImages:
                 "floor or the sky; give another colour"
             )
 
-    def read(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def read(self, images: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Convert images of one cube to faces; raise InputError if a pixel shows something else."""
-        faces = np.full(pictures.shape[:3], ANYTHING, np.uint8)
-        packed = _packed(pictures)
+        faces = np.full(images.shape[:3], ANYTHING, np.uint8)
+        packed = _packed(images)
         for face, color in enumerate(self.colors):
             shown = self.background if face == NOTHING else color
             faces[packed == _packed(shown.numpy())] = face
@@ -226,8 +226,8 @@ class CubeImages:
                     is_clear[those] &= ~near.any(-1)
                 is_clear[those] &= not self._camera.grazed(seen).any()
         colored = self.colors.numpy()[shown]
-        pictures = np.where((shown == NOTHING)[..., None], self.background.numpy(), colored)
-        return torch.from_numpy(pictures), is_clear
+        images = np.where((shown == NOTHING)[..., None], self.background.numpy(), colored)
+        return torch.from_numpy(images), is_clear
 
     def check(self, count: int, random_state: np.random.RandomState) -> int:
         """Compare random images with the closed form; return how many were on no border.
@@ -287,6 +287,6 @@ class CubeView:
         hidden = np.broadcast_to(np.arange(cubes.shape[1]) != self.cube, cubes.shape)
         return self.images.render(cubes, np.array([[self.steps, 0]] * count), hidden).numpy()
 
-    def read(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def read(self, images: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """See `CubeImages.read`."""
-        return self.images.read(pictures)
+        return self.images.read(images)

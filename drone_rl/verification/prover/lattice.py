@@ -179,13 +179,13 @@ class Graph:
         """Return the nodes as states that can be rendered."""
         return _states(self.settings, self.cubes, self.nodes)
 
-    def pictures(self) -> tuple[Tensor, Tensor]:
+    def images(self) -> tuple[Tensor, Tensor]:
         """Return one node per distinct image, (U,), and the image of each node, (K,)."""
         standing = dataclasses.replace(self.nodes, collected=_as_bits(self.states().present))
-        keys, picture = _keys(shape_of(self.settings), standing).unique(return_inverse=True)
+        keys, image = _keys(shape_of(self.settings), standing).unique(return_inverse=True)
         node = torch.empty_like(keys)
-        node[picture] = torch.arange(len(picture))  # whichever node is written last is one of them
-        return node, picture
+        node[image] = torch.arange(len(image))  # whichever node is written last is one of them
+        return node, image
 
 
 def explore(settings: TaskSettings, cubes: Tensor) -> Graph:

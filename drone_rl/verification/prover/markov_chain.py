@@ -123,7 +123,7 @@ class NodeEvaluator:
     """Render graph nodes and evaluate the policy's action probabilities at them."""
 
     def __init__(self, env: TransformedEnv, network: nn.Module) -> None:
-        self.pictures = 0  # images rendered so far
+        self.num_images = 0  # images rendered so far
         self._worlds, self._network = worlds_of(env), network
         self._rounding = RoundingBound.find(network)
         pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
@@ -131,24 +131,24 @@ class NodeEvaluator:
 
     def on(self, graph: Graph) -> Evaluate:
         """Return the evaluator of a graph's nodes; no image is rendered twice."""
-        node, picture = graph.pictures()
+        node, image = graph.images()
         every = graph.states()
         shape = len(node), len(self._worlds.dynamics.actions.names)
         known = torch.full(shape, torch.nan, dtype=torch.float64)
 
         def evaluate(nodes: Tensor) -> Tensor:
-            wanted = picture[nodes].unique()
+            wanted = image[nodes].unique()
             new = wanted[known[wanted, 0].isnan()]
             if len(new):
                 known[new] = self._probabilities(every[node[new]])
-            return known[picture[nodes]]
+            return known[image[nodes]]
 
         return evaluate
 
     @torch.no_grad()
     def _probabilities(self, states: WorldState) -> Tensor:
         """Return the action probabilities. Shape: (N, A), float64, on the CPU."""
-        self.pictures += len(states)
+        self.num_images += len(states)
         logits = []
         for part in states.to(self._worlds.device).split(BATCH):
             pixels = self._worlds.render(part)
@@ -294,7 +294,7 @@ class _ActionBounds:
             task, (low, high) = self.spec.lattice.task, self._box[cube]
             aside = task.side_bound + task.step_length
             cells = self.spec.cells(cube, ahead, low - aside, high + aside)
-            self._known[cube, ahead] = cells, ImageRanges(torch.from_numpy(cells.pictures))
+            self._known[cube, ahead] = cells, ImageRanges(torch.from_numpy(cells.images))
         cells, ranges = self._known[cube, ahead]
         first, last = cells.span(interval[0] - y, interval[1] - y)
         return ranges.part, *ranges.of(np.stack([cells.first[first], cells.last[last]], -1))

@@ -131,11 +131,11 @@ def one_thread() -> Iterator[None]:
         torch.set_num_threads(threads)
 
 
-PICTURES = 3  # approximate number of images per border: beside it, and within its band
+IMAGES_PER_BORDER = 3  # approximate number: next to it, and within its band
 MAX_PARTS = 1_000  # a task with more would take days
 
 
-def pictures_of_each(spec: PolicySpec) -> list[int]:
+def images_per_cube(spec: PolicySpec) -> list[int]:
     """Return the approximate number of images of each cube, where their product is largest."""
     lattice, found = spec.lattice, []
     for steps in range(lattice.last):
@@ -143,7 +143,7 @@ def pictures_of_each(spec: PolicySpec) -> list[int]:
         for ahead in lattice.cubes - steps * lattice.task.step_length:
             borders = spec.camera.borders(ahead - camera_ahead())[0] if ahead >= 0 else np.empty(0)
             inside = np.abs(borders) <= lattice.task.lateral_bound
-            counts.append(1 + PICTURES * int(inside.sum()))
+            counts.append(1 + IMAGES_PER_BORDER * int(inside.sum()))
         found.append(counts)
     return max(found, key=math.prod)
 
@@ -157,7 +157,7 @@ def partition_placements(spec: PolicySpec, most: int) -> Boxes:
     Raises:
         InputError: There are too many parts.
     """
-    counts = pictures_of_each(spec)
+    counts = images_per_cube(spec)
     strips, total = [1] * len(counts), math.prod(counts)
     for cube in reversed(range(len(counts))):
         left = math.prod(n / s for n, s in zip(counts, strips, strict=True))

@@ -1,4 +1,4 @@
-"""Files of a proof: the certificate, and the state from which a stopped proof resumes.
+"""Files of a proof (`drone-rl prove`): the certificate, and the state from which a proof resumes.
 
 A certificate can be checked without this program: the boxes of all outcomes and the undecided ones
 partition the placements, and every episode from a box must end as stated.
@@ -26,14 +26,14 @@ from drone_rl.verification.prover.prover import ProofFindings, Prover, combine
 
 FORMAT = "drone_rl certificate"
 FORMAT_VERSION = 1
-_COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band", "decided")
-_SETS = ("waiting", "ended", "ways", "forked", "parts", "part", "done", "undecided")
+_COUNTS = ("num_states", "num_images", "most_boxes", "least_gap", "largest_band", "decided")
+_BOX_SETS = ("waiting", "ended", "ways", "forked", "parts", "part", "done", "undecided")
 _DAMAGE = (ValueError, TypeError, LookupError, ArithmeticError, AttributeError)  # of damaged files
-_MAX_INTEGER = 2**40  # bound on every integer in a row
-_NOWHERE = (-1, 0, 0)  # stands for an unknown ending
+_MAX_INTEGER = 2**40  # in a row
+_UNKNOWN_ENDING = (-1, 0, 0)
 
-_Row = tuple[int, ...]
-_Set = list[tuple[_Row, Boxes]]  # boxes, each with the integers that say what they are
+_Row = tuple[int, ...]  # a lattice state or an ending as integers; empty for neither
+_BoxSet = list[tuple[_Row, Boxes]]  # boxes by lattice state or ending
 
 
 def certify(
@@ -46,8 +46,8 @@ def certify(
 ) -> dict[str, Any]:
     """Return the certificate of what is known so far, as plain data.
 
-    The description is in the task of the proof; `weights` is the SHA-256 hash of the network's;
-    `stopped_by` is the setting that stopped the proof early.
+    `description` has the task of the proof, `weights` is the SHA-256 hash of the network's weights,
+    and `stopped_by` is the setting that stopped the proof early.
     """
     findings, task = prover.findings(), prover.lattice.task
     total = (2 * task.lateral_bound) ** task.num_cubes
@@ -81,8 +81,8 @@ def certify(
         },
         "found": {
             "least_gap": prover.least_gap if prover.least_gap < float("inf") else None,
-            "pictures": prover.pictures,
-            "states": prover.num_places,
+            "pictures": prover.num_images,
+            "states": prover.num_states,
             "most_boxes": prover.most_boxes,
             "seconds": seconds,
             "stopped_by": stopped_by,
@@ -93,7 +93,7 @@ def certify(
 def save(prover: Prover, path: Path, proof_id: str) -> None:
     """Write a proof's state atomically; `proof_id` identifies what is proved."""
     done = prover.done
-    sets: dict[str, _Set] = {
+    sets: dict[str, _BoxSet] = {
         "waiting": [
             ((*dataclasses.astuple(p), prover.longest.get(p, 0)), b)
             for p, boxes in prover.waiting.items()
@@ -135,14 +135,16 @@ def load(prover: Prover, path: Path, proof_id: str, most: int = ARRAYS_BYTES) ->
             for name, count in zip(_COUNTS, state["counts"].tolist(), strict=True)
         }
         shape = prover.parts.shape[1:]
-        sets = {name: _unpacked(name, state, shape) for name in _SETS}
-        waiting = [(*_place(row), b) for row, b in sets["waiting"]]
+        sets = {name: _unpacked(name, state, shape) for name in _BOX_SETS}
+        waiting = [(*_lattice_state(row), b) for row, b in sets["waiting"]]
         ended = [((_ending(row), row[3]), b) for row, b in sets["ended"]]
-        ways = [(None if row == _NOWHERE else _ending(row), b) for row, b in sets["ways"]]
+        fork_ends = [
+            (None if row == _UNKNOWN_ENDING else _ending(row), b) for row, b in sets["ways"]
+        ]
         forked = [boxes for _, boxes in sets["forked"]]
         ((_, parts),), ((_, part),) = sets["parts"], sets["part"]
         ((_, left),) = sets["undecided"]
-        _check(part, waiting, [*ended, *ways, *forked])
+        _check(part, waiting, [*ended, *fork_ends, *forked])
         done = [ProofFindings({_ending(row): b}, left[:0], {}) for row, b in sets["done"]]
         done = combine([ProofFindings({}, left, _steps(state)), *done])
     except _DAMAGE as error:
@@ -153,33 +155,33 @@ def load(prover: Prover, path: Path, proof_id: str, most: int = ARRAYS_BYTES) ->
         raise InputError(f"{path} belongs to another proof; delete it, or give another folder")
     prover.waiting.clear()
     prover.boxes_under_way = 0
-    for place, longest, boxes in waiting:
-        prover.wait(place, boxes)
-        if place.is_fork:
-            prover.longest[place] = longest
+    for waited, longest, boxes in waiting:
+        prover.wait(waited, boxes)
+        if waited.is_fork:
+            prover.longest[waited] = longest
     for key, boxes in ended:
         prover.ended[key].append(boxes)
-    for way, boxes in ways:
-        prover.fork_ends[way].append(boxes)
+    for ending, boxes in fork_ends:
+        prover.fork_ends[ending].append(boxes)
     prover.forked, prover.parts, prover.part, prover.done = forked, parts, part, done
     for name, count in counts.items():
         setattr(prover, name, count)
 
 
 def _check(part: Boxes, waiting: Sequence, known: Sequence) -> None:
-    """Check that states are pending exactly where a part is in progress."""
+    """Check that lattice states wait only while a part of the placements is in progress."""
     if len(part) != bool(waiting) or (known and not waiting):
-        raise ValueError(f"{len(part)} parts are in progress at {len(waiting)} states")
+        raise ValueError(f"{len(part)} parts in progress, {len(waiting)} states waiting")
 
 
-def _place(row: _Row) -> tuple[LatticeState, int]:
+def _lattice_state(row: _Row) -> tuple[LatticeState, int]:
     ahead, left, collected, steps, came, is_fork, longest = row
     return LatticeState(ahead, left, collected, steps, came, bool(is_fork)), longest
 
 
 def _row(ending: Ending | None) -> tuple[int, int, int]:
     if ending is None:
-        return _NOWHERE
+        return _UNKNOWN_ENDING
     return int(ending.reason), ending.collected, int(ending.loops)
 
 
@@ -206,7 +208,7 @@ def _packed(name: str, parts: Sequence[tuple[_Row, Boxes]]) -> dict[str, NDArray
     }
 
 
-def _unpacked(name: str, state: dict[str, NDArray], shape: tuple[int, ...]) -> _Set:
+def _unpacked(name: str, state: dict[str, NDArray], shape: tuple[int, ...]) -> _BoxSet:
     rows, counts, boxes = (state[f"{name}_{part}"] for part in ("rows", "counts", "boxes"))
     if not len(counts):
         return []

@@ -69,7 +69,7 @@ class Prover:
         self.longest: dict[LatticeState, int] = {}  # most steps of forks to each state
         self.fork_ends: dict[Ending | None, list[Boxes]] = defaultdict(list)  # by ending, if known
         self.boxes_under_way = 0  # boxes in all waiting states
-        self.num_places = self.pictures = self.most_boxes = 0  # states, images, boxes of a state
+        self.num_states = self.num_images = self.most_boxes = 0  # states, images, boxes of a state
         self.decided = 0.0  # volume known; of the part in progress, without forks
         self.least_gap, self.largest_band = np.inf, 0.0
         self._most = most_combinations
@@ -89,30 +89,30 @@ class Prover:
         if not self.waiting:
             self.part, self.parts = self.parts[:1], self.parts[1:]
             self.wait(LatticeState(0, 0), self.part)
-        place = min(self.waiting, key=lambda p: p.turn)
-        self._foresee(place)
-        boxes = np.concatenate(self.waiting.pop(place))
+        state = min(self.waiting, key=lambda p: p.turn)
+        self._foresee(state)
+        boxes = np.concatenate(self.waiting.pop(state))
         self.boxes_under_way -= len(boxes)
-        boxes = union(boxes) if place.is_fork else merge(boxes)
-        if place.is_fork:
-            place = dataclasses.replace(place, steps=self.longest.pop(place))
-        self.num_places += 1
+        boxes = union(boxes) if state.is_fork else merge(boxes)
+        if state.is_fork:
+            state = dataclasses.replace(state, steps=self.longest.pop(state))
+        self.num_states += 1
         self.most_boxes = max(self.most_boxes, len(boxes))
-        for bits, part in self._cut(place, boxes):
+        for bits, part in self._cut(state, boxes):
             actions = [action for action in (AHEAD, LEFT, RIGHT) if bits >> action & 1]
-            is_first_fork = len(actions) > 1 and not place.is_fork
+            is_first_fork = len(actions) > 1 and not state.is_fork
             if is_first_fork:
                 self.forked.append(part)
-            origin = dataclasses.replace(place, is_fork=place.is_fork or is_first_fork)
+            origin = dataclasses.replace(state, is_fork=state.is_fork or is_first_fork)
             for action in actions:
                 self._follow(origin, action, part)
         if not self.waiting:
             self._finish_part()
-        return place
+        return state
 
-    def wait(self, place: LatticeState, boxes: Boxes) -> None:
+    def wait(self, state: LatticeState, boxes: Boxes) -> None:
         """Add placements to be followed from a state."""
-        self.waiting[place].append(boxes)
+        self.waiting[state].append(boxes)
         self.boxes_under_way += len(boxes)
 
     def findings(self) -> ProofFindings:
@@ -133,12 +133,12 @@ class Prover:
         for record in (self.ended, self.forked, self.fork_ends):
             record.clear()
 
-    def _follow(self, place: LatticeState, action: int, boxes: Boxes) -> None:
+    def _follow(self, state: LatticeState, action: int, boxes: Boxes) -> None:
         """Move on, or end the episode; returning where the drone came from is a loop."""
-        if {place.came, action} == {LEFT, RIGHT}:
-            self._end(place, Ending(EndReason.STEP_LIMIT, place.collected, loops=True), boxes)
+        if {state.came, action} == {LEFT, RIGHT}:
+            self._end(state, Ending(EndReason.STEP_LIMIT, state.collected, loops=True), boxes)
             return
-        for moved, part in self.lattice.move(place, action, boxes):
+        for moved, part in self.lattice.move(state, action, boxes):
             if ending := self.lattice.ending(moved):
                 self._end(moved, ending, part)
             elif not moved.is_fork:
@@ -146,31 +146,31 @@ class Prover:
             else:
                 self._gather(moved, part)
 
-    def _gather(self, place: LatticeState, boxes: Boxes) -> None:
+    def _gather(self, state: LatticeState, boxes: Boxes) -> None:
         """Merge forks that reach a state by different paths, with the most steps of any."""
         # positions of cubes that are gone are rounded outwards: at worst more stays undecided
-        gone = [k for k in range(boxes.shape[1]) if k not in self.lattice.standing(place)]
+        gone = [k for k in range(boxes.shape[1]) if k not in self.lattice.standing(state)]
         boxes = boxes.copy()
         boxes[:, gone, 0] = np.floor(boxes[:, gone, 0] / COARSE) * COARSE
         boxes[:, gone, 1] = np.ceil(boxes[:, gone, 1] / COARSE) * COARSE
-        there = dataclasses.replace(place, steps=0)
-        self.longest[there] = max(place.steps, self.longest.get(there, 0))
+        there = dataclasses.replace(state, steps=0)
+        self.longest[there] = max(state.steps, self.longest.get(there, 0))
         self.wait(there, boxes)
 
-    def _end(self, place: LatticeState, ending: Ending, boxes: Boxes) -> None:
-        if place.is_fork:  # a loop with an uncertain action may be left at any time
+    def _end(self, state: LatticeState, ending: Ending, boxes: Boxes) -> None:
+        if state.is_fork:  # a loop with an uncertain action may be left at any time
             is_known = not ending.loops and ending.reason is not EndReason.STEP_LIMIT
             self.fork_ends[ending if is_known else None].append(boxes)
             return
-        steps = self.lattice.task.step_limit if ending.loops else place.steps
+        steps = self.lattice.task.step_limit if ending.loops else state.steps
         self.ended[ending, steps].append(boxes)
         self.decided += float(volumes(boxes).sum())
 
-    def _cut(self, place: LatticeState, boxes: Boxes) -> Iterator[tuple[int, Boxes]]:
+    def _cut(self, state: LatticeState, boxes: Boxes) -> Iterator[tuple[int, Boxes]]:
         """Yield the bits of the possible actions and their part of the boxes."""
-        cubes, y = self.lattice.standing(place), self.lattice.y(place)
+        cubes, y = self.lattice.standing(state), self.lattice.y(state)
         seen = boxes[:, cubes] - y
-        table = self._table(place, cubes, seen)
+        table = self._table(state, cubes, seen)
         if not cubes:
             yield table.nothing_in_sight(), boxes
             return
@@ -192,34 +192,34 @@ class Prover:
 
     def _fill(self, table: ActionTable, boxes: Boxes) -> NDArray[np.int64]:
         """Fill a table within boxes; return their spans."""
-        spans, pictures = table.spans(boxes), table.pictures
+        spans, before = table.spans(boxes), table.num_images
         table.fill(spans)
-        self.pictures += table.pictures - pictures
+        self.num_images += table.num_images - before
         self.least_gap = min(self.least_gap, table.least_gap)
         return spans
 
-    def _foresee(self, place: LatticeState) -> None:
+    def _foresee(self, state: LatticeState) -> None:
         """Fill the table for all waiting states beside this one: one large batch is faster."""
-        if place.ahead != self._seen_from:
-            self._seen_from = place.ahead
+        if state.ahead != self._seen_from:
+            self._seen_from = state.ahead
             for known in (self._foreseen, self._tables, self._cells):
                 known.clear()
-        if place.collected in self._foreseen or not (cubes := self.lattice.standing(place)):
+        if state.collected in self._foreseen or not (cubes := self.lattice.standing(state)):
             return
-        self._foreseen.add(place.collected)
+        self._foreseen.add(state.collected)
         beside = [
             np.concatenate(boxes)[:, cubes] - self.lattice.y(p)
             for p, boxes in self.waiting.items()
-            if (p.ahead, p.collected, p.came) == (place.ahead, place.collected, AHEAD)
+            if (p.ahead, p.collected, p.came) == (state.ahead, state.collected, AHEAD)
         ]
         if len(beside) > 1:
             boxes = merge(np.unique(np.concatenate(beside), axis=0))
-            if self._fits(self._all_cells(place, cubes, boxes)):
-                self._fill(self._table(place, cubes, boxes), boxes)
+            if self._fits(self._all_cells(state, cubes, boxes)):
+                self._fill(self._table(state, cubes, boxes), boxes)
 
-    def _table(self, place: LatticeState, cubes: list[int], boxes: Boxes) -> ActionTable:
+    def _table(self, state: LatticeState, cubes: list[int], boxes: Boxes) -> ActionTable:
         """Return the table at the state's x, as far to the sides as the boxes reach."""
-        cells = self._all_cells(place, cubes, boxes)
+        cells = self._all_cells(state, cubes, boxes)
         if not self._fits(cells):  # other states would profit little from a larger table
             cells = [c.between(*end) for c, end in zip(cells, _hull(boxes), strict=True)]
         known = self._tables.get(tuple(cubes))
@@ -229,19 +229,19 @@ class Prover:
         return known
 
     def _fits(self, cells: list[Cells]) -> bool:
-        return math.prod(len(c.pictures) for c in cells) <= self._most
+        return math.prod(len(c.images) for c in cells) <= self._most
 
-    def _all_cells(self, place: LatticeState, cubes: list[int], boxes: Boxes) -> list[Cells]:
-        return [self._cells_of(place, k, *end) for k, end in zip(cubes, _hull(boxes), strict=True)]
+    def _all_cells(self, state: LatticeState, cubes: list[int], boxes: Boxes) -> list[Cells]:
+        return [self._cells_of(state, k, *end) for k, end in zip(cubes, _hull(boxes), strict=True)]
 
-    def _cells_of(self, place: LatticeState, cube: int, lowest: float, highest: float) -> Cells:
+    def _cells_of(self, state: LatticeState, cube: int, lowest: float, highest: float) -> Cells:
         """Return the cells of one cube, at least from the lowest to the highest position."""
         known = self._cells.get(cube)
         if known is not None and known.limits[0] <= lowest and highest <= known.limits[-1]:
             return known
         if known is not None:
             lowest, highest = min(lowest, known.limits[0]), max(highest, known.limits[-1])
-        found = self.spec.cells(cube, place.ahead, lowest - MARGIN, highest + MARGIN)
+        found = self.spec.cells(cube, state.ahead, lowest - MARGIN, highest + MARGIN)
         bands = np.diff(found.limits)[1::2]
         self.largest_band = max(self.largest_band, float(bands.max(initial=0.0)))
         self._cells[cube] = found

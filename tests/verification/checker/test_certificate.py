@@ -48,8 +48,8 @@ def test_where_it_comes_from_may_be_told(one_sided):
         (["outcomes", 0, "steps"], {"007": 0.1}, "'007' is not a number of steps"),
         (["outcomes", 0, "steps"], {"12": -0.1}, r"steps\.12=-0\.1"),
         (["outcomes", 0, "steps"], [], "must be a mapping"),
-        (["outcomes", 0, "boxes"], {}, "another shape"),
-        (["outcomes", 0, "boxes"], [[[1.0, 2.0, 3.0]]], "another shape; give a list of boxes"),
+        (["outcomes", 0, "boxes"], {}, "the wrong shape"),
+        (["outcomes", 0, "boxes"], [[[1.0, 2.0, 3.0]]], "the wrong shape; give a list of boxes"),
         (["outcomes", 0, "boxes"], [[[1.0, True]]], "values other than numbers"),
         (["outcomes", 0, "boxes"], [[[1.0, float("inf")]]], "not finite"),
         (["outcomes", 0, "boxes"], [[[1.0, 1.0]]], r"boxes\[0\] is empty"),
@@ -94,7 +94,7 @@ def test_sizes_are_bounded(one_sided, write, monkeypatch):
 def test_borders_need_no_more_bits_than_exact_sums_can_have(one_sided, border):
     low, high = sorted((border, 0.0))
     one_sided["outcomes"][0]["boxes"] = [[[low, high]]]
-    with pytest.raises(InputError, match="has a border below"):
+    with pytest.raises(InputError, match="contains a border whose magnitude"):
         parse_certificate(one_sided)
 
 

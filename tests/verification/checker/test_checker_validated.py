@@ -31,7 +31,7 @@ def test_a_certificate_that_goes_together_is_read(write, good):
         (lambda c: c["outcomes"][0].update(boxes=[[[-6.0, 5.0], [-6.0, 6.0]]]), "no partition"),
         (lambda c: c.update(finished=False), "finished is false"),
         (lambda c: c.update(more=1), r"can't be used: .*more"),
-        (lambda c: c["policy"].update(weights="0" * 64), "of a network with the hash 0000"),
+        (lambda c: c["policy"].update(weights="0" * 64), "for a network with hash 0000"),
         (lambda c: c["policy"]["description"]["camera"].update(width=32), "differ in camera"),
     ],
 )

@@ -25,8 +25,8 @@ def look(faces):
 class Turns(torch.nn.Module):
     """Turns to the pixel that is bright; flies on by a gap of 0.5 where none is."""
 
-    def forward(self, pictures):
-        left, right = pictures[:, 0, 0].T
+    def forward(self, images):
+        left, right = images[:, 0, 0].T
         return torch.stack([torch.full_like(left, 0.5), left, 0.8 * right], -1)
 
 

@@ -1,4 +1,4 @@
-"""Borders of cameras of few pixels, by hand; and of larger ones, by pictures."""
+"""Borders of cameras of few pixels, by hand; and of larger ones, by images."""
 
 import contextlib
 import dataclasses
@@ -85,13 +85,13 @@ WINDOW = Window(1.4, 40.0, 9.0)
 
 
 def missed(camera, found, count=2000):
-    """How many of random places have another picture than their cell."""
+    """How many of random places have another image than their cell."""
     cells = arrange(found, WINDOW, 100_000)
     random_state = np.random.RandomState(0)
     low, high = (WINDOW.nearest, -WINDOW.sideways), (WINDOW.farthest, WINDOW.sideways)
     places = random_state.uniform(low, high, (count, 2))
-    pictures = camera.faces(*cells.inner_points().T)[cells.locate(places)]
-    return int((pictures != camera.faces(*places.T)).any((1, 2)).sum())
+    images = camera.faces(*cells.inner_points().T)[cells.locate(places)]
+    return int((images != camera.faces(*places.T)).any((1, 2)).sum())
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
@@ -107,8 +107,8 @@ def test_every_place_has_the_picture_of_its_cell(camera):
     assert cells.areas().sum() == pytest.approx(18.0 * (40.0 - 1.4), rel=1e-12)
     label, twin = cells.cell, cells.cell[cells.twin]
     inner = (label >= 0) & (twin >= 0)
-    pictures = seen.faces(*cells.inner_points().T)
-    differ = (pictures[label[inner]] != pictures[twin[inner]]).any((1, 2))
+    images = seen.faces(*cells.inner_points().T)
+    differ = (images[label[inner]] != images[twin[inner]]).any((1, 2))
     assert differ.all()  # no border parts what is alike
 
 

@@ -1,4 +1,4 @@
-"""The table of possible actions, against looking at every picture."""
+"""The table of possible actions, against looking at every image."""
 
 import numpy as np
 import pytest
@@ -28,8 +28,8 @@ class Network(nn.Module):
             nn.init.zeros_(layer.bias)
         self.layers = nn.Sequential(nn.Flatten(), hidden, nn.ReLU(), last)
 
-    def forward(self, pictures):
-        return self.layers(pictures)
+    def forward(self, images):
+        return self.layers(images)
 
 
 def make(cells):
@@ -49,16 +49,16 @@ def all_of(table):
 
 
 def looked_at(table):
-    """The action in each combination of cells (not bands), by painting each picture."""
+    """The action in each combination of cells (not bands), by painting each image."""
     near, far = table.cells
     shades = np.array([0.2, 1.0, -1.0, 0.6], np.float32)
-    pictures = [
+    images = [
         shades[np.where(n > 0, n, f)]
-        for f in far.pictures[far.first[0::2]]
-        for n in near.pictures[near.first[0::2]]
+        for f in far.images[far.first[0::2]]
+        for n in near.images[near.first[0::2]]
     ]
     with torch.no_grad():
-        logits = Network()(torch.from_numpy(np.array(pictures)))
+        logits = Network()(torch.from_numpy(np.array(images)))
     return logits.argmax(-1).reshape(len(far.limits) // 2, -1).numpy()
 
 
@@ -67,7 +67,7 @@ def test_cells_have_the_action_of_their_picture(table):
     expected = looked_at(table)
     assert (table.table[0::2, 0::2] == 1 << expected).all()
     assert len(np.unique(expected)) > 1  # else it says nothing
-    assert table.pictures < 4 * expected.size
+    assert table.num_images < 4 * expected.size
     assert 0 < table.least_gap < 10
 
 
@@ -85,9 +85,9 @@ def test_only_what_is_asked_for_is_filled_and_only_once(table):
     table.fill(part)
     assert (table.table[3:5, 2:7] > 0).all()
     assert (table.table > 0).sum() == 10
-    known = table.pictures
+    known = table.num_images
     table.fill(part)
-    assert table.pictures == known
+    assert table.num_images == known
     table.fill(all_of(table))
     assert (table.table[0::2, 0::2] == 1 << looked_at(table)).all()
 
@@ -98,16 +98,16 @@ def test_what_several_ask_for_is_looked_at_once(table):
     table.fill(np.array([[[0, near], [0, 0]], [[0, 0], [0, far]], [[0, near], [0, 2]]]))
     a, b = table.cells[0].last[near] + 1, table.cells[1].last[far] + 1
     c = table.cells[1].last[2] + 1
-    assert 0.5 * (a * c + b - c) < table.pictures <= a * c + b - c  # some are hidden
+    assert 0.5 * (a * c + b - c) < table.num_images <= a * c + b - c  # some are hidden
 
 
 def test_what_is_hidden_is_not_looked_at_again(table):
     table._record[:, 0] = 10**9
     table.fill(all_of(table))
-    near, far = (c.pictures for c in table.cells)
+    near, far = (c.images for c in table.cells)
     seen = np.where(near[:, None] > 0, near[:, None], far[None])
     different = len(np.unique(seen.reshape(-1, 40), axis=0))
-    assert different <= table.pictures < 0.9 * len(near) * len(far)
+    assert different <= table.num_images < 0.9 * len(near) * len(far)
 
 
 def test_nothing_in_sight():

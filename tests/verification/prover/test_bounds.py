@@ -1,4 +1,4 @@
-"""Interval bounds by hand, and against every picture that they are about."""
+"""Interval bounds by hand, and against every image that they are about."""
 
 import itertools
 
@@ -22,32 +22,32 @@ class Linear(nn.Module):
             last.bias.copy_(torch.tensor(bias))
         self.layers = nn.Sequential(*before, nn.Flatten(), last)
 
-    def forward(self, pictures):
-        return self.layers(pictures)
+    def forward(self, images):
+        return self.layers(images)
 
 
-def pictures(*pixels):
+def images(*pixels):
     return torch.tensor(pixels)[:, None, None].float()
 
 
 def test_what_actions_have_in_common_cancels():
     """Both logits rise alike with the first pixel, so that it decides nothing."""
     bounds = NetworkBounds(Linear([[5.0, 1.0], [5.0, 0.0]], [0.0, 0.0]), gap=0.1)
-    assert bounds.possible(pictures([-9, 0.2]), pictures([9, 1])).tolist() == [0b01]
-    assert bounds.possible(pictures([-9, -1]), pictures([9, -0.2])).tolist() == [0b10]
-    assert bounds.possible(pictures([-9, 0.05]), pictures([9, 1])).tolist() == [0b11]
+    assert bounds.possible(images([-9, 0.2]), images([9, 1])).tolist() == [0b01]
+    assert bounds.possible(images([-9, -1]), images([9, -0.2])).tolist() == [0b10]
+    assert bounds.possible(images([-9, 0.05]), images([9, 1])).tolist() == [0b11]
 
 
 def test_known_pictures_and_their_gap():
     bounds = NetworkBounds(Linear([[1.0, 0.0], [0.0, 1.0]], [0.0, 0.0]), gap=0.5)
-    bits, gaps = bounds.decide(pictures([3, 1], [1, 1.2], [0, 2]))
+    bits, gaps = bounds.decide(images([3, 1], [1, 1.2], [0, 2]))
     assert bits.tolist() == [0b01, 0b11, 0b10]
     assert gaps.tolist() == pytest.approx([2.0, 0.2, 2.0])
 
 
 def test_a_third_action_is_left_out_where_another_beats_it():
     bounds = NetworkBounds(Linear([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], [0.0, 0.0, -5.0]), gap=0.0)
-    assert bounds.possible(pictures([0.0, 0.0]), pictures([1.0, 1.0])).tolist() == [0b011]
+    assert bounds.possible(images([0.0, 0.0]), images([1.0, 1.0])).tolist() == [0b011]
 
 
 @pytest.mark.parametrize(("make", "doubt"), [(SmallCNN, 0.05), (OriginalCNN, 1e-3)])
@@ -98,12 +98,12 @@ def test_other_layers_are_refused():
 def test_probabilities_of_drawn_actions_by_hand():
     """Logits 0 and x with x from 1 to 2: the second is drawn with 1 / (1 + exp(-x))."""
     bounds = NetworkBounds(Linear([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.0)
-    least, most = bounds.probabilities(pictures([1.0, 0.0]), pictures([2.0, 0.0]))
+    least, most = bounds.probabilities(images([1.0, 0.0]), images([2.0, 0.0]))
     one, two = (1 / (1 + torch.tensor([-1.0, -2.0]).double().exp())).tolist()
     assert least[0].tolist() == pytest.approx([1 - two, one], rel=1e-5)
     assert most[0].tolist() == pytest.approx([1 - one, two], rel=1e-5)
     wider, _ = NetworkBounds(Linear([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.5).probabilities(
-        pictures([1.0, 0.0]), pictures([2.0, 0.0])
+        images([1.0, 0.0]), images([2.0, 0.0])
     )
     assert float(wider[0, 1]) == pytest.approx(1 / (1 + float(torch.tensor(-0.5).exp())))
 
@@ -116,7 +116,7 @@ def test_an_action_that_an_order_of_summation_decides_is_left_open():
         hidden.bias.copy_(torch.tensor([1.0, 0.0]))
     network = Linear([[1.0, 0.0], [0.0, 0.0]], [0.0, 0.5], nn.Flatten(), hidden, nn.ReLU())
     bounds = NetworkBounds(network, gap=0.0)
-    seen = pictures([1.0, 1.0])
+    seen = images([1.0, 1.0])
     assert bounds.decide(seen)[0].tolist() == [0b11]
     assert bounds.possible(seen.clone(), seen.clone()).tolist() == [0b11]
     plain = Linear([[1.0, 0.0], [0.0, 0.0]], [0.0, 0.5])

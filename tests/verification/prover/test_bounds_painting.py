@@ -1,4 +1,4 @@
-"""Bounds on pictures of one row of two pixels, by hand."""
+"""Bounds on images of one row of two pixels, by hand."""
 
 import itertools
 
@@ -54,8 +54,8 @@ def test_bounds_hold_all_pictures_and_no_more():
         seen = []
         for one, other in itertools.product(near, far):
             faces = [torch.tensor([[[f, f]]], dtype=torch.uint8) for f in (one, other)]
-            (picture,) = PAINTER.paint_one([(ALL, f) for f in faces], 1)
-            seen.append(picture[0])
+            (image,) = PAINTER.paint_one([(ALL, f) for f in faces], 1)
+            seen.append(image[0])
         lower, upper = paint(mask(near, near), mask(far, far))
         close(
             (lower, upper),
@@ -66,8 +66,8 @@ def test_bounds_hold_all_pictures_and_no_more():
 
 def test_a_cube_is_seen_in_its_part_alone():
     part = (slice(0, 1), slice(1, 2))
-    (picture,) = PAINTER.paint_one([(part, torch.tensor([[[FRONT]]], dtype=torch.uint8))], 1)
-    assert torch.allclose(picture, torch.tensor([[0.5, 0.3]]))
+    (image,) = PAINTER.paint_one([(part, torch.tensor([[[FRONT]]], dtype=torch.uint8))], 1)
+    assert torch.allclose(image, torch.tensor([[0.5, 0.3]]))
 
 
 def test_what_follows_is_applied():

@@ -25,18 +25,18 @@ class Drawn:
         ]
         return np.stack(faces, -1)[..., None].repeat(3, -1)
 
-    def read(self, pictures):
-        return pictures[..., 0]
+    def read(self, images):
+        return images[..., 0]
 
 
 def test_cells_by_hand():
-    """4 m ahead, pictures change 2, 4 and 6 m to either side."""
+    """4 m ahead, images change 2, 4 and 6 m to either side."""
     cells = Cells(TINY, 4.0, -5.0, 5.0)
     middles = (cells.limits[1:] + cells.limits[:-1]) / 2
     assert middles[1::2].round(6).tolist() == [-4.0, -2.0, 2.0, 4.0]
     assert len(cells) == 9
     assert np.diff(cells.limits)[1::2].max() < 2e-5
-    assert cells.pictures[:, 0].tolist() == [[0, 3], [0, 1], [0, 0], [1, 0], [2, 0]]
+    assert cells.images[:, 0].tolist() == [[0, 3], [0, 1], [0, 0], [1, 0], [2, 0]]
 
 
 def test_a_band_shows_what_is_on_either_side():
@@ -54,11 +54,11 @@ def test_spans():
 def test_an_outermost_band_is_whole():
     cells = Cells(TINY, 4.0, 2.0, 5.0)
     assert cells.limits[0] < 2.0 - 1e-6
-    assert cells.pictures[:, 0].tolist() == [[0, 0], [1, 0], [2, 0]]
+    assert cells.images[:, 0].tolist() == [[0, 0], [1, 0], [2, 0]]
 
 
 def test_pictures_within_a_band_are_found():
-    """The pixel on the right changes late: at its borders there is a picture of neither side."""
+    """The pixel on the right changes late: at its borders there is an image of neither side."""
     both = CameraModel(**{**vars(TINY), "left": np.array([1.0, 1.0])})
 
     class Late(Drawn):
@@ -67,10 +67,10 @@ def test_pictures_within_a_band_are_found():
             return np.concatenate(faces, -1)[..., None].repeat(3, -1)
 
     cells = Cells(both, 4.0, 1.0, 3.0, Late())
-    assert cells.pictures[:, 0].tolist() == [[0, 0], [1, 0], [1, 1]]
+    assert cells.images[:, 0].tolist() == [[0, 0], [1, 0], [1, 1]]
     assert (cells.first.tolist(), cells.last.tolist()) == ([0, 0, 2], [0, 2, 2])
     two = Cells(both, 4.0, 1.0, 5.0, Late())  # a band at 2 m and one at 4 m
-    assert two.pictures[:, 0].tolist() == [[0, 0], [1, 0], [1, 1], [2, 1], [2, 2]]
+    assert two.images[:, 0].tolist() == [[0, 0], [1, 0], [1, 1], [2, 1], [2, 2]]
     assert (two.first.tolist(), two.last.tolist()) == ([0, 0, 2, 2, 4], [0, 2, 2, 4, 4])
 
 
@@ -98,10 +98,10 @@ def test_a_part_of_a_row_shows_what_the_row_does_there():
     assert 1 < len(some) < len(whole) and len(some) % 2 == 1
     (at,) = np.flatnonzero(whole.limits == some.limits[0])
     for k in range(len(some)):
-        mine = some.pictures[some.first[k] : some.last[k] + 1]
-        theirs = whole.pictures[whole.first[at + k] : whole.last[at + k] + 1]
+        mine = some.images[some.first[k] : some.last[k] + 1]
+        theirs = whole.images[whole.first[at + k] : whole.last[at + k] + 1]
         assert np.array_equal(mine, theirs)
-    assert len(some.pictures) == some.last[-1] + 1
+    assert len(some.images) == some.last[-1] + 1
 
 
 class Borders:

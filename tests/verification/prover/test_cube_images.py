@@ -1,4 +1,4 @@
-"""The closed form of a cube's picture, by hand for a tiny camera and against the renderer."""
+"""The closed form of a cube's image, by hand for a tiny camera and against the renderer."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""The renderer's pictures are the closed form's, byte for byte."""
+"""The renderer's images are the closed form's, byte for byte."""
 
 import numpy as np
 import pytest
@@ -46,13 +46,13 @@ def test_colours_are_the_renderers(images):
 
 
 def test_a_picture_that_is_another_is_told(images, monkeypatch):
-    """One pixel of one picture, one step brighter."""
+    """One pixel of one image, one step brighter."""
     render = images.render
 
     def a_little_off(cubes, places):
-        pictures = render(cubes, places).clone()
-        pictures[7, 3, 4, 1] += 1
-        return pictures
+        images = render(cubes, places).clone()
+        images[7, 3, 4, 1] += 1
+        return images
 
     monkeypatch.setattr(images, "render", a_little_off)
     with pytest.raises(InputError, match="differs from the closed form, so nothing can be proved"):
@@ -62,8 +62,8 @@ def test_a_picture_that_is_another_is_told(images, monkeypatch):
 def test_one_cube_alone(images):
     one = CubeView(images, cube=1, steps=20)
     left = np.array([-1.0, 0.0, 30.0], np.float32)
-    pictures = one.render(left)
-    faces = one.read(pictures)
+    rendered = one.render(left)
+    faces = one.read(rendered)
     assert (faces == images._camera.faces(3.6, left.astype(float))).all()
     assert faces[1, 12, 32] == FRONT and (faces[2] == NOTHING).all()
 

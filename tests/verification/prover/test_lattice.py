@@ -43,7 +43,7 @@ def test_a_cube_that_is_left_behind_is_touched_no_more():
 
 
 def test_collecting_ends_a_way_to_the_side():
-    """Whoever has collected sees another picture, so that the way back is no loop."""
+    """Whoever has collected sees another image, so that the way back is no loop."""
     found = moves(LatticeState(14, 0), LEFT, all_placements(6, 2))
     assert {p.collected: p.came for p in found} == {0: LEFT, 1: AHEAD}
 

@@ -72,10 +72,10 @@ def test_random_walks_go_as_the_rules_have_it(settings):
 def test_cells_that_look_alike_share_a_picture_and_no_others(place):
     settings = TaskSettings(num_cubes=2)
     graph = explore(settings, place(settings, [0.0, 5.0], [0.0, 5.0]))
-    node, picture = graph.pictures()
+    node, image = graph.images()
     state = graph.states()
     view = torch.cat([graph.nodes.placement[:, None].double(), state.drone, state.present], -1)
-    assert torch.equal(view[node][picture], view)
+    assert torch.equal(view[node][image], view)
     assert len(node) == len(view.unique(dim=0)) < len(view)
 
 

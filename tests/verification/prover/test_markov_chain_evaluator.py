@@ -16,9 +16,9 @@ def test_wishes_are_those_of_the_same_pictures_in_flight(make_pipeline):
     graph, sight = explore(task, cubes), NodeEvaluator(env, network)
     ask, node = sight.on(graph), torch.arange(3)
     probs = ask(torch.arange(len(graph.nodes)))
-    assert sight.pictures == len(graph.pictures()[0])
+    assert sight.num_images == len(graph.images()[0])
     assert torch.equal(ask(torch.tensor([7, 3, 7])), probs[[7, 3, 7]])
-    assert sight.pictures == len(graph.pictures()[0])  # no more than before
+    assert sight.num_images == len(graph.images()[0])  # no more than before
     random = torch.Generator().manual_seed(0)
     for _ in range(20):
         with torch.no_grad():

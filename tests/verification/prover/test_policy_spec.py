@@ -48,10 +48,10 @@ def test_transforms_after_the_shades_are_applied(spec):
     crop = {"name": "crop", "top": 2, "bottom": 22}
     description = with_transforms("gray", crop, {"name": "standardize", "mean": 0.5, "std": 0.25})
     compositor = make_compositor(description, spec.images)
-    picture = compositor.see(compositor.paint([], 1)[0])
-    assert picture.shape == (1, 1, 20, 64)
+    image = compositor.see(compositor.paint([], 1)[0])
+    assert image.shape == (1, 1, 20, 64)
     sky = (0.299 * 158 + 0.587 * 188 + 0.114 * 234) / 255
-    assert float(picture[0, 0, 0, 0]) == pytest.approx((sky - 0.5) / 0.25, abs=1e-5)
+    assert float(image[0, 0, 0, 0]) == pytest.approx((sky - 0.5) / 0.25, abs=1e-5)
 
 
 def test_a_resize_to_the_same_size_is_left_out(spec):
@@ -60,8 +60,8 @@ def test_a_resize_to_the_same_size_is_left_out(spec):
     plain = make_compositor(with_transforms("gray", standardize), spec.images)
     resized = make_compositor(with_transforms("gray", resize, standardize), spec.images)
     assert resized._rest is None
-    picture = plain.paint([], 1)[0]
-    assert torch.equal(resized.paint([], 1)[0], picture)
+    image = plain.paint([], 1)[0]
+    assert torch.equal(resized.paint([], 1)[0], image)
     smaller = make_compositor(with_transforms("gray", {**resize, "height": 24}), spec.images)
     assert smaller.see(smaller.paint([], 1)[0]).shape == (1, 1, 24, 64)
 
@@ -81,8 +81,8 @@ def test_cells_are_those_of_a_cubes_distance(spec):
     cells = spec.cells(1, 4, -3.0, 3.0)
     expected = Cells(spec.camera, 24.0 - 4.0 - 0.4, -3.0, 3.0, CubeView(spec.images, 1, 4))
     assert np.array_equal(cells.limits, expected.limits)
-    assert np.array_equal(cells.pictures, expected.pictures)
-    assert len(cells) > 10 and cells.pictures.any()
+    assert np.array_equal(cells.images, expected.images)
+    assert len(cells) > 10 and cells.images.any()
 
 
 @pytest.mark.parametrize(

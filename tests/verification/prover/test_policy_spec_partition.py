@@ -1,4 +1,4 @@
-"""How placements are cut where there are too many pictures, counted by hand."""
+"""How placements are cut where there are too many images, counted by hand."""
 
 import dataclasses
 import math
@@ -11,7 +11,7 @@ from drone_rl.config import TaskSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.boxes import volumes
 from drone_rl.verification.prover.lattice import Lattice
-from drone_rl.verification.prover.policy_spec import partition_placements, pictures_of_each
+from drone_rl.verification.prover.policy_spec import images_per_cube, partition_placements
 
 
 def spec(num_cubes, borders=(-7.0, -5.0, 0.0, 5.0, 6.5)):
@@ -21,7 +21,7 @@ def spec(num_cubes, borders=(-7.0, -5.0, 0.0, 5.0, 6.5)):
 
 
 def test_borders_beyond_the_placements_do_not_count():
-    assert pictures_of_each(spec(2)) == [1 + 3 * 3] * 2
+    assert images_per_cube(spec(2)) == [1 + 3 * 3] * 2
 
 
 @pytest.mark.parametrize(

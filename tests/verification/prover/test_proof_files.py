@@ -42,7 +42,7 @@ def finish(prover):
         prover.advance()
     found = prover.findings()
     endings = {e: sorted(b.tolist()) for e, b in found.endings.items()}
-    return endings, found.steps, sorted(found.undecided.tolist()), prover.num_places
+    return endings, found.steps, sorted(found.undecided.tolist()), prover.num_states
 
 
 @pytest.mark.parametrize("places", [3, 40])
@@ -63,7 +63,7 @@ def test_stopped_within_a_part_or_between_two(narrow, uninterrupted_parts, tmp_p
     path, stopped, later = tmp_path / "state.npz", *(Prover(narrow, 100) for _ in range(2))
     assert len(stopped.parts) == 2
     stopped.advance()
-    while stopped.waiting and stopped.num_places != places:
+    while stopped.waiting and stopped.num_states != places:
         stopped.advance()
     assert len(stopped.parts) == 1 and bool(stopped.waiting) == bool(places)
     save(stopped, path, "this")
@@ -133,4 +133,4 @@ def test_a_state_that_makes_no_sense_is_refused_and_nothing_taken_over(spec, tmp
         load(fresh, path, "this")
     assert not fresh.waiting and not fresh.ended and not fresh.fork_ends and not fresh.forked
     assert not len(fresh.part) and not fresh.done.endings and not fresh.done.steps
-    assert fresh.num_places == 0 and fresh.parts.tolist() == [[[-6.0, 6.0]]]
+    assert fresh.num_states == 0 and fresh.parts.tolist() == [[[-6.0, 6.0]]]

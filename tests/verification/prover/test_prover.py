@@ -61,7 +61,7 @@ def test_the_share_that_a_policy_collects(one_sided):
 
 def test_part_by_part_it_comes_to_the_same(narrow):
     partition_placements = prove("right_and_forward", most=200, lateral_bound=2.0)
-    assert partition_placements.num_places > narrow.num_places
+    assert partition_placements.num_states > narrow.num_states
     (parts, undecided), (whole, left) = (
         shares(partition_placements.findings(), bound=2.0),
         shares(narrow.findings(), bound=2.0),
