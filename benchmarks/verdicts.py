@@ -20,8 +20,9 @@ from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, run_baselines
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.rollouts import run_episodes
-from drone_rl.evaluation.rule import NOT_CERTAIN, Kind
+from drone_rl.evaluation.rule import Kind
 from drone_rl.evaluation.verdict import apply_rule
+from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.seeding import Stream
 
 SHIPPED = ("good", "poor", "right_and_forward")

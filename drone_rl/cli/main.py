@@ -7,6 +7,7 @@ from typing import Any
 
 import drone_rl
 from drone_rl.cli.commands import COMMANDS, TABLE
+from drone_rl.utils.exit_codes import OUTPUT_CLOSED, USER_ERROR
 from drone_rl.utils.imports import leave_compiler_unloaded
 from drone_rl.utils.memory import look_for_garbage_rarely
 
@@ -40,8 +41,6 @@ Runs three commands, each with its own folder under outputs/:
 
 The settings are those of drone-rl train; drone-rl train --help lists them.
 """
-CLOSED = 128 + 13
-"""Exit status when standard output is closed, as of a program that SIGPIPE ends."""
 
 
 def main() -> None:
@@ -50,10 +49,10 @@ def main() -> None:
         status = _main(sys.argv[1:])
         sys.stdout.flush()
     except BrokenPipeError:
-        status = CLOSED
+        status = OUTPUT_CLOSED
         _let_output_go()
     except OSError as error:
-        status = 2
+        status = USER_ERROR
         print(f"error: standard output can't be written ({error.strerror})", file=sys.stderr)
         _let_output_go()
     sys.exit(status)
@@ -102,8 +101,7 @@ def _run_all(steps: list[tuple[str, list[str]]]) -> int:
 
 def find_command(name: str) -> Any:
     """Return the settings class of a command, such as `SweepReportCommand`."""
-    module = importlib.import_module(f"drone_rl.cli.{COMMANDS[name]}")
-    return getattr(module, f"{name.title().replace('-', '')}Command")
+    return getattr(importlib.import_module(f"drone_rl.cli.{COMMANDS[name]}"), TABLE[name]["class"])
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""`drone-rl policies`."""
+"""`drone-rl policies`: list policies and their verdicts."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -12,14 +12,15 @@ from drone_rl.utils.display import aligned
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import trained_policies
 from drone_rl.utils.schema import Whole, as_mapping
-from drone_rl.utils.text import rate
+from drone_rl.utils.text import plural, rate
 
 _LONGEST_NAME = 18
 """Characters of a path above which its figures are on a line of their own."""
-_WRITE_NOTHING = (
+_NO_RUN_FOLDER = (
     *("hydra.run.dir=.", "hydra.output_subdir=null", "hydra.job_logging.root.handlers=[console]"),
     "++hydra.job_logging.handlers.file.delay=true",
 )
+"""Keep Hydra from creating a folder, settings and a log."""
 
 
 class PoliciesCommand(CommandSettings):
@@ -31,7 +32,7 @@ class PoliciesCommand(CommandSettings):
     @classmethod
     def prepare(cls, overrides: Sequence[str]) -> list[str]:
         """Return the command line of a command that writes no files."""
-        return [*super().prepare(overrides), *_WRITE_NOTHING]
+        return [*super().prepare(overrides), *_NO_RUN_FOLDER]
 
     def run(self, folder: Path) -> tuple[int, None]:
         """List the shipped and the trained policies; return the exit status."""
@@ -47,9 +48,10 @@ class PoliciesCommand(CommandSettings):
             print(*([name] if len(name) > _LONGEST_NAME else []), line, sep="\n")
         left = len(newest) - len(trained)
         if left:
-            print(f"and {left} older ones; most={len(newest)} lists them")
+            older = plural(left, "older policy", "older policies")
+            print(f"and {older}; list all with most={len(newest)}")
         if not newest:
-            print(f"no trained policies under {self.paths.outputs}/train; drone-rl train makes one")
+            print(f"no trained policies under {self.paths.outputs}/train; run drone-rl train")
         return 0, None
 
 

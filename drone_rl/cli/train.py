@@ -22,7 +22,7 @@ from drone_rl.config.training import Logger, Tensorboard, TrainSettings
 from drone_rl.sweeps.manifest import read_result
 from drone_rl.utils.progress import silent
 from drone_rl.utils.schema import Instance, Several, Whole
-from drone_rl.verification.text import found
+from drone_rl.verification.text import describe_round
 
 if TYPE_CHECKING:
     from drone_rl.training import Callback
@@ -38,7 +38,7 @@ class TrainCommand(CommandSettings, TrainSettings):
     resume: str | None = None
     """Folder of a run to resume with its own settings; null starts a new one."""
     provable: ProvableSettings = ProvableSettings()
-    """Training until a proof succeeds."""
+    """Training in rounds until a proof succeeds, if provable.rounds is above 0."""
     trial: Annotated[int, Whole(0)] | None = None
     """Number of this run in a search, which hydra/sweeper=optuna sets; null for no search."""
 
@@ -72,7 +72,7 @@ class TrainCommand(CommandSettings, TrainSettings):
             done = vars(stop)["training"]
         _log.info("run folder: %s", folder)
         for row in done.result.get("rounds", ()):
-            _log.info(found(row))
+            _log.info(describe_round(row))
         if before is not None and before.get("frames") == done.result["frames"]:
             _log.info(
                 "the run is already finished (%s, %s frames); to train longer, give a larger "

@@ -8,11 +8,9 @@ import drone_rl
 from drone_rl.cli.settings import CommandSettings, PolicyCommandSettings, finish
 from drone_rl.config.commands import ChanceSettings, CheckSettings, PlacesSettings, ProveSettings
 from drone_rl.config.configuration import TaskChanges, no_changes
+from drone_rl.utils.exit_codes import NOT_PROVED
 from drone_rl.utils.progress import silent
 from drone_rl.utils.schema import Real, Several
-
-NOT_PROVED = 15
-"""Exit status of `prove` if some placements fail or are undecided."""
 
 _log = logging.getLogger(__name__)
 

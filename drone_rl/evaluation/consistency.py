@@ -198,7 +198,7 @@ def _check_failures(verdict: Mapping[str, Any]) -> None:
     )
     rows = failures.get("rows")
     if not isinstance(rows, list) or not 0 < len(rows) <= 1000:
-        raise InputError("failures.rows is no list of up to 1000 rows; judge again")
+        raise InputError("failures.rows is not a list of at most 1000 rows; judge again")
     for row in rows:
         row = as_mapping(row, "a row of failures")
         share = {**row, "successes": row.get("failed"), "trials": row.get("episodes")}

@@ -13,14 +13,9 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.exit_codes import NO_KIND, ONE_SIDED, POOR, TRIVIAL
 from drone_rl.utils.schema import Real
 
-NOT_CERTAIN = 13
-"""Exit code if the episodes are too few to be certain of the kind."""
-PROOF_MISSING = 16
-"""Exit code if a proof for every placement is required and no certificate gives it."""
-NOT_COVERED = 17
-"""Exit code if an operating domain is required in which the policy was not found to be good."""
 _FRACTION = Real(0.0, 1.0, is_above=True, is_below=True)
 
 
@@ -37,9 +32,9 @@ class Kind(enum.StrEnum):
 
     @property
     def exit_code(self) -> int:
-        """0 for good; 10 poor, 11 one-sided, 12 none of these, 18 good, but trivial."""
-        codes = {Kind.GOOD: 0, Kind.POOR: 10, Kind.NONE: 12, Kind.TRIVIAL: 18}
-        return codes.get(self, 11)
+        """Exit code if it is certain, see `drone_rl.utils.exit_codes`."""
+        codes = {Kind.GOOD: 0, Kind.POOR: POOR, Kind.NONE: NO_KIND, Kind.TRIVIAL: TRIVIAL}
+        return codes.get(self, ONE_SIDED)
 
     @property
     def mirrored(self) -> "Kind":
@@ -50,7 +45,7 @@ class Kind(enum.StrEnum):
     @property
     def family(self) -> str:
         """One of `KINDS`."""
-        return "one-sided" if self.exit_code == Kind.ONE_SIDED_LEFT.exit_code else self.value
+        return "one-sided" if self.exit_code == ONE_SIDED else self.value
 
 
 KINDS = ("good", "good, but trivial", "one-sided", "poor", "none of these")

@@ -17,9 +17,10 @@ from drone_rl.evaluation.metrics import Episodes, failure_table, summarise
 from drone_rl.evaluation.outcomes import OutcomeSet, Rounding
 from drone_rl.evaluation.rollouts import StepLog, base_env, run_episodes
 from drone_rl.evaluation.rounding_sensitivity import check_rounding
-from drone_rl.evaluation.rule import NOT_CERTAIN, Kind, Quantity, Rule, decide, kinds_within
+from drone_rl.evaluation.rule import Kind, Quantity, Rule, decide, kinds_within
 from drone_rl.evaluation.verdict_text import SENTENCES, is_proved
 from drone_rl.policies.policy import load_policy
+from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed
 from drone_rl.utils.text import say
@@ -47,7 +48,7 @@ class Verdict:
 
     @property
     def exit_code(self) -> int:
-        """Exit code of the kind if it is certain, else 13."""
+        """Exit code of the kind if it is certain, else `NOT_CERTAIN`."""
         return self.evidence["exit_code"]
 
     @property

@@ -19,8 +19,7 @@ _TRIED = 2  # observations in the forward pass that finds the layers
 def layers(network: ImageNetwork) -> dict[str, tuple[nn.Module, tuple[int, ...]]]:
     """Return layers by name in the order of the forward pass, with the shapes of their outputs.
 
-    A layer has no submodules, runs once, and returns one tensor; a policy that is no torch module
-    has none.
+    A layer has no submodules, runs once, and returns one tensor. Third-party callables have none.
     """
     names = {part: name for name, part in network.parts.named_modules() if name}
     ran: list[tuple[nn.Module, tuple[int, ...]]] = []
@@ -45,7 +44,7 @@ def find_layer(network: ImageNetwork, name: str) -> nn.Module:
     """Return the layer of that name; if there is none, raise InputError with those that exist."""
     found = dict(network.parts.named_modules()).get(name) if name else None
     if found is None or [*found.children()]:
-        there = ", ".join(layers(network)) or "none, for it is no torch module"
+        there = ", ".join(layers(network)) or "none, because it is not a torch module"
         raise InputError(f"layer={name} is not in the policy; choose from: {there}")
     return found
 

@@ -276,7 +276,7 @@ def _exact_map(context: Context, settings: PlacesSettings) -> ActionMap:
     task: TaskSettings = scenes.task.settings
     check_task(task)
     if not network.has_weights:
-        raise InputError("it is no torch module, so that nothing is known of its sums")
+        raise InputError("it is not a torch module, so its rounding error has no bound")
     camera = CameraModel.of(task, scenes.worlds.camera)
     images = CubeImages(scenes.worlds, Lattice(task), camera)
     images.check(_COMPARED, np.random.RandomState(legacy_seed(context.seed.value)))

@@ -62,4 +62,4 @@ def make_env(
 
 def _check(value: Any, name: str, kind: type) -> None:
     if value is not None and not isinstance(value, kind):
-        raise InputError(f"{name}={shown(value)} is no {kind.__name__}; give a {kind.__name__}")
+        raise InputError(f"{name}={shown(value)} is not of type {kind.__name__}; give one")

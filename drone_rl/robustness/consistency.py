@@ -72,7 +72,7 @@ def check_probe(found: Mapping[str, Any], episodes: int, where: str) -> None:
     """
     success = found.get("success")
     if success is not None and abs(success * episodes - round(success * episodes)) > 1e-6:
-        raise InputError(f"{where}.success is no share of {episodes} episodes; {_REMEDY}")
+        raise InputError(f"{where}.success is not a fraction of {episodes} episodes; {_REMEDY}")
     if found["good"] and (found["bad"] or found["refused"] is not None):
         raise InputError(f"{where} is both good and bad; {_REMEDY}")
     _refuse(_wrong_oracle(found.get("oracle"), episodes), where)

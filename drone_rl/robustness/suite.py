@@ -221,5 +221,5 @@ def unpacked(text: str, shape: tuple[int, ...], where: str) -> NDArray:
     except (ValueError, zlib.error):
         content = b""
     if len(content) != size:
-        raise InputError(f"{where} is no image of {shape[0]} rows and {shape[1]} columns")
+        raise InputError(f"{where} is not an image of {shape[0]} rows and {shape[1]} columns")
     return np.frombuffer(content, np.uint8).reshape(shape)

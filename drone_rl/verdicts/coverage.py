@@ -173,7 +173,7 @@ def read_requirements(path: Path) -> dict[str, Need]:
 
 def _read_need(name: str, value: Any) -> Need:
     if name not in AXES:
-        raise InputError(f"{shown(name)} is no axis; give some of: {', '.join(AXES)}")
+        raise InputError(f"{shown(name)} is not an axis; give one or more of: {', '.join(AXES)}")
     axis = AXES[name]
     example = f"give low, high or both, and unit: {axis.unit}"
     given = as_mapping(value, name)

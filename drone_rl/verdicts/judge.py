@@ -16,7 +16,7 @@ from drone_rl.config.configuration import Changes
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, make_baseline
 from drone_rl.evaluation.evaluate import held_out_environments
-from drone_rl.evaluation.rule import NOT_COVERED, PROOF_MISSING, Rule
+from drone_rl.evaluation.rule import Rule
 from drone_rl.evaluation.verdict import Verdict, judge_policy
 from drone_rl.evaluation.verdict_text import quantity_label
 from drone_rl.policies.external_network import Logits
@@ -26,6 +26,7 @@ from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.robustness.shifts_text import QUOTED, why_not
 from drone_rl.utils.display import aligned, paragraph, table
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.exit_codes import NOT_COVERED, PROOF_MISSING
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed

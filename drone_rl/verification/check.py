@@ -12,6 +12,7 @@ from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import policy_names
 from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.exit_codes import CERTIFICATE_REFUSED
 from drone_rl.utils.files import newest
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
@@ -23,8 +24,6 @@ from drone_rl.verification.checker.certificate import (
     read_certificate,
 )
 from drone_rl.verification.checker.checker import CheckFindings, check_certificate
-
-REFUSED = 14  # exit status for a refused certificate
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,7 +49,7 @@ class Check:
     @property
     def exit_code(self) -> int:
         """Exit status of a process that reports it."""
-        return 0 if self.accepted else REFUSED
+        return 0 if self.accepted else CERTIFICATE_REFUSED
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values, as in `check.json`."""

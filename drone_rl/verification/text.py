@@ -32,7 +32,7 @@ def say_places(evidence: Evidence) -> Claims:
     """Say what the exact map shows, or why there is none."""
     places = evidence["places"]
     if "refused" in places:
-        return {"places.refused": f"Of this policy there is no exact map: {places['refused']}."}
+        return {"places.refused": f"There is no exact map of this policy: {places['refused']}."}
     names, window, claims = shown_actions(evidence).names, places["window"], Claims()
     parts, blind = [], []
     for side, of in places["sides"].items():
@@ -112,8 +112,8 @@ def why_stopped(setting: str | None) -> str:
     )
 
 
-def found(search: Mapping[str, Any]) -> str:
-    """Describe a search for failures of a training, see `drone_rl.verification.provable.Round`."""
+def describe_round(search: Mapping[str, Any]) -> str:
+    """Describe the search for failures of one round, see `drone_rl.verification.provable.Round`."""
     text = f"at frame {search['frames']:,}: {search['failures']} of {search['flights']:,} flights"
     if search["losing"] is None:
         return f"{text} failed"

@@ -37,4 +37,4 @@ def test_trained_policies_newest_first(run, in_process, tmp_path):
     assert any("can't be read" in line for line in lines)
     assert max(map(len, lines)) <= 100
     done = in_process("policies", "most=1")
-    assert "and 2 older ones; most=3 lists them" in done.stdout
+    assert "and 2 older policies; list all with most=3" in done.stdout

@@ -55,12 +55,12 @@ def test_task_is_selected_by_name():
     [
         ({"task": "pillar"}, "task='pillar' is unknown; valid names: collect_cubes, pillars"),
         ({"task": 3}, "task=3 is no task; give one of collect_cubes, pillars"),
-        ({"camera": "tiny"}, "camera='tiny' is no CameraSettings; give a CameraSettings"),
-        ({"dynamics": "simple_flight"}, "dynamics='simple_flight' is no DynamicsSettings"),
-        ({"actions": "velocity"}, "actions='velocity' is no ActionSettings"),
-        ({"appearance": "fog"}, "appearance='fog' is no AppearanceSettings"),
-        ({"transforms": "gray"}, "transforms='gray' is no Transform"),
-        ({"transforms": [Gray(), 3]}, "transforms=3 is no Transform"),
+        ({"camera": "tiny"}, "camera='tiny' is not of type CameraSettings; give one"),
+        ({"dynamics": "simple_flight"}, "dynamics='simple_flight' is not of type DynamicsSettings"),
+        ({"actions": "velocity"}, "actions='velocity' is not of type ActionSettings"),
+        ({"appearance": "fog"}, "appearance='fog' is not of type AppearanceSettings"),
+        ({"transforms": "gray"}, "transforms='gray' is not of type Transform"),
+        ({"transforms": [Gray(), 3]}, "transforms=3 is not of type Transform"),
     ],
 )
 def test_values_of_wrong_type_raise_with_the_name(given, message):

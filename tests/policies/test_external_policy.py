@@ -193,7 +193,7 @@ def test_callable_gets_a_reduced_report(network, tmp_path):
     truth = numbers["truth"]
     assert (truth["trusted"], truth["methods"], truth["integration_error"]) == (None, {}, None)
     assert truth["outcomes"]["flights"] > 0
-    assert "it is no torch module" in numbers["places"]["refused"]
+    assert "it is not a torch module" in numbers["places"]["refused"]
     assert numbers["provenance"]["trained"] is None
     page = done.report.read_text()
     assert "What is left out, and why" in page

@@ -75,7 +75,9 @@ def test_actor_can_be_created_without_environment():
         flown.append(env.rollout(4, actor)["action"])
     env.close()
     assert torch.equal(*flown)
-    with pytest.raises(drone_rl.InputError, match=r"env=2 is no TorchRL environment; give policy"):
+    with pytest.raises(
+        drone_rl.InputError, match=r"env=2 is not a TorchRL environment; give policy"
+    ):
         policy.make_actor(2)
 
 

@@ -65,7 +65,7 @@ def test_no_strength_is_good_at_which_the_counts_say_otherwise(good, numbers):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"success": 0.5012}, "here.success is no share of 400 episodes"),
+        ({"success": 0.5012}, "here.success is not a fraction of 400 episodes"),
         ({"good": True}, "here is both good and bad"),
         ({"oracle": share(9, 10)}, "here.oracle is of 10 episodes, not of 400"),
     ],

@@ -96,7 +96,7 @@ _ALL_GOOD = {f"{_BLUR}.flown.3.good": True, **_WIDE}
         ({f"{_FIGURES}.difference.lower95": 0.1}, "difference is not that of its pairs"),
         ({"axes.blur.areas.constant": 0.9}, "areas is not that of its shares"),
         ({"together.impossible": True}, "together.impossible does not follow"),
-        ({"domain.plain.success": 0.9999}, "success is no share of 400 episodes"),
+        ({"domain.plain.success": 0.9999}, "success is not a fraction of 400 episodes"),
         ({"domain.plain.bad": True}, "is both good and bad"),
         ({f"{_BLUR}.failed.0.good": True}, "is both good and bad"),
         ({f"{_BLUR}.failed.0.oracle": share(200)}, "oracle is of 200 episodes, not of 400"),
@@ -122,7 +122,7 @@ _ALL_GOOD = {f"{_BLUR}.flown.3.good": True, **_WIDE}
         ({"seed": -1}, "seed=-1 is out of range"),
         ({"seed_is_fixed": "no"}, "seed_is_fixed='no' is neither true nor false"),
         ({"pictures.blur.0": None}, "does not show the world as it is"),
-        ({"pictures.blur.1": "AAAA"}, "is no image of 25 rows"),
+        ({"pictures.blur.1": "AAAA"}, "is not an image of 25 rows"),
     ],
 )
 def test_what_does_not_go_together_is_refused(read, lie, message):

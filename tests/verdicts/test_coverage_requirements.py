@@ -43,7 +43,7 @@ def test_what_shifts_leaves_can_be_needed(read):
         ("fog: [", "no plain YAML"),
         ("fog: {low: 1}\nfog: {low: 2}", "stands there twice"),
         ("a: !!python/object/apply:os.getcwd []", "no plain YAML"),
-        ("wind: {low: 1, unit: m/s}", "'wind' is no axis; give some of: object_color"),
+        ("wind: {low: 1, unit: m/s}", "'wind' is not an axis; give one or more of: object_color"),
         ("fog: 60", "fog=60 must be a mapping"),
         ("fog: {low: 60, unit: km}", "fog.unit='km' is not its own; give .* unit: m of sight"),
         ("fog: {low: 60}", "fog.unit=None is not its own"),

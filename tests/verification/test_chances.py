@@ -111,7 +111,7 @@ def test_the_tables(good, several):
     [
         ([1.0, 2.0], {}, r"cubes=\[1.0, 2.0\] must place 3"),
         ([], {}, "must place 3"),
-        (["a", "b", "c"], {}, "are no numbers"),
+        (["a", "b", "c"], {}, "are not numbers"),
         ([0.0, 7.0, 0.0], {}, "give metres to the left from -6 to 6"),
         ([0.0, float("nan"), 0.0], {}, "give metres to the left from -6 to 6"),
         (None, {"placements": 0}, "placements=0 is out of range"),

@@ -37,7 +37,7 @@ def test_the_closest_logits():
 def test_without_a_map_only_that_is_said():
     found = say_places({"places": {"refused": "it sees a stack of frames"}})
     assert found == {
-        "places.refused": "Of this policy there is no exact map: it sees a stack of frames."
+        "places.refused": "There is no exact map of this policy: it sees a stack of frames."
     }
 
 

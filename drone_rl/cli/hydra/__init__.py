@@ -1,1 +1,1 @@
-"""Hydra's side of the command line: schemas, composition, launchers, a sweeper, help."""
+"""How the command line uses Hydra: schemas, composition, launchers, a sweeper and help."""

@@ -44,6 +44,7 @@ from drone_rl.config.networks import Network
 from drone_rl.config.training import Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.exit_codes import USER_ERROR
 from drone_rl.utils.schema import Kind
 from drone_rl.utils.settings import Settings, kinds_of, plain, types_of
 
@@ -79,7 +80,7 @@ _PLUGINS = (("plugins", list[str], dataclasses.field(default_factory=list)),)
 def register_schemas(**commands: type[Settings]) -> None:
     """Register the schemas of commands, by the names of their files, before Hydra composes.
 
-    Parts and tasks of plug-ins, which have no file in conf/, become choices of their groups.
+    Parts and tasks of plugins, which have no file in conf/, become choices of their groups.
     """
     store = ConfigStore.instance()
     for task in TASKS.values():
@@ -98,7 +99,7 @@ def register_schemas(**commands: type[Settings]) -> None:
 
 
 def _store(group: str, name: str, settings: type[Settings]) -> None:
-    """Register the schema of a group's file; settings of a plug-in are a choice themselves."""
+    """Register the schema of a group's file; settings of a plugin are a choice themselves."""
     store = ConfigStore.instance()
     store.store(group=group, name=f"base_{name}", node=schema_of(settings))
     if not settings.__module__.startswith("drone_rl."):
@@ -119,7 +120,7 @@ def import_plugins(overrides: Sequence[str]) -> None:
     """Import the modules that `plugins=[MODULE, ...]` names on a command line, and none from files.
 
     Raises:
-        InputError: There is no such module.
+        InputError: A module is not found.
     """
     typed = [o.partition("=")[2] for o in overrides if re.match(r"\+{0,2}plugins=", o)]
     names = re.findall(r"[^\[\]\s,'\"]+", typed[-1]) if typed else []
@@ -294,7 +295,7 @@ def _job(
             if isinstance(error, BrokenPipeError) and is_output_closed():
                 raise
             print(f"error: {one_line(error)}", file=sys.stderr)
-            status, value = 2, None
+            status, value = USER_ERROR, None
         statuses.append(status)
         if status > 128:  # a signal ends a whole sweep, not one run of it
             sys.exit(status)

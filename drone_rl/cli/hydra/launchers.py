@@ -1,4 +1,4 @@
-"""Hydra plug-ins of `drone-rl train -m`: launchers and a sweeper; each run is its own process.
+"""Hydra plugins of `drone-rl train -m`: launchers and a sweeper; each run is its own process.
 
 Hydra's default launcher runs all jobs in one process, and its joblib launcher is unmaintained.
 Separate processes all start from the same state, and one can fail without the others.
@@ -55,8 +55,8 @@ class SweepLauncher(Launcher):
         """Store Hydra's objects."""
         self.hydra_context, self.config = hydra_context, config
         self.task_function = task_function
-        noted = Path(str(config.hydra.sweep.dir)) / "multirun.yaml"
-        self._noted = noted, noted.read_bytes() if noted.is_file() else None
+        multirun = Path(str(config.hydra.sweep.dir)) / "multirun.yaml"
+        self._multirun = multirun, multirun.read_bytes() if multirun.is_file() else None
 
     def launch(
         self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int
@@ -76,15 +76,15 @@ class SweepLauncher(Launcher):
                 _log.info("sweep of %d runs, %d finished before: %s", len(runs), finished, folder)
                 failed = self._finish(sweep, runs)
         except InputError:
-            self._leave_as_it_was()
+            self._restore_multirun()
             raise
         if failed:
             self.task_function.statuses.append(1)  # pyright: ignore[reportFunctionMemberAccess]
         return [_job_return(run) for run in runs]
 
-    def _leave_as_it_was(self) -> None:
+    def _restore_multirun(self) -> None:
         """Restore multirun.yaml, which Hydra's sweeper wrote for a sweep that is refused."""
-        path, content = self._noted
+        path, content = self._multirun
         if content is None:
             path.unlink(missing_ok=True)
         else:
@@ -102,7 +102,7 @@ class SweepLauncher(Launcher):
                 failed += status != 0
                 _log.info("[%d/%d] %s: %s", done, len(unfinished), run.folder.name, _outcome(run))
         except KeyboardInterrupt:
-            _log.info("go on with the same command: %s", sweep.command)
+            _log.info("resume with the same command: %s", sweep.command)
             raise
         finally:
             _log.info("report: %s", write_sweep_report(sweep)[0])
@@ -188,7 +188,7 @@ def _job_return(run: Run) -> JobReturn:
 def _outcome(run: Run) -> str:
     result = read_result(run.folder)
     if result is None:
-        return f"failed: {read_failure(run) or 'for a reason unknown'}"
+        return f"failed: {read_failure(run) or 'reason unknown'}"
     return f"{result['reason']}, running reward {_number(result.get('running_reward'))}"
 
 
@@ -285,16 +285,16 @@ class OptunaSweeper(Sweeper):
         complete = [t for t in study.trials if t.state == optuna.trial.TrialState.COMPLETE]
         if complete:
             best = study.best_trial
-            _log.info("best: run %d, %.3f cubes, %s", best.number, best.value, best.params)
+            _log.info("best: run %d, running reward %.3f, %s", best.number, best.value, best.params)
 
 
 def check_params(params: Mapping[str, Any], space: Mapping[str, Any]) -> None:
-    """Raise an `InputError` for parameters of a journal that this search can't have sampled."""
+    """Raise an `InputError` for parameters of a journal outside this search's space."""
     for name, value in params.items():
         if name not in space or not space[name]._contains(space[name].to_internal_repr(value)):
             raise InputError(
-                f"optuna.journal sets {shown(name)} to {shown(value)}, which this search never "
-                "draws; choose another folder"
+                f"optuna.journal sets {shown(name)} to {shown(value)}, which is outside "
+                "this search's space; choose another folder"
             )
 
 
@@ -309,6 +309,6 @@ def distribution(override: Override) -> Any:
         last = start + (int(value.stop or 0) - 1 - start) // step * step
         return d.IntDistribution(start, last, step=step)
     if not isinstance(value, IntervalSweep):
-        raise InputError(f"{override.input_line} can't be searched; give a choice or an interval")
+        raise InputError(f"{override.input_line} can't be searched; give a choice or a range")
     low, high = cast(float, value.start), cast(float, value.end)  # Hydra's parser wants both
     return d.FloatDistribution(float(low), float(high), log="log" in value.tags)

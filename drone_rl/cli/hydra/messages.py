@@ -15,6 +15,7 @@ from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.exit_codes import INTERRUPTED, USER_ERROR
 
 MISTAKES = (InputError, HydraException, OmegaConfBaseException, OSError)
 """Errors of a user; any other is a bug and keeps its traceback."""
@@ -47,13 +48,13 @@ def guarded(command: Callable[[], int]) -> int:
         return status
     except KeyboardInterrupt:
         print("error: interrupted", file=sys.stderr)
-        return 130
+        return INTERRUPTED
     except Exception as error:
         is_closed = isinstance(error, BrokenPipeError) and is_output_closed()
         if is_closed or not is_mistake(error):
             raise
         print(f"error: {one_line(error)}", file=sys.stderr)
-        return 2
+        return USER_ERROR
 
 
 def _errors_in_threads() -> list[OSError]:

@@ -72,7 +72,7 @@ def is_group(conf: Path, name: str) -> bool:
 
 
 def choices(conf: Path, group: str) -> list[str]:
-    """Return the choices of a group: names of its files, and parts of plug-ins."""
+    """Return the choices of a group: names of its files, and what plugins register."""
     names = [path.name for path in (conf / group).glob("*.yaml")]
     with contextlib.suppress(OSError):  # nothing is stored in the group
         names += ConfigStore.instance().list(group)
@@ -192,7 +192,7 @@ def _syntax(word: str) -> InputError:
         return InputError(f"{word!r} holds two settings in one pair of quotes; type: {word}")
     if not re.fullmatch(r"(\+{0,2}|~)[A-Za-z_][\w./@-]*", key) or key.endswith("."):
         fixed = re.sub(r"[^\w./@]", "_", key.strip()).strip("._")
-        return InputError(f"{word}: {key!r} is no name of a setting; type {fixed}={value}")
+        return InputError(f"{word}: {key!r} is not a valid name; type {fixed}={value}")
     if value.startswith("~"):
         return InputError(f"{word}: the shell left ~ as it is; type {key}=$HOME{value[1:]}")
     if found := re.fullmatch(r"\((.*)\)", value):
@@ -231,7 +231,7 @@ def _wrong_type(command: Command, override: Override) -> InputError | None:
     for value in _values(override):
         try:
             OmegaConf.update(command.config, key, value, force_add=text.startswith("+"))
-        except (AttributeError, KeyError):  # of OmegaConf
+        except (AttributeError, KeyError):  # from OmegaConf, for a name that it does not know
             return command.unknown(text, key)
         except OmegaConfBaseException as error:
             return _wrong_value(command.config, key, value, text, str(error).splitlines()[0])
@@ -277,7 +277,7 @@ def _wrong_value(config: DictConfig, key: str, value: Any, text: str, reason: st
     if isinstance(now, ListConfig):
         listed = [value] if isinstance(value, int | float) else ([*now] or [1, 2])
         listed = str(listed).replace(" ", "").replace("'", "")
-        return InputError(f"{text} is no list of such values; type one such as {name}={listed}")
+        return InputError(f"{text} has the wrong type; type a list such as {name}={listed}")
     written = re.fullmatch(r"(\d+(?:\.\d+)?)([kKmMgG])", str(value))
     if written and "number" in expected:
         now = f"{float(written[1]) * _MAGNITUDES[written[2].lower()]:.0f}"

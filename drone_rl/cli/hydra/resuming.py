@@ -1,4 +1,4 @@
-"""Command lines of trainings: former setting names, a sweep's folder, the settings of a run."""
+"""Complete the command line of `drone-rl train`: former names, a sweep's folder, `resume=`."""
 
 import re
 import shlex
@@ -18,7 +18,7 @@ from drone_rl.utils.settings import FORMER_CHOICES, FORMER_NAMES
 
 
 def translate_former(overrides: Sequence[str]) -> list[str]:
-    """Translate former names in trainings: `policy=mlp` to `network=mlp`, and `FORMER_NAMES`."""
+    """Translate former setting names: `policy=mlp` to `network=mlp`, and `FORMER_NAMES`."""
     named = map(with_current_name, overrides)
     return [re.sub(r"^(\+{0,2}|~)policy(?=[.=])", r"\1network", o) for o in named]
 
@@ -35,17 +35,17 @@ _RENAMED = [
 ]
 """Patterns of current names in overrides and the former names, the latest first."""
 _FOLDER = "hydra.sweep.dir=${paths.outputs}/${hydra.job.config_name}/multiruns/"
-_WRITE_NOTHING = ("hydra.output_subdir=null", "++hydra.job_logging.handlers.file.delay=true")
+_NO_EARLY_FILES = ("hydra.output_subdir=null", "++hydra.job_logging.handlers.file.delay=true")
 """Keep Hydra from writing settings before they are checked, and from opening a log."""
 _PLAIN = re.compile(r"[\w./+-]*")
 """Values that Hydra parses alike with and without quotes."""
 
 
 def complete(overrides: Sequence[str]) -> list[str]:
-    """Complete the command line of a training by settings and folder of a run or sweep.
+    """Add the folder of a sweep, or the folder and settings of a resumed run, to a command line.
 
     Raises:
-        InputError: There is no run at `resume=FOLDER`, or its settings are unclear.
+        InputError: `resume=FOLDER` has no checkpoint, or a setting that may not come from a file.
     """
     typed = translate_former(overrides)
     if is_sweep(typed):
@@ -55,7 +55,7 @@ def complete(overrides: Sequence[str]) -> list[str]:
     if not folders or folders[-1] in ("", "null"):
         return typed
     if any(o.startswith("hydra.run.dir=") for o in typed):
-        return [*typed, *_WRITE_NOTHING]  # a sweep gives all settings itself
+        return [*typed, *_NO_EARLY_FILES]  # a sweep's command line has all settings
     folder = Path(_unquoted(folders[-1]))
     if not (folder / "checkpoints" / "last.pt").is_file():
         raise InputError(f"resume={folder} has no checkpoints/last.pt; give the folder of a run")
@@ -63,7 +63,7 @@ def complete(overrides: Sequence[str]) -> list[str]:
     former = [re.sub(r"^(\+{0,2}|~)network(?=[.=])", r"\1policy", o) for o in typed]
     kept = translate_former(taken_over(folder, [*typed, *former]))
     plain = [_resume(folder) if o.startswith("resume=") else o for o in typed]
-    own = ["hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}", *_WRITE_NOTHING]
+    own = ["hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}", *_NO_EARLY_FILES]
     return [*kept, *plain, *own]
 
 
@@ -82,8 +82,8 @@ def check_folder(resume: str, folder: Path) -> None:
     """Raise an `InputError` if hydra.run.dir, `folder`, is not the folder of the resumed run."""
     if Path(resume).resolve() != folder.resolve():
         raise InputError(
-            f"resume={resume} goes on in that folder, but hydra.run.dir={folder} is another; "
-            "leave hydra.run.dir out"
+            f"resume={resume} resumes in that folder, but hydra.run.dir={folder} differs; omit "
+            "hydra.run.dir"
         )
 
 

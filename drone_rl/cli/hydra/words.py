@@ -1,4 +1,4 @@
-"""Find words on a command line that are no settings, before Hydra reads it."""
+"""Reject words on a command line that are not settings, before Hydra reads it."""
 
 import difflib
 import re
@@ -26,7 +26,7 @@ _CHOICES = ("experiment", "objective", "network", "appearance", "dynamics", "tas
 
 
 def check_words(name: str, conf: Path, words: Sequence[str]) -> None:
-    """Raise an `InputError` for the first word on a command line that is no setting."""
+    """Raise an `InputError` for the first word that is not a setting."""
     position = 0
     while position < len(words):
         word = words[position]
@@ -108,7 +108,7 @@ def _bare(command: Command, words: Sequence[str], position: int) -> InputError:
 
 
 def no_command(word: str, following: Sequence[str], known: Sequence[str]) -> str:
-    """Return the message about a first word that is no command."""
+    """Return the message about an unknown command."""
     if "=" in word or word.startswith(tuple(_DASHES)):
         command = next((w for w in following if w in known), "train")
         others = [w for w in (word, *following) if w != command]

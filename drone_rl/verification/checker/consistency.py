@@ -134,7 +134,7 @@ def _misfits(certificate: Certificate, whole: Fraction) -> Iterator[str]:
     if misfit is not None:
         place, count = misfit
         yield (
-            f"the boxes are no partition of the placements: {count} of them hold the place "
+            f"the boxes do not partition the placements: {count} of them contain the placement "
             f"{place}, where lateral_bound={bound}"
         )
     if (total := volume(boxes)) != whole:

@@ -85,4 +85,4 @@ def test_an_interrupted_sweep_says_how_to_go_on(run, tmp_path, monkeypatch, capl
     sweep = Sweep(tmp_path, "drone-rl train -m seed=0,1", {}, [run])
     with pytest.raises(KeyboardInterrupt):
         launcher._finish(sweep, [run])
-    assert "go on with the same command: drone-rl train -m seed=0,1" in caplog.text
+    assert "resume with the same command: drone-rl train -m seed=0,1" in caplog.text

@@ -67,7 +67,7 @@ def test_a_folder_whose_name_hydra_would_parse_is_quoted(run):
 def test_a_run_goes_on_in_its_own_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     check_folder("run", tmp_path / "run")
-    with pytest.raises(InputError, match=r"hydra.run.dir=.*other is another; leave"):
+    with pytest.raises(InputError, match=r"hydra.run.dir=.*other differs; omit"):
         check_folder("run", tmp_path / "other")
 
 

@@ -27,8 +27,8 @@ def test_a_certificate_that_goes_together_is_read(write, good):
     ("lie", "message"),
     [
         (lambda c: c["outcomes"][0].update(share=0.9), r"contradicts itself: .*share of 0\.9"),
-        (lambda c: c["outcomes"][0]["boxes"].append([[0.0, 1.0]] * 2), "no partition"),
-        (lambda c: c["outcomes"][0].update(boxes=[[[-6.0, 5.0], [-6.0, 6.0]]]), "no partition"),
+        (lambda c: c["outcomes"][0]["boxes"].append([[0.0, 1.0]] * 2), "do not partition"),
+        (lambda c: c["outcomes"][0].update(boxes=[[[-6.0, 5.0], [-6.0, 6.0]]]), "do not partition"),
         (lambda c: c.update(finished=False), "finished is false"),
         (lambda c: c.update(more=1), r"can't be used: .*more"),
         (lambda c: c["policy"].update(weights="0" * 64), "for a network with hash 0000"),

@@ -66,8 +66,8 @@ def test_what_is_missing_of_the_steps(parsed, two_halves):
         ),
         ({"steps": {}}, "outcome 0 (all_cubes, cubes collected: 1) states no number of steps"),
         ({"steps": {"14": 1e-12}}, "numbers of steps are left open for a share of 0.637"),
-        ({"boxes": [[[-6.0, 1.6]]]}, "0 of them hold the place [1.62"),
-        ({"boxes": [[[-6.5, 1.649]]]}, "1 of them hold the place [-6.25]"),
+        ({"boxes": [[[-6.0, 1.6]]]}, "0 of them contain the placement [1.62"),
+        ({"boxes": [[[-6.5, 1.649]]]}, "1 of them contain the placement [-6.25]"),
         ({"boxes": [[[-6.0, 6.0]]]}, "the boxes have 1.36"),
     ],
 )
