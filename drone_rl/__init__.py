@@ -66,9 +66,9 @@ if TYPE_CHECKING:
     from drone_rl.training.run_folder import Training as Training
     from drone_rl.training.train import train as train
     from drone_rl.utils.errors import InputError as InputError
+    from drone_rl.verdicts.bodies import Bodies as Bodies
+    from drone_rl.verdicts.bodies import bodies as bodies
     from drone_rl.verdicts.coverage import Coverage as Coverage
-    from drone_rl.verdicts.dynamics_sweep import Bodies as Bodies
-    from drone_rl.verdicts.dynamics_sweep import bodies as bodies
     from drone_rl.verdicts.judge import Judgement as Judgement
     from drone_rl.verdicts.judge import Judgements as Judgements
     from drone_rl.verdicts.judge import judge as judge

@@ -16,7 +16,7 @@ from drone_rl.robustness import sitl as looped
 from drone_rl.robustness.sitl import evaluate_in_the_loop
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
-from drone_rl.verdicts.dynamics_sweep import chart
+from drone_rl.verdicts.bodies import chart
 
 STUB = Path(__file__).parents[1] / "flight" / "stub_firmware.py"
 

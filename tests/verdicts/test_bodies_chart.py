@@ -4,8 +4,8 @@ from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
 
 from drone_rl.utils import palette
-from drone_rl.verdicts.dynamics_sweep import LOOPED, chart
-from tests.verdicts.test_dynamics_sweep_text import BAD, GOOD, NUMBERS
+from drone_rl.verdicts.bodies import LOOPED, chart
+from tests.verdicts.test_bodies_text import BAD, GOOD, NUMBERS
 
 
 def cells(figure):

@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.evidence import VERDICT, changed
-from drone_rl.verdicts.dynamics_sweep import cell, failure, rows
+from drone_rl.verdicts.bodies import cell, failure, rows
 
 GOOD = changed(
     VERDICT,

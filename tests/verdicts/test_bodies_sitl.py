@@ -1,6 +1,6 @@
 from drone_rl.utils.intervals import proportion
-from drone_rl.verdicts.dynamics_sweep import LOOPED, cell, left_out, rows, sitl_cell
-from tests.verdicts.test_dynamics_sweep_text import BAD, GOOD
+from drone_rl.verdicts.bodies import LOOPED, cell, left_out, rows, sitl_cell
+from tests.verdicts.test_bodies_text import BAD, GOOD
 
 FLIGHTS = {"good": {"success": proportion(4, 5)}, "poor": {"left_out": "no rotor turned"}}
 NUMBERS = {

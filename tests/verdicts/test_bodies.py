@@ -9,7 +9,7 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.config.commands import BODIES
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
-from drone_rl.verdicts.dynamics_sweep import changes_of
+from drone_rl.verdicts.bodies import changes_of
 
 TWO = ["computer vision", "wind 8 m/s"]
 STILL = {"wind": [0.0, 0.0, 0.0], "gusts": 0.0}
