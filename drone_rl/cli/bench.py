@@ -1,4 +1,4 @@
-"""`drone-rl bench`."""
+"""`drone-rl bench`: run benchmarks of a checkout."""
 
 import importlib
 import json

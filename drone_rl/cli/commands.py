@@ -1,4 +1,4 @@
-"""The table of all commands."""
+"""All commands, read from `commands.toml`."""
 
 import tomllib
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`drone-rl evaluate`, `play`, `verdict`, `shifts`, `bodies` and `export`."""
+"""`drone-rl evaluate`, `play`, `verdict`, `shifts`, `bodies` and `export`: their settings."""
 
 import json
 import logging

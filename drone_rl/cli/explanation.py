@@ -1,4 +1,4 @@
-"""`drone-rl explain` and `drone-rl report`."""
+"""`drone-rl explain` and `drone-rl report`: their settings."""
 
 import logging
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`drone-rl sweep-report`."""
+"""`drone-rl sweep-report`: its settings."""
 
 import logging
 from collections.abc import Sequence

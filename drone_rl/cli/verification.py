@@ -1,4 +1,4 @@
-"""`drone-rl prove`, `check`, `places` and `chain`."""
+"""`drone-rl prove`, `check`, `places` and `chain`: their settings."""
 
 import logging
 from pathlib import Path

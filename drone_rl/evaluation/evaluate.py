@@ -1,4 +1,4 @@
-"""Evaluate a policy next to the baselines, and print the figures."""
+"""`drone-rl evaluate`: evaluate a policy next to the baselines, and print the figures."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence

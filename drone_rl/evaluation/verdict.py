@@ -136,7 +136,7 @@ def apply_rule(
         rule: Thresholds of the verdict.
         sampled: The policy's episodes with sampled actions, from the same states.
         claim: A certificate of the policy in this task, if there is one.
-        unlike: How the dynamics differ from those of the training: setting to "own" and "flown".
+        unlike: How the dynamics differ from those in training: setting to "own" and "flown".
         seed: Root of the environments' random streams; without it the verdict says that a policy
             could have been fitted to these environments.
         rounding: How rounding can change `greedy`; None if that was not checked.

@@ -1,4 +1,4 @@
-"""Videos of episodes: the drone, its cameras, the observation and the action probabilities."""
+"""`drone-rl play`: videos of the drone, its cameras, the observation and action probabilities."""
 
 import dataclasses
 import logging

@@ -1,4 +1,4 @@
-"""Explain policies: compute all sections, write them as files, and make one report."""
+"""`drone-rl explain`: compute all sections, write them as files, and make one report."""
 
 import dataclasses
 import json

@@ -46,11 +46,11 @@ class ExternalPolicy(BasePolicy):
     transforms: tuple[Transform, ...]
     """If empty, the callable gets the camera's RGB bytes."""
     own_dynamics: DynamicsSettings = COMPUTER_VISION  # pyright: ignore[reportIncompatibleMethodOverride] (a field)
-    """The vehicle dynamics of the training."""
+    """The vehicle dynamics in training."""
     actions: ActionSettings = MOVES_SETTINGS  # pyright: ignore[reportIncompatibleMethodOverride] (a field)
     """One action for each logit."""
     used_dynamics: DynamicsSettings | None = None
-    """Vehicle dynamics of the evaluation; those of the training by default."""
+    """Vehicle dynamics of the evaluation; those in training by default."""
 
     @property
     def dynamics(self) -> DynamicsSettings:

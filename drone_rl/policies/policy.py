@@ -57,7 +57,7 @@ class BasePolicy(abc.ABC):
     @property
     @abc.abstractmethod
     def own_dynamics(self) -> DynamicsSettings:
-        """The vehicle dynamics of the training."""
+        """The vehicle dynamics in training."""
 
     @property
     def unlike(self) -> dict[str, dict[str, Any]]:
@@ -191,7 +191,7 @@ class Policy(BasePolicy):
 
     @property
     def own_dynamics(self) -> DynamicsSettings:
-        """The vehicle dynamics of the training."""
+        """The vehicle dynamics in training."""
         return parse(self.state["description"]).dynamics
 
     @property

@@ -21,7 +21,7 @@ from typing import Any
 import torch
 
 from drone_rl.evaluation.metrics import Episodes
-from drone_rl.evaluation.outcomes import Outcomes
+from drone_rl.evaluation.outcomes import OutcomeSet
 from drone_rl.evaluation.rule import Kind, Quantity, Rule, kinds_within
 from drone_rl.evaluation.verdict import measure, widen
 from drone_rl.robustness.agents import OracleAgent, PolicyAgent, has_oracle
@@ -154,7 +154,7 @@ class Prober:
             self._baselines[key] = self._evaluator.run_baselines(condition)
         rule = self.rule_at(part)
         baselines = {**self._baselines[key], "oracle": self._oracle}
-        unknown = Outcomes(None, torch.empty(0, dtype=torch.int64), agent.is_fragile)
+        unknown = OutcomeSet(None, torch.empty(0, dtype=torch.int64), agent.is_fragile)
         widened = widen(measure(greedy, baselines, rule), greedy, baselines, rule, unknown)
         found = dict(zip(rule.quantities, widened, strict=True))
         return {

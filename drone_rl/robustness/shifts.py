@@ -1,4 +1,4 @@
-"""Evaluate a policy under perturbations, and find its operating domain."""
+"""`drone-rl shifts`: evaluate a policy under perturbations, and find its operating domain."""
 
 import dataclasses
 import itertools

@@ -79,7 +79,7 @@ class Run:
         return ["train", *self.overrides, *own, *resume]
 
     def repeat_command(self) -> str:
-        """Return the shell command that repeats this training."""
+        """Return the shell command that repeats this training run."""
         settings = [o for o in self.overrides if not o.startswith("trial=")]
         return shlex.join(["drone-rl", "train", *settings, "hydra.mode=RUN"])
 

@@ -1,4 +1,4 @@
-"""The report of a sweep: a CSV and a JSON for programs, an HTML page, and lines for a terminal.
+"""`drone-rl sweep-report`: a CSV and a JSON file, an HTML page, and lines for a terminal.
 
 It needs no torch unless the runs are judged again.
 """

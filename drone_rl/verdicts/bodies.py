@@ -1,4 +1,4 @@
-"""Judge policies under several vehicle dynamics: drones, wind, software in the loop."""
+"""`drone-rl bodies`: judge policies under several vehicle dynamics, also in the loop."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""Export a policy as safetensors with a model card."""
+"""`drone-rl export`: write a policy as safetensors with a model card."""
 
 import hashlib
 import shlex
@@ -78,7 +78,7 @@ def export(
 
 
 def origin_of(path: Path, state: dict[str, Any]) -> tuple[str, dict[str, Any] | None]:
-    """Return the command that repeats the training, and the selection in a sweep, if any."""
+    """Return the command that repeats the training run, and the selection in a sweep, if any."""
     folder = path.absolute().parent.parent
     if path.suffix == ".pt" and (folder.parent / "sweep.json").is_file():
         rows = read_rows(read_sweep(folder.parent))
@@ -294,7 +294,7 @@ SENTENCES = (
         "card.not_chosen",
         "the run is not in a sweep's folder",
         lambda c: c["chosen"] is None,
-        lambda c: "Whether it was chosen among several trainings, and how, is not recorded.",
+        lambda c: "Whether it was chosen among several training runs, and how, is not recorded.",
     ),
     Sentence("card.tested", "always", lambda c: True, _tested),
     Sentence("card.body", "the drone has vehicle dynamics", _flies, _body),

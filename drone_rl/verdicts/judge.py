@@ -1,4 +1,4 @@
-"""Judge policies and baselines, with certificate and operating domain."""
+"""`drone-rl verdict`: judge policies and baselines, with certificate and operating domain."""
 
 import dataclasses
 import json

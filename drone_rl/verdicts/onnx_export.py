@@ -1,4 +1,4 @@
-"""Export a policy as an ONNX model and check that both agree."""
+"""`drone-rl export format=onnx`: write an ONNX model and check that it agrees with the policy."""
 
 import dataclasses
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Exact success probabilities of a policy that samples its actions, by placement."""
+"""`drone-rl chain`: exact success probabilities of a policy that samples its actions."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""Check a certificate independently of the prover."""
+"""`drone-rl check`: check a certificate independently of the prover."""
 
 import dataclasses
 import functools

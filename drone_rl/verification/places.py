@@ -1,4 +1,4 @@
-"""The exact map of a greedy policy's action over all positions of one cube."""
+"""`drone-rl places`: the exact map of a greedy policy's action over all positions of one cube."""
 
 import dataclasses
 import json

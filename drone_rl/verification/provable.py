@@ -1,4 +1,4 @@
-"""Train until a proof finds no placement at which the policy fails."""
+"""`drone-rl train provable.rounds=N`: train until a proof finds no placement of failure."""
 
 import dataclasses
 import io
@@ -67,7 +67,7 @@ class Round(Settings):
 
 @dataclasses.dataclass
 class Journal(Callback):
-    """The rounds of one training, saved in its folder once the training accepts its settings."""
+    """The rounds of one training run, saved in its folder once the settings are accepted."""
 
     folder: Path
     settings: TrainSettings
@@ -103,7 +103,7 @@ class Journal(Callback):
             rounds = [Round.read(row, "rounds") for row in saved["rounds"]]
         journal = cls(folder, settings, how or ProvableSettings(rounds=10), rounds)
         _ = journal.task  # refused before anything is written
-        if state is None:  # whoever is killed from here on finds the rounds of this training
+        if state is None:  # from here on, the folder has no rounds of an earlier run
             journal.save()
         return journal
 
@@ -170,7 +170,7 @@ class Journal(Callback):
         return boxes
 
     def save(self) -> None:
-        """Write the file; without rounds, delete those of an earlier training."""
+        """Write the file; without rounds, delete those of an earlier run."""
         if not self.rounds:
             shutil.rmtree(self.folder / "rounds", ignore_errors=True)
         noted = {
@@ -199,14 +199,14 @@ def train_until_proved(
     search was a proof, its certificate is `certificate.json` in the folder.
 
     Args:
-        settings: Settings of the training, for all rounds together.
+        settings: Settings of the training run, for all rounds together.
         how: Number of rounds and their settings; 10 rounds by default.
         folder: See `train`.
-        resume: Whether to resume the training in the folder, in any round. The result is identical
+        resume: Whether to resume the run in the folder, in any round. The result is identical
             bit for bit unless a time limit stops a proof.
         callbacks: Called at every update.
         progress: Called with the progress of training and proofs; a bar by default.
-        changes: Changes to the settings of the training.
+        changes: Changes to the settings of the training run.
 
     Raises:
         InputError: A setting is unusable, such a policy cannot be proved, or training diverged.

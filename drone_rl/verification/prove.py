@@ -1,4 +1,4 @@
-"""Prove what a policy does over all placements of the cubes."""
+"""`drone-rl prove`: verify a policy over all placements of the cubes."""
 
 import contextlib
 import dataclasses

@@ -1,4 +1,4 @@
-"""From a command line to a command's settings: Hydra schemas, composition and runs."""
+"""Compose a command's settings from a command line with Hydra, and run the command."""
 
 import contextlib
 import dataclasses

@@ -1,4 +1,4 @@
-"""`drone-rl COMMAND --help`."""
+"""`drone-rl COMMAND --help`: print settings and examples."""
 
 import re
 import shlex

@@ -1,4 +1,4 @@
-"""User errors as one line, whichever library raised them."""
+"""Report user errors in one line, whichever library raised them."""
 
 import errno
 import logging

@@ -1,4 +1,4 @@
-"""Build a report from explanations: one self-contained HTML file, and its figures as files."""
+"""`drone-rl report`: build one self-contained HTML file from explanations, and its figures."""
 
 import dataclasses
 import functools

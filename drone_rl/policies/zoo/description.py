@@ -205,7 +205,7 @@ class PolicyDescription:
 
 
 def describe(settings: TrainSettings) -> PolicyDescription:
-    """Return the description of the policy of a training; `InputError` for unregistered parts."""
+    """Return the description of a training run's policy; `InputError` for unregistered parts."""
     for part in (settings.network, *settings.transforms):
         if not part.is_known:
             kind = "network" if part is settings.network else "transform"
