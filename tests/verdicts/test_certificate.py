@@ -7,7 +7,7 @@ import torch
 
 import drone_rl
 from drone_rl.evaluation.metrics import Episodes
-from drone_rl.evaluation.outcomes import Outcomes, Rounding
+from drone_rl.evaluation.outcomes import OutcomeSet, Rounding
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import CubeGoals, EndReason
 from drone_rl.verdicts.certificate import Claim
@@ -72,7 +72,7 @@ def rounded(count, fragile=(), ends=None, owner=(), is_open=()):
     """What rounding can change: a frame of some episodes, and how they can end."""
     flags, opened = torch.zeros(count, dtype=torch.bool), torch.zeros(count, dtype=torch.bool)
     flags[list(fragile)], opened[list(is_open)] = True, True
-    outcomes = Outcomes(ends, torch.tensor(owner, dtype=torch.int64), opened)
+    outcomes = OutcomeSet(ends, torch.tensor(owner, dtype=torch.int64), opened)
     return Rounding("float32", True, 1000, len(fragile), flags, outcomes, "PyTorch", count, 0, 0)
 
 
