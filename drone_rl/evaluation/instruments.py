@@ -24,7 +24,7 @@ _SPEEDS, _BARS = (172, 30), 140
 """Position of the speeds, and width of their bars, pixels."""
 _MOTORS = (330, 30)
 _STILL = 0.05
-"""Speed that counts as none, m/s."""
+"""Slower motion backward, right or down is labelled forward, left or up, m/s."""
 _WORDS = (("forward", "backward"), ("left", "right"), ("climbs", "sinks"))
 _PLACES = {"front left": 2, "front right": 0, "rear left": 1, "rear right": 3}
 """Index of each rotor in `FlightState.rotors`."""
@@ -42,7 +42,7 @@ class Reading(NamedTuple):
 
 
 def read(body: FlightState) -> Reading:
-    """Return the readings of the first of some drones."""
+    """Return the readings of the first drone of a batch."""
     w, x, y, z = body.attitude[0].tolist()
     x_speed, y_speed, climb = body.velocity[0].tolist()
     heading = float(body.heading[0])
@@ -51,22 +51,22 @@ def read(body: FlightState) -> Reading:
     return Reading(Attitude.of((w, x, y, z)), speeds, tuple(body.rotors[0].tolist()))
 
 
-def panel(reading: Reading, most: float, hover: float) -> Image.Image:
+def panel(reading: Reading, max_speed: float, hover: float) -> Image.Image:
     """Draw the instruments. Size: (WIDTH, HEIGHT).
 
-    Bars of speeds are full at `most`, m/s. A mark on each motor's bar shows the thrust in hover, as
-    a fraction of the maximum thrust.
+    Bars of speeds are full at `max_speed`, m/s. A mark on each bar of a motor shows `hover`, thrust
+    in hover as a fraction of the maximum thrust.
     """
     image = Image.new("RGB", (WIDTH, HEIGHT), _BACKGROUND)
     draw = ImageDraw.Draw(image)
     _draw_horizon(image, draw, reading.attitude)
-    _draw_speeds(draw, reading.speeds, most)
+    _draw_speeds(draw, reading.speeds, max_speed)
     _draw_motors(draw, reading.rotors, hover)
     return image
 
 
 def horizon(attitude: Attitude) -> Image.Image:
-    """Draw the artificial horizon, whose size is twice the radius each way."""
+    """Draw the artificial horizon, a square of twice its radius."""
     size = 2 * _RADIUS * _SHARPER
     across = (np.arange(size) + 0.5) / size * 2.0 - 1.0
     x, y = np.meshgrid(across, -across)
@@ -96,7 +96,7 @@ def _draw_horizon(image: Image.Image, draw: ImageDraw.ImageDraw, attitude: Attit
 
 
 def _draw_speeds(
-    draw: ImageDraw.ImageDraw, speeds: tuple[float, float, float], most: float
+    draw: ImageDraw.ImageDraw, speeds: tuple[float, float, float], max_speed: float
 ) -> None:
     left, top = _SPEEDS
     middle = left + _BARS // 2
@@ -108,7 +108,7 @@ def _draw_speeds(
         text = f"{abs(speed):.1f} m/s"
         draw.text((left + _BARS, y), text, _TEXT, ImageFont.load_default(15), anchor="ra")
         draw.rectangle((left, y + 24, left + _BARS, y + 36), (50, 54, 63))
-        share = max(-1.0, min(1.0, speed / most))
+        share = max(-1.0, min(1.0, speed / max_speed))
         is_mirrored = row == 1  # to the left is on the left
         end = middle + round(_BARS / 2 * (-share if is_mirrored else share))
         draw.rectangle((min(middle, end), y + 24, max(middle, end), y + 36), _BAR)

@@ -15,13 +15,13 @@ MAX_FRAGILE = 0.02
 """Largest fraction of fragile frames with which a verdict can be certain. Honest policies have at
 most 0.002."""
 MAX_FRAGILE_EPISODES = 0.25
-"""The same of episodes with a fragile frame. Honest policies have at most 0.06."""
+"""Largest fraction of episodes with a fragile frame. Honest policies have at most 0.06."""
 MAX_UNEXPLAINED = 0.04
 """Largest fraction of episodes that may end differently in another implementation if there is no
 bound on rounding, actions are continuous, or drones have flight dynamics. Otherwise an episode may
 take other actions only after a fragile frame."""
 MAX_BRANCHES = 64
-"""Branches per episode; the outcome of an episode with more is left open."""
+"""Largest number of branches of an episode; with more, its outcome is left open."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Rounding:
     """How rounding can change some episodes."""
 
     arithmetic: str
-    """That computed the episodes, such as "float32 on cpu, fused kernel"."""
+    """Arithmetic that computed the episodes, such as "float32 on cpu, fused kernel"."""
     is_bound: bool
     """Whether the rounding error is bounded, not estimated."""
     frames: int
@@ -50,14 +50,14 @@ class Rounding:
     is_fragile: Tensor
     """Episodes with such a frame. Shape: (n,), bool."""
     outcomes: OutcomeSet
-    """Possible ends of these; `owner` and `is_open` index all n episodes."""
+    """Possible outcomes of these; `owner` and `is_open` index all n episodes."""
     compared: str
     """Implementation that ran the episodes again."""
     compared_episodes: int
     differing: int
     """Episodes in which it took other actions."""
     unexplained: int
-    """Those of them without a fragile frame before the first difference."""
+    """Differing episodes without a fragile frame before the first difference."""
 
     @property
     def is_excessive(self) -> bool:
@@ -96,7 +96,7 @@ class Rounding:
 
 @torch.no_grad()
 def enumerate_outcomes(renderer: DirectRenderer, decide: Decide, worlds: Tensor) -> OutcomeSet:
-    """Run episodes from their starts, with every possible action wherever there are several.
+    """Run episodes from their initial states and follow every action that rounding permits.
 
     The renderer is in the state at the start of the episodes. The policy has discrete actions and
     no memory. `worlds` are the indices of the episodes, shape (k,).

@@ -68,7 +68,7 @@ class Context:
         generator = torch_generator(self.seed.value, Stream.REPORT, device=str(self.env.device))
         return make_actor(self.network, self.env.action_spec, generator)
 
-    def aside(self) -> "Context":
+    def copied_for_thread(self) -> "Context":
         """Return a copy for another thread, which must not step the environments.
 
         Hooks and gradients don't mix, since the network is a copy; all else is shared.

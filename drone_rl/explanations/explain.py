@@ -35,7 +35,7 @@ from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import find_domain
 from drone_rl.verification.prover.policy_spec import one_thread
 
-_Result = tuple[dict[str, Any], dict[str, NDArray], float] | LeftOutError  # or why it is left out
+_Result = tuple[dict[str, Any], dict[str, NDArray], float] | LeftOutError  # with seconds
 Given = str | Path | BasePolicy | Logits  # a policy or something that `as_policy` converts to one
 Section = Callable[[Context], tuple[dict[str, Any], dict[str, NDArray]]]
 """Returns entries of `explanation.json` and `arrays.npz`; writes nothing, runs at any time."""
@@ -53,7 +53,7 @@ SECTIONS: dict[str, Section] = {
     "truth": truth.section,
 }
 """All sections by name. `report.page.PARTS` displays them."""
-ASIDE = frozenset({"attribution", "class_models", "embedding", "flaws"})
+THREADED = frozenset({"attribution", "class_models", "embedding", "flaws"})
 """Sections that run in a second thread: they step no environment and use a copy of the network."""
 
 
@@ -132,7 +132,7 @@ def explain(
                 seed=seed,
             )
 
-    with one_thread():  # the same file on every machine; small observations gain nothing
+    with one_thread():  # same results for any number of cores; threads would gain nothing
         numbers = {name: explain_one(one, folders[name]) for name, one in chosen.items()}
     progress("report")
     report = write_report(list(folders.values()), folder)
@@ -168,9 +168,9 @@ def explain_policy(
     """Compute all sections for one policy and write them to a folder.
 
     The environments are held out, have not been stepped, and have the policy's transforms; the
-    network is on the CPU. `provenance` is the origin of the policy as plain values. `progress` is
-    called with the title of each section, by default of `SECTIONS`; their order changes no result.
-    For `more` see `Context`.
+    network is on the CPU. `provenance` is the origin of the policy as plain values. `sections` are
+    `SECTIONS` by default; their order changes no result. `progress` is called with the title of
+    each. For `more` see `Context`.
 
     Returns:
         The contents of `explanation.json`; "left_out" gives the reason for each section that can't
@@ -205,11 +205,11 @@ def explain_policy(
 def _run(
     sections: Mapping[str, Section], context: Context, progress: Callable[[str], None]
 ) -> dict[str, _Result]:
-    """Run all sections, those in `ASIDE` in a second thread."""
-    twin, results = context.aside(), dict[str, _Result]()
+    """Run all sections, those in `THREADED` in a second thread."""
+    twin, results = context.copied_for_thread(), dict[str, _Result]()
     with ThreadPoolExecutor(1) as pool:
-        aside = {t: pool.submit(_compute, sections[t], twin) for t in sections if t in ASIDE}
-        for title in sorted(sections, key=ASIDE.__contains__):
+        aside = {t: pool.submit(_compute, sections[t], twin) for t in sections if t in THREADED}
+        for title in sorted(sections, key=THREADED.__contains__):
             progress(title.replace("_", " "))
             waiting = aside.get(title)
             results[title] = waiting.result() if waiting else _compute(sections[title], context)

@@ -266,13 +266,14 @@ def places_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]
 
 
 def _exact_map(context: Context, settings: PlacesSettings) -> ActionMap:
+    """Compute the exact map; raise InputError with the reason if the policy has none."""
     scenes, network = context.scenes, context.network
     if not isinstance(scenes.task, CollectCubes):
-        raise InputError("its task is not that of collecting cubes")
+        raise InputError("its task is not cube collection")
     if scenes.actions != MOVES:
         raise InputError(f"it does not choose among {', '.join(MOVES.names)}")
     if scenes.memory:
-        raise InputError("it sees a stack of frames, so what it does depends on the past")
+        raise InputError("it observes a stack of frames, so its actions depend on earlier frames")
     task: TaskSettings = scenes.task.settings
     check_task(task)
     if not network.has_weights:

@@ -29,10 +29,10 @@ from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State, Task
 
-SEEN = {
-    "observations": "what the policy's network got, float32 (T, C, h, w)",
+RENDERED = {
+    "observations": "input of the policy's network, float32 (T, C, h, w)",
     "probabilities": "the policy's probability of each action, float32 (T, number of actions)",
-    "frames": "RGB pictures before the action, uint8 (T, H, W, 3)",
+    "frames": "RGB images before the action, uint8 (T, H, W, 3)",
     "regions": "what each pixel shows: " + ", ".join(f"{r.value} {r.name.lower()}" for r in Region),
     "depth": "metres along the optical axis, 0 for the sky, float16 (T, H, W)",
 }
@@ -41,7 +41,7 @@ _POSE = ("drone", "attitude")
 _SAME = 1e-9  # poses (metres, quaternion) that differ by less are equal up to rounding
 
 
-def flown_fields(task: Task[Any], actions: Actions) -> dict[str, str]:
+def step_fields(task: Task[Any], actions: Actions) -> dict[str, str]:
     """Return the fields of each step; in the file also of every step flown, as "flights/..."."""
     ends = ", ".join(f"{end.value} {end.name.lower()}" for end in task.ends)
     return {
@@ -59,7 +59,7 @@ def flown_fields(task: Task[Any], actions: Actions) -> dict[str, str]:
 
 @dataclasses.dataclass
 class RolloutDataset:
-    """Frames of episodes in order of time; see `flown_fields` and `SEEN`."""
+    """Frames of episodes in order of time; see `step_fields` and `RENDERED`."""
 
     arrays: dict[str, NDArray]
     features: dict[str, NDArray]  # output of each recorded layer, by name. Shape: (T, *).
@@ -97,7 +97,7 @@ class RolloutDataset:
         arrays |= {f"features/{name}": value for name, value in self.features.items()}
         if flights is not None:
             whole = flights.arrays.items()
-            arrays |= {f"flights/{name}": value for name, value in whole if name not in SEEN}
+            arrays |= {f"flights/{name}": value for name, value in whole if name not in RENDERED}
         described = json.dumps({**self.meta, "features": list(self.features)})
         np.savez_compressed(path, meta=described, **arrays)
 
@@ -121,8 +121,8 @@ def collect(
         while collector.episodes < num_episodes or collector.frames < num_frames:
             missing = num_episodes - collector.episodes
             batches.append(collector.collect(missing if missing > 0 else None))
-    fields = flown_fields(worlds.task, worlds.dynamics.actions)
-    described = {**fields, "observations": SEEN["observations"]}
+    fields = step_fields(worlds.task, worlds.dynamics.actions)
+    described = {**fields, "observations": RENDERED["observations"]}
     about = {"greedy": False, **(meta or {}), "fields": described}
     batch = cast(TensorDictBase, torch.cat(batches))
     return RolloutDataset(_arrays(batch, worlds.task, worlds.dynamics.actions), {}, about)
@@ -158,7 +158,7 @@ def render_frames(
 ) -> RolloutDataset:
     """Return steps (T,) with frames, ground truth, probabilities and outputs of layers."""
     arrays = {name: value[rows] for name, value in flights.arrays.items()}
-    fields = {**flights.meta["fields"], **SEEN}
+    fields = {**flights.meta["fields"], **RENDERED}
     dataset = RolloutDataset(arrays, {}, {**flights.meta, "fields": fields})
     worlds = scenes.worlds
     state = dataset.state(worlds.task, worlds.dynamics).to(worlds.device)

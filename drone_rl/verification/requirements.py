@@ -6,7 +6,9 @@ from drone_rl.utils.errors import InputError
 
 
 def require_cubes(described: PolicyDescription, what: str) -> TaskSettings:
-    """Return the task of a policy that verification supports; `what` needs it, such as "proofs".
+    """Return the task of a policy that verification supports.
+
+    `what` is the subject of the error message, such as "proofs".
 
     Raises:
         InputError: The task is not cube collection by the three moves of computer-vision mode, or a

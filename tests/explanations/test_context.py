@@ -55,7 +55,7 @@ def test_another_thread_has_the_same_data_and_a_network_of_its_own(make_pipeline
     env, actor = make_pipeline(num_envs=30, task=TaskSettings(num_cubes=1))
     network = actor.module[0].module
     context = Context(env, network, SMALL)
-    twin = context.aside()
+    twin = context.copied_for_thread()
     assert twin.dataset is context.dataset and twin.film is context.film
     assert twin.maps is context.maps and context.frame_maps is twin.frame_maps
     assert twin.network is not network and twin.explainer.network is twin.network
@@ -70,7 +70,7 @@ def test_another_thread_has_the_same_data_and_a_network_of_its_own(make_pipeline
 def test_what_has_no_gradients_is_shared_with_another_thread(make_pipeline):
     env, _ = make_pipeline(num_envs=30, task=TaskSettings(num_cubes=1))
     network = ExternalNetwork(lambda x: x.detach().flatten(1)[:, :3], (1, 25, 64), MOVES)
-    assert Context(env, network, SMALL).aside().network is network
+    assert Context(env, network, SMALL).copied_for_thread().network is network
 
 
 def test_the_first_thread_computes_a_shared_value_and_others_wait(context):

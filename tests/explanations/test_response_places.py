@@ -42,7 +42,7 @@ def test_why_there_is_none(context):
 
     assert "stack of frames" in refused(memory=1)
     assert "does not choose among forward, left, right" in refused(actions=FIVE)
-    assert "not that of collecting cubes" in refused(task=None)
+    assert "its task is not cube collection" in refused(task=None)
     tall = dataclasses.replace(scenes.task.settings, vertical_bound=1.0)
     function = ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 25, 64), MOVES)
     assert "no torch module" in refused(network=function)

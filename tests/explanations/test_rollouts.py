@@ -4,18 +4,18 @@ import numpy as np
 import torch
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.explanations.rollouts import SEEN, collect, flown_fields
+from drone_rl.explanations.rollouts import RENDERED, collect, step_fields
 from drone_rl.explanations.scenes import Region
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.dynamics import BodyState, ComputerVision, FlightState, Quadrotor
 from drone_rl.sim.tasks import CollectCubes
 
-FLOWN = flown_fields(CollectCubes(), MOVES)
+FLOWN = step_fields(CollectCubes(), MOVES)
 
 
 def test_everything_is_known_of_an_analysed_frame(dataset):
     assert len(dataset) == 60
-    assert set(dataset.arrays) == {*FLOWN, *SEEN} == set(dataset.meta["fields"])
+    assert set(dataset.arrays) == {*FLOWN, *RENDERED} == set(dataset.meta["fields"])
 
 
 def test_redrawn_frames_are_those_that_the_policy_saw(dataset, scenes):

@@ -20,13 +20,13 @@ Rows = Sequence[Sequence[Any]]
 _DPI = 90
 """Pixels per inch of a chart."""
 _MAX_PIXELS = 2**25
-"""Largest size of a chart."""
+"""Largest number of pixels of a chart."""
 FRAMES_PER_SECOND = 8
-"""Of videos."""
+"""Frame rate of videos."""
 
 
 def new_chart(width: float = 4.5, height: float = 3.2) -> tuple[Figure, Axes]:
-    """Return a chart of one panel; at the default width, in inches, a phone shows it legibly."""
+    """Return a chart of one panel. Sizes are in inches; the default is legible on a phone."""
     figure = Figure(figsize=(width, height), layout="constrained")
     return figure, figure.subplots()
 
@@ -62,16 +62,16 @@ def save_numbers(numbers: Any, path: Path) -> None:
     path.with_name(path.name + ".json").write_text(json.dumps(numbers, indent=1))
 
 
-def to_png(picture: Image.Image | Figure) -> bytes:
+def to_png(drawn: Image.Image | Figure) -> bytes:
     """Encode an image or chart as PNG."""
     buffer = io.BytesIO()
-    if isinstance(picture, Figure):
-        width, height = (_DPI * picture.get_size_inches()).tolist()
+    if isinstance(drawn, Figure):
+        width, height = (_DPI * drawn.get_size_inches()).tolist()
         if not width * height <= _MAX_PIXELS:
             raise ValueError(f"a chart has {width:.0f} x {height:.0f} pixels")
-        picture.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
+        drawn.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
     else:
-        picture.save(buffer, "png", optimize=True)
+        drawn.save(buffer, "png", optimize=True)
     return buffer.getvalue()
 
 

@@ -63,7 +63,7 @@ def report(folders: Sequence[Path], target: Path) -> Path:
             raise
         names = ", ".join(map(str, folders))
         raise InputError(
-            f"explanations={names} do not hold what a report needs "
+            f"explanations={names} lack entries that a report needs "
             f"({type(error).__name__}: {str(error)[:200]}); run drone-rl explain again"
         ) from error
 
@@ -71,7 +71,7 @@ def report(folders: Sequence[Path], target: Path) -> Path:
 def find_explanations(which: Sequence[str], outputs: str | Path = "outputs") -> list[Path]:
     """Return folders of explanations, or raise InputError if there is none.
 
-    `which` has such folders, folders that contain some, or "latest" alone: that in `outputs`.
+    `which` has such folders, folders that contain some, or only "latest": the newest in `outputs`.
     """
     folders = [Path(path) for path in which]
     if tuple(which) == ("latest",):
@@ -230,14 +230,14 @@ def _render(template: jinja2.Template, part: Part, policies: Sequence[Policy]) -
 
 
 def _save(drawn: Drawn, folder: Path, prefix: str) -> dict[str, str | dict[str, str]]:
-    """Save pictures; return their data URIs by name, and by caption where a name has several."""
+    """Save figures; return their data URIs by name, and by caption where a name has several."""
     saved: dict[str, str | dict[str, str]] = {}
     for name, one in drawn.items():
         path = folder / f"{prefix}{name}"
         if isinstance(one, Mapping):
             files = [path.with_name(f"{path.name}_{i}") for i in range(1, len(one) + 1)]
-            pictures = zip(one.items(), files, strict=True)
-            saved[name] = {caption: save_drawn(drawn, file) for (caption, drawn), file in pictures}
+            pairs = zip(one.items(), files, strict=True)
+            saved[name] = {caption: save_drawn(drawn, file) for (caption, drawn), file in pairs}
         else:
             saved[name] = save_drawn(one, path)
     return saved

@@ -21,7 +21,7 @@ from drone_rl.utils.text import Claims, Evidence, bounds, listed, percent
 from drone_rl.verification.text import rows as place_rows
 from drone_rl.verification.text import say_places
 
-_OUTCOMES = (css(EMPTY), css(GOOD))  # colours of targets not handled, and of those that are
+_OUTCOMES = (css(EMPTY), css(GOOD))  # colours of unhandled and of handled targets
 
 
 def say_response(evidence: Evidence) -> Claims:
@@ -91,7 +91,7 @@ def say_asymmetry(evidence: Evidence) -> Claims:
 def response_charts(explanation: Explanation) -> dict[str, Figure]:
     """Plot over the target's place: the actions' probabilities, the best action, the outcome.
 
-    There are charts for each height of targets, the highest first.
+    Each height of targets has its own charts, the highest first.
     """
     arrays, actions, terms = explanation.arrays, explanation.actions, explanation.terms
     heights, count = arrays["response_height"], len(explanation.actions.names)

@@ -112,7 +112,7 @@ def check_files(
     data: Mapping[str, NDArray],
     actions: ShownActions,
 ) -> None:
-    """Refuse the contents of `explanation.json`, `arrays.npz` and `dataset.npz` unless they fit.
+    """Check the contents of `explanation.json`, `arrays.npz` and `dataset.npz`.
 
     Raises:
         InputError: A part is too large, of another type or does not fit; the message names it.
@@ -144,7 +144,7 @@ def _check_values(arrays: Mapping[str, NDArray], data: Mapping[str, NDArray], co
         for name in most.keys() & given.keys():
             check_indices(given[name], max(1, most[name]), name)
     if (np.diff(arrays.get("places_ends", np.empty(0))) < 0).any():
-        raise InputError("places_ends go down")
+        raise InputError("places_ends decrease; run drone-rl explain again")
 
 
 def _check_shown(numbers: Mapping[str, Any]) -> None:
@@ -161,7 +161,7 @@ def _check_lengths(value: Any) -> None:
     while level:
         for item in level:
             if len(item) > _LONGEST:
-                raise InputError(f"it holds a list of {len(item)}; give at most {_LONGEST}")
+                raise InputError(f"it has a list of {len(item)} entries; give at most {_LONGEST}")
         inner = [v for item in level for v in (item.values() if isinstance(item, dict) else item)]
         level = [v for v in inner if isinstance(v, dict | list)]
 
@@ -211,7 +211,7 @@ def _check_places(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], cou
     window = _read(places.get("window"), _WINDOW, "places.window")
     near, far, side = (window[key] for key in ("nearest", "farthest", "sideways"))
     if not near < far:
-        raise InputError(f"places.window goes from {near:g} to {far:g} m ahead; it must go up")
+        raise InputError(f"places.window goes from {near:g} to {far:g} m ahead; it must increase")
     if not 1 / _FARTHEST_RATIO <= far / (2 * side) <= _FARTHEST_RATIO:
         raise InputError(
             f"places.window is {far:g} m long and {2 * side:g} m wide; a map can be up to "

@@ -42,5 +42,5 @@ def test_what_lacks_something_is_a_mistake_of_the_file(monkeypatch, tmp_path, er
         raise error
 
     monkeypatch.setattr(page, "write_report", fail)
-    with pytest.raises(InputError, match="do not hold what a report needs"):
+    with pytest.raises(InputError, match="lack entries that a report needs"):
         report([tmp_path], tmp_path)

@@ -61,7 +61,7 @@ def test_what_explain_writes_is_accepted():
         ("places.window", 1e9, "places.window="),
         ("places.window.farthest", 0, "places.window.farthest=0"),
         ("places.window.farthest", 1e9, "places.window.farthest="),
-        ("places.window.farthest", 2.0, "must go up"),
+        ("places.window.farthest", 2.0, "must increase"),
         ("places.window.sideways", 1e-9, "as long as wide"),
         ("places.touch_distance", -1, "places.touch_distance=-1"),
         ("places.least_gap_left", 1e300, "places.least_gap_left="),
