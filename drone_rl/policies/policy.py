@@ -138,9 +138,7 @@ class BasePolicy(abc.ABC):
             own.close()
             return self.make_actor(own, seed=seed, stream=stream)
         if not isinstance(env, EnvBase):
-            raise InputError(
-                f"env={shown(env)} is not a TorchRL environment; give policy.make_env(n)"
-            )
+            raise InputError(f"env={shown(env)} is not a TorchRL environment; use policy.make_env")
         device = str(env.device or "cpu")
         generator = torch_generator(seed, stream, device=device)
         return make_actor(self.make_network(device), env.action_spec, generator)

@@ -143,9 +143,7 @@ def result_of(
 def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Training:
     """Judge the last policy if settings request it and no signal came; write `result.json`."""
     if settings.evaluate_after and not result["reason"].startswith("SIG"):
-        from drone_rl.evaluation.verdict import (
-            judge_for_selection,  # slow to import, and few need it
-        )
+        from drone_rl.evaluation.verdict import judge_for_selection  # slow to import
 
         last, episodes = last_of(folder), settings.evaluate_after
         given = (settings.device, settings.renderer)

@@ -76,7 +76,7 @@ def test_actor_can_be_created_without_environment():
     env.close()
     assert torch.equal(*flown)
     with pytest.raises(
-        drone_rl.InputError, match=r"env=2 is not a TorchRL environment; give policy"
+        drone_rl.InputError, match=r"env=2 is not a TorchRL environment; use policy"
     ):
         policy.make_actor(2)
 

@@ -43,9 +43,7 @@ class ActionMap:
     window: Window
     arrangement: Arrangement
     places: NDArray[np.float64]  # a point of each cell, metres ahead and left. Shape: (cells, 2)
-    areas: NDArray[
-        np.float64
-    ]  # area of each cell, m^2, by side of the cube, see `SIDES`. Shape: (cells, 3)
+    areas: NDArray[np.float64]  # area of each cell, m^2, by `SIDES`. Shape: (cells, 3)
     action: NDArray[np.int64]  # argmax action. Shape: (cells,)
     gap: NDArray[np.float64]  # gap of the two highest logits. Shape: (cells,)
     is_unseen: NDArray[np.bool_]  # whether no pixel shows the cube. Shape: (cells,)

@@ -30,7 +30,7 @@ _COUNTS = ("num_states", "num_images", "most_boxes", "least_gap", "largest_band"
 _BOX_SETS = ("waiting", "ended", "ways", "forked", "parts", "part", "done", "undecided")
 _DAMAGE = (ValueError, TypeError, LookupError, ArithmeticError, AttributeError)  # of damaged files
 _MAX_INTEGER = 2**40  # in a row
-_UNKNOWN_ENDING = (-1, 0, 0)
+_UNKNOWN = (-1, 0, 0)  # row of an unknown ending
 
 _Row = tuple[int, ...]  # a lattice state or an ending as integers; empty for neither
 _BoxSet = list[tuple[_Row, Boxes]]  # boxes by lattice state or ending
@@ -138,13 +138,11 @@ def load(prover: Prover, path: Path, proof_id: str, most: int = ARRAYS_BYTES) ->
         sets = {name: _unpacked(name, state, shape) for name in _BOX_SETS}
         waiting = [(*_lattice_state(row), b) for row, b in sets["waiting"]]
         ended = [((_ending(row), row[3]), b) for row, b in sets["ended"]]
-        fork_ends = [
-            (None if row == _UNKNOWN_ENDING else _ending(row), b) for row, b in sets["ways"]
-        ]
+        forks = [(None if row == _UNKNOWN else _ending(row), b) for row, b in sets["ways"]]
         forked = [boxes for _, boxes in sets["forked"]]
         ((_, parts),), ((_, part),) = sets["parts"], sets["part"]
         ((_, left),) = sets["undecided"]
-        _check(part, waiting, [*ended, *fork_ends, *forked])
+        _check(part, waiting, [*ended, *forks, *forked])
         done = [ProofFindings({_ending(row): b}, left[:0], {}) for row, b in sets["done"]]
         done = combine([ProofFindings({}, left, _steps(state)), *done])
     except _DAMAGE as error:
@@ -161,7 +159,7 @@ def load(prover: Prover, path: Path, proof_id: str, most: int = ARRAYS_BYTES) ->
             prover.longest[waited] = longest
     for key, boxes in ended:
         prover.ended[key].append(boxes)
-    for ending, boxes in fork_ends:
+    for ending, boxes in forks:
         prover.fork_ends[ending].append(boxes)
     prover.forked, prover.parts, prover.part, prover.done = forked, parts, part, done
     for name, count in counts.items():
@@ -181,7 +179,7 @@ def _lattice_state(row: _Row) -> tuple[LatticeState, int]:
 
 def _row(ending: Ending | None) -> tuple[int, int, int]:
     if ending is None:
-        return _UNKNOWN_ENDING
+        return _UNKNOWN
     return int(ending.reason), ending.collected, int(ending.loops)
 
 
