@@ -185,7 +185,7 @@ def chances(
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
     chosen = require_cubes(policy.description, "exact probabilities")
-    placed = _drawn(chosen, settings.placements, seed) if cubes is None else _given(chosen, cubes)
+    placed = _sampled(chosen, settings.placements, seed) if cubes is None else _given(chosen, cubes)
     at_a_time = max(1, CELLS_AT_A_TIME // math.prod(shape_of(chosen)))
     parts = placed.split(min(at_a_time, PLACEMENTS_AT_A_TIME))
     with closing(policy.make_env(1, device=settings.device, renderer=settings.renderer)) as env:
@@ -223,7 +223,7 @@ def _bounded(
     return tuple(found)
 
 
-def _drawn(task: TaskSettings, count: int, seed: RootSeed) -> Tensor:
+def _sampled(task: TaskSettings, count: int, seed: RootSeed) -> Tensor:
     """Return the first placement of each of `count` held-out environments."""
     streams = (world_random_state(seed.value, env, Stream.REPORT) for env in range(count))
     return torch.stack([CollectCubes(task).sample(stream) for stream in streams])
@@ -237,12 +237,12 @@ def _given(task: TaskSettings, cubes: Any) -> Tensor:
         raise InputError(f"cubes={cubes} are not numbers; give metres to the left") from None
     if aside.ndim != 2 or not len(aside) or aside.shape[1] != task.num_cubes:
         raise InputError(
-            f"cubes={cubes} must place {task.num_cubes}; give so many metres to the left, nearest "
+            f"cubes={cubes} must have {task.num_cubes} positions; give metres to the left, nearest "
             "first, or change task.num_cubes"
         )
     if not (aside.abs() <= task.lateral_bound).all():
         raise InputError(
-            f"cubes={cubes} stand where the task puts none; give metres to the left from "
+            f"cubes={cubes} are outside the task's range; give metres to the left from "
             f"-{task.lateral_bound:g} to {task.lateral_bound:g} (task.lateral_bound)"
         )
     ahead = task.first_distance + task.spacing * torch.arange(task.num_cubes).double()

@@ -137,7 +137,7 @@ def check(
         seed=seed.value,
         device=settings.device,
         renderer=settings.renderer,
-        tell=functools.partial(progress or Bar(), "flown"),
+        report=functools.partial(progress or Bar(), "flown"),
     )
     return Check(path, policy, settings, stated, findings, seed)
 

@@ -63,10 +63,10 @@ class Places:
     def save(self, folder: Path) -> None:
         """Write `places.json`, `places.png` and the zoomable `places.svg`."""
         (folder / "places.json").write_text(json.dumps(self.numbers | provenance(), indent=2))
-        ways = self.places.outlines()
-        regions.chart(self.numbers, ways, SHOWN_MOVES).savefig(folder / "places.png", dpi=200)
-        drawn = regions.svg(self.numbers, ways, SHOWN_MOVES)
-        head = drawn.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1)
+        outlines = self.places.outlines()
+        regions.chart(self.numbers, outlines, SHOWN_MOVES).savefig(folder / "places.png", dpi=200)
+        svg = regions.svg(self.numbers, outlines, SHOWN_MOVES)
+        head = svg.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1)
         (folder / "places.svg").write_text(head)
 
     def __str__(self) -> str:

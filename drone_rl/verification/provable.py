@@ -53,7 +53,7 @@ _JOURNAL = Record({"settings": Plain(), "how": Plain(), "rounds": Several(Plain(
 
 
 class Round(Settings):
-    """The result of a search for failures, which are trained on next."""
+    """The result of one search for failures; the next training starts episodes there."""
 
     frames: _Count  # collected by training so far
     trained_s: _Seconds  # training time so far, seconds
@@ -152,7 +152,7 @@ class Journal(Callback):
         self.save()
 
     def failures(self) -> NDArray[np.float64]:
-        """Return those of the last search. Shape: (boxes, num_cubes, 2), metres.
+        """Return the boxes of the last search. Shape: (boxes, num_cubes, 2), metres.
 
         Raises:
             InputError: The file is damaged.
@@ -193,8 +193,8 @@ def train_until_proved(
 ) -> Training:
     """Train as usual, then in rounds, until the policy succeeds from every placement.
 
-    Each round searches for failures, first in episodes, which are fast, and where those find none
-    by a proof, which misses none. Then training continues with a fraction of its episodes there.
+    Each round searches for failures: first in episodes, which are fast, and if all succeed by a
+    proof, which misses none. Then training continues, with a fraction of its episodes at failures.
     The result's reason is then "proved", and its "rounds" list what each search found. If the last
     search was a proof, its certificate is `certificate.json` in the folder.
 
@@ -209,7 +209,7 @@ def train_until_proved(
         changes: Changes to the settings of the training run.
 
     Raises:
-        InputError: A setting is unusable, such a policy cannot be proved, or training diverged.
+        InputError: A setting is unusable, proofs do not support the policy, or training diverged.
         KeyboardInterrupt: Ctrl-C stopped it, see `train`; a search for failures ends at once and is
             repeated on resume.
         SystemExit: SIGTERM stopped it, see `train`.
@@ -300,6 +300,6 @@ def _fly(policy: Policy, journal: Journal) -> tuple[NDArray[np.float64], int]:
 
 
 def _doubtful(proof: Proof) -> NDArray[np.float64]:
-    """Return what fails or may fail; if a proof was stopped, only what certainly fails."""
+    """Return boxes of possible failure; of a stopped proof, only those of certain failure."""
     is_whole = proof.certificate["finished"]
     return np.concatenate([proof.losing(), proof.open()]) if is_whole else proof.losing()

@@ -139,13 +139,13 @@ def _prove(
 ) -> Proof:
     prover = Prover(spec, settings.most_combinations)
     weights = fingerprint(policy.state["policy"])
-    known = json.dumps([weights, policy.description.as_dict(), settings.logit_gap])
+    proof_id = json.dumps([weights, policy.description.as_dict(), settings.logit_gap])
     state = None if folder is None else folder / "state.npz"
     if state is not None and state.exists():
         boxes = settings.most_boxes * policy.description.task.values()["num_cubes"]
-        load(prover, state, known, most=max(ARRAYS_BYTES, _BYTES_PER_SIDE * boxes))
+        load(prover, state, proof_id, most=max(ARRAYS_BYTES, _BYTES_PER_SIDE * boxes))
     begin = time.monotonic()
-    stopped = _advance(prover, settings, progress, state, known)
+    stopped = _advance(prover, settings, progress, state, proof_id)
     seconds = time.monotonic() - begin
     found = certify(policy.name, policy.description, weights, prover, seconds, stopped)
     found |= provenance()
@@ -157,7 +157,7 @@ def _prove(
 
 
 def _advance(
-    prover: Prover, settings: ProveSettings, progress: Progress, state: Path | None, known: str
+    prover: Prover, settings: ProveSettings, progress: Progress, state: Path | None, proof_id: str
 ) -> str | None:
     """Advance a proof, saving it regularly; return the setting that stops it, if one does."""
     task, last = prover.lattice.task, prover.lattice.last
@@ -176,10 +176,10 @@ def _advance(
             text, at = f"{text}, {plural(count, 'part')} to come", int(done * last)
         progress(text, at, last)
         if state is not None and time.monotonic() - saved > settings.save_interval_s:
-            save(prover, state, known)
+            save(prover, state, proof_id)
             saved = time.monotonic()
     if state is not None and stopped:
-        save(prover, state, known)
+        save(prover, state, proof_id)
     progress(why_stopped(stopped) if stopped else "proved", last, last)
     return stopped
 

@@ -27,7 +27,7 @@ def test_held_out_placements(in_process):
 @pytest.mark.parametrize(
     ("told", "words"),
     [
-        (["cubes=[1.0,2.0]"], ["cubes=(1.0, 2.0)", "must place 3", "task.num_cubes"]),
+        (["cubes=[1.0,2.0]"], ["cubes=(1.0, 2.0)", "must have 3", "task.num_cubes"]),
         (["cubes=[1.0,2.0,9.0]"], ["from -6 to 6"]),
         (["within=-0.1"], ["within=-0.1", "0"]),
         (["within=0.1", "parts=0"], ["parts=0", "1"]),

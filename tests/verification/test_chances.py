@@ -109,8 +109,8 @@ def test_the_tables(good, several):
 @pytest.mark.parametrize(
     ("cubes", "change", "message"),
     [
-        ([1.0, 2.0], {}, r"cubes=\[1.0, 2.0\] must place 3"),
-        ([], {}, "must place 3"),
+        ([1.0, 2.0], {}, r"cubes=\[1.0, 2.0\] must have 3"),
+        ([], {}, "must have 3"),
         (["a", "b", "c"], {}, "are not numbers"),
         ([0.0, 7.0, 0.0], {}, "give metres to the left from -6 to 6"),
         ([0.0, float("nan"), 0.0], {}, "give metres to the left from -6 to 6"),

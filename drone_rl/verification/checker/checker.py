@@ -33,11 +33,11 @@ from drone_rl.verification.checker.sampling import ANYWHERE, BORDER, INSIDE, sam
 from drone_rl.verification.requirements import require_cubes
 
 MAX_PRINTED = 20  # contradictions printed
-MAX_EXACT = 200  # episodes repeated with the network in float64, about
+MAX_EXACT = 200  # approximate number of episodes repeated with the network in float64
 MAX_KEPT = 1000  # contradictions kept
-MAX_AT_ONCE = 1024  # episodes per batch
+MAX_BATCH_SIZE = 1024  # episodes per batch
 MAX_PIXELS = 2**22  # pixels per batch of images
-_JUST_BEGUN = 2  # repetitions up to which a loop may count as one or not
+_SHORT_LOOP = 2  # up to so many repetitions, a loop need not be stated as one
 ProgressCallback = Callable[[int, int], None]  # called with the number done, and of all
 
 
@@ -109,8 +109,8 @@ class Simulator:
         renderer: str = "raytrace",
     ) -> None:
         pixels = described.camera.width * described.camera.height
-        self.at_once = max(1, min(MAX_AT_ONCE, MAX_PIXELS // pixels))
-        count = min(self.at_once, 64)
+        self.batch_size = max(1, min(MAX_BATCH_SIZE, MAX_PIXELS // pixels))
+        count = min(self.batch_size, 64)
         self._env = described.build_env(count, seed=0, device=device, renderer=renderer)
         self._worlds = worlds_of(self._env)
         self._task = require_cubes(described, "certificates")
@@ -120,13 +120,13 @@ class Simulator:
         self._dtype = torch.float32
 
     def fly(
-        self, placements: NDArray[np.float64], tell: ProgressCallback = lambda done, total: None
+        self, placements: NDArray[np.float64], report: ProgressCallback = lambda done, total: None
     ) -> Rollouts:
         """Simulate episodes in batches, from metres to the left of each cube (k, cubes)."""
         parts = [self._fly(placements[:0])]
-        for first in range(0, len(placements), self.at_once):
-            parts.append(self._fly(placements[first : first + self.at_once]))
-            tell(min(first + self.at_once, len(placements)), len(placements))
+        for first in range(0, len(placements), self.batch_size):
+            parts.append(self._fly(placements[first : first + self.batch_size]))
+            report(min(first + self.batch_size, len(placements)), len(placements))
         return Rollouts(*map(np.concatenate, zip(*(vars(p).values() for p in parts), strict=True)))
 
     def compute_in(self, dtype: torch.dtype) -> None:
@@ -181,35 +181,35 @@ def check_certificate(
     seed: int = 0,
     device: str = "cpu",
     renderer: str = "raytrace",
-    tell: ProgressCallback = lambda done, total: None,
+    report: ProgressCallback = lambda done, total: None,
 ) -> CheckFindings:
     """Check a certificate of a policy with these weights, see `check_same_policy`.
 
     An inconsistent certificate is refused without simulation. Else up to `flights` episodes are
     simulated; the seed is that of their placements, see `sample_placements`. Undecided placements
-    are skipped. `tell` is called with the number of episodes done, and of all.
+    are skipped. `report` is called with the number of episodes done, and of all.
 
     Raises:
         InputError: There is no such device.
     """
-    lies = tuple(find_inconsistencies(certificate))
-    if lies:
-        return CheckFindings(lies, (), 0, {})
-    drawn = sample_placements(certificate, flights, np.random.default_rng(seed))
-    stated = drawn.outcome < len(certificate.outcomes)
-    points, why = drawn.points[stated], drawn.why[stated]
+    inconsistencies = tuple(find_inconsistencies(certificate))
+    if inconsistencies:
+        return CheckFindings(inconsistencies, (), 0, {})
+    sample = sample_placements(certificate, flights, np.random.default_rng(seed))
+    stated = sample.outcome < len(certificate.outcomes)
+    points, why = sample.points[stated], sample.why[stated]
     with closing(Simulator(certificate.description, weights, device, renderer)) as simulator:
-        rollouts = simulator.fly(points, tell)
+        rollouts = simulator.fly(points, report)
         some = np.arange(len(rollouts.end))[:: max(1, len(rollouts.end) // MAX_EXACT)]
         simulator.compute_in(torch.float64)
         exact = simulator.fly(points[some])
-    outcomes = [certificate.outcomes[i] for i in drawn.outcome[stated]]
+    outcomes = [certificate.outcomes[i] for i in sample.outcome[stated]]
     wrong = [i for i, outcome in enumerate(outcomes) if not ends_as_stated(outcome, rollouts, i)]
     rounded = _rounding_errors([outcomes[i] for i in some], exact, np.isin(some, wrong))
-    steps = np.zeros_like(drawn.outcome)
+    steps = np.zeros_like(sample.outcome)
     steps[stated] = rollouts.steps
-    anywhere = drawn.why == ANYWHERE
-    counts = find_wrong_step_counts(certificate.outcomes, drawn.outcome[anywhere], steps[anywhere])
+    anywhere = sample.why == ANYWHERE
+    counts = find_wrong_step_counts(certificate.outcomes, sample.outcome[anywhere], steps[anywhere])
     kept = [
         Contradiction(
             str(why[i]), tuple(points[i].tolist()), _stated(outcomes[i]), _found(rollouts, i)
@@ -230,9 +230,9 @@ def read_validated(
     """
     certificate = read_certificate(path)
     check_same_policy(certificate, described, weights, described.task)
-    lie = next(find_inconsistencies(certificate), None)
-    if lie is not None:
-        raise InputError(f"certificate {path} contradicts itself: {lie}; prove the policy again")
+    found = next(find_inconsistencies(certificate), None)
+    if found is not None:
+        raise InputError(f"certificate {path} is inconsistent: {found}; prove the policy again")
     return certificate
 
 
@@ -241,7 +241,7 @@ def ends_as_stated(outcome: Outcome, rollouts: Rollouts, i: int) -> bool:
     if rollouts.end[i] != outcome.end or tuple(rollouts.collected[i]) != outcome.collected:
         return False
     if outcome.end == EndReason.STEP_LIMIT:
-        loops = rollouts.repeats[i] > (0 if outcome.loops else _JUST_BEGUN)
+        loops = rollouts.repeats[i] > (0 if outcome.loops else _SHORT_LOOP)
         if loops != outcome.loops:
             return False
     return int(rollouts.steps[i]) in outcome.steps or missing_steps(outcome) > 0

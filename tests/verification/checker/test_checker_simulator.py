@@ -43,7 +43,7 @@ def test_a_cube_that_is_just_touched_and_one_that_is_not(make):
 
 def test_batches_are_joined_and_told_of(make):
     simulator, told = make(num_cubes=1), []
-    simulator.at_once = 2
+    simulator.batch_size = 2
     y = np.array([[-5.9], [0.0], [5.9], [0.1], [2.0]])
     flown = simulator.fly(y, lambda done, total: told.append((done, total)))
     assert told == [(2, 5), (4, 5), (5, 5)]
@@ -99,4 +99,4 @@ def test_straight_flights_repeat_nothing(make):
 
 def test_large_pictures_come_in_small_batches():
     policy = drone_rl.load_policy("good")
-    assert Simulator(policy.description, policy.state["policy"]).at_once == 1024
+    assert Simulator(policy.description, policy.state["policy"]).batch_size == 1024

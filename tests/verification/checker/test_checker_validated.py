@@ -26,7 +26,7 @@ def test_a_certificate_that_goes_together_is_read(write, good):
 @pytest.mark.parametrize(
     ("lie", "message"),
     [
-        (lambda c: c["outcomes"][0].update(share=0.9), r"contradicts itself: .*share of 0\.9"),
+        (lambda c: c["outcomes"][0].update(share=0.9), r"is inconsistent: .*share of 0\.9"),
         (lambda c: c["outcomes"][0]["boxes"].append([[0.0, 1.0]] * 2), "do not partition"),
         (lambda c: c["outcomes"][0].update(boxes=[[[-6.0, 5.0], [-6.0, 6.0]]]), "do not partition"),
         (lambda c: c.update(finished=False), "finished is false"),
