@@ -48,13 +48,13 @@ from drone_rl.sim.dynamics import ComputerVision
 from drone_rl.utils.errors import InputError
 
 _CHECKED_EPISODES = 32
-"""Episodes that check whether a third-party policy acts by the current frame only."""
+"""Episodes that check whether a third-party policy depends on the current frame only."""
 COMPARED = 50
 """Episodes that are run again: by the other implementation, or in other batches."""
 ALONE = 16
 """Episodes that a third-party network runs again one frame at a time and in other batches."""
 _PAIR = 2
-"""Possible actions of a frame of which each is tried."""
+"""Number of possible actions of the frames in which the second best one is tried."""
 
 
 def run_compared(
@@ -74,9 +74,9 @@ def run_compared(
 
 
 def require_function(policy: BasePolicy, **how: Any) -> None:
-    """Check that a third-party policy acts by the current frame only.
+    """Check that a third-party policy depends on the current frame only.
 
-    Policies of this package act so by construction. `how` are the seed, device and renderer of the
+    Policies of this package do so by construction. `how` are the seed, device and renderer of the
     environments, see `BasePolicy.flying`.
 
     Raises:
@@ -101,7 +101,7 @@ def check_rounding(
     the present state of the environments. Return None for an actor without a network.
 
     Raises:
-        InputError: An output is not finite, or a third-party network is no function of the frame.
+        InputError: An output is not finite, or a third-party network depends on other frames.
     """
     network = getattr(actor, "network", None)
     if not isinstance(network, ImageNetwork):
@@ -226,9 +226,9 @@ class _Checked:
 
     def outcomes(self) -> OutcomeSet:
         """Possible outcomes of all episodes."""
-        nobody = torch.empty(0, dtype=torch.int64)
+        none = torch.empty(0, dtype=torch.int64)
         if self.followed is None:
-            return OutcomeSet(None, nobody, self.is_fragile)
+            return OutcomeSet(None, none, self.is_fragile)
         is_open = torch.zeros_like(self.is_fragile)
         ends, owners = [], []
         for first, found, worlds in self.followed:
@@ -237,7 +237,7 @@ class _Checked:
                 ends.append(found.episodes)
                 owners.append(first + worlds[found.owner])
         if not ends:
-            return OutcomeSet(None, nobody, is_open)
+            return OutcomeSet(None, none, is_open)
         return OutcomeSet(Episodes.joined(ends), torch.cat(owners), is_open)
 
 
@@ -278,9 +278,9 @@ def _run_second_best(
 ) -> OutcomeSet:
     """Run a batch again with the second best action in fragile frames.
 
-    For policies whose observations cannot be rendered from a state alone. The two rollouts are all
-    that an episode can become if each has a single fragile frame, the same one. `before` has the
-    random streams at the start of the batch, `worlds` the episodes with fragile frames.
+    For policies whose observations cannot be rendered from a state. If each of the two rollouts
+    has a single fragile frame, the same one, there are no other outcomes. `before` has the random
+    streams at the start of the batch, `worlds` the episodes with fragile frames.
     """
     after, log = base_env(env).state_dict(), StepLog()
     base_env(env).load_state_dict(before)
@@ -304,7 +304,7 @@ def _run_regrouped(
 def _require_function_of_frames(
     env: EnvBase, network: ImageNetwork, log: StepLog, checked: _Checked
 ) -> None:
-    """Check that a third-party network acts by the frame alone, in batches of any size."""
+    """Check that a third-party network depends on the frame alone, in batches of any size."""
     before, frames = base_env(env).state_dict(), torch.empty(0)
     count = min(ALONE, len(checked.fragile))
     for groups, how in (("single", "one frame at a time"), ("mixed", "in other batches")):
@@ -317,7 +317,7 @@ def _require_function_of_frames(
         other = [i for i, at in first if at is not None and not checked.explains(i, at)]
         if isinstance(network.actions, DiscreteActions) and len(other) > MAX_UNEXPLAINED * count:
             raise InputError(
-                f"{network.owner} acts by more than the frame: evaluated {how} it takes other "
+                f"{network.owner} depends on more than the frame: evaluated {how} it takes other "
                 f"actions in {len(other)} of {count} episodes; {REMEDY}"
             )
     require_same_in_any_batch(network, frames, env.batch_size[0])

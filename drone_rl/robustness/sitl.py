@@ -35,9 +35,9 @@ class SitlEpisode:
     world: int
     """Number of the environment, as in evaluations."""
     goals: int
-    """Number reached."""
+    """Number of goals reached."""
     success: bool
-    """Whether all were reached."""
+    """Whether all goals were reached."""
     end: str
     """Name of one of the task's ends."""
     steps: int

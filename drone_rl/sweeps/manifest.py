@@ -188,9 +188,9 @@ def open_sweep(
     folder.mkdir(parents=True, exist_ok=True)
     refuse_links(folder)
     if not (folder / "sweep.json").exists():
-        if stranger := next(folder.glob("*/run.yaml"), None):
+        if other := next(folder.glob("*/run.yaml"), None):
             raise InputError(
-                f"hydra.sweep.dir={folder} holds other runs ({stranger.parent.name}); "
+                f"hydra.sweep.dir={folder} holds other runs ({other.parent.name}); "
                 "choose another folder"
             )
         sweep = Sweep(folder, shlex.join(command), dict(settings), list(runs))

@@ -26,7 +26,7 @@ _NEVER = float("inf")
 
 
 def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> dict[str, Any]:
-    """Return all figures of a sweep as plain values, and the sentences that they license."""
+    """Return all figures of a sweep as plain values, and the sentences that they permit."""
     states = [row.state for row in rows]
     judged = [row.verdict for row in rows if row.verdict is not None]
     older = sum(row.has_older_verdict for row in rows)
@@ -174,10 +174,10 @@ def make_groups(rows: Sequence[Row]) -> list[Group]:
     return list(groups.values())
 
 
-def _to_solve(rows: Sequence[Row], had: Sequence[float]) -> dict[str, Any]:
-    """Return the median cost to solve; an unsolved run needs more than it had (censored)."""
-    pairs = zip(rows, had, strict=True)
-    return median_of_runs([value if row.is_solved else _NEVER for row, value in pairs], had)
+def _to_solve(rows: Sequence[Row], used: Sequence[float]) -> dict[str, Any]:
+    """Return the median cost to solve; an unsolved run needs more than it used (censored)."""
+    pairs = zip(rows, used, strict=True)
+    return median_of_runs([value if row.is_solved else _NEVER for row, value in pairs], used)
 
 
 def share_of_runs(successes: int, unknown: int, trials: int) -> dict[str, Any]:
@@ -190,18 +190,18 @@ def share_of_runs(successes: int, unknown: int, trials: int) -> dict[str, Any]:
     return {**proportion(successes, trials), "upper95": upper, "unknown": unknown}
 
 
-def median_of_runs(values: Sequence[float], had: Sequence[float] | None = None) -> dict[str, Any]:
+def median_of_runs(values: Sequence[float], used: Sequence[float] | None = None) -> dict[str, Any]:
     """Return the median over runs with its exact interval, allowing for censored values.
 
     There is one value per run, infinite for a censored one, which ended without reaching its
-    target; what it had at its end (`had`) is a lower bound.
+    target; what it used until then (`used`) is a lower bound.
 
     Returns:
         "median" (None of no runs, or if at least half are censored), "more_than" (then a lower
         bound), "lower95" and "upper95" (None of fewer than six runs; "upper95" also if it is
         unbounded) and "runs".
     """
-    least = values if had is None else had
+    least = values if used is None else used
     middle = float(np.median(values)) if len(values) else None
     low, high = median_bounds(least), median_bounds(values)
     return {
@@ -229,6 +229,6 @@ def median_band(values: Array) -> tuple[Array, Array] | None:
 def on_grid(x: Array, y: Array, grid: Array) -> Array:
     """Interpolate a curve on a grid; it is 0 before its first point and constant after its last.
 
-    The positions rise; they are empty for a run without progress. Shapes: (n,) of both.
+    Positions `x` ascend; they are empty for a run without progress. Shapes: (n,) of both.
     """
     return np.interp(grid, x, y, left=0.0) if len(x) else np.zeros_like(grid)

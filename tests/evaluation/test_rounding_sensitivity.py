@@ -88,7 +88,7 @@ def test_callables_that_act_by_more_than_the_frame_are_refused(kind):
             made[0, Move.LEFT] = 2.0
         return made
 
-    with pytest.raises(InputError, match=r"policy=logits acts by more than the frame"):
+    with pytest.raises(InputError, match=r"policy=logits depends on more than the frame"):
         examined(policy_from(logits), is_compiled=False)
 
 
