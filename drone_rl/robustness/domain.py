@@ -38,7 +38,7 @@ PARTS = 4
 WALKING = 1 / 4
 """Fraction of an axis's error probability for the search of each of its two sides."""
 REFINING = 1 / 20
-"""The same for each of the ten gaps before the five strengths and the five sampled ones."""
+"""Fraction for each of the ten gaps before the five strengths and the five sampled ones."""
 _BETWEEN = 2000
 """Number of the random stream that samples strengths between those of the table."""
 

@@ -42,26 +42,26 @@ class Suite:
         self.oracle: ConditionResult | None = None
         self.oracle = self._fly_oracle(Condition()) if self._knows else None
 
-    def run(self, axes: Sequence[Axis], numbers: Iterable[int], tell: Report) -> dict[str, Any]:
+    def run(self, axes: Sequence[Axis], numbers: Iterable[int], report: Report) -> dict[str, Any]:
         """Measure axes at the strengths with these numbers (from 1), alone and combined.
 
         Returns:
             Plain values: "plain", without perturbation; "axes", by name; and "together", all axes
             combined, each at its third strength.
         """
-        found = {axis.name: self.along(axis, numbers, tell) for axis in axes}
-        tell("all together")
+        found = {axis.name: self.along(axis, numbers, report) for axis in axes}
+        report("all together")
         parts = (axis.make(axis.strengths[TOGETHER - 1], self._evaluator.subject) for axis in axes)
         together = functools.reduce(lambda a, b: a | b, parts, Condition())
         plain = {"oracle": _success(self.oracle), **self._figures(self.plain)}
         return {"plain": plain, "axes": found, "together": self.level(together)}
 
-    def along(self, axis: Axis, numbers: Iterable[int], tell: Report) -> dict[str, Any]:
+    def along(self, axis: Axis, numbers: Iterable[int], report: Report) -> dict[str, Any]:
         """Measure one axis at some of its strengths."""
         levels, subject = [], self._evaluator.subject
         for number in numbers:
             strength = axis.strengths[number - 1]
-            tell(f"{axis.name} {number}")
+            report(f"{axis.name} {number}")
             at = {"value": axis.value(strength, subject), "position": axis.position(strength)}
             levels.append({"number": number, **at, **self.level(axis.make(strength, subject))})
         plain = float(self.plain.episodes.success.mean())

@@ -42,7 +42,7 @@ def test_an_attack_succeeds_with_the_known_seed_only(name, judged):
 
 def test_a_policy_that_counts_steps_is_refused_even_with_the_known_seed():
     policy = gamed_memory._memorising(step_playback, Stream.REPORT)
-    with pytest.raises(InputError, match="acts by more than the frame"):
+    with pytest.raises(InputError, match="depends on more than the frame"):
         drone_rl.judge(policy, seed=0, episodes=EPISODES, sampled=False, progress=silent)
 
 
