@@ -131,13 +131,13 @@ def shifts(
     total = len(axes) * (len(settings.strengths) + settings.domain) + 1
     done = itertools.count()
 
-    def tell(text: str) -> None:
+    def report(text: str) -> None:
         progress(text, next(done), total)
 
     with closing(PairedEvaluator(subject, settings.episodes, seed.value)) as evaluator:
         suite = Suite(evaluator, [Mode(mode) for mode in settings.modes], settings.possible_share)
-        found = suite.run(axes, settings.strengths, tell)
-    domain = _domain(subject, axes, settings, seed, tell) if settings.domain else None
+        found = suite.run(axes, settings.strengths, report)
+    domain = _domain(subject, axes, settings, seed, report) if settings.domain else None
     with closing(PairedEvaluator(subject, 1, seed.value)) as filmed:
         pictures = {axis.name: make_strip(filmed, axis) for axis in axes}
     progress("flown", total, total)
@@ -175,7 +175,7 @@ def _domain(
     axes: Sequence[Axis],
     settings: ShiftSettings,
     seed: RootSeed,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> dict[str, Any]:
     """Return the operating domain: "plain", without perturbation, and "ranges" by axis."""
     task = as_task(subject.task)
@@ -186,7 +186,7 @@ def _domain(
         oracle = evaluator.run(Condition(), agent=OracleAgent(only_visible=False)).episodes
         prober = Prober(evaluator, oracle, settings.good_share, settings.possible_share)
         for axis in axes:
-            tell(f"range of {axis.name}")
+            report(f"range of {axis.name}")
             ranges[axis.name] = prober.search(axis)
     return {"plain": prober.plain, "ranges": ranges}
 
