@@ -36,7 +36,7 @@ _BATCH = 256
 
 @dataclasses.dataclass(frozen=True)
 class Decisions:
-    """What a network decides on frames, and whether rounding can change that."""
+    """Decisions of a network on frames, and whether rounding can change them."""
 
     outputs: Tensor
     """Of the network, in float32. Shape: (N, outputs)."""

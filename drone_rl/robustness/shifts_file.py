@@ -274,5 +274,5 @@ def _check_domain(numbers: Mapping[str, Any], of: Any) -> None:
 def _read_strip(value: Any, shape: tuple[int, int, int], name: str) -> list[NDArray | None]:
     texts = Several(Maybe(Text(_MAX_IMAGE_LENGTH)), 6, 6).read(value, f"pictures.{name}")
     if texts[0] is None:
-        raise InputError(f"pictures.{name} does not show the world as it is")
+        raise InputError(f"pictures.{name} has no image without perturbation")
     return [None if t is None else unpacked(t, shape, f"pictures.{name}") for t in texts]

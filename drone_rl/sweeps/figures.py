@@ -28,7 +28,7 @@ COLORS = {
     FAILED: css(FAINT),
 }
 MARKERS = dict(zip(COLORS, ("o", "D", "s", "v", "P", "X"), strict=True))
-"""Shapes, so that no kind is told by its colour alone."""
+"""Shapes of markers, so that kinds differ in more than colour."""
 MAX_PANELS = 6
 LOG_FROM = 3.0
 """Ratio of the greatest to the least value from which the axis is logarithmic."""

@@ -289,9 +289,9 @@ def _job(
                 settings = read_settings(command, config)
             folder = Path(HydraConfig.get().runtime.output_dir)
             status, value = settings.run(folder)
-            if status < 128 and sys.stdout.isatty():  # for people; pipes get the results alone
+            if status < 128 and sys.stdout.isatty():  # pipes get only the results
                 print(next_steps(name.replace("_", "-"), settings.used_policy(folder), folder))
-        except (InputError, OSError) as error:  # one bad run of a sweep leaves the others alone
+        except (InputError, OSError) as error:  # a failed run of a sweep does not stop the others
             if isinstance(error, BrokenPipeError) and is_output_closed():
                 raise
             print(f"error: {one_line(error)}", file=sys.stderr)

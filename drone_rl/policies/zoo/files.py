@@ -112,7 +112,7 @@ def read_policy(path: Path) -> dict[str, Any]:
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
-    """Read a checkpoint, see `read_policy`; its "config" is plain data alone."""
+    """Read a checkpoint, see `read_policy`; its "config" has plain data only."""
     state = load_checkpoint(path)
     try:
         for key in ("policy", "progress", "provenance", "config"):

@@ -72,59 +72,59 @@ class Lattice:
         """Steps ahead after which every episode has ended."""
         return int(self.task.front_bound / self.task.step_length) + 1
 
-    def x(self, place: LatticeState) -> float:
+    def x(self, state: LatticeState) -> float:
         """Return the metres ahead of the start."""
-        return place.ahead * self.task.step_length
+        return state.ahead * self.task.step_length
 
-    def y(self, place: LatticeState) -> float:
+    def y(self, state: LatticeState) -> float:
         """Return the metres to the left of the start."""
-        return place.left * self.task.step_length
+        return state.left * self.task.step_length
 
-    def standing(self, place: LatticeState) -> list[int]:
+    def standing(self, state: LatticeState) -> list[int]:
         """Return the cubes neither collected nor passed, nearest first."""
-        x = self.x(place)
+        x = self.x(state)
         cubes = range(len(self.cubes))
-        return [k for k in cubes if not place.collected >> k & 1 and x <= self.cubes[k]]
+        return [k for k in cubes if not state.collected >> k & 1 and x <= self.cubes[k]]
 
     def move(
-        self, place: LatticeState, action: int, boxes: Boxes
+        self, state: LatticeState, action: int, boxes: Boxes
     ) -> Iterator[tuple[LatticeState, Boxes]]:
         """Yield the next state and its part of the boxes, for each set of cubes then collected."""
         sideways = {AHEAD: 0, LEFT: 1, RIGHT: -1}[action]
         moved = dataclasses.replace(
-            place,
-            ahead=place.ahead + (action == AHEAD),
-            left=place.left + sideways,
-            steps=place.steps + 1,
+            state,
+            ahead=state.ahead + (action == AHEAD),
+            left=state.left + sideways,
+            steps=state.steps + 1,
             came=action,
         )
-        for collected, part in self._touched(moved, self.standing(place), boxes):
-            is_new = collected != place.collected
+        for collected, part in self._touched(moved, self.standing(state), boxes):
+            is_new = collected != state.collected
             came = AHEAD if is_new else action
             yield dataclasses.replace(moved, collected=collected, came=came), part
 
-    def ending(self, place: LatticeState) -> Ending | None:
+    def ending(self, state: LatticeState) -> Ending | None:
         """Return how the episode has ended, in the order of Algorithm 3; None if it continues."""
         reason = None
-        if place.steps >= self.task.step_limit:
+        if state.steps >= self.task.step_limit:
             reason = EndReason.STEP_LIMIT
-        if abs(self.y(place)) > self.task.side_bound:
+        if abs(self.y(state)) > self.task.side_bound:
             reason = EndReason.SIDE_BOUNDARY
-        if self.x(place) > self.task.front_bound:
+        if self.x(state) > self.task.front_bound:
             reason = EndReason.FRONT_BOUNDARY
-        if place.collected == self.everything:
+        if state.collected == self.everything:
             reason = EndReason.ALL_CUBES
-        return None if reason is None else Ending(reason, place.collected)
+        return None if reason is None else Ending(reason, state.collected)
 
     def _touched(
-        self, place: LatticeState, stood: list[int], boxes: Boxes
+        self, state: LatticeState, stood: list[int], boxes: Boxes
     ) -> Iterator[tuple[int, Boxes]]:
         """Split boxes by which of the cubes that stood the drone touches."""
-        parts = [(place.collected, boxes)]
-        reach, y = self.task.touch_distance, self.y(place)
+        parts = [(state.collected, boxes)]
+        reach, y = self.task.touch_distance, self.y(state)
         first, beyond = _least(y, reach), math.nextafter(-_least(-y, reach), math.inf)
         for cube in stood:
-            if abs(self.x(place) - self.cubes[cube]) > reach:
+            if abs(self.x(state) - self.cubes[cube]) > reach:
                 continue
             for _ in range(len(parts)):
                 collected, part = parts.pop(0)

@@ -35,7 +35,7 @@ Ended = Mapping[tuple[Ending, int], Sequence[Boxes]]  # disjoint, by number of s
 
 @dataclasses.dataclass
 class ProofFindings:
-    """What is known of disjoint sets of placements."""
+    """Known endings of disjoint sets of placements."""
 
     endings: dict[Ending, Boxes]
     undecided: Boxes
@@ -199,7 +199,7 @@ class Prover:
         return spans
 
     def _foresee(self, state: LatticeState) -> None:
-        """Fill the table for all waiting states beside this one: one large batch is faster."""
+        """Fill the table for all waiting states next to this one: one large batch is faster."""
         if state.ahead != self._seen_from:
             self._seen_from = state.ahead
             for known in (self._foreseen, self._tables, self._cells):
