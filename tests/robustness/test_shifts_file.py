@@ -121,7 +121,7 @@ _ALL_GOOD = {f"{_BLUR}.flown.3.good": True, **_WIDE}
         ({"settings.seed": None}, "seed=0 is not settings.seed=None"),
         ({"seed": -1}, "seed=-1 is out of range"),
         ({"seed_is_fixed": "no"}, "seed_is_fixed='no' is neither true nor false"),
-        ({"pictures.blur.0": None}, "does not show the world as it is"),
+        ({"pictures.blur.0": None}, "has no image without perturbation"),
         ({"pictures.blur.1": "AAAA"}, "is not an image of 25 rows"),
     ],
 )
