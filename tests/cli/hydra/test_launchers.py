@@ -39,7 +39,7 @@ def test_a_finished_run_returns_its_running_mean(run):
 
 def test_an_unfinished_run_returns_nothing_and_says_why(run):
     assert _job_return(run).return_value is None
-    assert _outcome(run) == "failed: for a reason unknown"
+    assert _outcome(run) == "failed: reason unknown"
     (run.folder / "failure.json").write_text(json.dumps({"error": "no memory"}))
     assert _outcome(run) == "failed: no memory"
 
