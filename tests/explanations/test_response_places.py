@@ -45,5 +45,5 @@ def test_why_there_is_none(context):
     assert "its task is not cube collection" in refused(task=None)
     tall = dataclasses.replace(scenes.task.settings, vertical_bound=1.0)
     function = ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 25, 64), MOVES)
-    assert "no torch module" in refused(network=function)
+    assert "not a torch module" in refused(network=function)
     assert "vertical_bound=1.0" in refused(task=type(scenes.task)(tall))

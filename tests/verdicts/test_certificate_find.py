@@ -64,7 +64,7 @@ def test_one_that_is_given_must_be_believed(poor, truth, tmp_path):
     assert find_claim(poor, tmp_path, flights=20).path == path
     with pytest.raises(InputError, match="another task"):
         find_claim(poor.in_task(num_cubes=2), path)
-    with pytest.raises(InputError, match="network with the hash"):
+    with pytest.raises(InputError, match="network with hash"):
         find_claim(drone_rl.load_policy("good").in_task(num_cubes=1), path)
     with pytest.raises(InputError, match=r"none\.json can't be read"):
         find_claim(poor, tmp_path / "none.json")

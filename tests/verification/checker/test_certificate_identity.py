@@ -37,7 +37,7 @@ def test_its_own_policy_is_accepted_in_any_task_or_the_one_asked_for(parsed, pol
 
 def test_another_network_is_refused(parsed):
     other = drone_rl.load_policy("good")
-    with pytest.raises(InputError, match=r"hash 38f68e02c181\.\.\., the policy's has 5eefc41fd425"):
+    with pytest.raises(InputError, match=r"hash 38f68e02c181\..*network has 5eefc41fd425"):
         check_same_policy(parsed, other.description, other.state["policy"])
 
 
