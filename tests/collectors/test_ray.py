@@ -68,7 +68,10 @@ def test_episodes_equal_those_of_threads_also_after_a_worker_is_killed(on_ray, o
 
 
 @pytest.mark.parametrize(("workers", "cores"), [(3, 1.0), (2, 1.5)])
-def test_more_workers_than_cores_raise(workers, cores):
+def test_more_workers_than_cores_raise(workers, cores, monkeypatch):
+    ends = []
+    monkeypatch.setattr(ray, "shutdown", lambda: ends.append(ray))  # other tests need the cluster
     message = rf"num_threads={workers} workers .*more than the cluster's 2 cores"
     with pytest.raises(InputError, match=message):
         build(Ray(num_envs=6, num_threads=workers, num_cpus=cores))
+    assert ends == [ray]
