@@ -29,7 +29,7 @@ def plot_placebos(truth: Mapping[str, Any], path: Path, policy: str) -> None:
 
     methods = {_title(name): found for name, found in truth["methods"].items()}
     placebos = {_title(name): {"score": score} for name, score in truth["placebos"].items()}
-    figure = Figure(figsize=(7.5, 4.2), layout="constrained")
+    figure = Figure(figsize=(8.5, 4.2), layout="constrained")
     axes = figure.subplots()
     for row, (name, found) in enumerate({**methods, **placebos}.items()):
         score, color = found["score"], MAPS if name in methods else PLACEBOS
@@ -41,15 +41,15 @@ def plot_placebos(truth: Mapping[str, Any], path: Path, policy: str) -> None:
     axes.invert_yaxis()
     axes.axvline(0, color="0.3", linewidth=0.8)
     axes.set(
-        xlabel="rank correlation with the effect of each patch on the policy (95% CI)",
-        xlim=(None, 1.1),
-        title=f"Do heat maps of policy {policy} show what it responds to?",
+        xlabel="rank correlation with the effect of each patch (95% CI)",
+        xlim=(None, 1.2),
     )
+    figure.suptitle(f"Do heat maps of policy {policy} show what it responds to?")
     handles = [
         Patch(color=MAPS, label="heat maps of the policy"),
         Patch(color=PLACEBOS, label="placebos: maps that ignore the policy"),
     ]
-    figure.legend(handles=handles, loc="outside upper center", ncols=2, frameon=False)
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
     figure.savefig(path, dpi=120)
 
 

@@ -22,7 +22,7 @@ def test_placebos_are_plotted_from_an_explanation(tmp_path):
     folder.mkdir(parents=True)
     (folder / "explanation.json").write_text(json.dumps({"name": "good", "truth": TRUTH}))
     assert main(["placebos", str(folder.parent)], tmp_path) == 0
-    assert Image.open(tmp_path / "placebos.png").size == (900, 504)
+    assert Image.open(tmp_path / "placebos.png").size == (1020, 504)
 
 
 @pytest.mark.parametrize("arguments", [[], ["placebos"], ["none"]])

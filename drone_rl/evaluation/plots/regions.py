@@ -12,7 +12,7 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from drone_rl.sim.vocabulary import ShownActions
-from drone_rl.utils.palette import INK, MUTED, css
+from drone_rl.utils.palette import FAINT, INK, MUTED, css
 
 _LINE = 'fill="none" class="line"'
 _CLOSEST = "smallest difference of two logits"
@@ -44,7 +44,9 @@ def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: Show
     axis.set_xlabel("metres to the left (+) or right (-)")
     axis.set_ylabel("metres ahead of the camera")
     axis.axhline(near, color=css(INK), lw=0.5)
-    axis.set_title("action for one cube at each position")
+    note = f"not tested: closer than {near:g} m"
+    axis.text(0.97 * side, 0.5 * near, note, va="center", color=css(FAINT))
+    axis.set_title("Action for one cube at each position")
     handles = [Patch(color=names.css(a), label=f"goes {names.names[a]}") for a in names.order]
     if numbers["unseen"]:
         style = {"facecolor": css(MUTED), "edgecolor": "white", "hatch": "////"}
