@@ -6,6 +6,7 @@ import pytest
 
 from benchmarks import injections
 from benchmarks.injections import HOST, PAYLOADS, RAN
+from tests.explanations.quick import quick_figures
 from tests.explanations.report.conftest import explanations  # noqa: F401
 
 pytest.importorskip("selenium.webdriver")
@@ -51,7 +52,8 @@ def test_a_blocked_script_is_detected_unless_it_is_markup_on_purpose(browser, tm
 @pytest.mark.slow
 def test_nothing_runs_on_the_programs_pages(explanations, tmp_path):  # noqa: F811
     few = [PAYLOADS[7], f'"></script><script>{RAN}</script>']  # markup; attributes and scripts
-    outcomes = injections.open_all(tmp_path, explanations[1], few, names=False)
+    with quick_figures():
+        outcomes = injections.open_all(tmp_path, explanations[1], few, names=False)
     assert {outcome["page"] for outcome in outcomes} == {
         "report", "report_of_files", "report_without_policy", "sweep", "sweep_without_policy",
         "notebook", "markup_under_policy",

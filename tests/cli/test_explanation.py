@@ -8,19 +8,19 @@ import drone_rl
 from drone_rl.explanations.explain import Explanations
 from drone_rl.utils.seeding import RootSeed
 from tests.cli.running import error_line
-from tests.explanations.quick import quick
+from tests.explanations.quick import quick, quick_figures
 
 
 @pytest.mark.slow
 def test_explain_then_report(in_process, tmp_path):
     few = ["frames=60", "episodes=8", "perplexity=5", "num_envs=32"]
-    with quick():
+    with quick(), quick_figures():
         done = in_process("explain", "policy=poor", "require=good", *few, "hydra.run.dir=run")
+        again = in_process("report", "explanations=run", "hydra.run.dir=again")
     assert "poor: poor" in done.stdout
     assert done.returncode == 13  # poor, but 8 episodes are too few to be certain
     first = (tmp_path / "run" / "report.html").read_text()
-    done = in_process("report", "explanations=run", "hydra.run.dir=again")
-    assert done.returncode == 0, done.stderr
+    assert again.returncode == 0, again.stderr
     assert (tmp_path / "again" / "report.html").read_text() == first
 
 

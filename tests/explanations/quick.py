@@ -1,22 +1,48 @@
-"""Small searches and grids, for tests of what surrounds them."""
+"""Small searches, grids and figures, for tests of what surrounds them."""
 
 import contextlib
+import dataclasses
 import functools
 from collections.abc import Iterator
 
 import pytest
+from matplotlib.figure import Figure
 
+from drone_rl.evaluation.plots import saving
 from drone_rl.explanations import class_models, response
+from drone_rl.explanations.report import attribution
 
 
 @contextlib.contextmanager
-def quick(*, grids: bool = True) -> Iterator[None]:
-    """Optimize class models for a few steps and, if `grids`, evaluate few places of a target."""
+def quick() -> Iterator[None]:
+    """Optimize class models for a few steps and evaluate few places of a target."""
     with pytest.MonkeyPatch.context() as patch:
         few = functools.partial(class_models.ClassModelSettings, steps=3, starts=2)
         patch.setattr(class_models, "ClassModelSettings", few)
-        if grids:
-            for make in (response.response_map, response.outcome_map):
-                patch.setitem(make.__kwdefaults__, "num_lateral", 9)
-                patch.setitem(make.__kwdefaults__, "num_forward", 4)
+        for make in (response.response_map, response.outcome_map):
+            patch.setitem(make.__kwdefaults__, "num_lateral", 9)
+            patch.setitem(make.__kwdefaults__, "num_forward", 4)
+        yield
+
+
+@contextlib.contextmanager
+def quick_figures() -> Iterator[None]:
+    """Draw charts as SVG alone, without a layout, and films of three frames.
+
+    The fixture `report` has whole figures.
+    """
+    to_png, film = saving.to_png, attribution.film
+
+    def no_chart(picture):
+        return b"\x89PNG" if isinstance(picture, Figure) else to_png(picture)
+
+    def three_frames(explanation, method):
+        few = explanation.arrays["film_frames"][:3]
+        arrays = {**explanation.arrays, "film_frames": few}
+        return film(dataclasses.replace(explanation, arrays=arrays), method)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(saving, "to_png", no_chart)
+        patch.setattr(saving, "_lay_out", lambda figure: figure.set_layout_engine(None))
+        patch.setattr(attribution, "film", three_frames)
         yield

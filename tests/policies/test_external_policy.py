@@ -9,6 +9,7 @@ from drone_rl.config.transforms import EpisodeReward, Gray, Resize, Rgb, Stack, 
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
+from tests.explanations.quick import quick, quick_figures
 from tests.fake_flight import FLIGHT, floating
 from tests.second_dynamics import Turning
 from tests.second_task import Posts
@@ -182,7 +183,8 @@ def test_callable_gets_a_reduced_report(network, tmp_path):
     task = drone_rl.TaskSettings(**ONE)
     policy = drone_rl.policy_from(on_bytes(network), transforms=(), name="a function", task=task)
     small = {"frames": 40, "episodes": 6, "perplexity": 5}
-    done = drone_rl.explain(policy, folder=tmp_path, progress=silent, **small)
+    with quick(), quick_figures():
+        done = drone_rl.explain(policy, folder=tmp_path, progress=silent, **small)
     numbers = done.numbers["a function"]
     assert set(numbers["left_out"]) == {"class_models", "embedding"}
     assert not {"class_model", "tsne"} & set(numbers)

@@ -10,7 +10,7 @@ from drone_rl.explanations.explain import explain_policy
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.settings import ExplainSettings
 from tests.continuous import make_env, make_policy
-from tests.explanations.quick import quick
+from tests.explanations.quick import quick, quick_figures
 
 NAMES = ["forward", "left", "right", "turn left", "turn right"]
 
@@ -50,7 +50,8 @@ def test_the_data_say_what_was_asked_for_in_units(folder):
 
 
 def test_the_report_names_and_draws_the_parts(folder, tmp_path):
-    page = write_report([folder], tmp_path).read_text()
+    with quick_figures():
+        page = write_report([folder], tmp_path).read_text()
     for name in NAMES:
         assert name in page, name
     assert "if that is above a third of the maximum" in page

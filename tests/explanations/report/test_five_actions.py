@@ -11,7 +11,7 @@ from drone_rl.explanations.explain import SECTIONS, explain_policy
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import MLP
-from tests.explanations.quick import quick
+from tests.explanations.quick import quick, quick_figures
 from tests.second_dynamics import Turning
 
 
@@ -44,7 +44,8 @@ def test_the_explanation_says_what_its_actions_are(folder):
 
 
 def test_the_report_names_and_draws_all_five(folder, tmp_path):
-    page = write_report([folder], tmp_path).read_text()
+    with quick_figures():
+        page = write_report([folder], tmp_path).read_text()
     for name in Turning.actions.names:
         assert name in page, name
     assert page.count('rx=".2" fill="#000000"') == 5  # the legend of the map of frames
