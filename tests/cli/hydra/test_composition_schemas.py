@@ -89,11 +89,17 @@ def test_every_setting_of_every_choice_is_typed(chosen, config):
 
 
 @pytest.mark.parametrize(
-    ("group", "name"), files("task", "appearance", "camera", "transforms", "network")
+    "chosen",
+    [
+        *together("task", "appearance", "camera"),
+        *({group: name} for group, name in files("transforms", "network")),
+    ],
 )
-def test_every_choice_of_what_a_policy_is_builds(group, name, settings):
-    frame = ["camera=frame"] if name == "original" else []  # whose rows are of that frame
-    told = settings("train", f"{group}={name}", *frame).as_base(TrainSettings)
+def test_every_choice_of_what_a_policy_is_builds(chosen, settings):
+    names = {group: name for group, name in chosen.items() if name is not None}
+    if "original" in names.values():
+        names["camera"] = "frame"  # of whose rows it crops some
+    told = settings("train", *(f"{g}={name}" for g, name in names.items())).as_base(TrainSettings)
     described = describe(told)
     env = described.build_env(1, seed=0, device="cpu")
     network = described.build_network(torch.Generator().manual_seed(0))
@@ -114,9 +120,9 @@ def test_every_return_estimator_builds_and_estimates(group, name, settings):
     assert estimator(TensorDict(batch, [4]))["return_to_go"].shape == (4, 1)
 
 
-@pytest.mark.parametrize(("group", "name"), files("optimizer", "scheduler"))
-def test_every_optimizer_and_schedule_builds_and_steps(group, name, settings):
-    told = settings("train", f"{group}={name}")
+@pytest.mark.parametrize("chosen", together("optimizer", "scheduler"))
+def test_every_optimizer_and_schedule_builds_and_steps(chosen, settings):
+    told = settings("train", *(f"{group}={name}" for group, name in chosen.items() if name))
     weight = torch.nn.Parameter(torch.ones(1))
     optimizer = told.optimizer.make([weight])
     schedule = told.scheduler.make(optimizer)
@@ -126,14 +132,14 @@ def test_every_optimizer_and_schedule_builds_and_steps(group, name, settings):
     assert weight < 1
 
 
-@pytest.mark.parametrize(("group", "name"), files("experiment", "sweep"))
-def test_every_experiment_and_sweep_composes_and_describes_a_policy(group, name, settings):
-    told = settings("train", f"{group}={name}").as_base(TrainSettings)
+@pytest.mark.parametrize("name", [name for _, name in files("experiment")])
+def test_every_experiment_composes_and_describes_a_policy(name, settings):
+    told = settings("train", f"experiment={name}").as_base(TrainSettings)
     assert describe(told).network.name
 
 
 @pytest.mark.parametrize("name", [name for _, name in files("sweep")])
-def test_every_value_of_every_sweep_is_understood(name, settings):
+def test_every_value_of_every_sweep_is_understood_and_describes_a_policy(name, settings):
     sweep = yaml.safe_load((CONF / "sweep" / f"{name}.yaml").read_text())
     params = sweep["hydra"]["sweeper"]["params"]
     listed = {k: str(v).split(",") for k, v in params.items() if "(" not in str(v)}
@@ -142,7 +148,8 @@ def test_every_value_of_every_sweep_is_understood(name, settings):
             listed[key] = [values[0], values[-1]]
     for row in itertools.zip_longest(*listed.values()):
         told = [f"{k}={v}" for k, v in zip(listed, row, strict=True) if v is not None]
-        settings("train", f"sweep={name}", *told)
+        chosen = settings("train", f"sweep={name}", *told).as_base(TrainSettings)
+        assert describe(chosen).network.name
 
 
 @pytest.mark.parametrize(
