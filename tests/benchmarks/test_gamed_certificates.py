@@ -17,7 +17,9 @@ def _few_episodes():
 
     See below for certificates and tests/cli/test_evaluation_verdict.py for operating domains.
     """
-    few = functools.partial(drone_rl.judge, episodes=150, certificate_flights=400)
+    few = functools.partial(
+        drone_rl.judge, episodes=150, certificate_flights=400, domain_flights=30
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(gamed_certificates, "judge", few)
         yield

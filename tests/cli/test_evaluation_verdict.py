@@ -100,9 +100,9 @@ def test_conditions_can_be_required(in_process, tmp_path, good, needed, status, 
     kept = json.loads((tmp_path / "v" / "verdict.json").read_text())
     assert bool(kept["required_domain"]["lacking"]) == (status == 17)
     if status == 0:
-        both = in_process(*many, "require=proved")
+        both = in_process(*many, "episodes=10", "require=proved")
         assert both.returncode == 16
-        unchecked = in_process(*many, "domain_flights=0")
+        unchecked = in_process(*many, "episodes=10", "domain_flights=0")
         assert unchecked.returncode == 17 and "no episodes re-checked it" in unchecked.stdout
         few = in_process(*many, "episodes=10")
         assert few.returncode == 13  # covered, but not certainly good where nothing is different

@@ -64,7 +64,7 @@ def test_a_verdict_with_proof(good, tmp_path):
     assert "A certificate states for every placement" in str(done)
     assert "re-checked by 400 rollouts from fresh placements" in str(done)
     assert (done.as_dict()["certificate"], done.as_dict()["proof"]["agreeing"]) == (str(path), 8)
-    again = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=400, **how)
+    again = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=50, **how)
     seeds = [one.as_dict()["proof"]["seed"] for one in (done, again)]
     assert seeds[0] != seeds[1]
     unchecked = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=0, **how)
@@ -86,7 +86,7 @@ def test_a_certificate_that_flights_refute_proves_nothing(tmp_path):
     assert "8 of 8 greedy flights of this verdict ended otherwise than it states." in str(done)
     assert "A certificate states" not in str(done)
     with pytest.raises(InputError, match=r"does not hold: .* ended otherwise than stated"):
-        drone_rl.judge(poor, certificate=path, **few)
+        drone_rl.judge(poor, certificate=path, certificate_flights=100, **few)
 
 
 def test_without_a_certificate_nothing_is_proved(good):

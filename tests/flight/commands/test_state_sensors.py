@@ -32,8 +32,8 @@ def test_of_a_flight_they_tell_height_place_and_touch():
     assert not pilot.sensors.gps().is_valid[0]  # within its first second
     pilot.arm()
     pilot.take_off()
-    pilot.move_to(10, 0, 5, speed=3)
-    pilot.advance(3.0)
+    pilot.move_to(4, 0, 2, speed=3)
+    pilot.advance(1.5)
     x, _, z = pilot.state.position
     risen = float(pilot.sensors.barometer().altitude[0]) - on_the_ground
     assert risen == pytest.approx(z - 0.3, abs=0.1)
