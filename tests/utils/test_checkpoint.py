@@ -1,14 +1,13 @@
 import errno
 import os
 import pickle
-import subprocess
-import sys
 
 import pytest
 import torch
 
 from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.utils.errors import InputError
+from tests.forked import run_forked
 
 
 @pytest.fixture
@@ -58,8 +57,7 @@ def test_the_system_says_why_pytorch_could_not_write(tmp_path):
         "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, -1))\n"
         "save_checkpoint('last.pt', {'a': torch.zeros(10**6)})\n"
     )
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = run_forked(code, cwd=tmp_path)
     assert "last.pt could not be written (File too large)" in done.stderr
     assert list(tmp_path.iterdir()) == []
 

@@ -11,6 +11,7 @@ import pytest
 
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.imports import ENVIRONMENTS, register
+from tests.forked import run_forked
 
 ROOT = Path(__file__).parents[2]
 gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
@@ -83,15 +84,17 @@ def test_the_entry_point_registers():
     assert metadata.EntryPoint("", text, "gymnasium.envs").load() is register
 
 
-def test_without_gymnasium_one_line_tells_what_to_install():
+def test_without_gymnasium_one_line_tells_what_to_install(tmp_path):
     code = (
-        "import sys; sys.modules['gymnasium'] = None\n"
+        "import sys\n"
+        "for name in [*sys.modules]:\n"
+        "    if name.partition('.')[0] in ('drone_rl', 'gymnasium'): del sys.modules[name]\n"
+        "sys.modules['gymnasium'] = None\n"
         "import drone_rl\n"
         "try: drone_rl.DroneWorld\n"
         "except drone_rl.InputError as error: print(error)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    (line,) = done.stdout.splitlines()
+    (line,) = run_forked(code, cwd=tmp_path).stdout.splitlines()
     assert line.endswith("install it with pip install -e '.[gym]' in the checkout")
 
 

@@ -1,7 +1,6 @@
 """What was freed goes back to the system, and oneDNN's kernels are bounded before there is one."""
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import pytest
 
 from drone_rl.utils import memory
 from drone_rl.utils.memory import bound_kernels, return_freed_memory
+from tests.forked import run_forked
 
 MIB = 2**20
 
@@ -47,11 +47,12 @@ def test_kernels_are_bounded_unless_the_user_says_otherwise(monkeypatch):
     monkeypatch.delenv(name)
 
 
-def test_kernels_of_many_shapes_take_bounded_memory():
+def test_kernels_of_many_shapes_take_bounded_memory(tmp_path):
     """A convolution of 300 shapes: with 4 kernels kept it must hold far less than with all."""
     code = """
 import os, sys, torch
 from drone_rl.utils import memory
+os.environ.pop("ONEDNN_PRIMITIVE_CACHE_CAPACITY", None)
 memory.KEPT_KERNELS = int(sys.argv[1])
 memory.bound_kernels()
 torch.set_num_threads(1)
@@ -67,12 +68,5 @@ with torch.no_grad():
         layer(torch.zeros(n, 16, 6, 6))
 print(resident() - before)
 """
-    unbound = {k: v for k, v in os.environ.items() if k != "ONEDNN_PRIMITIVE_CACHE_CAPACITY"}
-    grown = []
-    for kept in (4, 1000):
-        command = [sys.executable, "-c", code, str(kept)]
-        out = subprocess.run(
-            command, capture_output=True, text=True, check=True, env=unbound
-        ).stdout
-        grown.append(float(out))
+    grown = [float(run_forked(code, kept, cwd=tmp_path).stdout) for kept in (4, 1000)]
     assert grown[0] + 4 < grown[1]

@@ -1,6 +1,4 @@
 import functools
-import subprocess
-import sys
 import time
 import types
 from concurrent.futures import ThreadPoolExecutor
@@ -12,6 +10,7 @@ import torch
 from drone_rl.sim.rendering import devices
 from drone_rl.sim.rendering.devices import check_device, load_kernels
 from drone_rl.utils.errors import InputError
+from tests.forked import run_forked
 
 
 def test_unknown_device_raises():
@@ -25,10 +24,10 @@ def test_cuda_without_gpu_raises():
         check_device("cuda")
 
 
-def test_warp_starts_without_output():
+def test_warp_starts_without_output(tmp_path):
     code = "from drone_rl.sim.rendering.devices import start_warp; start_warp('cpu')"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert (done.stdout, done.stderr) == ("", "")
+    done = run_forked(code, cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
 def test_kernels_are_loaded_once_in_a_thread(monkeypatch):
