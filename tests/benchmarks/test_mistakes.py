@@ -2,7 +2,9 @@
 
 import pytest
 
+from benchmarks import mistakes
 from benchmarks.mistakes import find_fault, read_cases, run_all
+from tests.forked import run_module_forked
 
 GOOD = "error: sed=1 is unknown; did you mean seed=1?\n"
 
@@ -47,7 +49,8 @@ def test_the_list_is_long_and_without_repetition():
     assert all(words for _, *words in read_cases())
 
 
-def test_a_sample_is_answered(tmp_path):
+def test_a_sample_is_answered(tmp_path, monkeypatch):
+    monkeypatch.setattr(mistakes.subprocess, "run", run_module_forked)
     outcomes = run_all(tmp_path, every=15)
     assert len(outcomes) == len(read_cases()[::15])
     assert [o for o in outcomes if o["wrong"]] == []
