@@ -149,7 +149,8 @@ class SteppingCollector:
             self._collector.reset_at_each_iter = False
             keys = {*self._kept, *(self._actor.keys if self._keep_observations else ())}
             rollouts.append(rollout.select(*keys))
-        steps: Any = torch.cat(rollouts, 1)  # (num_envs, T)
+        # a lazy stack is slow to index
+        steps: Any = torch.cat(rollouts, 1).contiguous()  # (num_envs, T)
         mask = torch.stack(self._env.masks, 1)
         batch = steps[mask]  # row-major: environment after environment, step after step
         return batch.set(("collector", "traj_ids"), mask.nonzero()[:, 0])
