@@ -77,6 +77,7 @@ def test_the_table_of_an_evaluation(good):
 
 
 def test_in_another_appearance_it_is_said_so(good):
+    good = good.in_task(num_cubes=1)  # short episodes
     few, fog = (
         {"episodes": 4, "sampled": False, "progress": silent},
         AppearanceSettings(shadows=1.0),
@@ -87,7 +88,8 @@ def test_in_another_appearance_it_is_said_so(good):
     )
     assert said in str(done) and said in done.as_dict()["sentence"]
     assert done.as_dict()["unlike"] == {"appearance.shadows": {"own": 0.0, "flown": 1.0}}
-    found = drone_rl.evaluate(good.in_appearance(fog), episodes=2, num_envs=2, progress=silent)
+    two = {"episodes": 2, "num_envs": 2, "baselines": False, "progress": silent}
+    found = drone_rl.evaluate(good.in_appearance(fog), **two)
     assert said in str(found) and "appearance.shadows" in found.as_dict()["unlike"]
     both = good.in_appearance(fog).in_dynamics(mode="simple_flight")
     assert "with other dynamics and another appearance: " in unlike({"unlike": both.unlike})
@@ -122,6 +124,7 @@ def test_in_another_body_it_is_said_so(good, monkeypatch):
 
 
 def test_an_evaluation_says_what_its_seed_is(good):
+    good = good.in_task(num_cubes=1)
     how = {"episodes": 2, "baselines": False, "progress": silent}
     fresh, fixed = drone_rl.evaluate(good, **how), drone_rl.evaluate(good, seed=3, **how)
     assert (fixed.as_dict()["seed"], fixed.as_dict()["seed_is_fixed"]) == (3, True)

@@ -1,6 +1,8 @@
 """Certificates without a prover: true ones of one cube by bisection, and of any boxes by hand."""
 
+import functools
 import itertools
+import json
 
 import numpy as np
 
@@ -14,9 +16,15 @@ BAND = 1e-5
 """Half-width of the undecided band at a border, metres."""
 
 
-def of_one_cube(name, **task):
-    """Bisect between neighbours on a grid whose episodes end differently."""
-    policy = drone_rl.load_policy(name).in_task(num_cubes=1, **task)
+def of_one_cube(name):
+    """Return a certificate of one cube, made once in a process."""
+    return json.loads(_by_bisection(name))
+
+
+@functools.cache
+def _by_bisection(name):
+    """Bisect between neighbours on a grid whose episodes end differently; return JSON."""
+    policy = drone_rl.load_policy(name).in_task(num_cubes=1)
     simulator = Simulator(policy.description, policy.state["policy"])
     bound = policy.task.lateral_bound
 
@@ -36,7 +44,7 @@ def of_one_cube(name, **task):
     simulator.close()
     cuts = [-bound, *((low + high) / 2).tolist(), bound]
     pieces = [found[0], *(found[i + 1] for i in sides)]
-    return certificate_of(policy, *_as_outcomes(pieces, cuts))
+    return json.dumps(certificate_of(policy, *_as_outcomes(pieces, cuts)))
 
 
 def _as_outcomes(pieces, cuts):
