@@ -15,6 +15,7 @@ from drone_rl.flight.in_the_loop import dynamics as module
 from drone_rl.flight.in_the_loop.drone import DroneInTheLoop, FlightControllerError, NotReadyError
 from drone_rl.flight.in_the_loop.dynamics import InTheLoopDynamics
 from drone_rl.sim.dynamics import FlightState, Obstacles, Quadrotor
+from tests.flight.arming import arm_at_once
 
 SETTINGS = DynamicsSettings(mode="simple_flight", camera_mount="body")
 FAST = SETTINGS.replace(tick=0.001)
@@ -43,7 +44,9 @@ def hovering():
     dynamics = InTheLoopDynamics(drone(), SETTINGS)
     start = dynamics.start(PLACE, torch.tensor([7]))
     assert dynamics.drone.time == 0.0  # `start` moves nothing
-    dynamics.begin(start)
+    with pytest.MonkeyPatch.context() as patch:
+        arm_at_once(patch)
+        dynamics.begin(start)
     return dynamics, start
 
 
@@ -99,6 +102,7 @@ def test_obstacles_are_felt(begun):
 
 def test_a_firmware_that_never_arms(monkeypatch):
     monkeypatch.setattr(module, "_ARM_TRIES", 2)
+    arm_at_once(monkeypatch, within=0.2)
     dynamics = InTheLoopDynamics(drone(Even(arms=False)), SETTINGS)
     with pytest.raises(NotReadyError, match="refuses to arm"):
         dynamics.begin(dynamics.start(PLACE))
@@ -111,8 +115,9 @@ def test_a_policy_that_thinks_for_too_long(begun, monkeypatch):
         dynamics.step(body, torch.tensor([0]))
 
 
-def test_it_goes_where_actions_lead(stub, tmp_path):
+def test_it_goes_where_actions_lead(stub, tmp_path, monkeypatch):
     """The stub flies it forward, then to the left."""
+    arm_at_once(monkeypatch)
     program = tmp_path / "stub"
     program.write_text(f"#!/bin/sh\nexec {shlex.join(stub())}\n")
     program.chmod(0o755)

@@ -3,6 +3,7 @@ import pytest
 
 from drone_rl.flight.betaflight.sitl import Betaflight
 from drone_rl.flight.commands.path_following import make_paths
+from drone_rl.flight.in_the_loop import trial_flight
 from drone_rl.flight.in_the_loop.drone import DroneInTheLoop, FlightControllerError
 from drone_rl.flight.in_the_loop.instruments import Readings
 from drone_rl.flight.in_the_loop.trial_flight import (
@@ -14,6 +15,7 @@ from drone_rl.flight.in_the_loop.trial_flight import (
     square,
     take_off,
 )
+from tests.flight.arming import arm_at_once
 from tests.flight.simple_body import SETTINGS, SimpleBody
 
 ORIGIN = np.zeros(3)
@@ -45,17 +47,20 @@ def test_holding_a_place():
 
 
 @pytest.mark.slow
-def test_a_whole_flight_through_the_stub(stub, tmp_path):
+def test_a_whole_flight_through_the_stub(stub, tmp_path, monkeypatch):
+    arm_at_once(monkeypatch)
+    monkeypatch.setattr(trial_flight, "_SETTLING", 2.0)
     body = SimpleBody()
     with Betaflight(stub(), tmp_path) as firmware:
         drone = DroneInTheLoop(body, body.start(), firmware, SETTINGS)
-        report = fly_course(drone, Course(height=0.6, side=0.5, speed=0.5, hover=3.2))
+        report = fly_course(drone, Course(height=0.6, side=0.5, speed=0.5, hover=2.2))
     assert report.hover_error_m < 0.1
     assert report.path_error_m < 0.3
     assert report.path_error_m < report.path_error_max_m < 1.0
     assert report.landing_error_m < 0.3
     assert report.simulated_s == pytest.approx(drone.time)
     assert drone.readings.position[2] == 0.0
+    assert np.ptp([readings.position for readings in drone.trace], axis=0)[:2].min() > 0.3
 
 
 class Dead:
