@@ -138,12 +138,12 @@ class DroneEnv(EnvBase):
             self.appearances.load(state["looks"])
         self._render(self._indices(None))
 
-    def side_streams(self, worlds: Tensor, *key: int) -> list[np.random.Generator]:
+    def side_streams(self, env_ids: Tensor, *key: int) -> list[np.random.Generator]:
         """Return further random streams of episodes that have just begun, for the purpose `key`.
 
-        They leave the task's own streams unchanged. `worlds` are indices, (k,).
+        They leave the task's own streams unchanged. `env_ids` are indices, (k,).
         """
-        return [side_stream(self._random_states[i], *key) for i in worlds.tolist()]
+        return [side_stream(self._random_states[i], *key) for i in env_ids.tolist()]
 
     @property
     def last_pixels(self) -> Tensor:
@@ -180,41 +180,41 @@ class DroneEnv(EnvBase):
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
-        worlds = self._indices(mask)
-        self.start(worlds)
-        self._render(worlds)
+        env_ids = self._indices(mask)
+        self.start(env_ids)
+        self._render(env_ids)
         running = torch.zeros(*self.batch_size, 1, dtype=torch.bool, device=self.device)
         return self._observe({name: running.clone() for name in _DONE_KEYS})
 
-    def start(self, worlds: Tensor | None = None) -> None:
+    def start(self, env_ids: Tensor | None = None) -> None:
         """Start episodes without rendering, by default all. Indices: (k,)."""
-        worlds = self._indices(None) if worlds is None else worlds
-        random_states = [self._random_states[i] for i in worlds.tolist()]
-        self.appearances.reset(worlds, random_states)
-        self.worlds.reset(worlds, random_states)
+        env_ids = self._indices(None) if env_ids is None else env_ids
+        random_states = [self._random_states[i] for i in env_ids.tolist()]
+        self.appearances.reset(env_ids, random_states)
+        self.worlds.reset(env_ids, random_states)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
-        worlds = self._indices(tensordict.get("_step", None))
+        env_ids = self._indices(tensordict.get("_step", None))
         reward = torch.zeros(*self.batch_size, 1, device=self.device)
         action = tensordict.get(self.action_key)
-        reward[worlds, 0] = self.worlds.step(worlds, action[worlds]).float()
-        self._render(worlds)
+        reward[env_ids, 0] = self.worlds.step(env_ids, action[env_ids]).float()
+        self._render(env_ids)
         terminated, truncated = (flag[:, None] for flag in self.worlds.ends())
         done = terminated | truncated
         flags = {"done": done, "terminated": terminated, "truncated": truncated}
         return self._observe({"reward": reward, **flags})
 
-    def _render(self, worlds: Tensor) -> None:
+    def _render(self, env_ids: Tensor) -> None:
         if not self.pixels:
             return
-        is_whole = len(worlds) == len(self._pixels)
-        state = self.worlds.state if is_whole else self.worlds.state[worlds]
-        pixels = self.worlds.render(state, appearance=self.appearances.current(worlds))
+        is_whole = len(env_ids) == len(self._pixels)
+        state = self.worlds.state if is_whole else self.worlds.state[env_ids]
+        pixels = self.worlds.render(state, appearance=self.appearances.current(env_ids))
         if is_whole:
             self._pixels = pixels
         else:
             self._pixels = self._pixels.clone()
-            self._pixels[worlds] = pixels
+            self._pixels[env_ids] = pixels
 
     def _observe(self, entries: dict[str, Tensor]) -> TensorDict:
         pixels = {"pixels": self._pixels} if self.pixels else {}

@@ -95,19 +95,19 @@ class Rounding:
 
 
 @torch.no_grad()
-def enumerate_outcomes(renderer: DirectRenderer, decide: Decide, worlds: Tensor) -> OutcomeSet:
+def enumerate_outcomes(renderer: DirectRenderer, decide: Decide, env_ids: Tensor) -> OutcomeSet:
     """Run episodes from their initial states and follow every action that rounding permits.
 
     The renderer is in the state at the start of the episodes. The policy has discrete actions and
-    no memory. `worlds` are the indices of the episodes, shape (k,).
+    no memory. `env_ids` are the indices of the episodes, shape (k,).
     """
-    simulated, count = renderer.worlds, len(worlds)
-    state: Any = simulated.state[worlds]
-    owner = torch.arange(count, device=worlds.device)
+    simulated, count = renderer.worlds, len(env_ids)
+    state: Any = simulated.state[env_ids]
+    owner = torch.arange(count, device=env_ids.device)
     is_open = torch.zeros_like(owner, dtype=torch.bool)
     ends, owners = [], []
     while len(owner):
-        possible = decide(renderer.observe(state, worlds[owner]).get("pixels")).possible
+        possible = decide(renderer.observe(state, env_ids[owner]).get("pixels")).possible
         row, action = possible.nonzero().unbind(-1)
         state, owner = state[row], owner[row]
         state, _ = simulated.advance(state, action)

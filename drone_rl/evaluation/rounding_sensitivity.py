@@ -274,22 +274,22 @@ def _run_second_best(
     actor: TensorDictModuleBase,
     before: dict[str, Any],
     fragile: Sequence[Tensor],
-    worlds: Tensor,
+    env_ids: Tensor,
 ) -> OutcomeSet:
     """Run a batch again with the second best action in fragile frames.
 
     For policies whose observations cannot be rendered from a state. If each of the two rollouts
     has a single fragile frame, the same one, there are no other outcomes. `before` has the random
-    streams at the start of the batch, `worlds` the episodes with fragile frames.
+    streams at the start of the batch, `env_ids` the episodes with fragile frames.
     """
     after, log = base_env(env).state_dict(), StepLog()
     base_env(env).load_state_dict(before)
     (batch,) = episode_batches(env, actor, len(fragile), ("fragile",), log=log)
     base_env(env).load_state_dict(after)
     again = cast(Tensor, batch["fragile"]).cpu().split([len(a) for a in log.actions])
-    pairs = [(only_index(fragile[i]), only_index(again[i])) for i in worlds.tolist()]
+    pairs = [(only_index(fragile[i]), only_index(again[i])) for i in env_ids.tolist()]
     is_open = torch.tensor([one is None or one != other for one, other in pairs])
-    return OutcomeSet(final_episodes(env, batch)[worlds], torch.arange(len(worlds)), is_open)
+    return OutcomeSet(final_episodes(env, batch)[env_ids], torch.arange(len(env_ids)), is_open)
 
 
 def _run_regrouped(

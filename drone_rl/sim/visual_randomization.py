@@ -149,25 +149,25 @@ class AppearanceSampler:
         """Sampled numbers. Shape: (num_envs, *)."""
         self._now: Appearance | None = None
 
-    def reset(self, worlds: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
+    def reset(self, env_ids: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
         """Sample new appearances by indices, (k,); the given random streams are not advanced."""
-        if not self.varies or not len(worlds):
+        if not self.varies or not len(env_ids):
             return
         rows = [self._sample(_appearance_stream(state)) for state in random_states]
         self.values = self.values.clone()
-        self.values[worlds.cpu()] = torch.tensor(rows, dtype=torch.float64)
+        self.values[env_ids.cpu()] = torch.tensor(rows, dtype=torch.float64)
         self._now = None
 
     def load(self, values: Tensor) -> None:
         """Restore saved `values`."""
         self.values, self._now = values.clone(), None
 
-    def current(self, worlds: Tensor | None = None) -> Appearance | None:
+    def current(self, env_ids: Tensor | None = None) -> Appearance | None:
         """Return appearances by ordered indices, (k,), all by default; None if they never vary."""
         if not self.varies:
             return None
-        if worlds is not None and len(worlds) < len(self.values):
-            return self._to_appearance(self.values[worlds.cpu()])
+        if env_ids is not None and len(env_ids) < len(self.values):
+            return self._to_appearance(self.values[env_ids.cpu()])
         if self._now is None:
             self._now = self._to_appearance(self.values)
         return self._now

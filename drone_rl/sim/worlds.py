@@ -121,22 +121,22 @@ class Worlds:
         place = torch.tensor(self.task.origin, dtype=torch.float64).repeat(count, 1)
         return self.dynamics.start(place) if seeds is None else self.dynamics.start(place, seeds)
 
-    def reset(self, worlds: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
+    def reset(self, env_ids: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
         """Start new episodes in environments, shape (k,), each from a random state."""
-        if not len(worlds):
+        if not len(env_ids):
             return
         sampled = torch.stack([self.task.sample(r) for r in random_states])
         seeds = draw_seeds(random_states) if self.dynamics.is_random else None
-        self.state[worlds] = self.start(sampled, seeds)
+        self.state[env_ids] = self.start(sampled, seeds)
 
-    def step(self, worlds: Tensor, action: Tensor) -> Tensor:
+    def step(self, env_ids: Tensor, action: Tensor) -> Tensor:
         """Take actions, (k, *), in environments, (k,). Returns rewards, (k,), float64."""
-        is_whole = torch.equal(worlds, self._every)
-        state, reward = self.advance(self.state if is_whole else self.state[worlds], action)
+        is_whole = torch.equal(env_ids, self._every)
+        state, reward = self.advance(self.state if is_whole else self.state[env_ids], action)
         if is_whole:
             self.state = state
         else:
-            self.state[worlds] = state
+            self.state[env_ids] = state
         return reward
 
     def advance(self, state: State, action: Tensor) -> tuple[State, Tensor]:

@@ -14,14 +14,14 @@ class Batch:
         """Return the number of environments."""
         return len(next(iter(vars(self).values())))
 
-    def __getitem__(self, worlds: Tensor | slice) -> Self:
+    def __getitem__(self, env_ids: Tensor | slice) -> Self:
         """Return some environments: a copy for an index, a view for a slice."""
-        return type(self)(**{k: v[worlds] for k, v in vars(self).items()})
+        return type(self)(**{k: v[env_ids] for k, v in vars(self).items()})
 
-    def __setitem__(self, worlds: Tensor, other: Self) -> None:
+    def __setitem__(self, env_ids: Tensor, other: Self) -> None:
         """Overwrite some environments."""
         for name, value in vars(self).items():
-            value[worlds] = getattr(other, name)
+            value[env_ids] = getattr(other, name)
 
     def to(self, device: torch.device | str) -> Self:
         """Return the batch on another device."""

@@ -29,5 +29,5 @@ def test_the_same_frames_are_counted_on_both_sides(monkeypatch):
 
 def test_without_gymnasium_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "gymnasium", None)
-    with pytest.raises(InputError, match=r"^drone-rl bench gymnasium needs .*drone-rl\[gym\]"):
+    with pytest.raises(InputError, match=r"^drone-rl bench gymnasium needs .*-e '.\[gym\]'"):
         bench.bench_gymnasium(2, "cpu", quick=True)

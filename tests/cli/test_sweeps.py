@@ -86,7 +86,7 @@ def test_one_run_of_a_sweep_can_be_gone_on_with_by_hand(sweep, in_process):
     ],
 )
 def test_clusters_from_the_command_line(module, launcher, tmp_path):
-    pytest.importorskip(module, reason="pip install 'drone-rl[slurm,ray]'")
+    pytest.importorskip(module, reason="pip install -e '.[slurm,ray]'")
     sweep = [*PROGRAM, "train", "-m", *TINY, "seed=0", *launcher, "hydra.sweep.dir=sweep"]
     subprocess.run(sweep, cwd=tmp_path, check=True)
     summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())

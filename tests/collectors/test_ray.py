@@ -13,7 +13,7 @@ from drone_rl.training.trainer import episode_rewards
 from drone_rl.utils.errors import InputError
 
 pytestmark = pytest.mark.slow
-ray = pytest.importorskip("ray", reason="pip install 'drone-rl[ray]'")
+ray = pytest.importorskip("ray", reason="pip install -e '.[ray]'")
 
 TASK = TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60)
 

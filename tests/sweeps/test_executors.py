@@ -54,12 +54,12 @@ def test_interrupting_a_sweep_stops_its_runs(make_runs):
 
 
 def slurm(folder):
-    pytest.importorskip("submitit", reason="pip install 'drone-rl[slurm]'")
+    pytest.importorskip("submitit", reason="pip install -e '.[slurm]'")
     return SlurmExecutor(folder / "jobs", cluster="local", num_jobs=2, timeout_min=5)
 
 
 def ray(folder):
-    pytest.importorskip("ray", reason="pip install 'drone-rl[ray]'")
+    pytest.importorskip("ray", reason="pip install -e '.[ray]'")
     return RayExecutor(address=None, num_cpus=1, num_gpus=0)
 
 

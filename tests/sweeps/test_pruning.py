@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-optuna = pytest.importorskip("optuna", reason="pip install 'drone-rl[optuna]'")
+optuna = pytest.importorskip("optuna", reason="pip install -e '.[optuna]'")
 
 from drone_rl.sweeps.pruning import PruneCallback  # noqa: E402
 from drone_rl.sweeps.search import next_trials, note_outcome  # noqa: E402

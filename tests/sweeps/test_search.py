@@ -2,7 +2,7 @@
 
 import pytest
 
-optuna = pytest.importorskip("optuna", reason="pip install 'drone-rl[optuna]'")
+optuna = pytest.importorskip("optuna", reason="pip install -e '.[optuna]'")
 
 from drone_rl.sweeps import search  # noqa: E402
 from drone_rl.sweeps.search import next_trials, note_outcome, open_study  # noqa: E402

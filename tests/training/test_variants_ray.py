@@ -20,7 +20,7 @@ TASK = TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60)
 
 def test_missing_ray_raises_with_install_command(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(InputError, match=r"pip install 'drone-rl\[ray\]'"):
+    with pytest.raises(InputError, match=r"pip install -e '.\[ray\]'"):
         make_collector(TrainSettings(task=TASK, collector=Ray(num_envs=2)))
 
 

@@ -14,5 +14,5 @@ def test_a_package_that_is_there():
 
 def test_one_that_is_not(monkeypatch):
     monkeypatch.setitem(sys.modules, "submitit", None)
-    with pytest.raises(InputError, match=r"launcher=slurm.*pip install 'drone-rl\[slurm\]'"):
+    with pytest.raises(InputError, match=r"launcher=slurm.*pip install -e '.\[slurm\]'"):
         extra("submitit", "slurm", "hydra/launcher=slurm")

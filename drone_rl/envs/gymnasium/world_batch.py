@@ -145,11 +145,11 @@ class WorldBatch:
         )
         self.action_space = action_space(self.worlds.dynamics.actions.entry)
 
-    def reset(self, worlds: Tensor, generators: Sequence[np.random.Generator]) -> None:
+    def reset(self, env_ids: Tensor, generators: Sequence[np.random.Generator]) -> None:
         """Reset environments by index, shape (k,), each with its own random generator."""
         # each RandomState shares its generator's bit generator, so both advance together
         streams = [np.random.RandomState(generator.bit_generator) for generator in generators]
-        self.worlds.reset(worlds, streams)
+        self.worlds.reset(env_ids, streams)
 
     def step(self, actions: Tensor) -> NDArray[np.float64]:
         """Step all environments; return their rewards. Shapes: (num_envs, *) to (num_envs,)."""

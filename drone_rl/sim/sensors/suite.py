@@ -87,10 +87,10 @@ class SensorSuite:
         return SensorSuiteState(time=time, **states, collision=collision)
 
     def read_collision(
-        self, state: SensorSuiteState, worlds: Tensor | None = None
+        self, state: SensorSuiteState, env_ids: Tensor | None = None
     ) -> tuple[CollisionState, SensorSuiteState]:
         """Return the last collisions, and the sensors with the flag cleared."""
-        reading, after = read_collisions(state.collision, worlds)
+        reading, after = read_collisions(state.collision, env_ids)
         return reading, dataclasses.replace(state, collision=after)
 
 
@@ -115,13 +115,13 @@ def update_collisions(state: CollisionState, contact: Contact, position: Tensor)
 
 
 def read_collisions(
-    state: CollisionState, worlds: Tensor | None = None
+    state: CollisionState, env_ids: Tensor | None = None
 ) -> tuple[CollisionState, CollisionState]:
     """Return the last collisions of drones by index, (k,), and the state with the flag cleared."""
-    worlds = torch.arange(len(state), device=state.position.device) if worlds is None else worlds
+    env_ids = torch.arange(len(state), device=state.position.device) if env_ids is None else env_ids
     flag = state.has_collided.clone()
-    flag[worlds] = False
-    return state[worlds], dataclasses.replace(state, has_collided=flag)
+    flag[env_ids] = False
+    return state[env_ids], dataclasses.replace(state, has_collided=flag)
 
 
 def _touched(state: CollisionState, body: BodyState) -> CollisionState:

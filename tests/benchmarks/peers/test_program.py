@@ -44,5 +44,5 @@ def test_the_lower_bound_of_ten_successes():
 
 def test_without_the_library_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3", None)
-    with pytest.raises(InputError, match=r"bench peers needs .*pip install 'drone-rl\[sb3\]'$"):
+    with pytest.raises(InputError, match=r"bench peers needs .*pip install -e '.\[sb3\]' in the"):
         measure(["sb3_ppo"])

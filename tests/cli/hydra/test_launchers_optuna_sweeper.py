@@ -3,7 +3,7 @@
 import pytest
 from hydra.core.override_parser.overrides_parser import OverridesParser
 
-optuna = pytest.importorskip("optuna", reason="pip install 'drone-rl[optuna]'")
+optuna = pytest.importorskip("optuna", reason="pip install -e '.[optuna]'")
 
 from optuna.distributions import (  # noqa: E402
     CategoricalDistribution,

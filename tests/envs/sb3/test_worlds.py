@@ -152,5 +152,5 @@ def test_missing_extra_raises_with_install_command(monkeypatch):
         if name.startswith(("stable_baselines3", "drone_rl.envs.sb3")):
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "stable_baselines3", None)
-    with pytest.raises(InputError, match=r"pip install 'drone-rl\[sb3\]'$"):
+    with pytest.raises(InputError, match=r"pip install -e '.\[sb3\]' in the checkout$"):
         import drone_rl.envs.sb3.worlds  # noqa: F401

@@ -161,7 +161,7 @@ def test_unsupported_graph_raises_one_line(registered):
 def test_missing_package_raises_with_install_command(missing, monkeypatch, linear):
     monkeypatch.setitem(sys.modules, missing, None)
     description = describe(5, 6, [GRAY], LINEAR)
-    with pytest.raises(InputError, match=rf"format=onnx needs {missing}.*'drone-rl\[onnx\]'"):
+    with pytest.raises(InputError, match=rf"format=onnx needs {missing}.*-e '.\[onnx\]'"):
         open_onnx(linear) if missing == "onnxruntime" else make_onnx(
             description, build(description), {}
         )
