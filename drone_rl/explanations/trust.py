@@ -83,6 +83,11 @@ class Trial:
         """Return the score of each map. Shape: (T, h, w) to (T,)."""
         return patches.scores(self.grid.means(maps), self.effects)
 
+    @functools.cached_property
+    def placebo_scores(self) -> dict[str, NDArray]:
+        """Scores of the placebos, by name. Shape: (T,)."""
+        return {name: self.scores(maps) for name, maps in self.placebos.items()}
+
     def thinned(self) -> "Trial":
         """Return the trial on the middle frame of each episode."""
         rows = [np.flatnonzero(self.episode == e) for e in np.unique(self.episode)]
@@ -176,8 +181,8 @@ def check_maps(
         "trusted": max(scores, key=lambda name: scores[name], default=None),
         "methods": results,
         "placebos": {
-            name: patches.summarise_scores(trial.scores(placebo), trial.episode)
-            for name, placebo in trial.placebos.items()
+            name: patches.summarise_scores(found, trial.episode)
+            for name, found in trial.placebo_scores.items()
         },
         "frames": len(trial.episode),
         "frames_unmoved": trial.still,
@@ -209,8 +214,8 @@ def check_method(
     result = {
         "score": patches.summarise_scores(scores, episode),
         "placebos": {
-            name: _median(scores - trial.scores(placebo), episode, level)
-            for name, placebo in trial.placebos.items()
+            name: _median(scores - found, episode, level)
+            for name, found in trial.placebo_scores.items()
         },
         "pointing": {
             **_median(hit - chance, episode, level),
