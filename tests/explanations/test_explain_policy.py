@@ -12,7 +12,7 @@ from drone_rl.policies import MLP
 from drone_rl.utils.errors import InputError
 from tests.explanations.quick import quick
 
-SMALL = ExplainSettings(frames=60, episodes=6, perplexity=5, seed=3)
+SMALL = ExplainSettings(frames=40, episodes=6, perplexity=5, seed=3)
 
 
 def explain(env, network, folder, settings=SMALL, **kwargs):
@@ -68,7 +68,7 @@ def test_a_section_that_can_not_be_made_is_told_of_and_the_others_are(make_pipel
     sections = {"eyes": fails, "dataset": SECTIONS["dataset"]}
     numbers = explain(env, actor.module[0].module, tmp_path, sections=sections)
     assert numbers["left_out"] == {"eyes": "It has no eyes."}
-    assert numbers["dataset"]["frames"] == 60 and "eyes" not in numbers["seconds"]
+    assert numbers["dataset"]["frames"] == SMALL.frames and "eyes" not in numbers["seconds"]
     del sections["eyes"]
     assert "left_out" not in explain(env, actor.module[0].module, tmp_path, sections=sections)
 
