@@ -1,13 +1,17 @@
 """Runs the example in a short version, and limits its length."""
 
+import functools
 from pathlib import Path
 
 import pytest
 
+import drone_rl
 from drone_rl.explanations import explain
 from drone_rl.explanations.explain import SECTIONS
+from tests.explanations.quick import quick_figures
 
 sb3 = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
+SHORT = {"num_cubes": 1, "first_distance": 6.0, "step_limit": 40}
 PATH = Path(__file__).parents[2] / "examples" / "judge_sb3.py"
 
 
@@ -16,9 +20,12 @@ def test_a_model_is_trained_saved_judged_and_explained(example, tmp_path, capsys
     kept = ("attribution", "dataset", "embedding", "evaluation")
     few = {name: SECTIONS[name] for name in kept}
     monkeypatch.setattr(explain, "SECTIONS", few)  # all of them take a minute
+    short = functools.partial(drone_rl.policy_from, task=drone_rl.TaskSettings(**SHORT))
+    monkeypatch.setattr(drone_rl, "policy_from", short)
     example.train(512, num_envs=32, steps=16).save(tmp_path / "ppo.zip")
     model = sb3.PPO.load(tmp_path / "ppo.zip")
-    example.trust(model, str(tmp_path), frames=40, episodes=6, perplexity=5)
+    with quick_figures():
+        example.trust(model, str(tmp_path), frames=40, episodes=6, perplexity=5)
     verdict, *_, report = capsys.readouterr().out.splitlines()
     assert "episodes are too few to be certain" in verdict
     page = Path(report).read_text()
