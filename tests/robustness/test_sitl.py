@@ -17,6 +17,7 @@ from drone_rl.robustness.sitl import evaluate_in_the_loop
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verdicts.bodies import chart
+from tests.flight.arming import arm_at_once
 
 STUB = Path(__file__).parents[1] / "flight" / "stub_firmware.py"
 
@@ -44,6 +45,7 @@ def flown(program):
     """An episode in the loop, and what `_fly` has returned of it."""
     returned, fly = [], looped._fly
     with pytest.MonkeyPatch.context() as patch:
+        arm_at_once(patch)
         patch.setattr(looped, "_fly", lambda *given: returned.append(fly(*given)) or returned[-1])
         done = evaluate_in_the_loop(near(), 1, seed=3, firmware=program, progress=silent)
     return done, returned[0]
