@@ -1,8 +1,4 @@
-"""Settings of sensors: rates, latencies and noise.
-
-The defaults are AirSim's where it has one. Each sensor has a factor on all of its noise, 0 for a
-perfect one.
-"""
+"""Settings of sensors: rates, latencies and noise; AirSim's defaults where it has them."""
 
 from typing import Annotated
 
@@ -13,7 +9,7 @@ FIELDS = ("dipole", "constant")
 Rate = Annotated[float, Real(0.0, 100_000.0, is_above=True, unit="Hz")]
 Latency = Annotated[float, Real(0.0, 10.0, unit="s")]
 Seconds = Annotated[float, Real(0.0, 1e9, is_above=True, unit="s")]
-Share = Annotated[float, Real(0.0, 1000.0)]
+Factor = Annotated[float, Real(0.0, 1000.0)]
 Metres = Annotated[float, Real(0.0, 10_000.0, unit="m")]
 
 
@@ -21,92 +17,92 @@ class ImuSettings(Settings):
     """Accelerometer and gyroscope; the defaults are an MPU-6000's."""
 
     rate: Rate = 1000.0
-    """Readings a second; one a tick where ticks are longer."""
-    noise: Share = 1.0
-    """Factor on all that follows; 0 for a perfect sensor."""
+    """Readings per second, at most one per simulation tick."""
+    noise: Factor = 1.0
+    """Factor on all noise, bias and drift amplitudes below; 0 for a noise-free sensor."""
     gyro_random_walk: Annotated[float, Real(0.0, 1000.0, unit="degrees/sqrt(h)")] = 0.30
-    """White noise of the gyroscope: how far its sum drifts in an hour, in degrees."""
+    """Angle random walk: standard deviation of the integrated rate after an hour, in degrees."""
     gyro_bias_stability: Annotated[float, Real(0.0, 1e6, unit="degrees/h")] = 4.6
-    """How far its bias walks in the time below, in degrees an hour."""
+    """Standard deviation of the change of the bias over `gyro_bias_time`, in degrees per hour."""
     gyro_bias_time: Seconds = 500.0
-    """That time, in seconds."""
+    """Time to which `gyro_bias_stability` refers, in seconds."""
     gyro_turn_on_bias: Annotated[float, Real(0.0, 1e6, unit="degrees/h")] = 0.0
-    """Standard deviation of its bias at the start, in degrees an hour."""
+    """Standard deviation of the bias at the start, in degrees per hour."""
     accel_random_walk: Annotated[float, Real(0.0, 1e6, unit="mg/sqrt(Hz)")] = 0.24
-    """White noise of the accelerometer, in thousandths of standard gravity."""
+    """Noise density of the accelerometer, in milli-g per root hertz (velocity random walk)."""
     accel_bias_stability: Annotated[float, Real(0.0, 1e6, unit="ug")] = 36.0
-    """How far its bias walks in the time below, in millionths of standard gravity."""
+    """Standard deviation of the change of the bias over `accel_bias_time`, in micro-g."""
     accel_bias_time: Seconds = 800.0
-    """That time, in seconds."""
+    """Time to which `accel_bias_stability` refers, in seconds."""
     accel_turn_on_bias: Annotated[float, Real(0.0, 1e6, unit="mg")] = 0.0
-    """Standard deviation of its bias at the start, in thousandths of standard gravity."""
+    """Standard deviation of the bias at the start, in milli-g."""
 
 
 class BarometerSettings(Settings):
     """Pressure of the standard atmosphere."""
 
     rate: Rate = 50.0
-    """Readings a second."""
+    """Readings per second."""
     latency: Latency = 0.0
     """Age of a reading when it is reported, in seconds."""
     sea_level_pressure: Annotated[float, Real(100.0, 2000.0, unit="hPa")] = 1013.25
-    """The day's, known to the altimeter (QNH), in hectopascals."""
-    noise: Share = 1.0
-    """Factor on all that follows; 0 for a perfect sensor."""
+    """Sea-level pressure of the day, in hectopascals; the altimeter is set to it (QNH)."""
+    noise: Factor = 1.0
+    """Factor on all noise, bias and drift amplitudes below; 0 for a noise-free sensor."""
     white_noise: Annotated[float, Real(0.0, 10_000.0, unit="Pa")] = 2.7
     """Standard deviation of a reading, in pascals: about 0.2 m."""
     drift: Annotated[float, Real(0.0, 1.0)] = 0.001825
-    """Standard deviation of the slow change of pressure, as a share of it, after a long time."""
+    """Stationary standard deviation of the relative pressure drift (Gauss-Markov)."""
     drift_time: Seconds = 3600.0
-    """In which that change forgets itself, in seconds."""
+    """Time constant of the drift, in seconds."""
 
 
 class MagnetometerSettings(Settings):
     """Earth's field along the body's axes."""
 
     rate: Rate = 50.0
-    """Readings a second."""
+    """Readings per second."""
     latency: Latency = 0.0
     """Age of a reading when it is reported, in seconds."""
     field: Annotated[str, OneOf(FIELDS)] = "dipole"
-    """dipole, a bar magnet's in the middle of Earth, or constant, that of Seattle."""
-    scale: Share = 1.0
-    """Factor of a sensor that tells too much or too little; no noise."""
-    noise: Share = 1.0
-    """Factor on all that follows; 0 for a perfect sensor."""
+    """dipole: that of a dipole at Earth's centre. constant: that of Seattle, everywhere."""
+    scale: Factor = 1.0
+    """Scale-factor error: multiplies the measured field; 1 for none."""
+    noise: Factor = 1.0
+    """Factor on all noise, bias and drift amplitudes below; 0 for a noise-free sensor."""
     white_noise: Annotated[float, Real(0.0, 100.0, unit="gauss")] = 0.005
     """Standard deviation of a reading along each axis, in gauss."""
     bias: Annotated[float, Real(0.0, 100.0, unit="gauss")] = 0.0
-    """The greatest constant error along each axis, drawn at the start, in gauss."""
+    """Largest constant error per axis, sampled at the start, in gauss."""
 
 
 class GpsSettings(Settings):
-    """A receiver that finds its satellites after a while and tells where it was."""
+    """GPS receiver with start-up time and latency."""
 
     rate: Rate = 50.0
-    """Readings a second; those of real receivers come at 5 to 10."""
+    """Readings per second; real receivers have 5 to 10."""
     latency: Latency = 0.2
     """Age of a reading when it is reported, in seconds."""
     startup: Latency = 1.0
-    """Until the first reading is taken, in seconds."""
+    """Time until the first reading is taken, in seconds."""
     first_error: Metres = 100.0
     """Stated error at the start (eph and epv), in metres."""
     last_error: Metres = 0.1
     """Stated error after a long time, in metres."""
     error_time: Seconds = 0.9
-    """In which the rest of it falls to 37%, in seconds."""
+    """Time constant with which the stated error decays to `last_error`, in seconds."""
     error_3d: Metres = 3.0
-    """Stated error up to which there is a fix in three dimensions, in metres."""
+    """Largest stated error with a fix in three dimensions, in metres."""
     error_2d: Metres = 4.0
-    """The same in two, in metres."""
-    noise: Share = 1.0
-    """Factor on all that follows; 0 for a perfect sensor."""
+    """Largest stated error with a fix in two dimensions, in metres."""
+    noise: Factor = 1.0
+    """Factor on all noise, bias and drift amplitudes below; 0 for a noise-free sensor."""
     horizontal_noise: Metres = 0.0
     """Standard deviation of a reading to the north and to the east, in metres; AirSim has none."""
     vertical_noise: Metres = 0.0
     """The same of the altitude, in metres."""
     velocity_noise: Annotated[float, Real(0.0, 1000.0, unit="m/s")] = 0.0
-    """The same of the velocity along each axis, in metres a second."""
+    """The same of the velocity along each axis, in metres per second."""
 
 
 class SensorSettings(Settings):
@@ -119,7 +115,7 @@ class SensorSettings(Settings):
     magnetometer: MagnetometerSettings = MagnetometerSettings()
     """Earth's field."""
     gps: GpsSettings = GpsSettings()
-    """Place on Earth."""
+    """Position on Earth."""
 
     @property
     def perfect(self) -> "SensorSettings":
