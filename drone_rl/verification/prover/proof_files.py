@@ -95,27 +95,36 @@ def save(prover: Prover, path: Path, proof_id: str) -> None:
     done = prover.done
     sets: dict[str, _BoxSet] = {
         "waiting": [
-            ((*dataclasses.astuple(p), prover.longest.get(p, 0)), b)
-            for p, boxes in prover.waiting.items()
-            for b in boxes
+            ((*dataclasses.astuple(state), prover.longest.get(state, 0)), boxes)
+            for state, known in prover.waiting.items()
+            for boxes in known
         ],
-        "ended": [((*_row(e), s), b) for (e, s), boxes in prover.ended.items() for b in boxes],
-        "ways": [(_row(e), b) for e, boxes in prover.fork_ends.items() for b in boxes],
-        "forked": [((), b) for b in prover.forked],
+        "ended": [
+            ((*_row(ending), steps), boxes)
+            for (ending, steps), known in prover.ended.items()
+            for boxes in known
+        ],
+        "ways": [(_row(end), boxes) for end, known in prover.fork_ends.items() for boxes in known],
+        "forked": [((), boxes) for boxes in prover.forked],
         "parts": [((), prover.parts)],
         "part": [((), prover.part)],
-        "done": [(_row(e), b) for e, b in done.endings.items()],
+        "done": [(_row(ending), boxes) for ending, boxes in done.endings.items()],
         "undecided": [((), done.undecided)],
     }
-    steps = [((*_row(e), s), v) for e, known in done.steps.items() for s, v in known.items()]
+    volumes_of = [
+        ((*_row(ending), steps), volume)
+        for ending, known in done.steps.items()
+        for steps, volume in known.items()
+    ]
     arrays: dict[str, Any] = {
         "subject": np.frombuffer(proof_id.encode(), np.uint8),
         "counts": np.array([getattr(prover, name) for name in _COUNTS], np.float64),
     }
     for name, parts in sets.items():
         arrays |= _packed(name, parts)
-    arrays["steps_rows"] = np.array([row for row, _ in steps], np.int64).reshape(len(steps), 4)
-    arrays["steps_volumes"] = np.array([volume for _, volume in steps], np.float64)
+    rows = [row for row, _ in volumes_of]
+    arrays["steps_rows"] = np.array(rows, np.int64).reshape(len(rows), 4)
+    arrays["steps_volumes"] = np.array([volume for _, volume in volumes_of], np.float64)
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
     write_atomically(path, buffer.getvalue())
@@ -141,10 +150,10 @@ def load(prover: Prover, path: Path, proof_id: str, most: int = ARRAYS_BYTES) ->
         forks = [(None if row == _UNKNOWN else _ending(row), b) for row, b in sets["ways"]]
         forked = [boxes for _, boxes in sets["forked"]]
         ((_, parts),), ((_, part),) = sets["parts"], sets["part"]
-        ((_, left),) = sets["undecided"]
+        ((_, undecided),) = sets["undecided"]
         _check(part, waiting, [*ended, *forks, *forked])
-        done = [ProofFindings({_ending(row): b}, left[:0], {}) for row, b in sets["done"]]
-        done = combine([ProofFindings({}, left, _steps(state)), *done])
+        done = [ProofFindings({_ending(row): b}, undecided[:0], {}) for row, b in sets["done"]]
+        done = combine([ProofFindings({}, undecided, _steps(state)), *done])
     except _DAMAGE as error:
         raise InputError(
             f"{path} is not a saved proof state ({error}); delete it to start again"
