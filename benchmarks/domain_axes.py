@@ -12,7 +12,7 @@ from drone_rl.robustness.axes import AXES, Axis
 from drone_rl.robustness.shifts import shifts
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import root_seed
-from drone_rl.verdicts.coverage import Coverage, find_domain, recheck_domain, require
+from drone_rl.verdicts.coverage import Coverage, compare_with_required, find_domain, recheck_domain
 
 POLICY = "robust"
 """A policy that is good in a range of positive width on every axis."""
@@ -70,7 +70,7 @@ def _problems(policy: Policy, folder: Path, name: str) -> Iterator[str]:
 
 
 def _required(policy: Policy, folder: Path, needs: Path) -> Coverage:
-    return require(policy, needs, find_domain(policy, folder))
+    return compare_with_required(policy, needs, find_domain(policy, folder))
 
 
 def _ranges(

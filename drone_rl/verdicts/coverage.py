@@ -28,12 +28,12 @@ from drone_rl.utils.readers import parse_yaml
 from drone_rl.utils.schema import Maybe, Real, as_mapping, shown
 from drone_rl.utils.seeding import RootSeed
 
-RANDOM = 2
+NUM_RANDOM_STRENGTHS = 2
 """Number of random strengths within each range, in addition to its ends."""
 MAX_FILES = 100
 """Largest number of files of `drone-rl shifts` to read."""
 Need = Mapping[str, float | None]
-"""Of an axis, "low" and "high"; None for the value without perturbation."""
+"""Required range of an axis: "low" and "high"; None stands for the value without perturbation."""
 _KEYS = ("low", "high", "unit")
 _LIMIT = Maybe(Real(-1e9, 1e9))
 _SIGNED = frozenset({"sun"})
@@ -51,7 +51,7 @@ class DomainRecheck:
     seed_is_fixed: bool
     """Whether it was chosen, so that a policy could have been fitted to it."""
     strengths: Mapping[str, tuple[float, ...]]
-    """By axis, the values that were run."""
+    """Values that were run, by axis."""
     contradictions: tuple[str, ...]
     """What contradicts the file, one line each."""
     fewest: int
@@ -124,8 +124,8 @@ def find_domain(
     if not isinstance(policy, Policy):
         if given is not None:
             raise InputError(
-                f"shifts={given}, but policy={policy.name} was made elsewhere, and is known by no "
-                "hash; leave shifts out"
+                f"policy={policy.name} is not a drone_rl policy file, so shifts={given} can't be "
+                "matched to its weights; leave shifts out"
             )
         return None
     of = policy.description, policy.state["policy"]
@@ -156,8 +156,7 @@ def read_requirements(path: Path) -> dict[str, Need]:
     The file has for each axis `{low: 40, high: 100, unit: m of sight}`; one end may be missing.
 
     Raises:
-        InputError: The file is missing or damaged, an axis does not exist, a unit is not its own,
-            or a range is none.
+        InputError: The file is missing or damaged, or an axis, unit or range in it is wrong.
     """
     parse = parse_json if path.suffix == ".json" else parse_yaml
     try:
@@ -181,7 +180,7 @@ def _read_need(name: str, value: Any) -> Need:
     if unknown:
         raise InputError(f"{name}.{shown(unknown[0])} is unknown; {example}")
     if given.get("unit") != axis.unit:
-        raise InputError(f"{name}.unit={shown(given.get('unit'))} is not its own; {example}")
+        raise InputError(f"{name}.unit={shown(given.get('unit'))} is wrong; {example}")
     low, high = (_LIMIT.read(given.get(end), f"{name}.{end}") for end in ("low", "high"))
     if low is None and high is None:
         raise InputError(f"{name} has neither low nor high; {example}")
@@ -192,12 +191,15 @@ def _read_need(name: str, value: Any) -> Need:
     least = min(end for end in (low, high) if end is not None)
     if least < 0 and name not in _SIGNED:
         raise InputError(
-            f"{name} has {least:g}, and there is nothing below 0; give how much, whichever way"
+            f"{name}: limits must be 0 or more because the axis is a magnitude, got {least:g}; "
+            f"{example}"
         )
     return {"low": low, "high": high}
 
 
-def require(policy: BasePolicy, needed: str | Path, measured: SavedShifts | None) -> Coverage:
+def compare_with_required(
+    policy: BasePolicy, needed: str | Path, measured: SavedShifts | None
+) -> Coverage:
     """Compare the requirements in a file with a policy's operating domain.
 
     See `read_requirements` and `find_domain`.
@@ -209,7 +211,7 @@ def require(policy: BasePolicy, needed: str | Path, measured: SavedShifts | None
     given = policy.path if isinstance(policy, Policy) else policy.name
     remedy = f"run drone-rl shifts policy={given} first, in the same task"
     if measured is None:
-        raise InputError(f"require_domain={needed}, but no domain of it was measured; {remedy}")
+        raise InputError(f"require_domain={needed}, but the policy has no shifts.json; {remedy}")
     if measured.numbers is None:
         raise InputError(f"require_domain={needed}, but {measured.refused}; {remedy}")
     if not measured.has_ranges:
@@ -230,8 +232,7 @@ def recheck_domain(
     """Run new episodes at the ends of the required ranges and at random strengths within them.
 
     `needs` are from `read_requirements`, `numbers` as in `shifts.json`; the settings have
-    `domain_flights` and `good_share`. `seed` is the root of the random streams of the sample and of
-    its environments.
+    `domain_flights` and `good_share`. `seed` is the root of all random streams.
     """
     from drone_rl.robustness.shifts import make_evaluated_policy  # slow to import: it draws charts
 
@@ -274,7 +275,7 @@ def _strengths(
     """The ends other than no perturbation, and random strengths between them, each once."""
     low, high = needed_range(numbers["axes"][axis.name], need)
     ends = sorted(axis.position(axis.strength(value, subject)) for value in (low, high))
-    drawn = rng.uniform(ends[0], ends[1], RANDOM) if ends[0] < ends[1] else []
+    drawn = rng.uniform(ends[0], ends[1], NUM_RANDOM_STRENGTHS) if ends[0] < ends[1] else []
     seen: set[float] = set()
     for position in (*ends, *(float(one) for one in drawn)):
         strength = axis.at(position)

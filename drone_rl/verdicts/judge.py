@@ -32,7 +32,7 @@ from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
 from drone_rl.utils.text import rate, say, seed_line
 from drone_rl.verdicts.certificate import find_claim
-from drone_rl.verdicts.coverage import Coverage, find_domain, recheck_domain, require
+from drone_rl.verdicts.coverage import Coverage, compare_with_required, find_domain, recheck_domain
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Judgement:
     settings: JudgeSettings
     verdict: Verdict
     certificate: Path | None = None
-    """File next to the policy or given, whether it is quoted or not."""
+    """The given file or that next to the policy, even if the verdict does not quote it."""
     measured: SavedShifts | None = None
     """Its robustness evaluation, if there is one."""
     coverage: Coverage | None = None
@@ -153,7 +153,7 @@ def judge(
     if not isinstance(policy, list | tuple):
         return judge_one(cast("Any", policy), settings, **how)
     if not policy:
-        raise InputError("policy=[] names nobody; give one or more policies")
+        raise InputError("policy=[] is empty; give one or more policies")
     for one in policy:  # a wrong one is refused before any episode
         if one not in BASELINES:
             as_policy(one, how.get("outputs", "outputs"))
@@ -197,8 +197,7 @@ def judge_one(
         changes: Settings to change, as in `judge("good", episodes=1000)`.
 
     Raises:
-        InputError: The policy, a setting or a file is unusable, or a domain is required and none
-            was measured.
+        InputError: A policy, setting or file is unusable, or a required domain was not measured.
     """
     settings, seed = with_seed((settings or JudgeSettings()).replace(**changes), drawn_seed)
     progress = progress or Bar()
@@ -219,7 +218,8 @@ def judge_one(
         loaded = loaded.in_dynamics(**dynamics) if dynamics else loaded
         loaded = loaded if appearance is None else loaded.in_appearance(appearance)
         measured = find_domain(loaded, shifts, outputs)
-        coverage = require(loaded, require_domain, measured) if require_domain is not None else None
+        needs = require_domain
+        coverage = None if needs is None else compare_with_required(loaded, needs, measured)
         coverage = _reflown(loaded, coverage, measured, settings, seed)
         where = {"device": settings.device, "renderer": settings.renderer}
         flights = settings.certificate_flights

@@ -11,7 +11,7 @@ from benchmarks.evidence import changed
 from drone_rl.policies.zoo import shifts_path
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
-from drone_rl.verdicts.coverage import find_domain, require
+from drone_rl.verdicts.coverage import compare_with_required, find_domain
 from tests.robustness.making import shifts_of
 
 
@@ -62,7 +62,7 @@ def test_what_is_given_must_be_believed(good, tmp_path):
         find_domain(good.in_task(num_cubes=2), path)
     foreign = drone_rl.policy_from(lambda pictures: pictures.flatten(1)[:, :3])
     assert find_domain(foreign, outputs=tmp_path) is None
-    with pytest.raises(InputError, match="made elsewhere"):
+    with pytest.raises(InputError, match="is not a drone_rl policy file"):
         find_domain(foreign, path)
 
 
@@ -73,7 +73,7 @@ def test_what_is_given_must_be_believed(good, tmp_path):
 def test_what_is_required_is_held_against_what_was_found(good, tmp_path, needs, lacks):
     (tmp_path / "needs.yaml").write_text(needs)
     measured = find_domain(good, leave(tmp_path / "a", shifts_of(good)))
-    found = require(good, tmp_path / "needs.yaml", measured)
+    found = compare_with_required(good, tmp_path / "needs.yaml", measured)
     assert [*found.lacking] == lacks and found.is_stated == (not lacks)
     assert not found.is_covered  # nothing was flown to check it
     said = "blur: needed" if lacks else "the file states it, and no episodes re-checked it"

@@ -54,14 +54,14 @@ def test_a_poor_policy_is_contradicted_where_nothing_is_different():
 
 
 def test_a_fresh_seed_is_stated_as_such(good, monkeypatch):
-    monkeypatch.setattr("drone_rl.verdicts.coverage.RANDOM", 0)
+    monkeypatch.setattr("drone_rl.verdicts.coverage.NUM_RANDOM_STRENGTHS", 0)
     few, seed = FEW.replace(domain_flights=2), RootSeed(8, False)
     found = recheck_domain(good, {"blur": need(high=0.5)}, shifts_of(good), few, seed)
     assert (found.seed, found.seed_is_fixed) == (8, False) and "(fresh seed 8" in str(found)
 
 
 def test_with_fewer_successes_it_would_have_been_contradicted(good, monkeypatch):
-    monkeypatch.setattr("drone_rl.verdicts.coverage.RANDOM", 0)
+    monkeypatch.setattr("drone_rl.verdicts.coverage.NUM_RANDOM_STRENGTHS", 0)
     found = recheck_domain(good, {"blur": need(high=0.5)}, shifts_of(good), FEW, SEED)
     confidence = 1 - 0.05 / 2 / len(Rule().quantities)  # two strengths, the neutral one included
 

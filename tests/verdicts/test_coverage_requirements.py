@@ -45,14 +45,17 @@ def test_what_shifts_leaves_can_be_needed(read):
         ("a: !!python/object/apply:os.getcwd []", "no plain YAML"),
         ("wind: {low: 1, unit: m/s}", "'wind' is not an axis; give one or more of: object_color"),
         ("fog: 60", "fog=60 must be a mapping"),
-        ("fog: {low: 60, unit: km}", "fog.unit='km' is not its own; give .* unit: m of sight"),
-        ("fog: {low: 60}", "fog.unit=None is not its own"),
+        ("fog: {low: 60, unit: km}", "fog.unit='km' is wrong; give .* unit: m of sight"),
+        ("fog: {low: 60}", "fog.unit=None is wrong"),
         ("fog: {least: 60, unit: m of sight}", "fog.'least' is unknown"),
         ("fog: {unit: m of sight}", "neither low nor high"),
         ("fog: {low: 60, high: 40, unit: m of sight}", "from 60 to 40, which is less"),
         ("fog: {low: sixty, unit: m of sight}", "fog.low='sixty' is out of range"),
         ("fog: {high: .inf, unit: m of sight}", "fog.high=inf is out of range"),
-        ("camera_yaw: {low: -5, high: 5, unit: degrees}", "nothing below 0"),
+        (
+            "camera_yaw: {low: -5, high: 5, unit: degrees}",
+            "camera_yaw: limits must be 0 or more because .*, got -5; give low",
+        ),
     ],
 )
 def test_mistakes_get_one_line_that_names_the_file(read, text, message):

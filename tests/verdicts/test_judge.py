@@ -49,7 +49,7 @@ def test_several_at_once(good):
     assert alone.verdict.evidence == done[1].verdict.evidence
     both = drone_rl.judge((good, "oracle"), episodes=2, sampled=False, progress=silent)
     assert [one.name for one in both] == ["good", "oracle"]
-    with pytest.raises(InputError, match=r"policy=\[\] names nobody"):
+    with pytest.raises(InputError, match=r"policy=\[\] is empty"):
         drone_rl.judge([])
     with pytest.raises(InputError, match="policy=nope does not exist"):
         drone_rl.judge(["oracle", "nope"], progress=refused)
