@@ -157,7 +157,10 @@ def from_config(cls: type[S], config: Any, where: str = "") -> S:
 
 
 def variant_of(part: type[Variant], config: Any, where: str) -> Variant:
-    """Read a variant of a part from "_target_" and values; nothing is imported before it is built.
+    """Read a variant of a part from "_target_" and values.
+
+    A dotted name is imported only when the variant is built. Another name that is not registered
+    loads the entry points of installed packages.
 
     Returns:
         A registered variant. For the dotted name of another class, or for further values, a variant
@@ -166,7 +169,8 @@ def variant_of(part: type[Variant], config: Any, where: str) -> Variant:
     values = dict(as_mapping(config, where))
     target = values.pop("_target_", None)
     if not isinstance(target, str):
-        raise InputError(f"{where}._target_={shown(target)} names nothing; give what makes it")
+        must = "must be a registered name or a dotted class name"
+        raise InputError(f"{where}._target_ {must}, got {shown(target)}")
     known = next((v for v in part.variants() if v.target == target), part)
     if known is part and "." not in target:
         known = part.named(target, f"{where}._target_")
@@ -220,7 +224,7 @@ def _read(hint: Any, value: Any, where: str) -> Any:
 
 
 def _with_target(part: type[Variant], name: str, value: Any) -> Any:
-    """Return the values of a step; one named like a registered part needs no "_target_"."""
+    """Add "_target_" to an entry of `transforms` or `logger` whose key is a registered name."""
     if not isinstance(value, Mapping) or "_target_" in value:
         return value
     known = next((v for v in part.variants() if v.registered_name() == name), None)
