@@ -21,7 +21,7 @@ from torchrl.collectors import BaseCollector
 from drone_rl.collectors.episodes import EpisodeCollector
 from drone_rl.utils.errors import InputError, extra
 
-Parts = tuple[EpisodeCollector, nn.Module, torch.Generator]
+WorkerComponents = tuple[EpisodeCollector, nn.Module, torch.Generator]
 """A worker's collector, the network inside it and the stream of its actions."""
 
 _log = logging.getLogger(__name__)
@@ -30,7 +30,9 @@ _log = logging.getLogger(__name__)
 class RemoteEpisodes(BaseCollector):
     """Run an `EpisodeCollector` in a worker, with the parameters and state of each request."""
 
-    def __init__(self, create_env_fn: Sequence[Callable[[], Parts]], **unused: object) -> None:
+    def __init__(
+        self, create_env_fn: Sequence[Callable[[], WorkerComponents]], **unused: object
+    ) -> None:
         super().__init__()
         torch.set_num_threads(1)
         self._episodes, self._network, self._actions = create_env_fn[0]()
@@ -80,7 +82,7 @@ class RayEpisodeCollector:
 
     def __init__(
         self,
-        makers: Sequence[Callable[[], Parts]],
+        makers: Sequence[Callable[[], WorkerComponents]],
         actor: TensorDictModuleBase,
         network: nn.Module,
         *,
@@ -182,7 +184,7 @@ class RayEpisodeCollector:
 
 
 def _start(
-    makers: Sequence[Callable[[], Parts]], address: str | None, num_cpus: float
+    makers: Sequence[Callable[[], WorkerComponents]], address: str | None, num_cpus: float
 ) -> tuple[Any, Any]:
     """Return the module ray and TorchRL's collector, whose workers are ready."""
     ray = extra("ray", "ray", "collector=ray")

@@ -91,8 +91,8 @@ def register_returns(name: str) -> Callable[[F], F]:
 def register_learner(name: str) -> Callable[[F], F]:
     """Decorate a class or function to register it as a learner, selected by `objective=NAME`.
 
-    It is called as `factory(settings, parts, **own)`, with the settings of the training run and
-    the result of `drone_rl.training.components.make_collector`, and returns a
+    It is called as `factory(settings, components, **own)`, with the settings of the training run
+    and the result of `drone_rl.training.components.make_collector`, and returns a
     `drone_rl.training.learners.Learner`. See `register_network` for errors.
     """
     return lambda factory: _register(Objective, name, factory, 2)

@@ -66,17 +66,17 @@ def make_collector(settings: TrainSettings, replay: FailureReplayTask | None = N
     return settings.collector.make(settings, replay)  # by default `train.threaded_collector`
 
 
-def learning_actor(settings: TrainSettings, parts: Components) -> Any:
+def learning_actor(settings: TrainSettings, components: Components) -> Any:
     """Return the actor that the loss evaluates, with a fused network if it is supported.
 
     The fused kernel has `trainer.num_threads` threads of its own; PyTorch then gets one.
     """
-    actor, threads = parts.collector.actor, settings.trainer.num_threads
+    actor, threads = components.collector.actor, settings.trainer.num_threads
     if not settings.trainer.compiled:
         return actor
-    cache = parts.collector.cache_activations
-    fused = accelerated_gradients(parts.network, threads, cache=cache)
-    if fused is parts.network:
+    cache = components.collector.cache_activations
+    fused = accelerated_gradients(components.network, threads, cache=cache)
+    if fused is components.network:
         return actor
     torch.set_num_threads(1)
     return make_actor(fused, actor.spec["action"])

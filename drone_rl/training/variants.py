@@ -41,7 +41,7 @@ def rollout_collector(
 
 @implements(A2c, Ppo)
 def actor_critic_learner(
-    settings: TrainSettings, parts: Components, **own: Any
+    settings: TrainSettings, components: Components, **own: Any
 ) -> ActorCriticLearner:
     """Make the learner with a critic, on the policy's features or with its own network.
 
@@ -51,11 +51,11 @@ def actor_critic_learner(
     assert isinstance(objective, WithCritic)
     weights = torch_generator(settings.seed, Stream.CRITIC_INIT)
     critic = None if objective.shares_trunk else describe(settings).build_critic(weights)
-    model = ActorCritic(parts.network, critic, weights).to(settings.device)
+    model = ActorCritic(components.network, critic, weights).to(settings.device)
     loss = locate(objective.target)(model.actor, model.critic, functional=False, **own)
     optimizer = settings.optimizer.make(model.parameters())
     learner = ActorCriticLearner(
-        network=parts.network,
+        network=components.network,
         model=model,
         estimator=settings.returns.make().to(settings.device),
         loss=loss.to(settings.device),
@@ -66,7 +66,7 @@ def actor_critic_learner(
         chunk_frames=settings.trainer.chunk_frames,
         **objective.passes,
     )
-    parts.collector.postproc = learner.estimate
+    components.collector.postproc = learner.estimate
     return learner
 
 
