@@ -100,9 +100,9 @@ class VerdictCommand(AppearanceCommandSettings, JudgeSettings):
     """Certificate file to quote; null takes the one next to the policy, if it matches:
     certificate.json in the folder of a run, NAME.certificate.json next to NAME.safetensors."""
     require: Annotated[str, OneOf(("good", "proved"))] | None = None
-    """good: exit status 0 only if the policy is certainly good. proved: 0 only if a certificate
-    proves success from every placement and rollouts re-checked it, else 16. null: one exit status
-    for each kind."""
+    """good or null: exit status 0 only if the policy is certainly good, otherwise one per kind.
+    proved: 0 only if a certificate proves success from every placement and rollouts re-checked it,
+    otherwise 16."""
     shifts: str | None = None
     """File shifts.json to quote; null takes the one next to the policy, otherwise the newest under
     outputs/shifts of this network and task."""
@@ -127,7 +127,7 @@ class ShiftsCommand(RolloutCommandSettings, ShiftSettings):
     """Settings of `drone-rl shifts`."""
 
     def run(self, folder: Path) -> tuple[int, float]:
-        """Measure robustness; return the exit status and the mean success over strengths."""
+        """Measure robustness; return the exit status and the mean area under the success curves."""
         chosen, given = self.as_base(ShiftSettings), self.shared()
         done = drone_rl.shifts(self.policy, chosen, dynamics=self.dynamics, **given, progress=log)
         finish(done, folder, "shifts.json, shifts.png and strips.png")
@@ -149,15 +149,13 @@ class ExportCommand(CommandSettings, HeldOutSettings):
     """Settings of `drone-rl export`."""
 
     policy: str = "latest"
-    """Policy: a .pt or .safetensors file, the folder of a run, latest, or a shipped policy's
-    name."""
+    """Policy: a .pt or .safetensors file, folder of a run, latest, or name of a shipped policy."""
     name: Annotated[str, FileName()] = "policy"
     """Name of the files, without extension."""
     format: Annotated[str, OneOf(("safetensors", "onnx"))] = "safetensors"
-    """safetensors with a model card, or onnx, an ONNX model of RGB image to action
-    probabilities."""
+    """safetensors with model card, or onnx: a model from RGB image to action probabilities."""
     command: Annotated[str, COMMAND] | None = None
-    """Training command for the card; null takes the run's own settings."""
+    """Training command for the model card; null takes that of the run's settings."""
     certificate: str | None = None
     """Certificate file for the card; null takes the one next to the policy, if it matches."""
     shifts: str | None = None

@@ -24,8 +24,8 @@ class ExplainCommand(CommandSettings, ExplainSettings):
     num_envs: Annotated[int, Whole(1, unit="environments")] = 128
     """Environments in a batch; bounds memory."""
     require: Annotated[str, OneOf(tuple(Kind))] | None = None
-    """Kind of verdict to require, such as good; other kinds end with exit status 10 to 13 or 18.
-    null accepts all kinds."""
+    """Kind of verdict to require, such as good; other kinds and uncertain verdicts end with exit
+    status 10 to 13 or 18. null accepts all kinds."""
     task: TaskChanges = no_changes()
     """Changes of the policy's task settings (see conf/task), as in task.num_cubes=5."""
     dynamics: DynamicsChanges = no_changes()

@@ -32,7 +32,7 @@ class CommandSettings(Settings):
         raise NotImplementedError
 
     def used_policy(self, folder: Path) -> str:
-        """Return the argument `policy=` that selects the policy which the command used."""
+        """Return the value of `policy=` that selects the policy which this command used."""
         del folder
         which = getattr(self, "policy", None) or "latest"
         which = which if isinstance(which, str) else which[0]
@@ -44,8 +44,7 @@ class PolicyCommandSettings(CommandSettings):
     """Settings of a command on one policy and its task."""
 
     policy: str = "latest"
-    """Policy: a .pt or .safetensors file, the folder of a run, latest, or a shipped policy's
-    name."""
+    """Policy: a .pt or .safetensors file, folder of a run, latest, or name of a shipped policy."""
     task: TaskChanges = no_changes()
     """Changes of the policy's task settings (see conf/task), as in task.num_cubes=5."""
 

@@ -21,7 +21,7 @@ class SweepReportCommand(CommandSettings):
     judge: bool = False
     """Whether to repeat the verdict on each finished run's last.pt with the current rule."""
     episodes: Annotated[int, Whole(1, unit="episodes")] = 200
-    """Episodes of each of these verdicts, in environments for selection."""
+    """Episodes of each of these verdicts, in environments reserved for model selection."""
     device: str = "cpu"
     """Device of these episodes: cpu, cuda or cuda:N."""
 

@@ -44,8 +44,7 @@ class JudgeSettings(HeldOutSettings):
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
     """A good policy succeeds in more than this fraction of the oracle's episodes."""
     certificate_flights: Annotated[int, Whole(0, 10_000_000, "rollouts")] = 1000
-    """Rollouts that re-check a quoted certificate, as drone-rl check does; with 0 it proves
-    nothing."""
+    """Rollouts that re-check a quoted certificate like drone-rl check; with 0 it proves nothing."""
     domain_flights: Annotated[int, Whole(0, 100_000, "episodes")] = 200
     """New episodes at each sampled strength of the required domain, the ends of each range and two
     random ones within it; with 0 it is not covered."""
@@ -188,7 +187,8 @@ class ChanceSettings(DeviceSettings):
     """Seed of the held-out placements; null takes a fresh one from the operating system, which is
     printed and recorded."""
     within: Annotated[float, Real(0.0, 10_000.0, unit="m")] = 0.0
-    """Metres to either side of each cube within which success is bounded; 0 for none."""
+    """Half-width in metres of a box around the cube positions; the success probability is bounded
+    over the box; 0: exact at the positions."""
     parts: Annotated[int, Whole(1, 1_000_000, "parts")] = 20
     """Cells of such a box: more cells give tighter bounds and take longer."""
 

@@ -106,7 +106,8 @@ class TrainSettings(Settings):
     renderer: RendererName = "raytrace"
     """Renderer: raytrace, this package's ray tracer, or mujoco_warp, MuJoCo Warp's."""
     evaluate_after: Annotated[int, Whole(0, unit="episodes")] = 0
-    """Episodes of the final verdict on last.pt, in environments for selection; 0 for no verdict."""
+    """Episodes of a verdict on last.pt after training, in environments reserved for model selection
+    (never for training or reported figures); 0 for none."""
 
     def check(self) -> None:
         """Refuse parts that don't work together."""

@@ -59,8 +59,7 @@ GROUPS: dict[str, type[Settings]] = {
 }
 """Groups whose files start from the schema `base_<group>`."""
 _CHANGED = (DynamicsSettings,)
-"""Groups of which commands accept changes: a file of the group contains all of its settings, so its
-schema extends that of the changes."""
+"""Groups of which commands accept changes; the schema of their files extends that of changes."""
 PARTS: dict[str, type[Variant]] = {
     "network": Network,
     "returns": Returns,
@@ -232,9 +231,9 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
 
 
 def _may_be_multirun(name: str, overrides: Sequence[str]) -> bool:
-    """Return whether Hydra must find out its mode, which costs a composition of the settings.
+    """Return whether Hydra must determine its mode, which takes another composition of settings.
 
-    If only a file of a group starts many runs, Hydra rejects the mode after its composition.
+    Otherwise the mode is a single run. Hydra rejects a file of a group that asks for a multirun.
     """
     text = (conf_dir() / f"{name}.yaml").read_text()
     return any(map(_MULTIRUN_WORDS.search, overrides)) or bool(_MULTIRUN_TEXT.search(text))

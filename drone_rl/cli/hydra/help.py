@@ -117,8 +117,8 @@ def comments(command: str, conf: Path, chosen: dict[str, str | None]) -> dict[st
     `command` is the name of its file in `conf`, `chosen` the file of each group.
     """
     found = {"plugins": "Modules that register parts of your own: networks, transforms and so on."}
-    moved = read_comments(conf / "dynamics" / "computer_vision.yaml")
-    found |= {f"dynamics.{key}": text for key, text in moved.items()}
+    dynamics = read_comments(conf / "dynamics" / "computer_vision.yaml")
+    found |= {f"dynamics.{key}": text for key, text in dynamics.items()}
     tasks = conf / "task"
     for path in [*sorted(tasks.glob("*.yaml")), tasks / "collect_cubes.yaml"]:  # the last one wins
         found |= {f"task.{key}": text for key, text in read_comments(path).items()}

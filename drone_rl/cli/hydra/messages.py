@@ -73,7 +73,7 @@ def _errors_in_threads() -> list[OSError]:
 
 
 def is_mistake(error: Exception) -> bool:
-    """Return whether an error is the user's; logging wraps those of its files."""
+    """Return whether the user made a mistake; logging wraps an OSError in a ValueError."""
     is_wrapped = isinstance(error, ValueError) and isinstance(error.__cause__, OSError)
     return isinstance(error, MISTAKES) or is_wrapped
 
