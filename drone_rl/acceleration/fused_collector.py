@@ -143,11 +143,11 @@ class FusedCollector:
 
     def _run(self, num_envs: int) -> tuple[Tensor, dict[str, Tensor]]:
         """Return the environment of each step, episode after episode, and what the kernel wrote."""
-        taken, reasons = self._rules.steps[:num_envs], self._rules.end_reasons[:num_envs]
+        taken, end_reasons = self._rules.steps[:num_envs], self._rules.end_reasons[:num_envs]
         is_observed = self._direct.keep_observations
         seen = ("pixels", "logits") if is_observed else ()
         names, parts = ("action", "reward", "end_reason", *seen), []
-        while not (parts and bool(reasons.all())):
+        while not (parts and bool(end_reasons.all())):
             before, first = taken.clone(), len(parts) * self._num_rows
             self._launch(num_envs, len(parts), names)
             envs, rows = self._written(taken - before)
@@ -180,7 +180,7 @@ class FusedCollector:
         rollout.end_reasons = wp.from_torch(opened["end_reason"])
         if self._cache is not None:
             first, last = part * self._num_rows, (part + 1) * self._num_rows
-            # of no rows if there is not enough memory
+            # an empty slice if the cache has too little memory
             rollout.outputs = wp.from_torch(self._cache.outputs[first:last])
 
         def run_span(member: int, first: int, last: int) -> None:

@@ -91,7 +91,7 @@ def _sample_pixels(observations: Tensor) -> Tensor:
 
 
 class FusedNetwork(ImageNetwork):
-    """Compute the same logits and gradients as a network, faster than torch.
+    """Compute a network's logits and gradients faster than torch, up to the rounding of sums.
 
     With a small network, torch spends a third of its time between matrix products. The fused kernel
     passes blocks of observations through all layers, so that the activations stay in cache.
@@ -264,7 +264,10 @@ class _Engine:
         return saved.outputs.take(saved.rows[:, None].long() * self._size + last)
 
     def gradients(self, pixels: Tensor, saved: _Activations, grad_output: Tensor) -> list[Tensor]:
-        """Return gradients with respect to parameters or pixels; later calls may reuse `saved`."""
+        """Return gradients of parameters or pixels.
+
+        Invalidates `saved`: a later forward pass may overwrite its buffer.
+        """
         if self._cache is not None and saved.generation not in (None, self._cache.generation):
             raise RuntimeError("a batch was collected between the forward and the backward pass")
         self._gradients.zero_()

@@ -139,7 +139,7 @@ class SteppingCollector:
         """Return None: PyTorch discards the activations of the forward pass."""
 
     def collect(self, num_envs: int) -> TensorDictBase:
-        """Run an episode in each of the first environments; trajectories count from 0."""
+        """Run an episode in each of the first environments; traj_ids are 0 to num_envs - 1."""
         self._env.num_envs = num_envs
         self._actor.exploration = exploration_type()
         self._collector.reset_at_each_iter = True

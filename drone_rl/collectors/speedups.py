@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     )
 
 Acceleration = Literal["none", "direct", "fused"]
-"""Of a collector: TorchRL's steps; steps without TorchRL, which give the same bit for bit; or one
-kernel for whole episodes, which samples and sums in another order."""
+"""Implementation. "none": step with TorchRL. "direct": step without it, bit-identical. "fused": one
+kernel per batch of episodes; sampling and sums are in another order."""
 MISSING = Reasons(["drone_rl.acceleration is not installed"])
 
 

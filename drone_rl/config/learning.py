@@ -106,8 +106,7 @@ class Ray(CompleteEpisodes, target="ray"):
     """Batches of complete episodes from workers on a Ray cluster."""
 
     num_threads: Annotated[int, Whole(1, unit="workers")] = 2
-    """Workers, each with its part of the environments and its own stream of actions, so results for
-    a seed differ."""
+    """Workers with own environments and action streams; results depend on their number."""
     address: str | None = None
     """Address of the cluster, such as auto or ray://host:10001; null starts one on this machine."""
     num_cpus: Annotated[float, Real(0.0, is_above=True, unit="cores")] = 1.0

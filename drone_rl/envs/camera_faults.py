@@ -74,7 +74,7 @@ class CameraFault(ObservationTransform):
         return self._shown(next_tensordict, images)
 
     def _fits(self, images: Tensor) -> bool:
-        """Return whether there is a memory of so many environments."""
+        """Return whether the memory has as many environments as the images."""
         return self._memory is not None and len(self._memory) == len(images)
 
     def _begin(self, envs: Tensor, images: Tensor) -> None:
@@ -173,7 +173,7 @@ class Noise(_BuiltInFault):
 
 @implements(settings.DeadRows)
 class DeadRows(_BuiltInFault):
-    """Blank rows: fixed ones, or of each episode; see `drone_rl.config.transforms.DeadRows`."""
+    """Blank `rows` and `count` random rows per episode; see `config.transforms.DeadRows`."""
 
     def _model(self, own: settings.DeadRows) -> FaultModel:
         model = dead_rows(own.count, own.rows, own.level)

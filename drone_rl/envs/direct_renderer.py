@@ -23,7 +23,7 @@ _END_REASON = ("next", "info", "end_reason")
 
 
 class Reasons(tuple[str, ...]):
-    """Reasons why an implementation does not support a configuration; at least one."""
+    """Reasons why an implementation does not support a configuration; empty if there is none."""
 
     def __str__(self) -> str:
         return "; ".join(self)

@@ -65,7 +65,7 @@ class DroneEnv(EnvBase):
             seed: Root of the environments' random streams.
             stream: Purpose of the environments; training and evaluation use different streams.
             first_world: Number of the first environment, so that workers use different streams.
-            num_shards: Rendering threads; the number of cores by default.
+            num_shards: Threads that render on the CPU; the number of cores by default.
             pixels: Whether to render; policies that read the ground truth don't need it.
             device: "cpu", "cuda" or "cuda:N".
             dynamics: Vehicle dynamics; the task's default if None.
@@ -75,8 +75,7 @@ class DroneEnv(EnvBase):
 
         Raises:
             InputError: A setting is out of range, a texture can't be read, there is no room for
-                the camera or for distractors, or `actions` are given with dynamics that have their
-                own.
+                the camera or for distractors, or `actions` are given with dynamics that have some.
         """
         if not (isinstance(num_envs, int) and num_envs >= 1):
             raise InputError(f"num_envs={num_envs} is out of range; give a whole number from 1")

@@ -33,8 +33,7 @@ class Evaluation:
     policy: BasePolicy
     settings: EvaluateSettings
     figures: dict[str, dict[str, Any]]
-    """Figures by name, see `drone_rl.evaluation.metrics.summarise`: "greedy", "sampled" and the
-    baselines."""
+    """Figures of "greedy", "sampled" and the baselines; see `evaluation.metrics.summarise`."""
     seed: RootSeed
     """Root of the environments' random streams."""
     rounding: dict[str, Any] | None = None

@@ -12,8 +12,7 @@ from drone_rl.policies.rounding import Decide
 from drone_rl.sim.tasks import State
 
 MAX_FRAGILE = 0.02
-"""Largest fraction of fragile frames with which a verdict can be certain. Honest policies have at
-most 0.002."""
+"""Largest fraction of fragile frames for a certain verdict; honest policies have at most 0.002."""
 MAX_FRAGILE_EPISODES = 0.25
 """Largest fraction of episodes with a fragile frame. Honest policies have at most 0.06."""
 MAX_UNEXPLAINED = 0.04

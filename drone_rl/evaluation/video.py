@@ -127,8 +127,7 @@ def film_episode(
 ) -> Iterator[np.ndarray]:
     """Run one episode in a single environment and yield its video frames.
 
-    The policy takes the most probable action, or samples it; its "logits", if it has any, are shown
-    as probabilities.
+    The policy takes the most probable action, or samples it; "logits" are shown as probabilities.
 
     Yields:
         RGB frames, uint8. Shape: (720, 1280, 3).
@@ -239,8 +238,7 @@ def _draw_bars(
 def render_chase(worlds: Worlds, look: Appearance | None, height: int, width: int) -> Tensor:
     """Render the drones from behind, in an appearance that all environments share.
 
-    With flight dynamics the chase camera follows the heading only, so that the tilt of the body is
-    visible.
+    With flight dynamics the chase camera follows the heading only, so that tilt is visible.
 
     Returns:
         Colours. Shape: (num_envs, height, width, 3), uint8.

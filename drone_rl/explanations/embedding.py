@@ -48,8 +48,7 @@ def embed(
 ) -> tuple[NDArray, dict[str, float]]:
     """Embed points (T, *) in the plane (Eqs. 16 and 17); return them (T, 2), and `faithfulness`.
 
-    The perplexity is the effective number of neighbours of a point; a seed below 2**32 fixes the
-    result.
+    The perplexity is the effective number of neighbours; a seed below 2**32 fixes the result.
 
     Raises:
         InputError: There are too few points for the perplexity, or one is not finite.

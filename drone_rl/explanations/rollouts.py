@@ -131,8 +131,7 @@ def collect(
 def select_frames(episode: NDArray, num_frames: int) -> NDArray:
     """Return indices of the same number of frames of each episode, evenly spaced in time.
 
-    `episode` has the episode of each frame, from 0, in order. If there are fewer than `num_frames`,
-    all are selected.
+    `episode` has the episode of each frame, from 0, in order. At most `num_frames` are selected.
     """
     lengths = np.bincount(episode)
     quota = np.zeros_like(lengths)

@@ -100,8 +100,7 @@ class RoundingBound:
     def together(self, pixels: Tensor) -> tuple[Tensor, Tensor]:
         """Return the outputs for frames (N, C, H, W), float32, and one bound for all frames.
 
-        The bound is the largest error of each output, (outputs,), float64; infinite where a sum may
-        overflow.
+        The bound is each output's largest error, (outputs,), float64; infinite if it may overflow.
         """
         largest = pixels.abs().amax(0, keepdim=True).double()
         error = _pixel_error(largest.amax().clamp(min=UNIT)).expand_as(largest)

@@ -53,8 +53,7 @@ class SavedShifts:
     path: Path
     """Their file."""
     numbers: dict[str, Any] | None
-    """As in `shifts.json`, without images but with "file", its "path" and date ("dated"); None if
-    refused."""
+    """As in `shifts.json`, without images but with "file" ("path", "dated"); None if refused."""
     pictures: Mapping[str, list[NDArray | None]] = dataclasses.field(default_factory=dict)
     """See `Shifts.pictures`."""
     refused: str | None = None
@@ -77,8 +76,7 @@ def read_shifts(
     """Read the robustness evaluation of a policy in its task from a JSON file.
 
     Raises:
-        InputError: It is missing, damaged, of another network, camera or task, or contradicts
-            itself.
+        InputError: It is missing, damaged, inconsistent, or of another network, camera or task.
     """
     content = read_bytes(path, SHIFTS_BYTES)
     policy: Any = described  # has what axes read of an EvaluatedPolicy

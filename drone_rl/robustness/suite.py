@@ -78,8 +78,7 @@ class Suite:
 
         Returns:
             "refused": why the task or the camera does not allow it, or None; "oracle": the oracle's
-            success rate, if the task has an oracle; "impossible": whether that is too low; "modes":
-            figures by mode.
+            success rate, if any; "impossible": whether that is too low; "modes": figures by mode.
         """
         try:
             self._evaluator.settings(condition)

@@ -120,8 +120,7 @@ def judge_run(
     that are compared.
 
     Raises:
-        InputError: The run has no result, or its last checkpoint is unusable or does not belong to
-            the result.
+        InputError: The run has no result, or its last checkpoint is unusable or of another run.
     """
     from drone_rl.evaluation.verdict import judge_for_selection  # imports torch
 

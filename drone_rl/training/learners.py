@@ -323,7 +323,7 @@ def accumulate(
         terms = {k: v for k, v in metrics.items() if k.startswith("loss_")}
         for name, value in terms.items():
             check_finite(value, name)
-        total: Any = sum(terms.values())  # not the 0 that it begins with
+        total: Any = sum(terms.values())  # its type includes the int 0 of an empty sum
         (total * weight).backward()
         for name, value in metrics.items():
             part = float(value.detach()) * (weight if name in terms else share)

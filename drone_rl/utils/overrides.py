@@ -1,7 +1,6 @@
 """Read and check the overrides (`key=value`) in the folder of an earlier run.
 
-Overrides on the command line may name classes, files and programs. Those in a file of unknown
-origin may not.
+Overrides on the command line may name classes, files and programs. Those in foreign files may not.
 """
 
 import re

@@ -138,8 +138,7 @@ def _looped(policy: BasePolicy, settings: BodiesSettings, seed: RootSeed) -> dic
 def changes_of(body: str, own: DynamicsSettings) -> Mapping[str, Any]:
     """Return the settings in which named dynamics differ from a policy's own.
 
-    Wind blows from the right, with gusts of a quarter of its speed along each axis; otherwise the
-    air is still.
+    Wind, if any, blows from the right, with gusts of a quarter of its speed along each axis.
     """
     still = {"wind": [0.0, 0.0, 0.0], "gusts": 0.0}
     if body == "computer vision":

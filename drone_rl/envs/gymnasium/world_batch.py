@@ -101,7 +101,7 @@ FILM_HEIGHT, FILM_WIDTH = 360, 640
 """Size in pixels of the images of `render`, which show the drone from behind."""
 END = "end_reason"
 Chosen = str | BaseTaskSettings | Task[Any] | None
-"""A task, its settings, or the import path of the settings class; default: cube collection."""
+"""A task, its settings or its registered name; cube collection by default."""
 
 
 class WorldBatch:

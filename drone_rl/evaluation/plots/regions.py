@@ -21,8 +21,7 @@ _CLOSEST = "smallest difference of two logits"
 def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: ShownActions) -> Figure:
     """Draw the map as a chart.
 
-    `numbers` are "places" of an explanation; `arrays` are "points", "ends" and "labels" of its
-    outlines.
+    `numbers` are "places" of an explanation; `arrays`: "points", "ends", "labels" of outlines.
     """
     window = numbers["window"]
     side, near, far = window["sideways"], window["nearest"], window["farthest"]

@@ -178,8 +178,7 @@ class Betaflight:
     def _start(self) -> None:
         """Start the firmware and wait until it steps.
 
-        Its threads share a clock without a lock, so that it sometimes hangs while starting; then it
-        is started again.
+        Its threads share a clock without a lock: sometimes it hangs and is started again.
         """
         for _ in range(STARTS):
             self._process.start(self.program, self.folder, self.log)

@@ -305,8 +305,7 @@ class Pilot(Drone):
         """Follow `sticks`, which may change meanwhile.
 
         `vx_max` and `vy_max` are the speeds at full stick, forward in the heading at the start and
-        sideways, metres per second; `z_max` is the height of the goal above the drone at full
-        throttle, metres.
+        sideways, m/s; `z_max` is the goal's height above the drone at full throttle, metres.
         """
         fastest = checks.speed(vx_max, "vx_max"), checks.speed(vy_max, "vy_max")
         climb = checks.height(z_max, "z_max")

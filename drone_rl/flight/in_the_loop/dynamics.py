@@ -42,8 +42,7 @@ class InTheLoopDynamics:
     ) -> None:
         """Take a disarmed drone on the ground, the three moves as its actions by default.
 
-        The settings are the duration of an action and the camera mount; the drone has its own
-        vehicle.
+        Only the duration of an action and the camera mount apply: the drone has its own vehicle.
         """
         self.drone = drone
         self.settings = settings

@@ -143,8 +143,7 @@ class PolicyDescription:
     ) -> TransformedEnv:
         """Build environments with the described camera and transforms; see `DroneEnv`.
 
-        `task` is the same task with other starts of episodes. Without `pixels`, transforms are left
-        out.
+        `task` is the same task with other starts of episodes. Without `pixels`: no transforms.
         """
         env = DroneEnv(
             num_envs,

@@ -53,8 +53,7 @@ def make_onnx(
     output, and `about`.
 
     Raises:
-        InputError: The policy needs more than one frame, ONNX does not support it, or a package is
-            missing.
+        InputError: The policy needs several frames, ONNX does not support it, or lacks a package.
     """
     extra("onnxscript", "onnx", _ASKED_BY)  # which torch's exporter needs
     passes = extra("onnx_ir.passes.common", "onnx", _ASKED_BY)
