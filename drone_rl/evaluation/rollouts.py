@@ -133,8 +133,7 @@ def find_failures(
     It runs at least `num_episodes`, in whole batches, unless `enough` failures were found before.
 
     Returns:
-        The placements, metres to the left of the start, shape (failures, num_cubes), and the
-        number of episodes.
+        Placements, metres to the left of the start, (failures, num_cubes); number of episodes.
     """
     found: list[NDArray[np.float64]] = []
     episodes = 0

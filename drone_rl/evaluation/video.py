@@ -257,8 +257,7 @@ def render_chase(worlds: Worlds, look: Appearance | None, height: int, width: in
 def level(attitude: Tensor, camera: str) -> Mounting:
     """Return the mounting that keeps the chase camera level on tilted bodies.
 
-    The attitudes are quaternions (w, x, y, z), shape (num_envs, 4); the camera is given by its
-    full name in the model.
+    Attitudes are quaternions (w, x, y, z), (num_envs, 4); the camera is its name in the model.
     """
     back = product(attitude * attitude.new_tensor(_BACK), heading_only(attitude))
     place = torch.tensor(CHASE.pos, dtype=attitude.dtype, device=attitude.device)

@@ -42,8 +42,7 @@ class Layer(abc.ABC):
     def bound(self, largest: Tensor, error: Tensor) -> Tensor:
         """Return bounds on the errors of outputs, for bounded inputs. Shapes: (1, *), float64.
 
-        `largest` is the largest absolute value of each input in one float32 evaluation, `error` is
-        the error of each input.
+        `largest` and `error` of each input: largest absolute value in float32, and error.
         """
 
     @abc.abstractmethod

@@ -116,8 +116,7 @@ def judge_run(
 ) -> dict[str, Any]:
     """Judge the last policy of a finished run and store the verdict in its result.json.
 
-    The root of the environments' random streams, by default a fresh one, is the same for all runs
-    that are compared.
+    All runs that are compared need the same root of the environments' streams; default: fresh.
 
     Raises:
         InputError: The run has no result, or its last checkpoint is unusable or of another run.

@@ -1,7 +1,6 @@
 """The Optuna study of a hyperparameter search, in the sweep's folder.
 
-The study is a journal file that all processes share, so that an interrupted search resumes with
-its unfinished trials.
+The study is a journal file that all processes share; a search resumes its unfinished trials.
 """
 
 from collections.abc import Mapping

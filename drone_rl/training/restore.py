@@ -19,8 +19,7 @@ def check_fits(saved: Any, own: Any, where: str) -> None:
     """Check that a saved state has the structure of the run's `own`; None fits anything.
 
     Raises:
-        InputError: A name, type, shape or length differs, or a number is not finite; the message
-            names it, from `where` on.
+        InputError: A name, type, shape or length differs, or a number is not finite.
     """
     if isinstance(own, Tensor):
         _check_tensor(saved, own, where)

@@ -105,8 +105,7 @@ def find_claim(
     None if there is none; an invalid one next to the policy is returned as refused.
 
     Raises:
-        InputError: The given one is unreadable, of another network or task, contradicts itself, or
-            is refuted by a rollout.
+        InputError: The given one is unreadable, of another network or task, or refuted.
     """
     if not isinstance(policy, Policy):
         if given is not None:

@@ -86,8 +86,7 @@ def export_onnx(
         Agreement of the model and PyTorch on 10,000 images of the policy's episodes.
 
     Raises:
-        InputError: The policy can't be converted or written, or the model does not agree with it;
-            no file is written.
+        InputError: The policy can't be converted, or the model differs; no file is written.
     """
     policy = policy if isinstance(policy, Policy) else load_policy(policy)
     told = {"command": command or origin_of(policy.path, policy.state)[0]}

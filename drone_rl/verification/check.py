@@ -114,8 +114,7 @@ def check(
         changes: Changes to the settings, as in `check("certificate.json", flights=10_000)`.
 
     Raises:
-        InputError: The certificate is unreadable or of another network or task, or the policy or a
-            setting is unusable.
+        InputError: The certificate is of another network or task, or an input is unusable.
     """
     settings, seed = with_seed((settings or CheckSettings()).replace(**changes))
     path = _find(certificate, outputs)

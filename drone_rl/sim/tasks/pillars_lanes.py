@@ -61,8 +61,7 @@ class Lanes:
     def nearest(self, rows: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
         """Find the nearest open lane of rows; of two, that whose gap's middle is nearer.
 
-        The y of pillars, (n, K), and of drones, (n,), to metres to the left, (n,), and the width of
-        the gap, (n,).
+        From y of pillars, (n, K), and drones, (n,): metres to the left and width of the gap, (n,).
         """
         turns, is_open = self.seen_from(rows[:, None], y)
         left, right = self._gap(rows, y[:, None] + turns)

@@ -235,8 +235,7 @@ def check_same_policy(
     The task in `described` is ignored. Without `task`, any task is accepted.
 
     Raises:
-        InputError: The certificate is for another network, camera or task, or the policy has
-            memory or camera faults.
+        InputError: Another network, camera or task, or the policy has memory or camera faults.
     """
     require_cubes(described, "certificates")
     if certificate.weights != (own := fingerprint(weights)):

@@ -160,8 +160,7 @@ class Arrangement:
 def arrange(pieces: Pieces, window: Window, most_cells: int) -> Arrangement:
     """Compute all cells into which segments inside a window cut it, see `Pieces.clipped`.
 
-    Collinear segments must not overlap, and each must connect to the sides of the window, directly
-    or through others.
+    Collinear segments must not overlap; each must connect, perhaps indirectly, to a window side.
 
     Raises:
         InputError: There are more cells than `most_cells`.
