@@ -155,7 +155,7 @@ class ExportCommand(CommandSettings, HeldOutSettings):
     format: Annotated[str, OneOf(("safetensors", "onnx"))] = "safetensors"
     """safetensors with model card, or onnx: a model from RGB image to action probabilities."""
     command: Annotated[str, COMMAND] | None = None
-    """Training command for the model card; null takes that of the run's settings."""
+    """Training command for the model card; null makes it from the run's settings."""
     certificate: str | None = None
     """Certificate file for the card; null takes the one next to the policy, if it matches."""
     shifts: str | None = None
