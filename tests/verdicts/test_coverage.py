@@ -106,7 +106,7 @@ def test_no_domain_and_no_network_are_told_before_anything_is_flown(good, tmp_pa
     needs = tmp_path / "needs.yaml"
     needs.write_text("blur: {high: 1.0, unit: pixels}")
     told = {"require_domain": needs, "outputs": tmp_path, "progress": silent}
-    with pytest.raises(InputError, match=r"no domain .* run drone-rl shifts policy=.*mine"):
+    with pytest.raises(InputError, match=r"no shifts.json; run drone-rl shifts policy=.*mine"):
         drone_rl.judge(good, **told)
     path = leave(tmp_path / "shifts" / "runs" / "a", changed(shifts_of(good), {"domain": None}))
     with pytest.raises(InputError, match=r"has no ranges \(domain=false\); run drone-rl shifts"):
