@@ -111,7 +111,7 @@ def test_conditions_can_be_required(in_process, tmp_path, good, needed, status, 
 @pytest.mark.parametrize(
     ("needed", "words"),
     [
-        ("blur: {high: 1, unit: pixels}", ["no domain", "run drone-rl shifts policy="]),
+        ("blur: {high: 1, unit: pixels}", ["no shifts.json", "run drone-rl shifts policy="]),
         ("rain: {high: 1, unit: mm}", ["'rain' is not an axis", "object_color"]),
         ("blur: {high: 1, unit: m}", ["blur.unit='m'", "unit: pixels"]),
         ("blur: {low: 2, high: 1, unit: pixels}", ["from 2 to 1", "the lower first"]),
