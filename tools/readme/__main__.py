@@ -6,6 +6,7 @@ from pathlib import Path
 
 from benchmarks.ledger import Ledger
 from benchmarks.registry import BENCHMARKS
+from tools.readme.axes import list_axes
 from tools.readme.blocks import replace_blocks
 from tools.readme.flight_rows import FLIGHT
 from tools.readme.headlines import HEADLINES, make_headlines
@@ -57,6 +58,7 @@ def make_blocks(root: Path) -> dict[str, str]:
         **{name: make_table(rows, ledger.figures) for name, rows in tables.items()},
         "headlines": make_headlines(HEADLINES, ledger.figures),
         "peers": make_peers(ledger.figures),
+        "axes": list_axes(),
         "robust": make_robust(ledger.figures),
         "figures": list_figures(ledger),
         "origins": list_origins(ledger, BENCHMARKS),
