@@ -84,8 +84,14 @@ def test_a_critic_is_chosen_stopped_and_gone_on_with(in_process, tmp_path, objec
 @pytest.mark.parametrize(
     ("told", "remedy"),
     [
-        (["objective=ppo", "collector=episodes"], "of collector; give collector=rollouts"),
-        (["returns=gae"], "lacks; give objective=ppo or a2c, or another returns"),
+        (
+            ["objective=ppo", "collector=episodes"],
+            "ppo requires collector=rollouts, got collector=episodes",
+        ),
+        (
+            ["returns=gae"],
+            "requires a critic, which objective=reinforce does not have; set objective=ppo or a2c",
+        ),
         (["objective=a2c", "objective.epochs=2"], "epochs"),
     ],
 )

@@ -123,7 +123,8 @@ def test_a_column_of_bodies(program, monkeypatch):
     flights = done.numbers["software in the loop"]["good"]
     assert flights["success"]["trials"] == len(flights["flights"]) == 1
     assert str(done).splitlines()[1].endswith("to 100.0%)")
-    words = [text.get_text() for text in chart(done.numbers).axes[0].texts]
+    texts = chart(done.numbers).axes[0].texts
+    words = [text.get_text().replace("\n", " ") for text in texts]
     assert "software in the loop" in words
     assert any(word.startswith("no verdict: 1 of 1") for word in words)
 
