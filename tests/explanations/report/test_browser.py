@@ -45,21 +45,21 @@ def middle_of_a_frame(browser, number):
 def test_hover_shows_the_frame_with_its_probabilities(browser):
     canvas = browser.find_element(By.CSS_SELECTOR, "#map0 canvas")
     browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", canvas)
-    x, y = middle_of_a_frame(browser, 8)
+    x, y = middle_of_a_frame(browser, 4)
     ActionChains(browser).move_to_element_with_offset(canvas, round(x), round(y)).perform()
     tip, known = browser.find_element(By.ID, "tip"), points(browser)
     assert tip.is_displayed()
     assert "forward" in tip.text
-    assert f"episode 1, step {known['step'][8]} of {known['last'][1]}" in tip.text
+    assert f"episode 1, step {known['step'][4]} of {known['last'][1]}" in tip.text
 
 
 def test_click_shows_the_moment_in_the_episode(browser):
     canvas = browser.find_element(By.CSS_SELECTOR, "#map0 canvas")
-    x, y = middle_of_a_frame(browser, 8)  # the third of six frames of episode 1
+    x, y = middle_of_a_frame(browser, 4)  # the second of three frames of episode 1
     ActionChains(browser).move_to_element_with_offset(canvas, round(x), round(y)).click().perform()
     strip, steps = browser.find_element(By.CSS_SELECTOR, "#map0 .strip"), points(browser)["step"]
-    assert all(f"step {step}:" in strip.text for step in steps[6:12])
-    assert f"step {steps[8]}:" in strip.find_element(By.CSS_SELECTOR, ".here").text
+    assert all(f"step {step}:" in strip.text for step in steps[3:6])
+    assert f"step {steps[4]}:" in strip.find_element(By.CSS_SELECTOR, ".here").text
 
 
 def test_the_map_of_pixels_can_be_chosen(browser):
