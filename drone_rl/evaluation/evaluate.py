@@ -19,7 +19,7 @@ from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.tasks import as_task
-from drone_rl.utils.display import aligned, paragraph, table
+from drone_rl.utils.display import aligned, table
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
@@ -94,7 +94,7 @@ class Evaluation:
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()
-        return table(head, rows) + "".join(map(paragraph, self._notes()))
+        return table(head, rows, self._notes())
 
     def _notes(self) -> list[str]:
         """Return notes on the arithmetic, the seed and differences from the training's dynamics."""

@@ -30,7 +30,7 @@ from drone_rl.robustness.shifts_file import FORMAT, FORMAT_VERSION
 from drone_rl.robustness.shifts_text import SHIFTS, is_tested, rows
 from drone_rl.robustness.suite import Suite, make_strip, packed
 from drone_rl.sim.tasks import as_task
-from drone_rl.utils.display import aligned, paragraph, picture, table
+from drone_rl.utils.display import aligned, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
@@ -86,8 +86,7 @@ class Shifts:
 
     def _repr_html_(self) -> str:
         head, *lines = rows(self.numbers)
-        notes = "".join(map(paragraph, self._notes()))
-        return table(head, lines) + notes + picture(chart(self.numbers))
+        return table(head, lines, self._notes()) + picture(chart(self.numbers))
 
     def _notes(self) -> tuple[str, str]:
         unlike = self.policy.unlike

@@ -30,13 +30,17 @@ def aligned(rows: Sequence[Sequence[str]], *, are_numbers: bool = False) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return rows of texts, one for each column, as an HTML table; every text is escaped."""
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], notes: Iterable[str] = ()) -> str:
+    """Return rows of texts, one for each column, as an HTML table, with a paragraph for each note.
+
+    Every text is escaped.
+    """
     cells = "".join(f"<th>{html.escape(text)}</th>" for text in head)
     lines = "".join(
         f"<tr>{''.join(f'<td>{html.escape(text)}</td>' for text in row)}</tr>" for row in rows
     )
-    return f"<table><thead><tr>{cells}</tr></thead><tbody>{lines}</tbody></table>"
+    below = "".join(map(paragraph, notes))
+    return f"<table><thead><tr>{cells}</tr></thead><tbody>{lines}</tbody></table>{below}"
 
 
 def paragraph(text: str) -> str:

@@ -16,7 +16,7 @@ from drone_rl.flight.in_the_loop.drone import FlightControllerError
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.display import aligned, paragraph, picture, table
+from drone_rl.utils.display import aligned, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import BAD, EMPTY, FAINT, GOOD, INK, ONE_SIDED, css, light
 from drone_rl.utils.progress import Bar, Progress, silent
@@ -63,8 +63,7 @@ class Bodies:
 
     def _repr_html_(self) -> str:
         head, *lines = rows(self.numbers)
-        notes = "".join(map(paragraph, self._notes()))
-        return table(head, lines) + notes + picture(chart(self.numbers))
+        return table(head, lines, self._notes()) + picture(chart(self.numbers))
 
     def _notes(self) -> list[str]:
         """Reasons for missing episodes, and the seed."""

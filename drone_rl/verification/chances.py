@@ -16,7 +16,7 @@ from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ChanceSettings, ProveSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason
-from drone_rl.utils.display import aligned, paragraph, table
+from drone_rl.utils.display import aligned, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
@@ -116,7 +116,7 @@ class Chances:
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()
-        return table(head, rows) + "".join(map(paragraph, self._notes()))
+        return table(head, rows, self._notes())
 
     def _notes(self) -> list[str]:
         """Return the lines below the table."""

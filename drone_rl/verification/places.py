@@ -16,7 +16,7 @@ from drone_rl.config.commands import PlacesSettings
 from drone_rl.evaluation.plots import regions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
-from drone_rl.utils.display import aligned, paragraph, picture, table
+from drone_rl.utils.display import aligned, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
@@ -77,7 +77,7 @@ class Places:
         head, *lines = rows(self.numbers, SHOWN_MOVES.names)
         figure = regions.chart(self.numbers, self.places.outlines(), SHOWN_MOVES)
         about = say(say_places, {"places": self.numbers})
-        return table(head, lines) + paragraph(about) + picture(figure)
+        return table(head, lines, [about]) + picture(figure)
 
 
 def places(

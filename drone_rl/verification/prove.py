@@ -13,7 +13,7 @@ import numpy as np
 
 from drone_rl.config.commands import ProveSettings
 from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.utils.display import aligned, paragraph, table
+from drone_rl.utils.display import aligned, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically
 from drone_rl.utils.limits import ARRAYS_BYTES
@@ -88,7 +88,7 @@ class Proof:
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()
-        return table(head, rows) + paragraph(describe_proof(self.certificate))
+        return table(head, rows, [describe_proof(self.certificate)])
 
 
 def prove(
