@@ -47,6 +47,7 @@ def bench_revisions(
         InputError: The earlier revision does not exist.
         RuntimeError: A benchmark failed.
     """
+    folder = folder.resolve()  # each revision runs in its own tree
     trees = {"before": extract(before, folder / "before", root), "after": root}
     names = NAMES[:1] if quick else NAMES
     found: dict[str, list[Mapping[str, float]]] = {name: [] for name in trees}

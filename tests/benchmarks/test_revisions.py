@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+from pathlib import Path
 
 import pytest
 
@@ -35,8 +36,9 @@ def checkout(tmp_path):
 
 
 @pytest.mark.parametrize("quick", [True, False])
-def test_both_revisions_are_measured(checkout, tmp_path, quick):
-    found = revisions.bench_revisions(tmp_path / "out", quick, before="HEAD~1", root=checkout)
+def test_both_revisions_are_measured(checkout, tmp_path, monkeypatch, quick):
+    monkeypatch.chdir(tmp_path)
+    found = revisions.bench_revisions(Path("out"), quick, before="HEAD~1", root=checkout)
     assert found["ratio_before_after"] == {"explain_s": 1.2, "collector_fps": 1.25}
     assert found["revisions"]["before_figures"] == {"explain_s": 10.0, "collector_fps": 100.0}
     json.dumps(found)
