@@ -9,14 +9,14 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.commands.command import Hover, fly_command, period_ticks
+from drone_rl.flight.commands.command import Command, Hover, period_ticks
 from drone_rl.flight.commands.path_following import (
     PathCommand,
     braking_time,
     distance_from,
     make_paths,
 )
-from drone_rl.sim.dynamics import Quadrotor
+from drone_rl.sim.dynamics import FlightState, Obstacles, Quadrotor
 
 HEIGHT = 5.0
 """Height of the first point of paths in metres."""
@@ -213,3 +213,29 @@ def _wind_error(number: int) -> HoverError:
     angle = 2.0 * math.pi * number / _DIRECTIONS
     wind = (WIND * math.cos(angle), WIND * math.sin(angle), 0.0)
     return hover_error(DynamicsSettings(mode="simple_flight", wind=wind), num_drones=1)
+
+
+def fly_command(
+    quadrotor: Quadrotor,
+    body: FlightState,
+    command: Command,
+    seconds: float = math.inf,
+    obstacles: Obstacles | None = None,
+) -> tuple[list[FlightState], Tensor]:
+    """Run one command until all drones are complete; drones that are complete continue.
+
+    It ends after `seconds`, or the command's own limit, at the latest.
+
+    Returns:
+        The state at the start and after each of T - 1 control periods, and the index of the first
+        one at which each drone was complete, of shape (num_envs,), int64; T if it never was.
+    """
+    ticks = period_ticks(quadrotor.settings)
+    states = [body]
+    done = torch.full((len(body),), -1)
+    most = int(min(seconds, command.limit) / (ticks * quadrotor.settings.tick))
+    while len(states) <= most and bool((done < 0).any()):
+        body = quadrotor.fly(body, command.goals(body), ticks, obstacles)
+        done = torch.where((done < 0) & command.is_complete(body), len(states), done)
+        states.append(body)
+    return states, torch.where(done < 0, len(states), done)

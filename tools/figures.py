@@ -41,7 +41,8 @@ def plot_placebos(truth: Mapping[str, Any], path: Path, policy: str) -> None:
     axes.invert_yaxis()
     axes.axvline(0, color="0.3", linewidth=0.8)
     axes.set(
-        xlabel="rank correlation with the effect of each patch (95% CI)",
+        xlabel="rank correlation with the change of the output "
+        "when a patch is re-rendered (95% CI)",
         xlim=(None, 1.2),
     )
     figure.suptitle(f"Do heat maps of policy {policy} show what it responds to?")

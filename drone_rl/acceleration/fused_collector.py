@@ -29,15 +29,15 @@ from drone_rl.sim.rendering.raytrace.structs_kernel import Images
 _MAX_STEPS = 64
 """Steps of one launch of the kernel; most episodes end within them."""
 _MAX_PIXELS = 2**23
-"""Of the frames of one launch."""
+"""Maximum number of pixels of all frames of one launch."""
 _MAX_ACTIVATIONS = 2**24
-"""Numbers that are cached: 64 MiB."""
+"""Maximum number of cached activations: 64 MiB."""
 
 
 class FusedCollector:
     """Collect complete episodes; renderer, network and task run in one kernel.
 
-    The state that the environment itself holds stays as it is at the start of the episodes.
+    The kernel steps a copy of the environments: their own state stays that of the reset.
     """
 
     implementation = "fused kernel"
@@ -112,7 +112,7 @@ class FusedCollector:
         return self._cache
 
     def collect(self, num_envs: int) -> TensorDictBase:
-        """Run an episode in each of the first environments; trajectories count from 0."""
+        """Run an episode in each of the first environments; traj_ids are 0 to `num_envs` - 1."""
         if self._actor.exploration not in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC):
             return self._direct.collect(num_envs)
         load_kernels(self._kernel.module).result()
@@ -163,7 +163,7 @@ class FusedCollector:
 
     def _launch(self, num_envs: int, part: int, kept: tuple[str, ...]) -> None:
         """Run up to `_length` steps; the named entries are kept beyond the next launch."""
-        draws = torch.full((num_envs, self._length), -1.0)
+        draws = torch.full((num_envs, self._length), -1.0)  # the most probable action
         if self._actor.exploration == ExplorationType.RANDOM:
             source: Any = self._actor.generator
             draws.uniform_(generator=source)
@@ -190,7 +190,7 @@ class FusedCollector:
         self._workers.map_spans(0, num_envs, run_span)
 
     def _written(self, lengths: Tensor) -> tuple[Tensor, Tensor]:
-        """Return environment and row of each step, from the steps of each environment."""
+        """Return environment and row of each step, from the environments' numbers of steps."""
         is_step = torch.arange(self._length) < lengths[:, None]
         rows = is_step.flatten().nonzero()[:, 0]
         return rows // self._length, rows

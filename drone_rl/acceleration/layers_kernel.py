@@ -3,8 +3,8 @@
 Libraries gain their speed on large batches; a kernel that runs an episode has one frame at a time,
 or a few. A layer is therefore a matrix product whose rows are read in place: patches of a frame
 with its channels last, or whole vectors. Tiles of the product stay in registers, which makes it
-twice as fast as oneDNN on one core. Each output is summed in the order of its inputs, whatever is
-computed next to it.
+twice as fast as oneDNN on one core. Each output is summed in the order of its inputs, so it
+does not depend on the batch.
 """
 
 import warp as wp
@@ -12,8 +12,8 @@ import warp as wp
 WIDTH = 16
 """Number of outputs that are computed together. Layers are padded to a multiple of it."""
 
-# As arguments of a function, vectors make the compiler use 512-bit registers where there are any;
-# otherwise it takes two of 256 bits for each, at half the speed.
+# `add` takes vectors as arguments because clang then uses a 512-bit register for each, where there
+# are any; otherwise it splits them in two, at half the speed.
 PREAMBLE = """
 #pragma clang fp contract(fast)
 #pragma clang diagnostic ignored "-Wpsabi"
@@ -28,7 +28,7 @@ const int kernel_rows = g.kernel_rows, length = g.kernel_row_length;
 const int kernel_row_stride = g.kernel_row_stride, panel = 16 * (1 + kernel_rows * length);
 const float* input = inputs.data + g.input_offset;
 """
-"""Sixteen numbers at a time, and the geometry `g` of a layer, for functions in C++."""
+"""C++ declarations that functions share: vectors of 16 floats, and the fields of `g`."""
 
 _TILES = (
     PREAMBLE
@@ -80,7 +80,7 @@ auto cover = [&](auto* many, auto* one, int outs) __attribute__((always_inline))
     for (; patch + PATCHES <= num_patches; patch += PATCHES) tile(many, patch, outs);
     for (; patch < num_patches; ++patch) tile(one, patch, outs);
 };
-// Tiles that fill the vector registers: 32 of 16 floats with AVX-512, otherwise 16 of 8.
+// The sums of a tile take at most half of the vector registers; the rest holds weights and inputs.
 int outs = 0;
 #ifdef __AVX512F__
 typedef numbers eight_by_two[8][2];

@@ -42,12 +42,12 @@ class JudgeSettings(HeldOutSettings):
     sampled: bool = True
     """Evaluate the policy with sampled actions, too; reported next to the verdict."""
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
-    """A good policy succeeds in more than this fraction of the oracle's episodes."""
+    """Fraction of the oracle's success rate that a good policy exceeds."""
     certificate_flights: Annotated[int, Whole(0, 10_000_000, "rollouts")] = 1000
-    """Rollouts that re-check a quoted certificate like drone-rl check; with 0 it proves nothing."""
+    """Rollouts that re-check a given certificate like drone-rl check; with 0 it does not count."""
     domain_flights: Annotated[int, Whole(0, 100_000, "episodes")] = 200
-    """New episodes at each sampled strength of the required domain, the ends of each range and two
-    random ones within it; with 0 it is not covered."""
+    """New episodes at each re-checked strength of the required domain: both ends of each range and
+    two random strengths within it; with 0 it is not covered."""
 
 
 BODIES = (
@@ -110,7 +110,7 @@ class ShiftSettings(DeviceSettings):
     """Root of the held-out environments' random streams; null takes a fresh one from the operating
     system, which is printed and recorded."""
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
-    """A good policy succeeds in more than this fraction of the oracle's episodes."""
+    """Fraction of the oracle's success rate that a good policy exceeds."""
     possible_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
     """A strength is impossible if the oracle's success rate is certainly below this."""
 
@@ -207,7 +207,7 @@ class ProveSettings(RendererSettings):
     most_boxes: Annotated[int, Whole(1, unit="boxes")] = 2_000_000
     """Open boxes at which the proof stops; bounds memory."""
     most_combinations: Annotated[int, Whole(1)] = 500_000_000
-    """Cached combinations of images; proofs of more cubes are split into parts."""
+    """Maximum number of combinations of cube images per part; proofs of more are split."""
 
 
 class PlacesSettings(RendererSettings):

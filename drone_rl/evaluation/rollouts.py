@@ -37,6 +37,11 @@ class StepLog:
         self.actions += cast(Tensor, batch["action"]).cpu().split(_lengths(batch).tolist())
 
 
+def exploration(greedy: bool) -> ExplorationType:
+    """Return how actors choose actions: the most probable one, or a sample."""
+    return ExplorationType("deterministic" if greedy else "random")
+
+
 def run_episodes(
     env: EnvBase, actor: TensorDictModuleBase, num_episodes: int, **how: Any
 ) -> Episodes:
@@ -89,9 +94,8 @@ def episode_batches(
     )
     if log is not None:
         log.implementation = collector.source.implementation
-    kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
     while (missing := num_episodes - collector.episodes) > 0:
-        with set_exploration_type(kind):
+        with set_exploration_type(exploration(greedy)):
             batch = collector.collect(min(missing, env.batch_size[0]) if is_exact else None)
         if log is not None:
             log.add(batch)

@@ -1,5 +1,6 @@
 """`drone-rl play`: videos of the drone, its cameras, the observation and action probabilities."""
 
+import contextlib
 import dataclasses
 import logging
 import os
@@ -15,15 +16,17 @@ from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import TransformedEnv
-from torchrl.envs.utils import ExplorationType, set_exploration_type
+from torchrl.envs.utils import set_exploration_type
 
 from drone_rl.envs import DroneEnv
+from drone_rl.envs.transforms import memory_of, pixel_transforms, see_film
 from drone_rl.evaluation import instruments
+from drone_rl.evaluation.rollouts import exploration
 from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics import FlightState, Quadrotor
-from drone_rl.sim.dynamics.state import heading_only
+from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.entities import (
     BACK_CENTER,
     BOTTOM_CENTER,
@@ -40,7 +43,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import MUTED, PAPER
 from drone_rl.utils.seeding import legacy_seed
 
-_BACK = (1.0, -1.0, -1.0, -1.0)
+_CONJUGATE = (1.0, -1.0, -1.0, -1.0)
 """Signs of a quaternion's inverse."""
 _log = logging.getLogger(__name__)
 WIDTH, HEIGHT = 1280, 720
@@ -50,7 +53,9 @@ INSET_WIDTH = 320
 FRAMES_PER_SECOND = 10
 _STRIP = CHASE_HEIGHT + GAP
 _BOTTOM = _STRIP + STRIP_HEIGHT + 9
-_FIVE = tuple(c.name for c in (FRONT_LEFT, FRONT_CENTER, FRONT_RIGHT, BACK_CENTER, BOTTOM_CENTER))
+_CAMERAS = tuple(
+    c.name for c in (FRONT_LEFT, FRONT_CENTER, FRONT_RIGHT, BACK_CENTER, BOTTOM_CENTER)
+)
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 _BACKGROUND, _TEXT, _CHOSEN, _BAR = (24, 26, 31), (235, 235, 240), PAPER, MUTED
 
@@ -97,26 +102,32 @@ def view(policy: Policy, *, greedy: bool = True, seed: int = 0, **how: Any) -> N
         random_state=legacy_seed(seed),
         appearance=base.appearances.settings,
     )
-    kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
+    pipeline: Any = env.transform
+    transforms, frames = pixel_transforms(pipeline), list[Tensor]()
 
     @torch.no_grad()
-    def act(timestep: dm_env.TimeStep) -> int:
-        del timestep
+    def act(timestep: dm_env.TimeStep) -> np.ndarray:
+        if timestep.first():
+            frames.clear()
         state = shown.task.state.to(worlds.device)
-        pixels = worlds.render(state, appearance=shown.task.appearance)
-        seen = env.transform(TensorDict({"pixels": pixels}, [1], device=worlds.device))
-        with set_exploration_type(kind):
-            return int(actor(seen)["action"])
+        frames.append(worlds.render(state, appearance=shown.task.appearance))
+        del frames[: -1 - memory_of(transforms)]
+        seen = TensorDict({"pixels": see_film(transforms, frames)}, [1], device=worlds.device)
+        with set_exploration_type(exploration(greedy)):
+            return actor(seen)["action"][0].cpu().numpy()
 
-    viewer.launch(shown, act, title="drone-rl play")
+    with contextlib.closing(env):
+        viewer.launch(shown, act, title="drone-rl play")
 
 
-class _Seen(NamedTuple):
-    """Images of one step. Shapes: (height, width, 3); of the five: (5, height, width, 3)."""
+class _VideoImages(NamedTuple):
+    """Images of one step. Shapes: (height, width, 3); of the strip: (5, height, width, 3)."""
 
-    inside: Tensor
-    outside: Tensor
-    five: Tensor
+    camera: Tensor
+    """The policy's camera, before transforms."""
+    chase: Tensor
+    strip: Tensor
+    """All cameras of the drone."""
     panel: Image.Image | None = None
     """Instruments, if the drone has flight dynamics."""
 
@@ -134,9 +145,8 @@ def film_episode(
     """
     base = cast(DroneEnv, env.base_env)
     worlds = base.worlds
-    kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
     state, earned = env.reset(), 0.0
-    with set_exploration_type(kind):
+    with set_exploration_type(exploration(greedy)):
         while True:
             acted = actor(state.clone(False))
             caption = _caption(worlds.task, state, earned)
@@ -151,7 +161,10 @@ def film_episode(
 def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
     """Write RGB frames of one size as MP4 and, at half the size, as GIF; return the two files.
 
-    The path is without suffix. Files that can't be written are an `InputError`.
+    The path is without suffix.
+
+    Raises:
+        InputError: A file can't be written.
     """
     files = [path.with_suffix(".mp4"), path.with_suffix(".gif")]
     try:
@@ -174,39 +187,39 @@ def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
 def _caption(task: Task[Any], state: TensorDictBase, earned: float) -> str:
     end = task.ends(int(state["info", "end_reason"][0]))
     ended = "" if end == 0 else f"   ended: {end.name.lower()}"
-    return f"{task.vocabulary.goals} {earned:.3g}" + ended.replace("_", " ")
+    return f"return {earned:.3g}" + ended.replace("_", " ")
 
 
-def _look(base: DroneEnv) -> _Seen:
+def _look(base: DroneEnv) -> _VideoImages:
     """Render the first environment."""
     worlds, look = base.worlds, base.appearances.current()
-    five = worlds.view(_FIVE, height=STRIP_HEIGHT, width=(WIDTH + GAP) // len(_FIVE) - GAP)
-    outside = render_chase(worlds, look, CHASE_HEIGHT, WIDTH)[0]
+    five = worlds.view(_CAMERAS, height=STRIP_HEIGHT, width=(WIDTH + GAP) // len(_CAMERAS) - GAP)
+    chase = render_chase(worlds, look, CHASE_HEIGHT, WIDTH)[0]
     strip = worlds.render_all(worlds.state, five, look)["rgb"][0]
     body, dynamics, panel = worlds.state.body, worlds.dynamics, None
     if isinstance(body, FlightState) and isinstance(dynamics, Quadrotor):
-        reading, of = instruments.read(body), dynamics.settings
-        panel = instruments.panel(reading, of.velocity_limit, of.hover_throttle)
-    return _Seen(base.last_pixels[0], outside, strip, panel)
+        reading, settings = instruments.read(body), dynamics.settings
+        panel = instruments.panel(reading, settings.velocity_limit, settings.hover_throttle)
+    return _VideoImages(base.last_pixels[0], chase, strip, panel)
 
 
 def _compose(
-    seen: _Seen, caption: str, acted: TensorDictBase | None = None, actions: Actions = MOVES
+    seen: _VideoImages, caption: str, acted: TensorDictBase | None = None, actions: Actions = MOVES
 ) -> np.ndarray:
     """Chase view with the observation as inset; below all five cameras, a caption and bars."""
     canvas = Image.new("RGB", (WIDTH, HEIGHT), _BACKGROUND)
     draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(16)
-    canvas.paste(Image.fromarray(seen.outside.cpu().numpy()), (0, 0))
-    inside = Image.fromarray(seen.inside.cpu().numpy())
+    canvas.paste(Image.fromarray(seen.chase.cpu().numpy()), (0, 0))
+    inside = Image.fromarray(seen.camera.cpu().numpy())
     height = INSET_WIDTH * inside.height // inside.width
     size = (INSET_WIDTH, max(1, min(CHASE_HEIGHT // 2, height)))
     draw.rectangle((12, 12, 17 + size[0], 41 + size[1]), _BACKGROUND)
-    draw.text((20, 16), "what the policy sees", _TEXT, font)
+    draw.text((20, 16), "camera image", _TEXT, font)
     canvas.paste(inside.resize(size, Image.Resampling.NEAREST), (15, 39))
     if seen.panel is not None:
         canvas.paste(seen.panel, (WIDTH - 12 - instruments.WIDTH, 12))
-    for i, (name, picture) in enumerate(zip(_FIVE, seen.five.cpu().numpy(), strict=True)):
-        x = i * (WIDTH + GAP) // len(_FIVE)
+    for i, (name, picture) in enumerate(zip(_CAMERAS, seen.strip.cpu().numpy(), strict=True)):
+        x = i * (WIDTH + GAP) // len(_CAMERAS)
         canvas.paste(Image.fromarray(picture), (x, _STRIP))
         label = name.replace("_", " ")
         width = draw.textlength(label, font)
@@ -221,7 +234,7 @@ def _compose(
 def _draw_bars(
     draw: ImageDraw.ImageDraw, font: Font, acted: TensorDictBase, actions: Actions
 ) -> None:
-    """One bar per action, as long as it is probable; the chosen one in red."""
+    """Draw a bar for each action; its length is the probability. The chosen action's is white."""
     chosen, names = int(actions.part(acted["action"][0])), actions.names
     logits = acted.get("logits", None)
     probs = torch.eye(len(names))[chosen] if logits is None else actions.probabilities(logits[0])
@@ -259,6 +272,6 @@ def level(attitude: Tensor, camera: str) -> Mounting:
 
     Attitudes are quaternions (w, x, y, z), (num_envs, 4); the camera is its name in the model.
     """
-    back = product(attitude * attitude.new_tensor(_BACK), heading_only(attitude))
+    back = product(attitude * attitude.new_tensor(_CONJUGATE), twist_about_z(attitude))
     place = torch.tensor(CHASE.pos, dtype=attitude.dtype, device=attitude.device)
     return Mounting(camera=camera, offset=rotate(back, place) - place, turn=back)

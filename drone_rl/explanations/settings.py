@@ -24,7 +24,7 @@ class ExplainSettings(Settings):
     episodes: Annotated[int, Whole(1, unit="episodes")] = 400
     """Episodes on which the verdict rests."""
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
-    """A good policy succeeds in more than this fraction of the oracle's episodes."""
+    """Fraction of the oracle's success rate that a good policy exceeds."""
     layer: str | None = None
     """Layer whose features t-SNE embeds; null for the last one before the logits."""
     grad_cam_layer: str | None = None

@@ -5,6 +5,7 @@ Layers are named, and explanations address them by name. The registered networks
 `generator`, the source of their initial weights; they raise `InputError` if the frame is too small.
 """
 
+import itertools
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 
@@ -144,12 +145,10 @@ class OriginalCNN(PolicyNetwork):
         generator: torch.Generator | None = None,
     ) -> None:
         convolutions: OrderedDict[str, nn.Module] = OrderedDict()
-        before = in_shape[0]
-        for i, after in enumerate(channels, start=1):
+        for i, (before, after) in enumerate(itertools.pairwise([in_shape[0], *channels]), start=1):
             convolutions[f"conv{i}"] = nn.Conv2d(before, after, 5)
             convolutions[f"relu{i}"] = nn.ReLU()
             convolutions[f"pool{i}"] = nn.MaxPool2d(2)
-            before = after
 
         def initialise(layer: Weighted, is_last: bool) -> None:
             if isinstance(layer, nn.Conv2d):
@@ -181,12 +180,10 @@ class SmallCNN(PolicyNetwork):
         generator: torch.Generator | None = None,
     ) -> None:
         convolutions: OrderedDict[str, nn.Module] = OrderedDict()
-        before = in_shape[0]
-        for i, after in enumerate(channels, start=1):
+        for i, (before, after) in enumerate(itertools.pairwise([in_shape[0], *channels]), start=1):
             kernel, stride = (patch, patch) if i == 1 else (3, 1)
             convolutions[f"conv{i}"] = nn.Conv2d(before, after, kernel, stride)
             convolutions[f"relu{i}"] = nn.ReLU()
-            before = after
         layers = _with_head(convolutions, in_shape, hidden, num_actions)
         super().__init__(in_shape, layers, orthogonal(generator))
 

@@ -1,4 +1,4 @@
-"""Our network in Stable-Baselines3's policies, and their policies as networks of ours."""
+"""Networks of this project in Stable-Baselines3, and its policies as networks of this project."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy  # noqa: E402
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor  # noqa: E402
 
 _SAME = 1e-4
-"""Log-probabilities that differ by less are the model's own."""
+"""Log-probabilities that differ by less count as equal."""
 
 
 class Sb3Logits(nn.Module):
@@ -27,17 +27,19 @@ class Sb3Logits(nn.Module):
     A policy that was trained on bytes gets frames from 0 to 1, as from the transform `Rgb`.
 
     Raises:
-        InputError: Its action probabilities are not a function of one frame.
+        InputError: It is no actor-critic with discrete actions, or needs more than one array.
     """
 
     def __init__(self, model: BaseAlgorithm) -> None:
         """Take the modules between frame and logits, which it shares with the model."""
         super().__init__()
-        policy = model.policy
+        policy, space = model.policy, model.policy.observation_space
         if not isinstance(policy, ActorCriticPolicy) or not hasattr(policy.action_space, "n"):
             raise _refusal(model)
-        self.observes_bytes = policy.observation_space.dtype == np.uint8
-        self.observation_shape = _channels_first(policy.observation_space.shape or ())
+        if not isinstance(space, spaces.Box):
+            raise _refusal(model)
+        self.observes_bytes = space.dtype == np.uint8
+        self.observation_shape = _channels_first(space.shape)
         self.scale = 255.0 if self.observes_bytes and not policy.normalize_images else 1.0
         self.trunk = policy.pi_features_extractor
         self.hidden = policy.mlp_extractor.policy_net
@@ -46,7 +48,7 @@ class Sb3Logits(nn.Module):
             raise _refusal(model)
 
     observes_bytes: bool
-    """Whether the model was trained on frames of bytes, which are RGB if there are three."""
+    """Whether the model was trained on frames of bytes; three channels are RGB."""
     observation_shape: tuple[int, ...] | None
     """Of one frame, channels first; None if the model was not trained on frames."""
 
@@ -56,10 +58,12 @@ class Sb3Logits(nn.Module):
 
     @torch.no_grad()
     def _agrees(self, policy: ActorCriticPolicy) -> bool:
-        """Return whether it computes the policy's logits; a recurrent one has others."""
-        image = torch.zeros(1, *(policy.observation_space.shape or ()), device=policy.device)
+        """Return whether it gives the policy's logits of a random image; recurrent ones differ."""
+        shape = policy.observation_space.shape or ()
+        image = torch.rand(1, *shape, generator=torch.Generator().manual_seed(0)).to(policy.device)
         try:
-            distribution: Any = policy.get_distribution(image).distribution
+            given = image * 255.0 if self.observes_bytes else image
+            distribution: Any = policy.get_distribution(given).distribution
         except TypeError:
             return False
         own = self(image).log_softmax(-1)
@@ -83,7 +87,7 @@ class Sb3Trunk(BaseFeaturesExtractor):
     """A features extractor: `policy_kwargs={"features_extractor_class": Sb3Trunk, "net_arch": []}`.
 
     Raises:
-        InputError: The observations are no frames with the channels first.
+        InputError: The observations do not have three dimensions.
     """
 
     def __init__(self, observation_space: spaces.Box, network: Network | None = None) -> None:
@@ -95,7 +99,7 @@ class Sb3Trunk(BaseFeaturesExtractor):
         assert isinstance(made, PolicyNetwork)
         width = made.layers.get_parameter("logits.weight").shape[1]
         super().__init__(observation_space, features_dim=width)
-        # with our order of the weights in memory its initialisation could not do
+        # Stable-Baselines3's initialization needs contiguous weights, not channels_last
         self.layers = made.layers[:-1].to(memory_format=torch.contiguous_format)  # pyright: ignore[reportCallIssue] (torch's annotations lack it)
 
     def forward(self, observations: Tensor) -> Tensor:

@@ -45,15 +45,15 @@ def check_counts(numbers: Mapping[str, Any], task: Task[Any]) -> None:
 
 
 def check_range(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[str, Any]) -> None:
-    """Check that a range of `domain.ranges` follows from the strengths that the search tries.
+    """Check a range of `domain.ranges` by replaying the search with the stored answers.
 
     The axis has the policy's own neutral strength; `of` is the policy's description.
 
     Raises:
-        InputError: The search gives another limit or other strengths.
+        InputError: The search gives another limit or other strengths, or `axes` contradicts them.
     """
     if not _is_sound(axis, found, of, numbers):
-        raise InputError(f"domain.ranges.{axis.name} contradicts what was flown at; {_REMEDY}")
+        raise InputError(f"domain.ranges.{axis.name} contradicts its tested strengths; {_REMEDY}")
     levels = numbers["axes"][axis.name]["levels"]
     for level, at in ((v, at) for v in levels for at in found["flown"]):
         is_there = _is_same(at["position"], level["position"]) and level["refused"] is None
@@ -74,7 +74,7 @@ def check_probe(found: Mapping[str, Any], episodes: int, where: str) -> None:
     if success is not None and abs(success * episodes - round(success * episodes)) > 1e-6:
         raise InputError(f"{where}.success is not a fraction of {episodes} episodes; {_REMEDY}")
     if found["good"] and (found["bad"] or found["refused"] is not None):
-        raise InputError(f"{where} is both good and bad; {_REMEDY}")
+        raise InputError(f"{where} is good, but also bad or refused; {_REMEDY}")
     _refuse(_wrong_oracle(found.get("oracle"), episodes), where)
 
 
@@ -98,8 +98,8 @@ def _wrong_level(
         return None if is_empty else " is refused, and has figures"
     if not {*level["modes"]} <= {*settings["modes"]} or "constant" not in level["modes"]:
         return ".modes are not those of settings.modes"
-    possible = None if oracle is None else oracle["upper95"] < settings["possible_share"]
-    if level["impossible"] != possible:
+    impossible = None if oracle is None else oracle["upper95"] < settings["possible_share"]
+    if level["impossible"] != impossible:
         return ".impossible does not follow from its oracle"
     episodes = settings["episodes"]
     problems = (
@@ -123,10 +123,10 @@ def _problems(
     if every is None or any(not _is_mean(share, episodes) for share in figures["shares"].values()):
         yield ".shares holds something else than means of its episodes"
     elif every["count"] != episodes or every["mean"] < count / episodes - CLOSE:
-        yield ".shares.all is less than its share of successes"
+        yield ".shares.all has another count than its episodes, or less than its successes"
     lost, gained = figures["paired"]["lost"], figures["paired"]["gained"]
     if gained - lost != count - before or lost > before or gained > episodes - before:
-        yield ".paired does not lead from the successes without a change to its own"
+        yield ".paired: gained - lost is not the difference to the unperturbed successes"
     elif not _is_same(figures["paired"]["p"], mcnemar_p(lost, gained)):
         yield ".paired.p is not that of its counts"
     difference = figures["difference"]
@@ -136,7 +136,7 @@ def _problems(
 
 
 def _is_mean(share: Mapping[str, Any], episodes: int) -> bool:
-    """Whether this is a mean of at most one share from 0 to 1 an episode."""
+    """Return whether a mean of at most one value per episode lies in its interval."""
     if share["count"] > episodes:
         return False
     if share["mean"] is None:
@@ -158,10 +158,10 @@ def _is_sound(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[st
     is_plain_good = numbers["domain"]["plain"]["good"]
     if found["positions"] is None or not is_plain_good:
         return found["positions"] is None and not is_plain_good and not found["flown"]
-    left = {at["position"]: at["good"] for at in found["flown"]}
+    unused = {at["position"]: at["good"] for at in found["flown"]}
 
     def is_good(strength: float, _: float) -> bool:
-        return left.pop(next(at for at in left if _is_same(at, axis.position(strength))))
+        return unused.pop(next(at for at in unused if _is_same(at, axis.position(strength))))
 
     seed = numbers["settings"]["seed"]
     try:
@@ -173,7 +173,7 @@ def _is_sound(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[st
         for name, end in ends.items()
         if end.failed is not None
     ]
-    return not left and _agrees(range_of(axis, ends, failed, of), found)
+    return not unused and _agrees(range_of(axis, ends, failed, of), found)
 
 
 def _agrees(expected: Any, given: Any) -> bool:

@@ -263,7 +263,7 @@ def _check_domain(numbers: Mapping[str, Any], of: Any) -> None:
     check_probe(domain["plain"], episodes, "domain.plain")
     for name, found in domain["ranges"].items():
         if name not in numbers["axes"]:
-            raise InputError(f"domain.ranges.{name} contradicts what was flown at")
+            raise InputError(f"domain.ranges.{name} contradicts its tested strengths")
         check_range(AXES[name].of(of), found, of, numbers)
         for failure in found["failed"]:
             check_probe(failure, episodes, f"domain.ranges.{name}.failed")

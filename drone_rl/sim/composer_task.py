@@ -17,7 +17,7 @@ from drone_rl.config import (
 )
 from drone_rl.sim import entities
 from drone_rl.sim.dynamics import BodyState, Dynamics, Quadrotor, draw_seeds, make_dynamics
-from drone_rl.sim.dynamics.state import heading_only
+from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.mujoco_flight import MujocoFlight
 from drone_rl.sim.rendering import Appearance, opengl
 from drone_rl.sim.rendering.opengl import OpenGlAppearance
@@ -200,7 +200,7 @@ class ComposerTask(composer.Task):
 
     def _shown(self, body: BodyState) -> torch.Tensor:
         """Return the cameras' attitude. Shape: (1, 4)."""
-        return heading_only(body.attitude) if self.dynamics.mount == "gimbal" else body.attitude
+        return twist_about_z(body.attitude) if self.dynamics.mount == "gimbal" else body.attitude
 
     def _show(self, physics: mjcf.Physics) -> None:
         body = self.state.body

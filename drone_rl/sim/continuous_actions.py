@@ -5,9 +5,9 @@ the greatest speed or rate to the left, -1 to the right. Samples of normal distr
 `normal_of`, are squashed by tanh.
 
 The parts are forward, left, right, and, where drones can turn, turn left and turn right.
-An action is left if it goes left at more than a third of full speed, and turns left at more than a
-third of the greatest rate. It counts half to each if it does both, and is forward if it does
-neither. A part's share is its probability, in closed form.
+An action belongs to "left" if its speed to the left exceeds a third of the greatest, and to "turn
+left" if its yaw rate does. If it does both, `probabilities` counts half to each and `part` returns
+the larger one. If it does neither, it belongs to "forward". Probabilities have a closed form.
 """
 
 import dataclasses
@@ -104,7 +104,7 @@ class ContinuousActions(Actions):
         return torch.stack([(1 - aside) * (1 - turned), *shares], -1)
 
     def scores(self, outputs: Tensor) -> Tensor:
-        """Return the outputs for the means, signed towards each part."""
+        """Return the means' outputs, signed to each part; that of forward is its speed."""
         forward, left, turn_left = outputs[..., :3].unbind(-1)
         every = (forward, left, -left, turn_left, -turn_left)
         return torch.stack(every[: len(self)], -1)
@@ -117,12 +117,12 @@ class ContinuousActions(Actions):
         """Return the side that an action goes or turns to, whichever is more; else forward."""
         aside, turned = action[..., SIDEWAYS], action[..., YAW] * self.can_turn
         is_turn = turned.abs() > aside.abs()
-        way = torch.where(is_turn, turned, aside)
-        part = torch.where(is_turn, 3, 1) + (way < 0).long()
-        return part.masked_fill(way.abs() <= ASIDE, 0)
+        stronger = torch.where(is_turn, turned, aside)
+        part = torch.where(is_turn, 3, 1) + (stronger < 0).long()
+        return part.masked_fill(stronger.abs() <= ASIDE, 0)
 
     def always(self, name: str) -> Tensor:
-        """Return full speed; actions to a side do not go forward."""
+        """Return the full-speed action of a part; those to a side do not go forward."""
         given = ((1, 0, 0), (-1, 1, 0), (-1, -1, 0), (-1, 0, 1), (-1, 0, -1))
         return torch.tensor(given[self.names.index(name)], dtype=torch.float32)
 
@@ -134,12 +134,12 @@ class ContinuousActions(Actions):
     def fields(self) -> dict[str, str]:
         """Return the entries of part and rates."""
         return {
-            "actions": "what the action taken is, for the most part: " + listed(self.names),
+            "actions": "part to which the action taken belongs: " + listed(self.names),
             "rates": "the action: m/s forward, m/s to the left, rad/s to the left (T, 3)",
         }
 
     def kept(self, action: Tensor) -> dict[str, Tensor]:
-        """Return the part, and the action in units."""
+        """Return the part, and the action in m/s and rad/s."""
         return {"actions": self.part(action), "rates": self.to_rates(action)}
 
     def as_dict(self) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from drone_rl.config.dynamics import GRAVITY
 from drone_rl.sim.dynamics import BodyState, FlightState, Goals, Quadrotor
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.forces_kernel import forces
-from drone_rl.sim.dynamics.state import heading_only
+from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.entities import DRONE_CAMERAS, Drone
 
 mujoco: Any = mujoco_module
@@ -165,7 +165,7 @@ class MujocoFlight:
         if self.quadrotor.mount != "gimbal" or self._mounted is None:
             return
         attitude = physics.data.qpos[self._pose][3:]
-        level = heading_only(torch.tensor(attitude)).numpy()
+        level = twist_about_z(torch.tensor(attitude)).numpy()
         turn, place, quat = np.empty(4), np.empty(3), np.empty(4)
         mujoco.mju_mulQuat(turn, attitude * (1.0, -1.0, -1.0, -1.0), level)
         model = physics.model.ptr

@@ -12,7 +12,7 @@ from drone_rl.config import ActionSettings, BaseTaskSettings, CameraSettings, Dy
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.composer_task import ComposerTask
 from drone_rl.sim.dynamics import BodyState, Dynamics, draw_seeds, make_dynamics
-from drone_rl.sim.dynamics.state import heading_only
+from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.entities import FRONT_CENTER
 from drone_rl.sim.rendering import (
     Appearance,
@@ -187,7 +187,7 @@ class Worlds:
             props = torch.cat([props, places.to(props)], 1)
         attitude = state.body.attitude
         if self.dynamics.mount == "gimbal":
-            attitude = heading_only(attitude)
+            attitude = twist_about_z(attitude)
         return Poses(state.body.position, attitude, props)
 
     def prepare(self, view: View | None = None) -> None:

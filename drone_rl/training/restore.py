@@ -16,10 +16,11 @@ MAY_DIFFER = ("lr", "initial_lr", "_last_lr", "base_lrs")
 
 
 def check_fits(saved: Any, own: Any, where: str) -> None:
-    """Check that a saved state has the structure of the run's `own`; None fits anything.
+    """Check that a saved state has the structure of `own`, whose None fits anything.
 
     Raises:
-        InputError: A name, type, shape or length differs, or a number is not finite.
+        InputError: A key, type, shape, length, text or flag differs; a number is infinite, or NaN
+            where `own` has no NaN.
     """
     if isinstance(own, Tensor):
         _check_tensor(saved, own, where)

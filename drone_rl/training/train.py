@@ -55,16 +55,16 @@ def train(
     Args:
         settings: All settings; by default those of the run if it is resumed.
         folder: The run's folder; by default a new one under outputs/train/runs.
-        resume: Whether to resume the run in the folder, bit for bit.
+        resume: Whether to resume the run in the folder; on a CPU bit for bit.
         callbacks: Called after every update, besides those that write checkpoints and metrics.
         progress: Called with the progress; a bar by default.
-        changes: Settings, as in `train(seed=1, task=TaskSettings(num_cubes=5))`, or a `Task`.
+        changes: Settings by name, as in `train(seed=1)`; `task` may also be a `Task` object.
 
     Raises:
         InputError: A setting is unusable, or learning broke down.
         KeyboardInterrupt: Ctrl-C stopped it; its attribute `training` is the result so far.
-        SystemExit: SIGTERM stopped it (status 143); likewise. A signal handler of the caller is
-            called instead of either.
+        SystemExit: SIGTERM stopped it (status 143); it has the same attribute. A signal handler
+            that the caller has set is called instead, and nothing is raised.
     """
     run, state = RunFolder.open(folder, resume)
     if settings is None:
@@ -92,7 +92,7 @@ def learn(
         folder: The run's folder, locked by this process.
         state: Checkpoint to resume from, if any.
         callbacks: See `train`.
-        replay: Task that replays failures, instead of that of the settings; not saved.
+        replay: Task that replays failures, used instead of the settings' task; not saved.
 
     Returns:
         Why it stopped and how far it came, as in `result.json`.
@@ -157,7 +157,7 @@ def make_groups(
 ) -> list[Group]:
     """Make the environments of threads or workers, and the policy that acts in them.
 
-    `sizes` are the environments of each group, `numbers` the groups to make; all by default.
+    `sizes` are the numbers of environments of the groups, `numbers` the indices of those to make.
     """
     description, seed, device = describe(settings), settings.seed, settings.device
     network = description.build_network(torch_generator(seed, Stream.POLICY_INIT)).to(device)

@@ -25,7 +25,7 @@ from drone_rl.utils.memory import return_freed_memory
 def episode_rewards(batch: TensorDictBase) -> Tensor:
     """Return the rewards of the episodes that end in a batch, in order. Shape: (num_episodes,).
 
-    The rows (*batch, T) are complete episodes, or have ("next", "episode_reward"), which
+    Each row (*batch, T) holds complete episodes, or has ("next", "episode_reward"), which
     `RolloutCollector` and TorchRL's `RewardSum` write; otherwise raise an `InputError`.
     """
     done, reward = (cast(Tensor, batch["next", name]) for name in ("done", "reward"))
@@ -52,7 +52,7 @@ def running_mean(old: float, values: Tensor, decay: float) -> float:
 def batch_metrics(batch: TensorDictBase, ends: Iterable[enum.IntEnum] = ()) -> dict[str, float]:
     """Return means over the episodes that end in a batch; NaN where none ends.
 
-    With `ends` (`Task.ends`), also the rate of each ("next", "info", "end_reason") but 0.
+    With `ends` (`Task.ends`), also the rate of each ("next", "info", "end_reason") but 0, running.
     """
     rewards = episode_rewards(batch)
     done, lengths = batch["next", "done"], batch.get(("next", "step_count"), None)
@@ -70,8 +70,8 @@ def batch_metrics(batch: TensorDictBase, ends: Iterable[enum.IntEnum] = ()) -> d
     return metrics
 
 
-TRIMMED_EVERY = 16
-"""Updates between releases of memory, which make the next update a tenth slower."""
+TRIM_INTERVAL = 16
+"""Updates between releases of freed memory; a release makes the next update 10% slower."""
 
 
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
@@ -161,7 +161,7 @@ class Trainer:
             self._collected = time.perf_counter()
             check_batch(batch, self.learner.in_keys, type(self.learner).__name__)
             yield batch
-            if self.progress.updates % TRIMMED_EVERY == 0:
+            if self.progress.updates % TRIM_INTERVAL == 0:
                 return_freed_memory()
         self._reason = reason
 

@@ -66,8 +66,8 @@ def read_arrays(
 ) -> dict[str, NDArray]:
     """Return the arrays of numbers and texts in an .npz file.
 
-    `most` is the largest size of all arrays together, in bytes; `allowance` is shared with further
-    files and replaces it.
+    `most` is the largest size of all arrays together, in bytes, and also limits the file itself;
+    `allowance`, shared with further files, replaces it for the arrays.
 
     Raises:
         InputError: The file is unusable, or an array holds objects.
@@ -94,8 +94,7 @@ def _members(
     methods: Collection[int],
     read: Callable[[Any, int, str], T],
 ) -> Iterator[tuple[str, T]]:
-    """Yield the name of each file and the result of `read` for the opened file and its size."""
-    remedy = "the file was damaged or cut short"
+    """Yield the name of each file and the result of `read(file, size, where)`."""
     if content.count(_ENTRY) > MEMBERS:
         raise InputError(f"{where} holds more than {MEMBERS} files")
     try:
@@ -106,20 +105,22 @@ def _members(
                 raise InputError(f"{where} holds two files of one name")
             for member in members:
                 if member.compress_type not in methods:
-                    raise InputError(f"{where} is compressed in a way that is not accepted")
+                    raise InputError(
+                        f"{where} uses compression {member.compress_type}, which is not accepted"
+                    )
                 name = member.filename
                 with archive.open(member) as file:
                     yield name, read(file, member.file_size, f"{where}: {name}")
     except InputError:
         raise
     except _DAMAGE as error:
-        raise InputError(f"{where} is no whole archive ({error}); {remedy}") from None
+        raise InputError(f"{where} is damaged or cut short ({error}); write it again") from None
 
 
 def _array(file: Any, size: int, where: str) -> NDArray:
     """Read one array; NumPy would allocate whatever the header states."""
     begin = file.read(12)
-    start = {1: 10, 2: 12}.get(begin[6] if begin[:6] == b"\x93NUMPY" else 0, 0)
+    start = {b"\x93NUMPY\x01": 10, b"\x93NUMPY\x02": 12}.get(begin[:7], 0)
     length = int.from_bytes(begin[8:start], "little")
     header_size = min(length, _LONGEST_HEADER + 1)
     text = begin[start:] + file.read(max(0, start + header_size - len(begin)))
@@ -130,7 +131,7 @@ def _array(file: Any, size: int, where: str) -> NDArray:
     shape = tuple(int(length) for length in header["shape"].split(",") if length.strip())
     count = math.prod(shape)
     if count * dtype.itemsize != size - start - length:
-        raise InputError(f"{where} is said to be {shape} of {dtype}, which its bytes are not")
+        raise InputError(f"{where} states {shape} of {dtype}, but holds another number of bytes")
     check_shape(shape, dtype.itemsize, ELEMENTS * dtype.itemsize, where)
     flat = np.empty(count, dtype)
     _fill(flat, file, where)

@@ -21,7 +21,7 @@ from drone_rl.verdicts.export import origin_of
 
 MAX_DIFFERENCE = 1e-5
 """Largest allowed difference of a probability from PyTorch's."""
-_WORLDS, _STEPS = 100, 100
+_NUM_ENVS, _STEPS = 100, 100
 """Numbers of environments and steps of the comparison: 10,000 images."""
 
 
@@ -34,7 +34,7 @@ class Agreement:
     difference: float
     """Largest difference of a probability; NaN if one is NaN."""
     actions_differ: int
-    """Number of images for which the most probable action, or the largest component, differs."""
+    """Number of images whose most probable action differs; see `Actions.probabilities`."""
 
 
 @torch.no_grad()
@@ -77,7 +77,7 @@ def export_onnx(
 
     Args:
         policy: The policy, or an argument of `load_policy`.
-        target: The file, ending in .onnx, see `drone_rl.policies.zoo.make_onnx`.
+        target: Path of the file to write, usually *.onnx; see `drone_rl.policies.zoo.make_onnx`.
         command: The training command, for the metadata; None takes it from the policy's file or
             folder.
         seed: Root of the random streams of the comparison; a fresh one by default.
@@ -86,14 +86,14 @@ def export_onnx(
         Agreement of the model and PyTorch on 10,000 images of the policy's episodes.
 
     Raises:
-        InputError: The policy can't be converted, or the model differs; no file is written.
+        InputError: The policy can't be converted, the model differs, or the file can't be written.
     """
     policy = policy if isinstance(policy, Policy) else load_policy(policy)
-    told = {"command": command or origin_of(policy.path, policy.state)[0]}
-    content = make_onnx(policy.description, policy.make_network(), told)
+    metadata = {"command": command or origin_of(policy.path, policy.state)[0]}
+    content = make_onnx(policy.description, policy.make_network(), metadata)
     model = open_onnx(content)
-    sound = dataclasses.replace(policy, description=policy.description.without_faults())
-    with sound.flying(_WORLDS, seed=root_seed(seed).value) as (env, actor):
+    without_faults = dataclasses.replace(policy, description=policy.description.without_faults())
+    with without_faults.flying(_NUM_ENVS, seed=root_seed(seed).value) as (env, actor):
         found = agreement(env, actor, model, _STEPS)
     if not found.difference <= MAX_DIFFERENCE:
         raise InputError(

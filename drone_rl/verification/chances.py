@@ -40,7 +40,7 @@ _BOUNDS = {
     "mean_least": "on average at least",
     "mean_most": "on average at most",
 }
-CELLS_AT_A_TIME = 2**22  # bounds memory
+MAX_NODES = 2**22  # lattice nodes of placements that are explored together; bounds memory
 PLACEMENTS_AT_A_TIME = 20  # placements between two reports of progress
 
 
@@ -69,13 +69,13 @@ class Chances:
 
     @property
     def worst(self) -> Tensor:
-        """The placement with the smallest success probability, metres to the left. Shape: (C,)."""
+        """The placement with the largest failure probability, metres to the left. Shape: (C,)."""
         return self.cubes[self.outcomes.failure.argmax(), :, 1]
 
     def rows(self) -> list[list[str]]:
         """Return a table: a header, then mean, minimum and maximum over placements."""
         outcomes, collected = self.outcomes, self.outcomes.collected.unbind(-1)
-        reasons = list(EndReason)[EndReason.FRONT_BOUNDARY : EndReason.LOST_CONTROL]
+        reasons = (EndReason.FRONT_BOUNDARY, EndReason.SIDE_BOUNDARY, EndReason.STEP_LIMIT)
         rows = [
             ["", "mean", "least", "most"],
             _row("all cubes", outcomes.success),
@@ -120,9 +120,11 @@ class Chances:
 
     def _notes(self) -> list[str]:
         """Return the lines below the table."""
-        about = f"{len(self.cubes)} placements; least probable at cubes={_places(self.worst)}"
+        about = (
+            f"{len(self.cubes)} placements; least probable at cubes={_format_positions(self.worst)}"
+        )
         if len(self.cubes) == 1:
-            about = f"cubes at {_places(self.cubes[0, :, 1])} metres to the left"
+            about = f"cubes at {_format_positions(self.cubes[0, :, 1])} metres to the left"
         if self.seed is None:
             return [about]
         seed = self.seed.as_dict()
@@ -163,14 +165,14 @@ def chances(
 ) -> Chances:
     """Compute the exact probability of each end of an episode with sampled actions, as in training.
 
-    Every lattice position that is not nearly unreachable is rendered once; the rest is arithmetic
-    in float64. The network computes in float32. Probability not followed is reported as undecided.
+    Each drone position that is reached with a probability above `MIN_PROBABILITY` is rendered once;
+    the rest is arithmetic in float64, the network in float32. What is not followed is undecided.
 
     Args:
         policy: The policy, or an argument of `load_policy`.
         cubes: Positions of the cubes, metres to the left, nearest first, in one placement or
             several; held-out placements by default. Shape: (C,) or (P, C).
-        settings: Which placements, if none are given.
+        settings: Device, renderer, box of the bounds, and placements if `cubes` is None.
         task: Changes to the policy's task.
         outputs: Folder of runs.
         progress: Called with the progress; a bar by default.
@@ -183,15 +185,19 @@ def chances(
     progress = progress or Bar()
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
-    chosen = require_cubes(policy.description, "exact probabilities")
-    placed = _sampled(chosen, settings.placements, seed) if cubes is None else _given(chosen, cubes)
-    at_a_time = max(1, CELLS_AT_A_TIME // math.prod(shape_of(chosen)))
+    task_settings = require_cubes(policy.description, "exact probabilities")
+    placed = (
+        _sampled(task_settings, settings.placements, seed)
+        if cubes is None
+        else _given(task_settings, cubes)
+    )
+    at_a_time = max(1, MAX_NODES // math.prod(shape_of(task_settings)))
     parts = placed.split(min(at_a_time, PLACEMENTS_AT_A_TIME))
     with closing(policy.make_env(1, device=settings.device, renderer=settings.renderer)) as env:
         evaluator, found = NodeEvaluator(env, policy.make_network(settings.device)), []
         for part in parts:
             progress("placements", sum(map(len, found)), len(placed))
-            graph = explore(chosen, part)
+            graph = explore(task_settings, part)
             found.append(propagate(graph, evaluator.on(graph)))
     progress("placements", len(placed), len(placed))
     return Chances(
@@ -208,7 +214,7 @@ def chances(
 def _bounded(
     policy: Policy, placed: Tensor, settings: ChanceSettings, progress: Progress
 ) -> tuple[SuccessBounds, ...]:
-    """Return bounds around each placement, clipped to the positions where cubes may stand."""
+    """Bound the success probability over a box around each placement, within the lateral bound."""
     network, gap = policy.make_network(), ProveSettings.logit_gap
     found: list[SuccessBounds] = []
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
@@ -229,7 +235,7 @@ def _sampled(task: TaskSettings, count: int, seed: RootSeed) -> Tensor:
 
 
 def _given(task: TaskSettings, cubes: Any) -> Tensor:
-    """Return placements by metres to the left, at the drone's altitude."""
+    """Return placements (P, C, 3) from metres to the left; cubes are at the drone's altitude."""
     try:
         aside = torch.atleast_2d(torch.as_tensor(cubes, dtype=torch.float64))
     except (TypeError, ValueError, RuntimeError):
@@ -254,5 +260,5 @@ def _row(name: str, values: Tensor, show: Callable[[float], str] = exact_percent
     return [name, *(show(float(figure)) for figure in (values.mean(), values.min(), values.max()))]
 
 
-def _places(aside: Tensor) -> str:
+def _format_positions(aside: Tensor) -> str:
     return f"[{', '.join(f'{y:.6g}' for y in aside.tolist())}]"

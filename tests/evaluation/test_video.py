@@ -15,7 +15,7 @@ from drone_rl.evaluation.video import (
     _compose,
     _draw_bars,
     _look,
-    _Seen,
+    _VideoImages,
     film_episode,
     write_video,
 )
@@ -58,12 +58,12 @@ def test_a_film_shows_the_world_as_it_was_drawn(make_pipeline):
     env, _ = make_pipeline(1, appearance=look)
     env.reset()
     seen = _look(env.base_env)
-    assert seen.outside.shape == (532, 1280, 3) and seen.five.shape == (5, 144, 252, 3)
+    assert seen.chase.shape == (532, 1280, 3) and seen.strip.shape == (5, 144, 252, 3)
     own = env.base_env.appearances.current().colors[SemanticClass.GROUND][0]
-    below = seen.five[4, -1, 0].double()  # the ground, in full light
+    below = seen.strip[4, -1, 0].double()  # the ground, in full light
     sun = 0.35 + 0.75 * 0.82
     assert below.tolist() == pytest.approx((255 * sun * own).tolist(), abs=3)
-    assert torch.equal(seen.inside, env.base_env.last_pixels[0])
+    assert torch.equal(seen.camera, env.base_env.last_pixels[0])
 
 
 def test_video_that_cannot_be_written(tmp_path):
@@ -125,10 +125,10 @@ def test_pictures_of_one_moment_by_the_pixel():
     red, green, blue = (
         torch.tensor(c, dtype=torch.uint8) for c in ((200, 0, 0), (0, 200, 0), (0, 0, 200))
     )
-    seen = _Seen(
-        inside=blue.expand(10, 20, 3),
-        outside=red.expand(532, 1280, 3),
-        five=green.expand(5, 144, 252, 3),
+    seen = _VideoImages(
+        camera=blue.expand(10, 20, 3),
+        chase=red.expand(532, 1280, 3),
+        strip=green.expand(5, 144, 252, 3),
     )
     shown = _compose(seen, "")
     of = {name: (shown == color.numpy()).all(-1) for name, color in
@@ -149,7 +149,7 @@ def test_pictures_of_one_moment_by_the_pixel():
 def test_a_tall_picture_of_the_policys_is_cut_to_half_the_height():
     red, blue = (torch.tensor(c, dtype=torch.uint8) for c in ((200, 0, 0), (0, 0, 200)))
     five = torch.zeros(5, 144, 252, 3, dtype=torch.uint8)
-    shown = _compose(_Seen(blue.expand(40, 20, 3), red.expand(532, 1280, 3), five), "")
+    shown = _compose(_VideoImages(blue.expand(40, 20, 3), red.expand(532, 1280, 3), five), "")
     rows, _ = (shown == blue.numpy()).all(-1).nonzero()
     assert (rows.min(), rows.max()) == (39, 39 + 266 - 1)
 

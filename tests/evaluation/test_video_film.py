@@ -34,3 +34,22 @@ def test_no_display(monkeypatch):
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(InputError, match="needs a display"):
         view(drone_rl.load_policy("good"))
+
+
+@pytest.mark.parametrize("name", ["good", "flight_velocity", "pillars_good"])
+def test_viewer_runs_a_policy_in_dm_control(name, monkeypatch):
+    """A viewer calls the policy with each time step of some episodes; the last stacks frames."""
+    policy, actions = drone_rl.load_policy(name), []
+
+    def launch(env, act, title):
+        for _ in range(2):
+            timestep = env.reset()
+            for _ in range(5):
+                actions.append(act(timestep))
+                timestep = env.step(actions[-1])
+
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr("dm_control.viewer.launch", launch)
+    view(policy)
+    assert len(actions) == 10
+    assert actions[0].shape == ((3,) if name == "flight_velocity" else ())

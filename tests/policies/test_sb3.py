@@ -105,6 +105,24 @@ def test_model_without_action_probabilities_raises():
         Sb3Logits(model)
 
 
+def test_model_of_several_observations_raises():
+    space = gymnasium.spaces.Dict({"a": FLOATS, "b": FLOATS})
+    model = sb3.PPO("MultiInputPolicy", StaticEnv(space), seed=0)
+    with pytest.raises(InputError, match=r"^the policy of PPO gives no logits of a single image"):
+        Sb3Logits(model)
+
+
+def test_model_that_scales_features_itself_raises():
+    """Its logits of a black image are the same."""
+    model = sb3.PPO("MlpPolicy", StaticEnv(FLOATS), seed=0)
+    network = model.policy.mlp_extractor
+    network.forward_actor = lambda features: network.policy_net(0.5 * features)
+    with torch.no_grad():
+        model.policy.action_net.weight.mul_(100)
+    with pytest.raises(InputError, match=r"^the policy of PPO gives no logits of a single image"):
+        Sb3Logits(model)
+
+
 def test_the_smaller_end_of_a_shape_is_the_channels():
     assert _channels_first((40, 48, 3)) == (3, 40, 48)
     assert _channels_first((3, 40, 48)) == (3, 40, 48)

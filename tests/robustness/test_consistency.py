@@ -35,7 +35,7 @@ def test_counts_that_go_together_pass_unchanged(good, numbers):
         ({"together.oracle": share(150)}, "together.impossible does not follow from its oracle"),
         (
             {"axes.blur.levels.0.modes.constant.paired.gained": 1},
-            r"axes.blur.levels.0.paired does not lead .*; run drone-rl shifts again",
+            r"axes.blur.levels.0.paired: gained - lost is not .*; run drone-rl shifts again",
         ),
     ],
 )
@@ -50,7 +50,7 @@ def test_a_range_has_to_follow_from_its_answers(good, numbers, name):
     axis, found = owned(name, of), numbers["domain"]["ranges"][name]
     check_range(axis, found, of, numbers)
     low, high = found["positions"]
-    with pytest.raises(InputError, match=f"domain.ranges.{name} contradicts what was flown at"):
+    with pytest.raises(InputError, match=f"domain.ranges.{name} contradicts its tested strengths"):
         check_range(axis, {**found, "positions": [low, high + 0.01]}, of, numbers)
 
 
@@ -66,7 +66,7 @@ def test_no_strength_is_good_at_which_the_counts_say_otherwise(good, numbers):
     ("change", "message"),
     [
         ({"success": 0.5012}, "here.success is not a fraction of 400 episodes"),
-        ({"good": True}, "here is both good and bad"),
+        ({"good": True}, "here is good, but also bad or refused"),
         ({"oracle": share(9, 10)}, "here.oracle is of 10 episodes, not of 400"),
     ],
 )

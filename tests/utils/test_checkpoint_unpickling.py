@@ -167,7 +167,7 @@ def test_other_files_in_the_archive():
     with pytest.raises(DamagedError, match="byte order"):
         unpickle(archive(b"\x80\x02N.", byteorder=b"big"), "x")
     assert unpickle(archive(b"\x80\x02N.", byteorder=b"little"), "x") is None
-    with pytest.raises(InputError, match="no whole archive"):
+    with pytest.raises(InputError, match="is damaged or cut short"):
         unpickle(pickle.dumps(Call(os.mkdir, "ran")), "x")
 
 

@@ -14,7 +14,7 @@ from drone_rl.cli.commands import TABLE
 from drone_rl.cli.hydra.mistakes import composed
 from drone_rl.utils.settings import Settings, kinds_of
 
-_KNOB = re.compile(r"(?P<indent> *)(?P<name>[A-Za-z_]\w*):(?= |$)")
+_SETTING = re.compile(r"(?P<indent> *)(?P<name>[A-Za-z_]\w*):(?= |$)")
 _NOT_SHOWN = ("hydra", "paths")
 """Groups without choices for users."""
 _WIDTH = 100
@@ -132,11 +132,11 @@ def read_comments(path: Path) -> dict[str, str]:
     """Return the comment above each setting of one file by its dotted name."""
     found, above, where = {}, [], []
     for line in path.read_text().splitlines():
-        knob = _KNOB.match(line)
+        setting = _SETTING.match(line)
         if line.lstrip().startswith("#"):
             above.append(line.strip().lstrip("#").strip())
-        elif knob and knob["name"] != "defaults":
-            where = [*where[: len(knob["indent"]) // 2], knob["name"]]
+        elif setting and setting["name"] != "defaults":
+            where = [*where[: len(setting["indent"]) // 2], setting["name"]]
             if above:
                 found[".".join(where)] = "\n".join(above)
             above = []

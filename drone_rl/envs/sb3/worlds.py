@@ -1,6 +1,6 @@
 """A Gymnasium vector environment as a Stable-Baselines3 `VecEnv`.
 
-Stable-Baselines3 accepts single Gymnasium environments only, which it steps one after the other.
+Stable-Baselines3's own wrappers take single environments; `DummyVecEnv` steps them in turn.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from drone_rl.utils.errors import InputError
 
 
 class Sb3Worlds(VecEnv):
-    """`Sb3Worlds(gymnasium.make_vec(name, num_envs=64, autoreset_mode="SameStep"))`.
+    """Wrap `gymnasium.make_vec(name, num_envs=64, autoreset_mode="SameStep")` as a `VecEnv`.
 
     A step returns infos only for environments whose episode has just ended.
     """

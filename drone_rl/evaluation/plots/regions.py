@@ -64,7 +64,7 @@ def _mark(axis: Axes, numbers: Mapping[str, Any]) -> None:
         label = "beyond: flying straight on misses it" if y < 0 else None
         axis.axvline(y, color="white", ls=(0, (5, 4)), lw=1.6)
         axis.axvline(y, color=css(INK), ls=(0, (5, 4)), lw=0.8, label=label)
-    axis.plot(0, 0, "^", color=css(INK), ms=11, clip_on=False, ls="", label="camera, looking up")
+    axis.plot(0, 0, "^", color=css(INK), ms=11, clip_on=False, ls="", label="camera, facing up")
     at = numbers["least_gap_left"], numbers["least_gap_ahead"]
     for color, width, label in (
         ("white", 2, None),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from drone_rl.evaluation.plots import images
-from drone_rl.explanations.report.explanation import Drawn, Explanation, Part
+from drone_rl.explanations.report.explanation import Explanation, Figures, Part
 from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.utils.text import Claims, Evidence
 
@@ -118,7 +118,7 @@ def explained_step(
     )
 
 
-def _draw(explanation: Explanation) -> Drawn:
+def _draw(explanation: Explanation) -> Figures:
     numbers = explanation.numbers
     method = trusted_method(numbers) if is_shown(numbers) else None
     drawn: dict[str, Any] = {"sequence": key_frames(explanation, method)} if method else {}

@@ -5,7 +5,7 @@ from PIL import Image
 from drone_rl.evaluation.plots import images
 from drone_rl.evaluation.plots.saving import Rows
 from drone_rl.evaluation.verdict_text import depends_on_rounding
-from drone_rl.explanations.report.explanation import Drawn, Explanation, Part
+from drone_rl.explanations.report.explanation import Explanation, Figures, Part
 from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.robustness import charts
 from drone_rl.robustness.shifts_text import QUOTED, is_quoted, rows, untested
@@ -108,7 +108,7 @@ EVALUATION_PART = Part(
 )
 
 
-def _draw_shifts(explanation: Explanation) -> Drawn:
+def _draw_shifts(explanation: Explanation) -> Figures:
     """Draw curves and rows of frames, unless the measurement is refused."""
     numbers = explanation.numbers["shifts"]
     if not is_quoted(explanation.numbers):

@@ -23,7 +23,7 @@ from drone_rl.utils.text import SEED_KEYS, Paragraph
 
 FORMAT = "drone_rl explanation"
 FORMAT_VERSION = 3
-FRAME = frozenset(
+HEADER = frozenset(
     {
         *("format", "format_version", "name", "date", "settings", "seconds", "actions", "terms"),
         *("provenance", *SEED_KEYS),
@@ -58,7 +58,9 @@ class Explanation:
 
     @classmethod
     def load(cls, folder: Path, allowance: Allowance | None = None) -> "Explanation":
-        """Read a folder; the allowance bounds the arrays of all explanations of a report.
+        """Read a folder.
+
+        `allowance` is the byte budget for arrays, shared by all explanations of a report.
 
         Raises:
             InputError: A file is missing, damaged, too large, or of another version.
@@ -71,6 +73,9 @@ class Explanation:
                 content, "explanation.json", allow_nan=True, most_values=EXPLANATION_VALUES
             )
             numbers = dict(as_mapping(parsed, "explanation.json"))
+            version = numbers.get("format"), numbers.get("format_version")
+            if version != (FORMAT, FORMAT_VERSION):
+                raise InputError(f"it has no format version {FORMAT_VERSION}")
             arrays = read_arrays(folder / "arrays.npz", allowance=allowance)
             data = read_arrays(folder / "dataset.npz", allowance=allowance)
             data.pop("meta", None)
@@ -82,7 +87,7 @@ class Explanation:
             check_intervals(numbers, "explanation")
             if numbers.get("verdict") is not None:
                 check_verdict(numbers["verdict"])
-            # files of version 0.1 have the seed among their settings only
+            # drone_rl 0.1 wrote the seed only into the settings
             older = as_mapping(numbers.get("settings", {}), "settings").get("seed")
             Maybe(Whole(0)).read(numbers.get("seed", older), "seed")
             Flag().read(numbers.get("seed_is_fixed", True), "seed_is_fixed")
@@ -90,17 +95,12 @@ class Explanation:
             raise InputError(
                 f"explanation {folder} can't be read ({error}); run drone-rl explain again"
             ) from None
-        if numbers.get("format") != FORMAT or numbers.get("format_version") != FORMAT_VERSION:
-            raise InputError(
-                f"{folder} holds no explanation of format version {FORMAT_VERSION}; "
-                "run drone-rl explain again"
-            )
         return cls(numbers, arrays, data, f"{folder.name}/explanation.json")
 
 
-Picture = Image.Image | Figure | NDArray
+Media = Image.Image | Figure | NDArray
 """An image, a chart, or a film (T, H, W, 3), uint8, with sizes that are multiples of 16."""
-Drawn = Mapping[str, Picture | Mapping[str, Picture]]
+Figures = Mapping[str, Media | Mapping[str, Media]]
 """Pictures by name; several under one name, by caption, are laid out side by side."""
 
 
@@ -112,7 +112,7 @@ def _nothing(_: Any) -> dict[str, Any]:
 class Part:
     """Display of a section in the report.
 
-    A part is listed in `page.PARTS`; its template is `templates/sections/NAME.html`.
+    `page.PARTS` maps a name to the part; `templates/sections/NAME.html` is its template.
     """
 
     title: str
@@ -125,13 +125,13 @@ class Part:
     """Whether it is rendered after the other parts, so that their errors are found first."""
     text: Mapping[str, Paragraph] = dataclasses.field(default_factory=dict)
     """Paragraphs by name."""
-    draw: Callable[[Explanation], Drawn] = _nothing
+    draw: Callable[[Explanation], Figures] = _nothing
     """Returns the figures of one policy by file name."""
     tables: Callable[[Explanation], Mapping[str, Rows]] = _nothing
     """Returns the numbers behind the figures, saved as CSV."""
     extras: Callable[[Explanation], Mapping[str, Any]] = _nothing
     """Returns further values for the template."""
-    compare: Callable[[Sequence[Explanation]], Drawn] = _nothing
+    compare: Callable[[Sequence[Explanation]], Figures] = _nothing
     """Returns figures of all policies together."""
 
     def fits(self, explanation: Explanation) -> bool:

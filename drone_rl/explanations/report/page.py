@@ -20,7 +20,7 @@ from drone_rl.explanations.report import (
     summary,
     truth,
 )
-from drone_rl.explanations.report.explanation import FRAME, Drawn, Explanation, Part
+from drone_rl.explanations.report.explanation import HEADER, Explanation, Figures, Part
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest, to_file_name
@@ -212,7 +212,7 @@ def _parts(environment: jinja2.Environment, policies: Sequence[Policy]) -> list[
     ]
     others = []
     for explanation in (policy.explanation for policy in policies):
-        shown = FRAME.union(*(part.needs for part in PARTS.values() if part.fits(explanation)))
+        shown = HEADER.union(*(part.needs for part in PARTS.values() if part.fits(explanation)))
         others.append((explanation, sorted(explanation.numbers.keys() - shown)))
     if any(keys for _, keys in others):
         html = Markup(environment.get_template("others.html").render(others=others))
@@ -229,7 +229,7 @@ def _render(template: jinja2.Template, part: Part, policies: Sequence[Policy]) -
     return Markup(template.render(policies=[p.show(part) for p in fitting], shared=shared))
 
 
-def _save(drawn: Drawn, folder: Path, prefix: str) -> dict[str, str | dict[str, str]]:
+def _save(drawn: Figures, folder: Path, prefix: str) -> dict[str, str | dict[str, str]]:
     """Save figures; return their data URIs by name, and by caption where a name has several."""
     saved: dict[str, str | dict[str, str]] = {}
     for name, one in drawn.items():

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from drone_rl.evaluation.rule import Kind
 from drone_rl.evaluation.verdict_text import is_proved, is_quoted, is_stated
 from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.robustness import shifts_text
@@ -18,7 +19,7 @@ LINES: Mapping[str, tuple[str, str]] = {
     "heat": ("Heat maps", "truth"),
     "limits": ("Not shown", "left_out"),
 }
-"""Label and section of each line, by the word after "summary." in the names of its sentences."""
+"""Label and section of each line, by the word after "summary." in the names of its claims."""
 _SECTIONS = {
     "dataset": "rollouts",
     "tsne": "t-SNE",
@@ -27,7 +28,7 @@ _SECTIONS = {
     "response": "response map",
     "asymmetry": "asymmetry",
 }
-"""Sections that the other lines do not name, by their entries."""
+"""Names of sections that only the line "Not shown" mentions, by entry of explanation.json."""
 
 
 def say_summary(evidence: Evidence) -> Claims:
@@ -47,19 +48,20 @@ def _missing(line: str) -> Claims:
 
 def _say_verdict(evidence: Evidence) -> Claims:
     verdict, terms, claims = evidence["verdict"], terms_of(evidence), Claims()
-    greedy = verdict["greedy"]
+    greedy, kind = verdict["greedy"], verdict["kind"]
+    kind = "neither good nor poor nor one-sided" if kind == str(Kind.NONE) else kind
     if verdict["certain"]:
         claims["summary.verdict"] = (
-            f"{verdict['kind'].capitalize()}. The verdict is wrong with at most "
+            f"{kind.capitalize()}. This verdict is wrong with at most "
             f"{100 * verdict['error_rate']:g}% probability."
         )
     else:
         claims["summary.verdict_open"] = (
-            f"Not certain: it looks {verdict['kind']}, but this evidence does not decide it."
+            f"Not certain: the evidence suggests {kind}, but does not decide it."
         )
     claims["summary.success"] = (
-        f"{rate(greedy['success'])} of {greedy['episodes']:,} episodes, with every {terms.goal} "
-        f"{terms.reached} by the most probable actions."
+        f"The most probable actions have every {terms.goal} {terms.reached} in "
+        f"{rate(greedy['success'])} of {greedy['episodes']:,} episodes."
     )
     return claims
 
@@ -75,14 +77,14 @@ def _say_robustness(evidence: Evidence) -> Claims:
     if not shifts_text.is_quoted(evidence):
         why = shifts_text.why_not(evidence)
         return {"summary.robustness_refused": f"Measured, but not shown here: {why}."}
-    count = plural(len(shifts["axes"]), "axis", "axes")
+    count = plural(len(shifts["axes"]), "perturbation")
     if shifts["domain"] is None:
-        return {"summary.robustness_table": f"Success rates under {count} of perturbations."}
+        return {"summary.robustness_table": f"Success rates under {count}."}
     wide = [shifts_text.NAMES[name] for name in shifts_text.wide(shifts)]
     names = f": {listed(wide)}" if wide else ""
     return {
         "summary.robustness": (
-            f"Certainly good in a range of strengths on {len(wide)} of {count} tested{names}."
+            f"Good with 95% confidence in a range of {len(wide)} of {count} tested{names}."
         )
     }
 
@@ -102,7 +104,7 @@ def _say_verification(evidence: Evidence) -> Claims:
         )
     else:
         claims["summary.certificate_none"] = (
-            "No certificate covers all placements; drone-rl prove searches for one."
+            "No accepted certificate; for the collection of cubes, drone-rl prove searches for one."
         )
     places = evidence.get("places")
     if not places:
@@ -112,8 +114,8 @@ def _say_verification(evidence: Evidence) -> Claims:
     else:
         window = places["window"]
         claims["summary.map"] = (
-            f"Its action is known exactly for every place of one cube, {window['nearest']:g} to "
-            f"{window['farthest']:g} m ahead."
+            "Its most probable action is computed for every place of one cube, "
+            f"{window['nearest']:g} to {window['farthest']:g} m ahead."
         )
     return claims
 
@@ -124,14 +126,16 @@ def _say_heat(truth: Mapping[str, Any]) -> Claims:
     if passed:
         return {
             "summary.heat": (
-                f"Trust {listed(passed)}: passed the tests, of {len(methods)} methods tested."
+                f"Trust {listed(passed)}: {len(passed)} of {len(methods)} methods passed the tests."
             )
         }
     if methods:
         return {
-            "summary.heat_none": f"None of {len(methods)} methods passed the tests: trust no map."
+            "summary.heat_none": (
+                f"None of {len(methods)} methods passed the tests: trust no heat map."
+            )
         }
-    return {"summary.heat_untested": "No method could be tested: trust no map."}
+    return {"summary.heat_untested": "No method could be tested: trust no heat map."}
 
 
 def _say_limits(evidence: Evidence) -> Claims:

@@ -30,7 +30,7 @@ from drone_rl.utils.text import Claims, Evidence, bounds, listed, percent, plura
 
 _KINDS = {"deletion": "lower is better", "insertion": "higher is better"}
 _DASHES = ("-", "--", "-.", ":", (0, (1, 1)))
-_REGIONS = [css(color) for color in (NEXT_CUBE, OTHER_CUBES, INK, GROUND, SKY)]
+_REGION_COLORS = [css(color) for color in (NEXT_CUBE, OTHER_CUBES, INK, GROUND, SKY)]
 _UNMOVED = "no patch of any frame\naffects this policy"
 
 
@@ -118,7 +118,7 @@ def heat_chart(explanation: Explanation) -> Figure:
     bars = [*((shares, "share") for shares in heat.values()), (first, "chance")]
     for y, (shares, of) in zip(range(len(heat), -1, -1), bars, strict=True):
         left = 0.0
-        for region, color in zip(first, _REGIONS, strict=True):
+        for region, color in zip(first, _REGION_COLORS, strict=True):
             value = shares[region][of]["mean"] or 0.0
             label = region.replace("_", " ") if of == "chance" else None
             axis.barh(y, value, left=left, color=color, height=0.7, label=label)
@@ -256,8 +256,8 @@ def _say_outcomes(evidence: Evidence) -> Claims:
         )
     claims["truth.ground"] = (
         "Another ground colour, which should not matter, changes the outcome of "
-        f"{percent(ground['mean'])} of these rollouts, and of no more than "
-        f"{percent(ground['upper95'])} (95%)."
+        f"{percent(ground['mean'])} of the rollouts from these frames (upper 95% limit: "
+        f"{percent(ground['upper95'])})."
     )
     return claims
 

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.sim.dynamics import FlightState, Goals, Mode, Obstacles, Quadrotor
+from drone_rl.sim.dynamics import FlightState, Goals, Mode
 from drone_rl.sim.dynamics.control import Modes
 from drone_rl.utils.errors import InputError
 
@@ -219,29 +219,3 @@ class FlightFuture:
 def period_ticks(settings: DynamicsSettings) -> int:
     """Return the physics ticks of one control period: the fewest that last `PERIOD`."""
     return max(1, math.ceil(PERIOD / settings.tick - 1e-9))
-
-
-def fly_command(
-    quadrotor: Quadrotor,
-    body: FlightState,
-    command: Command,
-    seconds: float = math.inf,
-    obstacles: Obstacles | None = None,
-) -> tuple[list[FlightState], Tensor]:
-    """Run one command until all drones are complete; drones that are complete continue.
-
-    It ends after `seconds`, or the command's own limit, at the latest.
-
-    Returns:
-        The state at the start and after each of T - 1 control periods, and the index of the first
-        one at which each drone was complete, of shape (num_envs,), int64; T if it never was.
-    """
-    ticks = period_ticks(quadrotor.settings)
-    states = [body]
-    done = torch.full((len(body),), -1)
-    most = int(min(seconds, command.limit) / (ticks * quadrotor.settings.tick))
-    while len(states) <= most and bool((done < 0).any()):
-        body = quadrotor.fly(body, command.goals(body), ticks, obstacles)
-        done = torch.where((done < 0) & command.is_complete(body), len(states), done)
-        states.append(body)
-    return states, torch.where(done < 0, len(states), done)

@@ -23,7 +23,7 @@ from drone_rl.flight.commands.path_following import GoHomeCommand
 from drone_rl.flight.commands.state import LandedState, PilotState, Sensors, Trajectory
 from drone_rl.sim.dynamics import FlightState, Goals, Obstacles, Quadrotor
 from drone_rl.sim.dynamics.control import rotor_goals
-from drone_rl.sim.dynamics.state import CLIMB, NOTHING, TICKS, heading_only
+from drone_rl.sim.dynamics.state import CLIMB_INTEGRAL, NOTHING, TICKS, twist_about_z
 from drone_rl.sim.entities import FRONT_CENTER
 from drone_rl.sim.image_types import ImageRequest, images
 from drone_rl.sim.rendering.view import Modality
@@ -211,7 +211,7 @@ class Drone:
             raise PilotError(f"{name}: there is nothing to render; give worlds=Worlds(1, ...)")
         state, body = copy.copy(self.worlds.state), self.body
         is_level = self._quadrotor.mount == "gimbal"
-        state.body = body.moved(body.position, heading_only(body.attitude)) if is_level else body
+        state.body = body.moved(body.position, twist_about_z(body.attitude)) if is_level else body
         return self.worlds, state
 
     @property
@@ -312,7 +312,7 @@ class Drone:
     def _settle(self) -> None:
         """Mark the drone as landed and reset the climb controller."""
         self._landed = LandedState.LANDED
-        self.body.numbers[:, CLIMB] = 2.0 * self.settings.hover_throttle - 1.0
+        self.body.numbers[:, CLIMB_INTEGRAL] = 2.0 * self.settings.hover_throttle - 1.0
 
     def _check(self, future: FlightFuture) -> None:
         """End the command if it is complete, over time, or the drone is lost."""

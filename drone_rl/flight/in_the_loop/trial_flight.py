@@ -117,7 +117,7 @@ def fly_course(drone: DroneInTheLoop, course: Course | None = None) -> CourseRep
 
 
 def take_off(drone: DroneInTheLoop, above: Vector, within: float = 10.0) -> None:
-    """Climb to a position above an armed drone.
+    """Climb towards a position above an armed drone, until its height is reached to 0.3 m.
 
     Raises:
         FlightControllerError: It isn't reached within so many seconds.
@@ -145,7 +145,7 @@ def land(drone: DroneInTheLoop, ground: Vector, within: float = 20.0) -> None:
     low = ground[2] + _NEAR_GROUND
     if not drone.fly(descend, within, until=lambda s: bool(s.position[2] < low)):
         raise FlightControllerError(
-            f"landing: still {drone.readings.position[2]:.2f} m up after {within:g} s"
+            f"landing: still {drone.readings.position[2] - ground[2]:.2f} m up after {within:g} s"
         )
     drone.disarm()
 

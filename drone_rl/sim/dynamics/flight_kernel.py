@@ -127,7 +127,7 @@ def loaded(before: wp.array2d[wp.float64], world: int) -> Flight:
     flight.motion.velocity = _three(before, world, fs.VELOCITY)
     flight.motion.rates = _three(before, world, fs.RATES)
     flight.rotors = four(before, world, fs.ROTORS)
-    flight.climb = float(before[world, fs.CLIMB])
+    flight.climb = float(before[world, fs.CLIMB_INTEGRAL])
     flight.gust = _three(before, world, fs.GUST)
     flight.touch = Touch()
     flight.touch.thing = fs.NOTHING
@@ -260,7 +260,7 @@ def write(after: wp.array2d[wp.float64], world: int, flight: Flight, ticks: int)
     for i in range(4):
         after[world, fs.ATTITUDE + i] = wp.float64(motion.attitude[i])
         after[world, fs.ROTORS + i] = wp.float64(flight.rotors[i])
-    after[world, fs.CLIMB] = wp.float64(flight.climb)
+    after[world, fs.CLIMB_INTEGRAL] = wp.float64(flight.climb)
     after[world, fs.TICKS] = wp.float64(flight.past + wp.int64(ticks))
 
 

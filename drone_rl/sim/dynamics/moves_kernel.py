@@ -48,7 +48,7 @@ def fly_move(fleet: Fleet, world: int, action: int) -> wp.vec3d:
 
 @wp.func
 def camera_attitude(fleet: Fleet, world: int) -> wp.vec4:
-    """Return the attitude of a drone's cameras: of its body, or `heading_only` on a gimbal."""
+    """Return the attitude of a drone's cameras: of its body, or `twist_about_z` on a gimbal."""
     if fleet.is_gimballed == 1:
         w = fleet.numbers[world, fs.ATTITUDE]
         z = fleet.numbers[world, fs.ATTITUDE + 3]

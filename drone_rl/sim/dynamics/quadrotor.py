@@ -11,7 +11,7 @@ from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import flight_kernel
 from drone_rl.sim.dynamics.control import Goals, Moves, Velocities, rotor_goals
 from drone_rl.sim.dynamics.rigid_body_kernel import make_airframe
-from drone_rl.sim.dynamics.state import CLIMB, BodyState, FlightState, Obstacles
+from drone_rl.sim.dynamics.state import CLIMB_INTEGRAL, BodyState, FlightState, Obstacles
 from drone_rl.sim.rendering.devices import WorkerPool, on_torch_stream, start_warp
 
 _LEAST_WORK = 3000
@@ -37,7 +37,7 @@ class Quadrotor:
         """Return drones that hover at rest; see `Dynamics`."""
         state = FlightState.at_rest(position, seeds=seeds)
         state.rotors[:] = self.settings.hover_throttle
-        state.numbers[:, CLIMB] = 2.0 * self.settings.hover_throttle - 1.0
+        state.numbers[:, CLIMB_INTEGRAL] = 2.0 * self.settings.hover_throttle - 1.0
         return state
 
     def step(

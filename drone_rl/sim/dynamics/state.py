@@ -12,8 +12,8 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 """The attitude of a drone that is level and looks forward, quaternion (w, x, y, z)."""
 
 
-def heading_only(attitude: Tensor) -> Tensor:
-    """Remove the tilt of unit quaternions (w, x, y, z), (*, 4); upside down becomes `LEVEL`."""
+def twist_about_z(attitude: Tensor) -> Tensor:
+    """Return the twist about z of quaternions (w, x, y, z), (*, 4); upside down becomes `LEVEL`."""
     w, z = attitude[..., 0], attitude[..., 3]
     length = (w * w + z * z).sqrt()
     zero, has_one = torch.zeros_like(length), length > 0.0
@@ -33,10 +33,10 @@ class BodyState(Batch):
 
     position: Tensor  # (num_envs, 3) float64
     attitude: Tensor  # (num_envs, 4) float64
-    """Unit quaternion (w, x, y, z) that turns the body's frame into the world's."""
+    """Unit quaternion (w, x, y, z) that rotates vectors from the body frame to the world frame."""
     velocity: Tensor  # (num_envs, 3) float64
     angular_velocity: Tensor  # (num_envs, 3) float64
-    """Radians a second; of drones in flight about the body's axes."""
+    """Radians per second, body frame; `Kinematic` drones turn about z alone."""
 
     @property
     def is_lost(self) -> Tensor:
@@ -71,9 +71,9 @@ NOTHING, GROUND = -2, -1
 
 
 POSITION, ATTITUDE, VELOCITY, RATES, ROTORS, REFERENCE = 0, 3, 7, 10, 13, 17
-CLIMB, GUST, SEED, TICKS, LOST, THING = 21, 22, 25, 26, 27, 28
+CLIMB_INTEGRAL, GUST, SEED, TICKS, LOST, THING = 21, 22, 25, 26, 27, 28
 NORMAL, POINT, DEPTH, TIME = 29, 32, 35, 36
-"""Index of the first number of each part of `FlightState.numbers`."""
+"""First column of each quantity in `FlightState.numbers`."""
 NUMBERS = 37
 
 

@@ -125,7 +125,7 @@ class Shard:
             render_rgb=self._modality == "rgb",
             render_depth=self._modality == "depth",
             render_seg=self._modality == "segmentation",
-            enabled_geom_groups=sorted({*map(int, model.geom_group[scene.seen(view.show_drone)])}),
+            enabled_geom_groups=sorted({*map(int, model.geom_group[scene.shown(view.show_drone)])}),
             background_color=(*scene.sky, _SKY_OPACITY),
             use_textures=False,
             enable_specular=False,

@@ -77,7 +77,7 @@ _CLASSES = {
 
 
 def find_renderer(which: str | RendererFactory) -> RendererFactory:
-    """Return a renderer's factory, by a name of `RENDERERS`; a factory is returned itself."""
+    """Return the factory of a name in `RENDERERS`; a factory is returned as it is."""
     if not isinstance(which, str):
         return which
     if which not in RENDERERS:

@@ -14,7 +14,7 @@ _UNSET = (0.5, 0.5, 0.5, 1.0)
 
 
 class SemanticClass(enum.IntEnum):
-    """What an object is to the drone. Which target comes next is part of the task's state."""
+    """Role of a geom in the task; it does not change during an episode."""
 
     SKY = 0
     GROUND = 1
@@ -32,7 +32,7 @@ class Scene:
     """A `mujoco.MjModel`, whose bindings are untyped."""
     semantic_classes: tuple[SemanticClass, ...]
     props: tuple[int, ...]
-    """Index of the task's prop that each geom belongs to; -1 for none."""
+    """Index in `Task.make_props()` of the entity that each geom belongs to; -1 for none."""
     sky: tuple[float, float, float]
     """Background colour: red, green, blue in [0, 1]."""
 
@@ -40,8 +40,8 @@ class Scene:
         """Return the indices of the geoms of a class."""
         return [i for i, found in enumerate(self.semantic_classes) if found is semantic_class]
 
-    def seen(self, show_drone: bool) -> list[int]:
-        """Return the indices of the geoms that a view shows; invisible geoms are left out."""
+    def shown(self, show_drone: bool) -> list[int]:
+        """Return the indices of visible geoms; without `show_drone`, not the drone's."""
         hidden = [] if show_drone else self.geoms(SemanticClass.DRONE)
         return [i for i in np.flatnonzero(self.colors[:, 3] > 0).tolist() if i not in hidden]
 
@@ -49,8 +49,8 @@ class Scene:
     def colors(self) -> NDArray[np.float32]:
         """Colours and opacity of geoms, or of their materials, in [0, 1]. Shape: (num_geoms, 4)."""
         model, colors = self.model, self.model.geom_rgba.copy()
-        is_materials = (model.geom_matid >= 0) & (colors == _UNSET).all(1)
-        colors[is_materials] = model.mat_rgba[model.geom_matid[is_materials]]
+        uses_material = (model.geom_matid >= 0) & (colors == _UNSET).all(1)
+        colors[uses_material] = model.mat_rgba[model.geom_matid[uses_material]]
         return colors
 
     def camera(self, name: str) -> int:

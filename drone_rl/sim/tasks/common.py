@@ -30,7 +30,7 @@ SIDES = tuple(side.name.lower() for side in Side)
 
 
 def side_of(lateral: Tensor, tolerance: float) -> Tensor:
-    """Return the `Side` of something so many metres to the left of the drone. Shape kept."""
+    """Return the `Side` of metres to the left; AHEAD within `tolerance` metres. Shape kept."""
     right = torch.where(lateral < -tolerance, Side.RIGHT.value, Side.AHEAD.value)
     return torch.where(lateral > tolerance, Side.LEFT.value, right)
 
@@ -44,7 +44,7 @@ class PropTask(Task[S]):
     settings: Any
 
     def make_dynamics(self) -> ComputerVision:
-        """Return the chapter's three moves (Table 1)."""
+        """Return computer-vision dynamics with three moves (Table 1 of Luo et al., 2018)."""
         return ComputerVision(self.settings.step_length)
 
     def places(self, state: S) -> Tensor:
@@ -54,7 +54,7 @@ class PropTask(Task[S]):
         return getattr(state, self.props) - torch.nn.functional.pad(hidden[..., None], (2, 0))
 
     def next_moved(self, state: S, metres: Tensor | float) -> S:
-        """Move the next prop to the left."""
+        """Return the state with the next prop moved by metres to the left."""
         moved = getattr(state, self.props).clone()
         metres = torch.as_tensor(metres, dtype=moved.dtype, device=moved.device)
         moved[..., 1] += metres.expand(len(moved))[:, None] * self._is_next(state)
@@ -64,9 +64,9 @@ class PropTask(Task[S]):
 def number_classes(name: str, goals: Goals) -> Iterator[tuple[str, str, Tensor]]:
     """Yield one class for each goal of an episode: first, second, and so on."""
     for number in range(goals.reached.shape[-1]):
-        of = torch.zeros_like(goals.reached)
-        of[:, number] = True
-        yield name, ordinal(number), of
+        mask = torch.zeros_like(goals.reached)
+        mask[:, number] = True
+        yield name, ordinal(number), mask
 
 
 def interval_classes(
@@ -84,7 +84,8 @@ def place_in_view(
     """Return random positions in view of a camera, uniform over the image's columns.
 
     `draw` are numbers in [0, 1) for distance and column. Positions are metres ahead of the camera
-    and to its left, from `nearest` to `farthest` ahead, at most `widest` aside. Shapes: (*, 2).
+    and to its left, from `nearest` to `farthest` ahead, at most `widest` aside, or more
+    where even `nearest` is wider. Shapes: (*, 2).
     """
     slope = (2 * draw[..., 1] - 1) * math.tan(math.radians(camera.horizontal_fov / 2))
     most = (widest / slope.abs().clamp_min(1e-9)).clamp(max=farthest).clamp(min=nearest)

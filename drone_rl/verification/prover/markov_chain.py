@@ -26,8 +26,8 @@ NEGLIGIBLE = 1e-15  # sum of the probabilities of running episodes at which prop
 MAX_ROUNDING = 0.1  # largest rounding error of a logit; typical policies have about 0.01
 ROUNDING = 1e-9  # bound on the float64 error of several hundred steps
 BATCH = 1000  # images rendered at a time; bounds memory
-_FEW = 256
-_BATCH = 512
+_ROUNDING_BATCH = 256  # images whose rounding errors are bounded at a time
+_BOUNDS_BATCH = 512  # image ranges whose logits are bounded at a time
 _LOST, _WON = 0, 1
 _MOVES = (AHEAD, LEFT, RIGHT)
 Evaluate = Callable[[Tensor], Tensor]  # nodes (N,) to action probabilities (N, A), float64
@@ -52,7 +52,7 @@ class Outcomes(Batch):
 
     @property
     def failure(self) -> Tensor:
-        """Probability that a cube is missed, to full precision even if tiny. Shape: (P,)."""
+        """Probability that not all cubes are collected, precise even if tiny. Shape: (P,)."""
         return self.reasons[:, [end for end in EndReason if end != EndReason.ALL_CUBES]].sum(-1)
 
     @property
@@ -74,7 +74,7 @@ class Outcomes(Batch):
 
 
 def propagate(graph: Graph, evaluate: Evaluate) -> Outcomes:
-    """Propagate the probability of every node step by step until all episodes have ended."""
+    """Return how episodes end, by propagating probabilities until the rest is `NEGLIGIBLE`."""
     count, sets = len(graph.cubes), 2 ** graph.cubes.shape[1]
     placement = graph.nodes.placement.numpy()
     probability, visits, last, dropped = _propagate(graph, evaluate)
@@ -130,7 +130,7 @@ class NodeEvaluator:
         self._transforms = pixel_transforms(pipeline)
 
     def on(self, graph: Graph) -> Evaluate:
-        """Return the evaluator of a graph's nodes; no image is rendered twice."""
+        """Return a function from nodes of a graph to action probabilities; it caches images."""
         node, image = graph.images()
         every = graph.states()
         shape = len(node), len(self._worlds.dynamics.actions.names)
@@ -165,7 +165,7 @@ class NodeEvaluator:
         _, error = self._rounding.together(pixels)
         if bool((error <= MAX_ROUNDING).all()):  # a probability changes by no more than its logit
             return
-        for part in pixels.split(_FEW):
+        for part in pixels.split(_ROUNDING_BATCH):
             most = float(self._rounding.errors(part).max())
             if not most <= MAX_ROUNDING:
                 raise InputError(
@@ -185,25 +185,26 @@ class SuccessBounds:
     mean_most: float  # upper bound of the mean over the box
 
 
-def bound_success(spec: PolicySpec, box: Boxes, most: int = 1) -> SuccessBounds:
+def bound_success(spec: PolicySpec, box: Boxes, max_parts: int = 1) -> SuccessBounds:
     """Bound the probability that all cubes are collected, over a box of placements (C, 2).
 
     Network bounds over all images in the box give an interval Markov chain (Givan, Leach and Dean,
-    2000), solved backwards for its best and worst case. The box is cut into up to `most` parts;
-    smaller parts give tighter bounds.
+    2000), solved backwards for its best and worst case. The box is cut into up to
+    `max_parts`; smaller parts give tighter bounds.
 
     Raises:
         InputError: See `Cells`.
     """
     actions = _ActionBounds(spec, box)
     parts = [(box, *_bound(actions, box))]
-    while len(parts) < most:
+    while len(parts) < max_parts:
         gaps = [np.prod(np.diff(part)) * (high - low) for part, low, high in parts]
         part, low, high = parts[worst := int(np.argmax(gaps))]
         if high - low <= 2 * ROUNDING:
             break
         parts[worst : worst + 1] = [(half, *_bound(actions, half)) for half in _halves(part)]
-    shares = [float(np.prod(np.diff(part)) / np.prod(np.diff(box))) for part, _, _ in parts]
+    sizes = np.array([np.prod(np.diff(part)) for part, _, _ in parts])
+    shares = (sizes / sizes.sum() if sizes.any() else np.full(len(sizes), 1 / len(sizes))).tolist()
     return SuccessBounds(
         least=min(low for _, low, _ in parts),
         most=max(high for _, _, high in parts),
@@ -221,15 +222,15 @@ def _halves(box: Boxes) -> tuple[Boxes, Boxes]:
 
 def _bound(actions: "_ActionBounds", box: Boxes) -> tuple[float, float]:
     """Return bounds on the success probability by backward iteration."""
-    places, targets = _reachable(actions.spec, box)
-    lowest, highest = actions.probabilities(box, places)
-    start = np.concatenate([[0.0, 1.0], np.zeros(len(places))])
+    states, targets = _reachable(actions.spec, box)
+    lowest, highest = actions.probabilities(box, states)
+    start = np.concatenate([[0.0, 1.0], np.zeros(len(states))])
     least, most = start, start
     for _ in range(actions.spec.lattice.task.step_limit):
         before = least, most
         least, most = start.copy(), start.copy()
-        least[2:] = _extreme(before[0][targets].min(-1), lowest, highest)
-        most[2:] = -_extreme(-before[1][targets].max(-1), lowest, highest)
+        least[2:] = _least_mean(before[0][targets].min(-1), lowest, highest)
+        most[2:] = -_least_mean(-before[1][targets].max(-1), lowest, highest)
         if all(map(np.array_equal, before, (least, most))):
             break
     return max(0.0, float(least[2]) - ROUNDING), min(1.0, float(most[2]) + ROUNDING)
@@ -240,24 +241,24 @@ def _reachable(spec: PolicySpec, box: Boxes) -> tuple[list[LatticeState], NDArra
 
     A target is 0 for failure, 1 for success, else 2 plus the index of the state.
     """
-    lattice, number = spec.lattice, {LatticeState(0, 0): 0}
-    places, found = [LatticeState(0, 0)], []
-    for place in places:  # the loop appends to `places`
+    lattice, index_of = spec.lattice, {LatticeState(0, 0): 0}
+    states, found = [LatticeState(0, 0)], []
+    for state in states:  # the loop appends to `states`
         for move in _MOVES:
             targets = []
-            for moved, _ in lattice.move(place, move, box[None]):
-                bare = dataclasses.replace(moved, steps=0, came=AHEAD)
-                if (ending := lattice.ending(bare)) is not None:
+            for moved, _ in lattice.move(state, move, box[None]):
+                untimed = dataclasses.replace(moved, steps=0, came=AHEAD)
+                if (ending := lattice.ending(untimed)) is not None:
                     targets.append(_WON if ending.reason == EndReason.ALL_CUBES else _LOST)
                     continue
-                if bare not in number:
-                    number[bare] = len(places)
-                    places.append(bare)
-                targets.append(2 + number[bare])
+                if untimed not in index_of:
+                    index_of[untimed] = len(states)
+                    states.append(untimed)
+                targets.append(2 + index_of[untimed])
             found.append(targets)
     most = max(map(len, found))
     padded = [targets + targets[:1] * (most - len(targets)) for targets in found]
-    return places, np.array(padded).reshape(len(places), len(_MOVES), most)
+    return states, np.array(padded).reshape(len(states), len(_MOVES), most)
 
 
 class _ActionBounds:
@@ -268,17 +269,17 @@ class _ActionBounds:
         self._known: dict[tuple[int, int], tuple[Cells, ImageRanges]] = {}
 
     def probabilities(
-        self, box: Boxes, places: list[LatticeState]
+        self, box: Boxes, states: list[LatticeState]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return lower and upper bounds of each action's probability. Shapes: (states, moves)."""
         lattice, compositor = self.spec.lattice, self.spec.compositor
-        lowest, highest = np.zeros((2, len(places), len(_MOVES)))
-        alike: dict[tuple[int, ...], list[int]] = {}
-        for i, place in enumerate(places):
-            alike.setdefault((place.ahead, *lattice.standing(place)), []).append(i)
-        for (ahead, *cubes), numbers in alike.items():
-            y = np.array([lattice.y(places[i]) for i in numbers])
-            for some in np.array_split(np.arange(len(y)), -(-len(y) // _BATCH)):
+        lowest, highest = np.zeros((2, len(states), len(_MOVES)))
+        groups: dict[tuple[int, ...], list[int]] = {}
+        for i, state in enumerate(states):
+            groups.setdefault((state.ahead, *lattice.standing(state)), []).append(i)
+        for (ahead, *cubes), numbers in groups.items():
+            y = np.array([lattice.y(states[i]) for i in numbers])
+            for some in np.array_split(np.arange(len(y)), -(-len(y) // _BOUNDS_BATCH)):
                 cases = [self._case(cube, ahead, box[cube], y[some]) for cube in cubes]
                 lower, upper = map(compositor.see, compositor.paint(cases, len(some)))
                 at = np.array(numbers)[some]
@@ -300,7 +301,7 @@ class _ActionBounds:
         return ranges.part, *ranges.of(np.stack([cells.first[first], cells.last[last]], -1))
 
 
-def _extreme(
+def _least_mean(
     values: NDArray[np.float64], lowest: NDArray[np.float64], highest: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the smallest mean over all probabilities within bounds. (N, A) to (N,)."""

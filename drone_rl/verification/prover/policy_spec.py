@@ -1,4 +1,4 @@
-"""A policy and a task in the form that proofs need, and the parts of large tasks."""
+"""A policy and a task in the form that proofs need; partition of the placements of large tasks."""
 
 import contextlib
 import dataclasses
@@ -45,7 +45,10 @@ class PolicySpec:
     worlds: Worlds
 
     def cells(self, cube: int, steps: int, lowest: float, highest: float) -> Cells:
-        """Return one cube's cells between metres to the left, after a number of steps ahead."""
+        """Return the intervals of a cube's lateral position over which its image is constant.
+
+        `lowest` and `highest` are metres to the left of the drone, which has flown `steps` steps.
+        """
         ahead = self.lattice.cubes[cube] - steps * self.lattice.task.step_length - camera_ahead()
         return Cells(self.camera, ahead, lowest, highest, CubeView(self.images, cube, steps))
 
@@ -60,7 +63,7 @@ def make_policy_spec(
     gap: float,
     renderer: str = "raytrace",
 ) -> PolicySpec:
-    """Build the components of a proof from a description with the task to prove.
+    """Build the components of a proof from a policy description, whose task is proved.
 
     The network must be on the CPU; for the gap see `NetworkBounds`.
 
@@ -81,12 +84,17 @@ def make_policy_spec(
     lattice, camera = Lattice(task), CameraModel.of(task, description.camera)
     bounds = NetworkBounds(network.eval(), gap)
     worlds = Worlds(64, task, description.camera, renderer=renderer)
-    images = CubeImages(worlds, lattice, camera)
-    return PolicySpec(lattice, camera, bounds, make_compositor(description, images), images, worlds)
+    try:
+        images = CubeImages(worlds, lattice, camera)
+        compositor = make_compositor(description, images)
+    except InputError:
+        worlds.close()
+        raise
+    return PolicySpec(lattice, camera, bounds, compositor, images, worlds)
 
 
 def check_task(task: TaskSettings) -> None:
-    """Raise InputError if the task's images have no closed form."""
+    """Raise InputError if the task's images have no closed form, or there is one placement only."""
     if task.vertical_bound:
         raise InputError(f"task.vertical_bound={task.vertical_bound} is not supported; give 0")
     if task.spacing <= task.cube_size:
@@ -101,16 +109,20 @@ def check_task(task: TaskSettings) -> None:
 
 
 def make_compositor(description: PolicyDescription, images: CubeImages) -> Compositor:
-    """Apply the transforms to the colours; raise InputError if one is not monotone."""
+    """Return the colours after pixelwise transforms, and the other transforms.
+
+    Raises:
+        InputError: The first transform is not gray, or one is not supported.
+    """
     chosen = [choice for choice in description.transforms if choice.name not in _BLIND]
     names = [choice.name for choice in chosen]
-    if strange := [name for name in names if name not in _MONOTONE]:
-        raise InputError(
-            f"the transform {strange[0]} is not monotone in brightness; prove a policy whose only "
-            f"transforms are {', '.join(_MONOTONE)}"
-        )
     if names[:1] != ["gray"]:
         raise InputError("the policy observes colours; prove one whose first transform is gray")
+    if strange := [name for name in names if name not in _MONOTONE]:
+        raise InputError(
+            f"proofs do not support the transform {strange[0]}; prove a policy whose only "
+            f"transforms are {', '.join(_MONOTONE)}"
+        )
     made = without_identities([choice.make() for choice in chosen], images.background)
     shades = (GrayPixels, StandardizePixels)
     count = next((i for i, t in enumerate(made) if not isinstance(t, shades)), len(made))
@@ -131,12 +143,12 @@ def one_thread() -> Iterator[None]:
         torch.set_num_threads(threads)
 
 
-IMAGES_PER_BORDER = 3  # approximate number: next to it, and within its band
+IMAGES_PER_BORDER = 3  # approximate number: the one beyond it, and two within its rounding band
 MAX_PARTS = 1_000  # a task with more would take days
 
 
 def images_per_cube(spec: PolicySpec) -> list[int]:
-    """Return the approximate number of images of each cube, where their product is largest."""
+    """Return the approximate numbers of images of the cubes, at the step of the largest product."""
     lattice, found = spec.lattice, []
     for steps in range(lattice.last):
         counts = []
@@ -149,10 +161,10 @@ def images_per_cube(spec: PolicySpec) -> list[int]:
 
 
 def partition_placements(spec: PolicySpec, most: int) -> Boxes:
-    """Cut all placements into parts of about `most` images each. Shape: (N, num_cubes, 2).
+    """Cut all placements into parts. Shape: (N, num_cubes, 2).
 
-    Each cube multiplies the number of images by a few hundred, so the placements of the furthest
-    cubes are cut into strips.
+    A part has about `most` combinations of cube images. Each cube multiplies their number by a few
+    hundred, so the placements of the furthest cubes are cut into strips.
 
     Raises:
         InputError: There are too many parts.
@@ -160,8 +172,8 @@ def partition_placements(spec: PolicySpec, most: int) -> Boxes:
     counts = images_per_cube(spec)
     strips, total = [1] * len(counts), math.prod(counts)
     for cube in reversed(range(len(counts))):
-        left = math.prod(n / s for n, s in zip(counts, strips, strict=True))
-        strips[cube] = min(counts[cube], max(1, math.ceil(left / most)))
+        remaining = math.prod(n / s for n, s in zip(counts, strips, strict=True))
+        strips[cube] = min(counts[cube], max(1, math.ceil(remaining / most)))
     if math.prod(strips) > MAX_PARTS:
         raise InputError(
             f"task.num_cubes={len(counts)} gives about {total:.0e} combinations of images in "

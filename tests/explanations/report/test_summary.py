@@ -16,16 +16,16 @@ def test_each_question_has_one_line_in_order():
 
 def test_rates_have_one_decimal_and_an_interval():
     assert speak()["summary.success"] == (
-        "60.0% (95% CI 58.0 to 62.0) of 400 episodes, with every cube collected by the most "
-        "probable actions."
+        "The most probable actions have every cube collected in 60.0% (95% CI 58.0 to 62.0) of 400 "
+        "episodes."
     )
 
 
 def test_robustness_names_the_axes_with_a_range():
     found = speak(shifts=SHIFTS, verdict__kind="good")
     assert found["summary.robustness"] == (
-        "Certainly good in a range of strengths on 2 of 3 axes tested: elevation of the sun and "
-        "blur."
+        "Good with 95% confidence in a range of 2 of 3 perturbations tested: elevation of the sun "
+        "and blur."
     )
     found = speak(shifts={"refused": "it is of another task"})
     assert found["summary.robustness_refused"].endswith("not shown here: it is of another task.")

@@ -1,7 +1,8 @@
 import torch
 
+from benchmarks.flight_paths import fly_command
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.commands.command import Land, TimedCommand, fly_command, goals_of, period_ticks
+from drone_rl.flight.commands.command import Land, TimedCommand, goals_of, period_ticks
 from drone_rl.sim.dynamics import Mode, Obstacles
 
 

@@ -3,12 +3,8 @@ import math
 import pytest
 import torch
 
-from drone_rl.flight.commands.command import (
-    Hover,
-    RotateByCommand,
-    RotateToCommand,
-    fly_command,
-)
+from benchmarks.flight_paths import fly_command
+from drone_rl.flight.commands.command import Hover, RotateByCommand, RotateToCommand
 
 
 def test_hovering_comes_back(quadrotor, hovering):

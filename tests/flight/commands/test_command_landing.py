@@ -1,6 +1,7 @@
 import torch
 
-from drone_rl.flight.commands.command import Land, fly_command
+from benchmarks.flight_paths import fly_command
+from drone_rl.flight.commands.command import Land
 
 
 def test_it_sinks_slowly_and_is_done_where_it_stands(quadrotor, hovering):

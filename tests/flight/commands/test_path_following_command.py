@@ -3,8 +3,8 @@ import math
 import pytest
 import torch
 
+from benchmarks.flight_paths import fly_command
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.commands.command import fly_command
 from drone_rl.flight.commands.path_following import (
     Drivetrain,
     PathCommand,

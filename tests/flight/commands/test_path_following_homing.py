@@ -1,6 +1,6 @@
 import torch
 
-from drone_rl.flight.commands.command import fly_command
+from benchmarks.flight_paths import fly_command
 from drone_rl.flight.commands.path_following import GoHomeCommand, PathCommand
 
 

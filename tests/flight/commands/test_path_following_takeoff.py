@@ -1,7 +1,7 @@
 import pytest
 
+from benchmarks.flight_paths import fly_command
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.commands.command import fly_command
 from drone_rl.flight.commands.path_following import TakeoffCommand
 from drone_rl.sim.dynamics import Quadrotor
 

@@ -14,7 +14,7 @@ from drone_rl.sim.dynamics.moves_kernel import (
     is_lost,
     make_fleet,
 )
-from drone_rl.sim.dynamics.state import heading_only
+from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.rendering.devices import start_warp
 
 start_warp("cpu")
@@ -51,7 +51,7 @@ def test_moves_equal_quadrotor_steps(mount):
         wp.launch(moved, 2, inputs=inputs, device="cpu")
         assert torch.equal(places, state.position)
         assert torch.equal(wp.to_torch(fleet.numbers), state.numbers)
-        seen = state.attitude if mount == "body" else heading_only(state.attitude)
+        seen = state.attitude if mount == "body" else twist_about_z(state.attitude)
         assert torch.equal(turns, seen.float())
     assert not flags.any()
     assert state.attitude[0, 2].abs() > 1e-3  # the drone is tilted, so mounts differ

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.dynamics.state import heading_only
+from drone_rl.sim.dynamics.state import twist_about_z
 
 
 def test_body_at_rest_is_level_by_default():
@@ -42,15 +42,15 @@ def test_heading_only_removes_roll_and_pitch(yaw):
         q = times(about(2, yaw), times(about(1, pitch), about(0, roll)))
         for sign in (1.0, -1.0):  # both quaternions of one attitude
             attitude = sign * torch.tensor([q], dtype=torch.float64)
-            found = heading_only(attitude)
+            found = twist_about_z(attitude)
             torch.testing.assert_close(found, sign * expected, atol=1e-12, rtol=0)
 
 
 def test_heading_only_keeps_level_attitudes_exactly():
     level = torch.tensor([[[1.0, 0.0, 0.0, 0.0]]]).double()
-    assert torch.equal(heading_only(level), level)
+    assert torch.equal(twist_about_z(level), level)
 
 
 def test_inverted_attitude_has_no_heading():
     turned = torch.tensor([[0.0, 1.0, 0.0, 0.0], [0.0, 0.6, 0.8, 0.0]]).double()
-    assert heading_only(turned).tolist() == [[1.0, 0.0, 0.0, 0.0]] * 2
+    assert twist_about_z(turned).tolist() == [[1.0, 0.0, 0.0, 0.0]] * 2

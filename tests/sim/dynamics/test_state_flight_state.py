@@ -11,7 +11,15 @@ from tests.flying import doubles
 
 def test_parts_are_contiguous():
     sizes = {"POSITION": 3, "ATTITUDE": 4, "VELOCITY": 3, "RATES": 3, "ROTORS": 4, "REFERENCE": 4}
-    sizes |= {"CLIMB": 1, "GUST": 3, "SEED": 1, "TICKS": 1, "LOST": 1, "THING": 1, "NORMAL": 3}
+    sizes |= {
+        "CLIMB_INTEGRAL": 1,
+        "GUST": 3,
+        "SEED": 1,
+        "TICKS": 1,
+        "LOST": 1,
+        "THING": 1,
+        "NORMAL": 3,
+    }
     sizes |= {"POINT": 3, "DEPTH": 1, "TIME": 1}
     ends = itertools.accumulate(sizes.values())
     assert [getattr(fs, name) for name in sizes] == [0, *ends][:-1]

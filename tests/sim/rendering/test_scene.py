@@ -19,8 +19,8 @@ def test_geoms_are_found_by_semantic_class():
     scene = Scene(model, semantic_classes, (-1, 0, -1, 1), (0.0, 0.0, 1.0))
     assert scene.geoms(SemanticClass.TARGET) == [1, 3]
     assert scene.geoms(SemanticClass.OBSTACLE) == []
-    assert scene.seen(show_drone=True) == [0, 1, 2, 3]
-    assert scene.seen(show_drone=False) == [0, 1, 3]
+    assert scene.shown(show_drone=True) == [0, 1, 2, 3]
+    assert scene.shown(show_drone=False) == [0, 1, 3]
 
 
 def test_cameras_are_found_by_name():
@@ -41,4 +41,4 @@ def test_colors_default_to_the_material():
     )
     colors = [[0.5, 0.5, 0.5, 1], [0.1, 0.2, 0.3, 1], [1, 0, 0, 1], [1, 1, 1, 0]]
     np.testing.assert_allclose(scene.colors, colors, atol=1e-7)
-    assert scene.seen(show_drone=True) == [0, 1, 2]  # the last geom is invisible
+    assert scene.shown(show_drone=True) == [0, 1, 2]  # the last geom is invisible

@@ -5,7 +5,7 @@ import pytest
 
 import drone_rl
 from drone_rl.utils.progress import silent
-from drone_rl.verification.prover.markov_chain import _extreme, bound_success
+from drone_rl.verification.prover.markov_chain import _least_mean, bound_success
 from drone_rl.verification.prover.policy_spec import make_policy_spec
 
 
@@ -34,9 +34,9 @@ def test_the_least_mean_by_hand():
     """0.2 to 0.5 of 10, 0.1 to 0.9 of 1 and 0.2 to 0.6 of 4: as much as may be of 1, then of 4."""
     values = np.array([[10.0, 1.0, 4.0]])
     lowest, highest = np.array([[0.2, 0.1, 0.2]]), np.array([[0.5, 0.9, 0.6]])
-    assert _extreme(values, lowest, highest)[0] == pytest.approx(0.2 * 10 + 0.6 * 1 + 0.2 * 4)
+    assert _least_mean(values, lowest, highest)[0] == pytest.approx(0.2 * 10 + 0.6 * 1 + 0.2 * 4)
     highest[0, 1] = 0.3
-    assert _extreme(values, lowest, highest)[0] == pytest.approx(0.2 * 10 + 0.3 * 1 + 0.5 * 4)
+    assert _least_mean(values, lowest, highest)[0] == pytest.approx(0.2 * 10 + 0.3 * 1 + 0.5 * 4)
 
 
 @pytest.mark.parametrize(
@@ -66,3 +66,8 @@ def test_small_boxes_are_exact_and_more_parts_are_closer():
     assert many.mean_most - many.mean_least < 0.8 * (one.mean_most - one.mean_least)
     assert many.mean_least - 0.05 < float(exact.mean()) < many.mean_most + 0.05
     assert many.least >= one.least and many.most <= one.most
+
+
+def test_a_box_of_no_width_has_the_bounds_of_its_placement():
+    found = bounds_over("right_and_forward", [[1.6, 1.6]], most=2)
+    assert 0 <= found.mean_least == found.least <= found.most == found.mean_most <= 1

@@ -35,12 +35,12 @@ def render_images_with_effects(
     """Render images one after the other, as one worker; see `plain_kernel.render_images`."""
     count = view.height * view.width
     for row in range(first, last):
-        world = row // view.count
-        job = start_job(view, poses, scratch, row, row % view.cameras.shape[0], world, member)
+        env = row // view.count
+        job = start_job(view, poses, scratch, row, row % view.cameras.shape[0], env, member)
         find_visible(job, geoms, poses)
         fill(job.dark, 0, count, 0)
-        if effects.shadows[world % effects.shadows.shape[0]] != 0:
-            _cast_shadows(job, materials.direction[world % materials.direction.shape[0], 0])
+        if effects.shadows[env % effects.shadows.shape[0]] != 0:
+            _cast_shadows(job, materials.direction[env % materials.direction.shape[0], 0])
         start = int(0)
         while start < count:
             end = span_end(job.owner, start, count)

@@ -61,8 +61,8 @@ def render_pixels_with_effects(
     job.nearest[pixel] = nearest
     job.owner[pixel] = owner
     job.dark[pixel] = 0
-    if owner != structs.NO_GEOM and effects.shadows[job.world % effects.shadows.shape[0]] != 0:
-        sun = materials.direction[job.world % materials.direction.shape[0], 0]
+    if owner != structs.NO_GEOM and effects.shadows[job.env % effects.shadows.shape[0]] != 0:
+        sun = materials.direction[job.env % materials.direction.shape[0], 0]
         for geom in range(job.geom_views.shape[0]):
             caster = job.geom_views[geom]
             if geom != owner // structs.FACES and caster.kind != PLANE:

@@ -46,9 +46,9 @@ def render_images(
     Launch it with a dimension of 1.
     """
     for row in range(first, last):
-        world = row // view.count
+        env = row // view.count
         camera = row % view.cameras.shape[0]
-        render_image(view, camera, geoms, poses, world, materials, scratch, member, images, row)
+        render_image(view, camera, geoms, poses, env, materials, scratch, member, images, row)
 
 
 @wp.func
@@ -57,7 +57,7 @@ def render_image(
     camera: int,
     geoms: structs.Geoms,
     poses: structs.Poses,
-    world: int,
+    env: int,
     materials: structs.Materials,
     scratch: structs.Scratch,
     member: int,
@@ -65,7 +65,7 @@ def render_image(
     row: int,
 ) -> None:
     """Render the image `row` of one camera of one environment; see `render_images`."""
-    job = start_job(view, poses, scratch, row, camera, world, member)
+    job = start_job(view, poses, scratch, row, camera, env, member)
     find_visible(job, geoms, poses)
     count = view.height * view.width
     start = int(0)

@@ -13,24 +13,24 @@ from drone_rl.sim.rendering.raytrace.structs_kernel import (
     View,
 )
 
-IN_FRONT = wp.constant(1e-3)
+NEAR = wp.constant(1e-3)
 """Metres in front of the camera from which corners are projected."""
 
 
 @wp.func
 def start_job(
-    view: View, poses: Poses, scratch: Scratch, row: int, camera: int, world: int, member: int
+    view: View, poses: Poses, scratch: Scratch, row: int, camera: int, env: int, member: int
 ) -> Job:
     """Return the job of rendering image `row`, with the scratch buffers `member`."""
     job = Job()
     job.row = row
-    job.world = world
+    job.env = env
     job.view = view
     job.camera = view.cameras[camera]
-    turned = _frame_attitude(job.camera.frame, poses.attitudes[world])
-    origin = poses.positions[world, job.camera.frame]
+    turned = _frame_attitude(job.camera.frame, poses.attitudes[env])
+    origin = poses.positions[env, job.camera.frame]
     job.eye = origin + _rotation(turned) @ job.camera.position
-    job.looking = _rotation(_product(turned, job.camera.attitude))
+    job.camera_to_world = _rotation(_product(turned, job.camera.attitude))
     job.rays = view.rays[camera]
     job.cosines = view.cosines[camera]
     job.nearest = scratch.nearest[member]
@@ -45,19 +45,19 @@ def start_job(
 def view_geom(job: Job, geoms: Geoms, geom: int, poses: Poses) -> GeomView:
     """Return a geom relative to the camera."""
     frame = geoms.frame[geom]
-    turned = _frame_attitude(frame, poses.attitudes[job.world])
-    centre = poses.positions[job.world, frame] + _rotation(turned) @ geoms.position[geom]
+    turned = _frame_attitude(frame, poses.attitudes[job.env])
+    centre = poses.positions[job.env, frame] + _rotation(turned) @ geoms.position[geom]
     geom_view = GeomView()
     geom_view.kind = geoms.kind[geom]
     geom_view.number = geoms.number[geom]
     geom_view.size = geoms.size[geom]
     geom_view.reach = geoms.reach[geom]
     if poses.scales:
-        geom_view.size *= poses.scales[job.world, frame]
-        geom_view.reach *= poses.scales[job.world, frame]
+        geom_view.size *= poses.scales[job.env, frame]
+        geom_view.reach *= poses.scales[job.env, frame]
     geom_view.axes = _rotation(_product(turned, geoms.attitude[geom]))
     geom_view.eye = wp.transpose(geom_view.axes) @ (job.eye - centre)
-    geom_view.into = wp.transpose(geom_view.axes) @ job.looking
+    geom_view.into = wp.transpose(geom_view.axes) @ job.camera_to_world
     return geom_view
 
 
@@ -79,7 +79,7 @@ def bounding_rectangle(job: Job, geom_view: GeomView, shadow: wp.vec3) -> wp.vec
     behind = int(0)
     for corner in range(1 << bits):
         at = _corner(corner, centre, sides, swept)
-        if -at[2] < IN_FRONT:
+        if -at[2] < NEAR:
             behind += 1 << corner
         else:
             seen = wp.vec2(at[0] / -at[2], -at[1] / -at[2])
@@ -93,8 +93,8 @@ def bounding_rectangle(job: Job, geom_view: GeomView, shadow: wp.vec3) -> wp.vec
             if ((behind >> one) & 1) == 0 and ((behind >> other) & 1) == 1:
                 at = _corner(one, centre, sides, swept)
                 hidden = _corner(other, centre, sides, swept)
-                at += (at[2] + IN_FRONT) / (at[2] - hidden[2]) * (hidden - at)
-                seen = wp.vec2(at[0], -at[1]) / IN_FRONT
+                at += (at[2] + NEAR) / (at[2] - hidden[2]) * (hidden - at)
+                seen = wp.vec2(at[0], -at[1]) / NEAR
                 lowest = wp.min(lowest, seen)
                 highest = wp.max(highest, seen)
     wide, high = job.camera.half_width, job.camera.half_height

@@ -1,4 +1,4 @@
-"""The ray tracer's cameras, rays, geoms and poses, in frames: world 0, drone 1, props from 2."""
+"""Encode a scene for the kernels, in reference frames: 0 world, 1 drone, props from 2."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -22,7 +22,7 @@ from drone_rl.utils.errors import InputError
 mujoco: Any = _mujoco
 """MuJoCo's bindings, which are untyped."""
 
-REACH: Mapping[int, Callable[[NDArray], NDArray]] = MappingProxyType(
+HALF_EXTENTS: Mapping[int, Callable[[NDArray], NDArray]] = MappingProxyType(
     {
         **dict.fromkeys((solids.PLANE, solids.ELLIPSOID, solids.BOX), lambda size: size),
         solids.SPHERE: lambda size: size[[0, 0, 0]],
@@ -30,14 +30,14 @@ REACH: Mapping[int, Callable[[NDArray], NDArray]] = MappingProxyType(
         solids.CYLINDER: lambda size: size[[0, 0, 1]],
     }
 )
-"""Half extents of the bounding box of each kind of geom, from MuJoCo's size."""
+"""Half extents of the bounding box of each kind of geom, from MuJoCo's size; a plane has none."""
 
 
 def check_scene(scene: Scene) -> None:
     """Raise an `InputError` if the ray tracer does not support a geom or light of a scene."""
     model = scene.model
     for geom in range(model.ngeom):
-        if model.geom_type[geom] not in REACH:
+        if model.geom_type[geom] not in HALF_EXTENTS:
             kind = mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
             raise InputError(
                 f"geom {model.geom(geom).name!r} is a {kind}, which Raytracer can't draw; give "
@@ -53,8 +53,8 @@ def check_scene(scene: Scene) -> None:
     is_fixed = model.light_bodyid == 0
     if not (is_distant & is_fixed & (model.light_castshadow == 0)).all():
         raise InputError(
-            "a light of the scene is near, moves or casts shadows, which Raytracer can't draw; "
-            "give renderer=mujoco_warp"
+            "a light of the scene is near, moves or has castshadow=true, which Raytracer does not "
+            "support (appearance.shadows casts shadows); give renderer=mujoco_warp"
         )
     if model.vis.headlight.active:
         raise InputError("the scene's headlight is on; switch it off or give renderer=mujoco_warp")
@@ -80,7 +80,10 @@ class Frames:
     def place(
         self, body: int, position: NDArray, attitude: NDArray
     ) -> tuple[int, NDArray, NDArray]:
-        """Convert a body's local pose into its frame's index, position and attitude there."""
+        """Convert a pose relative to a body into the body's frame and the pose in that frame.
+
+        Positions are in metres, attitudes quaternions (w, x, y, z).
+        """
         data, frame = self._data, int(self._of_body[body])
         root = self._model.body_rootid[body] if frame else 0
         back, turned, whole = np.empty(4), np.empty(3), np.empty(4)
@@ -94,7 +97,7 @@ class Frames:
 
 
 def make_view(scene: Scene, frames: Frames, view: View, device: str) -> structs.View:
-    """Return a view for the kernels, without its modalities."""
+    """Return a view for the kernels; the caller sets its modalities, `what`."""
     model: Any = scene.model
     made: Any = structs.View()
     cameras = [make_camera(scene, frames, name, view.width / view.height) for name in view.cameras]
@@ -116,8 +119,8 @@ def make_camera(scene: Scene, frames: Frames, name: str, aspect: float) -> struc
     is_plain = model.cam_projection[number] == mujoco.mjtProjection.mjPROJ_PERSPECTIVE
     if not (is_plain and camera.mode[0] == 0 and model.cam_sensorsize[number, 1] == 0):
         raise InputError(
-            f"camera {name!r} is not a fixed one with an angle of view, which is all that "
-            "Raytracer knows; give renderer=mujoco_warp"
+            f"camera {name!r} is not supported: Raytracer needs mode=fixed, perspective and fovy; "
+            "give renderer=mujoco_warp"
         )
     made: Any = structs.Camera()
     made.frame, position, attitude = frames.place(camera.bodyid[0], camera.pos, camera.quat)
@@ -138,7 +141,7 @@ def make_rays(camera: structs.Camera, height: int, width: int) -> NDArray:
 
 def make_geoms(scene: Scene, frames: Frames, show_drone: bool, device: str) -> structs.Geoms:
     """Return the rendered geoms for the kernels."""
-    model, seen = scene.model, scene.seen(show_drone)
+    model, seen = scene.model, scene.shown(show_drone)
     bodies, positions, attitudes = model.geom_bodyid, model.geom_pos, model.geom_quat
     places = [frames.place(bodies[i], positions[i], attitudes[i]) for i in seen]
     values = {
@@ -148,7 +151,7 @@ def make_geoms(scene: Scene, frames: Frames, show_drone: bool, device: str) -> s
         "position": ([place[1] for place in places], wp.vec3),
         "attitude": ([place[2] for place in places], wp.vec4),
         "size": (model.geom_size[seen], wp.vec3),
-        "reach": ([REACH[model.geom_type[i]](model.geom_size[i]) for i in seen], wp.vec3),
+        "reach": ([HALF_EXTENTS[model.geom_type[i]](model.geom_size[i]) for i in seen], wp.vec3),
     }
     geoms: Any = structs.Geoms()
     for name, (value, dtype) in values.items():
@@ -229,10 +232,12 @@ class PoseBuffers:
         self._positions[:count, 1] = poses.position
         self._positions[:count, 2:] = poses.props
         self._attitudes[:count] = poses.attitude
+        if distractors is not None or self._is_scaled:
+            self._scales.fill_(1.0)
         if distractors is not None:
             sizes = distractors.sizes
             self._scales[:count, frames - sizes.shape[-1] :] = sizes
-            self._encoded.scales = self._encoded_scales
+            self._encoded.scales, self._is_scaled = self._encoded_scales, True
         return self._encoded
 
     def _allocate(self, count: int, frames: int) -> None:
@@ -243,6 +248,7 @@ class PoseBuffers:
         self._encoded: Any = structs.Poses()
         self._encoded.positions = wp.from_torch(self._positions, dtype=wp.vec3)
         self._encoded.attitudes = wp.from_torch(self._attitudes, dtype=wp.vec4)
+        self._is_scaled = False
 
 
 def _array(value: object) -> np.ndarray:

@@ -26,9 +26,9 @@ def shade_span(
     """
     shown = _find_surface(job, first, last, owner, distance)
     if shown.number == structs.NO_GEOM:
-        shown.color = _bytes(materials.sky[job.world % materials.sky.shape[0]])
+        shown.color = _bytes(materials.sky[job.env % materials.sky.shape[0]])
     else:
-        shown.color = _bytes(_lambert(materials, job.world, shown.number, shown.normal))
+        shown.color = _bytes(_lambert(materials, job.env, shown.number, shown.normal))
     shown.gray = _gray(shown.color)
     write_span(job, images, job.view.what, first, last, shown)
 
@@ -45,9 +45,9 @@ def shade_span_with_effects(
     """`shade_span` with fog, shadow, texture and a sky gradient."""
     shown = _find_surface(job, first, last, job.owner[first], job.nearest[first])
     if shown.number == structs.NO_GEOM:
-        up = wp.transpose(job.looking) @ wp.vec3(0.0, 0.0, 1.0)
-        horizon = materials.sky[job.world % materials.sky.shape[0]]
-        zenith = effects.zenith[job.world % effects.zenith.shape[0]]
+        up = wp.transpose(job.camera_to_world) @ wp.vec3(0.0, 0.0, 1.0)
+        horizon = materials.sky[job.env % materials.sky.shape[0]]
+        zenith = effects.zenith[job.env % effects.zenith.shape[0]]
         spans.shade_sky(job, first, last, up, horizon, zenith)
     else:
         _color_geom(job, materials, effects, first, last, shown)
@@ -106,10 +106,10 @@ def write_span(
 
 
 @wp.func
-def _lambert(materials: structs.Materials, world: int, geom: int, normal: wp.vec3) -> wp.vec3:
+def _lambert(materials: structs.Materials, env: int, geom: int, normal: wp.vec3) -> wp.vec3:
     """Lambert's law under distant lights, 0 to 255. Normal: world frame."""
-    own = materials.colors[world % materials.colors.shape[0], geom]
-    row = world % materials.ambient.shape[0]
+    own = materials.colors[env % materials.colors.shape[0], geom]
+    row = env % materials.ambient.shape[0]
     color = wp.vec3()
     for light in range(materials.ambient.shape[1]):
         color += wp.cw_mul(own, materials.ambient[row, light])
@@ -128,7 +128,7 @@ def _bytes(color: wp.vec3) -> wp.vec3ub:
 
 @wp.func
 def _gray(color: wp.vec3ub) -> float:
-    """Gray by `WEIGHTS`; each sum is rounded as by torch on x86."""
+    """Return fma(green, G, red * R) + blue * B in float32, as torch does on x86 by `WEIGHTS`."""
     red, green, blue = float(color[0]), float(color[1]), float(color[2])
     two = float(wp.float64(red * _RED) + wp.float64(green) * wp.float64(_GREEN))
     return float(wp.float64(two) + wp.float64(blue * _BLUE))
@@ -143,35 +143,35 @@ def _color_geom(
     last: int,
     shown: structs.PixelValue,
 ) -> None:
-    world, geom = job.world, shown.number
-    own = 255.0 * materials.colors[world % materials.colors.shape[0], geom]
-    lit, shaded = light_surface(materials, world, shown.normal)
+    env, geom = job.env, shown.number
+    own = 255.0 * materials.colors[env % materials.colors.shape[0], geom]
+    lit, shaded = light_surface(materials, env, shown.normal)
     light = structs.SurfaceLight()
     light.lit = wp.cw_mul(own, lit)
     light.shaded = wp.cw_mul(own, shaded)
-    light.extinction = effects.extinction[world % effects.extinction.shape[0]]
-    light.horizon = materials.sky[world % materials.sky.shape[0]]
-    row = world % effects.texture.shape[0]
+    light.extinction = effects.extinction[env % effects.extinction.shape[0]]
+    light.horizon = materials.sky[env % materials.sky.shape[0]]
+    row = env % effects.texture.shape[0]
     texture = effects.texture[row, geom]
     if texture < 0:
         spans.shade_plain(job, first, last, light)
     else:
         tiles, side = effects.tiles[row, geom], effects.sides[texture]
         geom_view = job.geom_views[job.owner[first] // structs.FACES]
-        cover = map_texture(tiles, geom_view, shown.face, shown.face_normal)
-        cover.start = effects.starts[texture]
-        cover.side = side
+        texture_map = map_texture(tiles, geom_view, shown.face, shown.face_normal)
+        texture_map.start = effects.starts[texture]
+        texture_map.side = side
         pixel = 2.0 * job.camera.half_height / float(job.view.height) * tiles * float(side)
-        cover.area = pixel * pixel
-        spans.shade_textured(job, first, last, light, cover, effects.texels)
+        texture_map.area = pixel * pixel
+        spans.shade_textured(job, first, last, light, texture_map, effects.texels)
 
 
 @wp.func
 def light_surface(
-    materials: structs.Materials, world: int, normal: wp.vec3
+    materials: structs.Materials, env: int, normal: wp.vec3
 ) -> tuple[wp.vec3, wp.vec3]:
-    """Return the light on a surface in the sun, and in shadow. Normal: world frame."""
-    row = world % materials.ambient.shape[0]
+    """Return the light on a surface with and without light 0, the sun. Normal: world frame."""
+    row = env % materials.ambient.shape[0]
     dark = wp.vec3()
     for light in range(materials.ambient.shape[1]):
         dark += materials.ambient[row, light]
@@ -199,9 +199,9 @@ def map_texture(
         right = 1
     if axis == 2:
         low = 1
-    cover = structs.TextureMap()
-    cover.across = tiles * geom_view.into[right]
-    cover.down = -tiles * geom_view.into[low]
-    cover.corner = tiles * wp.vec2(geom_view.eye[right], -geom_view.eye[low])
-    cover.facing = -(wp.transpose(geom_view.into) @ normal)
-    return cover
+    texture_map = structs.TextureMap()
+    texture_map.across = tiles * geom_view.into[right]
+    texture_map.down = -tiles * geom_view.into[low]
+    texture_map.corner = tiles * wp.vec2(geom_view.eye[right], -geom_view.eye[low])
+    texture_map.facing = -(wp.transpose(geom_view.into) @ normal)
+    return texture_map

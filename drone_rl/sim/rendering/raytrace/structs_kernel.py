@@ -213,12 +213,12 @@ class Job:
     """One image to render: the camera in its environment, and one worker's part of `Scratch`."""
 
     row: int
-    world: int
+    env: int
     view: View
     camera: Camera
     eye: wp.vec3
     """The camera's position, world frame."""
-    looking: wp.mat33
+    camera_to_world: wp.mat33
     """Rotates directions from the camera's frame to the world's."""
     rays: wp.array[wp.vec3]
     cosines: wp.array[float]

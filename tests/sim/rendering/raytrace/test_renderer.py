@@ -255,7 +255,7 @@ def test_geoms_beyond_the_far_limit_are_sky(both):
         (
             ' fovy="60"',
             ' projection="orthographic"',
-            "'front' is not a fixed one with an angle of view",
+            "'front' is not supported",
         ),
         ('name="front"', 'name="nose"', "'front' is not in the model; choose from: nose, rear"),
     ],

@@ -1,8 +1,11 @@
 """Frames as encoded for the kernels."""
 
+import dataclasses
+
 import pytest
 import torch
 
+from drone_rl.sim.rendering.appearance import Distractors
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.scene import PoseBuffers
 from drone_rl.sim.rendering.renderer import Poses
@@ -37,3 +40,15 @@ def test_pose_buffers_are_reused_for_fewer_environments():
     places = PoseBuffers(torch.device("cpu"))
     assert places.write(some(4)) is places.write(some(3))
     assert places.write(some(3)) is not places.write(some(5))
+
+
+def test_sizes_of_distractors_hold_for_one_call():
+    places = PoseBuffers(torch.device("cpu"))
+    none = torch.zeros(1, 2, 3)
+    given = Distractors(places=none, colors=none, sizes=torch.tensor([[0.5, 0.7]]))
+    assert places.write(some(1), given).scales.numpy()[0].tolist() == pytest.approx(
+        [1, 1, 0.5, 0.7]
+    )
+    fewer = dataclasses.replace(given, sizes=torch.tensor([[0.4]]))
+    assert places.write(some(1), fewer).scales.numpy()[0].tolist() == pytest.approx([1, 1, 1, 0.4])
+    assert places.write(some(1)).scales.numpy()[0].tolist() == [1, 1, 1, 1]
