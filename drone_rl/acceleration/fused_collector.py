@@ -19,7 +19,7 @@ from drone_rl.acceleration.direct_collector import DirectCollector
 from drone_rl.acceleration.fused_network import ACTIVATIONS, ActivationCache
 from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
 from drone_rl.envs.direct_renderer import DirectRenderer, Entries, Reasons
-from drone_rl.envs.transforms import StandardizePixels
+from drone_rl.envs.transforms import CropRows, StandardizePixels
 from drone_rl.policies.actor import CategoricalActor
 from drone_rl.policies.networks import require_finite
 from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
@@ -65,6 +65,7 @@ class FusedCollector:
         camera.poses = rules.poses
         camera.mean, camera.deviation = _mean_and_deviation(renderer)
         self._camera = camera
+        self._rows = _cropped_rows(renderer)
         shape = (self._workers.size, network.workspace_size)
         self._workspaces = wp.empty(shape, dtype=float, device="cpu")
         pixels = view.height * view.width
@@ -98,7 +99,8 @@ class FusedCollector:
         if reasons or rules is None:
             return Reasons(reasons)
         actor: Any = direct.actor
-        network = PackedNetwork(actor.network, int(rollout_kernel.TOGETHER))
+        first_pixel = _cropped_rows(direct.renderer).start * direct.renderer.view.width
+        network = PackedNetwork(actor.network, int(rollout_kernel.TOGETHER), first_pixel)
         return cls(direct, network, rules, num_threads)
 
     def cache_activations(self) -> ActivationCache | None:
@@ -157,6 +159,8 @@ class FusedCollector:
         order = envs.argsort(stable=True)
         envs, rows = envs[order], rows[order]
         logged = self._buffer.read(rows, names)
+        if is_observed and self._rows != slice(0, self._renderer.view.height):
+            logged["pixels"] = logged["pixels"][..., self._rows, :].contiguous()
         if self._cache is not None and is_observed:
             logged[ACTIVATIONS] = self._cache.add(rows, self._network.weights, logged["pixels"])
         return envs, logged
@@ -223,6 +227,14 @@ def _mean_and_deviation(renderer: DirectRenderer) -> tuple[float, float]:
     return 0.0, 1.0
 
 
+def _cropped_rows(renderer: DirectRenderer) -> slice:
+    """Return the rows of rendered frames that the policy sees."""
+    for transform in renderer.after:
+        if type(transform) is CropRows:
+            return slice(transform.top, transform.bottom)
+    return slice(0, renderer.view.height)
+
+
 def _not_fused(renderer: DirectRenderer) -> list[str]:
     """Return reasons against fusing the renderer, the appearance or the transforms."""
     worlds, reasons = renderer.worlds, []
@@ -231,10 +243,12 @@ def _not_fused(renderer: DirectRenderer) -> list[str]:
         reasons.append(f"renderer {type(worlds.renderer).__name__} on {device} is not fused")
     if renderer.view.modalities != ("gray",):
         reasons.append("frames that are not gray are not fused")
-    first, *others = [*renderer.after, None]
-    if first is not None and type(first) is not StandardizePixels:
-        others.insert(0, first)
-    reasons += [f"transform {type(t).__name__} is not fused" for t in others if t is not None]
+    known = [CropRows, StandardizePixels]
+    for transform in renderer.after:
+        if type(transform) in known:
+            known.remove(type(transform))
+        else:
+            reasons.append(f"transform {type(transform).__name__} is not fused")
     if worlds.appearance is not None:
         reasons.append("visual randomization is not fused")
     return reasons

@@ -14,10 +14,11 @@ from drone_rl.acceleration.gradients_kernel import BLOCK, Batch, PackedParams, W
 from drone_rl.acceleration.layers_kernel import WIDTH
 from drone_rl.acceleration.packed_layers import (
     Order,
+    OutputOffsets,
     PackedLayer,
     as_geometries,
+    as_indices,
     odd_lines,
-    output_offsets,
     packed_layers,
     unsupported,
 )
@@ -201,8 +202,8 @@ class _Engine:
         self._order = order = Order(layers)
         self._weights = torch.zeros(order.weight_offsets[-1])
         self._transposed = torch.zeros(order.transposed_offsets[-1])
-        offsets = output_offsets(layers)
-        self._logits_offset, self._size = offsets[-2:]
+        offsets = OutputOffsets.of(layers)
+        self._logits_offset, self._size = offsets.outputs[-2:]
         params = self._params = PackedParams()
         params.geometries = as_geometries(
             {"weights_offset": at, **layer.geometry, "is_rectified": int(layer is not layers[-1])}
@@ -214,9 +215,10 @@ class _Engine:
         )
         params.weights = wp.from_torch(self._weights)
         params.transposed_weights = wp.from_torch(self._transposed)
-        params.output_offsets = wp.from_torch(torch.tensor(offsets, dtype=torch.int32))
+        params.output_offsets = as_indices(offsets.outputs)
+        params.kept_offsets = as_indices(offsets.kept)
         params.num_convolutions = sum(layer.is_convolution for layer in layers)
-        stride = odd_lines(self._logits_offset - offsets[params.num_convolutions - 1])
+        stride = odd_lines(self._logits_offset - offsets.kept[params.num_convolutions - 1])
         params.inputs_stride = stride
         self._gradients = torch.empty(self._workers.size, *self._weights.shape)
         numbers = (v.num_inputs * math.prod(v.output_shape) for v in layers if v.is_convolution)

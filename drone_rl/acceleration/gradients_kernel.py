@@ -6,7 +6,14 @@ a block of frames at a time through all layers, so that its numbers stay in cach
 
 import warp as wp
 
-from drone_rl.acceleration.layers_kernel import PREAMBLE, LayerGeometry, copy, multiply
+from drone_rl.acceleration.layers_kernel import (
+    PREAMBLE,
+    LayerGeometry,
+    copy,
+    multiply,
+    num_kept,
+    pool,
+)
 
 _TILES = (
     PREAMBLE
@@ -105,6 +112,46 @@ def rectify(
     ...
 
 
+@wp.func_native("""
+const int columns = g.patches_per_row / g.pool_size, stride = g.num_outs;
+const int rows = g.num_patches / g.patches_per_row / g.pool_size;
+const float* kept = outputs.data + kept_at;
+const float* delta = deltas.data + kept_delta_at;
+float* to = deltas.data + g.output_offset;
+for (int i = 0; i < g.num_patches * stride; ++i) to[i] = 0.0f;
+for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column, kept += stride, delta += stride) {
+        const int first = g.pool_size * (row * g.patches_per_row + column) * stride;
+        for (int i = 0; i < stride; ++i) {
+            bool is_open = kept[i] > 0.0f;
+            for (int y = 0; y < g.pool_size; ++y) {
+                for (int x = 0; x < g.pool_size; ++x) {
+                    const int at = first + (y * g.patches_per_row + x) * stride + i;
+                    const bool is_largest = is_open && outputs.data[output_at + at] == kept[i];
+                    if (is_largest) to[at] = delta[i];
+                    is_open = is_open && !is_largest;
+                }
+            }
+        }
+    }
+}
+""")
+def unpool(
+    outputs: wp.array[float],
+    output_at: int,
+    kept_at: int,
+    deltas: wp.array[float],
+    kept_delta_at: int,
+    g: LayerGeometry,
+) -> None:
+    """Give the gradient of each maximum to the first output that has it, as PyTorch does.
+
+    `output_at` and `kept_at` are the offsets of the outputs before and after pooling,
+    `kept_delta_at` that of the latter's gradients; those of the former go to `g.output_offset`.
+    """
+    ...
+
+
 BLOCK = wp.constant(64)
 """Frames at a time."""
 
@@ -122,6 +169,8 @@ class PackedParams:
     transposed_weights: wp.array[float]
     output_offsets: wp.array[int]
     """Offset of each layer in the outputs of a frame, and the size of these."""
+    kept_offsets: wp.array[int]
+    """Offset of each layer's outputs after pooling."""
     num_convolutions: int
     inputs_stride: int
     """Stride between the linear layers' inputs of two frames in `Workspace.inputs`."""
@@ -169,11 +218,14 @@ def forward(first: int, last: int, params: PackedParams, batch: Batch) -> None:
                 if layer == 0:
                     multiply(batch.frames[frame], params.weights, batch.outputs, g)
                 else:
-                    g.input_offset = frame * size + params.output_offsets[layer - 1]
+                    g.input_offset = frame * size + params.kept_offsets[layer - 1]
                     multiply(batch.outputs, params.weights, batch.outputs, g)
+                if g.pool_size > 0:
+                    g.pooled_offset = frame * size + params.kept_offsets[layer]
+                    pool(batch.outputs, g)
         for layer in range(params.num_convolutions, params.geometries.shape[0]):
             g = params.geometries[layer]
-            g.input_offset = block * size + params.output_offsets[layer - 1]
+            g.input_offset = block * size + params.kept_offsets[layer - 1]
             g.output_offset = block * size + params.output_offsets[layer]
             g.num_patches = wp.min(BLOCK, last - block)
             g.row_stride = size
@@ -189,8 +241,8 @@ def _size(params: PackedParams) -> int:
 
 @wp.func
 def _stride(params: PackedParams, layer: int) -> int:
-    """Numbers of the outputs of a layer, with padding."""
-    return params.output_offsets[layer + 1] - params.output_offsets[layer]
+    """Numbers of the outputs of a layer after pooling, with padding."""
+    return params.output_offsets[layer + 1] - params.kept_offsets[layer]
 
 
 @wp.kernel
@@ -216,7 +268,7 @@ def _begin(
     params: PackedParams, frame: int, block: int, batch: Batch, workspace: Workspace
 ) -> None:
     """Write the inputs of a frame's linear layers, and the logits' gradient padded with zeros."""
-    inputs_offset = params.output_offsets[params.num_convolutions - 1]
+    inputs_offset = params.kept_offsets[params.num_convolutions - 1]
     top = params.geometries.shape[0] - 1
     row = frame - block
     source = batch.rows[frame] * _size(params) + inputs_offset
@@ -233,8 +285,8 @@ def _begin(
 @wp.func
 def _linear(params: PackedParams, layer: int, count: int, workspace: Workspace) -> None:
     """Compute the gradients with respect to a linear layer's weights and inputs."""
-    first = params.output_offsets[params.num_convolutions - 1]
-    inputs_offset = params.output_offsets[layer - 1] - first
+    first = params.kept_offsets[params.num_convolutions - 1]
+    inputs_offset = params.kept_offsets[layer - 1] - first
     if workspace.gradients.shape[0] > 0:
         g = params.geometries[layer]  # the frames' inputs, side by side, are its patches
         g.input_offset = inputs_offset
@@ -247,7 +299,7 @@ def _linear(params: PackedParams, layer: int, count: int, workspace: Workspace) 
         accumulate(workspace.inputs, workspace.deltas, workspace.gradients, g)
     transposed = params.transposed[layer]
     transposed.input_offset = BLOCK * params.output_offsets[layer]
-    transposed.output_offset = BLOCK * params.output_offsets[layer - 1]
+    transposed.output_offset = BLOCK * params.kept_offsets[layer - 1]
     transposed.num_patches = count
     transposed.row_stride = _stride(params, layer)
     transposed.output_stride = _stride(params, layer - 1)
@@ -264,12 +316,20 @@ def _convolution(
 ) -> None:
     """Compute the gradients with respect to a convolution's weights and input, for one frame."""
     row = frame - block
+    frame_at = batch.rows[frame] * _size(params)
     input_offset = int(0)
     if layer > 0:
-        input_offset = batch.rows[frame] * _size(params) + params.output_offsets[layer - 1]
+        input_offset = frame_at + params.kept_offsets[layer - 1]
     g = params.geometries[layer]
     g.input_offset = input_offset
-    g.output_offset = BLOCK * params.output_offsets[layer] + row * _stride(params, layer)
+    kept_delta_at = BLOCK * params.kept_offsets[layer] + row * _stride(params, layer)
+    g.output_offset = kept_delta_at
+    if g.pool_size > 0:
+        size = params.kept_offsets[layer] - params.output_offsets[layer]
+        g.output_offset = BLOCK * params.output_offsets[layer] + row * size
+        outputs_at = frame_at + params.output_offsets[layer]
+        kept_at = frame_at + params.kept_offsets[layer]
+        unpool(batch.outputs, outputs_at, kept_at, workspace.deltas, kept_delta_at, g)
     if workspace.gradients.shape[0] > 0:
         if layer == 0:
             accumulate(batch.frames[frame], workspace.deltas, workspace.gradients, g)
@@ -284,7 +344,7 @@ def _convolution(
         fold(workspace.patches, batch.grad_frames[frame], batch.grad_frames.shape[1], g)
         return
     below = layer - 1
-    g.input_offset = BLOCK * params.output_offsets[below] + row * _stride(params, below)
-    size = params.geometries[below].num_patches * params.geometries[below].num_outs
-    fold(workspace.patches, workspace.deltas, size, g)
-    rectify(workspace.deltas, g.input_offset, batch.outputs, input_offset, size)
+    g.input_offset = BLOCK * params.kept_offsets[below] + row * _stride(params, below)
+    num_inputs = num_kept(params.geometries[below])
+    fold(workspace.patches, workspace.deltas, num_inputs, g)
+    rectify(workspace.deltas, g.input_offset, batch.outputs, input_offset, num_inputs)

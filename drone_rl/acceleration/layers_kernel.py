@@ -122,6 +122,10 @@ class LayerGeometry:
     """Stride between the outputs of two patches."""
     is_rectified: int
     """Whether outputs below 0 become 0."""
+    pool_size: int
+    """Rows and columns of outputs of which one is kept, their maximum; 0 to keep all outputs."""
+    pooled_offset: int
+    """Where they are kept."""
 
 
 @wp.func_native(_TILES)
@@ -133,6 +137,38 @@ def multiply(
     `weights` are, for each `WIDTH` outputs, their biases, then for each input their weights.
     """
     ...
+
+
+@wp.func_native("""
+const int columns = g.patches_per_row / g.pool_size, stride = g.output_stride;
+const int rows = g.num_patches / g.patches_per_row / g.pool_size;
+float* to = values.data + g.pooled_offset;
+for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column, to += stride) {
+        const int first = g.pool_size * (row * g.patches_per_row + column);
+        const float* from = values.data + g.output_offset + first * stride;
+        for (int i = 0; i < stride; ++i) to[i] = from[i];
+        for (int y = 0; y < g.pool_size; ++y) {
+            for (int x = 0; x < g.pool_size; ++x) {
+                const float* by = from + (y * g.patches_per_row + x) * stride;
+                for (int i = 0; i < stride; ++i) to[i] = by[i] > to[i] ? by[i] : to[i];
+            }
+        }
+    }
+}
+""")
+def pool(values: wp.array[float], g: LayerGeometry) -> None:
+    """Keep the maximum of each square of outputs, as `torch.nn.MaxPool2d(g.pool_size)` does."""
+    ...
+
+
+@wp.func
+def num_kept(g: LayerGeometry) -> int:
+    """Return the numbers of a frame that a layer keeps: its outputs after pooling."""
+    if g.pool_size == 0:
+        return g.num_patches * g.num_outs
+    rows = g.num_patches / g.patches_per_row / g.pool_size
+    return rows * (g.patches_per_row / g.pool_size) * g.num_outs
 
 
 @wp.func_native("""
@@ -163,6 +199,8 @@ class Layers:
     """Stride between the logits of two frames."""
     output_offsets: wp.array[int]
     """Offset of each layer in the saved outputs of a frame."""
+    kept_offsets: wp.array[int]
+    """The same of its outputs after pooling."""
 
 
 @wp.func
@@ -176,11 +214,16 @@ def run_convolutions(
     for layer in range(layers.num_convolutions):
         geometry = layers.geometries[layer]
         if layer == layers.num_convolutions - 1:
-            geometry.output_offset += row * layers.features_size
+            if geometry.pool_size > 0:
+                geometry.pooled_offset += row * layers.features_size
+            else:
+                geometry.output_offset += row * layers.features_size
         if layer == 0:
             multiply(frame, layers.weights, workspace, geometry)
         else:
             multiply(workspace, layers.weights, workspace, geometry)
+        if geometry.pool_size > 0:
+            pool(workspace, geometry)
 
 
 @wp.func
@@ -206,6 +249,10 @@ def save_outputs(
         geometry = layers.geometries[layer]
         size = geometry.num_patches * geometry.num_outs
         offset = geometry.output_offset
+        if geometry.pool_size > 0:
+            copy(workspace, offset, outputs, layers.output_offsets[layer], size)
+            size = num_kept(geometry)
+            offset = int(geometry.pooled_offset)
         if layer >= layers.num_convolutions - 1:
             offset += row * size
-        copy(workspace, offset, outputs, layers.output_offsets[layer], size)
+        copy(workspace, offset, outputs, layers.kept_offsets[layer], size)

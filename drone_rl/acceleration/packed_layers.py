@@ -1,5 +1,6 @@
 """A network laid out for kernels, see `layers_kernel`."""
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate
 from typing import Any, NamedTuple
@@ -23,6 +24,8 @@ class PackedLayer(NamedTuple):
     """Height, width and channels of its input."""
     kernel: tuple[int, int]
     stride: int
+    pool_size: int = 0
+    """Side of the squares of outputs whose maximum is kept; 0 without pooling."""
 
     @property
     def is_convolution(self) -> bool:
@@ -57,6 +60,19 @@ class PackedLayer(NamedTuple):
         return rows * columns * self.num_outs
 
     @property
+    def pooled_shape(self) -> tuple[int, int]:
+        """Rows and columns of outputs that are kept."""
+        rows, columns = self.output_shape
+        size = self.pool_size or 1
+        return rows // size, columns // size
+
+    @property
+    def pooled_size(self) -> int:
+        """Outputs that are kept for each frame, with padding."""
+        rows, columns = self.pooled_shape
+        return rows * columns * self.num_outs
+
+    @property
     def geometry(self) -> dict[str, int]:
         """Fields of `LayerGeometry` without offsets and `is_rectified`."""
         _, width, channels = self.shape
@@ -73,6 +89,7 @@ class PackedLayer(NamedTuple):
             "kernel_row_stride": 0 if is_whole else line,
             "num_outs": self.num_outs,
             "output_stride": self.num_outs,
+            "pool_size": self.pool_size,
         }
 
     @property
@@ -134,10 +151,24 @@ class Order:
         return [part.view(p.shape) for part, p in zip(parts, parameters, strict=True)]
 
 
-def output_offsets(layers: Sequence[PackedLayer]) -> list[int]:
-    """Return the offset of each layer in the outputs of a frame, and the size of these."""
-    begins = list(accumulate((odd_lines(layer.output_size) for layer in layers), initial=0))
-    return [*begins[:-1], odd_lines(begins[-1])]
+class OutputOffsets(NamedTuple):
+    """Where the outputs of each layer are among those of a frame."""
+
+    outputs: list[int]
+    """Offset of each layer's outputs before pooling; last, the size of the outputs of a frame."""
+    kept: list[int]
+    """Offset of each layer's outputs after pooling: the inputs of the next layer."""
+
+    @classmethod
+    def of(cls, layers: Sequence[PackedLayer]) -> "OutputOffsets":
+        """Lay out the outputs of layers."""
+        every, kept, end = [], [], 0
+        for layer in layers:
+            every.append(end)
+            end += odd_lines(layer.output_size)
+            kept.append(end if layer.pool_size else every[-1])
+            end += odd_lines(layer.pooled_size) if layer.pool_size else 0
+        return cls([*every, odd_lines(end)], kept)
 
 
 def odd_lines(size: int) -> int:
@@ -159,10 +190,16 @@ def as_geometries(layers: Iterable[Mapping[str, int]]) -> Any:
     return wp.array(np.array(rows, dtype), dtype=kind, device="cpu")
 
 
+def as_indices(numbers: Sequence[int]) -> Any:
+    """Return an array of int32."""
+    return wp.from_torch(torch.tensor(numbers, dtype=torch.int32))
+
+
 def unsupported(network: nn.Module) -> list[str]:
     """Return why kernels do not support a network; empty if they do.
 
-    They support convolutions of gray frames, then linear layers, with ReLU, in float32 on a CPU.
+    They support convolutions of gray frames, each with ReLU and possibly pooling, then linear
+    layers with ReLU, in float32 on a CPU.
     """
     name = type(network).__name__
     if not isinstance(network, PolicyNetwork):
@@ -170,11 +207,7 @@ def unsupported(network: nn.Module) -> list[str]:
     if network.in_shape[0] != 1:
         return [f"a network of {network.in_shape[0]} channels is not fused"]
     kinds = "".join(_letter(layer) for layer in network.layers)
-    convolutions, _, rest = kinds.partition("f")
-    is_known = convolutions == "cr" * (len(convolutions) // 2) != "" and (
-        rest == "lr" * (len(rest) // 2) + "l"
-    )
-    if not is_known:
+    if not re.fullmatch("(crp?)+f(lr)*l", kinds):
         return [f"network {name} is not fused"]
     tensors = list(network.parameters())
     if not all(p.dtype == torch.float32 and p.device.type == "cpu" for p in tensors):
@@ -187,17 +220,30 @@ def packed_layers(network: nn.Module) -> list[PackedLayer]:
     assert isinstance(network, PolicyNetwork)
     channels, height, width = network.in_shape
     padded, packed = channels, []
+    pool_sizes = _pool_sizes(network)
     for layer in network.layers:
         if isinstance(layer, Weighted):
             is_convolution = isinstance(layer, nn.Conv2d)
             shape = (height, width, padded)
             high, wide = layer.weight.shape[2:] if is_convolution else (height, width)
             stride = int(layer.stride[0]) if is_convolution else 1
-            one = PackedLayer(layer, channels, shape, (high, wide), stride)
+            pool_size = pool_sizes.get(layer, 0)
+            one = PackedLayer(layer, channels, shape, (high, wide), stride, pool_size)
             packed.append(one)
-            (height, width), channels = one.output_shape, len(layer.weight)
+            (height, width), channels = one.pooled_shape, len(layer.weight)
             padded = one.num_outs
     return packed
+
+
+def _pool_sizes(network: PolicyNetwork) -> dict[nn.Module, int]:
+    """Return the size of the pooling after each convolution that has one."""
+    sizes: dict[nn.Module, int] = {}
+    convolution: nn.Module | None = None
+    for layer in network.layers:
+        if isinstance(layer, nn.MaxPool2d) and convolution is not None:
+            sizes[convolution] = int(layer.kernel_size)  # pyright: ignore[reportArgumentType]
+        convolution = layer if isinstance(layer, nn.Conv2d) else convolution
+    return sizes
 
 
 def _letter(layer: nn.Module) -> str:
@@ -207,6 +253,10 @@ def _letter(layer: nn.Module) -> str:
         return "c" if is_square and plain and layer.bias is not None else "?"
     if isinstance(layer, nn.Linear):
         return "l" if layer.bias is not None else "?"
+    if isinstance(layer, nn.MaxPool2d):
+        is_square = isinstance(layer.kernel_size, int) and layer.stride == layer.kernel_size
+        plain = (layer.padding, layer.dilation, layer.ceil_mode) == (0, 1, False)
+        return "p" if is_square and plain and not layer.return_indices else "?"
     if isinstance(layer, nn.Flatten):
         return "f" if (layer.start_dim, layer.end_dim) == (1, -1) else "?"
     return "r" if isinstance(layer, nn.ReLU) else "?"
@@ -215,20 +265,29 @@ def _letter(layer: nn.Module) -> str:
 class PackedNetwork:
     """A network that kernels support, with its weights laid out for them."""
 
-    def __init__(self, network: nn.Module, num_frames: int) -> None:
-        """Pack a network, see `unsupported`, for linear layers of `num_frames` frames at once."""
+    def __init__(self, network: nn.Module, num_frames: int, first_pixel: int = 0) -> None:
+        """Pack a network, see `unsupported`.
+
+        Args:
+            network: The network.
+            num_frames: Frames whose linear layers are computed at once.
+            first_pixel: Index of the first pixel of a frame that the network sees.
+        """
         packed = packed_layers(network)
         self._order = Order(packed)
         self.weights = torch.zeros(self._order.weight_offsets[-1])
         """Packed weights."""
-        geometries, inputs, outputs = [], 0, 0
+        geometries, inputs, outputs = [], first_pixel, 0
         for i, (layer, weights) in enumerate(zip(packed, self._order.weight_offsets, strict=False)):
             is_last = i == len(packed) - 1
             offsets = {"input_offset": inputs, "weights_offset": weights, "output_offset": outputs}
             geometries.append({**offsets, **layer.geometry, "is_rectified": int(not is_last)})
+            if layer.pool_size:
+                outputs += layer.output_size
+                geometries[-1]["pooled_offset"] = outputs
             is_alone = not is_last and packed[i + 1].is_convolution
             inputs = outputs
-            outputs += layer.output_size * (1 if is_alone else num_frames)
+            outputs += layer.pooled_size * (1 if is_alone else num_frames)
         self.workspace_size = outputs
         """Numbers of the buffer that kernels need."""
         layers: Any = Layers()
@@ -237,9 +296,11 @@ class PackedNetwork:
         layers.num_convolutions = sum(layer.is_convolution for layer in packed)
         layers.features_size = packed[layers.num_convolutions].num_inputs
         layers.logits_offset, layers.logits_stride = inputs, packed[-1].num_outs
-        *offsets, self.num_outputs = output_offsets(packed)
+        offsets = OutputOffsets.of(packed)
+        self.num_outputs = offsets.outputs[-1]
         """Numbers of the outputs of all layers of a frame."""
-        layers.output_offsets = wp.from_torch(torch.tensor(offsets, dtype=torch.int32))
+        layers.output_offsets = as_indices(offsets.outputs)
+        layers.kept_offsets = as_indices(offsets.kept)
         self.layers = layers
         """For kernels."""
         self.num_actions = len(packed[-1].layer.weight)

@@ -29,7 +29,7 @@ from drone_rl.envs import (
     StandardizePixels,
     with_transforms,
 )
-from drone_rl.policies import MLP, SmallCNN, make_actor
+from drone_rl.policies import MLP, OriginalCNN, SmallCNN, make_actor
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.sim.dynamics.state import LOST
 from drone_rl.sim.tasks.collect_cubes import EndReason
@@ -139,6 +139,36 @@ def test_resize_to_the_same_size_changes_nothing():
     assert isinstance(resized.source, FusedCollector)
     one, other = make().collect(), resized.collect()
     assert all(torch.equal(one[key], other[key]) for key in one.keys(True, True))
+
+
+@pytest.mark.parametrize("is_cropped_first", [True, False])
+def test_cropped_frames_and_a_network_with_pooling_are_fused(is_cropped_first):
+    """As in the original study: the collector keeps the rows that the network sees."""
+    transforms = [GrayPixels, StandardizePixels]
+    transforms.insert(1 if is_cropped_first else 2, lambda: CropRows(3, 23))
+    network = OriginalCNN((1, 20, 64), 3, generator=torch.Generator().manual_seed(0))
+    made = [make(transforms=transforms, network=network, acceleration=a) for a in ("fused", "none")]
+    assert isinstance(made[0].source, FusedCollector)
+    with set_exploration_type(DETERMINISTIC):
+        one, other = (collector.collect() for collector in made)
+    for key in other.keys(True, True):
+        if key != "logits":
+            assert torch.equal(one[key], other[key]), key
+    assert torch.allclose(one["logits"], other["logits"], atol=1e-4)
+    assert one["pixels"].shape[1:] == (1, 20, 64)
+
+
+@pytest.mark.parametrize("network", [None, OriginalCNN((1, 20, 64), 3, channels=(2, 3))])
+def test_cached_activations_of_cropped_frames_and_of_pooling_are_found(network):
+    transforms = (GrayPixels, StandardizePixels, lambda: CropRows(3, 23))
+    collector = make(transforms=transforms, network=network)
+    plain, reusing = FusedNetwork(collector.actor.module[0].module), cached(collector)
+    plain.network.zero_grad()
+    batch = collector.collect()
+    assert torch.equal(reusing(batch["pixels"], batch["activations"]), batch["logits"])
+    expected = learned(plain.network, plain, batch)
+    found = learned(plain.network, reusing, batch, batch["activations"])
+    assert all(torch.equal(*pair) for pair in zip(found, expected, strict=True))
 
 
 def test_kernel_reports_the_same_info_as_a_replay():
@@ -305,7 +335,10 @@ def test_no_activations_without_a_request_or_without_observations():
 @pytest.mark.parametrize(
     ("how", "reason"),
     [
-        ({"transforms": (GrayPixels, lambda: CropRows(2, 20))}, "transform CropRows is not fused"),
+        (
+            {"transforms": (GrayPixels, lambda: CropRows(2, 22), lambda: CropRows(1, 19))},
+            "transform CropRows is not fused",
+        ),
         ({"transforms": (RgbPixels,)}, "frames that are not gray are not fused"),
         ({"task": PillarsSettings(num_rows=1)}, "task Pillars with ComputerVision is not fused"),
         ({"network": MLP((1, 25, 64), 3)}, "network MLP is not fused"),
@@ -340,7 +373,7 @@ def test_resuming_from_a_state_gives_the_same_batches():
     [
         {"acceleration": "direct"},
         {"transforms": (GrayPixels, StandardizePixels, RewardSum)},
-        {"transforms": (GrayPixels, lambda: CropRows(2, 20))},
+        {"transforms": (GrayPixels, lambda: CropRows(2, 22), lambda: CropRows(1, 19))},
         {"transforms": (GrayPixels, StandardizePixels, StandardizePixels)},
         {"task": PillarsSettings(num_rows=1)},
         {"network": MLP((1, 25, 64), 3)},

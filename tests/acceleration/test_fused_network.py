@@ -7,7 +7,7 @@ import torch
 
 from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
 from drone_rl.envs.direct_renderer import Reasons
-from drone_rl.policies import MLP, OriginalCNN, SmallCNN
+from drone_rl.policies import MLP, SmallCNN
 from drone_rl.utils.errors import InputError
 from tests.policies.halves import draw_weights, forward_backward, halves, make_network
 
@@ -89,7 +89,6 @@ def test_network_for_images_keeps_its_initial_weights():
 def test_unsupported_networks_return_a_reason():
     for network, reason in (
         (MLP((1, 25, 64), 3), "network MLP is not fused"),
-        (OriginalCNN((1, 25, 64), 3), "network OriginalCNN is not fused"),
         (SmallCNN((2, 25, 64), 3), "a network of 2 channels is not fused"),
         (SmallCNN((1, 25, 64), 3, hidden=(600,)), "1082515 weights are more than 1048576"),
     ):

@@ -4,7 +4,8 @@ import pytest
 import torch
 
 from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
-from drone_rl.acceleration.packed_layers import output_offsets, packed_layers
+from drone_rl.acceleration.packed_layers import OutputOffsets, packed_layers
+from drone_rl.policies import OriginalCNN
 from tests.policies.halves import draw_weights, forward_backward, halves, make_network
 
 
@@ -31,6 +32,32 @@ def test_gradients_equal_torch(shape, options, num_threads):
         for gradient, other in zip(gradients, expected, strict=True):
             torch.testing.assert_close(gradient, other, rtol=1e-5, atol=1e-5)
         assert expected[0].any() or count < 3
+        draw_weights(network)
+
+
+@pytest.mark.parametrize("num_threads", [1, 2])
+@pytest.mark.parametrize(
+    ("shape", "options"),
+    [
+        ((1, 25, 64), {"channels": (6, 7), "hidden": (20, 9)}),
+        ((1, 17, 19), {"channels": (3,), "hidden": (5,)}),  # pooling drops a row and a column
+        ((1, 16, 16), {"channels": (18, 4), "hidden": ()}),  # output of 1x1
+    ],
+)
+def test_gradients_of_a_network_with_pooling_equal_torch(shape, options, num_threads):
+    """Pixels are halves, so several outputs of a square are often equal."""
+    network = OriginalCNN(shape, 3, **options)
+    draw_weights(network)
+    fused = FusedNetwork.try_create(network, num_threads)
+    for count in (70, 1):
+        images, weights = halves(count, *shape), halves(count, 3)
+        logits, expected = forward_backward(network, network, images, weights)
+        found, gradients = forward_backward(network, fused, images, weights)
+        assert logits.any()
+        torch.testing.assert_close(found, logits)
+        for gradient, other in zip(gradients, expected, strict=True):
+            assert other.any() or count == 1
+            torch.testing.assert_close(gradient, other, rtol=1e-5, atol=1e-5)
         draw_weights(network)
 
 
@@ -63,9 +90,20 @@ def test_gradients_of_images_equal_torch(shape, options):
 )
 def test_gradients_from_cached_outputs_in_any_order_equal_torch(first, last):
     network = make_network((1, 12, 20), channels=(5, 6), hidden=(9, 7))
-    known = ActivationCache(100, output_offsets(packed_layers(network))[-1])
+    check_cached_outputs(network, first, last)
+
+
+def test_gradients_from_cached_outputs_of_pooling_equal_torch():
+    network = OriginalCNN((1, 17, 20), 3, channels=(5, 6), hidden=(9,))
+    draw_weights(network)
+    check_cached_outputs(network, 13, 58)
+
+
+def check_cached_outputs(network, first, last):
+    shape = network.in_shape
+    known = ActivationCache(100, OutputOffsets.of(packed_layers(network)).outputs[-1])
     fused = FusedNetwork.try_create(network, 2, cache=lambda: known)
-    images, weights = halves(70, 1, 12, 20), halves(last - first, 3)
+    images, weights = halves(70, *shape), halves(last - first, 3)
     fused(images)  # packs the weights; nothing is cached yet
     engine = fused._engine
     outputs = engine.compute(images.flatten(1), None).outputs.view(-1, known.outputs.shape[1])

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from drone_rl.acceleration.inference_kernel import BatchedInference
-from drone_rl.policies import OriginalCNN, SmallCNN
+from drone_rl.policies import MLP, SmallCNN
 
 
 @pytest.fixture
@@ -42,8 +42,8 @@ def test_threads_use_separate_buffers(network):
 
 
 def test_other_networks_are_not_supported():
-    found = BatchedInference.try_create(OriginalCNN((1, 25, 64), 3))
-    assert found == ("network OriginalCNN is not fused",)
+    found = BatchedInference.try_create(MLP((1, 25, 64), 3))
+    assert found == ("network MLP is not fused",)
 
 
 def test_logits_behind_a_first_layer_of_more_outputs():

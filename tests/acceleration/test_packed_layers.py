@@ -62,6 +62,31 @@ def test_logits_equal_the_network_after_updates(shape, options):
         assert not torch.allclose(given, network(images), rtol=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("shape", "options"),
+    [
+        ((1, 25, 64), {}),
+        ((1, 17, 19), {"channels": (3,), "hidden": (5,)}),  # pooling drops a row and a column
+        ((1, 16, 16), {"channels": (18, 4), "hidden": ()}),  # output of 1x1
+    ],
+)
+def test_logits_equal_those_of_a_network_with_pooling(shape, options):
+    network = OriginalCNN(shape, 3, generator=torch.Generator().manual_seed(0), **options)
+    packed = PackedNetwork(network, 6)
+    packed.update()
+    for count in (6, 1, 5):
+        images = torch.randn(count, *shape)
+        assert torch.allclose(infer(packed, images, 3), network(images), rtol=1e-4, atol=1e-4)
+
+
+def test_first_pixel_skips_rows_of_a_larger_frame():
+    network = SmallCNN((1, 12, 20), 3, generator=torch.Generator().manual_seed(0))
+    packed = PackedNetwork(network, 2, first_pixel=3 * 20)
+    packed.update()
+    images = torch.randn(2, 1, 17, 20)
+    assert torch.allclose(infer(packed, images, 3), network(images[:, :, 3:15]), atol=1e-5)
+
+
 class CustomNetwork(PolicyNetwork):
     """A network with the given layers."""
 
@@ -83,7 +108,28 @@ class CustomNetwork(PolicyNetwork):
         ([nn.Conv2d(1, 2, 3), nn.Tanh(), nn.Flatten(), nn.Linear(72, 3)], False),
         ([nn.Conv2d(1, 2, 3), nn.Flatten(), nn.Linear(72, 3)], False),
         ([nn.Conv2d(1, 2, 3), nn.ReLU(), nn.Flatten(), nn.Linear(72, 3), nn.ReLU()], False),
-        ([nn.Conv2d(1, 2, 3), nn.ReLU(), nn.MaxPool2d(2), nn.Flatten(), nn.Linear(18, 3)], False),
+        ([nn.Conv2d(1, 2, 3), nn.ReLU(), nn.MaxPool2d(2), nn.Flatten(), nn.Linear(18, 3)], True),
+        ([nn.Conv2d(1, 2, 3), nn.ReLU(), nn.MaxPool2d(4), nn.Flatten(), nn.Linear(2, 3)], True),
+        ([nn.Conv2d(1, 2, 3), nn.MaxPool2d(2), nn.Flatten(), nn.Linear(18, 3)], False),
+        ([nn.MaxPool2d(2), nn.Conv2d(1, 2, 3), nn.ReLU(), nn.Flatten(), nn.Linear(8, 3)], False),
+        (
+            [nn.Conv2d(1, 2, 3), nn.ReLU(), nn.MaxPool2d(3, 1), nn.Flatten(), nn.Linear(32, 3)],
+            False,
+        ),
+        (
+            [
+                *(nn.Conv2d(1, 2, 3), nn.ReLU(), nn.MaxPool2d(4, ceil_mode=True)),
+                *(nn.Flatten(), nn.Linear(8, 3)),
+            ],
+            False,
+        ),
+        (
+            [
+                *(nn.Conv2d(1, 2, 3), nn.ReLU(), nn.MaxPool2d(2, padding=1)),
+                *(nn.Flatten(), nn.Linear(32, 3)),
+            ],
+            False,
+        ),
         ([nn.Flatten(), nn.Linear(64, 3)], False),
         ([nn.Conv2d(1, 2, 3), nn.ReLU(), nn.Flatten(), nn.Linear(72, 3, bias=False)], False),
     ],
@@ -100,6 +146,6 @@ def test_only_supported_layers_are_packed(layers, is_supported):
 
 def test_other_networks_are_not_packed():
     assert unsupported(MLP((1, 25, 64), 3))
-    assert unsupported(OriginalCNN((1, 25, 64), 3))
+    assert unsupported(OriginalCNN((3, 25, 64), 3))
     assert unsupported(SmallCNN((3, 25, 64), 3))
     assert unsupported(SmallCNN((1, 25, 64), 3).double())

@@ -5,13 +5,13 @@ import torch
 from drone_rl.acceleration.layers_kernel import WIDTH
 from drone_rl.acceleration.packed_layers import (
     Order,
+    OutputOffsets,
     PackedLayer,
     in_panels,
     odd_lines,
-    output_offsets,
     packed_layers,
 )
-from drone_rl.policies import SmallCNN
+from drone_rl.policies import OriginalCNN, SmallCNN
 
 
 def small():
@@ -23,11 +23,11 @@ def test_geometry_matches_hand_computed_values():
     _, (conv, hidden, logits) = small()
     # 2x2 positions; the row stride is 4 rows of 8 pixels, the column stride 4 pixels
     names = ("num_patches", "patches_per_row", "row_stride", "column_stride", "kernel_rows")
-    names += ("kernel_row_length", "kernel_row_stride", "num_outs", "output_stride")
-    assert conv.geometry == dict(zip(names, (4, 2, 32, 4, 4, 4, 8, 16, 16), strict=True))
+    names += ("kernel_row_length", "kernel_row_stride", "num_outs", "output_stride", "pool_size")
+    assert conv.geometry == dict(zip(names, (4, 2, 32, 4, 4, 4, 8, 16, 16, 0), strict=True))
     # 2x2 positions of 16 channels
-    assert hidden.geometry == dict(zip(names, (1, 1, 64, 16, 1, 64, 0, 16, 16), strict=True))
-    assert logits.geometry == dict(zip(names, (1, 1, 16, 16, 1, 16, 0, 16, 16), strict=True))
+    assert hidden.geometry == dict(zip(names, (1, 1, 64, 16, 1, 64, 0, 16, 16, 0), strict=True))
+    assert logits.geometry == dict(zip(names, (1, 1, 16, 16, 1, 16, 0, 16, 16, 0), strict=True))
     assert [layer.output_size for layer in (conv, hidden, logits)] == [64, 16, 16]
     assert [layer.is_convolution for layer in (conv, hidden, logits)] == [True, False, False]
 
@@ -35,8 +35,16 @@ def test_geometry_matches_hand_computed_values():
 def test_outputs_take_an_odd_number_of_cache_lines():
     assert [odd_lines(n) for n in (1, 16, 17, 32, 33, 1792)] == [16, 16, 48, 48, 48, 1808]
     _, layers = small()
-    assert output_offsets(layers) == [0, 80, 96, 112]  # five cache lines, one and one
-    assert output_offsets(layers[:2]) == [0, 80, 112]  # five and one, and an empty one
+    # five cache lines, one and one
+    assert OutputOffsets.of(layers) == ([0, 80, 96, 112], [0, 80, 96])
+    assert OutputOffsets.of(layers[:2]).outputs == [0, 80, 112]  # five and one, and an empty one
+
+
+def test_outputs_after_pooling_follow_those_before():
+    layers = packed_layers(OriginalCNN((1, 10, 12), 3, channels=(2,), hidden=()))
+    # 6x8 and 3x4 positions of 16 channels: 48 and 12 cache lines, and one more of each
+    assert OutputOffsets.of(layers) == ([0, 16 * (49 + 13), 16 * (49 + 13 + 1)], [16 * 49, 992])
+    assert layers[0].pooled_shape == (3, 4) and layers[1].num_inputs == 3 * 4 * 16
 
 
 def test_order_matches_hand_computed_indices():
