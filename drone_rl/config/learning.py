@@ -184,8 +184,9 @@ class Reinforce(Objective, target="reinforce"):
 
     entropy_coeff: Weight = 0.01
     """Weight of the entropy bonus, which keeps a policy exploring; 0 for none."""
-    reduction: Annotated[str, OneOf(("mean", "sum"))] = "mean"
-    """Reduction over a batch's steps: mean, or sum as in Algorithm 4."""
+    reduction: Annotated[str, OneOf(("mean", "sum", "episode_mean"))] = "mean"
+    """Reduction over a batch's steps: mean; sum as in Algorithm 4; or episode_mean, the sum divided
+    by the number of episodes (Eq. 12)."""
 
 
 class WithCritic(Objective):

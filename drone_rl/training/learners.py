@@ -121,7 +121,7 @@ class ReinforceLearner(GradientLearner):
     """REINFORCE (Algorithm 4): one optimizer step for each batch of episodes with returns."""
 
     loss: ReinforceLoss
-    """Gives the `loss_*` terms of a batch, as a mean over its steps or a sum."""
+    """Gives the `loss_*` terms of a batch, reduced over its steps."""
     chunk_frames: int = TrainerSettings.chunk_frames
     """Frames per forward and backward pass. Gradients are accumulated over chunks, so this bounds
     memory and affects only rounding."""
@@ -146,10 +146,9 @@ class ReinforceLearner(GradientLearner):
         """
         mask = batch.get(("collector", "mask"), None)
         steps = batch.reshape(-1) if mask is None else batch[mask]
-        is_sum = self.loss.reduction == "sum"
         self.optimizer.zero_grad()
         try:
-            terms = accumulate(steps, self.loss, self.chunk_frames, is_sum=is_sum)
+            terms = accumulate(steps, self.loss, self.chunk_frames, self.loss.divisor)
             norm = descend(self.optimizer, self.network.named_parameters(), self.max_grad_norm)
         except NotANumberError:
             self.optimizer.zero_grad()
@@ -298,8 +297,7 @@ def accumulate(
     batch: TensorDictBase,
     losses: Callable[[TensorDictBase], TensorDictBase],
     chunk_frames: int,
-    *,
-    is_sum: bool = False,
+    divisor: Callable[[TensorDictBase], int] = len,
 ) -> dict[str, float]:
     """Add the gradient of steps (num_steps,) to the parameters, chunk by chunk.
 
@@ -307,7 +305,7 @@ def accumulate(
         batch: The steps.
         losses: Returns the terms of the loss, `loss_*`, and other metrics.
         chunk_frames: Steps in one forward and backward pass; bounds memory and affects rounding.
-        is_sum: Whether the terms are sums over steps; means otherwise.
+        divisor: What the terms of steps are divided by; by default they are means over steps.
 
     Returns:
         Terms and metrics of the whole batch, by name.
@@ -318,7 +316,7 @@ def accumulate(
     totals: dict[str, float] = {}
     for chunk in batch.split(chunk_frames):
         share = len(chunk) / len(batch)
-        weight = 1.0 if is_sum else share
+        weight = divisor(chunk) / divisor(batch)
         metrics = losses(chunk)
         terms = {k: v for k, v in metrics.items() if k.startswith("loss_")}
         for name, value in terms.items():

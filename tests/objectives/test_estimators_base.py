@@ -10,9 +10,9 @@ from torchrl.modules import RandomPolicy
 
 from drone_rl import objectives
 from drone_rl.config.learning import Gae, Returns
+from drone_rl.envs.three_state import ThreeStateEnv
 from drone_rl.objectives import BatchNormalized, RewardToGo, TimeBaseline, TotalReward
 from drone_rl.utils.errors import InputError
-from tests.three_state import ThreeStateEnv
 
 BUILT_IN = (v for v in Returns.variants() if v.__module__ == Returns.__module__)
 NAMES = [variant.factory.__name__ for variant in BUILT_IN if variant is not Gae]

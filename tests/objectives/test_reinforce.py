@@ -7,10 +7,10 @@ from torchrl.data import Categorical
 from torchrl.modules import ProbabilisticActor
 
 from drone_rl.collectors import EpisodeCollector
+from drone_rl.envs.three_state import SUCCESS_PROBABILITY, ThreeStateEnv
 from drone_rl.objectives import ReinforceLoss, returns
 from drone_rl.policies.actor import RandomSource, SeededCategorical
 from drone_rl.utils.errors import InputError
-from tests.three_state import SUCCESS_PROBABILITY, ThreeStateEnv
 
 
 class Linear(nn.Module):
@@ -177,11 +177,25 @@ def test_values_match_hand_computed_ones():
 
     assert float(loss()["loss_actor"].detach()) == pytest.approx(2 * log2)
     assert float(loss(reduction="sum")["loss_actor"].detach()) == pytest.approx(6 * log2)
+    batch["next", "done"] = torch.tensor([[False], [True], [True]])
+    averaged = loss(reduction="episode_mean", entropy_coeff=1.0)
+    assert float(averaged["loss_actor"].detach()) == pytest.approx(6 / 2 * log2)
+    assert float(averaged["loss_entropy"].detach()) == pytest.approx(-3 / 2 * log2)
     each = loss(reduction="none", entropy_coeff=0.5)
     assert each["loss_actor"].tolist() == pytest.approx([log2, 2 * log2, 3 * log2])
     assert each["loss_entropy"].tolist() == pytest.approx([-0.5 * log2] * 3)
     assert float(loss(entropy_coeff=0.0)["loss_entropy"].detach()) == 0.0
     assert float(loss()["entropy"]) == pytest.approx(log2)
+
+
+def test_a_batch_in_which_no_episode_ends_is_divided_by_one():
+    _, actor = make()
+    batch = make_batch(3)
+    batch["next", "done"] = torch.zeros(3, 1, dtype=torch.bool)
+    summed, averaged = (ReinforceLoss(actor, reduction=r) for r in ("sum", "episode_mean"))
+    assert torch.equal(averaged(batch)["loss_actor"], summed(batch)["loss_actor"])
+    assert [averaged.divisor(batch), summed.divisor(batch)] == [1, 1]
+    assert ("next", "done") in averaged.in_keys and ("next", "done") not in summed.in_keys
 
 
 def test_returns_are_detached():
@@ -274,7 +288,7 @@ def test_missing_returns_raise_with_the_remedy():
 
 def test_invalid_arguments_raise():
     _, actor = make()
-    with pytest.raises(InputError, match="mean, sum or none"):
+    with pytest.raises(InputError, match="mean, sum, episode_mean or none"):
         ReinforceLoss(actor, reduction="median")
     with pytest.raises(InputError, match="entropy_coeff=-1"):
         ReinforceLoss(actor, entropy_coeff=-1)

@@ -9,12 +9,12 @@ from torchrl.collectors import Collector
 from torchrl.envs import RewardSum, TransformedEnv
 from torchrl.modules import ProbabilisticActor
 
+from drone_rl.envs.three_state import ThreeStateEnv
 from drone_rl.policies.actor import SeededCategorical
 from drone_rl.training import CheckpointCallback, NotANumberError, Trainer
 from drone_rl.training.learners import check_batch, check_finite
 from drone_rl.utils.checkpoint import load_checkpoint
 from drone_rl.utils.errors import InputError
-from tests.three_state import ThreeStateEnv
 from tests.training_loop import run
 
 GAMMA, PASSES = 0.9, 2

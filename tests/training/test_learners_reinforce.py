@@ -11,7 +11,7 @@ from drone_rl.training import NotANumberError
 from drone_rl.utils.errors import InputError
 
 
-@pytest.mark.parametrize("reduction", ["mean", "sum"])
+@pytest.mark.parametrize("reduction", ["mean", "sum", "episode_mean"])
 def test_minibatch_gradients_sum_to_the_batch_gradient(make_trainer, reduction):
     gradients = []
     for size in (10_000, 3):
@@ -45,7 +45,7 @@ def test_every_frame_is_used_once(make_trainer, size):
     assert max(len(chunk) for chunk in learned) <= size
 
 
-@pytest.mark.parametrize("reduction", ["mean", "sum"])
+@pytest.mark.parametrize("reduction", ["mean", "sum", "episode_mean"])
 def test_loss_terms_are_summed_over_minibatches(make_trainer, reduction):
     terms = []
     for size in (10_000, 3):

@@ -2,7 +2,7 @@ import pytest
 import torch
 from torchrl.envs.utils import check_env_specs
 
-from tests.three_state import ThreeStateEnv, exact_gradient, outcomes
+from drone_rl.envs.three_state import ThreeStateEnv, exact_gradient, outcomes
 
 
 def test_specs():

@@ -81,13 +81,13 @@ class ThreeStateEnv(EnvBase):
         self.horizon = horizon
         n = num_envs
         self.observation_spec = Composite(
-            observation=OneHot(3, shape=(n, 3), dtype=torch.float32), shape=(n,)
+            observation=OneHot(3, shape=torch.Size([n, 3]), dtype=torch.float32), shape=(n,)
         )
-        self.action_spec = Categorical(2, shape=(n,), dtype=torch.int64)
-        self.reward_spec = Unbounded((n, 1))
+        self.action_spec = Categorical(2, shape=self.batch_size, dtype=torch.int64)
+        self.reward_spec = Unbounded(torch.Size([n, 1]))
         flags = ("done", "terminated", "truncated")
         self.full_done_spec = Composite(
-            {name: Binary(1, (n, 1), dtype=torch.bool) for name in flags}, shape=(n,)
+            {name: Binary(1, torch.Size([n, 1]), dtype=torch.bool) for name in flags}, shape=(n,)
         )
         self._state = torch.zeros(n, dtype=torch.int64)
         self._steps = torch.zeros(n, dtype=torch.int64)
