@@ -136,7 +136,7 @@ COMPUTER_VISION = DynamicsSettings()
 """Computer-vision mode, the default of files without dynamics."""
 
 
-ACTION_KINDS = ("moves", "velocity")
+ACTION_KINDS = ("moves", "moves_3d", "velocity")
 Speed = Annotated[float, Real(0.0, 50.0, is_above=True, unit="m/s")]
 
 
@@ -144,8 +144,8 @@ class ActionSettings(Settings):
     """Settings of the actions, one at each control step."""
 
     kind: Annotated[str, OneOf(ACTION_KINDS)] = "moves"
-    """moves, three discrete moves of equal length, or velocity: forward speed, lateral speed and
-    yaw rate, all continuous."""
+    """moves, three discrete moves of equal length; moves_3d, also up and down, in computer-vision
+    mode; or velocity: forward speed, lateral speed and yaw rate, all continuous."""
     move_speed: Speed = 4.0
     """Speed of the position setpoint during a move, in m/s; in computer-vision mode a move is the
     task's step."""

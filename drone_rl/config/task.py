@@ -143,6 +143,16 @@ class TaskSettings(BaseTaskSettings):
         return self.lateral_bound + self.side_margin
 
     @property
+    def must_climb(self) -> bool:
+        """Whether a drone that keeps its altitude passes some cubes without touching them."""
+        return self.vertical_bound > self.touch_distance
+
+    @property
+    def height_bound(self) -> float:
+        """|z - altitude| beyond which the drone is out of bounds, in metres."""
+        return self.vertical_bound + self.touch_distance if self.must_climb else math.inf
+
+    @property
     def things(self) -> ObjectRegion:
         """The cubes."""
         first, last = self.first_distance, self.last_distance
@@ -151,11 +161,10 @@ class TaskSettings(BaseTaskSettings):
 
     def check(self) -> None:
         """Reject tasks that can't be simulated or solved."""
-        if self.vertical_bound > self.touch_distance:
+        if self.must_climb and self.altitude <= self.height_bound:
             raise InputError(
-                f"vertical_bound={self.vertical_bound} puts cubes where a drone that keeps "
-                f"its altitude never touches them; give at most {self.touch_distance} "
-                "(half of cube_size + drone_size)"
+                f"altitude={self.altitude} lets the drone fly into the floor; give more than "
+                f"{self.height_bound} (vertical_bound + half of cube_size + drone_size)"
             )
         if self.altitude - self.vertical_bound - 0.5 * self.cube_size < 0:
             raise InputError(

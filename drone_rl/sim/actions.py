@@ -268,3 +268,17 @@ MOVES = DiscreteActions(
 """The moves as a set of actions; nothing undoes a move forward."""
 DIRECTIONS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0))
 """Unit vector of each of `MOVES`, world frame."""
+UP, DOWN = 3, 4
+"""Further moves of `MOVES_3D`."""
+MOVES_3D = DiscreteActions(
+    names=(*MOVES.names, "up", "down"),
+    mirrored=(*MOVES.mirrored, UP, DOWN),
+    opposite=(*MOVES.opposite, DOWN, UP),
+    left=Move.LEFT,
+    order=(Move.LEFT, UP, Move.FORWARD, DOWN, Move.RIGHT),
+    arrows=(*MOVES.arrows, (0.6, 0.8), (0.6, -0.8)),
+    colors=(*MOVES.colors, palette.UP, palette.DOWN),
+)
+"""The chapter's moves, up and down."""
+DIRECTIONS_3D = (*DIRECTIONS, (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))
+"""Unit vector of each of `MOVES_3D`, world frame."""

@@ -64,6 +64,7 @@ class ComposerTask(composer.Task):
         """
         self.rules = as_task(task)
         self.dynamics = make_dynamics(self.rules.make_dynamics, dynamics, actions)
+        self.rules.check_actions(self.dynamics.actions)
         self.camera = camera or CameraSettings()
         self._sampler = self._opengl = None
         if appearance is not None and not appearance.is_minimal:

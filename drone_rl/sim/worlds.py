@@ -56,6 +56,7 @@ class Worlds:
         self.task = as_task(task)
         self.camera = camera or CameraSettings()
         self.dynamics = make_dynamics(self.task.make_dynamics, dynamics, actions)
+        self.task.check_actions(self.dynamics.actions)
         self.device = torch.device(device)
         self._every = torch.arange(num_envs, device=self.device)
         self._make_renderer, self._num_shards = find_renderer(renderer), num_shards

@@ -11,6 +11,8 @@ LEFT: Rgb = (230, 159, 0)
 RIGHT: Rgb = (0, 114, 178)
 TURN_LEFT: Rgb = (242, 207, 128)
 TURN_RIGHT: Rgb = (128, 184, 216)
+UP: Rgb = (0, 120, 90)
+DOWN: Rgb = (120, 94, 60)
 """Actions; a turn is a lighter shade of its side."""
 GOOD: Rgb = (0, 158, 115)
 """Good, reached, passed."""

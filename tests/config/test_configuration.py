@@ -35,7 +35,7 @@ def test_a_training_comes_back_as_it_was():
     [
         ({"task": {"num_cubes": 0}}, "task.num_cubes=0 is out of range"),
         ({"task": {"num_cubs": 1}}, "num_cubs is unknown"),
-        ({"task": {"vertical_bound": 3.0}}, "task.vertical_bound=3.0 puts cubes"),
+        ({"task": {"vertical_bound": 3.0}}, "task.altitude=2.5 lets the drone fly into"),
         ({"trainer": 3}, "trainer=3 must be a mapping"),
         ({"unheard": 3}, "unheard is unknown"),
         (

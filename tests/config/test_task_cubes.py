@@ -29,7 +29,7 @@ def test_boundaries_adjust_to_the_cubes():
         ({"lateral_bound": -1.0}, "lateral_bound=-1.0"),
         ({"cube_color": (2.0, 0.0, 0.0)}, "cube_color[0]=2.0"),
         ({"step_limit": 5}, "step_limit=5"),
-        ({"vertical_bound": 5.0, "altitude": 20.0}, "vertical_bound=5.0"),
+        ({"vertical_bound": 5.0, "altitude": 6.6}, "altitude=6.6"),
         ({"altitude": 1.0}, "altitude=1.0"),
         ({"step_length": 3.0}, "step_length=3.0"),
         ({"first_distance": 1.0}, "first_distance=1.0"),

@@ -112,3 +112,11 @@ def test_inconsistent_sets_raise(change, message):
     given = {name: getattr(MOVES, name) for name in MOVES.__dataclass_fields__}
     with pytest.raises(ValueError, match=message):
         DiscreteActions(**{**given, **change})
+
+
+def test_moves_in_three_dimensions_extend_the_chapters():
+    from drone_rl.sim.actions import DIRECTIONS_3D, MOVES, MOVES_3D
+
+    assert MOVES_3D.names == (*MOVES.names, "up", "down")
+    assert [MOVES_3D.names[i] for i in MOVES_3D.opposite[3:]] == ["down", "up"]
+    assert [sum(d) for d in DIRECTIONS_3D] == [1, 1, -1, 1, -1]

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import COMPUTER_VISION, MOVES_SETTINGS, ActionSettings, DynamicsSettings
-from drone_rl.sim.actions import DIRECTIONS, MOVES, Actions
+from drone_rl.sim.actions import DIRECTIONS, DIRECTIONS_3D, MOVES, MOVES_3D, Actions
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.dynamics.quadrotor import Quadrotor
 from drone_rl.sim.dynamics.state import BodyState, Obstacles, heading_of
@@ -47,14 +47,14 @@ class Dynamics(Protocol):
 
 
 class ComputerVision(Dynamics):
-    """Moves a step forward, left or right, at once and without turning."""
+    """Moves a step forward, left, right and possibly up or down, at once and without turning."""
 
-    actions: Actions = MOVES
-
-    def __init__(self, step_length: float = 1.0) -> None:
-        """Set the length of a move, metres."""
+    def __init__(self, step_length: float = 1.0, *, is_3d: bool = False) -> None:
+        """Set the length of a move, metres, and whether there are moves up and down."""
         self.step_length = step_length
-        self.moves = torch.tensor(DIRECTIONS, dtype=torch.float64) * step_length
+        self.actions: Actions = MOVES_3D if is_3d else MOVES
+        directions = DIRECTIONS_3D if is_3d else DIRECTIONS
+        self.moves = torch.tensor(directions, dtype=torch.float64) * step_length
         """Metres, world frame. Shape: (number of actions, 3), float64."""
 
     def step(
@@ -99,7 +99,7 @@ def make_dynamics(
     """Return dynamics, or those of settings: computer-vision mode and moves by default.
 
     `default` makes those of moves in computer-vision mode, such as `Task.make_dynamics`. Raises an
-    `InputError` if both dynamics and settings of actions are given.
+    `InputError` if both dynamics and settings of actions are given, or they don't fit each other.
     """
     if dynamics is not None and not isinstance(dynamics, DynamicsSettings):
         if actions is not None:
@@ -109,6 +109,14 @@ def make_dynamics(
             )
         return dynamics
     dynamics, actions = dynamics or COMPUTER_VISION, actions or MOVES_SETTINGS
+    if actions.kind == "moves_3d":
+        own = default()
+        if not dynamics.is_computer_vision or type(own) is not ComputerVision:
+            raise InputError(
+                "actions=moves_3d needs dynamics=computer_vision and a task with moves; give them, "
+                "or actions=moves"
+            )
+        return ComputerVision(own.step_length, is_3d=True)
     if not dynamics.is_computer_vision:
         return Quadrotor(dynamics, actions)
     if actions.kind == "moves":

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.config import CameraSettings, TaskSettings
-from drone_rl.sim.actions import MOVES, Entry, Move
+from drone_rl.sim.actions import DOWN, MOVES, MOVES_3D, UP, Actions, Entry, Move
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.entities import Cube
 from drone_rl.sim.tasks.collect_cubes_kernel import (
@@ -95,7 +95,8 @@ class CollectCubes(PropTask[WorldState]):
         self.drone_size = settings.drone_size
         self.origin = (0.0, 0.0, settings.altitude)
         self.vocabulary = dataclasses.replace(CUBES, tested=some_cubes(settings.values()))
-        self.oracle = OracleRule(("drone", "cube_positions", "next_cube"), self.line_up, MOVES)
+        actions = MOVES_3D if settings.must_climb else MOVES
+        self.oracle = OracleRule(("drone", "cube_positions", "next_cube"), self.line_up, actions)
 
     @property
     def entries(self) -> Mapping[str, Entry]:
@@ -115,6 +116,16 @@ class CollectCubes(PropTask[WorldState]):
         """Return the cubes, nearest first."""
         size, color = self.settings.cube_size, self.settings.cube_color
         return [Cube(size, color, name=f"cube_{i}") for i in range(self.settings.num_cubes)]
+
+    def check_actions(self, actions: Actions) -> None:
+        """Refuse cubes that drones without moves up and down never touch."""
+        if self.settings.must_climb and not {"up", "down"} <= {*actions.names}:
+            raise InputError(
+                f"task.vertical_bound={self.settings.vertical_bound} puts cubes where a drone that "
+                f"keeps its altitude never touches them; give at most "
+                f"{self.settings.touch_distance} (half of cube_size + drone_size), or "
+                "actions=moves_3d"
+            )
 
     # Reset and rules
 
@@ -176,13 +187,21 @@ class CollectCubes(PropTask[WorldState]):
     # Oracle and goals
 
     def line_up(self, drone: Tensor, cubes: Tensor, next_cube: Tensor) -> Tensor:
-        """Line up with the next cube sideways, then fly forward. (N, 3), (N, C, 3), (N, 1)."""
+        """Line up with the next cube sideways, then in height, then fly forward.
+
+        Shapes: (N, 3), (N, C, 3), (N, 1).
+        """
         nearest = next_cube.clamp(max=cubes.shape[-2] - 1)
         rows = nearest[..., None].expand(*next_cube.shape[:-1], 1, 3)
-        offset = cubes.gather(-2, rows)[..., 0, 1] - drone[..., 1]
+        offset = cubes.gather(-2, rows)[..., 0, :] - drone
         tolerance = max(0.5 * self.settings.step_length, 0.5 * self.settings.touch_distance)
         is_done = next_cube[..., 0] >= cubes.shape[-2]  # no cube stands any more
-        return turn_towards(offset, tolerance).masked_fill(is_done, Move.FORWARD)
+        turn = turn_towards(offset[..., 1], tolerance)
+        if self.settings.must_climb:
+            height, is_level = offset[..., 2], turn == Move.FORWARD
+            turn = turn.masked_fill(is_level & (height > tolerance), UP)
+            turn = turn.masked_fill(is_level & (height < -tolerance), DOWN)
+        return turn.masked_fill(is_done, Move.FORWARD)
 
     def score(self, info: Mapping[str, Tensor]) -> CubeGoals:
         """Each cube is a goal, which is reached by collecting it."""

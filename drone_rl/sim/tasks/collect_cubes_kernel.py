@@ -47,6 +47,8 @@ class Bounds:
     touch_distance: wp.float64
     front_bound: wp.float64
     side_bound: wp.float64
+    height_bound: wp.float64
+    altitude: wp.float64
     step_limit: int
 
 
@@ -131,6 +133,8 @@ def _end_reason(
         return EndReason.FRONT_BOUNDARY
     if wp.abs(drone[1]) > cubes.bounds.side_bound:
         return EndReason.SIDE_BOUNDARY
+    if wp.abs(drone[2] - cubes.bounds.altitude) > cubes.bounds.height_bound:
+        return EndReason.SIDE_BOUNDARY
     if steps >= cubes.bounds.step_limit:
         return EndReason.STEP_LIMIT
     return EndReason.RUNNING
@@ -177,7 +181,8 @@ def start_all(
 def make_bounds(settings: TaskSettings) -> Bounds:
     """Return the bounds for kernels."""
     bounds = Bounds()
-    for name in ("touch_distance", "front_bound", "side_bound", "step_limit"):
+    names = ("touch_distance", "front_bound", "side_bound", "height_bound", "altitude")
+    for name in (*names, "step_limit"):
         setattr(bounds, name, getattr(settings, name))
     return bounds
 

@@ -171,6 +171,9 @@ class Task(abc.ABC, Generic[S]):
         """Return the default dynamics of the drone: moves of a metre."""
         return ComputerVision()
 
+    def check_actions(self, actions: Actions) -> None:
+        """Raise an `InputError` if no policy could do the task by these actions."""
+
     def make_props(self) -> Sequence[Prop]:
         """Return new entities besides field and drone, positioned by `places`."""
         return ()

@@ -119,7 +119,7 @@ def test_image_shape_is_predicted(camera, transforms, shape):
         ("task.spacing", ..., r"task\.spacing is missing"),
         ("task.wind", 1.0, "'wind' is unknown"),
         ("task.cube_color", [0.1, 0.2], "cube_color"),
-        ("task.vertical_bound", 3.0, "never touches"),
+        ("task.vertical_bound", 3.0, "fly into the floor"),
         ("camera.width", 4096, "width=4096"),
         ("camera.width", 1024, None),
         ("camera.horizontal_fov", 171, "horizontal_fov=171"),

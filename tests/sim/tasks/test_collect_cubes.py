@@ -7,9 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drone_rl.config import TaskSettings
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import DOWN, MOVES_3D, UP, Move
 from drone_rl.sim.dynamics import BodyState, ComputerVision
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason, Side
+from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
 from tests.fake_flight import FLIGHT, Floating
 
 SETTINGS = TaskSettings()  # contact up to 1.65 m on each axis
@@ -370,3 +372,44 @@ def test_episode_beyond_the_step_limit_ends():
         state.steps[:] = steps
         after, _ = fly(state, 1.0, 0.0, short)
         assert after.end_reason == reason
+
+
+TALL = TaskSettings(vertical_bound=6.0, altitude=10.0)  # out of bounds beyond 7.65 m up or down
+
+
+def test_drones_without_moves_up_and_down_are_refused_if_cubes_are_out_of_reach():
+    with pytest.raises(InputError, match=r"vertical_bound=6.0 puts cubes .* or actions=moves_3d"):
+        Worlds(1, TALL)
+    CollectCubes(TALL).check_actions(MOVES_3D)
+    CollectCubes(SETTINGS).check_actions(ComputerVision().actions)
+
+
+@pytest.mark.parametrize(
+    ("z", "end"),
+    [(17.6, EndReason.RUNNING), (17.7, EndReason.SIDE_BOUNDARY), (2.3, EndReason.SIDE_BOUNDARY)],
+)
+def test_a_drone_too_high_or_low_is_out_of_bounds(z, end):
+    state, _ = CollectCubes(TALL).step(at(0.0, 0.0, 0.0, settings=TALL), body(1.0, 0.0, z))
+    assert int(state.end_reason) == end
+
+
+def test_height_is_unbounded_where_drones_need_not_climb():
+    state, _ = CollectCubes(SETTINGS).step(at(0.0, 0.0, 0.0), body(1.0, 0.0, 500.0))
+    assert int(state.end_reason) == EndReason.RUNNING
+
+
+@pytest.mark.parametrize(
+    ("offset", "action"),
+    [
+        ((10.0, 3.0, 5.0), Move.LEFT),  # sideways first
+        ((10.0, 0.0, 5.0), UP),
+        ((10.0, 0.0, -5.0), DOWN),
+        ((10.0, 0.0, 0.5), Move.FORWARD),
+    ],
+)
+def test_the_oracle_climbs_once_it_is_lined_up(offset, action):
+    task, drone = CollectCubes(TALL), torch.tensor([[0.0, 0.0, 10.0]])
+    cubes = (drone + torch.tensor([offset]))[:, None]
+    assert task.oracle.actions is MOVES_3D
+    assert int(task.line_up(drone, cubes, torch.tensor([[0]]))) == action
+    assert int(task.line_up(drone, cubes, torch.tensor([[1]]))) == Move.FORWARD
