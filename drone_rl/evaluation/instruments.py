@@ -71,7 +71,7 @@ def horizon(attitude: Attitude) -> Image.Image:
     across = (np.arange(size) + 0.5) / size * 2.0 - 1.0
     x, y = np.meshgrid(across, -across)
     roll = math.radians(attitude.roll)
-    above = y * math.cos(roll) - x * math.sin(roll) - attitude.pitch / _DEGREES
+    above = y * math.cos(roll) - x * math.sin(roll) + attitude.pitch / _DEGREES
     along = x * math.cos(roll) + y * math.sin(roll)
     colors = np.where(above[..., None] < 0.0, _GROUND, _SKY).astype(np.uint8)
     for degrees in (-20.0, -10.0, 0.0, 10.0, 20.0):
@@ -90,7 +90,7 @@ def _draw_horizon(image: Image.Image, draw: ImageDraw.ImageDraw, attitude: Attit
         ends = sorted((x + side * 12, x + side * 40))
         draw.rectangle((ends[0], y - 2, ends[1], y + 1), _NEEDLE)
     draw.rectangle((x - 2, y - 2, x + 1, y + 1), _NEEDLE)
-    side, nose = "right" if attitude.roll > 0 else "left", "down" if attitude.pitch > 0 else "up"
+    side, nose = "right" if attitude.roll > 0 else "left", "down" if attitude.pitch < 0 else "up"
     text = f"{abs(attitude.roll):.0f}° {side}, {abs(attitude.pitch):.0f}° {nose}"
     draw.text((x, HEIGHT - 12), text, _TEXT, ImageFont.load_default(13), anchor="mm")
 

@@ -3,11 +3,13 @@
 import dataclasses
 import enum
 import functools
+import io
 import math
 import random
 from collections.abc import Sequence
 
 import torch
+from PIL import Image
 from torch import Tensor
 
 from drone_rl.sim.entities import find_camera
@@ -81,13 +83,19 @@ _MODALITIES: tuple[Modality, ...] = ("rgb", *_DISTANCES, "segmentation", "normal
 
 @dataclasses.dataclass(frozen=True)
 class ImageRequest:
-    """One image. Raises an `InputError` if the camera or type is unknown."""
+    """One image, as in Listing 3: `ImageRequest(0, ImageType.SCENE, False, False)`.
+
+    Raises an `InputError` if the camera or type is unknown, or numbers are to be compressed.
+    """
 
     camera: str | int = "front_center"
-    """AirSim's name or number."""
+    """AirSim's name or number: 0 front center, 1 front right, 2 front left, 3 bottom center, 4 back
+    center, as from version 1.1.3 on. The chapter's text calls its front center camera 1."""
     image_type: ImageType | int = ImageType.SCENE
     as_float: bool = False
     """Whether pixels are numbers (`pixels_as_float`) instead of red, green and blue."""
+    compress: bool = False
+    """Whether the image is encoded as PNG."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "camera", find_camera(self.camera).name)
@@ -95,6 +103,8 @@ class ImageRequest:
             names = ", ".join(f"{kind.value} ({kind.name.lower()})" for kind in ImageType)
             raise InputError(f"image_type={self.image_type!r} is unknown; give one of: {names}")
         object.__setattr__(self, "image_type", ImageType(self.image_type))
+        if self.as_float and self.compress:
+            raise InputError("as_float=True and compress=True are both given; PNG holds bytes only")
 
 
 def images(
@@ -106,6 +116,8 @@ def images(
     width: int | None = None,
 ) -> list[Tensor]:
     """Render several images of environments in a state, of one size, in one pass; see `pixels`.
+
+    A compressed image is a PNG file of shape (N, bytes), uint8; shorter ones end with zeros.
 
     The default size, in pixels, is that of the policy's camera; cameras keep their vertical field
     of view. Raises an `InputError` if there are no requests, a size is out of range, or the
@@ -122,8 +134,19 @@ def images(
         fov = float(scene.model.cam_fovy[scene.camera(view.cameras[number])])
         focal = view.height / 2 / math.tan(math.radians(fov) / 2)
         values = rendered[kind.modality][:, number]
-        found.append(pixels(kind, values, as_float=request.as_float, focal=focal, ids=ids))
+        image = pixels(kind, values, as_float=request.as_float, focal=focal, ids=ids)
+        found.append(_png(image) if request.compress else image)
     return found
+
+
+def _png(images: Tensor) -> Tensor:
+    """Encode images (N, H, W, 3) as PNG: bytes, padded with zeros, (N, length), uint8."""
+    encoded = []
+    for image in images.cpu().numpy():
+        buffer = io.BytesIO()
+        Image.fromarray(image).save(buffer, "png")
+        encoded.append(torch.frombuffer(bytearray(buffer.getvalue()), dtype=torch.uint8))
+    return torch.nn.utils.rnn.pad_sequence(encoded, batch_first=True)
 
 
 def pixels(

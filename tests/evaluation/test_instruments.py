@@ -27,7 +27,7 @@ def test_speeds_are_the_drones_own():
     body.rotors[:] = torch.tensor([0.1, 0.2, 0.3, 0.4])
     found = read(body)
     assert found.speeds == pytest.approx((2.0, -1.0, -0.5))  # 1 m/s along x is to its right
-    assert found.attitude.yaw == pytest.approx(90.0)
+    assert found.attitude.yaw == pytest.approx(-90.0)
     assert found.rotors == pytest.approx((0.1, 0.2, 0.3, 0.4))
 
 
@@ -38,9 +38,9 @@ def test_the_horizon_lies_across_the_middle_of_a_level_drones():
 
 
 def test_with_the_nose_down_there_is_more_ground():
-    assert ground(Attitude(0.0, 20.0, 0.0))[40, 60]  # 20 of 40 degrees: half the radius up, 34
-    assert not ground(Attitude(0.0, 20.0, 0.0))[28, 60]
-    assert not ground(Attitude(0.0, -20.0, 0.0))[96, 60]
+    assert ground(Attitude(0.0, -20.0, 0.0))[40, 60]  # 20 of 40 degrees: half the radius up, 34
+    assert not ground(Attitude(0.0, -20.0, 0.0))[28, 60]
+    assert not ground(Attitude(0.0, 20.0, 0.0))[96, 60]
 
 
 def test_with_the_right_side_down_the_ground_rises_there():
@@ -144,8 +144,8 @@ def test_bars_of_motors_by_the_pixel():
     ("attitude", "text"),
     [
         (LEVEL, "0° left, 0° up"),
-        (Attitude(12.4, -3.0, 0.0), "12° right, 3° up"),
-        (Attitude(-2.0, 7.0, 0.0), "2° left, 7° down"),
+        (Attitude(12.4, 3.0, 0.0), "12° right, 3° up"),
+        (Attitude(-2.0, -7.0, 0.0), "2° left, 7° down"),
     ],
 )
 def test_the_needles_stand_still_and_the_attitude_is_written_below(attitude, text):

@@ -19,6 +19,7 @@ from drone_rl.flight.commands.command import (
     hold,
     period_ticks,
 )
+from drone_rl.flight.commands.conventions import to_simulator
 from drone_rl.flight.commands.path_following import GoHomeCommand
 from drone_rl.flight.commands.state import LandedState, PilotState, Sensors, Trajectory
 from drone_rl.sim.dynamics import FlightState, Goals, Obstacles, Quadrotor
@@ -30,10 +31,11 @@ from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks import State
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Whole
+from drone_rl.utils.schema import OneOf, Whole
 
 COASTING = 0.06
 """Seconds for which the last goals hold after a command that sets no position."""
+_MODES = ("simple_flight", "computer_vision")
 _IDLE = 0.1
 """Thrust of idle rotors as a fraction of the hover thrust."""
 _LEAST_THRUST = 0.1
@@ -55,6 +57,7 @@ class Drone:
         self,
         dynamics: DynamicsSettings | Quadrotor | None = None,
         *,
+        mode: str = "simple_flight",
         start: Sequence[float] = (0.0, 0.0),
         yaw: float = 0.0,
         seed: int = 0,
@@ -68,8 +71,10 @@ class Drone:
         Args:
             dynamics: Vehicle and wind; those of `worlds` if it has vehicle dynamics, else AirSim's
                 generic drone in still air.
-            start: Position x and y, metres.
-            yaw: Heading, degrees to the left of the world's x axis.
+            mode: simple_flight, or computer_vision without dynamics (Table 1): then only poses can
+                be set.
+            start: Position x and y, metres; in computer-vision mode also z.
+            yaw: Heading, degrees to the right of the world's x axis.
             seed: Seed of gusts and sensor noise.
             obstacles: Obstacles in one world; those of `worlds` by default.
             worlds: A single world that the cameras render.
@@ -83,12 +88,16 @@ class Drone:
                 dynamics = worlds.dynamics.settings
             if obstacles is None:
                 obstacles = worlds.task.obstacles(worlds.state)
+        self.is_computer_vision = OneOf(_MODES).read(mode, "mode") == "computer_vision"
+        """Whether there are no dynamics."""
         self._quadrotor = _quadrotor(dynamics, changes)
         self.settings = self._quadrotor.settings
         """Vehicle and wind."""
-        x, y = checks.numbers(start, "start", 2, -checks.FARTHEST, checks.FARTHEST)
-        place = [[x, y, self.settings.radius]]
-        half = 0.5 * math.radians(checks.real(yaw, "yaw", unit="degrees"))
+        height = [] if self.is_computer_vision and len(start) == 3 else [self.settings.radius]
+        given = checks.numbers(start, "start", 3 - len(height), -checks.FARTHEST, checks.FARTHEST)
+        place = [[*given, *height]]
+        degrees = checks.real(yaw, "yaw", unit="degrees")
+        half = 0.5 * math.radians(to_simulator(0.0, 0.0, degrees)[2])
         attitude = [[math.cos(half), 0.0, 0.0, math.sin(half)]]
         self._seed = Whole(0, 2**31 - 1).read(seed, "seed")
         self.body = FlightState.at_rest(
@@ -100,6 +109,9 @@ class Drone:
         self.home = self.body.position[0].clone()
         """Starting position, metres. Shape: (3,)."""
         self.worlds, self._obstacles = worlds, obstacles
+        self._initial = copy.deepcopy((self.body, worlds.state if worlds else None, sensors))
+        self.has_api_control = True
+        """Whether commands are accepted; see `enable_api_control`."""
         self.trajectory = Trajectory()
         """The states of all control periods so far."""
         self.trajectory.append(self.time, self.body)
@@ -149,6 +161,25 @@ class Drone:
             self._sensors = Sensors(self.body, SensorSettings(), self._seed)
         return self._sensors
 
+    def enable_api_control(self, enable: bool = True) -> None:
+        """Accept commands, or refuse them by a `PilotError` after cancelling the running one."""
+        self.has_api_control = enable
+        if not enable:
+            self.cancel()
+
+    def reset(self) -> PilotState:
+        """Put the drone, disarmed, and the objects back where they started; time starts at 0."""
+        self.cancel()
+        self.body, state, sensors = copy.deepcopy(self._initial)
+        if self.worlds is not None and state is not None:
+            self.worlds.state = state
+        self.trajectory = Trajectory()
+        self.trajectory.append(self.time, self.body)
+        self._sensors = None if sensors is None else Sensors(self.body, sensors, self._seed)
+        self._is_armed, self._landed = False, LandedState.LANDED
+        self._goals, self._place, self._left, self._coasting = None, None, 0, 0
+        return self.state
+
     def advance(self, seconds: float) -> PilotState:
         """Advance simulated time and return the state; a negative duration is an `InputError`."""
         self._advance(self._ticks_of(checks.duration(seconds)))
@@ -162,6 +193,7 @@ class Drone:
 
     def arm(self) -> None:
         """Start the rotors; a `PilotError` in the air."""
+        self._require_dynamics("arm")
         if self._is_flying and not self._is_armed:
             raise PilotError("can't arm in the air; wait until the drone lies on the ground")
         self._is_armed = True
@@ -226,7 +258,14 @@ class Drone:
     def _speed(self) -> float:
         return float(self.body.velocity.norm())
 
+    def _require_dynamics(self, name: str) -> None:
+        if not self.has_api_control:
+            raise PilotError(f"{name}: API control is off; call enable_api_control() first")
+        if self.is_computer_vision:
+            raise PilotError(f"{name}: computer-vision mode has no dynamics; use set_pose or press")
+
     def _require_armed(self, name: str) -> None:
+        self._require_dynamics(name)
         if self._is_lost:
             raise PilotError(f"{name}: the simulation has diverged; make a new Pilot")
         if not self._is_armed:
@@ -282,6 +321,10 @@ class Drone:
         return hold(self._place)
 
     def _fly(self, goals: Goals | None, ticks: int) -> None:
+        if self.is_computer_vision:
+            self.body.numbers[:, TICKS] += ticks
+            self.trajectory.append(self.time, self.body)
+            return
         if not self._is_armed:
             goals = _all_rotors(0.0)
         elif goals is None:

@@ -15,6 +15,7 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
 from drone_rl.flight.commands.checks import real
 from drone_rl.flight.commands.command import ACCURACY, PERIOD, Command, Land
+from drone_rl.flight.commands.conventions import to_simulator
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import OneOf
@@ -47,7 +48,7 @@ class Drivetrain(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class YawMode:
-    """Heading or yaw rate during a movement (Table 3). Positive is to the left."""
+    """Heading or yaw rate during a movement (Table 3). Positive is to the right."""
 
     is_rate: bool = True
     """Whether the number is a rate, else an angle. A rate of 0 holds the heading."""
@@ -98,7 +99,7 @@ class YawControl:
         `travel` is a displacement or velocity in the world frame, shape (num_envs, 3); up to a
         horizontal length of `ACCURACY` the previous goal is kept.
         """
-        wanted = math.radians(self.yaw_mode.yaw_or_rate)
+        *_, wanted = to_simulator(0.0, 0.0, math.radians(self.yaw_mode.yaw_or_rate))
         if not self.is_forward:
             holds = self.yaw_mode.is_rate and self.mode is Mode.ANGLE
             return self._heading if holds else torch.full_like(travel[:, 0], wanted)

@@ -19,7 +19,8 @@ from drone_rl.flight.commands.command import (
     TimedCommand,
     goals_of,
 )
-from drone_rl.flight.commands.drone import Drone
+from drone_rl.flight.commands.computer_vision import ComputerVisionDrone
+from drone_rl.flight.commands.conventions import to_simulator
 from drone_rl.flight.commands.path_following import (
     AUTOMATIC,
     TAKEOFF_HEIGHT,
@@ -64,16 +65,20 @@ class Sticks:
             object.__setattr__(self, field.name, number)
 
 
-class Pilot(Drone):
+class Pilot(ComputerVisionDrone):
     """Flies one drone by the commands of AirSim (Tables 2 and 3), over simulated time.
 
-    World frame: x forward, y left, z up, metres; angles in degrees, positive with the right side
-    down (roll), the nose down (pitch), and to the left (yaw). The drone starts on the ground,
-    disarmed. Simulated time advances only while a command is waited for, or by `advance`.
+    World frame: x forward, y left, z up, metres. Angles are in degrees and have AirSim's signs:
+    positive with the right side down (roll), the nose up (pitch), and to the right (yaw); see
+    `conventions`. The drone starts on the ground, disarmed. Simulated time advances only while a
+    command is waited for, or by `advance`.
 
     A command waits until it ends and returns whether it succeeded in time; with `wait=False` it
     returns a `FlightFuture` at once. A new command cancels the running one. After a command the
     drone holds the position that the command reached, or else the one it has 0.06 s later.
+
+    With `mode="computer_vision"` there are no dynamics: `set_pose` and `press` move the drone, and
+    all other movements are refused.
 
     `duration` and `timeout` are in seconds. A command fails after its timeout, by default three
     times its expected duration plus 10 s. `drivetrain` and `yaw_mode` are a `Drivetrain` and a
@@ -136,20 +141,19 @@ class Pilot(Drone):
         yaw_rate: float | None = None,
         wait: bool = True,
     ) -> bool | FlightFuture:
-        """Hold roll (right side down) and pitch (nose down: forward), degrees.
+        """Hold roll (right side down) and pitch (nose up: backward), degrees.
 
         `z` is the height to hold, metres, the present one by default; in its place `throttle` is a
-        fraction of the maximum thrust, 0 to 1. `yaw` is the heading, degrees to the left of the
+        fraction of the maximum thrust, 0 to 1. `yaw` is the heading, degrees to the right of the
         world's x axis, unchanged by default; in its place `yaw_rate` is in degrees per second.
         """
         if yaw is not None and yaw_rate is not None:
             raise InputError(f"yaw={yaw} and yaw_rate={yaw_rate} are both given; give one of them")
-        x, y = checks.radians(roll, "roll", 90.0), checks.radians(pitch, "pitch", 90.0)
-        turn, turn_mode = self.body.heading, Mode.ANGLE
-        if yaw is not None:
-            turn = checks.radians(yaw, "yaw")
-        elif yaw_rate is not None:
-            turn, turn_mode = checks.radians(yaw_rate, "yaw_rate"), Mode.RATE
+        tilt = checks.radians(roll, "roll", 90.0), checks.radians(pitch, "pitch", 90.0)
+        name, given = ("yaw", yaw) if yaw_rate is None else ("yaw_rate", yaw_rate)
+        x, y, wanted = to_simulator(*tilt, checks.radians(given or 0.0, name))
+        turn = self.body.heading if given is None else wanted
+        turn_mode = Mode.ANGLE if yaw_rate is None else Mode.RATE
         lift_mode, lift = self._lift(z, throttle)
         modes: Modes = (Mode.ANGLE, Mode.ANGLE, turn_mode, lift_mode)
         goals = goals_of(self.body, modes, x, y, turn, lift)
@@ -168,7 +172,7 @@ class Pilot(Drone):
     ) -> bool | FlightFuture:
         """Hold body rates, degrees per second; see `move_by_angle`."""
         named = ((roll, "roll"), (pitch, "pitch"), (yaw, "yaw"))
-        x, y, turn = (checks.radians(value, name) for value, name in named)
+        x, y, turn = to_simulator(*(checks.radians(value, name) for value, name in named))
         lift_mode, lift = self._lift(z, throttle)
         goals = goals_of(self.body, (Mode.RATE, Mode.RATE, Mode.RATE, lift_mode), x, y, turn, lift)
         return self._hold("move_by_rates", goals, duration, wait)
@@ -275,19 +279,20 @@ class Pilot(Drone):
     def rotate_to(
         self, yaw: float, timeout: float | None = None, *, margin: float = 5.0, wait: bool = True
     ) -> bool | FlightFuture:
-        """Turn to a heading the shorter way round, degrees to the left of the world's x axis.
+        """Turn to a heading the shorter way round, degrees to the right of the world's x axis.
 
         It fails after 20 s by default. `margin` is the heading error in degrees at which it
         succeeds, once the drone no longer turns.
         """
         limit = 20.0 if timeout is None else checks.duration(timeout)
         near = math.radians(checks.real(margin, "margin", 0.0, 180.0, is_above=True))
-        command = RotateToCommand(self.body, checks.radians(yaw, "yaw"), near, limit)
+        *_, heading = to_simulator(0.0, 0.0, checks.radians(yaw, "yaw"))
+        command = RotateToCommand(self.body, heading, near, limit)
         return self._run("rotate_to", command, wait)
 
     def rotate_by(self, rate: float, duration: float, *, wait: bool = True) -> bool | FlightFuture:
-        """Turn at a rate, degrees per second to the left, for some seconds."""
-        turn = checks.radians(rate, "rate")
+        """Turn at a rate, degrees per second to the right, for some seconds."""
+        *_, turn = to_simulator(0.0, 0.0, checks.radians(rate, "rate"))
         command = RotateByCommand(self.body, turn, checks.duration(duration))
         return self._run("rotate_by", command, wait)
 

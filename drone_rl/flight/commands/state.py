@@ -10,6 +10,7 @@ import numpy as np
 from torch import Tensor
 
 from drone_rl.config.sensors import SensorSettings
+from drone_rl.flight.commands.conventions import to_pilot
 from drone_rl.sim.dynamics import FlightState
 from drone_rl.sim.dynamics.state import (
     ATTITUDE,
@@ -42,14 +43,14 @@ class LandedState(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Attitude:
-    """Orientation in degrees, applied in the order yaw, pitch, roll."""
+    """Orientation in degrees, applied in the order yaw, pitch, roll; signs as in `conventions`."""
 
     roll: float
     """Positive with the right side down."""
     pitch: float
-    """Positive with the nose down."""
+    """Positive with the nose up."""
     yaw: float
-    """Positive to the left of the world's x axis."""
+    """Positive to the right of the world's x axis."""
 
     @classmethod
     def of(cls, quaternion: Sequence[float]) -> Self:
@@ -58,7 +59,7 @@ class Attitude:
         roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
         pitch = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
         yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        return cls(*np.degrees([roll, pitch, yaw]).tolist())
+        return cls(*np.degrees(to_pilot(roll, pitch, yaw)).tolist())
 
 
 @dataclasses.dataclass(frozen=True)

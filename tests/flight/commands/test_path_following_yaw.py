@@ -24,15 +24,15 @@ def test_the_heading_is_held_by_default(body):
 
 
 def test_an_angle_and_a_rate(body):
-    angle = YawControl(body, "max_degree_of_freedom", YawMode(False, 90.0))
+    angle = YawControl(body, "max_degree_of_freedom", YawMode(False, -90.0))
     assert angle.mode == Mode.ANGLE
     assert angle.goal(LEFT).item() == pytest.approx(math.pi / 2)
-    rate = YawControl(body, "max_degree_of_freedom", YawMode(True, -180.0))
+    rate = YawControl(body, "max_degree_of_freedom", YawMode(True, 180.0))
     assert (rate.mode, rate.goal(LEFT).item()) == (Mode.RATE, pytest.approx(-math.pi))
 
 
 def test_forward_only_looks_where_it_goes_and_else_where_it_looked(body):
-    yaw_control = YawControl(body, Drivetrain.FORWARD_ONLY, YawMode(False, 45.0))
+    yaw_control = YawControl(body, Drivetrain.FORWARD_ONLY, YawMode(False, -45.0))
     up = torch.tensor([[0.0, 0.0, 5.0]], dtype=torch.float64)
     assert yaw_control.goal(up).item() == pytest.approx(0.3)
     assert yaw_control.goal(LEFT).item() == pytest.approx(math.radians(135))

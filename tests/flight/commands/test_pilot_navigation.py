@@ -9,8 +9,8 @@ from drone_rl.utils.errors import InputError
 
 
 def test_by_angle(flying):
-    assert flying.move_by_angle(0, 5, 1) is True
-    assert flying.state.attitude.pitch == pytest.approx(5, abs=0.2)
+    assert flying.move_by_angle(0, -5, 1) is True
+    assert flying.state.attitude.pitch == pytest.approx(-5, abs=0.2)
     assert flying.state.velocity[0] > 0.5
     flying.move_by_angle(5, 0, 1, throttle=0.6, yaw_rate=30)
     assert flying.state.attitude.roll == pytest.approx(5, abs=0.2)

@@ -36,7 +36,7 @@ def test_forward_is_the_heading_at_the_start(goals, hovering_pilot):
 
 
 def test_the_yaw_stick_adds_to_the_yaw_mode(goals):
-    found = goals(Sticks(yaw=0.1), yaw_mode=YawMode(True, 40.0))
+    found = goals(Sticks(yaw=0.1), yaw_mode=YawMode(True, -40.0))
     assert found.modes[2] == Mode.RATE
     assert found.values[0, 2].item() == pytest.approx(math.radians(30))
 

@@ -25,7 +25,7 @@ def test_goals(hovering_pilot):
 
 
 def test_the_body_frame_turns_with_the_drone(hovering_pilot):
-    hovering_pilot.rotate_to(90, margin=0.5)
+    hovering_pilot.rotate_to(-90, margin=0.5)
     hovering_pilot.move_by_velocity(2, 0, duration=6, z=5, frame="body")
     assert hovering_pilot.state.velocity == pytest.approx((0, 2, 0), abs=0.05)
 

@@ -14,8 +14,8 @@ HALF = math.sqrt(0.5)
     [
         ((1, 0, 0, 0), (0, 0, 0)),
         ((HALF, HALF, 0, 0), (90, 0, 0)),
-        ((math.cos(0.25), 0, math.sin(0.25), 0), (0, math.degrees(0.5), 0)),
-        ((HALF, 0, 0, HALF), (0, 0, 90)),
+        ((math.cos(0.25), 0, math.sin(0.25), 0), (0, -math.degrees(0.5), 0)),
+        ((HALF, 0, 0, HALF), (0, 0, -90)),
     ],
 )
 def test_angles(quaternion, angles):

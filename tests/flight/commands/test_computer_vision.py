@@ -1,0 +1,141 @@
+"""Poses without dynamics, keys, objects by name, reset and API control."""
+
+import math
+
+import pytest
+
+import drone_rl
+from drone_rl.flight.commands.computer_vision import KEYS, STEP, TURN
+from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
+
+
+@pytest.fixture
+def pilot():
+    return drone_rl.Pilot(mode="computer_vision", start=(1.0, 2.0, 3.0), worlds=Worlds(1))
+
+
+def test_the_drone_starts_in_the_air(pilot):
+    assert pilot.state.position == (1.0, 2.0, 3.0)
+    assert pilot.advance(2.0).position == (1.0, 2.0, 3.0) and pilot.time == pytest.approx(
+        2.0, abs=0.01
+    )
+
+
+def test_a_pose_is_set_with_airsims_signs(pilot):
+    state = pilot.set_pose([4, -5, 6], roll=10, pitch=20, yaw=30)
+    assert state.position == (4.0, -5.0, 6.0)
+    angles = state.attitude
+    assert (angles.roll, angles.pitch, angles.yaw) == pytest.approx((10, 20, 30))
+    assert float(pilot.body.heading) == pytest.approx(-math.radians(30))
+
+
+@pytest.mark.parametrize(
+    ("key", "change"),
+    [
+        # at a yaw of 90 degrees the drone faces -y
+        ("forward", (0, -STEP, 0)),
+        ("backward", (0, STEP, 0)),
+        ("left", (STEP, 0, 0)),
+        ("right", (-STEP, 0, 0)),
+        ("up", (0, 0, STEP)),
+        ("down", (0, 0, -STEP)),
+    ],
+)
+def test_keys_move_in_the_heading(pilot, key, change):
+    pilot.set_pose([0, 0, 5], yaw=90)
+    found = pilot.press(key, 2).position
+    assert found == pytest.approx([2 * d + p for d, p in zip(change, (0, 0, 5), strict=True)])
+
+
+@pytest.mark.parametrize("key", [key for key in KEYS if "_" in key])
+def test_keys_turn(pilot, key):
+    angle, side = key.split("_")
+    pilot.set_pose([0, 0, 5], roll=1, pitch=2, yaw=3)
+    sign = 1 if side in ("right", "up") else -1
+    expected = {"roll": 1.0, "pitch": 2.0, "yaw": 3.0}
+    expected[angle] += sign * TURN
+    found = pilot.press(key).attitude
+    assert vars(found) == pytest.approx(expected)
+
+
+def test_images_of_all_types_are_those_of_the_pose(pilot):
+    types = range(7)
+    requests = [drone_rl.ImageRequest(0, kind, False, False) for kind in types]
+    before = pilot.images(requests)
+    pilot.press("yaw_right", 10)
+    after = pilot.images(requests)
+    assert all(image.shape == (25, 64, 3) for image in before)
+    assert any((one != other).any() for one, other in zip(before, after, strict=True))
+
+
+def test_a_compressed_image_is_a_png_file(pilot):
+    (image,) = pilot.images([drone_rl.ImageRequest(0, 0, False, True)])
+    assert bytes(image[:8].tolist()) == b"\x89PNG\r\n\x1a\n"
+    with pytest.raises(InputError, match="both given"):
+        drone_rl.ImageRequest(0, 0, True, True)
+
+
+def test_objects_have_names_and_positions(pilot):
+    assert pilot.object_names == ("cube_0", "cube_1", "cube_2")
+    pilot.set_object_position("cube_1", [9, 8, 7])
+    assert pilot.object_position("cube_1") == (9.0, 8.0, 7.0)
+    pilot.worlds.state.collected[0, 1] = True
+    assert all(map(math.isnan, pilot.object_position("cube_1")))
+    with pytest.raises(InputError, match="did you mean cube_1"):
+        pilot.object_position("cube1")
+
+
+def test_reset_restores_drone_objects_and_time(pilot):
+    place = pilot.object_position("cube_0")
+    pilot.set_object_position("cube_0", [9, 8, 7])
+    pilot.press("forward")
+    pilot.advance(1.0)
+    for _ in range(2):
+        state = pilot.reset()
+        assert (state.position, state.time) == ((1.0, 2.0, 3.0), 0.0)
+        assert pilot.object_position("cube_0") == place
+        pilot.press("up")
+        pilot.advance(0.5)
+
+
+def test_movements_are_refused(pilot):
+    for command in (pilot.arm, pilot.take_off, pilot.land, lambda: pilot.move_to(0, 0, 1)):
+        with pytest.raises(drone_rl.PilotError, match="no dynamics; use set_pose or press"):
+            command()
+
+
+def test_a_flying_drone_is_not_put_elsewhere():
+    with pytest.raises(drone_rl.PilotError, match="the drone has dynamics"):
+        drone_rl.Pilot().set_pose([0, 0, 1])
+
+
+def test_commands_need_api_control(flying):
+    flying.enable_api_control(False)
+    with pytest.raises(drone_rl.PilotError, match="API control is off"):
+        flying.hover()
+    flying.enable_api_control()
+    assert flying.hover(0.1) and flying.has_api_control
+
+
+def test_a_drone_resets_to_the_ground(flying):
+    state = flying.reset()
+    assert state.position[2] == pytest.approx(flying.settings.radius) and not state.armed
+    with pytest.raises(drone_rl.PilotError, match="isn't armed"):
+        flying.take_off()
+
+
+@pytest.mark.parametrize(
+    ("act", "message"),
+    [
+        (lambda p: p.set_pose([0, 0, math.nan]), r"position\[2\]=nan"),
+        (lambda p: p.set_pose([0, 0]), "give 3 numbers"),
+        (lambda p: p.set_pose([0, 0, 1], yaw=math.inf), "yaw=inf"),
+        (lambda p: p.press("foward"), "did you mean forward"),
+        (lambda p: p.press("up", 0), "times=0"),
+        (lambda p: drone_rl.Pilot(mode="car"), "mode='car'"),
+    ],
+)
+def test_invalid_poses_and_keys(pilot, act, message):
+    with pytest.raises(InputError, match=message):
+        act(pilot)
