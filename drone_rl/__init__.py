@@ -39,8 +39,14 @@ if TYPE_CHECKING:
     from drone_rl.envs.sb3.worlds import Sb3Worlds as Sb3Worlds
     from drone_rl.evaluation.evaluate import Evaluation as Evaluation
     from drone_rl.evaluation.evaluate import evaluate as evaluate
+    from drone_rl.explanations.chapter_figures import ChapterFigure as ChapterFigure
+    from drone_rl.explanations.chapter_figures import FigureSettings as FigureSettings
+    from drone_rl.explanations.chapter_figures import reproduce as reproduce
+    from drone_rl.explanations.class_model_gallery import ClassModels as ClassModels
+    from drone_rl.explanations.class_model_gallery import class_models as class_models
     from drone_rl.explanations.explain import Explanations as Explanations
     from drone_rl.explanations.explain import explain as explain
+    from drone_rl.explanations.settings import ClassModelsSettings as ClassModelsSettings
     from drone_rl.explanations.settings import ExplainSettings as ExplainSettings
     from drone_rl.flight.commands.command import FlightFuture as FlightFuture
     from drone_rl.flight.commands.command import PilotError as PilotError

@@ -1,14 +1,15 @@
-"""`drone-rl explain` and `drone-rl report`: their settings."""
+"""`drone-rl explain`, `report`, `class-models` and `reproduce`: their settings."""
 
 import logging
 from pathlib import Path
 from typing import Annotated, Any
 
 import drone_rl
-from drone_rl.cli.settings import CommandSettings
+from drone_rl.cli.settings import CommandSettings, PolicyCommandSettings, finish
 from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.evaluation.rule import Kind
-from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.explanations.chapter_figures import FigureSettings
+from drone_rl.explanations.settings import ClassModelsSettings, ExplainSettings
 from drone_rl.utils.progress import log
 from drone_rl.utils.schema import Listed, OneOf, Whole
 
@@ -64,3 +65,26 @@ class ReportCommand(CommandSettings):
         made = report(find_explanations(self.explanations, self.paths.outputs), folder)
         _log.info("report: %s", made)
         return 0, str(made)
+
+
+class ClassModelsCommand(PolicyCommandSettings, ClassModelsSettings):
+    """Settings of `drone-rl class-models`."""
+
+    def run(self, folder: Path) -> tuple[int, str]:
+        """Optimize observations for each action; return the exit status and the image's path."""
+        done = drone_rl.class_models(
+            self.policy, self.as_base(ClassModelsSettings), **self.shared()
+        )
+        finish(done, folder, "class_models.png, class_models.json and class_models.npz")
+        return 0, str(folder / "class_models.png")
+
+
+class ReproduceCommand(CommandSettings, FigureSettings):
+    """Settings of `drone-rl reproduce`."""
+
+    def run(self, folder: Path) -> tuple[int, str]:
+        """Make a figure of the chapter again; return the exit status and the image's path."""
+        settings = self.as_base(FigureSettings)
+        done = drone_rl.reproduce(self.figure, settings, outputs=self.paths.outputs)
+        finish(done, folder, f"figure_{self.figure}.png and figure_{self.figure}.json")
+        return 0, str(folder / f"figure_{self.figure}.png")

@@ -4,7 +4,7 @@ import copy
 import dataclasses
 import itertools
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Literal
+from typing import Any
 
 import torch
 from numpy.typing import NDArray
@@ -15,19 +15,22 @@ from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.heat_maps import Objective
 from drone_rl.explanations.hooks import actions_of
+from drone_rl.explanations.settings import ClassModelSettings
 from drone_rl.policies import ImageNetwork
+from drone_rl.utils.errors import InputError
 
 OBJECTIVES: tuple[Objective, ...] = ("probability", "logit")
+NO_GRADIENTS = (
+    "Class models need gradients of the logits with respect to the pixels, and this policy has "
+    "none; give it as a torch function of floats, which the transform rgb makes."
+)
 AS_PROBABLE = 0.01  # of observations whose probabilities differ by less, the smoothest is the best
 
 
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Return "class_model"; arrays "class_model_probability", "class_model_logit" (A, C, h, w)."""
     if not context.network.is_differentiable:
-        raise LeftOutError(
-            "Class models need gradients of the logits with respect to the pixels, and this policy "
-            "has none; give it as a torch function of floats, which the transform rgb makes."
-        )
+        raise LeftOutError(NO_GRADIENTS)
     statistics = ImageStatistics.of(context.dataset.tensor("observations"))
 
     def optimize(objective: Objective) -> ClassModel:
@@ -43,19 +46,6 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     }
     arrays = {f"class_model_{name}": model.images.numpy() for name, model in found.items()}
     return {"class_model": numbers}, arrays
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class ClassModelSettings:
-    """Settings of the optimization."""
-
-    objective: Objective = "logit"  # maximized: the probability (Eq. 18), or logit minus mean logit
-    parameterisation: Literal["pixel", "fourier"] = "pixel"  # or coefficients times the frequency
-    steps: int = 64  # steps of gradient ascent
-    lr: float = 20.0  # length of a step (pixel), or Adam's learning rate times 400 (fourier)
-    blur: float = 0.6  # standard deviation of a Gaussian blur after each step, pixels
-    jitter: int = 1  # largest random shift before each gradient, pixels
-    starts: int = 8  # number of random starts
 
 
 @dataclasses.dataclass
@@ -100,14 +90,14 @@ class ClassModel:
         rows = [
             {
                 **dataclasses.asdict(attempts.settings),
-                **_values(attempts, attempts.best()),
+                **values_of(attempts, attempts.best()),
                 "each_start": attempts.probabilities.tolist(),
                 "chosen": [a for a, i in enumerate(best) if i // starts == setting],
             }
             for setting, attempts in enumerate(self.tried)
         ]
         return {
-            **_values(every, best),
+            **values_of(every, best),
             "starts": starts,
             "num_settings": len(self.tried),
             "highest": every.probabilities.amax(1).tolist(),
@@ -116,7 +106,7 @@ class ClassModel:
         }
 
 
-def _values(attempts: Attempts, best: list[int]) -> dict[str, list[float]]:
+def values_of(attempts: Attempts, best: list[int]) -> dict[str, list[float]]:
     """Return probability and roughness of each action's attempt."""
     return {
         name: [float(getattr(attempts, name)[a, i]) for a, i in enumerate(best)]
@@ -156,14 +146,18 @@ def visualise(
     """Optimize observations for each action from random starts; the network is not changed."""
     generator, shape = torch.Generator().manual_seed(seed), network.in_shape
     num_actions = len(actions_of(network).names)
-    starts = torch.rand(settings.starts, *shape, generator=generator)
-    start = statistics.low + (statistics.high - statistics.low) * starts
+    start = torch.rand(settings.starts, *shape, generator=generator)
+    start = statistics.low + (statistics.high - statistics.low) * start
+    if settings.initial == "constant":
+        start = torch.full_like(start, statistics.mean)
     images = start.repeat(num_actions, 1, 1, 1)
     action = torch.arange(num_actions).repeat_interleave(settings.starts)
     quick = accelerated_gradients(network, wrt="pixels") or network
     ascent = _Ascent(quick, action, statistics, settings, generator)
     optimize = ascent.pixels if settings.parameterisation == "pixel" else ascent.fourier
     reached = optimize(images)
+    if not bool(reached.isfinite().all()):
+        raise InputError(f"with lr={settings.lr:g} the images diverge; give less, or clamp=true")
     with torch.no_grad():
         each = actions_of(network).probabilities(network(reached)).gather(1, action[:, None])[:, 0]
     by_action = (num_actions, settings.starts)
@@ -185,7 +179,7 @@ def search(
     """Try a few settings, each from all starts."""
     tried = []
     for kind, blur in itertools.product(("pixel", "fourier"), (0.5, 0.9, 1.4)):
-        settings = ClassModelSettings(objective=objective, parameterisation=kind, blur=blur)
+        settings = ClassModelSettings(maximize=objective, parameterisation=kind, blur=blur)
         tried.append(visualise(network, statistics, settings, seed=seed))
     return ClassModel(tried)
 
@@ -203,19 +197,26 @@ class _Ascent:
     def value(self, images: Tensor) -> Tensor:
         """Return the quantity to maximize, on images shifted at random. Shape: (N,)."""
         actions, outputs = actions_of(self.network), self.network(self.jitter(images))
-        if self.settings.objective == "probability":
-            return actions.probabilities(outputs).gather(1, self.action[:, None])[:, 0]
-        scores = actions.scores(outputs)
-        return (scores - scores.mean(-1, keepdim=True)).gather(1, self.action[:, None])[:, 0]
+        if self.settings.maximize == "probability":
+            scores = actions.probabilities(outputs)
+        else:
+            scores = actions.scores(outputs)
+            scores = scores - scores.mean(-1, keepdim=True)
+        penalty = self.settings.l2 * images.square().sum((1, 2, 3)) if self.settings.l2 else 0.0
+        return scores.gather(1, self.action[:, None])[:, 0] - penalty
 
     def pixels(self, images: Tensor) -> Tensor:
-        """Take steps of a fixed length along the gradient."""
+        """Take steps along the gradient."""
         for _ in range(self.settings.steps):
             images = images.detach().requires_grad_()
             (gradient,) = torch.autograd.grad(self.value(images).sum(), images)
-            length = gradient.flatten(1).norm(dim=1).clamp_min(1e-12)
-            step = self.settings.lr * self.statistics.std / 10 * gradient
-            images = self.refine(images.detach() + step / length[:, None, None, None])
+            if self.settings.step == "plain":
+                step = self.settings.lr * gradient
+            else:
+                length = gradient.flatten(1).norm(dim=1).clamp_min(1e-12)
+                step = self.settings.lr * self.statistics.std / 10 * gradient
+                step = step / length[:, None, None, None]
+            images = self.refine(images.detach() + step)
         return images
 
     def fourier(self, images: Tensor) -> Tensor:
@@ -239,12 +240,15 @@ class _Ascent:
         return render().detach()
 
     def refine(self, images: Tensor) -> Tensor:
-        """Blur, restore the data set's mean and standard deviation, and clip to its range."""
-        images, kept = gaussian_blur(images, self.settings.blur), self.statistics
-        dims = (1, 2, 3)
-        mean, std = images.mean(dims, keepdim=True), images.std(dims, keepdim=True)
-        images = (images - mean) / (std + 1e-6) * kept.std + kept.mean
-        return images.clamp(kept.low, kept.high)
+        """Blur, normalize and clip images, as far as the settings say."""
+        settings, kept, dims = self.settings, self.statistics, (1, 2, 3)
+        images = gaussian_blur(images, settings.blur) if settings.blur else images
+        if settings.normalize == "match":
+            mean, std = images.mean(dims, keepdim=True), images.std(dims, keepdim=True)
+            images = (images - mean) / (std + 1e-6) * kept.std + kept.mean
+        elif settings.normalize == "training_set":
+            images = (images - kept.mean) / (kept.std + 1e-6)
+        return images.clamp(kept.low, kept.high) if settings.clamp else images
 
     def jitter(self, images: Tensor) -> Tensor:
         """Shift images at random, with edges repeated."""

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from drone_rl.config import RendererName
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Real, Whole
+from drone_rl.utils.schema import OneOf, Real, Whole
 from drone_rl.utils.settings import Settings
 
 MIN_EPISODES = 30  # intervals from fewer episodes are too wide to be useful
@@ -45,6 +45,53 @@ class ExplainSettings(Settings):
                 f"{self.data_episodes} (data_episodes) or more"
             )
         check_perplexity(self.perplexity, self.frames)
+
+
+class ClassModelSettings(Settings):
+    """Settings of class model visualization (section 5.2). Pixels have the observations' units.
+
+    Raises:
+        InputError: A value is out of range.
+    """
+
+    maximize: Annotated[str, OneOf(("logit", "probability"))] = "logit"
+    """Maximized for each action: its probability (Eq. 18), or its logit minus the mean logit."""
+    parameterisation: Annotated[str, OneOf(("pixel", "fourier"))] = "pixel"
+    """What the ascent changes: pixels, or Fourier coefficients divided by their frequency."""
+    initial: Annotated[str, OneOf(("random", "constant"))] = "random"
+    """Initial image: uniformly random pixels, or the mean pixel of the policy's observations."""
+    steps: Annotated[int, Whole(1, 100_000, "steps")] = 64
+    """Steps of gradient ascent."""
+    step: Annotated[str, OneOf(("length", "plain"))] = "length"
+    """Step of pixels: lr times the gradient (plain), or along the gradient with a length of lr
+    tenths of the observations' standard deviation (length)."""
+    lr: Annotated[float, Real(0.0, 1e9, is_above=True)] = 20.0
+    """Learning rate, see step; the chapter's example is 20. With fourier, 400 times Adam's."""
+    normalize: Annotated[str, OneOf(("match", "training_set", "none"))] = "match"
+    """After each step: give the image the observations' mean and deviation (match), subtract their
+    mean and divide by their deviation as in the chapter (training_set), or neither (none)."""
+    blur: Annotated[float, Real(0.0, 100.0, unit="pixels")] = 0.6
+    """Standard deviation of a Gaussian blur after each step; 0 for none."""
+    clamp: bool = True
+    """Whether pixels are clipped to the range of the observations after each step."""
+    l2: Annotated[float, Real(0.0, 1e6)] = 0.0
+    """Weight of the sum of squared pixels, which is subtracted from the objective."""
+    jitter: Annotated[int, Whole(0, 16, "pixels")] = 1
+    """Largest random shift of the image before each gradient."""
+    starts: Annotated[int, Whole(1, 1000, "images")] = 8
+    """Number of random initial images; the best result is shown."""
+
+
+class ClassModelsSettings(ClassModelSettings):
+    """Settings of `drone_rl.class_models`."""
+
+    gallery: bool = False
+    """Whether to show the chapter's refinements one after the other instead of these settings."""
+    episodes: Annotated[int, Whole(1, 10_000, "episodes")] = 30
+    """Episodes with sampled actions whose observations are the training set."""
+    seed: Annotated[int, Whole(0)] | None = None
+    """Root of the random streams; null takes a fresh one from the operating system, which is
+    printed and recorded."""
 
 
 def check_perplexity(perplexity: float, count: int) -> None:

@@ -13,6 +13,8 @@ import urllib.parse
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from PIL.Image import Image
+
 if TYPE_CHECKING:
     import jinja2
     from markupsafe import Markup
@@ -48,10 +50,13 @@ def paragraph(text: str) -> str:
     return f"<p>{html.escape(text)}</p>"
 
 
-def picture(figure: "Figure") -> str:
-    """Return a figure as an embedded image."""
+def picture(figure: "Figure | Image") -> str:
+    """Return a figure or image as an embedded image."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=90)
+    if isinstance(figure, Image):
+        figure.save(buffer, "png")
+    else:
+        figure.savefig(buffer, format="png", dpi=90)
     return f'<img src="data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}">'
 
 

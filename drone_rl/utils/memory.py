@@ -5,7 +5,6 @@ blocks, and oneDNN keeps a thousand kernels, one for each input shape.
 """
 
 import contextlib
-import ctypes
 import functools
 import gc
 import os
@@ -27,6 +26,8 @@ def return_freed_memory() -> None:
 
 @functools.cache
 def _trim() -> Callable[[int], int]:
+    import ctypes  # not at the start of every program
+
     try:
         return ctypes.CDLL(None).malloc_trim
     except (AttributeError, OSError, TypeError):  # another system's C library

@@ -33,7 +33,7 @@ def halves():
 @pytest.mark.parametrize("objective", ["probability", "logit"])
 def test_pictures_show_what_the_policy_waits_for(halves, parameterisation, objective):
     settings = ClassModelSettings(
-        objective=objective, parameterisation=parameterisation, blur=0.5, steps=64, starts=2
+        maximize=objective, parameterisation=parameterisation, blur=0.5, steps=64, starts=2
     )
     found = visualise(halves, STATISTICS, settings, seed=3)
     left, right = found.images[1, :, 0], found.images[2, :, 0]
@@ -168,7 +168,7 @@ def test_objectives_by_hand():
     actions = torch.tensor([0, 2])
 
     def value(objective):
-        settings = ClassModelSettings(objective=objective, jitter=0)
+        settings = ClassModelSettings(maximize=objective, jitter=0)
         network = constant(1.0, 2.0, 4.0)
         return _Ascent(network, actions, WIDE, settings, torch.Generator()).value(stripes).tolist()
 
@@ -282,3 +282,44 @@ def test_of_pictures_without_any_difference_the_roughness_is_large_and_finite():
     statistics = dataclasses.replace(WIDE, roughness=0.0)
     found = visualise(constant(0.0, 0.0, 0.0), statistics, dataclasses.replace(PLAIN, starts=2))
     assert torch.isfinite(found.roughness).all() and found.roughness.min() > 1e9
+
+
+def test_a_plain_step_is_the_rate_times_the_gradient(halves, unrefined):
+    plain = PLAIN.replace(step="plain", lr=3.0)
+    start = torch.zeros(1, 1, 6, 12)
+    found = _Ascent(halves, torch.tensor([1]), WIDE, plain, torch.Generator()).pixels(start)
+    gradient = torch.zeros(6, 12)
+    gradient[:, :6], gradient[:, 6:] = -0.2 + 0.2 / 3, 0.2 / 3
+    torch.testing.assert_close(found[0, 0], 3.0 * gradient)
+
+
+def test_squared_pixels_are_subtracted_from_the_objective():
+    images = torch.full((2, 1, 6, 12), 0.5)
+    settings = ClassModelSettings(jitter=0, l2=0.1)
+    ascent = _Ascent(constant(1.0, 2.0, 3.0), torch.tensor([0, 2]), WIDE, settings, None)
+    ascent = dataclasses.replace(ascent, generator=torch.Generator())
+    penalty = 0.1 * 72 * 0.25
+    assert ascent.value(images).tolist() == pytest.approx([-1 - penalty, 1 - penalty])
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"normalize": "training_set"}, [[-1.0, 1.0]]),  # (x - 0.3) / 2
+        ({"normalize": "none"}, [[-1.7, 2.3]]),
+        ({"normalize": "none", "clamp": True}, [[-1.0, 2.0]]),
+    ],
+)
+def test_refinements_by_hand(changes, expected):
+    images = torch.tensor([[-1.7, 2.3]])[None, None]
+    statistics = dataclasses.replace(WIDE, low=-1.0, high=2.0)
+    settings = ClassModelSettings(**{"blur": 0.0, "clamp": False, **changes})
+    found = _Ascent(None, None, statistics, settings, None).refine(images)
+    torch.testing.assert_close(found[0, 0], torch.tensor(expected), rtol=1e-5, atol=1e-5)
+
+
+def test_a_constant_start_is_the_mean_pixel():
+    settings = ClassModelSettings(initial="constant", steps=1, lr=1e-9, jitter=0, starts=2)
+    settings = settings.replace(normalize="none", blur=0.0, clamp=False)
+    found = visualise(constant(0.0, 0.0, 0.0), WIDE, settings)
+    torch.testing.assert_close(found.images, torch.full((3, 2, 1, 6, 12), WIDE.mean))

@@ -30,7 +30,7 @@ def test_gaps_between_blocks_in_use_are_returned():
 
 
 def test_other_systems_have_no_such_function(monkeypatch):
-    monkeypatch.setattr(memory.ctypes, "CDLL", lambda _: object())
+    monkeypatch.setattr("ctypes.CDLL", lambda _: object())
     memory._trim.cache_clear()
     return_freed_memory()
     memory._trim.cache_clear()

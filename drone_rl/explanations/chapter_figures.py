@@ -1,0 +1,313 @@
+"""`drone-rl reproduce`: the figures of Luo et al. (2018), each by one call."""
+
+import dataclasses
+import io
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import torch
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.spatial.distance import cdist
+
+from drone_rl.envs.three_state import SUCCESS_PROBABILITY, exact_gradient
+from drone_rl.evaluation.plots import images
+from drone_rl.evaluation.plots.saving import to_png
+from drone_rl.explanations.class_model_gallery import CHAPTER, class_models
+from drone_rl.explanations.embedding import embed
+from drone_rl.explanations.heat_maps import Explainer
+from drone_rl.explanations.hooks import feature_layer
+from drone_rl.explanations.report.embedding import tsne_map
+from drone_rl.explanations.report.explanation import Explanation
+from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frames, select_frames
+from drone_rl.explanations.scenes import Scenes, empty_scene
+from drone_rl.policies.policy import Policy, load_policy
+from drone_rl.training.three_state import sample_gradients, train_three_state
+from drone_rl.utils.display import picture
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.palette import INK, MUTED, css
+from drone_rl.utils.provenance import provenance
+from drone_rl.utils.schema import OneOf, Whole
+from drone_rl.utils.seeding import legacy_seed
+from drone_rl.utils.settings import Settings
+
+STEP_LENGTH = 0.25
+"""Metres per action: episodes then have about as many frames as those of the chapter."""
+_POLICIES: Mapping[int, tuple[str, ...]] = {
+    **{7: ("poor", "right_and_forward"), 8: ("good",), 9: ("good",)},
+    **{10: ("good",), 11: ("uniform",), 12: ("right_and_forward",)},
+    **{13: ("good",), 14: ("uniform",), 15: ("right_and_forward",)},
+}
+"""Policies of each figure, by the names of shipped policies."""
+_COUNTS: Mapping[tuple[int, str], tuple[int, int]] = {
+    **{(7, "poor"): (400, 15), (7, "right_and_forward"): (400, 8), (8, "good"): (625, 7)},
+}
+"""Frames and episodes that the chapter states for figures of t-SNE."""
+_PERPLEXITY = 30.0
+"""Of t-SNE, unless there are too few frames."""
+_SEQUENCE = 6
+"""Frames of Figs. 13 to 15."""
+
+
+class FigureSettings(Settings):
+    """Settings of `drone_rl.reproduce`."""
+
+    figure: Annotated[int, Whole(1, unit="the number of a figure")] = 8
+    """Figure of the chapter: 3, or 7 to 15."""
+    frames: Annotated[int, Whole(1, unit="frames")] | None = None
+    """Frames of t-SNE (Figs. 7 and 8) or of the search for a pair (Fig. 9); null for the chapter's
+    number."""
+    episodes: Annotated[int, Whole(1, 1000, "episodes")] | None = None
+    """Episodes that the frames come from; null for the chapter's number."""
+    tint: Annotated[str, OneOf(("predicted", "sampled"))] = "predicted"
+    """Action whose colour tints a frame of Figs. 7 and 8: the most probable one, or the one that
+    was sampled."""
+    seed: Annotated[int, Whole(0)] = 0
+    """Root of all random streams."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ChapterFigure:
+    """A figure of the chapter, made again."""
+
+    settings: FigureSettings
+    image: Image.Image = dataclasses.field(repr=False)
+    caption: str
+    """What the image shows, and how it was made."""
+    numbers: Mapping[str, Any]
+    """Plain values behind the image."""
+
+    def save(self, folder: Path) -> None:
+        """Write `figure_N.png` and `figure_N.json`."""
+        name = f"figure_{self.settings.figure}"
+        self.image.save(folder / f"{name}.png")
+        written = {
+            **{"caption": self.caption, "settings": self.settings.values()},
+            **self.numbers,
+            **provenance(),
+        }
+        (folder / f"{name}.json").write_text(json.dumps(written, indent=2))
+
+    def __str__(self) -> str:
+        return f"Figure {self.settings.figure}: {self.caption}"
+
+    def _repr_html_(self) -> str:
+        return picture(self.image)
+
+
+def reproduce(
+    figure: int,
+    settings: FigureSettings | None = None,
+    *,
+    outputs: str | Path = "outputs",
+    **changes: Any,
+) -> ChapterFigure:
+    """Make a figure of the chapter again, with shipped policies and the chapter's set-up.
+
+    Figs. 1, 2 and 4 to 6 are drawings and screenshots; see docs/chapter.md.
+
+    Args:
+        figure: Its number: 3, or 7 to 15.
+        settings: Numbers of frames and episodes, tint and seed.
+        outputs: See `load_policy`.
+        changes: Changes to the settings, as in `reproduce(8, tint="sampled")`.
+
+    Raises:
+        InputError: There is no such figure, or the episodes have fewer frames than asked for.
+    """
+    settings = (settings or FigureSettings()).replace(figure=figure, **changes)
+    if figure not in _MAKERS:
+        known = ", ".join(map(str, _MAKERS))
+        raise InputError(f"figure={figure} can't be reproduced; give one of {known}")
+    subjects = [load_policy(name, outputs=outputs) for name in _POLICIES.get(figure, ())]
+    image, caption, numbers = _MAKERS[figure](settings, subjects)
+    return ChapterFigure(settings, image, caption, numbers)
+
+
+_Made = tuple[Image.Image, str, dict[str, Any]]
+_Maker = Callable[[FigureSettings, list[Policy]], _Made]
+
+
+def _three_states(settings: FigureSettings, subjects: list[Policy]) -> _Made:
+    """Fig. 3: REINFORCE on the process, and its gradient next to the exact one."""
+    del subjects
+    runs = [train_three_state(60, seed=settings.seed + i) for i in range(5)]
+    figure = Figure(figsize=(9, 3.4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for run in runs:
+        left.plot(run.leaving.numpy(), color=css(MUTED), linewidth=0.9)
+    mean = torch.stack([run.leaving for run in runs]).mean(0)
+    left.plot(mean.numpy(), color=css(INK), label="mean of 5 seeds")
+    left.axhline(1.0, color=css(MUTED), linestyle="--", label="optimal policy")
+    left.set(xlabel="updates of 8 episodes", ylabel="probability of a1 in s0", ylim=(0, 1.04))
+    left.legend(loc="lower right", frameon=False)
+    estimates = sample_gradients(300, seed=settings.seed)
+    exact = float(exact_gradient([0.5] * 3).sum())
+    spread = 1.96 * float(estimates.std()) / len(estimates) ** 0.5
+    right.hist(estimates.numpy(), bins=25, color=css(MUTED), label="estimates (Eq. 12)")
+    right.axvline(exact, color=css(INK), label=f"exact gradient: {exact:.4f}")
+    mean_text = f"mean estimate: {float(estimates.mean()):.4f} ± {spread:.4f}"
+    right.axvline(float(estimates.mean()), color=css(INK), linestyle=":", label=mean_text)
+    right.set(xlabel="gradient by the logit of a1, uniform policy", ylabel="batches")
+    right.legend(frameon=False, fontsize=8)
+    right.set_ylim(0, 1.5 * right.get_ylim()[1])  # room for the legend
+    caption = (
+        "REINFORCE on the three-state process; action a1 leads from s0 to s2 and reward 1 with "
+        f"probability {SUCCESS_PROBABILITY:g}, otherwise to s1."
+    )
+    numbers = {
+        **{"exact_gradient": exact, "estimated_gradient": float(estimates.mean())},
+        **{"half_width95": spread, "final_probability": float(mean[-1])},
+    }
+    return Image.open(io.BytesIO(to_png(figure))), caption, numbers
+
+
+def _embeddings(settings: FigureSettings, subjects: list[Policy]) -> _Made:
+    """Figs. 7 and 8: t-SNE of the last layer's features, frames tinted by action."""
+    shown, numbers = [], {}
+    for subject in subjects:
+        frames, episodes = _COUNTS[settings.figure, subject.name]
+        data, network, scenes = _record(subject, settings, frames, episodes)
+        layer = feature_layer(network)
+        assert layer is not None
+        perplexity = min(_PERPLEXITY, (len(data) - 1) // 3)
+        points, faithful = embed(
+            data.features[layer], perplexity=perplexity, seed=legacy_seed(settings.seed)
+        )
+        arrays = dict(data.arrays)
+        if settings.tint == "predicted":
+            arrays["actions"] = data.probabilities.argmax(1)
+        about = {"name": subject.name, "actions": scenes.actions.as_dict()}
+        explanation = Explanation(about, {"tsne_features": points}, arrays)
+        count = len(np.unique(data.episode))
+        title = f"{subject.name}: {len(data)} frames of {count} episodes"
+        shown.append(images.titled(tsne_map(explanation, "features"), title))
+        by_action = np.bincount(arrays["actions"], minlength=len(scenes.actions.names)).tolist()
+        numbers[subject.name] = {
+            **{"frames": len(data), "episodes": count, "layer": layer, **faithful},
+            "frames_by_action": dict(zip(scenes.actions.names, by_action, strict=True)),
+        }
+    names = "forward violet, left orange, right blue"
+    caption = f"t-SNE of the policy's features, tinted by the {settings.tint} action: {names}."
+    return images.gridded(_padded(shown), len(shown)), caption, numbers
+
+
+def _pair(settings: FigureSettings, subjects: list[Policy]) -> _Made:
+    """Fig. 9: two similar frames with opposite actions."""
+    (subject,) = subjects
+    data, _, scenes = _record(subject, settings, 625, 7)
+    predicted, actions = data.probabilities.argmax(1), scenes.actions
+    left, right = (np.flatnonzero(predicted == side) for side in (actions.left, actions.right))
+    if not (len(left) and len(right)):
+        raise InputError(
+            f"policy {subject.name} moves to one side only in {len(data)} frames; give another "
+            "seed, or more frames and episodes"
+        )
+    flat = data.observations.reshape(len(data), -1)
+    distance = cdist(flat[left], flat[right]) / np.sqrt(flat.shape[1])
+    row, column = np.unravel_index(distance.argmin(), distance.shape)
+    pair = int(left[row]), int(right[column])
+    shown = [images.probed_frame(data.arrays, frame, f"frame {frame}") for frame in pair]
+    apart = float(np.abs(np.diff(data.offset(scenes.task)[list(pair)], axis=0)).max())
+    caption = (
+        f"The two most similar frames on which policy {subject.name} most probably moves to "
+        f"opposite sides; the next cube is {apart:.1f} m from its place in the other one."
+    )
+    numbers = {"frames": list(pair), "distance": float(distance.min()), "metres_apart": apart}
+    return images.gridded(shown, 2), caption, numbers
+
+
+def _class_models(settings: FigureSettings, subjects: list[Policy]) -> _Made:
+    """Figs. 10 to 12: class models with the chapter's refinements."""
+    (subject,) = subjects
+    found = class_models(subject, seed=settings.seed, **CHAPTER)
+    caption = (
+        f"Class models of policy {subject.name}: gradient ascent on the action's probability "
+        "(Eq. 18) in steps of fixed length, with blur and the training set's mean and deviation."
+    )
+    header, values = found.rows()
+    probabilities = dict(zip(header[1:], map(float, values[1:]), strict=True))
+    return found.image(), caption, {"probabilities": probabilities}
+
+
+def _attributions(settings: FigureSettings, subjects: list[Policy]) -> _Made:
+    """Figs. 13 to 15: Grad-CAM of the sampled action in six frames."""
+    (subject,) = subjects
+    data, network, scenes = _record(subject, settings, 1, 20, every=True)
+    task: Any = scenes.task
+    rows = _spread_by_side(data.offset(task)[:, 1], task.settings.touch_distance)
+    explainer = Explainer(network, scenes.observe(empty_scene(scenes))[0])
+    taken = data.tensor("actions")[rows]
+    heat = explainer.grad_cam(data.tensor("observations")[rows], taken)
+    shown = []
+    for letter, row, one in zip("abcdef", rows, scenes.to_frame(heat).numpy(), strict=False):
+        chosen = int(data.actions[row])
+        hot = images.titled(images.enlarge(images.heated(data.frames[row], one)), f"({letter})")
+        shown.append(
+            images.stacked(
+                [hot, images.indicator(data.probabilities[row].tolist(), chosen, hot.width)]
+            )
+        )
+    caption = (
+        f"Grad-CAM (Eqs. 19 and 20) of policy {subject.name} for the sampled action, whose bar is "
+        "dark; the next cube is to the left, ahead or to the right."
+    )
+    return images.gridded(shown, 3), caption, {"frames": rows.tolist()}
+
+
+_MAKERS: Mapping[int, _Maker] = {
+    **{3: _three_states, 7: _embeddings, 8: _embeddings, 9: _pair},
+    **dict.fromkeys((10, 11, 12), _class_models),
+    **dict.fromkeys((13, 14, 15), _attributions),
+}
+
+
+def _record(
+    subject: Policy, settings: FigureSettings, frames: int, episodes: int, *, every: bool = False
+) -> tuple[RolloutDataset, Any, Scenes]:
+    """Return frames of episodes with sampled actions, the network and the scenes.
+
+    The numbers of frames and episodes are those of the settings, or the given ones. `every`
+    returns all frames.
+    """
+    frames, episodes = settings.frames or frames, settings.episodes or episodes
+    network = subject.make_network()
+    layer = feature_layer(network)
+    with subject.in_task(step_length=STEP_LENGTH).flying(episodes, seed=settings.seed) as made:
+        env, actor = made
+        flights, scenes = collect(env, actor, num_episodes=episodes), Scenes(env)
+        if frames > len(flights):
+            raise InputError(
+                f"frames={frames} is more than the {len(flights)} of {episodes} episodes of policy "
+                f"{subject.name}; give fewer frames or more episodes"
+            )
+        rows = np.arange(len(flights)) if every else select_frames(flights.episode, frames)
+        return (
+            render_frames(flights, rows, scenes, network, (layer,) if layer else ()),
+            network,
+            scenes,
+        )
+
+
+def _spread_by_side(aside: NDArray, touch_distance: float) -> NDArray:
+    """Return two frames each with the next cube to the left, ahead and to the right."""
+    sides = (aside > touch_distance, np.abs(aside) <= touch_distance, aside < -touch_distance)
+    rows = [np.flatnonzero(side) for side in sides]
+    share = _SEQUENCE // len(sides)
+    chosen = [
+        one[np.linspace(0, len(one) - 1, share + 2)[1:-1].astype(int)] for one in rows if len(one)
+    ]
+    return np.concatenate(chosen)
+
+
+def _padded(shown: list[Image.Image]) -> list[Image.Image]:
+    """Return images on white canvases of the largest width and height."""
+    size = max(one.width for one in shown), max(one.height for one in shown)
+    canvases = [Image.new("RGB", size, "white") for _ in shown]
+    for canvas, one in zip(canvases, shown, strict=True):
+        canvas.paste(one)
+    return canvases

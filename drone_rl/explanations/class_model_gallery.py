@@ -1,0 +1,175 @@
+"""`drone-rl class-models`: class model visualization with settings of one's own (section 5.2)."""
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from PIL import Image
+
+from drone_rl.evaluation.plots import images
+from drone_rl.explanations.class_models import (
+    NO_GRADIENTS,
+    Attempts,
+    ImageStatistics,
+    values_of,
+    visualise,
+)
+from drone_rl.explanations.hooks import actions_of
+from drone_rl.explanations.rollouts import collect
+from drone_rl.explanations.scenes import Scenes
+from drone_rl.explanations.settings import ClassModelSettings, ClassModelsSettings
+from drone_rl.policies.external_network import Logits
+from drone_rl.policies.external_policy import as_policy
+from drone_rl.policies.policy import BasePolicy
+from drone_rl.sim.vocabulary import ShownActions, shown_actions
+from drone_rl.utils.display import aligned, picture, table
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seeding import RootSeed, with_seed
+from drone_rl.utils.text import seed_line
+
+_PRINTED: Mapping[str, Any] = {
+    **{"maximize": "probability", "step": "plain", "lr": 1.0, "normalize": "none"},
+    **{"blur": 0.0, "clamp": False, "jitter": 0, "starts": 1},
+}
+_LONG_STEPS = {**_PRINTED, "lr": 20.0, "step": "length"}
+CHAPTER: Mapping[str, Any] = {**_LONG_STEPS, "normalize": "match", "blur": 0.6}
+"""Gradient ascent on Eq. 18 with the refinements that the chapter names, as far as they help.
+
+Steps have a fixed length because the gradient of a probability near 0 vanishes. Images keep the
+training set's mean and deviation: to subtract and divide at each step, as the chapter says, lets
+them grow without bound where the deviation is below 1.
+"""
+_CLIPPED = {**CHAPTER, "clamp": True}
+GALLERY: Mapping[str, Mapping[str, Any]] = {
+    "Eq. 18, learning rate 1": _PRINTED,
+    "learning rate 20": {**_PRINTED, "lr": 20.0},
+    "+ fixed length": _LONG_STEPS,
+    "+ mean, deviation divided": {**_LONG_STEPS, "normalize": "training_set"},
+    "mean, deviation kept": {**CHAPTER, "blur": 0.0},
+    "+ blur": CHAPTER,
+    "+ clipping": _CLIPPED,
+    "logit": {**_CLIPPED, "maximize": "logit"},
+    "+ squared penalty": {**_CLIPPED, "maximize": "logit", "l2": 1e-3},
+    "defaults": {},
+}
+"""The chapter's refinements one after the other, then further ones and the defaults."""
+_BATCH = 64
+"""Environments that collect the training set."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ClassModels:
+    """Observations optimized for each action of a policy, with one or several settings."""
+
+    policy: BasePolicy
+    tried: Mapping[str, Attempts] = dataclasses.field(repr=False)
+    """Results by title of the settings."""
+    statistics: ImageStatistics
+    """Of the observations in the policy's episodes, the training set."""
+    actions: ShownActions
+    channels: str
+    """What the channels of an observation are, see `images.shown_picture`."""
+    seed: RootSeed
+
+    def rows(self) -> list[list[str]]:
+        """Return a table of texts: a header, then each setting's probability of each action."""
+        order, names = self.actions.order, self.actions.names
+        rows = [["settings", *(names[action] for action in order)]]
+        for title, found in self.tried.items():
+            reached = values_of(found, found.best())["probabilities"]
+            rows.append([title, *(f"{reached[action]:.3f}" for action in order)])
+        return rows
+
+    def image(self) -> Image.Image:
+        """Return the images: a row for each setting, a column for each action.
+
+        Black and white are the limits of the observations; without clipping, those of the row.
+        """
+        shown, order = [], self.actions.order
+        for title, found in self.tried.items():
+            best = found.best()
+            chosen = torch.stack([found.images[a, i] for a, i in enumerate(best)])
+            low, high = self.statistics.low, self.statistics.high
+            if not found.settings.clamp:
+                low, high = float(chosen.min()), float(chosen.max())
+            for action in order:
+                probability = float(found.probabilities[action, best[action]])
+                start = f"{title}: " if len(self.tried) > 1 and action == order[0] else ""
+                caption = f"{start}{self.actions.names[action]} {probability:.3f}"
+                pixels = images.shown_picture(chosen[action].numpy(), low, high, self.channels)
+                shown.append(images.titled(images.enlarge(pixels), caption))
+        return images.gridded(shown, len(order))
+
+    def save(self, folder: Path) -> None:
+        """Write `class_models.png`, `class_models.json` and, with every image, `.npz`."""
+        self.image().save(folder / "class_models.png")
+        written = {
+            **{"policy": self.policy.origin["policy"], **self.seed.as_dict()},
+            "statistics": dataclasses.asdict(self.statistics),
+            "settings": {
+                title: {**found.settings.values(), **values_of(found, found.best())}
+                for title, found in self.tried.items()
+            },
+            **provenance(),
+        }
+        (folder / "class_models.json").write_text(json.dumps(written, indent=2))
+        tried = enumerate(self.tried.values())
+        arrays: dict[str, Any] = {f"images_{i}": found.images.numpy() for i, found in tried}
+        np.savez_compressed(folder / "class_models.npz", **arrays)
+
+    def __str__(self) -> str:
+        return f"{aligned(self.rows())}\n{seed_line(self.seed.as_dict())}"
+
+    def _repr_html_(self) -> str:
+        head, *rows = self.rows()
+        return table(head, rows, [seed_line(self.seed.as_dict())]) + picture(self.image())
+
+
+def class_models(
+    policy: str | Path | BasePolicy | Logits,
+    settings: ClassModelsSettings | None = None,
+    *,
+    task: Mapping[str, Any] | None = None,
+    outputs: str | Path = "outputs",
+    **changes: Any,
+) -> ClassModels:
+    """Optimize an observation for each action of a policy (section 5.2, Eq. 18).
+
+    `drone_rl.explain` tries several settings and keeps the best; this function uses those given.
+
+    Args:
+        policy: The policy, what `load_policy` takes, or a callable, see `policy_from`.
+        settings: Of the gradient ascent; with `gallery` one row for each refinement.
+        task: Changes to the policy's task.
+        outputs: See `load_policy`.
+        changes: Changes to the settings, as in `class_models("good", maximize="probability")`.
+
+    Raises:
+        InputError: The policy or a setting is unusable, or the images diverge.
+    """
+    settings, seed = with_seed((settings or ClassModelsSettings()).replace(**changes))
+    subject = as_policy(policy, outputs=outputs)
+    subject = subject.in_task(**task) if task else subject
+    network = subject.make_network()
+    if not network.is_differentiable:
+        raise InputError(NO_GRADIENTS)
+    with subject.flying(min(settings.episodes, _BATCH), seed=seed.value) as (env, actor):
+        seen = collect(env, actor, num_episodes=settings.episodes).tensor("observations")
+        channels = Scenes(env).channels
+    statistics = ImageStatistics.of(seen)
+    tried = {"given settings": settings.as_base(ClassModelSettings)}
+    if settings.gallery:
+        tried = {title: ClassModelSettings(**changed) for title, changed in GALLERY.items()}
+    return ClassModels(
+        subject,
+        {t: visualise(network, statistics, one, seed=seed.value) for t, one in tried.items()},
+        statistics,
+        shown_actions({"actions": actions_of(network).as_dict()}),
+        channels,
+        seed,
+    )
