@@ -5,6 +5,7 @@ from typing import Any
 
 from benchmarks.accessibility import bench_accessibility
 from benchmarks.benchmark import Benchmark, Setup
+from benchmarks.chapter import bench_chapter
 from benchmarks.coverage import bench_coverage
 from benchmarks.domain_axes import bench_domain_axes
 from benchmarks.exact_coverage import bench_exact_coverage
@@ -284,6 +285,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_revisions(s.runs / "revisions", s.quick),
         "system",
         (*_TRAINING, "evaluation", "explanations", "cli", "conf", "benchmarks/revisions"),
+    ),
+    "chapter": Benchmark(
+        lambda s: bench_chapter(s.runs / "chapter", s.quick),
+        "long",
+        (*_TRAINING, "acceleration", "flight/commands", "conf", "benchmarks/chapter"),
     ),
     "mistakes": Benchmark(
         lambda s: bench_mistakes(s.runs / "mistakes"),

@@ -410,6 +410,24 @@ MAIN = (
         _class_models,
         "0.99",
     ),
+    Row(
+        "chapter",
+        "`experiment=original`, best of three learning rates: seeds of 5 that reach 2.99 of 3",
+        lambda f: f"{f['original_solved']} (learning rate {f['original_rate']:g})",
+        "4",
+    ),
+    Row(
+        "chapter",
+        "its time for 30,000 episodes, minutes; frames/s relative to stepping in Python",
+        lambda f: f"{f['original_minutes']:.1f}; {f['original_speedup']:.1f} times",
+        "15; 3 times",
+    ),
+    Row(
+        "chapter",
+        "elements of the chapter that a command or test shows; cases of signs and cameras",
+        lambda f: f"{f['chapter_shown']} of {f['chapter_elements']}; {f['convention_cases']}",
+        "all; 30",
+    ),
     Row("explain", "size of report.html", lambda f: f"{f['report_mib']:.1f} MiB", "10 MB"),
     Row(
         "sweeps",

@@ -1,0 +1,143 @@
+"""The chapter's own algorithm, trained to its criterion, and the chapter's elements and signs."""
+
+import os
+import re
+import statistics
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from benchmarks.commands import call, train
+from benchmarks.revisions import extract
+from drone_rl.cli.commands import COMMANDS
+from drone_rl.sweeps.executors import PROGRAM
+from drone_rl.utils.files import read_json
+
+BEFORE = "3e5d8a0b"
+"""The last revision that stepped the original network and camera in Python."""
+RATES = (3e-5, 1e-4, 1e-3)
+"""Learning rates; the chapter's program has the middle one."""
+SEEDS = range(5)
+EPISODES = 30_000
+"""Episodes after which the chapter's program stops."""
+_ROOT = Path(__file__).resolve().parents[1]
+_ELEMENT = re.compile(r"^\| ((?:Eq\.|Algorithm|Table|Listing|Fig\.) \d+) \|(.*)\|$", re.MULTILINE)
+_COMMAND = re.compile(r"`drone-rl ([\w-]+)")
+_TEST = re.compile(r"`(tests/\S+\.py)`")
+_CONVENTIONS = "tests/flight/commands/test_conventions.py"
+
+
+def bench_chapter(folder: Path, quick: bool, *, root: Path = _ROOT) -> dict[str, Any]:
+    """Train `experiment=original` at three rates, and count elements and conventions.
+
+    Args:
+        folder: Folder of the runs.
+        quick: Whether to train each rate once, for a few episodes.
+        root: Checkout.
+
+    Returns:
+        "original_runs": by rate, for each seed whether it reached the chapter's criterion, its
+        episodes, seconds, and kind of verdict; "original_rate": the best rate;
+        "original_solved": seeds that it solves; "original_minutes": minutes of 30,000 episodes
+        that stop for no criterion; "original_speedup": frames per second over those of `BEFORE`;
+        "chapter_elements", "chapter_shown", see `count_elements`; "convention_cases" that agree.
+
+    Raises:
+        RuntimeError: A command or the tests of conventions failed.
+    """
+    seeds = SEEDS[:1] if quick else SEEDS
+    runs = {f"{rate:g}": train_rate(folder / f"{rate:g}", rate, seeds, quick) for rate in RATES}
+    best = max(runs, key=lambda rate: sum(run["solved"] for run in runs[rate]))
+    elements, shown = count_elements(root / "docs" / "chapter.md", root)
+    return {
+        "original_runs": runs,
+        "original_rate": float(best),
+        "original_solved": sum(run["solved"] for run in runs[best]),
+        "original_minutes": minutes(folder / "whole", 100 if quick else EPISODES),
+        "original_speedup": speedup(folder / "speed", 1 if quick else 3, root=root),
+        "chapter_elements": elements,
+        "chapter_shown": shown,
+        "convention_cases": count_conventions(root),
+    }
+
+
+def train_rate(
+    folder: Path, rate: float, seeds: Sequence[int], quick: bool
+) -> list[dict[str, Any]]:
+    """Train with a learning rate from each seed, two at a time, and judge the policies."""
+    limit = ["trainer.total_episodes=20"] if quick else []
+
+    def one(seed: int) -> dict[str, Any]:
+        run = folder / str(seed)
+        settings = ["experiment=original", f"optimizer.lr={rate:g}", f"seed={seed}", *limit]
+        seconds, result = train(run, *settings)
+        place = f"hydra.run.dir={run}/verdict"
+        call("verdict", f"policy={run}", "seed=0", place, statuses=tuple(range(20)))
+        verdict = read_json(run / "verdict" / "verdict.json")
+        return {
+            "solved": result["reason"] == "solved",
+            **{"episodes": result["episodes"], "frames": result["frames"], "seconds": seconds},
+            "verdict": f"{verdict['kind']}{'' if verdict['certain'] else ' (not certain)'}",
+        }
+
+    with ThreadPoolExecutor(2) as pool:
+        return list(pool.map(one, seeds))
+
+
+def minutes(folder: Path, episodes: int) -> float:
+    """Return the minutes of 30,000 episodes, from so many that no criterion ends."""
+    settings = ["experiment=original", "seed=0", "trainer.target_share=null"]
+    seconds, _ = train(folder, *settings, f"trainer.total_episodes={episodes}")
+    return seconds / 60 * EPISODES / episodes
+
+
+def speedup(folder: Path, times: int, *, root: Path, episodes: int = 150) -> float:
+    """Return frames per second of training, over those of `BEFORE`: medians of alternate runs."""
+    trees = {"before": extract(BEFORE, folder.resolve() / "tree", root), "after": root}
+    rates: Mapping[str, list[float]] = {name: [] for name in trees}
+    settings = ["experiment=original", "seed=0", "trainer.target_share=null"]
+    for i in range(times):
+        for name, tree in trees.items():
+            run = folder.resolve() / f"{name}_{i}"
+            command = [*PROGRAM, "train", *settings, f"trainer.total_episodes={episodes}"]
+            done = subprocess.run(
+                [*command, f"hydra.run.dir={run}"],
+                cwd=tree,
+                env={**os.environ, "PYTHONPATH": str(tree)},
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            if done.returncode:
+                raise RuntimeError(f"a training in {tree} failed: {done.stderr.strip()[-500:]}")
+            result = read_json(run / "result.json")
+            rates[name].append(result["frames"] / result["seconds"])
+    return statistics.median(rates["after"]) / statistics.median(rates["before"])
+
+
+def count_elements(page: Path, root: Path) -> tuple[int, int]:
+    """Return the number of rows of the page, and of those with a command or a test that exists."""
+    rows = _ELEMENT.findall(page.read_text("utf-8"))
+    shown = 0
+    for _, cells in rows:
+        commands, tests = _COMMAND.findall(cells), _TEST.findall(cells)
+        exist = [name in COMMANDS for name in commands] + [(root / t).is_file() for t in tests]
+        shown += bool(exist) and all(exist)
+    return len(rows), shown
+
+
+def count_conventions(root: Path) -> int:
+    """Return the number of hand-computed cases of signs and cameras that agree.
+
+    Raises:
+        RuntimeError: One does not.
+    """
+    command = [sys.executable, "-m", "pytest", "-q", _CONVENTIONS]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
+    passed = re.search(r"(\d+) passed", done.stdout)
+    if done.returncode or passed is None:
+        raise RuntimeError(f"the tests of conventions failed: {done.stdout.strip()[-500:]}")
+    return int(passed[1])
