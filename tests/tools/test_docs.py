@@ -205,3 +205,5 @@ def test_a_copy_of_the_checkout_runs_a_page(tmp_path):
     assert outcome.status == RAN, outcome
     kept = json.loads((tmp_path / "out" / "README.json").read_text())
     assert kept["outcomes"][0]["printed"] == "the copy\n"
+    (tmp_path / "docs" / "table.md").write_text("| no | blocks |\n")
+    assert run.run_page("docs/table.md", tmp_path / "out", tmp_path) == []

@@ -31,6 +31,8 @@ def run_page(page: str, results: Path = RESULTS, root: Path = ROOT) -> list[Outc
     Raises:
         RuntimeError: The page could not be run at all.
     """
+    if not read_blocks(page, root):
+        return []
     name = page.removesuffix(".md").replace("/", "_")
     kept, digest = results / f"{name}.json", _digest(page, root)
     if kept.exists():
