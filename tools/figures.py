@@ -41,7 +41,7 @@ def plot_placebos(truth: Mapping[str, Any], path: Path, policy: str) -> None:
     axes.invert_yaxis()
     axes.axvline(0, color="0.3", linewidth=0.8)
     axes.set(
-        xlabel="rank correlation with the change of the output "
+        xlabel="rank correlation with the change of the output\n"
         "when a patch is re-rendered (95% CI)",
         xlim=(None, 1.2),
     )
