@@ -53,6 +53,9 @@ class Drone:
     command is waited for.
     """
 
+    _most_recorded: int | None = None
+    """States that the trajectory keeps, the last ones; None for all."""
+
     def __init__(
         self,
         dynamics: DynamicsSettings | Quadrotor | None = None,
@@ -112,7 +115,7 @@ class Drone:
         self._initial = copy.deepcopy((self.body, worlds.state if worlds else None, sensors))
         self.has_api_control = True
         """Whether commands are accepted; see `enable_api_control`."""
-        self.trajectory = Trajectory()
+        self.trajectory = Trajectory(self._most_recorded)
         """The states of all control periods so far."""
         self.trajectory.append(self.time, self.body)
         self._sensors = None if sensors is None else Sensors(self.body, sensors, self._seed)
@@ -173,7 +176,7 @@ class Drone:
         self.body, state, sensors = copy.deepcopy(self._initial)
         if self.worlds is not None and state is not None:
             self.worlds.state = state
-        self.trajectory = Trajectory()
+        self.trajectory = Trajectory(self._most_recorded)
         self.trajectory.append(self.time, self.body)
         self._sensors = None if sensors is None else Sensors(self.body, sensors, self._seed)
         self._is_armed, self._landed = False, LandedState.LANDED
