@@ -20,7 +20,13 @@ _READY = re.compile(r"127\.0\.0\.1:(\d+)")
 _YAW = {"is_rate": True, "yaw_or_rate": 0.0}
 _REQUEST = {"camera_name": "0", "image_type": 0, "pixels_as_float": False, "compress": False}
 _POSING = '{"SimMode": "ComputerVision"}'
-METHODS_1_8 = frozenset(
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+METHODS_1_8 = _words(
     """
     armDisarm cancelLastTask enableApiControl getBarometerData getDistanceSensorData getGpsData
     getHomeGeoPoint getImuData getLidarData getMagnetometerData getMinRequiredClientVersion
@@ -41,7 +47,7 @@ METHODS_1_8 = frozenset(
     simSetSegmentationObjectID simSetTimeOfDay simSetTraceLine simSetVehiclePose
     simSetWeatherParameter simSetWind simSpawnObject simTestLineOfSightBetweenPoints
     simTestLineOfSightToPoint startRecording stopRecording takeoff
-    """.split()
+    """
 )
 """Methods of the multirotor client 1.8.1 that are no lidar, car, or asset of Unreal."""
 

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from benchmarks.accessibility import bench_accessibility
-from benchmarks.benchmark import Benchmark, Setup
 from benchmarks.airsim import bench_airsim
+from benchmarks.benchmark import Benchmark, Setup
 from benchmarks.chapter import bench_chapter
 from benchmarks.coverage import bench_coverage
 from benchmarks.domain_axes import bench_domain_axes

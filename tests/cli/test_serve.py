@@ -39,7 +39,7 @@ def test_it_says_when_clients_can_connect_and_ends_by_ctrl_c(tmp_path):
     [
         (("scene=moon",), "scene=moon is unknown"),
         (("settings=none.json",), "settings=none.json can't be read"),
-        (("clock=fast",), "clock=fast is unknown"),
+        (("clock=fast",), "clock='fast' is unknown"),
     ],
 )
 def test_wrong_settings_are_one_line(tmp_path, args, message):

@@ -34,7 +34,7 @@ FLIGHT = (
     ),
     Row(
         "airsim",
-        "methods of the multirotor client 1.8.1 that work, without lidar; crafted messages survived; "
+        "methods of the multirotor client 1.8.1 that work (not lidar); crafted messages survived; "
         "growth over an hour of simulated traffic, MiB; two runs in lockstep are the same",
         lambda f: (
             f"{percent(f['airsim_methods_share'])}; {f['airsim_fuzz_survived']:,}; "

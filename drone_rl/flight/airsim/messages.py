@@ -130,7 +130,9 @@ def text(value: Any, name: str) -> str:
     return value
 
 
-def read_map(value: Any, name: str, keys: Sequence[str], *, can_be_nan: bool = False) -> list[float]:
+def read_map(
+    value: Any, name: str, keys: Sequence[str], *, can_be_nan: bool = False
+) -> list[float]:
     """Return the numbers of a map, in the order of its keys; other keys are ignored."""
     if not isinstance(value, Mapping):
         raise InputError(f"{name}={shown(value)} is not a map; give {', '.join(keys)}")

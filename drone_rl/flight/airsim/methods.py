@@ -348,9 +348,7 @@ for _label, _has_height, _in_body in (
     ("moveByVelocityZBodyFrame", True, True),
 ):
     method(_label, least=4)(
-        functools.partial(
-            _move_velocity, has_height=_has_height, in_body=_in_body, name=_label
-        )
+        functools.partial(_move_velocity, has_height=_has_height, in_body=_in_body, name=_label)
     )
 
 
@@ -366,9 +364,7 @@ def _move_path(simulation: Simulation, args: Sequence[Any]) -> Any:
     vehicle = _vehicle(simulation, args, 7)
     path = read_path(args[0])
     ahead = _lookahead(args, 5)
-    return _flown(
-        vehicle.move_path(path, speed, timeout, drivetrain, yaw, *ahead), "moveOnPath"
-    )
+    return _flown(vehicle.move_path(path, speed, timeout, drivetrain, yaw, *ahead), "moveOnPath")
 
 
 @method("moveToPosition", least=4)
@@ -377,9 +373,7 @@ def _move_to(simulation: Simulation, args: Sequence[Any]) -> Any:
     timeout = number(_at(args, 4, 1e6), "timeout_sec")
     drivetrain, yaw = read_yaw_mode(_at(args, 6, _HELD), _at(args, 5, 0))
     vehicle = _vehicle(simulation, args, 9)
-    future = vehicle.move_path(
-        [(x, y, z)], speed, timeout, drivetrain, yaw, *_lookahead(args, 7)
-    )
+    future = vehicle.move_path([(x, y, z)], speed, timeout, drivetrain, yaw, *_lookahead(args, 7))
     return _flown(future, "moveToPosition")
 
 
@@ -629,7 +623,9 @@ class _Request:
 
 def _read_request(value: Any, channels: str | None = None) -> _Request:
     if not isinstance(value, dict):
-        raise InputError("an image request is not a map; give ImageRequest(camera, image_type, ...)")
+        raise InputError(
+            "an image request is not a map; give ImageRequest(camera, image_type, ...)"
+        )
     given = {k.decode() if isinstance(k, bytes) else k: v for k, v in value.items()}
     legacy = "camera_id" in given
     if "image_type" not in given or not ("camera_name" in given or legacy):
@@ -927,12 +923,12 @@ def _accepted(simulation: Simulation, args: Sequence[Any]) -> None:
     """Do nothing: what the call changes is only seen in Unreal's window."""
 
 
-for _label in (
-    "simPrintLogMessage simSetTraceLine simFlushPersistentMarkers simPlotPoints simPlotLineStrip "
-    "simPlotLineList simPlotArrows simPlotStrings simPlotTransforms simPlotTransformsWithNames "
-    "simToggleCameraWindow"
-).split():
-    method(_label)(_accepted)
+_NOT_SHOWN = """
+simPrintLogMessage simSetTraceLine simFlushPersistentMarkers simPlotPoints simPlotLineStrip
+simPlotLineList simPlotArrows simPlotStrings simPlotTransforms simPlotTransformsWithNames
+simToggleCameraWindow
+"""
+method(*_NOT_SHOWN.split())(_accepted)
 
 
 @method("simRunConsoleCommand")
@@ -953,4 +949,3 @@ def _gains(simulation: Simulation, args: Sequence[Any]) -> None:
         if not isinstance(value, list | tuple) or len(value) > 4:
             raise InputError(f"{name} is not a list of gains; give three or four numbers")
     _log.warning("controller gains are fixed here; the call has no effect")
-

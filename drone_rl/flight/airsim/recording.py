@@ -33,7 +33,9 @@ class Recording:
         self.path = folder / now
         try:
             (self.path / "images").mkdir(parents=True)
-            self._table: io.TextIOWrapper = (self.path / "airsim_rec.txt").open("w", encoding="utf-8")
+            self._table: io.TextIOWrapper = (self.path / "airsim_rec.txt").open(
+                "w", encoding="utf-8"
+            )
         except OSError as error:
             raise InputError(
                 f"recordings can't be written to {folder} ({error.strerror}); choose another folder"

@@ -31,7 +31,7 @@ MAX_UNSENT = 2**25
 """Bytes of replies that a client may leave unread before its requests wait."""
 SLICE = 0.005
 """Seconds of simulation between two looks at the sockets."""
-PATIENCE = 0.002
+PATIENCE = 0.005
 """Seconds without a request after which lockstep time goes on: what a client asks right after it
 starts a movement is answered at the same simulated time every run."""
 MOST_PATIENCE = 0.02
@@ -92,7 +92,7 @@ class _Client(asyncio.Protocol):
         try:
             self._unpacker.feed(data)
             self._backlog.extend(self._unpacker)
-        except Exception as error:  # noqa: BLE001 (msgpack raises many types for crafted bytes)
+        except Exception as error:
             self._break(f"its bytes are no msgpack ({type(error).__name__})")
             return
         self._work()
@@ -258,9 +258,7 @@ class AirsimServer:
                 if left <= 0.0 or simulation.clock == "lockstep":
                     await asyncio.sleep(0)
                     continue
-                self._wake.clear()
-                with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(self._wake.wait(), min(left, _POLL))
+                await self._sleep(min(left, _POLL))
         finally:
             self.close()
 
@@ -270,14 +268,20 @@ class AirsimServer:
         Another client that asks without pause delays a call by `MOST_PATIENCE` only.
         """
         while not self.simulation.is_waited_for or self.simulation.is_paused:
-            self._wake.clear()
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._wake.wait(), _POLL)
+            await self._sleep(_POLL)
         while True:
             quiet = min(self.last_request + PATIENCE, self._asked + MOST_PATIENCE)
             if (left := quiet - time.monotonic()) <= 0.0:
                 return
             await asyncio.sleep(left)
+
+    async def _sleep(self, seconds: float) -> None:
+        """Sleep until a call waits, at most so long."""
+        self._wake.clear()
+        # not asyncio.wait_for, which can lose a cancellation
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                await self._wake.wait()
 
     def close(self) -> None:
         """Stop listening and close all connections."""

@@ -114,6 +114,10 @@ class _Table:
     """Keys that AirSim has and that mean nothing here."""
 
 
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
 _NUMBER = Real(-1e9, 1e9)
 _POSE = dict.fromkeys(("X", "Y", "Z", "Roll", "Pitch", "Yaw"), _NUMBER)
 _CAPTURE = _Table(
@@ -123,9 +127,9 @@ _CAPTURE = _Table(
         "Height": Whole(1, 4096),
         "FOV_Degrees": Real(1.0, 170.0),
     },
-    frozenset(
+    _words(
         "AutoExposureSpeed AutoExposureBias AutoExposureMaxBrightness AutoExposureMinBrightness "
-        "MotionBlurAmount TargetGamma ProjectionMode OrthoWidth".split()
+        "MotionBlurAmount TargetGamma ProjectionMode OrthoWidth"
     ),
 )
 _CAMERA = _Table(
@@ -140,11 +144,11 @@ _VEHICLE = _Table(
         "AllowAPIAlways": Flag(),
         "Cameras": {"": _CAMERA},
     },
-    frozenset(
+    _words(
         "EnableCollisions EnableCollisionPassthrogh EnableTrace RC Sensors PawnPath IsFpvVehicle "
         "UseSerial UseTcp TcpPort ControlIp ControlPort ControlPortLocal ControlPortRemote UdpIp "
         "UdpPort SerialPort SerialBaudRate LockStep Parameters Model QgcHostIp LocalHostIp SitlIp "
-        "SitlPort SimSysID SimCompID VehicleSysID VehicleCompID OffboardSysID OffboardCompID".split()
+        "SitlPort SimSysID SimCompID VehicleSysID VehicleCompID OffboardSysID OffboardCompID"
     ),
 )
 _FILE = _Table(
@@ -170,11 +174,11 @@ _FILE = _Table(
             frozenset({"MeshNamingMethod", "OverrideExisting"}),
         ),
     },
-    frozenset(
+    _words(
         "ClockType ViewMode SubWindows Recording PawnPaths TimeOfDay LogMessagesVisible RpcEnabled "
         "PhysicsEngineName EngineSound SpeedUnitFactor SpeedUnitLabel RecordUIVisible "
         "MoveWorldOrigin PawnPaths CameraDirector DefaultSensors Beacons ExternalCameras "
-        "ShowLosDebugLines InitialInstanceSegmentation ApiServerEndpoint PhysicsEngine".split()
+        "ShowLosDebugLines InitialInstanceSegmentation ApiServerEndpoint PhysicsEngine"
     ),
 )
 
@@ -261,23 +265,27 @@ def _read(table: _Table, data: Any, path: str, name: str) -> dict[str, Any]:
     for key, value in data.items():
         where = f"{path}.{key}" if path else key
         kind = table.keys.get(key)
-        if kind is None:
-            if key not in table.unused:
-                meant = did_you_mean(key, (*table.keys, *table.unused))
-                _log.warning("%s: %s is unknown and ignored%s", name, where, meant)
-        elif isinstance(kind, _Table):
-            found[key] = _read(kind, value, where, name)
-        elif isinstance(kind, list):
-            if not isinstance(value, list):
-                raise InputError(f"{name}: {where} is not a list; write [...]")
-            found[key] = [_read(kind[0], v, f"{where}[{i}]", name) for i, v in enumerate(value)]
-        elif isinstance(kind, Mapping):
-            if not isinstance(value, Mapping):
-                raise InputError(f"{name}: {where} is not an object; write {{...}}")
-            found[key] = {k: _read(kind[""], v, f"{where}.{k}", name) for k, v in value.items()}
-        else:
-            found[key] = _value(kind, value, f"{name}: {where}")
+        if kind is not None:
+            found[key] = _read_as(kind, value, where, name)
+        elif key not in table.unused:
+            meant = did_you_mean(key, (*table.keys, *table.unused))
+            _log.warning("%s: %s is unknown and ignored%s", name, where, meant)
     return found
+
+
+def _read_as(kind: Any, value: Any, where: str, name: str) -> Any:
+    """Read a value of a kind, which may be a table, or a list or mapping of a table."""
+    if isinstance(kind, _Table):
+        return _read(kind, value, where, name)
+    if isinstance(kind, list):
+        if not isinstance(value, list):
+            raise InputError(f"{name}: {where} is not a list; write [...]")
+        return [_read(kind[0], v, f"{where}[{i}]", name) for i, v in enumerate(value)]
+    if isinstance(kind, Mapping):
+        if not isinstance(value, Mapping):
+            raise InputError(f"{name}: {where} is not an object; write {{...}}")
+        return {k: _read(kind[""], v, f"{where}.{k}", name) for k, v in value.items()}
+    return _value(kind, value, f"{name}: {where}")
 
 
 def _value(kind: Kind, value: Any, where: str) -> Any:
@@ -324,7 +332,9 @@ def _captures(given: Mapping[str, Any]) -> dict[ImageType, Capture]:
     found: dict[ImageType, Capture] = {}
     for own in given.get("CaptureSettings", []):
         kind = own.get("ImageType", 0)
-        kinds = list(ImageType) if kind == -1 else [ImageType(kind)] if kind < len(ImageType) else []
+        kinds = (
+            list(ImageType) if kind == -1 else [ImageType(kind)] if kind < len(ImageType) else []
+        )
         for one in kinds:
             old = found.get(one, Capture())
             found[one] = Capture(

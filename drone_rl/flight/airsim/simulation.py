@@ -2,6 +2,7 @@
 
 import dataclasses
 import logging
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -10,7 +11,13 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.flight.airsim.messages import Pose, ned, ned_attitude, read_pose
 from drone_rl.flight.airsim.messages import pose as pose_map
 from drone_rl.flight.airsim.recording import Recording
-from drone_rl.flight.airsim.settings_file import FLYING, POSING, AirsimSettings, Offset, VehicleChoice
+from drone_rl.flight.airsim.settings_file import (
+    FLYING,
+    POSING,
+    AirsimSettings,
+    Offset,
+    VehicleChoice,
+)
 from drone_rl.flight.airsim.stage import CameraState, Stage
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.utils.errors import InputError, did_you_mean
@@ -194,25 +201,28 @@ class Simulation:
         Returns:
             Seconds after which there is more to do; infinite if only a call can change that.
         """
-        begin = time.monotonic()
+        end = time.monotonic() + budget
         if self.clock == "lockstep":
-            while self._waits and not self.is_paused:
-                self._period()
-                if time.monotonic() - begin > budget:
-                    return 0.0
-            return float("inf")
+            return self._run_lockstep(end)
         if self.is_paused:
             self._hold_anchor()
-            return float("inf")
+            return math.inf
         while (left := self._left()) <= 0.0:
             self._period()
             if self.is_paused:
-                return float("inf")
-            if time.monotonic() - begin > budget:
+                return math.inf
+            if time.monotonic() > end:
                 if self._left() < -1.0:  # the machine is too slow: time falls behind
                     self._hold_anchor()
                 return 0.0
         return left
+
+    def _run_lockstep(self, end: float) -> float:
+        while self._waits and not self.is_paused:
+            self._period()
+            if time.monotonic() > end:
+                return 0.0
+        return math.inf
 
     def _left(self) -> float:
         """Seconds of real time until the next control period is due."""

@@ -25,7 +25,7 @@ from drone_rl.sim.rendering import Appearance, Distractors, Mounting
 from drone_rl.sim.rendering.appearance import product, turned, zoom_for_fov
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.view import Modality
-from drone_rl.sim.tasks import CollectCubes, State, Task, as_task
+from drone_rl.sim.tasks import CollectCubes, Task, as_task
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError, did_you_mean
@@ -46,7 +46,9 @@ class _Fixed(Task[Any]):
 
     name = "scene"
 
-    def __init__(self, entities: Sequence[Any], places: Tensor, solid: Sequence[float] | None):
+    def __init__(
+        self, entities: Sequence[Any], places: Tensor, solid: Sequence[float] | None
+    ) -> None:
         self._entities, self._places, self._solid = entities, places, solid
 
     def make_props(self) -> Sequence[Any]:
@@ -82,7 +84,7 @@ class _File(VisualEntity):
     def _build(self, path: Path) -> None:
         try:
             self._mjcf_root = mjcf.from_path(str(path), escape_separators=True)
-        except (OSError, ValueError, KeyError, AttributeError, TypeError) as error:
+        except (OSError, SyntaxError, ValueError, KeyError, AttributeError, TypeError) as error:
             reason = str(error).strip().splitlines()[0] if str(error) else type(error).__name__
             raise InputError(
                 f"scene={path} can't be read as a MuJoCo model ({reason}); give a valid MJCF file"

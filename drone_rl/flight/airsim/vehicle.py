@@ -8,7 +8,6 @@ from typing import Any
 import torch
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.config.sensors import SensorSettings
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.messages import Map, Pose, nanoseconds, ned, ned_attitude, to_world
 from drone_rl.flight.airsim.settings_file import POSING, Offset, VehicleChoice
@@ -173,7 +172,11 @@ class Vehicle(Pilot):
         """Return RotorStates: thrust in newtons; speed in radians per second."""
         most = self.settings.rotor_thrust
         rotors = [
-            {"thrust": share * most, "torque_scaler": 1.0, "speed": _FASTEST * max(share, 0.0) ** 0.5}
+            {
+                "thrust": share * most,
+                "torque_scaler": 1.0,
+                "speed": _FASTEST * max(share, 0.0) ** 0.5,
+            }
             for share in self.body.rotors[0].tolist()
         ]
         return {"rotors": rotors, "timestamp": nanoseconds(self.time)}
@@ -242,9 +245,7 @@ class Vehicle(Pilot):
             "penetration_depth": float(contact.depth[0]) if touched else 0.0,
             "time_stamp": nanoseconds(time) if touched else 0,
             "normal": messages.vector(ned(contact.normal) if touched else nothing),
-            "impact_point": messages.vector(
-                ned(contact.point - self.home) if touched else nothing
-            ),
+            "impact_point": messages.vector(ned(contact.point - self.home) if touched else nothing),
             "position": messages.vector(self._relative(self.body) if touched else nothing),
             "object_name": name,
             "object_id": number,
@@ -366,7 +367,13 @@ class Vehicle(Pilot):
         )
 
     def move_height(
-        self, z: float, speed: float, timeout: float, yaw: YawMode, lookahead: float, adaptive: float
+        self,
+        z: float,
+        speed: float,
+        timeout: float,
+        yaw: YawMode,
+        lookahead: float,
+        adaptive: float,
     ) -> FlightFuture | None:
         """Fly straight up or down."""
         x, y, _ = self._relative(self.body)
@@ -416,9 +423,7 @@ class Vehicle(Pilot):
         if yaw_rate is not None:
             turn["yaw_rate"] = yaw_rate * _UNITS
         lift = {"z": self._height(z)} if z is not None else {"throttle": throttle}
-        return self._moved(
-            "move_by_angle", roll * _UNITS, pitch * _UNITS, seconds, **turn, **lift
-        )
+        return self._moved("move_by_angle", roll * _UNITS, pitch * _UNITS, seconds, **turn, **lift)
 
     def spin(
         self, rates: Sequence[float], seconds: float, *, z: float | None, throttle: float | None
@@ -452,7 +457,9 @@ class Vehicle(Pilot):
     def set_airsim_pose(self, pose: Pose, *, ignore_collision: bool) -> None:
         """Put it somewhere at once; NaN components stay. Velocities are kept."""
         now = self.pose
-        place = [n if math.isnan(v) else v for v, n in zip(pose.position, now.position, strict=True)]
+        place = [
+            n if math.isnan(v) else v for v, n in zip(pose.position, now.position, strict=True)
+        ]
         turn = pose.attitude if not any(map(math.isnan, pose.attitude)) else now.attitude
         there = self.home + torch.tensor(to_world(place), dtype=torch.float64)
         if not ignore_collision:
@@ -551,4 +558,3 @@ def _gps(vehicle: Vehicle) -> Map:
 
 
 _SENSORS = {"imu": _imu, "barometer": _barometer, "magnetometer": _magnetometer, "gps": _gps}
-

@@ -24,7 +24,7 @@ def run(request, start):
         pytest.skip(f"{name} is not installed; run python -m tools.airsim_clients")
 
     def call(script, text=None, *args, **settings):
-        server, client = start(text, **settings)
+        server, _client = start(text, **settings)
         command = [str(python), str(SCRIPTS / script), CLIENTS[name].module, str(server.address[1])]
         done = subprocess.run(
             [*command, *map(str, args)], capture_output=True, text=True, timeout=300, check=False

@@ -37,13 +37,13 @@ def test_frames_by_hand():
 @pytest.mark.parametrize(
     ("read", "value", "message"),
     [
-        (lambda v: messages.number(v, "x"), "1", "x=1 is not a number"),
+        (lambda v: messages.number(v, "x"), "1", "x='1' is not a number"),
         (lambda v: messages.number(v, "x"), True, "is not a number"),
         (lambda v: messages.number(v, "x"), math.nan, "x=nan is out of range"),
         (lambda v: messages.number(v, "x"), math.inf, "out of range"),
         (lambda v: messages.number(v, "x", 0, 1), 2, "x=2 is out of range; give 0 to 1"),
         (lambda v: messages.whole(v, "n", 0, 9), 1.5, "n=1.5 is not a whole number"),
-        (lambda v: messages.flag(v, "b"), "yes", "b=yes is neither true nor false"),
+        (lambda v: messages.flag(v, "b"), "yes", "b='yes' is neither true nor false"),
         (lambda v: messages.text(v, "t"), 7, "t=7 is not a text"),
         (lambda v: messages.text(v, "t"), "x" * 10_001, "is not a text"),
         (messages.read_pose, 7, "pose=7 is not a map"),
@@ -52,7 +52,11 @@ def test_frames_by_hand():
         (messages.read_path, [], "path is not a list of 1 to"),
         (messages.read_path, [{"x_val": 1, "y_val": 2, "z_val": math.nan}], r"path\[0\].z_val=nan"),
         (messages.attitude_to_world, [0.0, 0.0, 0.0, 0.0], "is no rotation"),
-        (lambda v: messages.read_yaw_mode(v, 1), {"is_rate": True, "yaw_or_rate": 5.0}, "ForwardOnly"),
+        (
+            lambda v: messages.read_yaw_mode(v, 1),
+            {"is_rate": True, "yaw_or_rate": 5.0},
+            "ForwardOnly",
+        ),
         (lambda v: messages.read_yaw_mode({}, v), 2, "drivetrain=2 is out of range"),
     ],
 )

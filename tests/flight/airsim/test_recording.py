@@ -7,7 +7,7 @@ from drone_rl.flight.airsim.recording import INTERVAL, to_letters
 
 
 def test_a_recording_is_a_table_and_images(start, tmp_path):
-    server, client = start(recordings=tmp_path / "recordings")
+    _server, client = start(recordings=tmp_path / "recordings")
     client.call("enableApiControl", True)
     client.call("startRecording")
     client.call("startRecording")  # goes on

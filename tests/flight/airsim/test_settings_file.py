@@ -90,7 +90,10 @@ def test_all_parts_of_a_file():
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("{'a//b': 1, \"c\": 'it\\'s', 'd': 'say \"x\"', }", {"a//b": 1, "c": "it's", "d": 'say "x"'}),
+        (
+            "{'a//b': 1, \"c\": 'it\\'s', 'd': 'say \"x\"', }",
+            {"a//b": 1, "c": "it's", "d": 'say "x"'},
+        ),
         ('{"x": [1, 2, /* two */ ], // end\n}', {"x": [1, 2]}),
     ],
 )
@@ -112,13 +115,19 @@ def test_unknown_keys_are_warned_about_and_others_are_not(caplog):
     ("text", "message"),
     [
         ("{'SimMode': 'Car'}", "SimMode=Car is not supported; give Multirotor or ComputerVision"),
-        ("{'SimMode': 'Boat'}", "SimMode=Boat is unknown"),
+        ("{'SimMode': 'Boat'}", "SimMode='Boat' is unknown"),
         ("{'ApiServerPort': 70000}", "ApiServerPort=70000 is out of range"),
-        ("{'ApiServerPort': '1'}", "ApiServerPort=1 is out of range"),
+        ("{'ApiServerPort': '1'}", "ApiServerPort='1' is out of range"),
         ("{'ClockSpeed': 0}", "ClockSpeed=0 is out of range"),
-        ("{'Vehicles': {'A': {'X': 'far'}}}", "Vehicles.A.X=far"),
-        ("{'Vehicles': {'A': {'VehicleType': 'PhysXCar'}}}", "VehicleType=PhysXCar is not supported"),
-        ("{'Vehicles': {'A': {'Cameras': {'side': {}}}}}", "Cameras.side: camera 'side' is unknown"),
+        ("{'Vehicles': {'A': {'X': 'far'}}}", "Vehicles.A.X='far'"),
+        (
+            "{'Vehicles': {'A': {'VehicleType': 'PhysXCar'}}}",
+            "VehicleType=PhysXCar is not supported",
+        ),
+        (
+            "{'Vehicles': {'A': {'Cameras': {'side': {}}}}}",
+            "Cameras.side: camera 'side' is unknown",
+        ),
         ("{'Vehicles': []}", "Vehicles is not an object"),
         ("{'Vehicles': {'A': 1}}", "Vehicles.A is not an object"),
         ("{'CameraDefaults': {'CaptureSettings': {}}}", "CaptureSettings is not a list"),

@@ -158,12 +158,14 @@ def test_blocks_can_be_touched_and_a_file_is_shown(tmp_path):
     house.close()
 
 
-@pytest.mark.parametrize(("text", "message"), [("<mujoco><", "can't be read"), ("", "can't be read")])
+@pytest.mark.parametrize(
+    ("text", "message"), [("<mujoco><", "can't be read"), ("", "can't be read")]
+)
 def test_crafted_files_are_refused(tmp_path, text, message):
     (tmp_path / "bad.xml").write_text(text)
     with pytest.raises(InputError, match=message):
         Stage(str(tmp_path / "bad.xml"), 0)
-    with pytest.raises(InputError, match="scene=blokcs is unknown; give cubes.*blocks"):
+    with pytest.raises(InputError, match=r"scene=blokcs is unknown; give cubes.*blocks"):
         Stage("blokcs", 0)
 
 

@@ -30,7 +30,7 @@ found["path"] = client.simGetVehiclePose().position.x_val
 
 # an orbit with commands that are sent again before they end
 center, radius = (6.0, 0.0), 6.0
-for step in range(40):
+for _ in range(40):
     position = client.simGetVehiclePose().position
     angle = math.atan2(position.y_val - center[1], position.x_val - center[0])
     vx, vy = -2.0 * math.sin(angle), 2.0 * math.cos(angle)

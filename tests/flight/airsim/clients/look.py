@@ -21,7 +21,9 @@ for camera in ("0", "1", "2", "3", "4"):
     for kind in range(7):
         compress = kind in (0, 5, 6)
         (image,) = client.simGetImages([airsim.ImageRequest(camera, kind, not compress, compress)])
-        found["sizes"][f"{camera}.{kind}"] = len(image.image_data_uint8) or len(image.image_data_float)
+        found["sizes"][f"{camera}.{kind}"] = len(image.image_data_uint8) or len(
+            image.image_data_float
+        )
 objects = client.simListSceneObjects("cube.*")
 found["objects"] = objects
 before = client.simGetObjectPose(objects[0])
