@@ -9,7 +9,7 @@ from torchrl.envs import TransformedEnv
 from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.config.learning import CompleteEpisodes, Ray
 from drone_rl.config.training import TrainSettings
-from drone_rl.policies import PolicyNetwork, make_actor
+from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.tasks import FailureReplayTask
 
@@ -19,7 +19,7 @@ class Group(NamedTuple):
 
     env: TransformedEnv
     actor: Any
-    network: PolicyNetwork
+    network: ImageNetwork
     """Shared by all groups."""
     generator: torch.Generator
     """Random stream of the actions."""
@@ -30,7 +30,7 @@ class Components(NamedTuple):
 
     collector: Any
     """Has `actor`, `postproc` and `cache_activations`, in addition to what `Trainer` needs."""
-    network: PolicyNetwork
+    network: ImageNetwork
     generators: dict[str, torch.Generator]
     """Random streams of this process, by name."""
 
