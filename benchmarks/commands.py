@@ -39,9 +39,7 @@ def call(
         raise RuntimeError(f"drone-rl {' '.join(args)} failed: {done.stderr.strip()[-500:]}")
 
 
-def train(
-    run: Path, *args: str, environment: Mapping[str, str] | None = None
-) -> tuple[float, Any]:
+def train(run: Path, *args: str, environment: Mapping[str, str] | None = None) -> tuple[float, Any]:
     """Run `drone-rl train`.
 
     Args:

@@ -4,14 +4,17 @@ drone-rl train 'plugins=[recall]' task=recall network=lstm   # in this folder
 """
 
 import dataclasses
+from collections.abc import Mapping
 
+import numpy as np
 import torch
 from torch import Tensor
 
 import drone_rl
 from drone_rl.sim.actions import MOVES, Move
+from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.entities import Cube
-from drone_rl.sim.tasks import EndReason, OracleRule, Task
+from drone_rl.sim.tasks import EndReason, Goals, OracleRule, SampledState, Task
 from drone_rl.sim.vocabulary import TaskVocabulary
 
 AHEAD, ASIDE, REACH = 4.0, 2.0, 1.5
@@ -27,7 +30,7 @@ def approach(drone: Tensor, cube: Tensor) -> Tensor:
     return torch.where(lateral.abs() > REACH / 2, aside, Move.FORWARD)
 
 
-class Recall(Task):
+class Recall(Task[SampledState]):
     """The reward is 1 for passing where the cube stood.
 
     Actions have no effect while the cube is shown. So neither a frame nor the drone's position
@@ -35,26 +38,26 @@ class Recall(Task):
     """
 
     name = "recall"
-    vocabulary = TaskVocabulary("cube", "collect", "collected", "cube", "collect the cube", "collected")
+    vocabulary = TaskVocabulary(goal="cube", reach="collect", reached="collected", target="cube")
     strata = ("left", "right")
     oracle = OracleRule(("drone", "sampled"), approach, MOVES)
 
-    def make_props(self):
+    def make_props(self) -> list[Cube]:
         """Return the cube."""
         return [Cube(1.0, (0.1, 0.1, 0.6), name="cube")]
 
-    def sample(self, random_state):
+    def sample(self, random_state: np.random.RandomState) -> Tensor:
         """Sample the side of the cube; return its position, metres."""
         side = random_state.choice([-1.0, 1.0])
         return torch.tensor([AHEAD, side * ASIDE, 1.0], dtype=torch.float64)
 
-    def places(self, state):
+    def places(self, state: SampledState) -> Tensor:
         """Return the cube's position, which is behind the drone once hidden. Shape: (N, 1, 3)."""
         is_hidden = (state.steps >= SHOWN)[:, None]
         behind = state.sampled.new_tensor([-100.0, 0.0, 1.0])
         return torch.where(is_hidden, behind, state.sampled)[:, None]
 
-    def step(self, state, body):
+    def step(self, state: SampledState, body: BodyState) -> tuple[SampledState, Tensor]:
         """End the episode where the cube was passed, on either side, or after too many steps."""
         steps, cube = state.steps + 1, state.sampled
         waits = steps <= SHOWN
@@ -67,7 +70,7 @@ class Recall(Task):
         new = dataclasses.replace(state, body=body, steps=steps, end_reason=end)
         return new, (end == EndReason.SUCCESS).double()
 
-    def score(self, info):
+    def score(self, info: Mapping[str, Tensor]) -> Goals:
         """Count cubes to the left and to the right separately."""
         goals = super().score(info)
         return dataclasses.replace(goals, stratum=(info["sampled"][:, 1:2] < 0).long())

@@ -68,7 +68,9 @@ def accelerated_collector(
     renderer = DirectRenderer.try_create(env, actor.in_keys, next_keys)
     if isinstance(renderer, Reasons):
         return renderer
-    direct = package.DirectCollector(renderer, actor, env.action_key, actor_keys, keep_actor_entries)
+    direct = package.DirectCollector(
+        renderer, actor, env.action_key, actor_keys, keep_actor_entries
+    )
     if acceleration == "direct":
         return direct
     found = package.FusedCollector.try_create(direct, num_threads)

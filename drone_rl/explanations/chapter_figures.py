@@ -219,7 +219,9 @@ def _pair(settings: FigureSettings, subjects: list[Policy]) -> _Made:
     distance = cdist(flat[left], flat[right]) / np.sqrt(flat.shape[1])
     row, column = np.unravel_index(distance.argmin(), distance.shape)
     pair = int(left[row]), int(right[column])
-    shown = [images.frame_with_probabilities(data.arrays, frame, f"frame {frame}") for frame in pair]
+    shown = [
+        images.frame_with_probabilities(data.arrays, frame, f"frame {frame}") for frame in pair
+    ]
     apart = float(np.abs(np.diff(data.offset(scenes.task)[list(pair)], axis=0)).max())
     caption = (
         f"The two most similar frames on which policy {subject.name} most probably moves to "

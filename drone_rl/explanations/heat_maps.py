@@ -38,7 +38,9 @@ class Explainer:
             return
         find_layer(self.network, self.layer)
         if self.layer not in spatial:
-            none = "it has no convolution" if self.network.is_differentiable else "it has no gradient"
+            none = (
+                "it has no convolution" if self.network.is_differentiable else "it has no gradient"
+            )
             have = ", ".join(spatial) or f"none of this policy, because {none}"
             raise InputError(f"layer={self.layer} has no feature map; those that do: {have}")
 

@@ -8,7 +8,7 @@ from tensordict.nn import (
     ProbabilisticTensorDictSequential,
     TensorDictModule,
 )
-from torch import Tensor, nn
+from torch import nn
 
 from drone_rl.policies.actor import distribution_of
 from drone_rl.policies.networks import PolicyNetwork, Trunk, orthogonal

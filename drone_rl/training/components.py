@@ -72,6 +72,9 @@ def learning_actor(settings: TrainSettings, components: Components) -> Any:
     The fused kernel has `trainer.num_threads` threads of its own; PyTorch then gets one.
     """
     actor, threads = components.collector.actor, settings.trainer.num_threads
+    if components.network.is_recurrent:
+        torch.set_num_threads(1)  # the steps of an LSTM are too small to share
+        return actor
     if not settings.trainer.compiled:
         return actor
     cache = components.collector.cache_activations

@@ -1,7 +1,7 @@
 """Independent random streams from one seed.
 
-Every stream but a `side_stream` is a child of `numpy.random.SeedSequence(seed)` with its own key, so the streams of two
-environments, of two purposes, or of seed and seed + 1 don't overlap.
+Every stream but a `side_stream` is a child of `numpy.random.SeedSequence(seed)` with its own key,
+so the streams of two environments, of two purposes, or of seed and seed + 1 don't overlap.
 """
 
 import dataclasses

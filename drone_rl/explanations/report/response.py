@@ -66,11 +66,12 @@ def say_asymmetry(evidence: Evidence) -> Claims:
     """Say how far the policy differs from its mirror image, and which side it prefers."""
     found = evidence["asymmetry"]["dataset"]
     absolute, signed = found["absolute"], found["signed"]
+    on_grid = evidence["asymmetry"]["grid"]["absolute"]
     claims = {
         "asymmetry.differs": (
             "On these frames the policy differs from its mirror image by "
             f"{absolute['mean']:.2f} on average (0: perfectly symmetric, 1: always opposite; "
-            f"{bounds(absolute)}), over the places of the response map by {evidence['asymmetry']['grid']['absolute']:.2f}."
+            f"{bounds(absolute)}), over the places of the response map by {on_grid:.2f}."
         )
     }
     if signed["lower95"] > 0 or signed["upper95"] < 0:
