@@ -21,6 +21,8 @@ BEFORE = "3e5d8a0b"
 RATES = (3e-5, 1e-4, 1e-3)
 """Learning rates; the chapter's program has the middle one."""
 SEEDS = range(5)
+NETWORKS = {"lstm": "lstm", "memoryless": "small_cnn"}
+"""Networks that learn a task that needs memory, by the first part of their key."""
 EPISODES = 30_000
 """Episodes after which the chapter's program stops."""
 _ROOT = Path(__file__).resolve().parents[1]
@@ -43,7 +45,8 @@ def bench_chapter(folder: Path, quick: bool, *, root: Path = _ROOT) -> dict[str,
         episodes, seconds, and kind of verdict; "original_rate": the best rate;
         "original_solved": seeds that it solves; "original_minutes": minutes of 30,000 episodes
         that stop for no criterion; "original_speedup": frames per second over those of `BEFORE`;
-        "chapter_elements", "chapter_shown", see `count_elements`; "convention_cases" that agree.
+        "chapter_elements", "chapter_shown", see `count_elements`; "convention_cases" that agree;
+        "lstm_success", "memoryless_success", see `memory`.
 
     Raises:
         RuntimeError: A command or the tests of conventions failed.
@@ -61,6 +64,7 @@ def bench_chapter(folder: Path, quick: bool, *, root: Path = _ROOT) -> dict[str,
         "chapter_elements": elements,
         "chapter_shown": shown,
         "convention_cases": count_conventions(root),
+        **memory(folder / "memory", quick, root=root),
     }
 
 
@@ -85,6 +89,29 @@ def train_rate(
 
     with ThreadPoolExecutor(2) as pool:
         return list(pool.map(one, seeds))
+
+
+def memory(folder: Path, quick: bool, *, root: Path) -> dict[str, float]:
+    """Return the success of an LSTM and of a network without memory, of 1,000 greedy episodes.
+
+    The task is that of `examples/recall.py`. Each is the median of three trainings.
+    """
+    paths = (str(root / "examples"), str(root), os.environ.get("PYTHONPATH", ""))
+    environment = {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    found, own = {}, ["plugins=[recall]", "task=recall"]
+    limit = ["trainer.total_frames=2000"] if quick else ["trainer.total_frames=400000"]
+    for key, network in NETWORKS.items():
+        rates = []
+        for seed in range(1 if quick else 3):
+            run = folder / f"{key}_{seed}"
+            given = [*own, f"network={network}", f"seed={seed}", *limit]
+            train(run, *given, environment=environment)
+            judged = (f"policy={run}", own[0], "seed=0", f"hydra.run.dir={run}/evaluation")
+            call("evaluate", *judged, "episodes=1000", environment=environment)
+            evaluation = read_json(run / "evaluation" / "evaluation.json")
+            rates.append(evaluation["greedy"]["success"]["mean"])
+        found[f"{key}_success"] = statistics.median(rates)
+    return found
 
 
 def minutes(folder: Path, episodes: int) -> float:

@@ -39,12 +39,13 @@ def call(
         raise RuntimeError(f"drone-rl {' '.join(args)} failed: {done.stderr.strip()[-500:]}")
 
 
-def train(run: Path, *args: str) -> tuple[float, Any]:
+def train(run: Path, *args: str, environment: Mapping[str, str] | None = None) -> tuple[float, Any]:
     """Run `drone-rl train`.
 
     Args:
         run: Folder of the run.
         args: Overrides.
+        environment: Additional environment variables.
 
     Returns:
         Seconds from the start of the command to its end, and the content of result.json.
@@ -53,7 +54,7 @@ def train(run: Path, *args: str) -> tuple[float, Any]:
         RuntimeError: The command failed.
     """
     begin = time.perf_counter()
-    call("train", *args, f"hydra.run.dir={run}")
+    call("train", *args, f"hydra.run.dir={run}", environment=environment)
     return time.perf_counter() - begin, read_json(run / "result.json")
 
 

@@ -28,11 +28,11 @@ class DirectCollector:
         actor: TensorDictModuleBase,
         action_key: NestedKey,
         actor_keys: Iterable[NestedKey] = (),
-        keep_observations: bool = True,
+        keep_actor_entries: bool = True,
     ) -> None:
         """See `collectors.speedups.accelerated_collector`."""
         self.renderer, self.actor, self.action_key = renderer, actor, action_key
-        self.keep_observations = keep_observations
+        self.keep_actor_entries = keep_actor_entries
         self.reasons = Reasons()
         """Why the collector is not fused; empty if it need not be."""
         self._actor_keys = tuple(actor_keys)
@@ -57,7 +57,7 @@ class DirectCollector:
         while len(active):
             acted = self.actor(renderer.observe(state, active))
             keys = (self.action_key, *self._actor_keys)
-            keys = acted.keys(True, True) if self.keep_observations else keys
+            keys = acted.keys(True, True) if self.keep_actor_entries else keys
             step: Entries = {key: acted.get(key) for key in keys}
             state, reward = renderer.worlds.advance(state, acted.get(self.action_key))
             entries, done = renderer.entries(state, reward)

@@ -146,7 +146,7 @@ class FusedCollector:
     def _run(self, num_envs: int) -> tuple[Tensor, dict[str, Tensor]]:
         """Return the environment of each step, episode after episode, and what the kernel wrote."""
         taken, end_reasons = self._rules.steps[:num_envs], self._rules.end_reasons[:num_envs]
-        is_observed = self._direct.keep_observations
+        is_observed = self._direct.keep_actor_entries
         seen = ("pixels", "logits") if is_observed else ()
         names, parts = ("action", "reward", "end_reason", *seen), []
         while not (parts and bool(end_reasons.all())):

@@ -73,7 +73,10 @@ def standardise(values: wp.array[float], count: int, mean: float, deviation: flo
 
 @wp.func
 def choose(logits: wp.array[float], at: int, count: int, draw: float) -> int:
-    """Return the action of a uniform sample, or the most probable one below 0; logits at `at`."""
+    """Return the action that a uniform sample `draw` selects; the most probable one if it is < 0.
+
+    The logits begin at index `at`.
+    """
     best = int(0)
     for action in range(1, count):
         if logits[at + action] > logits[at + best]:
@@ -106,7 +109,7 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
     def observe(
         first: int, last: int, step: int, worker: int, rollout: Rollout, envs: states
     ) -> int:
-        """Render running environments and compute the convolutions. Returns their number."""
+        """Render running environments, compute the convolutions; return how many are running."""
         camera = rollout.camera
         layers = rollout.layers
         running = int(0)
@@ -131,8 +134,8 @@ def make_kernel(states: Any, place: Any, move: Any) -> Any:  # noqa: C901 (funct
                 workspace = rollout.workspaces[worker]
                 run_convolutions(layers, frame, workspace, running)
                 if rollout.outputs.shape[0] > 0:
-                    last_layer = layers.num_convolutions
-                    save_outputs(layers, 0, last_layer, workspace, running, rollout.outputs[row])
+                    end = layers.num_convolutions
+                    save_outputs(layers, 0, end, workspace, running, rollout.outputs[row])
                 running += 1
         return running
 

@@ -38,7 +38,7 @@ class EpisodeCollector(BatchedCollector):
         env: EnvBase,
         actor: TensorDictModuleBase,
         *,
-        keep_observations: bool = True,
+        keep_actor_entries: bool = True,
         actor_keys: Iterable[NestedKey] = (),
         acceleration: Acceleration = "direct",
         num_threads: int = 1,
@@ -49,7 +49,7 @@ class EpisodeCollector(BatchedCollector):
         Args:
             env: A batch of environments that honours TorchRL's "_step" masks.
             actor: Writes the action.
-            keep_observations: Whether to keep all entries that the actor reads and writes.
+            keep_actor_entries: Whether to keep all entries that the actor reads and writes.
             actor_keys: Entries that the actor reads or writes, to keep in addition to the action.
             acceleration: The fastest implementation that may be used, if it is supported.
             num_threads: Of the fused kernel; no result depends on it.
@@ -57,7 +57,7 @@ class EpisodeCollector(BatchedCollector):
         """
         super().__init__(env, actor, **kwargs)
         options: dict[str, Any] = {"next_keys": self._kept, "actor_keys": actor_keys}
-        options["keep_observations"] = keep_observations
+        options["keep_actor_entries"] = keep_actor_entries
         found = accelerated_collector(env, actor, acceleration, num_threads=num_threads, **options)
         self.source: FusedCollector | DirectCollector | SteppingCollector = (
             SteppingCollector(env, actor, found, **options) if isinstance(found, Reasons) else found
@@ -112,14 +112,14 @@ class SteppingCollector:
         *,
         next_keys: Iterable[NestedKey],
         actor_keys: Iterable[NestedKey] = (),
-        keep_observations: bool = True,
+        keep_actor_entries: bool = True,
     ) -> None:
         """See `accelerated_collector`; the reasons are why there is no faster collector."""
         self.reasons = reasons
         self._env = _OneEpisode(env)
         self._actor = _ActiveOnly(actor, self._env)
         self._kept = (env.action_key, *next_keys, *actor_keys)
-        self._keep_observations = keep_observations
+        self._keep_actor_entries = keep_actor_entries
         self._collector = Collector(
             self._env,
             self._actor,
@@ -147,10 +147,10 @@ class SteppingCollector:
         while self._collector.reset_at_each_iter or bool(self._env.active.any()):
             rollout = self._collector.rollout()
             self._collector.reset_at_each_iter = False
-            keys = {*self._kept, *(self._actor.keys if self._keep_observations else ())}
+            keys = {*self._kept, *(self._actor.keys if self._keep_actor_entries else ())}
             rollouts.append(rollout.select(*keys))
         # a lazy stack is slow to index
-        steps: Any = torch.cat(rollouts, 1).contiguous()  # (num_envs, T)
+        steps: Any = torch.cat(rollouts, 1).contiguous()  # (batch_size, T)
         mask = torch.stack(self._env.masks, 1)
         batch = steps[mask]  # row-major: environment after environment, step after step
         return batch.set(("collector", "traj_ids"), mask.nonzero()[:, 0])
@@ -165,7 +165,7 @@ class _OneEpisode(TransformedEnv):
     def __init__(self, env: EnvBase) -> None:
         super().__init__(env, Compose(), auto_unwrap=False)  # pyright: ignore[reportCallIssue]
         self.num_envs = 0
-        """The first environments, which run; 0 until there is something to collect."""
+        """How many environments run, from the first on; 0 until there is something to collect."""
         self.active = torch.zeros(env.batch_size, dtype=torch.bool, device=env.device)
         """Whether an environment's episode is under way. Shape: (batch_size,)."""
         self.masks: list[Tensor] = []

@@ -46,7 +46,7 @@ def accelerated_collector(
     *,
     next_keys: Iterable[NestedKey],
     actor_keys: Iterable[NestedKey] = (),
-    keep_observations: bool = True,
+    keep_actor_entries: bool = True,
     num_threads: int = 1,
 ) -> "FusedCollector | DirectCollector | Reasons":
     """Return an accelerated collector of complete episodes, or the reasons why there is none.
@@ -57,7 +57,7 @@ def accelerated_collector(
         acceleration: The fastest implementation that may be used.
         next_keys: ("next", ...) entries to keep of each step.
         actor_keys: Entries that the actor reads or writes, to keep in addition to the action.
-        keep_observations: Whether to keep all entries that the actor reads and writes.
+        keep_actor_entries: Whether to keep all entries that the actor reads and writes.
         num_threads: Threads of the fused kernel; no result depends on it.
     """
     if acceleration == "none":
@@ -68,7 +68,9 @@ def accelerated_collector(
     renderer = DirectRenderer.try_create(env, actor.in_keys, next_keys)
     if isinstance(renderer, Reasons):
         return renderer
-    direct = package.DirectCollector(renderer, actor, env.action_key, actor_keys, keep_observations)
+    direct = package.DirectCollector(
+        renderer, actor, env.action_key, actor_keys, keep_actor_entries
+    )
     if acceleration == "direct":
         return direct
     found = package.FusedCollector.try_create(direct, num_threads)

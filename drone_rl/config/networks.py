@@ -33,6 +33,19 @@ class OriginalCnn(Network, target="original_cnn"):
     """Widths of the linear layers before the logits."""
 
 
+class Lstm(Network, target="lstm"):
+    """A recurrent network: the layers of small_cnn and an LSTM, which remembers earlier images."""
+
+    patch: Annotated[int, Whole(1, 64, "pixels")] = 4
+    """Size and stride of the first convolution, pixels."""
+    channels: Channels = (16, 32)
+    """Output channels of the convolutions."""
+    hidden: Widths = (64,)
+    """Widths of the linear layers before the LSTM."""
+    memory: Annotated[int, Whole(1, 1024, "numbers")] = 64
+    """Size of the LSTM's state."""
+
+
 class Mlp(Network, target="mlp"):
     """Linear layers on the flattened image."""
 

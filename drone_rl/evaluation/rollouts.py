@@ -87,7 +87,7 @@ def episode_batches(
         env,
         actor,
         next_keys=tuple(("next", "info", name) for name in keep),
-        keep_observations=False,
+        keep_actor_entries=False,
         actor_keys=actor_keys,
         acceleration="fused" if is_compiled else "direct",
         num_threads=num_cores(),

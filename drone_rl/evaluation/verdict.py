@@ -136,7 +136,7 @@ def apply_rule(
         rule: Thresholds of the verdict.
         sampled: The policy's episodes with sampled actions, from the same states.
         claim: A certificate of the policy in this task, if there is one.
-        unlike: How the dynamics differ from those in training: setting to "own" and "flown".
+        unlike: What differs from the training, by setting: "own", in training, and "flown".
         seed: Root of the environments' random streams; without it the verdict says that a policy
             could have been fitted to these environments.
         rounding: How rounding can change `greedy`; None if that was not checked.
@@ -219,10 +219,12 @@ def widen(
     for i, (quantity, values, ends) in enumerate(zip(found, observed, others, strict=True)):
         low, high = rule.ranges[i]
         lower, upper = values.copy(), values.copy()
-        owner = outcomes.owner.numpy()[~np.isnan(ends)]
-        np.fmin.at(lower, owner, ends[~np.isnan(ends)])
-        np.fmax.at(upper, owner, ends[~np.isnan(ends)])
-        is_open = outcomes.is_open.numpy()
+        owner, is_open = outcomes.owner.numpy(), outcomes.is_open.numpy().copy()
+        # whether the episode counts at all depends on the outcome: it may have any value
+        is_open[owner[np.isnan(ends) != np.isnan(values[owner])]] = True
+        is_known = ~np.isnan(ends)
+        np.fmin.at(lower, owner[is_known], ends[is_known])
+        np.fmax.at(upper, owner[is_known], ends[is_known])
         lower[is_open], upper[is_open] = low, high
         least, most = (estimate(i, v[~np.isnan(v)], rule) for v in (lower, upper))
         ends = {"lower": min(quantity.lower, least.lower), "upper": max(quantity.upper, most.upper)}

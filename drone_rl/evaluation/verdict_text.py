@@ -387,6 +387,12 @@ SENTENCES = (
         _drawing,
     ),
     Sentence(
+        "unchecked",
+        "rounding was not checked",
+        lambda e: "rounding" in e and e["rounding"] is None,
+        lambda e: "Whether rounding could change actions was not checked.",
+    ),
+    Sentence(
         "arithmetic",
         "rounding was checked",
         lambda e: e.get("rounding") is not None,

@@ -23,6 +23,7 @@ from drone_rl.envs.transforms import memory_of, pixel_transforms, see_film
 from drone_rl.evaluation import instruments
 from drone_rl.evaluation.rollouts import exploration
 from drone_rl.policies.policy import Policy
+from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics import FlightState, Quadrotor
@@ -84,8 +85,9 @@ def view(policy: Policy, *, greedy: bool = True, seed: int = 0, **how: Any) -> N
     The viewer shows the dm_control simulation; observations are rendered as in training.
 
     Raises:
-        InputError: There is no display.
+        InputError: There is no display, or the policy is recurrent.
     """
+    require_memoryless(policy.make_network(), "the viewer", "leave viewer=false to film it")
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise InputError("viewer=true needs a display, and there is none; leave it false to film")
     import dm_env
@@ -151,7 +153,7 @@ def film_episode(
             acted = actor(state.clone(False))
             caption = _caption(worlds.task, state, earned)
             yield _compose(_look(base), caption, acted, worlds.dynamics.actions)
-            state = env.step(state.set("action", acted["action"]))["next"]
+            state = env.step(acted)["next"]
             earned += float(state["reward"][0])
             if bool(state["done"].all()):
                 yield _compose(_look(base), _caption(worlds.task, state, earned))

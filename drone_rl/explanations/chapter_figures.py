@@ -26,6 +26,7 @@ from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.policies.policy import Policy, load_policy
+from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.training.three_state import sample_gradients, train_three_state
 from drone_rl.utils.display import picture
 from drone_rl.utils.errors import InputError
@@ -66,6 +67,9 @@ class FigureSettings(Settings):
     tint: Annotated[str, OneOf(("predicted", "sampled"))] = "predicted"
     """Action whose colour tints a frame of Figs. 7 and 8: the most probable one, or the one that
     was sampled."""
+    kernel: Annotated[str, OneOf(("student", "gaussian"))] = "student"
+    """Similarity of points on the maps of Figs. 7 and 8: Student's t, as t-SNE is defined, or the
+    Gaussian that Eq. 17 prints."""
     seed: Annotated[int, Whole(0)] = 0
     """Root of all random streams."""
 
@@ -176,7 +180,10 @@ def _embeddings(settings: FigureSettings, subjects: list[Policy]) -> _Made:
         assert layer is not None
         perplexity = min(_PERPLEXITY, (len(data) - 1) // 3)
         points, faithful = embed(
-            data.features[layer], perplexity=perplexity, seed=legacy_seed(settings.seed)
+            data.features[layer],
+            perplexity=perplexity,
+            seed=legacy_seed(settings.seed),
+            kernel=settings.kernel,
         )
         arrays = dict(data.arrays)
         if settings.tint == "predicted":
@@ -192,7 +199,8 @@ def _embeddings(settings: FigureSettings, subjects: list[Policy]) -> _Made:
             "frames_by_action": dict(zip(scenes.actions.names, by_action, strict=True)),
         }
     names = "forward violet, left orange, right blue"
-    caption = f"t-SNE of the policy's features, tinted by the {settings.tint} action: {names}."
+    method = "SNE (Eq. 17 as printed)" if settings.kernel == "gaussian" else "t-SNE"
+    caption = f"{method} of the policy's features, tinted by the {settings.tint} action: {names}."
     return images.gridded(_padded(shown), len(shown)), caption, numbers
 
 
@@ -211,7 +219,9 @@ def _pair(settings: FigureSettings, subjects: list[Policy]) -> _Made:
     distance = cdist(flat[left], flat[right]) / np.sqrt(flat.shape[1])
     row, column = np.unravel_index(distance.argmin(), distance.shape)
     pair = int(left[row]), int(right[column])
-    shown = [images.probed_frame(data.arrays, frame, f"frame {frame}") for frame in pair]
+    shown = [
+        images.frame_with_probabilities(data.arrays, frame, f"frame {frame}") for frame in pair
+    ]
     apart = float(np.abs(np.diff(data.offset(scenes.task)[list(pair)], axis=0)).max())
     caption = (
         f"The two most similar frames on which policy {subject.name} most probably moves to "
@@ -276,6 +286,7 @@ def _record(
     """
     frames, episodes = settings.frames or frames, settings.episodes or episodes
     network = subject.make_network()
+    require_memoryless(network, "this figure")
     layer = feature_layer(network)
     with subject.in_task(step_length=STEP_LENGTH).flying(episodes, seed=settings.seed) as made:
         env, actor = made

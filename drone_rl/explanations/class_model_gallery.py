@@ -25,6 +25,7 @@ from drone_rl.explanations.settings import ClassModelSettings, ClassModelsSettin
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
+from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.sim.vocabulary import ShownActions, shown_actions
 from drone_rl.utils.display import aligned, picture, table
 from drone_rl.utils.errors import InputError
@@ -156,6 +157,7 @@ def class_models(
     subject = as_policy(policy, outputs=outputs)
     subject = subject.in_task(**task) if task else subject
     network = subject.make_network()
+    require_memoryless(network, "a class model")
     if not network.is_differentiable:
         raise InputError(NO_GRADIENTS)
     with subject.flying(min(settings.episodes, _BATCH), seed=seed.value) as (env, actor):

@@ -17,6 +17,8 @@ logging.getLogger("openTSNE").setLevel(logging.ERROR)  # its messages are not fo
 COMPONENTS = 50  # principal components to which points are reduced first
 NEIGHBOURS = 10  # neighbours by which faithfulness is measured
 QUERIES = 1000  # most points whose neighbourhoods are compared
+GAUSSIAN_DOF = 1e4
+"""Degrees of freedom at which openTSNE's kernel (1 + d² / dof)^(-dof) is exp(-d²) within 1e-4."""
 FEW = 2000  # up to so many points, exact methods on one thread are the fastest
 
 
@@ -44,11 +46,17 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
 
 
 def embed(
-    originals: NDArray, *, perplexity: float = 30.0, seed: int = 0
+    originals: NDArray, *, perplexity: float = 30.0, seed: int = 0, kernel: str = "student"
 ) -> tuple[NDArray, dict[str, float]]:
     """Embed points (T, *) in the plane (Eqs. 16 and 17); return them (T, 2), and `faithfulness`.
 
-    The perplexity is the effective number of neighbours; a seed below 2**32 fixes the result.
+    Args:
+        originals: The points.
+        perplexity: Effective number of neighbours.
+        seed: Fixes the result; below 2**32.
+        kernel: Similarity of points of the plane: "student", 1 / (1 + d²), as t-SNE is defined
+            (van der Maaten and Hinton, 2008), or "gaussian", exp(-d²), as Eq. 17 prints it, which
+            is symmetric SNE's.
 
     Raises:
         InputError: There are too few points for the perplexity, or one is not finite.
@@ -67,6 +75,7 @@ def embed(
         n_jobs=1 if few else num_cores(),
         neighbors="exact" if few else "annoy",
         negative_gradient_method="bh" if few else "fft",
+        dof=GAUSSIAN_DOF if kernel == "gaussian" else 1,  # pyright: ignore[reportArgumentType] (takes fractions, too)
     ).fit(_distinct(reduced, seed))
     points = np.array(model)
     return points, faithfulness(centred, points)

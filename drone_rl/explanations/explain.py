@@ -24,6 +24,7 @@ from drone_rl.policies import ImageNetwork
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
+from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.utils.display import page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name
@@ -116,11 +117,13 @@ def explain(
 
     def explain_one(policy: BasePolicy, folder: Path) -> dict[str, Any]:
         require_function(policy, seed=seed.value, renderer=settings.renderer)
+        network = policy.make_network()
+        require_memoryless(network, "explain")
         env = policy.make_env(num_envs, seed=seed.value, renderer=settings.renderer)
         with closing(env):
             return explain_policy(
                 env,
-                policy.make_network(),
+                network,
                 folder,
                 settings,
                 name=policy.name,

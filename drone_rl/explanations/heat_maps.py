@@ -38,7 +38,10 @@ class Explainer:
             return
         find_layer(self.network, self.layer)
         if self.layer not in spatial:
-            have = ", ".join(spatial) or "none, for the policy has no convolution"
+            none = (
+                "it has no convolution" if self.network.is_differentiable else "it has no gradient"
+            )
+            have = ", ".join(spatial) or f"none of this policy, because {none}"
             raise InputError(f"layer={self.layer} has no feature map; those that do: {have}")
 
     def methods(self) -> dict[str, MapMethod]:
@@ -89,9 +92,10 @@ class Explainer:
         return (total - (there - absent)).abs()
 
     def occlusion(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """Return the absolute change if a patch is replaced by the baseline. Shape: (T, H, W).
+        """Return the change of the probability if a patch is replaced by the baseline. (T, H, W).
 
-        Patches overlap by half; a pixel gets the mean over the patches that cover it.
+        Patches overlap by about half; a pixel gets the absolute value of the mean change over the
+        patches that cover it.
         """
         height, width = observations.shape[-2:]
         windows = _windows(height, width)

@@ -44,7 +44,7 @@ def find_layer(network: ImageNetwork, name: str) -> nn.Module:
     """Return the layer of that name; if there is none, raise InputError with those that exist."""
     found = dict(network.parts.named_modules()).get(name) if name else None
     if found is None or [*found.children()]:
-        there = ", ".join(layers(network)) or "none, because it is not a torch module"
+        there = ", ".join(layers(network)) or "none, because it is no torch module made of layers"
         raise InputError(f"layer={name} is not in the policy; choose from: {there}")
     return found
 
@@ -83,7 +83,7 @@ def outputs(network: ImageNetwork, observations: Tensor) -> Tensor:
 
 @torch.no_grad()
 def probabilities(network: ImageNetwork, observations: Tensor) -> Tensor:
-    """Return action probabilities (Eq. 9). Shape: (T, C, h, w) to (T, number of parts)."""
+    """Return action probabilities (Eq. 9). (T, C, h, w) to (T, parts), see `Actions`."""
     return actions_of(network).probabilities(outputs(network, observations))
 
 

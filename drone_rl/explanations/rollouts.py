@@ -78,7 +78,10 @@ class RolloutDataset:
         return torch.from_numpy(self.arrays[name])
 
     def offset(self, task: Task[Any]) -> NDArray:
-        """Return metres ahead and to the left of the next target, or NaN. Shape: (T, 2)."""
+        """Return how far ahead of the drone and to its left the next target stands. (T, 2).
+
+        Metres; NaN if there is none.
+        """
         return task.next_offset(self.state(task))[:, :2].numpy()
 
     def state(self, task: Task[Any], dynamics: Dynamics | None = None) -> State:

@@ -7,6 +7,7 @@ from tensordict import TensorDict, TensorDictBase, TensorDictParams
 from tensordict.nn import ProbabilisticTensorDictSequential, dispatch
 from tensordict.utils import NestedKey
 from torch import Tensor
+from torchrl.modules import set_recurrent_mode
 from torchrl.objectives import LossModule
 
 from drone_rl.config.learning import Reinforce
@@ -109,7 +110,8 @@ class ReinforceLoss(LossModule):
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Compute "loss_actor", "loss_entropy" and the detached "entropy" of a batch.
 
-        It has observations, actions and returns; raise an `InputError` without returns.
+        It has observations, actions and returns; raise an `InputError` without returns. A recurrent
+        policy needs whole episodes, one after the other, each beginning where "is_init" is set.
         """
         returns = tensordict.get(self.tensor_keys.return_to_go, None)
         if returns is None:
@@ -117,7 +119,7 @@ class ReinforceLoss(LossModule):
                 f"the batch has no entry {self.tensor_keys.return_to_go!r}; "
                 "pass it through a return estimator first"
             )
-        with self.actor_network_params.to_module(self.actor_network):
+        with self.actor_network_params.to_module(self.actor_network), set_recurrent_mode(True):
             distribution = self.actor_network.get_dist(
                 tensordict.select(*self.actor_network.in_keys)
             )

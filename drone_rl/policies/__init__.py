@@ -8,3 +8,4 @@ from drone_rl.policies.networks import ImageNetwork as ImageNetwork
 from drone_rl.policies.networks import OriginalCNN as OriginalCNN
 from drone_rl.policies.networks import PolicyNetwork as PolicyNetwork
 from drone_rl.policies.networks import SmallCNN as SmallCNN
+from drone_rl.policies.recurrent import RecurrentNetwork as RecurrentNetwork

@@ -60,7 +60,7 @@ class SquashedNormal(Distribution):
 
     @property
     def mode(self) -> Tensor:
-        """Return `deterministic_sample`."""
+        """The median, under the name that TorchRL asks for; not the mode of the density."""
         return self.deterministic_sample
 
     @torch.no_grad()
@@ -166,7 +166,7 @@ class DirectActor(ProbabilisticActor):
 
 
 class CategoricalActor(DirectActor):
-    """An actor with discrete actions."""
+    """A `DirectActor` with discrete actions; the fused kernel requires exactly this type."""
 
 
 def distribution_of(dtype: torch.dtype) -> type[SeededCategorical | SquashedNormal]:
@@ -176,22 +176,28 @@ def distribution_of(dtype: torch.dtype) -> type[SeededCategorical | SquashedNorm
 
 def make_actor(
     network: nn.Module, action_spec: TensorSpec, generator: torch.Generator | None = None
-) -> DirectActor:
+) -> ProbabilisticActor:
     """Return a stochastic policy: "pixels" to "logits" to "action" (chapter, Eq. 9).
 
-    It samples by default and takes the most probable action, or of continuous ones the median,
-    under `set_exploration_type(ExplorationType.DETERMINISTIC)`.
+    It samples by default. Under `set_exploration_type(ExplorationType.DETERMINISTIC)` it takes the
+    most probable action, or the median of continuous ones.
 
     Args:
-        network: Frames (*, C, H, W) to outputs (*, num_outputs): logits of discrete actions.
+        network: Frames (*, C, H, W) to outputs (*, num_outputs): logits of discrete actions. A
+            recurrent one also reads and writes its state.
         action_spec: The environment's; its type decides the distribution.
         generator: Source of the sampled actions; torch's global one by default.
     """
     kind = distribution_of(action_spec.dtype)
+    make: type[ProbabilisticActor]
     make = CategoricalActor if kind is SeededCategorical else DirectActor
-    in_keys = network.in_keys if isinstance(network, ImageNetwork) else ("pixels",)
+    image_network = network if isinstance(network, ImageNetwork) else ImageNetwork
+    if image_network.is_recurrent:
+        make = ProbabilisticActor  # which the direct one shortens for networks with one output
     return make(
-        TensorDictModule(network, in_keys=list(in_keys), out_keys=["logits"]),
+        TensorDictModule(
+            network, in_keys=list(image_network.in_keys), out_keys=list(image_network.out_keys)
+        ),
         in_keys=["logits"],
         spec=action_spec,
         default_interaction_type=InteractionType.RANDOM,

@@ -8,10 +8,10 @@ from tensordict.nn import (
     ProbabilisticTensorDictSequential,
     TensorDictModule,
 )
-from torch import Tensor, nn
+from torch import nn
 
 from drone_rl.policies.actor import distribution_of
-from drone_rl.policies.networks import PolicyNetwork, orthogonal
+from drone_rl.policies.networks import PolicyNetwork, Trunk, orthogonal
 from drone_rl.utils.errors import InputError
 
 PIXELS, FEATURES = "pixels", "features"
@@ -41,11 +41,11 @@ class ActorCritic(nn.Module):
         super().__init__()
         if not isinstance(network, PolicyNetwork):
             raise InputError(
-                f"a critic needs a policy of layers, which {type(network).__name__} is not; derive "
-                "it from drone_rl.policies.PolicyNetwork"
+                f"a critic needs a policy of layers, which {type(network).__name__} is not; give "
+                "objective=reinforce, or derive the network from drone_rl.policies.PolicyNetwork"
             )
         *_, last = network.layers
-        self.trunk = TensorDictModule(_Trunk(network), in_keys=[PIXELS], out_keys=[FEATURES])
+        self.trunk = TensorDictModule(Trunk(network), in_keys=[PIXELS], out_keys=[FEATURES])
         """"pixels" to "features"."""
         head = ProbabilisticTensorDictModule(
             in_keys=["logits"],
@@ -63,17 +63,6 @@ class ActorCritic(nn.Module):
             out_keys=[VALUE],
         )
         """"features" or "pixels" to "state_value"."""
-
-
-class _Trunk(nn.Module):
-    def __init__(self, network: PolicyNetwork) -> None:
-        super().__init__()
-        self.in_shape = network.in_shape
-        self.layers = network.layers[:-1]
-
-    def forward(self, pixels: Tensor) -> Tensor:
-        features = self.layers(pixels.reshape(-1, *self.in_shape))
-        return features.reshape(*pixels.shape[:-3], features.shape[-1])
 
 
 def _one_number(logits: nn.Module, generator: torch.Generator | None) -> nn.Linear:

@@ -10,6 +10,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Sequence
 
 import torch
+from tensordict.utils import NestedKey
 from torch import Tensor, nn
 
 from drone_rl.config.networks import Mlp, OriginalCnn, SmallCnn
@@ -35,6 +36,10 @@ class ImageNetwork(nn.Module):
     """Whether the logits have gradients by the pixels."""
     in_keys: tuple[str, ...] = ("pixels",)
     """Entries of a batch that `forward` takes."""
+    out_keys: tuple[NestedKey, ...] = ("logits",)
+    """Entries of a batch that `forward` returns."""
+    is_recurrent: bool = False
+    """Whether outputs depend on earlier frames of the episode, too."""
 
     @property
     def num_actions(self) -> int:
@@ -109,11 +114,7 @@ class PolicyNetwork(ImageNetwork):
 
     def check(self, pixels: Tensor) -> None:
         """Raise an `InputError` for frames of another shape than the network's."""
-        if tuple(pixels.shape[-3:]) != self.in_shape:
-            raise InputError(
-                f"the policy was built for images of shape {self.in_shape}, not "
-                f"{tuple(pixels.shape[-3:])}; use the camera and transforms it was trained with"
-            )
+        check_shape(pixels, self.in_shape)
 
     def forward(self, pixels: Tensor) -> Tensor:
         """See `ImageNetwork`.
@@ -126,6 +127,29 @@ class PolicyNetwork(ImageNetwork):
         if not (torch.is_grad_enabled() or torch.compiler.is_compiling()):
             require_finite(logits, self.owner)
         return logits.reshape(*pixels.shape[:-3], logits.shape[-1])
+
+
+class Trunk(nn.Module):
+    """A policy network without its last layer: frames (*, C, H, W) to features (*, F)."""
+
+    def __init__(self, network: PolicyNetwork) -> None:
+        super().__init__()
+        self.in_shape = network.in_shape
+        self.layers = network.layers[:-1]
+
+    def forward(self, pixels: Tensor) -> Tensor:
+        """Return the features of frames."""
+        features = self.layers(pixels.reshape(-1, *self.in_shape))
+        return features.reshape(*pixels.shape[:-3], features.shape[-1])
+
+
+def check_shape(pixels: Tensor, in_shape: tuple[int, ...]) -> None:
+    """Raise an `InputError` for frames of another shape (C, H, W)."""
+    if tuple(pixels.shape[-3:]) != in_shape:
+        raise InputError(
+            f"the policy was built for images of shape {in_shape}, not "
+            f"{tuple(pixels.shape[-3:])}; use the camera and transforms it was trained with"
+        )
 
 
 @implements(OriginalCnn)

@@ -23,7 +23,8 @@ from drone_rl.config import (
 )
 from drone_rl.config.configuration import Changes
 from drone_rl.envs.transforms import memory_of, pixel_transforms, see_film
-from drone_rl.policies import ImageNetwork, PolicyNetwork, make_actor
+from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
+from drone_rl.policies.recurrent import Memory
 from drone_rl.policies.zoo import PolicyDescription, parse, policy_names, policy_path, read_policy
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.display import table
@@ -171,6 +172,10 @@ class Policy(BasePolicy):
         default_factory=list, init=False, repr=False, compare=False
     )
     """Images that `act_batch` remembers, oldest first."""
+    _memory: list[Memory] = dataclasses.field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
+    """State of a recurrent network after the last call of `act_batch`; empty at first."""
 
     @property
     def task(self) -> BaseTaskSettings:
@@ -229,7 +234,7 @@ class Policy(BasePolicy):
     def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv:
         return self.description.build_env(num_envs, **options)
 
-    def make_network(self, device: str | torch.device = "cpu") -> PolicyNetwork:
+    def make_network(self, device: str | torch.device = "cpu") -> ImageNetwork:
         """Return its network."""
         network = self.description.load_network(self.state["policy"]).to(device)
         network.owner = f"policy={self.name}"
@@ -252,7 +257,7 @@ class Policy(BasePolicy):
         """Return the greedy actions for images of several drones.
 
         The images pass through its transforms, without simulated camera faults. If it stacks
-        frames, it remembers the images of the last calls, until `reset`.
+        frames or is recurrent, it remembers the images of earlier calls, until `reset`.
 
         Args:
             images: RGB, uint8. Shape: (N, H, W, 3).
@@ -270,23 +275,31 @@ class Policy(BasePolicy):
                 f"images of shape {tuple(images.shape)} and type {images.dtype} do not fit the "
                 f"policy's camera; give uint8 of shape (N, {camera.height}, {camera.width}, 3)"
             )
-        if self._film and len(self._film[-1]) != len(images):
+        known = [*self._film[-1:], *(memory.hidden for memory in self._memory)]
+        if known and len(known[0]) != len(images):
             raise InputError(
-                f"{len(images)} images follow {len(self._film[-1])}; call reset() before images of "
+                f"{len(images)} images follow {len(known[0])}; call reset() before images of "
                 "another number of drones"
             )
         network, transforms = self._network_and_transforms
         film = [*self._film, images]
-        outputs = network(see_film(transforms, film))
+        observation = see_film(transforms, film)
+        if isinstance(network, RecurrentNetwork):
+            memory = self._memory[0] if self._memory else network.start(len(images))
+            outputs, memory = network.step(observation, memory)
+            self._memory[:] = [memory]
+        else:
+            outputs = network(observation)
         self._film[:] = film[-memory_of(transforms) :] if memory_of(transforms) else []
         return network.actions.greedy(outputs)
 
     def reset(self) -> None:
         """Forget the images of earlier calls of `act` and `act_batch`, before a new episode."""
         self._film.clear()
+        self._memory.clear()
 
     @functools.cached_property
-    def _network_and_transforms(self) -> tuple[PolicyNetwork, list[TorchrlTransform]]:
+    def _network_and_transforms(self) -> tuple[ImageNetwork, list[TorchrlTransform]]:
         made = self.description.without_faults().make_transforms()
         return self.make_network(), pixel_transforms(made)
 

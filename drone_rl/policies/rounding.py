@@ -64,7 +64,8 @@ class RoundingBound:
     def find(cls, network: nn.Module) -> Self | None:
         """Return the bounds of a network, or None if one of its layers is not supported.
 
-        Supported are convolutions, linear layers, ReLU, MaxPool2d and Flatten of a `PolicyNetwork`.
+        Supported are convolutions without padding and linear layers, all with biases, ReLU,
+        pooling without overlap and Flatten, of a `PolicyNetwork`; see `layer_of`.
         """
         if not isinstance(network, PolicyNetwork):
             return None
@@ -125,7 +126,8 @@ class RoundingBound:
     def possible(self, pixels: Tensor) -> Tensor:
         """Return which actions are possible for each of the frames (N, C, H, W), float32.
 
-        The exact logit is lower than the best one by no more than the error of their difference.
+        An action is possible if its exact logit is below the best one's by no more than the error
+        bound of their difference.
         """
 
         def leads(value: Tensor) -> Tensor:
@@ -173,7 +175,8 @@ def decider(network: nn.Module) -> tuple[Decide, bool]:
     """Return how to decide with a network, and whether a bound for its layers is known.
 
     Without a bound, an error of `TOLERANCE` is assumed or, of a torch module, twice the difference
-    between its outputs in float32 and in float64 if that is larger.
+    between its outputs in float32 and in float64 if that is larger. Of continuous actions none
+    counts as possible, so that no frame is fragile.
     """
     bound = RoundingBound.find(network)
     if bound is not None:
@@ -198,11 +201,12 @@ def decider(network: nn.Module) -> tuple[Decide, bool]:
 def arithmetic_on(device: torch.device) -> tuple[str, bool]:
     """Return the name of the arithmetic of a device, and whether the bounds hold for it.
 
-    They do not where cuDNN may round the inputs of convolutions to TF32, as it does by default.
+    They do not where cuDNN may round the inputs of convolutions to TF32, as it does by default, or
+    may choose other convolution algorithms than direct sums; so on no GPU.
     """
     if device.type == "cuda" and torch.backends.cudnn.allow_tf32:
         return f"float32 (convolutions in TF32) on {device.type}", False
-    return f"float32 on {device.type}", True
+    return f"float32 on {device.type}", device.type == "cpu"
 
 
 def _in_float64(network: nn.Module) -> nn.Module | None:
@@ -230,7 +234,10 @@ REMEDY = (
 
 
 class Regrouped(ImageNetwork):
-    """Evaluates a network on each frame in another batch; a function of the frame is unchanged."""
+    """Evaluates a network in other batches than given.
+
+    If its outputs depend on the frame alone, they stay the same up to rounding.
+    """
 
     def __init__(self, network: ImageNetwork, groups: str, seed: int = 0) -> None:
         """Wrap a network.

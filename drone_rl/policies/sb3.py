@@ -87,7 +87,7 @@ class Sb3Trunk(BaseFeaturesExtractor):
     """A features extractor: `policy_kwargs={"features_extractor_class": Sb3Trunk, "net_arch": []}`.
 
     Raises:
-        InputError: The observations do not have three dimensions.
+        InputError: The observations do not have three dimensions, or the network is recurrent.
     """
 
     def __init__(self, observation_space: spaces.Box, network: Network | None = None) -> None:
@@ -96,7 +96,8 @@ class Sb3Trunk(BaseFeaturesExtractor):
         if len(shape) != 3:
             raise InputError(f"Sb3Trunk got observations of shape {shape}; give images (C, H, W)")
         made: Any = (network or SmallCnn()).make(shape, 1)
-        assert isinstance(made, PolicyNetwork)
+        if not isinstance(made, PolicyNetwork):
+            raise InputError(f"Sb3Trunk got {type(made).__name__}; give settings of layers")
         width = made.layers.get_parameter("logits.weight").shape[1]
         super().__init__(observation_space, features_dim=width)
         # Stable-Baselines3's initialization needs contiguous weights, not channels_last

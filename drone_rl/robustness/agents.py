@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Iterable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, cast
 
 import torch
 from torch import Tensor
@@ -10,7 +10,8 @@ from torchrl.envs import Transform
 
 from drone_rl.envs import GrayPixels
 from drone_rl.envs.transforms import memory_of, pixel_transforms, see_film
-from drone_rl.policies import ImageNetwork
+from drone_rl.policies import ImageNetwork, RecurrentNetwork
+from drone_rl.policies.recurrent import Memory
 from drone_rl.policies.rounding import decider
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.rendering import Appearance, Poses
@@ -75,6 +76,7 @@ class PolicyAgent:
         self._first, *self._rest = pixel_transforms(transforms)
         self._memory, self._num_envs = memory_of(self._rest), num_envs
         self._film: list[Tensor] = []
+        self._state = network.start(num_envs) if isinstance(network, RecurrentNetwork) else None
 
     def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
         """See `Agent`."""
@@ -92,7 +94,18 @@ class PolicyAgent:
         if self._decide is not None:
             is_fragile = self._decide(observation).is_fragile.cpu()
             self.is_fragile[context.active.cpu()] |= is_fragile
-        return context.worlds.dynamics.actions.greedy(self._network(observation)), images
+        outputs = self._outputs(observation, context.active)
+        return context.worlds.dynamics.actions.greedy(outputs), images
+
+    def _outputs(self, observation: Tensor, active: Tensor) -> Tensor:
+        """Evaluate the network for the active environments, and keep their recurrent state."""
+        if self._state is None:
+            return self._network(observation)
+        before = Memory(*(part[active] for part in self._state))
+        outputs, after = cast(RecurrentNetwork, self._network).step(observation, before)
+        for part, new in zip(self._state, after, strict=True):
+            part[active] = new
+        return outputs
 
 
 class BaselineAgent:

@@ -20,6 +20,7 @@ from drone_rl.evaluation.verdict_text import unlike as say_unlike
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
+from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.robustness.agents import OracleAgent
 from drone_rl.robustness.axes import AXES, Axis, check_axes, find_axes
 from drone_rl.robustness.charts import chart, strips
@@ -126,6 +127,9 @@ def shifts(
     begin = time.perf_counter()
     require_function(loaded, seed=seed.value, device=settings.device, renderer=settings.renderer)
     subject = make_evaluated_policy(loaded, settings)
+    if settings.domain:
+        remedy = "give domain=false for the success rates under perturbations alone"
+        require_memoryless(subject.network, "the operating domain", remedy)
     axes = find_axes(settings.axes, subject)
     total = len(axes) * (len(settings.strengths) + settings.domain) + 1
     done = itertools.count()

@@ -139,7 +139,9 @@ class FrameRecorder:
         if self._step <= STEP:  # some episodes end earlier
             self.image = (images[0] * 255).round().to(torch.uint8).movedim(0, -1)
         self._step += 1
-        return torch.zeros_like(context.active), None
+        actions, active = context.worlds.dynamics.actions, context.active
+        ahead = actions.always(actions.names[0])
+        return ahead.expand(len(active), *ahead.shape).to(active.device), None
 
 
 def make_strip(evaluator: PairedEvaluator, axis: Axis) -> list[NDArray | None]:
@@ -187,7 +189,7 @@ def area(positions: Sequence[float], shares: Sequence[float]) -> float:
 
 
 def success_area(levels: Iterable[dict[str, Any]], plain: float, mode: Mode) -> float | None:
-    """Return the area under the curve of success rate against strength; None without levels."""
+    """Return the mean height of the curve of success rate against strength; None without levels."""
     points = [(0.0, plain)] + [
         (level["position"], level["modes"][mode.value]["success"]["share"])
         for level in levels

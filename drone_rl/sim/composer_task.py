@@ -92,7 +92,8 @@ class ComposerTask(composer.Task):
         }
         for info in self._task_observables.values():
             info.enabled = True
-        steps = (CONTROL_TIMESTEP_S, CONTROL_TIMESTEP_S)
+        seconds = getattr(self.dynamics, "timestep", CONTROL_TIMESTEP_S)
+        steps = (seconds, seconds)
         self.set_timesteps(*(steps if self._flight is None else self._flight.timesteps))
 
     @property

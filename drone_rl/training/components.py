@@ -9,7 +9,7 @@ from torchrl.envs import TransformedEnv
 from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.config.learning import CompleteEpisodes, Ray
 from drone_rl.config.training import TrainSettings
-from drone_rl.policies import PolicyNetwork, make_actor
+from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.tasks import FailureReplayTask
 
@@ -19,7 +19,7 @@ class Group(NamedTuple):
 
     env: TransformedEnv
     actor: Any
-    network: PolicyNetwork
+    network: ImageNetwork
     """Shared by all groups."""
     generator: torch.Generator
     """Random stream of the actions."""
@@ -30,7 +30,7 @@ class Components(NamedTuple):
 
     collector: Any
     """Has `actor`, `postproc` and `cache_activations`, in addition to what `Trainer` needs."""
-    network: PolicyNetwork
+    network: ImageNetwork
     generators: dict[str, torch.Generator]
     """Random streams of this process, by name."""
 
@@ -72,6 +72,9 @@ def learning_actor(settings: TrainSettings, components: Components) -> Any:
     The fused kernel has `trainer.num_threads` threads of its own; PyTorch then gets one.
     """
     actor, threads = components.collector.actor, settings.trainer.num_threads
+    if components.network.is_recurrent:
+        torch.set_num_threads(1)  # the steps of an LSTM are too small to share
+        return actor
     if not settings.trainer.compiled:
         return actor
     cache = components.collector.cache_activations

@@ -125,6 +125,8 @@ class ReinforceLearner(GradientLearner):
     chunk_frames: int = TrainerSettings.chunk_frames
     """Frames per forward and backward pass. Gradients are accumulated over chunks, so this bounds
     memory and affects only rounding."""
+    whole_episodes: bool = False
+    """Whether chunks consist of whole episodes, as a recurrent network needs them."""
 
     @property
     def in_keys(self) -> Sequence[NestedKey]:
@@ -146,9 +148,12 @@ class ReinforceLearner(GradientLearner):
         """
         mask = batch.get(("collector", "mask"), None)
         steps = batch.reshape(-1) if mask is None else batch[mask]
+        chunks: int | list[int] = self.chunk_frames
+        if self.whole_episodes:
+            chunks = episode_chunks(steps.get(("next", "done"))[:, 0], self.chunk_frames)
         self.optimizer.zero_grad()
         try:
-            terms = accumulate(steps, self.loss, self.chunk_frames, self.loss.divisor)
+            terms = accumulate(steps, self.loss, chunks, self.loss.divisor)
             norm = descend(self.optimizer, self.network.named_parameters(), self.max_grad_norm)
         except NotANumberError:
             self.optimizer.zero_grad()
@@ -293,10 +298,27 @@ def check_finite(value: Tensor, name: str) -> None:
         raise NotANumberError(f"{name} is NaN or infinite")
 
 
+def episode_chunks(done: Tensor, chunk_frames: int) -> list[int]:
+    """Return the sizes of chunks of whole episodes.
+
+    Args:
+        done: Whether a step is its episode's last. Shape: (num_steps,).
+        chunk_frames: Steps in a chunk at most, unless a single episode has more.
+    """
+    ends = {*(done.nonzero()[:, 0] + 1).tolist(), len(done)}
+    sizes, begin, end = [], 0, 0
+    for following in sorted(ends):
+        if following - begin > chunk_frames and end > begin:
+            sizes.append(end - begin)
+            begin = end
+        end = following
+    return [*sizes, end - begin]
+
+
 def accumulate(
     batch: TensorDictBase,
     losses: Callable[[TensorDictBase], TensorDictBase],
-    chunk_frames: int,
+    chunks: int | list[int],
     divisor: Callable[[TensorDictBase], int] = len,
 ) -> dict[str, float]:
     """Add the gradient of steps (num_steps,) to the parameters, chunk by chunk.
@@ -304,7 +326,8 @@ def accumulate(
     Args:
         batch: The steps.
         losses: Returns the terms of the loss, `loss_*`, and other metrics.
-        chunk_frames: Steps in one forward and backward pass; bounds memory and affects rounding.
+        chunks: Steps in one forward and backward pass, or in each of them; bounds memory and
+            affects rounding.
         divisor: What the terms of steps are divided by; by default they are means over steps.
 
     Returns:
@@ -314,7 +337,7 @@ def accumulate(
         NotANumberError: A term is NaN or infinite.
     """
     totals: dict[str, float] = {}
-    for chunk in batch.split(chunk_frames):
+    for chunk in batch.split(chunks):
         share = len(chunk) / len(batch)
         weight = divisor(chunk) / divisor(batch)
         metrics = losses(chunk)

@@ -196,4 +196,5 @@ def reinforce_learner(settings: TrainSettings, parts: Components, **own: Any) ->
         scheduler=settings.scheduler.make(optimizer),
         max_grad_norm=limits.max_grad_norm,
         chunk_frames=limits.chunk_frames,
+        whole_episodes=parts.network.is_recurrent,
     )

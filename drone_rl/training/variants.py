@@ -12,7 +12,7 @@ from drone_rl.config.configuration import as_config, from_config, locate
 from drone_rl.config.learning import A2c, Ppo, Ray, Rollouts, WithCritic
 from drone_rl.config.registry import implements, modules_of
 from drone_rl.config.training import TrainSettings
-from drone_rl.policies import ActorCritic, PolicyNetwork
+from drone_rl.policies import ActorCritic, ImageNetwork
 from drone_rl.policies.zoo import describe
 from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.training.components import Components, episode_options, group_sizes, joined
@@ -101,7 +101,7 @@ def _remote_collector(
     sizes: list[int],
     number: int,
     replay: FailureReplayTask | None,
-) -> tuple[EpisodeCollector, PolicyNetwork, torch.Generator]:
+) -> tuple[EpisodeCollector, ImageNetwork, torch.Generator]:
     """Make a worker's collector, from arguments that can be sent; `modules` register its parts."""
     for module in modules:
         importlib.import_module(module)

@@ -161,7 +161,7 @@ class FileName:
         if not is_name or not text.isprintable() or {*text} & {*"/\\"} or text[0] in ".~- ":
             raise InputError(
                 f"{where}={shown(value)} is no name of a file; give one of at most "
-                f"{self.longest} bytes without / and not beginning with a dot"
+                f"{self.longest} bytes without / and \\, not beginning with a dot, ~, - or a space"
             )
         return text
 
@@ -178,7 +178,9 @@ class Maybe:
             return None if value is None else self.kind.read(value, where)
         except InputError:
             if isinstance(value, str) and value.lower() == "none":
-                raise InputError(f"{where}={value}: type null (None in Python)") from None
+                raise InputError(
+                    f"{where}={value} is a text; write null (None in Python)"
+                ) from None
             raise
 
 

@@ -1,7 +1,7 @@
 """Independent random streams from one seed.
 
-Every stream is a child of `numpy.random.SeedSequence(seed)` with its own key, so the streams of two
-environments, of two purposes, or of seed and seed + 1 don't overlap.
+Every stream but a `side_stream` is a child of `numpy.random.SeedSequence(seed)` with its own key,
+so the streams of two environments, of two purposes, or of seed and seed + 1 don't overlap.
 """
 
 import dataclasses
@@ -19,6 +19,7 @@ class Stream(enum.IntEnum):
     """Purpose of a random stream."""
 
     WORLDS = 0
+    """Environments of training."""
     POLICY_INIT = 1
     ACTIONS = 2
     CHOICE = 3
@@ -111,12 +112,12 @@ def seed_sequence(seed: int, *key: int) -> np.random.SeedSequence:
 def world_random_state(
     seed: int, world: int, stream: Stream = Stream.WORLDS
 ) -> np.random.RandomState:
-    """Return the stream of all episodes of one environment."""
+    """Return the stream of all episodes of environment number `world`."""
     return np.random.RandomState(np.random.PCG64(seed_sequence(seed, stream, world)))
 
 
 def side_stream(random_state: np.random.RandomState, *key: int) -> np.random.Generator:
-    """Return a stream derived from the state of an environment's stream, which does not change.
+    """Return a new stream, seeded by the state of an environment's stream, which is not advanced.
 
     It depends on the state and the key only, so it is the same after a restart from a saved state.
     """
@@ -128,17 +129,27 @@ def side_stream(random_state: np.random.RandomState, *key: int) -> np.random.Gen
 def torch_generator(
     seed: int, stream: Stream, *, number: int = 0, device: torch.device | str = "cpu"
 ) -> torch.Generator:
-    """Return a torch generator for one purpose; `number` is that of the worker."""
+    """Return a torch generator for one purpose.
+
+    `number` distinguishes streams of one purpose, such as those of workers, sensors or faults.
+    """
     state = seed_sequence(seed, stream, number).generate_state(1, np.uint64)[0]
     return torch.Generator(device).manual_seed(int(state >> np.uint64(1)))
 
 
 def get_state(random_state: np.random.RandomState) -> dict[str, int]:
-    """Return the state of a `world_random_state`; uniform samples need no other buffers."""
-    return dict(random_state.get_state(legacy=False)["state"])
+    """Return the state of a `world_random_state`.
+
+    That is the generator's, and the half of a 64-bit draw that it keeps for the next integer. There
+    is no state of normal samples, which tasks must not draw by `RandomState`.
+    """
+    full = random_state.get_state(legacy=False)
+    return {**full["state"], "has_uint32": full["has_uint32"], "uinteger": full["uinteger"]}
 
 
 def set_state(random_state: np.random.RandomState, state: dict[str, int]) -> None:
     """Restore the state that `get_state` returned."""
     full = random_state.get_state(legacy=False)
-    random_state.set_state({**full, "state": dict(state)})
+    inner = {name: state[name] for name in ("state", "inc")}
+    kept = {name: state[name] for name in ("has_uint32", "uinteger")}
+    random_state.set_state({**full, "state": inner, **kept})

@@ -41,13 +41,14 @@ class Agreement:
 def agreement(
     env: TransformedEnv,
     actor: TensorDictModuleBase,
-    other: Callable[[Tensor], Tensor],
+    other: Callable[..., Tensor],
     steps: int,
 ) -> Agreement:
     """Run a policy with sampled actions and compare another implementation at every step.
 
-    The actor writes "logits"; `other` takes RGB images (N, H, W, 3), uint8, and returns
-    `Actions.probabilities` (N, A) on the CPU. Environments whose episode ends are reset.
+    The actor writes "logits"; `other` takes RGB images (N, H, W, 3), uint8, for a recurrent policy
+    also which episodes start, bool (N, 1), and returns `Actions.probabilities` (N, A) on the CPU.
+    Environments whose episode ends are reset.
     """
     base: Any = env.base_env
     actions = worlds_of(env).dynamics.actions
@@ -56,7 +57,8 @@ def agreement(
         for _ in range(steps):
             state = actor(state)
             probs.append(actions.probabilities(state["logits"]).cpu())
-            others.append(other(base.last_pixels.cpu()))
+            started = [state["is_init"].cpu()] if "is_init" in actor.in_keys else []
+            others.append(other(base.last_pixels.cpu(), *started))
             state = env.step_and_maybe_reset(state)[1]
     mine, its = torch.cat(probs), torch.cat(others)
     return Agreement(

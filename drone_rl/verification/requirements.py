@@ -23,6 +23,8 @@ def require_cubes(described: PolicyDescription, what: str) -> TaskSettings:
         problem = f"actions=moves, got actions.kind={actions.kind}"
     elif any(choice.name == "stack" for choice in described.transforms):
         problem = "policies that observe one frame; this one stacks frames (transform stack)"
+    elif described.is_recurrent:
+        problem = "policies that observe one frame; this one remembers earlier ones (network=lstm)"
     elif described.faults:
         problem = f"cameras without faults; it simulates faults (transform {described.faults[0]})"
     else:

@@ -140,7 +140,7 @@ def test_policies_that_read_the_true_state_are_supported(name):
         env = DroneEnv(3, SHORT, seed=5, pixels=False)
         actor = make_baseline(name, env.worlds.task, torch.Generator().manual_seed(3))
         collector = EpisodeCollector(
-            env, actor, next_keys=KEPT, keep_observations=False, acceleration=acceleration
+            env, actor, next_keys=KEPT, keep_actor_entries=False, acceleration=acceleration
         )
         assert collector.source.name.startswith("direct" if acceleration == "direct" else "step")
         batches.append(collector.collect())

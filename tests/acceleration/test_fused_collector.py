@@ -242,7 +242,7 @@ def test_collecting_from_fewer_environments():
 
 
 def test_observations_are_optional():
-    batch = make(keep_observations=False).collect()
+    batch = make(keep_actor_entries=False).collect()
     assert "pixels" not in batch and "logits" not in batch and "action" in batch
 
 
@@ -326,7 +326,7 @@ def test_activations_are_cached_if_they_fit(parts, fits, monkeypatch):
 def test_no_activations_without_a_request_or_without_observations():
     assert "activations" not in make().collect()
     assert make(acceleration="direct").source.cache_activations() is None
-    collector = make(keep_observations=False)
+    collector = make(keep_actor_entries=False)
     cache = collector.source.cache_activations()
     assert cache is not None and collector.source.cache_activations() is cache
     assert not {"pixels", "activations"} & set(collector.collect().keys())

@@ -37,8 +37,10 @@ def test_the_best_rate_solves_most_seeds(tmp_path, monkeypatch):
     monkeypatch.setattr(chapter, "minutes", lambda folder, episodes: 7.0)
     monkeypatch.setattr(chapter, "speedup", lambda folder, times, root: 4.0)
     monkeypatch.setattr(chapter, "count_conventions", lambda root: 33)
+    monkeypatch.setattr(chapter, "memory", lambda folder, quick, root: {"lstm_success": 0.9})
     found = chapter.bench_chapter(tmp_path, False)
     assert (found["original_rate"], found["original_solved"]) == (1e-4, 3)
+    assert found["lstm_success"] == 0.9
     assert (found["original_minutes"], found["original_speedup"]) == (7.0, 4.0)
 
 
@@ -66,3 +68,27 @@ def test_runs_are_trained_and_judged(tmp_path, monkeypatch):
 def test_minutes_are_scaled_to_all_episodes(tmp_path, monkeypatch):
     monkeypatch.setattr(chapter, "train", lambda run, *settings: (6.0, {}))
     assert chapter.minutes(tmp_path, 3000) == pytest.approx(1.0)
+
+
+def test_networks_learn_the_same_task(tmp_path, monkeypatch):
+    """Three trainings each; the median counts."""
+    rates = iter([0.5, 1.0, 0.9, 0.4, 0.6, 0.5])
+    given = []
+
+    def train(run, *settings, environment):
+        assert environment["PYTHONPATH"].startswith(f"{tmp_path}/examples:{tmp_path}")
+        given.append((run, settings))
+
+    def call(name, policy, *args, environment):
+        folder = given[-1][0] / "evaluation"
+        folder.mkdir(parents=True)
+        rate = next(rates)
+        (folder / "evaluation.json").write_text(f'{{"greedy": {{"success": {{"mean": {rate}}}}}}}')
+
+    monkeypatch.setattr(chapter, "train", train)
+    monkeypatch.setattr(chapter, "call", call)
+    found = chapter.memory(tmp_path / "runs", False, root=tmp_path)
+    assert found == {"lstm_success": 0.9, "memoryless_success": 0.5}
+    networks = [settings[2] for _, settings in given]
+    assert networks == ["network=lstm"] * 3 + ["network=small_cnn"] * 3
+    assert [settings[3] for _, settings in given[:3]] == ["seed=0", "seed=1", "seed=2"]

@@ -111,7 +111,7 @@ def test_nested_entries_are_read_and_kept_as_leaves():
 
 
 def test_kept_entries():
-    batch = scripted(keep_observations=False).collect()
+    batch = scripted(keep_actor_entries=False).collect()
     assert set(batch.keys()) == {"action", "next", "collector"}
     assert set(batch["next"].keys()) == {"reward", "done", "terminated", "frame"}
     assert set(scripted().collect().keys()) == {"frame", "action", "next", "collector"}
@@ -199,7 +199,7 @@ def test_finished_environments_are_not_rendered(make_pipeline):
 
 def test_observations_are_optional(make_pipeline):
     env, actor = make_pipeline(2, task=SHORT)
-    batch = EpisodeCollector(env, actor, keep_observations=False).collect()
+    batch = EpisodeCollector(env, actor, keep_actor_entries=False).collect()
     assert "pixels" not in batch
     assert "action" in batch
 

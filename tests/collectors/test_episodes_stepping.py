@@ -71,7 +71,7 @@ def test_outer_exploration_type_is_respected():
 
 
 def test_observations_are_omitted_and_extra_entries_kept():
-    collector, _ = make(keep_observations=False, actor_keys=("logits",))
+    collector, _ = make(keep_actor_entries=False, actor_keys=("logits",))
     batch = collector.collect(5)
     assert set(batch.keys()) == {"action", "logits", "next", "collector"}
     assert len(batch["logits"]) == len(batch)

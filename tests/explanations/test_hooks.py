@@ -91,7 +91,7 @@ def test_what_is_no_layer(elsewhere, name):
 def test_a_function_has_no_layers():
     network = ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 8, 10), MOVES)
     assert ([*layers(network)], spatial_layers(network), feature_layer(network)) == ([], [], None)
-    with pytest.raises(InputError, match="choose from: none, because it is not a torch module"):
+    with pytest.raises(InputError, match="from: none, because it is no torch module"):
         find_layer(network, "conv1")
     one = ExternalNetwork(nn.Sequential(nn.Flatten(), nn.Linear(80, 3)), (1, 8, 10), MOVES)
     assert feature_layer(one) == "0"

@@ -95,5 +95,8 @@ def test_initial_values_are_small_and_seeded(network):
 
 
 def test_network_without_layers_raises():
-    with pytest.raises(InputError, match=r"policy of layers, which Linear is not; derive it from"):
+    with pytest.raises(
+        InputError,
+        match=r"of layers, which Linear is not; give objective=",
+    ):
         ActorCritic(nn.Linear(4, 2))

@@ -206,7 +206,7 @@ def test_layers_are_boxes_followed_by_forbidden_imports():
     )
     boxes = ["top</code>", "left</code> <code>right</code>", "base</code>"]
     assert drawn.splitlines()[1:4] == [f"<li><code>{box}</li>" for box in boxes]
-    assert drawn.endswith("- No water inside: in top, left, no sea, rain.")
+    assert drawn.endswith("- No water inside: top, left may not import sea, rain.")
 
 
 def test_packages_are_listed_from_the_top_with_their_subpackages(tmp_path):

@@ -104,6 +104,17 @@ def test_state_round_trip_goes_on_where_it_was():
     assert all(isinstance(v, int) for v in state.values())
 
 
+def test_state_holds_the_half_of_a_draw_that_is_kept_for_the_next_integer():
+    """A 31-bit integer takes half of a 64-bit draw; the next one takes the other half."""
+    random_state = world_random_state(0, 0)
+    for _ in range(3):
+        state = get_state(random_state)
+        following = random_state.randint(2**31 - 1), random_state.uniform()
+        for other in (random_state, world_random_state(9, 9)):
+            set_state(other, state)
+            assert (other.randint(2**31 - 1), other.uniform()) == following
+
+
 def test_torch_generators_differ_by_stream_and_number():
     keys = [(Stream.ACTIONS, 0), (Stream.ACTIONS, 1), (Stream.POLICY_INIT, 0)]
     values = {float(torch.rand(1, generator=torch_generator(0, s, number=n))) for s, n in keys}

@@ -60,4 +60,4 @@ def _sentence(contract: dict[str, Any]) -> str:
     sources = ", ".join(name.removeprefix("drone_rl.") for name in contract["source_modules"])
     name = contract["name"][0].upper() + contract["name"][1:]
     forbidden = ", ".join(contract["forbidden_modules"])
-    return f"- {name}: in {sources}, no {forbidden}."
+    return f"- {name}: {sources} may not import {forbidden}."

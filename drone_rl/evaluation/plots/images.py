@@ -62,7 +62,7 @@ def explained_frame(
     return stacked([titled(plain, captions[0]), titled(hot, captions[1]), bars])
 
 
-def probed_frame(
+def frame_with_probabilities(
     data: Mapping[str, NDArray], frame: int, caption: str, actions: ShownActions = SHOWN_MOVES
 ) -> Image.Image:
     """Stack a frame of the data set under a caption, and its action probabilities.
@@ -115,7 +115,8 @@ def shown_picture(observation: NDArray, low: float, high: float, channels: str) 
     """Convert the newest frame of an observation, shape (C, H, W), to an RGB image, uint8.
 
     `low` is shown as black, `high` as white. The channels are "gray", "rgb", or "chromaticity" of
-    red and blue, with the remainder as green. Shape: (H, W, 3).
+    red and blue. Their green is 1 minus the mean of both: the image tells colours apart and does
+    not show those of the scene. Shape: (H, W, 3).
     """
     newest = observation[-_CHANNELS.get(channels, 1) :].astype(np.float64)
     share = ((newest - low) / max(high - low, 1e-12)).clip(0, 1)

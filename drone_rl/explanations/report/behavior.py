@@ -226,7 +226,7 @@ def pairs(explanation: Explanation, kind: str) -> dict[str, Image.Image]:
     listed = explanation.numbers["contradictions"]["list"]
     shown = [pair for pair in listed if pair["kind"] == kind][:MAX_PAIRS]
     return {
-        f"pair {i}, frame {pair[side]}: more {side}": images.probed_frame(
+        f"pair {i}, frame {pair[side]}: more {side}": images.frame_with_probabilities(
             explanation.data, pair[side], f"frame {pair[side]}: more {side}", explanation.actions
         )
         for i, pair in enumerate(shown, start=1)

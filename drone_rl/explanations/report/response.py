@@ -28,7 +28,7 @@ def say_response(evidence: Evidence) -> Claims:
     """Say from where targets are handled, and where the policy is blind to them."""
     rows, terms, claims = evidence["response"]["rows"], terms_of(evidence), Claims()
     level = [row for row in rows if row["height"] == 0]
-    other = [row for row in rows if row["height"] != 0]
+    other = [row for row in rows if row["height"] != 0 and row["places"]]
     if any(row["places"] for row in level):
         claims["response.collected"] = (
             f"With one {terms.target} alone and its most probable actions, the policy "
@@ -42,7 +42,7 @@ def say_response(evidence: Evidence) -> Claims:
         ]
         claims["response.heights"] = f"With the {terms.target} {'; '.join(parts)}."
     blind = {row["side"]: row["blind"] for row in level if row["side"] != "ahead"}
-    if None not in blind.values():
+    if blind and None not in blind.values():
         parts = [f"{percent(of)} of the places {terms.place(side)}" for side, of in blind.items()]
         claims["response.blind"] = (
             f"It is blind at {listed(parts)}: a turn is needed, it makes none, and its "
@@ -66,11 +66,12 @@ def say_asymmetry(evidence: Evidence) -> Claims:
     """Say how far the policy differs from its mirror image, and which side it prefers."""
     found = evidence["asymmetry"]["dataset"]
     absolute, signed = found["absolute"], found["signed"]
+    on_grid = evidence["asymmetry"]["grid"]["absolute"]
     claims = {
         "asymmetry.differs": (
             "On these frames the policy differs from its mirror image by "
             f"{absolute['mean']:.2f} on average (0: perfectly symmetric, 1: always opposite; "
-            f"{bounds(absolute)}), on the grid by {evidence['asymmetry']['grid']['absolute']:.2f}."
+            f"{bounds(absolute)}), over the places of the response map by {on_grid:.2f}."
         )
     }
     if signed["lower95"] > 0 or signed["upper95"] < 0:
@@ -98,14 +99,14 @@ def response_charts(explanation: Explanation) -> dict[str, Figure]:
     named = ([actions.css(action) for action in range(count)], actions.names)
     ends = (_OUTCOMES, [f"{terms.target} {what}" for what in (terms.unhandled, terms.handled)])
     charts: dict[str, Figure] = {}
-    for layer in reversed(range(len(heights))):
+    for level in reversed(range(len(heights))):
         panels = [new_chart(height=4.4) for _ in range(count + 2)]
         axes = [axis for _, axis in panels]
-        _draw_row(axes, arrays, layer, actions)
-        level = f", {terms.target} {heights[layer]:+g} m" if len(heights) > 1 else ""
+        _draw_maps(axes, arrays, level, actions)
+        suffix = f", {terms.target} {heights[level]:+g} m" if len(heights) > 1 else ""
         for figure, axis in panels:
             axis.set(ylabel="metres ahead", xlabel="metres to the left (+) or right (-)")
-            charts[f"{axis.get_title()}{level}"] = figure
+            charts[f"{axis.get_title()}{suffix}"] = figure
             axis.set_title(f"{axis.get_title()}{level}", fontsize=11)
         for figure, axis in panels[:count]:
             figure.colorbar(axis.images[0], ax=axis, shrink=0.8, label="probability")
@@ -115,16 +116,16 @@ def response_charts(explanation: Explanation) -> dict[str, Figure]:
     return charts
 
 
-def _draw_row(
-    axes: Sequence[Axes], arrays: dict[str, NDArray], layer: int, actions: ShownActions
+def _draw_maps(
+    axes: Sequence[Axes], arrays: dict[str, NDArray], level: int, actions: ShownActions
 ) -> None:
     """Draw the maps of one height: one for each action, the best action, the outcome."""
     forward, lateral = arrays["response_forward"], arrays["response_lateral"]
-    probabilities = arrays["response_probabilities"][layer]
-    extent = (lateral[0], lateral[-1], forward[0], forward[-1])
+    probabilities = arrays["response_probabilities"][level]
     style: dict[str, Any] = {
-        "extent": extent, "origin": "lower", "aspect": "auto", "interpolation": "nearest",
-    }  # fmt: skip
+        **{"origin": "lower", "aspect": "auto", "interpolation": "nearest"},
+        "extent": _extent(lateral, forward),
+    }
     *panels, most, outcome = axes
     for axis, action in zip(panels, actions.order, strict=True):
         axis.imshow(probabilities[..., action], vmin=0, vmax=1, cmap="viridis", **style)
@@ -132,15 +133,22 @@ def _draw_row(
     shades = ListedColormap([actions.css(action) for action in range(len(panels))])
     most.imshow(probabilities.argmax(-1), vmin=0, vmax=len(panels) - 1, cmap=shades, **style)
     most.set_title("most probable action")
-    blind = arrays["response_blind"][layer]
+    blind = arrays["response_blind"][level]
     if blind.any():
         most.contour(
             lateral, forward, blind.astype(float), levels=[0.5], colors="white", linewidths=2.5
         )
         most.set_title("most probable action; inside the white line: blind")
     ends = ListedColormap(_OUTCOMES)
-    outcome.imshow(arrays["outcome_collected"][layer], vmin=0, vmax=1, cmap=ends, **style)
+    style["extent"] = _extent(arrays["outcome_lateral"], arrays["outcome_forward"])
+    outcome.imshow(arrays["outcome_collected"][level], vmin=0, vmax=1, cmap=ends, **style)
     outcome.set_title("outcome")
+
+
+def _extent(lateral: NDArray, forward: NDArray) -> tuple[float, float, float, float]:
+    """Return the outer edges of cells whose middles are equally spaced, as `imshow` needs them."""
+    aside, ahead = ((a[-1] - a[0]) / max(1, len(a) - 1) / 2 or 0.5 for a in (lateral, forward))
+    return lateral[0] - aside, lateral[-1] + aside, forward[0] - ahead, forward[-1] + ahead
 
 
 def response_tables(explanation: Explanation) -> dict[str, Rows]:
@@ -175,7 +183,7 @@ def worst_frames(explanation: Explanation) -> dict[str, Image.Image]:
     shown: dict[str, Image.Image] = {}
     for one in explanation.numbers["asymmetry"]["dataset"]["worst"][:3]:
         caption = f"frame {one['frame']}: differs by {one['distance']:.2f}"
-        shown[caption] = images.probed_frame(
+        shown[caption] = images.frame_with_probabilities(
             explanation.data, one["frame"], caption, explanation.actions
         )
     return shown

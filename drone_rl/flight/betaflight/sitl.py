@@ -103,9 +103,9 @@ class Betaflight:
         """Take the firmware with its arguments; it starts in `__enter__`.
 
         The folder of its settings and log is created if missing; a firmware without settings is set
-        up. After `patience` seconds of silence, half of them while it starts, the firmware counts
-        as dead. After `answer_within` seconds without an answer to one state the rotors keep their
-        commands. See `FirmwareProcess` for `isolated`.
+        up. After `patience` seconds of silence it counts as dead; while it starts it is started
+        again after half of that, up to `STARTS` times. After `answer_within` seconds without an
+        answer to one state the rotors keep their commands. See `FirmwareProcess` for `isolated`.
         """
         self.program = list(program)
         self.folder = folder
@@ -118,7 +118,8 @@ class Betaflight:
         """States that were not answered in time."""
         self._rotors = np.zeros(4)
         self._next_sticks = -np.inf
-        self._heard = 0.0
+        self._silence = 0.0
+        """Seconds that were waited in vain since the last answer."""
         self._open = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
@@ -150,17 +151,19 @@ class Betaflight:
             self._send(self._sticks, pack_sticks(readings.time, sticks.channels))
         self._drop_late_answers()
         self._send(self._state, pack_state(readings))
+        begin = time.monotonic()
         try:
             self._rotors = unpack_rotors(self._hear.recv(64))
-            self._heard = time.monotonic()
+            self._silence = 0.0
         except TimeoutError:
             self.missed += 1
-            if time.monotonic() - self._heard > self.patience:
-                raise self._failure() from None
+            self._silence += time.monotonic() - begin
+            if self._silence > self.patience:
+                raise self._failure(f"has been silent for {self.patience:g} s") from None
         return self._rotors
 
-    def _failure(self) -> FlightControllerError:
-        status, what = self._process.status(), f"has been silent for {self.patience:g} s"
+    def _failure(self, what: str) -> FlightControllerError:
+        status = self._process.status()
         what = what if status is None else f"ended with status {status}"
         return FlightControllerError(f"the firmware {what}; see its log {self.log}")
 
@@ -185,9 +188,9 @@ class Betaflight:
             end = time.monotonic() + self.patience / 2
             while time.monotonic() < end:
                 if self._answers():
-                    self._heard = time.monotonic()
+                    self._silence = 0.0
                     return
-        raise self._failure()
+        raise self._failure(f"did not answer in {STARTS} starts of {self.patience / 2:g} s each")
 
     def _answers(self) -> bool:
         for _ in range(_AWAKE):
@@ -215,6 +218,9 @@ class Betaflight:
         except (OSError, FlightControllerError) as error:
             (self.folder / MEMORY).unlink(missing_ok=True)  # partial settings must not be reused
             raise FlightControllerError(f"the firmware can't be set up: {error}") from error
+        except BaseException:
+            (self.folder / MEMORY).unlink(missing_ok=True)
+            raise
 
     def _wait_for_end(self) -> None:
         end = time.monotonic() + self.patience

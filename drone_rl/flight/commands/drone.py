@@ -34,7 +34,8 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import OneOf, Whole
 
 COASTING = 0.06
-"""Seconds for which the last goals hold after a command that sets no position."""
+"""Seconds for which the last goals hold after a command that was cancelled, failed or sets no
+position."""
 _MODES = ("simple_flight", "computer_vision")
 _IDLE = 0.1
 """Thrust of idle rotors as a fraction of the hover thrust."""
@@ -145,7 +146,7 @@ class Drone:
 
     @property
     def time(self) -> float:
-        """Simulated seconds since the drone was created."""
+        """Simulated seconds since the drone was created or last reset."""
         return int(self.body.ticks[0]) * self.settings.tick
 
     @property
@@ -326,7 +327,7 @@ class Drone:
     def _fly(self, goals: Goals | None, ticks: int) -> None:
         if self.is_computer_vision:
             self.body.numbers[:, TICKS] += ticks
-            self.trajectory.append(self.time, self.body)
+            self._record(ticks)
             return
         if not self._is_armed:
             goals = _all_rotors(0.0)
@@ -336,10 +337,14 @@ class Drone:
             self.body = self._quadrotor.fly(self.body, goals, ticks, self._obstacles)
         if self._is_lost:  # the drone stays at its last valid state
             self.body.numbers[:, TICKS] += ticks
+        self._record(ticks)
+        self._update_landed()
+
+    def _record(self, ticks: int) -> None:
+        """Note the state, and show it to the sensors."""
         self.trajectory.append(self.time, self.body)
         if self._sensors is not None:
             self._sensors.update(self.body, ticks * self.settings.tick)
-        self._update_landed()
 
     def _update_landed(self) -> None:
         """Detect take-off and landing."""

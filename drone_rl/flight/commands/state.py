@@ -101,7 +101,7 @@ class PilotState:
     time: float
     """Simulated seconds."""
     position: Triple
-    """Centre of the drone, metres; above the ground when it has landed."""
+    """Centre of the drone, metres; z is the drone's radius when it stands on the ground."""
     velocity: Triple
     """Metres per second."""
     attitude: Attitude
@@ -111,7 +111,8 @@ class PilotState:
     armed: bool
     """Whether the rotors turn."""
     lost: bool
-    """Whether the simulation has diverged; the other values are then the last valid ones."""
+    """Whether the simulation has diverged: pose and contact are then the last valid ones, the
+    velocity is 0, and time goes on."""
     collision: Collision | None
     """The last contact, with the ground or an obstacle; None before the first."""
 

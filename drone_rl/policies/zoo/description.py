@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import torch
+from torchrl.envs import InitTracker, TransformedEnv
 from torchrl.envs import Transform as TorchrlTransform
-from torchrl.envs import TransformedEnv
 
 from drone_rl.config import (
     COMPUTER_VISION,
@@ -25,11 +25,11 @@ from drone_rl.config import (
     read_task,
 )
 from drone_rl.config.configuration import Variant
-from drone_rl.config.networks import Network
+from drone_rl.config.networks import Lstm, Network
 from drone_rl.config.training import MOST_TRANSFORMS, TrainSettings
 from drone_rl.config.transforms import Fault, Frame, Stack, Transform
 from drone_rl.envs import DroneEnv, with_transforms
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import Dynamics, make_dynamics
 from drone_rl.sim.tasks import Task, as_task
@@ -108,6 +108,11 @@ class PolicyDescription:
         return math.prod(t.N for t in self.transforms if isinstance(t, Stack))
 
     @property
+    def is_recurrent(self) -> bool:
+        """Whether the network remembers earlier frames of an episode."""
+        return isinstance(self.network, Lstm)
+
+    @property
     def faults(self) -> tuple[str, ...]:
         """Names of the transforms that simulate camera faults."""
         return tuple(t.name for t in self.transforms if isinstance(t, Fault))
@@ -168,20 +173,24 @@ class PolicyDescription:
         return make_dynamics(as_task(self.task).make_dynamics, self.dynamics, self.actions)
 
     def make_transforms(self) -> list[TorchrlTransform]:
-        """Build the transforms in order."""
-        return [transform.make() for transform in self.transforms]
+        """Build the transforms in order, then those that carry the state of a recurrent network."""
+        made = [transform.make() for transform in self.transforms]
+        if not self.is_recurrent:
+            return made
+        network: Any = self._without_weights()
+        return [*made, InitTracker(), network.lstm.make_tensordict_primer()]
 
-    def build_network(self, generator: torch.Generator | None = None) -> PolicyNetwork:
+    def build_network(self, generator: torch.Generator | None = None) -> ImageNetwork:
         """Return the network with fresh weights, from torch's global generator by default."""
         return self._network(self.make_dynamics().actions, generator)
 
-    def load_network(self, weights: Mapping[str, torch.Tensor]) -> PolicyNetwork:
+    def load_network(self, weights: Mapping[str, torch.Tensor]) -> ImageNetwork:
         """Return the network with given weights, as in `expected_weights`."""
         network = self._without_weights().to_empty(device="cpu")
         network.load_state_dict(weights)
         return network
 
-    def build_critic(self, generator: torch.Generator | None = None) -> PolicyNetwork:
+    def build_critic(self, generator: torch.Generator | None = None) -> ImageNetwork:
         """Return a network of the same kind with one output, see `build_network`."""
         return self._layers(1, generator)
 
@@ -189,17 +198,17 @@ class PolicyDescription:
         """Return meta tensors with the names, shapes and types of the network's weights."""
         return dict(self._without_weights().state_dict())
 
-    def _without_weights(self) -> PolicyNetwork:
+    def _without_weights(self) -> ImageNetwork:
         actions = self.make_dynamics().actions
         with torch.device("meta"):  # nothing is computed here: that would load a compiler's algebra
             return self._network(actions)
 
-    def _network(self, actions: Actions, generator: torch.Generator | None = None) -> PolicyNetwork:
+    def _network(self, actions: Actions, generator: torch.Generator | None = None) -> ImageNetwork:
         network = self._layers(actions.num_outputs, generator)
         network.actions = actions
         return network
 
-    def _layers(self, outputs: int, generator: torch.Generator | None) -> PolicyNetwork:
+    def _layers(self, outputs: int, generator: torch.Generator | None) -> ImageNetwork:
         return self.network.make(self.input.shape, outputs, generator=generator)
 
 

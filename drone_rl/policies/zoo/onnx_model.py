@@ -7,23 +7,26 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
 from drone_rl.envs import on_pixels
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import ImageNetwork, RecurrentNetwork
+from drone_rl.policies.recurrent import Memory
 from drone_rl.policies.zoo.description import PolicyDescription
 from drone_rl.utils.errors import InputError, extra
 
 FRAMES, PROBABILITIES, ACTION = "frames", "probabilities", "action"
-"""Names of the model's input and outputs."""
+STATE, NEXT_STATE = ("hidden", "cell"), ("next_hidden", "next_cell")
+"""Names of the model's inputs and outputs; only recurrent models have the states."""
 _ASKED_BY = "format=onnx"
 
 
 class _FullPolicy(nn.Module):
     """Transforms, network and probabilities: RGB (N, H, W, 3), uint8, to outputs of the model."""
 
-    def __init__(self, description: PolicyDescription, network: PolicyNetwork) -> None:
+    def __init__(self, description: PolicyDescription, network: ImageNetwork) -> None:
         super().__init__()
         if description.frames > 1:
             raise InputError(
@@ -35,20 +38,27 @@ class _FullPolicy(nn.Module):
         self.has_action = bool(network.actions.entry.shape)
         """Whether there is an output for the action, which is not the most probable part."""
 
-    def forward(self, frames: Tensor) -> Tensor | tuple[Tensor, Tensor]:
-        actions, outputs = self._network.actions, self._network(self._transform(frames))
-        probs = actions.probabilities(outputs)
-        return (probs, actions.greedy(outputs)) if self.has_action else probs
+    def forward(self, frames: Tensor, *state: Tensor) -> tuple[Tensor, ...]:
+        actions, network, seen = self._network.actions, self._network, self._transform(frames)
+        following: tuple[Tensor, ...] = ()
+        if isinstance(network, RecurrentNetwork):
+            outputs, following = network.step(seen, Memory(*state))
+        else:
+            outputs = network(seen)
+        decided = (actions.greedy(outputs),) if self.has_action else ()
+        return (actions.probabilities(outputs), *decided, *following)
 
 
 def make_onnx(
-    description: PolicyDescription, network: PolicyNetwork, about: Mapping[str, Any]
+    description: PolicyDescription, network: ImageNetwork, about: Mapping[str, Any]
 ) -> bytes:
     """Return a policy as an ONNX model.
 
     The input is "frames", RGB of the camera, uint8 (N, H, W, 3) for any N from 1. The output is
     "probabilities", of each action, float32 (N, A). Of continuous actions they are those of their
-    parts, see `Actions.probabilities`, and a second output is "action", float32 (N, 3). The
+    parts, see `Actions.probabilities`, and a second output is "action", float32 (N, 3). A recurrent
+    model has further inputs, "hidden" and "cell", float32 (N, 1, size), zero when an episode
+    starts, and further outputs, "next_hidden" and "next_cell", to pass with the next frame. The
     metadata are JSON: the description by its keys, "actions", names in the order of the first
     output, and `about`.
 
@@ -59,15 +69,20 @@ def make_onnx(
     passes = extra("onnx_ir.passes.common", "onnx", _ASKED_BY)
     policy, camera = _FullPolicy(description, network).eval(), description.camera
     sample = torch.zeros(2, camera.height, camera.width, 3, dtype=torch.uint8)
+    state = network.start(2) if isinstance(network, RecurrentNetwork) else ()
+    any_number = {0: torch.export.Dim("N")}
     try:
         with _silence():
             program = torch.onnx.export(
                 policy,
-                (sample,),
+                (sample, *state),
                 dynamo=True,
-                input_names=[FRAMES],
-                output_names=[PROBABILITIES, ACTION][: 1 + policy.has_action],
-                dynamic_shapes=({0: torch.export.Dim("N")},),
+                input_names=[FRAMES, *STATE[: len(state)]],
+                output_names=[
+                    *(PROBABILITIES, ACTION)[: 1 + policy.has_action],
+                    *NEXT_STATE[: len(state)],
+                ],
+                dynamic_shapes=(any_number, (any_number,) * len(state)),
                 verbose=False,
             )
     except torch.onnx.OnnxExporterError as error:
@@ -83,15 +98,27 @@ def make_onnx(
     return program.model_proto.SerializeToString()
 
 
-def open_onnx(content: bytes) -> Callable[[Tensor], Tensor]:
-    """Return a model of `make_onnx` as a function of frames; it needs onnxruntime."""
+def open_onnx(content: bytes) -> Callable[..., Tensor]:
+    """Return a model of `make_onnx` as a function of frames; it needs onnxruntime.
+
+    A recurrent model is also given which episodes start, bool (N, 1), and keeps its state.
+    """
     runtime = extra("onnxruntime", "onnx", _ASKED_BY)
     options = runtime.SessionOptions()
     options.intra_op_num_threads = 1  # more would only wait for torch's, and sums depend on them
     session = runtime.InferenceSession(content, options)
 
-    def probabilities(frames: Tensor) -> Tensor:
-        (found,) = session.run([PROBABILITIES], {FRAMES: frames.numpy()})
+    sizes = {given.name: given.shape[-1] for given in session.get_inputs()[1:]}
+    state: dict[str, np.ndarray] = {}
+
+    def probabilities(frames: Tensor, is_init: Tensor | None = None) -> Tensor:
+        for name, size in sizes.items():
+            assert is_init is not None
+            before = state.get(name, np.zeros((len(frames), 1, size), np.float32))
+            state[name] = np.where(is_init.numpy()[..., None], np.float32(0), before)
+        outputs = [PROBABILITIES, *NEXT_STATE[: len(sizes)]]
+        found, *following = session.run(outputs, {FRAMES: frames.numpy(), **state})
+        state.update(zip(sizes, following, strict=True))
         return torch.from_numpy(found)
 
     return probabilities

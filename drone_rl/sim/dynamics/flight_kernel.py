@@ -15,6 +15,8 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _FASTEST, _FARTHEST, _WILDEST = wp.constant(1000.0), wp.constant(1.0e18), wp.constant(10.0)
 """Metres or radians a second, square metres, and standard deviations of gusts that none exceeds."""
+_WIDEST = wp.constant(1.0e12)
+"""Square metres: no drone flies 1000 km."""
 
 
 @wp.struct
@@ -83,13 +85,13 @@ def is_sound(motion: rigid.Motion) -> bool:
     spin = wp.length_sq(motion.rates)
     turn = wp.length_sq(motion.attitude)
     most = _FASTEST * _FASTEST
-    near = place < most * most
+    near = place < _WIDEST
     return near and speed < most and spin < most and turn > 0.5 and turn < 2.0
 
 
 @wp.func
-def is_finite(goal: Goal, start: wp.vec3d) -> bool:
-    """Return whether a goal and a position are finite."""
+def is_plausible(goal: Goal, start: wp.vec3d) -> bool:
+    """Return whether a goal and a position are neither NaN nor absurdly large."""
     wanted = wp.length_sq(goal.values) + wp.length_sq(goal.drift)
     return wanted < _FARTHEST and wp.length_sq(start) < wp.float64(_FARTHEST)
 
@@ -300,7 +302,7 @@ def run(
     frame = command.frame
     flight = loaded(before, world)
     goal = goal_of(command, world, flight.start)
-    lost = before[world, fs.LOST] != wp.float64(0.0) or not is_finite(goal, flight.start)
+    lost = before[world, fs.LOST] != wp.float64(0.0) or not is_plausible(goal, flight.start)
     near = False
     if command.centers.shape[1] > 0:
         near = is_near(command, world, flight)

@@ -30,7 +30,7 @@ def push(
     flight = kernel.loaded(before, world)
     goal = kernel.goal_of(command, world, flight.start)
     lost = before[world, fs.LOST] != wp.float64(0.0)
-    if lost or not (kernel.is_finite(goal, flight.start) and kernel.is_sound(flight.motion)):
+    if lost or not (kernel.is_plausible(goal, flight.start) and kernel.is_sound(flight.motion)):
         after[world, fs.LOST] = wp.float64(1.0)
         return
     axes = axes_of(flight.motion.attitude)

@@ -68,8 +68,8 @@ def load(name: str) -> NDArray[np.uint8]:
     if name in PROCEDURAL:
         gray = np.round(PROCEDURAL[name]() * 255.0).astype(np.uint8)
         return np.repeat(gray[..., None], 3, -1)
-    path = Path(name).expanduser()
     try:
+        path = Path(name).expanduser()
         if not path.is_file():
             raise FileNotFoundError(path)
         with Image.open(path, formats=_FORMATS) as image:
@@ -77,7 +77,7 @@ def load(name: str) -> NDArray[np.uint8]:
             is_small = max(width, height) <= MAX_PIXELS
             side = 2 ** math.ceil(math.log2(max(width, height)))
             square = image.convert("RGB").resize((side, side)) if is_small else None
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+    except (OSError, RuntimeError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise InputError(
             f"texture={name!r} can't be read as an image; give a PNG or JPEG file, or one of: "
             f"{', '.join(PROCEDURAL)}"

@@ -32,7 +32,7 @@ class EndReason(enum.IntEnum):
     RUNNING = 0
     ALL_CUBES = 1
     FRONT_BOUNDARY = 2
-    SIDE_BOUNDARY = 3
+    SIDE_BOUNDARY = 3  # left, right, above or below
     STEP_LIMIT = 4
     LOST_CONTROL = 5
 

@@ -74,13 +74,13 @@ def test_chromaticity_shows_red_blue_and_what_they_leave():
     assert shown.tolist() == [[[255, 127, 0], [0, 127, 255], [0, 255, 0]]]
 
 
-def test_a_probed_frame_has_its_own_bars():
+def test_a_frame_with_probabilities_has_its_own_bars():
     data = {
         "frames": np.stack([BLACK, BLACK + 255]),
         "actions": np.array([0, 1]),
         "probabilities": np.array([[1.0, 0.0, 0.0], [0.2, 0.5, 0.3]]),
     }
-    white = pictures.probed_frame(data, 1, "x")
+    white = pictures.frame_with_probabilities(data, 1, "x")
     bars = indicator([0.2, 0.5, 0.3], 1, 6 * SCALE)
     assert isinstance(white, Image.Image)
     assert white.size == (30, 42 + 3 + bars.height)

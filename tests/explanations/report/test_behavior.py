@@ -1,4 +1,4 @@
-from drone_rl.evaluation.plots.images import probed_frame
+from drone_rl.evaluation.plots.images import frame_with_probabilities
 from drone_rl.explanations.report.behavior import FLAWS_PART, MAX_PAIRS, pairs
 
 
@@ -17,5 +17,5 @@ def test_the_first_few_pairs_are_shown_left_beside_right(make_explanation):
     shown = pairs(explanation, "unknown")
     assert len(shown) == 2 * MAX_PAIRS
     assert [*shown][:2] == ["pair 1, frame 1: more left", "pair 1, frame 2: more right"]
-    tile = probed_frame(explanation.data, 1, "frame 1: more left")
+    tile = frame_with_probabilities(explanation.data, 1, "frame 1: more left")
     assert list(shown["pair 1, frame 1: more left"].getdata()) == list(tile.getdata())

@@ -1,4 +1,4 @@
-from drone_rl.evaluation.plots.images import probed_frame
+from drone_rl.evaluation.plots.images import frame_with_probabilities
 from drone_rl.explanations.report.response import worst_frames
 
 
@@ -10,5 +10,5 @@ def test_the_three_worst_are_shown_in_order(make_explanation):
         "frame 7: differs by 0.90", "frame 3: differs by 0.50", "frame 1: differs by 0.25"
     ]  # fmt: skip
     for frame, (caption, picture) in zip((7, 3, 1), shown.items(), strict=True):
-        tile = probed_frame(explanation.data, frame, caption)
+        tile = frame_with_probabilities(explanation.data, frame, caption)
         assert list(picture.getdata()) == list(tile.getdata())

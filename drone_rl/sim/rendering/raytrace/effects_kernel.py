@@ -23,7 +23,7 @@ CANDIDATE = wp.constant(2)
 def render_images_with_effects(
     first: int,
     last: int,
-    member: int,
+    buffer: int,
     view: structs.View,
     geoms: structs.Geoms,
     poses: structs.Poses,
@@ -36,7 +36,7 @@ def render_images_with_effects(
     count = view.height * view.width
     for row in range(first, last):
         env = row // view.count
-        job = start_job(view, poses, scratch, row, row % view.cameras.shape[0], env, member)
+        job = start_job(view, poses, scratch, row, row % view.cameras.shape[0], env, buffer)
         find_visible(job, geoms, poses)
         fill(job.dark, 0, count, 0)
         if effects.shadows[env % effects.shadows.shape[0]] != 0:

@@ -19,7 +19,7 @@ ROUND = wp.constant(6)
 UPPER = wp.constant(5)
 """Face of a plane: its upper side is visible."""
 FAR_AWAY = wp.constant(1e10)
-"""Distance in metres of a miss."""
+"""Metres: farther than anything; the distance along a ray before anything is hit."""
 SAME = wp.constant(1e-6)
 """Relative distance within which the later of two geoms is in front, as in OpenGL."""
 
@@ -61,10 +61,10 @@ def _enter_ball(radius: float, point: wp.vec3, ray: wp.vec3) -> float:
     """Distance to a ball around the origin; negative for a miss or a start inside."""
     a = wp.dot(ray, ray)
     b = wp.dot(ray, point)
-    inside = b * b - a * (wp.dot(point, point) - radius * radius)
-    if inside <= 0.0:
+    discriminant = b * b - a * (wp.dot(point, point) - radius * radius)
+    if discriminant <= 0.0:
         return -1.0
-    return (-b - wp.sqrt(inside)) / a
+    return (-b - wp.sqrt(discriminant)) / a
 
 
 @wp.func
@@ -76,11 +76,11 @@ def _enter_tube(radius: float, half: float, point: wp.vec3, ray: wp.vec3) -> tup
     tube_in = -FAR_AWAY
     tube_out = FAR_AWAY
     if a > _PARALLEL:
-        inside = b * b - a * c
-        if inside <= 0.0:
+        discriminant = b * b - a * c
+        if discriminant <= 0.0:
             return -1.0, ROUND
-        tube_in = (-b - wp.sqrt(inside)) / a
-        tube_out = (-b + wp.sqrt(inside)) / a
+        tube_in = (-b - wp.sqrt(discriminant)) / a
+        tube_out = (-b + wp.sqrt(discriminant)) / a
     elif c > 0.0:
         return -1.0, ROUND
     ends_in = -FAR_AWAY
@@ -102,8 +102,8 @@ def _enter_tube(radius: float, half: float, point: wp.vec3, ray: wp.vec3) -> tup
 @wp.func
 def _enter_capsule(radius: float, half: float, point: wp.vec3, ray: wp.vec3) -> float:
     """The nearest of its round side and its two balls; no ray from inside enters."""
-    inside = point - wp.vec3(0.0, 0.0, wp.clamp(point[2], -half, half))
-    if wp.length_sq(inside) < radius * radius:
+    from_axis = point - wp.vec3(0.0, 0.0, wp.clamp(point[2], -half, half))
+    if wp.length_sq(from_axis) < radius * radius:
         return -1.0
     nearest = float(FAR_AWAY)
     a = ray[0] * ray[0] + ray[1] * ray[1]

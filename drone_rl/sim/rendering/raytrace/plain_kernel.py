@@ -33,7 +33,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 def render_images(
     first: int,
     last: int,
-    member: int,
+    buffer: int,
     view: structs.View,
     geoms: structs.Geoms,
     poses: structs.Poses,
@@ -41,14 +41,14 @@ def render_images(
     scratch: structs.Scratch,
     images: structs.Images,
 ) -> None:
-    """Render images from `first` up to, not including, `last`, as one worker, `member`.
+    """Render images from `first` up to, not including, `last`, with row `buffer` of `Scratch`.
 
     Launch it with a dimension of 1.
     """
     for row in range(first, last):
         env = row // view.count
         camera = row % view.cameras.shape[0]
-        render_image(view, camera, geoms, poses, env, materials, scratch, member, images, row)
+        render_image(view, camera, geoms, poses, env, materials, scratch, buffer, images, row)
 
 
 @wp.func
@@ -60,12 +60,12 @@ def render_image(
     env: int,
     materials: structs.Materials,
     scratch: structs.Scratch,
-    member: int,
+    buffer: int,
     images: structs.Images,
     row: int,
 ) -> None:
     """Render the image `row` of one camera of one environment; see `render_images`."""
-    job = start_job(view, poses, scratch, row, camera, env, member)
+    job = start_job(view, poses, scratch, row, camera, env, buffer)
     find_visible(job, geoms, poses)
     count = view.height * view.width
     start = int(0)

@@ -19,9 +19,9 @@ NEAR = wp.constant(1e-3)
 
 @wp.func
 def start_job(
-    view: View, poses: Poses, scratch: Scratch, row: int, camera: int, env: int, member: int
+    view: View, poses: Poses, scratch: Scratch, row: int, camera: int, env: int, buffer: int
 ) -> Job:
-    """Return the job of rendering image `row`, with the scratch buffers `member`."""
+    """Return the job of rendering image `row` with row `buffer` of `Scratch`."""
     job = Job()
     job.row = row
     job.env = env
@@ -33,11 +33,11 @@ def start_job(
     job.camera_to_world = _rotation(_product(turned, job.camera.attitude))
     job.rays = view.rays[camera]
     job.cosines = view.cosines[camera]
-    job.nearest = scratch.nearest[member]
-    job.owner = scratch.owner[member]
-    job.dark = scratch.dark[member]
-    job.colors = scratch.colors[member]
-    job.geom_views = scratch.geom_views[member]
+    job.nearest = scratch.nearest[buffer]
+    job.owner = scratch.owner[buffer]
+    job.dark = scratch.dark[buffer]
+    job.colors = scratch.colors[buffer]
+    job.geom_views = scratch.geom_views[buffer]
     return job
 
 

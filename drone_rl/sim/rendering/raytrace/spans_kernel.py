@@ -50,8 +50,9 @@ def intersect_level_plane(
 ) -> None:
     """Intersect rays with a plane that all of them meet; `mark` the pixels in which it is nearest.
 
-    `down` gives a ray's speed towards the plane by a dot product, `height` is that of the eye, and
-    `same` is the relative distance within which the plane is in front of what was nearest.
+    `down` is the plane's normal in the camera's frame, `height` minus the eye's height above the
+    plane: only their quotient counts. `same` is the relative distance within which the plane is in
+    front of what was nearest.
     """
 
 
@@ -216,5 +217,5 @@ def shade_textured(
     """Colour a textured face; `light` has the colours of a white texel.
 
     Texels are interpolated bilinearly. The mip level follows from the number of texels that a pixel
-    covers, by the mean of its two sides.
+    covers: half its base-2 logarithm, rounded.
     """

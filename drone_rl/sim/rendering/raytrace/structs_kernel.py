@@ -195,7 +195,7 @@ class TextureMap:
 
 @struct
 class Scratch:
-    """Working memory of one image at a time; first dimension: workers."""
+    """Working memory; a row for each worker (CPU) or each image (GPU)."""
 
     nearest: wp.array2d[float]
     """Distance along each pixel's ray to the nearest surface."""
