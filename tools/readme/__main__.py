@@ -39,6 +39,7 @@ PAGES = (
     "docs/results.md",
     "docs/robustness.md",
     "docs/settings.md",
+    "docs/tutorials/memory.md",
 )
 """Pages with generated blocks."""
 NOTEBOOK = "docs/tutorials/notebook"
@@ -72,6 +73,7 @@ def make_blocks(root: Path) -> dict[str, str]:
         "commands": list_commands(),
         "presets": list_presets(root / "conf"),
         "run_onnx": show_file(root, "examples/run_onnx.py"),
+        "recall": show_file(root, "examples/recall.py"),
         "airsim_methods": list_airsim_methods(),
     }
 
