@@ -27,6 +27,7 @@ OF_VERDICTS = (
     ("open", {"rounding.decides": True}, _UNDECIDED),
     ("rounding", {"rounding.decides": False}, _ROUNDED),
     ("rounding", {"rounding.unexplained": 3}, _ROUNDED),
+    ("unchecked", {"rounding": VERDICT["rounding"]}, {"rounding": None}),
     ("arithmetic", {"rounding": None}),
     ("arithmetic", {"rounding.bound": False}),
     ("arithmetic", {"rounding.arithmetic": "float32 on cuda, PyTorch"}),

@@ -103,7 +103,10 @@ def test_every_choice_of_what_a_policy_is_builds(chosen, settings):
     described = describe(told)
     env = described.build_env(1, seed=0, device="cpu")
     network = described.build_network(torch.Generator().manual_seed(0))
-    assert network(env.reset()["pixels"]).shape == (1, 3)
+    seen = env.reset()
+    outputs = network(*(seen[key] for key in network.in_keys))
+    logits = outputs[0] if network.is_recurrent else outputs
+    assert logits.shape == (1, 3)
     env.close()
 
 

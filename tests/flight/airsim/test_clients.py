@@ -42,7 +42,7 @@ def test_flight(run):
     assert found["landed"] == 1 and found["height"] == pytest.approx(-2.0, abs=0.15)
     assert max(found["corners"]) < 0.8
     assert found["path"] == pytest.approx(12.0, abs=0.8)
-    assert found["orbit"] == pytest.approx(6.0, abs=2.5)
+    assert found["orbit"] == pytest.approx(6.0, abs=1.5)
     assert found["imu"] == pytest.approx(-9.8, abs=1.0)
     assert found["gps"] == pytest.approx(47.6415, abs=1e-3)
     assert (found["raw"], found["png"], found["floats"]) == (256 * 144 * 3, "89504e47", 256 * 144)

@@ -33,13 +33,15 @@ center, radius = (6.0, 0.0), 6.0
 for _ in range(40):
     position = client.simGetVehiclePose().position
     angle = math.atan2(position.y_val - center[1], position.x_val - center[0])
-    vx, vy = -2.0 * math.sin(angle), 2.0 * math.cos(angle)
+    missing = radius - math.hypot(position.x_val - center[0], position.y_val - center[1])
+    vx = -2.0 * math.sin(angle) + missing * math.cos(angle)
+    vy = 2.0 * math.cos(angle) + missing * math.sin(angle)
     last = client.moveByVelocityZAsync(vx, vy, -3, 1)
     client.simContinueForTime(0.2)
     client.simPause(False)
-last.join()
 position = client.simGetVehiclePose().position
 found["orbit"] = math.hypot(position.x_val - center[0], position.y_val - center[1])
+last.join()
 
 # what sensors and cameras say
 found["imu"] = client.getImuData().linear_acceleration.z_val
