@@ -96,9 +96,9 @@ def memory(folder: Path, quick: bool, *, root: Path) -> dict[str, float]:
 
     The task is that of `examples/recall.py`. Each is the median of three trainings.
     """
-    paths = (str(root / "examples"), str(root), os.environ.get("PYTHONPATH", ""))
+    paths = (str(root), os.environ.get("PYTHONPATH", ""))
     environment = {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
-    found, own = {}, ["plugins=[recall]", "task=recall"]
+    found, own = {}, ["plugins=[examples.recall]", "task=recall"]
     limit = ["trainer.total_frames=2000"] if quick else ["trainer.total_frames=400000"]
     for key, network in NETWORKS.items():
         rates = []

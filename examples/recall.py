@@ -1,6 +1,6 @@
 """A task that needs memory: a cube is shown in the first frames only, and must be collected later.
 
-drone-rl train 'plugins=[recall]' task=recall network=lstm   # in this folder
+drone-rl train 'plugins=[examples.recall]' task=recall network=lstm
 """
 
 import dataclasses

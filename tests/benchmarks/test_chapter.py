@@ -76,7 +76,7 @@ def test_networks_learn_the_same_task(tmp_path, monkeypatch):
     given = []
 
     def train(run, *settings, environment):
-        assert environment["PYTHONPATH"].startswith(f"{tmp_path}/examples:{tmp_path}")
+        assert environment["PYTHONPATH"].startswith(f"{tmp_path}")
         given.append((run, settings))
 
     def call(name, policy, *args, environment):

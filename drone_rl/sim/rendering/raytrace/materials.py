@@ -66,7 +66,7 @@ class MaterialsEncoder:
             colors = appearance.distractors.expand(num_envs).colors.double()
             values["colors"][:, self._scene.geoms(SemanticClass.DISTRACTOR)] = colors
         for name, value in appearance.lights(num_envs).items():
-            values[_LIGHTS[name]][:, 0] = value  # the sun is the first light
+            values[_LIGHTS[name]][:] = value[:, None]
         zenith = appearance.zenith
         zenith = values["sky"] if zenith is None else expand_color(zenith, num_envs)
         if appearance.exposure is not None:
