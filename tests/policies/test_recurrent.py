@@ -240,8 +240,8 @@ def test_file_holds_the_policy(trained, tmp_path):
     assert other.description.as_dict()["network"] == {
         **{"name": "lstm", "patch": 4, "channels": [4], "hidden": [8], "memory": 6},
     }
-    frame, memory = torch.rand(3, 1, 8, 16), make_network().start(3)
     first, second = (policy.make_network() for policy in (one, other))
+    frame, memory = torch.rand(3, *first.in_shape), first.start(3)
     with torch.no_grad():
         torch.testing.assert_close(first.step(frame, memory)[0], second.step(frame, memory)[0])
 

@@ -82,7 +82,7 @@ def make_onnx(
                     *(PROBABILITIES, ACTION)[: 1 + policy.has_action],
                     *NEXT_STATE[: len(state)],
                 ],
-                dynamic_shapes=(any_number, (any_number,) * len(state)),
+                dynamic_shapes=(any_number, *([(any_number,) * len(state)] if state else [])),
                 verbose=False,
             )
     except torch.onnx.OnnxExporterError as error:

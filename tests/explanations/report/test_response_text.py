@@ -73,5 +73,6 @@ def test_blindness_is_told_only_if_both_sides_call_for_a_turn(row, is_told):
 def test_how_far_it_is_from_its_mirror_image():
     assert speak()["asymmetry.differs"] == (
         "On these frames the policy differs from its mirror image by 0.30 on average (0: "
-        "perfectly symmetric, 1: always opposite; 95%: 0.20 to 0.40), on the grid by 0.25."
+        "perfectly symmetric, 1: always opposite; 95%: 0.20 to 0.40), over the places of the "
+        "response map by 0.25."
     )
