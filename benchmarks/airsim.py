@@ -22,6 +22,11 @@ _REQUEST = {"camera_name": "0", "image_type": 0, "pixels_as_float": False, "comp
 _POSING = '{"SimMode": "ComputerVision"}'
 
 
+def _packed(value: Any) -> bytes:
+    packed: Any = msgpack.packb(value)
+    return packed
+
+
 def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
@@ -64,7 +69,7 @@ class Peer:
     def call(self, method: str, *args: Any) -> Any:
         """Return the result; raise a RuntimeError with the server's message."""
         self._number += 1
-        self._socket.sendall(msgpack.packb([0, self._number, method, args]))
+        self._socket.sendall(_packed([0, self._number, method, args]))
         while True:
             for _, _, error, result in self._unpacker:
                 if error is not None:
@@ -185,7 +190,7 @@ def _script(folder: Path) -> bytes:
             states += [peer.call("getMultirotorState", ""), peer.call("getImuData", "", "")]
             states.append(peer.call("simGetImage", "0", 0, ""))
         peer.close()
-    return msgpack.packb(states)
+    return _packed(states)
 
 
 def fuzz(port: int, count: int, seed: int = 0) -> int:
@@ -220,7 +225,7 @@ def _crafted(draw: random.Random) -> bytes:
     """Return a message that is wrong in one of several ways."""
     names = [*METHODS, *UNSUPPORTED, "x" * 1000, ""]
     method = draw.choice([name for name in names if name not in ("startRecording", "reset")])
-    good = msgpack.packb([0, draw.randrange(2**31), method, [_value(draw) for _ in range(9)]])
+    good = _packed([0, draw.randrange(2**31), method, [_value(draw) for _ in range(9)]])
     kind = draw.randrange(8)
     if kind == 0:
         return good[: draw.randrange(len(good))] + b"\xc1"

@@ -54,7 +54,8 @@ def train(run: Path, *args: str, environment: Mapping[str, str] | None = None) -
         RuntimeError: The command failed.
     """
     begin = time.perf_counter()
-    call("train", *args, f"hydra.run.dir={run}", environment=environment)
+    given: Any = {} if environment is None else {"environment": environment}
+    call("train", *args, f"hydra.run.dir={run}", **given)
     return time.perf_counter() - begin, read_json(run / "result.json")
 
 

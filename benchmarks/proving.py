@@ -13,7 +13,7 @@ import torch
 from benchmarks import commands
 from benchmarks.tampering import count_refused
 from drone_rl.config.training import TrainerSettings
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.policies.policy import load_policy
 from drone_rl.training.train import train
 from drone_rl.utils.progress import silent
@@ -26,7 +26,7 @@ _BATCH, _TIMES = 1024, 15
 
 
 @torch.no_grad()
-def network_images_per_s(network: PolicyNetwork, shape: tuple[int, ...]) -> float:
+def network_images_per_s(network: ImageNetwork, shape: tuple[int, ...]) -> float:
     """Return the images per second of a network's forward pass, with torch's number of threads.
 
     Args:

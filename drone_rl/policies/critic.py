@@ -11,7 +11,7 @@ from tensordict.nn import (
 from torch import nn
 
 from drone_rl.policies.actor import distribution_of
-from drone_rl.policies.networks import PolicyNetwork, Trunk, orthogonal
+from drone_rl.policies.networks import ImageNetwork, PolicyNetwork, Trunk, orthogonal
 from drone_rl.utils.errors import InputError
 
 PIXELS, FEATURES = "pixels", "features"
@@ -27,8 +27,8 @@ class ActorCritic(nn.Module):
 
     def __init__(
         self,
-        network: PolicyNetwork,
-        own: PolicyNetwork | None = None,
+        network: ImageNetwork,
+        own: ImageNetwork | None = None,
         generator: torch.Generator | None = None,
     ) -> None:
         """Add a critic to a policy.

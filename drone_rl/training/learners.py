@@ -150,7 +150,8 @@ class ReinforceLearner(GradientLearner):
         steps = batch.reshape(-1) if mask is None else batch[mask]
         chunks: int | list[int] = self.chunk_frames
         if self.whole_episodes:
-            chunks = episode_chunks(steps.get(("next", "done"))[:, 0], self.chunk_frames)
+            done: Any = steps[("next", "done")]
+            chunks = episode_chunks(done[:, 0], self.chunk_frames)
         self.optimizer.zero_grad()
         try:
             terms = accumulate(steps, self.loss, chunks, self.loss.divisor)

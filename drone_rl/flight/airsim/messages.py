@@ -30,7 +30,7 @@ class Pose(NamedTuple):
     attitude: tuple[float, float, float, float]
 
 
-NO_POSE = Pose((math.nan,) * 3, (math.nan,) * 4)
+NO_POSE = Pose((math.nan, math.nan, math.nan), (math.nan, math.nan, math.nan, math.nan))
 """Of an object that does not exist."""
 
 

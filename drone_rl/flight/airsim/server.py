@@ -193,7 +193,8 @@ def _packed(message: list[Any]) -> bytes:
     """Pack a reply: bytes as bin, and the numbers of images as 32 bits."""
     result = message[3]
     is_image = isinstance(result, list) and bool(result) and isinstance(result[0], dict)
-    return msgpack.packb(message, use_bin_type=True, use_single_float=is_image)
+    packed: Any = msgpack.packb(message, use_bin_type=True, use_single_float=is_image)
+    return packed
 
 
 class AirsimServer:

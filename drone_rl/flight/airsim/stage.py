@@ -196,7 +196,8 @@ class Stage:
 
     def touch(self, position: Tensor) -> None:
         """Apply the chapter's rule to a vehicle: cubes vanish when it touches them. (3,)."""
-        state, task = self.worlds.state, self.task
+        state: Any = self.worlds.state
+        task = self.task
         if not isinstance(task, CollectCubes):
             return
         near = (position - state.cubes[0]).abs().amax(-1) <= task.settings.touch_distance

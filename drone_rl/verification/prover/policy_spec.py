@@ -11,7 +11,7 @@ import torch
 from drone_rl.config import TaskSettings
 from drone_rl.envs import GrayPixels, StandardizePixels, on_pixels
 from drone_rl.envs.transforms import without_identities
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import ImageNetwork, PolicyNetwork
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.worlds import Worlds
@@ -59,7 +59,7 @@ class PolicySpec:
 
 def make_policy_spec(
     description: PolicyDescription,
-    network: PolicyNetwork,
+    network: ImageNetwork,
     gap: float,
     renderer: str = "raytrace",
 ) -> PolicySpec:
@@ -71,6 +71,8 @@ def make_policy_spec(
         InputError: The policy or task is not supported; the message says why.
     """
     task = require_cubes(description, "proofs")
+    if not isinstance(network, PolicyNetwork):
+        raise InputError(f"proofs need layers, which {type(network).__name__} has not")
     check_task(task)
     if not description.appearance.is_minimal:
         raise InputError(
