@@ -20,8 +20,7 @@ _ACTING = {
 
 def is_quoted(evidence: Evidence) -> bool:
     """Return whether a certificate is quoted."""
-    proof = evidence.get("proof")
-    return proof is not None and proof["refused"] is None
+    return bool(proof := evidence.get("proof")) and proof["refused"] is None
 
 
 def is_stated(evidence: Evidence) -> bool:

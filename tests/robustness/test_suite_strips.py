@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import numpy as np
 import torch
 
@@ -6,6 +8,7 @@ from drone_rl.robustness.agents import StepContext
 from drone_rl.robustness.axes import AXES
 from drone_rl.robustness.paired_evaluation import PairedEvaluator
 from drone_rl.robustness.suite import STEP, FrameRecorder, make_strip
+from drone_rl.sim.actions import MOVES
 from tests.robustness.subjects import Blind, subject
 
 
@@ -14,6 +17,7 @@ def test_the_picture_is_the_one_of_that_step():
 
     class Marked:
         active = torch.arange(1)
+        worlds = SimpleNamespace(dynamics=SimpleNamespace(actions=MOVES))
 
         def render(self, modality):
             assert modality == "rgb"

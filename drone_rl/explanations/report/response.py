@@ -107,7 +107,7 @@ def response_charts(explanation: Explanation) -> dict[str, Figure]:
         for figure, axis in panels:
             axis.set(ylabel="metres ahead", xlabel="metres to the left (+) or right (-)")
             charts[f"{axis.get_title()}{suffix}"] = figure
-            axis.set_title(f"{axis.get_title()}{level}", fontsize=11)
+            axis.set_title(f"{axis.get_title()}{suffix}", fontsize=11)
         for figure, axis in panels[:count]:
             figure.colorbar(axis.images[0], ax=axis, shrink=0.8, label="probability")
         for (figure, _), labels in zip(panels[count:], (named, ends), strict=True):

@@ -34,8 +34,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import OneOf, Whole
 
 COASTING = 0.06
-"""Seconds for which the last goals hold after a command that was cancelled, failed or sets no
-position."""
+"""Seconds for which the last goals hold after a command that leaves no position to hold."""
 _MODES = ("simple_flight", "computer_vision")
 _IDLE = 0.1
 """Thrust of idle rotors as a fraction of the hover thrust."""
@@ -50,12 +49,8 @@ _AT_REST = 0.08
 class Drone:
     """One drone that runs commands and hovers between them; `Pilot` adds the commands.
 
-    A new command replaces the running one. Simulated time advances only by `advance`, or while a
-    command is waited for.
+    A new command replaces the running one. Time advances by `advance`, or while one is waited for.
     """
-
-    _most_recorded: int | None = None
-    """States that the trajectory keeps, the last ones; None for all."""
 
     def __init__(
         self,
@@ -116,7 +111,7 @@ class Drone:
         self._initial = copy.deepcopy((self.body, worlds.state if worlds else None, sensors))
         self.has_api_control = True
         """Whether commands are accepted; see `enable_api_control`."""
-        self.trajectory = Trajectory(self._most_recorded)
+        self.trajectory = Trajectory()
         """The states of all control periods so far."""
         self.trajectory.append(self.time, self.body)
         self._sensors = None if sensors is None else Sensors(self.body, sensors, self._seed)
@@ -177,7 +172,7 @@ class Drone:
         self.body, state, sensors = copy.deepcopy(self._initial)
         if self.worlds is not None and state is not None:
             self.worlds.state = state
-        self.trajectory = Trajectory(self._most_recorded)
+        self.trajectory = Trajectory()
         self.trajectory.append(self.time, self.body)
         self._sensors = None if sensors is None else Sensors(self.body, sensors, self._seed)
         self._is_armed, self._landed = False, LandedState.LANDED
@@ -341,7 +336,6 @@ class Drone:
         self._update_landed()
 
     def _record(self, ticks: int) -> None:
-        """Note the state, and show it to the sensors."""
         self.trajectory.append(self.time, self.body)
         if self._sensors is not None:
             self._sensors.update(self.body, ticks * self.settings.tick)
