@@ -147,11 +147,10 @@ class ReinforceLearner(GradientLearner):
             NotANumberError: A loss or gradient is NaN or infinite.
         """
         mask = batch.get(("collector", "mask"), None)
-        steps = batch.reshape(-1) if mask is None else batch[mask]
+        steps: Any = batch.reshape(-1) if mask is None else batch[mask]
         chunks: int | list[int] = self.chunk_frames
         if self.whole_episodes:
-            done: Any = steps[("next", "done")]
-            chunks = episode_chunks(done[:, 0], self.chunk_frames)
+            chunks = episode_chunks(steps.get(("next", "done"))[:, 0], self.chunk_frames)
         self.optimizer.zero_grad()
         try:
             terms = accumulate(steps, self.loss, chunks, self.loss.divisor)
