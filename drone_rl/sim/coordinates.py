@@ -85,14 +85,3 @@ def geo_from_world(position: Values, home: GeoPoint = HOME) -> Values:
     longitude = home.longitude - math.degrees(1.0) * west / parallel
     longitude = (longitude + 180.0) % 360.0 - 180.0
     return library.stack([latitude, longitude, home.altitude + up], -1)
-
-
-def world_from_geo(place: GeoPoint, home: GeoPoint = HOME) -> tuple[float, float, float]:
-    """Return metres from home, north, west and up; the inverse of `geo_from_world`."""
-    share = 1 - _ECCENTRICITY_2 * math.sin(math.radians(home.latitude)) ** 2
-    across = EQUATOR_RADIUS / math.sqrt(share)
-    meridian = across * (1 - _ECCENTRICITY_2) / share
-    north = math.radians(place.latitude - home.latitude) * (meridian + home.altitude)
-    parallel = math.cos(math.radians(place.latitude)) * (across + home.altitude)
-    east = math.radians(math.remainder(place.longitude - home.longitude, 360.0)) * parallel
-    return north, -east, place.altitude - home.altitude
