@@ -13,7 +13,6 @@ from typing import Any
 from benchmarks.commands import call, train
 from benchmarks.revisions import extract
 from drone_rl.cli.commands import COMMANDS
-from drone_rl.sweeps.executors import PROGRAM
 from drone_rl.utils.files import read_json
 
 BEFORE = "3e5d8a0b"
@@ -129,17 +128,8 @@ def speedup(folder: Path, times: int, *, root: Path, episodes: int = 150) -> flo
     for i in range(times):
         for name, tree in trees.items():
             run = folder.resolve() / f"{name}_{i}"
-            command = [*PROGRAM, "train", *settings, f"trainer.total_episodes={episodes}"]
-            done = subprocess.run(
-                [*command, f"hydra.run.dir={run}"],
-                cwd=tree,
-                env={**os.environ, "PYTHONPATH": str(tree)},
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-            if done.returncode:
-                raise RuntimeError(f"a training in {tree} failed: {done.stderr.strip()[-500:]}")
+            limit = f"trainer.total_episodes={episodes}"
+            call("train", *settings, limit, f"hydra.run.dir={run}", tree=tree)
             result = read_json(run / "result.json")
             rates[name].append(result["frames"] / result["seconds"])
     return statistics.median(rates["after"]) / statistics.median(rates["before"])

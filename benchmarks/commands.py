@@ -16,6 +16,7 @@ def call(
     statuses: tuple[int, ...] = (0,),
     program: tuple[str, ...] = PROGRAM,
     environment: Mapping[str, str] | None = None,
+    tree: Path | None = None,
 ) -> None:
     """Run `drone-rl`.
 
@@ -24,16 +25,19 @@ def call(
         statuses: Exit statuses that count as success.
         program: Another program that takes the same arguments.
         environment: Additional environment variables.
+        tree: Checkout whose code runs, in its folder; by default that of this program, here.
 
     Raises:
         RuntimeError: The exit status is not in `statuses`.
     """
+    own = {} if tree is None else {"PYTHONPATH": str(tree)}
     done = subprocess.run(
         [*program, *args],
         capture_output=True,
         text=True,
         check=False,
-        env={**os.environ, **(environment or {})},
+        cwd=tree,
+        env={**os.environ, **own, **(environment or {})},
     )
     if done.returncode not in statuses:
         raise RuntimeError(f"drone-rl {' '.join(args)} failed: {done.stderr.strip()[-500:]}")

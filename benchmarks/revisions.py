@@ -1,14 +1,13 @@
 """Compare an earlier revision with the working tree by the same benchmarks on one machine."""
 
-import os
 import statistics
 import subprocess
-import sys
 import tarfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.commands import call
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_json
 
@@ -84,17 +83,8 @@ def extract(revision: str, target: Path, root: Path = _ROOT) -> Path:
 def measure(tree: Path, names: Sequence[str], folder: Path, quick: bool) -> dict[str, float]:
     """Run benchmarks of a tree in a separate process; return the compared figures."""
     only = f"only=[{','.join(names)}]"
-    program = [sys.executable, "-m", "drone_rl.cli.main", "bench", only, f"quick={quick}".lower()]
-    done = subprocess.run(
-        [*program, f"folder={folder}", f"hydra.run.dir={folder}/log"],
-        cwd=tree,
-        env={**os.environ, "PYTHONPATH": str(tree)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if done.returncode:
-        raise RuntimeError(f"the benchmarks of {tree} failed: {done.stderr.strip()[-500:]}")
+    places = (f"folder={folder}", f"hydra.run.dir={folder}/log")
+    call("bench", only, f"quick={quick}".lower(), *places, tree=tree)
     figures = read_json(folder / ("quick" if quick else "") / "results.json", 2**24)
     return {key: figures[key] for key in (*COSTS, *RATES) if figures.get(key) is not None}
 

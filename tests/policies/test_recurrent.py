@@ -213,7 +213,7 @@ def test_act_remembers_until_reset(trained):
             acted = actor(state)
             logits.append(acted["logits"])
             state = env.step(acted)["next"]
-    network, memory = policy.make_network(), None
+    network = policy.make_network()
     transforms = policy.description.make_transforms()
     memory = network.start(1)
     for image, expected in zip(images, logits, strict=True):
