@@ -13,12 +13,11 @@ import urllib.parse
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from PIL.Image import Image
-
 if TYPE_CHECKING:
     import jinja2
     from markupsafe import Markup
     from matplotlib.figure import Figure
+    from PIL.Image import Image
 
 
 def aligned(rows: Sequence[Sequence[str]], *, are_numbers: bool = False) -> str:
@@ -52,8 +51,10 @@ def paragraph(text: str) -> str:
 
 def picture(figure: "Figure | Image") -> str:
     """Return a figure or image as an embedded image."""
+    from PIL.Image import Image as PilImage  # not at the start of every program
+
     buffer = io.BytesIO()
-    if isinstance(figure, Image):
+    if isinstance(figure, PilImage):
         figure.save(buffer, "png")
     else:
         figure.savefig(buffer, format="png", dpi=90)
