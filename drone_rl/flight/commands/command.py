@@ -9,7 +9,7 @@ from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
-from drone_rl.sim.dynamics.control import Modes
+from drone_rl.sim.dynamics.control import Modes, rotor_goals
 from drone_rl.utils.errors import InputError
 
 PERIOD = 0.02
@@ -73,6 +73,11 @@ def goals_of(
 def hold(reference: Tensor) -> Goals:
     """Return goals that hold a pose. Shape: (num_envs, 4), as in `FlightState.reference`."""
     return Goals(HOLD, reference)
+
+
+def all_rotors(share: float) -> Goals:
+    """Return goals for one drone whose rotors all have this fraction of full thrust."""
+    return rotor_goals(torch.full((1, 4), share, dtype=torch.float64))
 
 
 class TimedCommand(Command):

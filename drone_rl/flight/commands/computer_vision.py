@@ -112,7 +112,6 @@ class ComputerVisionDrone(Drone):
         if not isinstance(task, PropTask):
             raise PilotError(f"set_object_position: task {task.name} does not let objects move")
         getattr(worlds.state, task.props)[0, index] = torch.tensor(place, dtype=torch.float64)
-        self._obstacles = task.obstacles(worlds.state)
 
     def _object(self, name: str) -> tuple[Worlds, int]:
         if self.worlds is None:

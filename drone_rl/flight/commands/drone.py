@@ -16,6 +16,7 @@ from drone_rl.flight.commands.command import (
     FlightFuture,
     Land,
     PilotError,
+    all_rotors,
     hold,
     period_ticks,
 )
@@ -23,7 +24,6 @@ from drone_rl.flight.commands.conventions import to_simulator
 from drone_rl.flight.commands.path_following import GoHomeCommand
 from drone_rl.flight.commands.state import LandedState, PilotState, Sensors, Trajectory
 from drone_rl.sim.dynamics import FlightState, Goals, Obstacles, Quadrotor
-from drone_rl.sim.dynamics.control import rotor_goals
 from drone_rl.sim.dynamics.state import CLIMB_INTEGRAL, NOTHING, TICKS, twist_about_z
 from drone_rl.sim.entities import FRONT_CENTER
 from drone_rl.sim.image_types import ImageRequest, images
@@ -49,7 +49,8 @@ _AT_REST = 0.08
 class Drone:
     """One drone that runs commands and hovers between them; `Pilot` adds the commands.
 
-    A new command replaces the running one. Time advances by `advance`, or while one is waited for.
+    A new command replaces the running one. Simulated time advances only by `advance`, or while a
+    command is waited for.
     """
 
     def __init__(
@@ -85,8 +86,6 @@ class Drone:
                 raise InputError(f"worlds has {worlds.num_envs} worlds; give Worlds(1, ...)")
             if dynamics is None and isinstance(worlds.dynamics, Quadrotor):
                 dynamics = worlds.dynamics.settings
-            if obstacles is None:
-                obstacles = worlds.task.obstacles(worlds.state)
         self.is_computer_vision = OneOf(_MODES).read(mode, "mode") == "computer_vision"
         """Whether there are no dynamics."""
         self._quadrotor = _quadrotor(dynamics, changes)
@@ -325,17 +324,21 @@ class Drone:
             self._record(ticks)
             return
         if not self._is_armed:
-            goals = _all_rotors(0.0)
+            goals = all_rotors(0.0)
         elif goals is None:
-            goals = _all_rotors(_IDLE * self.settings.hover_throttle)
+            goals = all_rotors(_IDLE * self.settings.hover_throttle)
         if not self._is_lost:
-            self.body = self._quadrotor.fly(self.body, goals, ticks, self._obstacles)
+            around = self._obstacles
+            if around is None and self.worlds is not None:
+                around = self.worlds.task.obstacles(self.worlds.state)
+            self.body = self._quadrotor.fly(self.body, goals, ticks, around)
         if self._is_lost:  # the drone stays at its last valid state
             self.body.numbers[:, TICKS] += ticks
         self._record(ticks)
         self._update_landed()
 
     def _record(self, ticks: int) -> None:
+        """Note the state, and show it to the sensors."""
         self.trajectory.append(self.time, self.body)
         if self._sensors is not None:
             self._sensors.update(self.body, ticks * self.settings.tick)
@@ -394,7 +397,3 @@ def _quadrotor(dynamics: DynamicsSettings | Quadrotor | None, changes: dict[str,
             raise InputError(f"{', '.join(changes)} and a Quadrotor are given; give settings alone")
         return dynamics
     return Quadrotor((dynamics or DynamicsSettings()).replace(mode="simple_flight", **changes))
-
-
-def _all_rotors(share: float) -> Goals:
-    return rotor_goals(torch.full((1, 4), share, dtype=torch.float64))

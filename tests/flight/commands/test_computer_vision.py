@@ -99,6 +99,26 @@ def test_reset_restores_drone_objects_and_time(pilot):
         pilot.advance(0.5)
 
 
+def test_a_moved_pillar_is_felt_where_it_stands_until_a_reset():
+    """Pillar 0 is put over the drone, which then touches it and, after the reset, does not."""
+    pilot = drone_rl.Pilot(worlds=Worlds(1, "pillars"))
+    height = pilot.object_position("pillar_0")[2]
+    pilot.advance(0.1)
+    assert pilot.state.collision is None or pilot.state.collision.thing == "ground"
+    pilot.set_object_position("pillar_0", [0.1, 0.0, height])
+    pilot.advance(0.1)
+    assert pilot.state.collision.thing == "obstacle 0"
+    pilot.reset()
+    pilot.advance(0.1)
+    assert pilot.state.collision is None or pilot.state.collision.thing == "ground"
+
+
+def test_sensors_go_on_without_dynamics(pilot):
+    begin = pilot.sensors.time
+    pilot.advance(1.0)
+    assert pilot.sensors.time == pytest.approx(begin + 1.0, abs=0.01)
+
+
 def test_movements_are_refused(pilot):
     for command in (pilot.arm, pilot.take_off, pilot.land, lambda: pilot.move_to(0, 0, 1)):
         with pytest.raises(drone_rl.PilotError, match="no dynamics; use set_pose or press"):
