@@ -264,14 +264,15 @@ def _not_fused_policy(direct: DirectCollector) -> list[str]:
 class RolloutBuffer:
     """Memory for the steps of episodes, in as many parts as the longest episode needs.
 
-    Memory is reused, also that of earlier results once nothing refers to them: allocating memory
-    for as many frames takes longer than filling it.
+    Memory is reused, also that of the last two results once nothing refers to them: allocating
+    memory for as many frames takes longer than filling it. Two, as a loop over a collector still
+    refers to a batch while the next one is collected.
     """
 
     def __init__(self, part: Mapping[str, Tensor]) -> None:
         self._arrays = dict(part)
         self._num_rows = len(next(iter(self._arrays.values())))
-        self._results: dict[str, Tensor] = {}
+        self._results: dict[str, list[Tensor]] = {}
 
     def open(self, part: int, kept: Iterable[str]) -> dict[str, Tensor]:
         """Return memory of a part, to be written. Shapes: (num_rows, *).
@@ -296,12 +297,15 @@ class RolloutBuffer:
         return read
 
     def _to_read(self, name: str, count: int) -> Tensor:
-        """Return memory for rows: that of the last result if it is large enough and free again."""
-        last = self._results.get(name)
-        if last is None or len(last) < count or not is_free(last):
-            array = self._arrays[name]
-            last = self._results[name] = array.new_empty(count + count // 4, *array.shape[1:])
-        return last[:count]
+        """Return memory for rows: that of an earlier result if it is large enough and free."""
+        results = self._results.setdefault(name, [])
+        for result in results:
+            if len(result) >= count and is_free(result):
+                return result[:count]
+        array = self._arrays[name]
+        made = array.new_empty(count + count // 4, *array.shape[1:])
+        results[:] = [*[result for result in results if not is_free(result)][-1:], made]
+        return made[:count]
 
 
 def is_free(tensor: Tensor) -> bool:

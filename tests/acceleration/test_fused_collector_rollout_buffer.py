@@ -78,6 +78,16 @@ def test_memory_is_reused_once_released():
         assert given(buffer, 5, 6, 7, 8, 5, 6).shape == (6, 2)
 
 
+def test_a_loop_that_holds_the_last_batch_alternates_between_two_memories():
+    buffer, places, held = make(), [], None
+    for i in range(6):
+        held = given(buffer, i, i, i, i)  # the earlier one is released after this one is made
+        places.append(held.data_ptr())
+    assert len(set(places)) == 2 and places[0] == places[2] == places[4]
+    wider = given(buffer, *range(9))  # neither fits: the one that is free is dropped
+    assert wider.data_ptr() not in places and held[:, 0].tolist() == [5] * 4
+
+
 @pytest.mark.parametrize(
     "hold",
     [
