@@ -10,7 +10,7 @@ from drone_rl.training.demonstrations import record_oracle
 
 DEMONSTRATIONS = 30
 """Flights of the oracle from which each policy is cloned."""
-_SEED = 1000
+_SEED = 2000
 """Added to a training's seed for its demonstrations, so that their scenes are others."""
 
 

@@ -104,9 +104,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         (*_TRAINING, "conf", "benchmarks/training"),
     ),
     "imitation": Benchmark(
-        lambda s: bench_imitation(
-            s.runs / "imitation", s.seeds[:3], s.episodes, s.device, s.quick
-        ),
+        lambda s: bench_imitation(s.runs / "imitation", s.seeds[:3], s.episodes, s.device, s.quick),
         "main",
         (*_TRAINING, "evaluation", "conf", "benchmarks/imitation", "benchmarks/training"),
     ),

@@ -9,15 +9,15 @@ import functools
 import io
 import json
 import re
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Self, cast
+from typing import Any, Self
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from tensordict.nn import TensorDictModule
-from torch import Tensor
 
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import (
@@ -37,7 +37,7 @@ from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, parse_json, refuse_links, write_atomically
 from drone_rl.utils.limits import ARRAYS_BYTES, Allowance
-from drone_rl.utils.schema import Plain, Record, Text, shown
+from drone_rl.utils.schema import Plain, Record, Text, as_mapping, shown
 
 FORMAT = "drone_rl demonstration"
 FORMAT_VERSION = 1
@@ -46,9 +46,7 @@ MOST_DEMONSTRATIONS = 10_000
 _ARRAYS = ("images", "actions", "rewards", "done")
 _CONDITIONS = ("task", "camera", "dynamics", "actions")
 _PILOT = Text(100)
-_ABOUT = Record(
-    {name: Plain() for name in ("format", "format_version", "pilot", *_CONDITIONS)}
-)
+_ABOUT = Record({name: Plain() for name in ("format", "format_version", "pilot", *_CONDITIONS)})
 _NAME = re.compile(r"flight_([0-9]{5,9})\.npz")
 _PATIENCE_S = 10.0
 """Seconds to wait for another process that adds a flight to the same folder."""
@@ -70,7 +68,7 @@ class FlightConditions:
         return cls(*(getattr(settings, name) for name in _CONDITIONS))
 
     @classmethod
-    def read(cls, data: dict[str, Any]) -> Self:
+    def read(cls, data: Mapping[str, Any]) -> Self:
         """Read conditions from plain data; see `Settings.read` for errors."""
         return cls(
             read_task(data["task"], "task"),
@@ -213,13 +211,14 @@ def read_demonstration(path: Path, allowance: Allowance | None = None) -> Demons
         about = arrays.pop("about")
         if about.shape or about.dtype.kind != "U":
             raise InputError("its description is no text")
-        data = _ABOUT.read(parse_json(about.item(), "its description"), "about")
-        version = data["format"], data["format_version"]
-        if version != (FORMAT, FORMAT_VERSION):
+        data = as_mapping(parse_json(about.item(), "its description"), "about")
+        kind, version = data.get("format"), data.get("format_version")
+        if kind != FORMAT or type(version) is not int or version != FORMAT_VERSION:
             raise InputError(
-                f"it has the format {shown(version[0])}, version {shown(version[1])}, not "
-                f"{FORMAT}, version {FORMAT_VERSION}"
+                f"it has the format {shown(kind)}, version {shown(version)}, not {FORMAT}, "
+                f"version {FORMAT_VERSION}"
             )
+        data = _ABOUT.read(data, "about")
         pilot = _PILOT.read(data["pilot"], "pilot")
         return Demonstration(FlightConditions.read(data), pilot=pilot, **arrays)
     except InputError as error:
@@ -323,18 +322,16 @@ def record_oracle(
             in_keys=["pixels", *oracle.in_keys],
             out_keys=["action"],
         )
-        batch = EpisodeCollector(env, watching).collect().cpu()
-    numbers = cast(Tensor, batch["collector", "traj_ids"])
+        batch: Any = EpisodeCollector(env, watching).collect().cpu()  # entries are tensors
     conditions, paths = FlightConditions.of(settings), []
     for number in range(flights):
-        steps = batch[numbers == number]
-        following = cast(Any, steps["next"])
+        steps = batch[batch["collector", "traj_ids"] == number]
         demonstration = Demonstration(
             conditions,
-            images=cast(Tensor, steps["pixels"]).numpy(),
-            actions=cast(Tensor, steps["action"]).numpy(),
-            rewards=following["reward"][:, 0].numpy(),
-            done=following["done"][:, 0].numpy(),
+            images=steps["pixels"].numpy(),
+            actions=steps["action"].numpy(),
+            rewards=steps["next", "reward"][:, 0].numpy(),
+            done=steps["next", "done"][:, 0].numpy(),
             pilot="oracle",
         )
         paths.append(add_demonstration(folder, demonstration))

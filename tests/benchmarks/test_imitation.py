@@ -38,7 +38,7 @@ def test_each_seed_clones_and_continues(monkeypatch, tmp_path):
         "imitation_solved": 2,
     }
     assert recorded == [
-        ((tmp_path / f"demonstrations_{s}",), {"flights": 30, "seed": 1000 + s}) for s in (3, 4)
+        ((tmp_path / f"demonstrations_{s}",), {"flights": 30, "seed": 2000 + s}) for s in (3, 4)
     ]
     assert [c[0] for c in commands] == ["train", "evaluate"] * 4
     assert all("experiment=imitation" in c for c in commands[::2])

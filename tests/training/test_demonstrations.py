@@ -166,7 +166,9 @@ def test_continuous_actions_out_of_bounds_are_refused(number):
         ({"about": about(camera=None)}, "about.camera is missing"),
         ({"about": about(more=1)}, "about.'more' is unknown"),
         ({"about": about(format="other")}, "it has the format 'other', version 1, not drone_rl"),
-        ({"about": about(format_version=2)}, "version 2, not drone_rl demonstration, version 1"),
+        ({"about": about(format=None)}, "it has the format None, version 1, not drone_rl"),
+        ({"about": about(format_version=2, more=1)}, "version 2, not drone_rl demonstration, ver"),
+        ({"about": about(format_version=True)}, "version True, not drone_rl demonstration"),
         ({"about": about(pilot="a\nb")}, "pilot='a.*nb' is no text"),
         ({"about": about(pilot=3)}, "pilot=3 is no text"),
         ({"about": about(task={"name": "chess"})}, "task.name='chess' is unknown"),
@@ -235,7 +237,7 @@ def test_damaged_and_huge_files_are_refused(tmp_path, content, message):
 def test_a_bomb_is_not_unpacked(tmp_path, monkeypatch):
     (tmp_path / "flight_00000.npz").write_bytes(zipped(images=npy((10**6,), data=bytes(10**6))))
     monkeypatch.setattr(demonstrations, "ARRAYS_BYTES", 10**5)
-    with pytest.raises(InputError, match="unpacked, has 10000.. bytes, more than 100000 bytes"):
+    with pytest.raises(InputError, match=r"unpacked, has 10000.. bytes, more than 100000 bytes"):
         read_demonstrations(tmp_path)
 
 
@@ -276,7 +278,7 @@ def test_a_folder_without_flights_is_refused(tmp_path, monkeypatch):
 
 def test_links_and_folders_in_place_of_flights_are_refused(tmp_path):
     (tmp_path / "flight_00000.npz").mkdir()
-    with pytest.raises(InputError, match="is no plain file"):
+    with pytest.raises(InputError, match=r"can't be read \(Is a directory\)"):
         read_demonstrations(tmp_path)
     (tmp_path / "flight_00000.npz").rmdir()
     (tmp_path / "flight_00000.npz").symlink_to("/dev/zero")
@@ -293,7 +295,7 @@ FLYING = DynamicsSettings(mode="simple_flight")
         ({}, {"camera": CameraSettings(width=4, height=3)}, "camera.height=2, .* camera.height=3"),
         ({}, {"task": TaskSettings(num_cubes=2)}, "task.num_cubes=3, .* task.num_cubes=2"),
         ({}, {"task": PillarsSettings()}, "task.name=collect_cubes, .* task.name=pillars"),
-        ({}, {"dynamics": FLYING}, "dynamics.mode=computer_vision, .* mode=simple_flight"),
+        ({}, {"dynamics": FLYING}, "dynamics.mode=computer_vision, .* dynamics.mode=simple_flight"),
         (
             {"dynamics": FLYING},
             {"dynamics": FLYING.replace(wind=(0, 5, 0))},
@@ -331,7 +333,7 @@ def test_flights_under_other_conditions_are_refused(recorded, needed, message):
 def test_values_without_an_effect_may_differ():
     other = TrainSettings(
         camera=CAMERA,
-        dynamics=DynamicsSettings(mass=2.0, control_ticks=5),
+        dynamics=DynamicsSettings(mass=0.9, control_ticks=5),
         actions=ActionSettings(move_speed=9.0),
         seed=5,
     )
@@ -359,9 +361,7 @@ def test_the_oracle_is_recorded_as_it_flies(tmp_path, kind):
     assert [path.name for path in paths] == [f"flight_0000{i}.npz" for i in range(3)]
     env = DroneEnv(3, settings.task, settings.camera, seed=5, actions=settings.actions)
     log = StepLog()
-    flown = run_episodes(
-        env, oracle_policy(settings.task, env.worlds.dynamics.actions), 3, log=log
-    )
+    flown = run_episodes(env, oracle_policy(settings.task, env.worlds.dynamics.actions), 3, log=log)
     assert bool(flown.success.all())
     env.set_seed(5)
     first = env.reset()["pixels"].numpy()

@@ -21,7 +21,7 @@ TINY = TrainSettings(
     task=TaskSettings(num_cubes=1, first_distance=6.0, step_limit=40),
     collector=Episodes(num_envs=4),
     cloning=CloningSettings(epochs=3),
-    trainer=TrainerSettings(total_frames=100, confirm_episodes=0, target_share=None),
+    trainer=TrainerSettings(total_frames=100, confirm_episodes=0, target_share=None, num_threads=1),
 )
 NOTHING = TINY.trainer.replace(total_frames=0)
 
@@ -142,7 +142,7 @@ def test_unusable_demonstrations_are_refused_at_once(flights, tmp_path, monkeypa
     larger = TINY.task.replace(num_cubes=2)
     with pytest.raises(InputError, match=r"task.num_cubes=1, but this training has .*=2; give"):
         drone_rl.train(TINY, folder=tmp_path, task=larger, demonstrations=str(flights))
-    with pytest.raises(InputError, match="^demonstrations=missing can't be read"):
+    with pytest.raises(InputError, match=r"^demonstrations=missing can't be read"):
         drone_rl.train(TINY, folder=tmp_path, demonstrations="missing")
     assert not (tmp_path / "checkpoints").exists()
 
@@ -161,7 +161,5 @@ def test_a_critic_continues_from_the_clone(flights, tmp_path):
             progress=silent,
         )
     assert runs["on"].result["updates"] > 0
-    own, other = (
-        {**run.result["cloning"], "seconds": 0, "folder": ""} for run in runs.values()
-    )
+    own, other = ({**run.result["cloning"], "seconds": 0, "folder": ""} for run in runs.values())
     assert own == other
