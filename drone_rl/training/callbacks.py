@@ -175,7 +175,7 @@ class CsvCallback(Callback):
             writer.writerow([*counters.values(), *(f"{v:.6g}" for v in metrics.values())])
 
     def on_end(self, training: OngoingTraining, reason: str) -> None:
-        """Write a header alone if there was no update, as in a run that only clones."""
+        """Write only a header if there was no update, as in a run that only clones."""
         if not self.path.exists() or self.path.stat().st_size == 0:
             self.path.write_text("update,frames,episodes,seconds,train/running_reward\n")
 
