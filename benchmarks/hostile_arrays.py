@@ -5,12 +5,15 @@ import json
 import shutil
 import struct
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.hostile_case import Case, npz, zipped, zipped_zeros
+from benchmarks.hostile_case import NOT_REGULAR, Case, npz, put, zipped, zipped_zeros
+from drone_rl.config.training import TrainSettings
+from drone_rl.training.demonstrations import Demonstration, FlightConditions
 
 _NUMBERS = {"format": "drone_rl explanation", "format_version": 3, "name": "x"}
 
@@ -21,8 +24,8 @@ def hostile_arrays(folder: Path) -> list[Case]:
     Args:
         folder: Parent folder.
     """
-    cases = []
-    for file, contents in (("arrays", _arrays()), ("dataset", _data())):
+    cases, archives = [], _arrays()
+    for file, contents in (("arrays", archives), ("dataset", _data())):
         for name, content in contents.items():
             here = folder / f"explanation_{file}_{name}"
             here.mkdir()
@@ -32,7 +35,7 @@ def hostile_arrays(folder: Path) -> list[Case]:
             cases.append(
                 (here.name, ["report", f"explanations={here}"], "a malicious array archive")
             )
-    return [*cases, *_together(folder), *_numbers(folder)]
+    return [*cases, *_together(folder), *_numbers(folder), *_demonstrations(folder, archives)]
 
 
 def _arrays() -> dict[str, bytes]:
@@ -151,6 +154,52 @@ def _numbers(folder: Path) -> list[Case]:
             (here / f"{other}.npz").write_bytes(_npz())
         cases.append((here.name, ["report", f"explanations={here}"], "too much to show"))
     return cases
+
+
+def _demonstrations(folder: Path, archives: Mapping[str, bytes]) -> list[Case]:
+    """Create folders of demonstrations to train from, each with one malicious file or archive."""
+    whole = _flight()
+    changes: dict[str, Any] = {
+        "pickle": {"images": np.array([{}], object)},
+        "shape": {"images": whole["images"][:, :, :4]},
+        "type": {"images": whole["images"].astype(np.float32)},
+        "rewards_nan": {"rewards": np.array([np.nan], np.float32)},
+        "action_99": {"actions": np.array([99])},
+        "further": {"more": np.zeros(1)},
+        "text": {"about": np.array("hello")},
+        "nested": {"about": np.array("[" * 10**5)},
+        "values": {"about": np.array("[" + "0," * 10**6 + "0]")},
+        "twice": {"about": np.array('{"format": 1, "format": 1}')},
+        "camera_large": {"about": np.array(str(whole["about"]).replace("64", str(10**18)))},
+        "task": {"about": np.array(str(whole["about"]).replace("num_cubes", "__class__"))},
+        "lines": {"about": np.array(str(whole["about"]).replace("person", "a\\nb"))},
+    }
+    contents: dict[str, Any] = {
+        **{f"archive_{name}": content for name, content in archives.items()},
+        **{name: npz({**whole, **change}) for name, change in changes.items()},
+        "frames_of_384_mib": _npz_of_zeros((2**15, 64, 64, 3), "|u1", 3 * 2**27, "images"),
+        **NOT_REGULAR,
+    }
+    cases = []
+    for name, content in contents.items():
+        here = folder / f"demonstration_{name}"
+        here.mkdir()
+        put(here / "flight_00000.npz", content)
+        command = ["train", f"demonstrations={here}", "logger=csv"]
+        cases.append((here.name, command, "a malicious demonstration"))
+    return cases
+
+
+def _flight() -> dict[str, np.ndarray]:
+    """Return the arrays of a valid demonstration of one step."""
+    one = Demonstration(
+        FlightConditions.of(TrainSettings()),
+        images=np.zeros((1, 25, 64, 3), np.uint8),
+        actions=np.zeros(1, np.int64),
+        rewards=np.zeros(1, np.float32),
+        done=np.ones(1, bool),
+    )
+    return dict(np.load(io.BytesIO(one.to_bytes())))
 
 
 def _npz(**arrays: np.ndarray) -> bytes:

@@ -17,6 +17,7 @@ from benchmarks.fragile_honest import bench_fragile_honest
 from benchmarks.gamed import bench_gamed
 from benchmarks.gymnasium import bench_gymnasium
 from benchmarks.hostile import bench_hostile
+from benchmarks.imitation import bench_imitation
 from benchmarks.injections import bench_injections
 from benchmarks.maps import bench_maps
 from benchmarks.memory import bench_memory
@@ -101,6 +102,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_large(s.runs, s.device, s.quick),
         "main",
         (*_TRAINING, "conf", "benchmarks/training"),
+    ),
+    "imitation": Benchmark(
+        lambda s: bench_imitation(s.runs / "imitation", s.seeds[:3], s.episodes, s.device, s.quick),
+        "main",
+        (*_TRAINING, "evaluation", "conf", "benchmarks/imitation", "benchmarks/training"),
     ),
     "size": Benchmark(lambda s: measure(), "main", (".", "conf")),
     "coverage": Benchmark(

@@ -111,19 +111,33 @@ def train_and_evaluate(
         results["frames"].append(result["frames"])
         results["trained_s"].append(result["seconds"])
         results["reason"].append(result["reason"])
-        call(
-            "evaluate",
-            "seed=0",
-            f"checkpoint={run}",
-            f"episodes={episodes}",
-            "baselines=false",
-            "videos=0",
-            f"device={device}",
-            f"hydra.run.dir={run}/evaluation",
-        )
-        evaluation = json.loads((run / "evaluation" / "evaluation.json").read_text())
-        results["lower95"].append(evaluation["greedy"]["success"]["lower95"])
+        results["lower95"].append(evaluate(run, episodes, device)["lower95"])
     return results
+
+
+def evaluate(run: Path, episodes: int, device: str) -> dict[str, float]:
+    """Evaluate the greedy policy of a run in held-out environments, by the command.
+
+    Args:
+        run: Folder of the run.
+        episodes: Held-out episodes.
+        device: Device of the evaluation.
+
+    Returns:
+        The success rate, "share", and its exact 95% interval, "lower95" and "upper95".
+    """
+    call(
+        "evaluate",
+        "seed=0",
+        f"checkpoint={run}",
+        f"episodes={episodes}",
+        "baselines=false",
+        "videos=0",
+        f"device={device}",
+        f"hydra.run.dir={run}/evaluation",
+    )
+    evaluation = json.loads((run / "evaluation" / "evaluation.json").read_text())
+    return evaluation["greedy"]["success"]
 
 
 _BRIEF = ("trainer.total_frames=4000", "trainer.confirm_episodes=0")

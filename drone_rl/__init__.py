@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from drone_rl.config.registry import register_returns as register_returns
     from drone_rl.config.registry import register_transform as register_transform
     from drone_rl.config.sensors import SensorSettings as SensorSettings
+    from drone_rl.config.training import CloningSettings as CloningSettings
     from drone_rl.config.training import TrainerSettings as TrainerSettings
     from drone_rl.config.training import TrainSettings as TrainSettings
     from drone_rl.envs.gymnasium.environments import DroneWorld as DroneWorld
@@ -69,6 +70,11 @@ if TYPE_CHECKING:
     from drone_rl.sim.image_types import ImageRequest as ImageRequest
     from drone_rl.sim.image_types import ImageType as ImageType
     from drone_rl.sim.tasks import register_task as register_task
+    from drone_rl.training.demonstrations import Demonstration as Demonstration
+    from drone_rl.training.demonstrations import FlightConditions as FlightConditions
+    from drone_rl.training.demonstrations import add_demonstration as add_demonstration
+    from drone_rl.training.demonstrations import read_demonstrations as read_demonstrations
+    from drone_rl.training.demonstrations import record_oracle as record_oracle
     from drone_rl.training.run_folder import Training as Training
     from drone_rl.training.train import train as train
     from drone_rl.utils.errors import InputError as InputError

@@ -20,6 +20,7 @@ from drone_rl.config.learning import (
     Constant,
     Episodes,
     Gae,
+    LearningRate,
     LeaveOneOut,
     Objective,
     Optimizer,
@@ -40,8 +41,8 @@ MOST_TRANSFORMS = 16
 class TrainerSettings(Settings):
     """Settings of the training loop: stopping rule, gradients, threads, checkpoints."""
 
-    total_frames: Annotated[int, Whole(1, unit="frames")] = 2_000_000
-    """Stop once this many frames were collected."""
+    total_frames: Annotated[int, Whole(0, unit="frames")] = 2_000_000
+    """Stop once this many frames were collected; 0 collects none, to clone only."""
     total_episodes: Annotated[int, Whole(1, unit="episodes")] | None = None
     """Stop once this many episodes were collected; null for no limit."""
     target_share: Annotated[float, Real(0.0, 1.0, is_above=True)] | None = 0.99
@@ -66,6 +67,19 @@ class TrainerSettings(Settings):
     """Threads of the learner; results depend on their number through rounding."""
     checkpoint_interval_s: Annotated[float, Real(0.0, unit="s")] = 15.0
     """Seconds between two checkpoints."""
+
+
+class CloningSettings(Settings):
+    """Settings of behavior cloning, with which a training with demonstrations begins."""
+
+    epochs: Annotated[int, Whole(1, 100_000, "epochs")] = 30
+    """Passes over the demonstrations."""
+    lr: LearningRate = 1e-3
+    """Learning rate of Adam."""
+    minibatch_size: Annotated[int, Whole(1, 1_000_000, "frames")] = 64
+    """Frames in a minibatch, each a step of the optimizer."""
+    held_out_share: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.1
+    """Fraction of the demonstrations that are not learned from but measure loss and accuracy."""
 
 
 class TrainSettings(Settings):
@@ -99,6 +113,10 @@ class TrainSettings(Settings):
     """Collector."""
     trainer: TrainerSettings = TrainerSettings()
     """Training loop: stopping rule, gradients, threads, checkpoints."""
+    demonstrations: str | None = None
+    """Folder of demonstrations that a new run clones before it collects episodes; null for none."""
+    cloning: CloningSettings = CloningSettings()
+    """Behavior cloning, if demonstrations are given."""
     seed: Annotated[int, Whole(0)] = 0
     """Root of all random streams: scenes, actions, initial weights."""
     device: str = "cpu"

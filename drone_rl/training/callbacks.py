@@ -55,6 +55,9 @@ _log = logging.getLogger(__name__)
 class Callback:
     """Hooks of the training loop; override those of interest."""
 
+    def on_clone(self, epoch: int, epochs: int, metrics: Mapping[str, float]) -> None:
+        """After each of the passes over the demonstrations of a new run, before `on_start`."""
+
     def on_start(self, training: OngoingTraining) -> None:
         """Before the first update of this process."""
 
@@ -123,10 +126,22 @@ class CheckpointCallback(Callback):
 
 
 class CsvCallback(Callback):
-    """Write a row of `metrics.csv` for each update; drop rows that a resumed run will repeat."""
+    """Write a row of `metrics.csv` for each update; drop rows that a resumed run will repeat.
+
+    Passes over demonstrations have their rows in `cloning.csv`.
+    """
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
+
+    def on_clone(self, epoch: int, epochs: int, metrics: Mapping[str, float]) -> None:
+        """Append a row to `cloning.csv`, which the first pass begins."""
+        is_first = epoch == 1
+        with self.path.with_name("cloning.csv").open("w" if is_first else "a", newline="") as file:
+            writer = csv.writer(file)
+            if is_first:
+                writer.writerow(["epoch", *metrics])
+            writer.writerow([epoch, *(f"{v:.6g}" for v in metrics.values())])
 
     def on_start(self, training: OngoingTraining) -> None:
         """Keep the rows up to the state that training resumes from."""
@@ -135,9 +150,9 @@ class CsvCallback(Callback):
         rows = [*read_table(self.path)] if self.path.stat().st_size else []
         whole = [r for r in rows[1:] if len(r) == len(rows[0])]  # the last may be cut short
         header = [[NAMES_OF_0_1.get(name, name) for name in row] for row in rows[:1]]
-        kept = header + [r for r in whole if self._update_of(r) <= training.progress.updates]
+        kept = [r for r in whole if self._update_of(r) <= training.progress.updates]
         text = io.StringIO(newline="")
-        csv.writer(text).writerows(kept)
+        csv.writer(text).writerows(header + kept if kept else [])  # `on_update` writes the header
         write_atomically(self.path, text.getvalue())
 
     def _update_of(self, row: Sequence[str]) -> int:
@@ -159,6 +174,11 @@ class CsvCallback(Callback):
                 writer.writerow([*counters, *metrics])
             writer.writerow([*counters.values(), *(f"{v:.6g}" for v in metrics.values())])
 
+    def on_end(self, training: OngoingTraining, reason: str) -> None:
+        """Write only a header if there was no update, as in a run that only clones."""
+        if not self.path.exists() or self.path.stat().st_size == 0:
+            self.path.write_text("update,frames,episodes,seconds,train/running_reward\n")
+
 
 class LoggerCallback(Callback):
     """Pass the metrics, by frames, to TorchRL's loggers."""
@@ -172,6 +192,12 @@ class LoggerCallback(Callback):
         """Make the loggers."""
         if self._make is not None:
             self.loggers, self._make = list(self._make()), None
+
+    def on_clone(self, epoch: int, epochs: int, metrics: Mapping[str, float]) -> None:
+        """Log each metric, by epochs."""
+        for logger in self.loggers:
+            for name, value in metrics.items():
+                logger.log_scalar(name, value, step=epoch)
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """Log each metric."""
@@ -187,6 +213,14 @@ class ProgressCallback(Callback):
         self.interval_s = interval_s
         self._bar: tqdm | None = None
         self._said_at = 0.0
+
+    def on_clone(self, epoch: int, epochs: int, metrics: Mapping[str, float]) -> None:
+        """Log a line every few seconds, and the last pass."""
+        if epoch < epochs and time.monotonic() - self._said_at < self.interval_s:
+            return
+        self._said_at = time.monotonic()
+        values = ", ".join(f"{k.rpartition('/')[2]} {v:.3f}" for k, v in metrics.items())
+        _log.info("cloning: epoch %d of %d, %s", epoch, epochs, values.replace("_", " "))
 
     def on_start(self, training: OngoingTraining) -> None:
         """Open the bar at the frames already done."""
@@ -228,6 +262,10 @@ class ForwardProgress(Callback):
 
     def __init__(self, progress: Report) -> None:
         self.progress = progress
+
+    def on_clone(self, epoch: int, epochs: int, metrics: Mapping[str, float]) -> None:
+        """Forward the accuracy and the epochs."""
+        self.progress(f"cloning: accuracy {metrics['cloning/accuracy']:.3f}", epoch, epochs)
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """Forward the running mean and the frames."""

@@ -14,10 +14,13 @@ import yaml
 from drone_rl.config.configuration import as_config, check_same_config, from_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
+from drone_rl.policies.recurrent import refusal
 from drone_rl.policies.zoo import describe, read_checkpoint
 from drone_rl.sim.tasks import as_task
 from drone_rl.training.callbacks import CheckpointCallback
+from drone_rl.training.cloning import Cloning
 from drone_rl.training.confirmation import Confirmation
+from drone_rl.training.demonstrations import Demonstration, FlightConditions, read_demonstrations
 from drone_rl.training.trainer import Trainer
 from drone_rl.utils.display import picture, table
 from drone_rl.utils.errors import InputError
@@ -36,6 +39,7 @@ MAY_CHANGE = (
     "trainer.checkpoint_interval_s",
     "evaluate_after",
     "renderer",
+    "demonstrations",
 )
 """Settings that a resumed run may change: they don't enter into what is learned."""
 _WRITTEN = ("metrics.csv", "result.json", "run.yaml", "provable.json")
@@ -67,8 +71,7 @@ class Training:
     def metrics(self) -> dict[str, list[float]]:
         """Return the columns of `metrics.csv`: one value for each update."""
         head, *rows = read_table(self.folder / "metrics.csv")
-        columns = zip(head, zip(*rows, strict=True), strict=True)
-        return {name: [float(value) for value in column] for name, column in columns}
+        return {name: [float(row[i]) for row in rows] for i, name in enumerate(head)}
 
     def _repr_html_(self) -> str:
         from matplotlib.figure import Figure  # slow to import; only a notebook needs it
@@ -95,11 +98,29 @@ class RunFolder:
         state = read_checkpoint(last_of(folder)) if resume else None
         return cls(folder), state
 
-    def prepare(self, settings: TrainSettings, state: Mapping[str, Any] | None) -> None:
-        """Delete half-written files; raise an `InputError` if the checkpoint has other settings."""
+    def prepare(
+        self, settings: TrainSettings, state: Mapping[str, Any] | None
+    ) -> list[Demonstration]:
+        """Delete half-written files; return the demonstrations that a new run clones, if any.
+
+        Raises:
+            InputError: The checkpoint has other settings, a demonstration is unusable, or the
+                policy is recurrent.
+        """
+        folder, found = settings.demonstrations, []
         if state is not None:
             check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
+            if folder is not None and "cloning" not in state:
+                raise InputError(
+                    f"can't resume with demonstrations={folder}: the run was started without any, "
+                    "and only a new run clones; leave them out or start a new run"
+                )
+        elif folder is not None:
+            if describe(settings).is_recurrent:
+                raise InputError(refusal("the policy", "cloning", "set another network=..."))
+            found = read_demonstrations(folder, FlightConditions.of(settings))
         remove_leftovers(self.path, *_WRITTEN)
+        return found
 
     def checkpoints(self, settings: TrainSettings) -> CheckpointCallback:
         """Return the callback that writes checkpoints, with the settings and their origin."""
@@ -118,6 +139,9 @@ class RunFolder:
         if state is not None:
             trainer.load_state_dict(state)
             checkpoints.best = _read_best(state.get("best"))
+            if "cloning" in state:
+                cloning = Cloning.read(state["cloning"], "the checkpoint's cloning")
+                checkpoints.extra["cloning"] = cloning.values()
         extra = checkpoints.extra
         noted = {"config": extra["config"], "description": extra["description"]}
         text = yaml.safe_dump({**noted, **extra["provenance"]}, sort_keys=False)
@@ -132,12 +156,17 @@ def possible_ends(settings: TrainSettings) -> list[enum.IntEnum]:
 
 
 def result_of(
-    trainer: Trainer, largest_reward: float, confirmation: Confirmation | None
+    trainer: Trainer,
+    largest_reward: float,
+    confirmation: Confirmation | None,
+    checkpoints: CheckpointCallback,
 ) -> dict[str, Any]:
     """Return the values of `result.json`."""
     confirmed = {} if confirmation is None else confirmation.result
+    cloned = {k: v for k, v in checkpoints.extra.items() if k == "cloning"}
     progress = dataclasses.asdict(trainer.progress)
-    return {"reason": trainer.reason, **progress, "largest_reward": largest_reward, **confirmed}
+    own = {"reason": trainer.reason, **progress, "largest_reward": largest_reward}
+    return {**own, **confirmed, **cloned}
 
 
 def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Training:

@@ -2,7 +2,7 @@
 
 `drone-rl train` and `drone_rl.train` run this file; `examples/train_with_torchrl.py` is a plain
 script of the same components. A critic and Ray workers are in `variants.py`, files in
-`run_folder.py`.
+`run_folder.py`, imitation in `cloning.py`.
 """
 
 import logging
@@ -11,19 +11,19 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torchrl.envs import Compose, TransformedEnv
 
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
 from drone_rl.config.learning import Episodes, Reinforce
 from drone_rl.config.registry import implements
 from drone_rl.config.training import TrainSettings
-from drone_rl.envs import DroneEnv
+from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.objectives import ReinforceLoss
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import describe
 from drone_rl.sim.tasks import FailureReplayTask, as_settings, as_task
 from drone_rl.training import components, run_folder
 from drone_rl.training.callbacks import Callback, CsvCallback, ForwardProgress
+from drone_rl.training.cloning import clone
 from drone_rl.training.components import Components, Group
 from drone_rl.training.confirmation import Confirmation
 from drone_rl.training.learners import NotANumberError, ReinforceLearner
@@ -72,8 +72,7 @@ def train(
     settings = settings.replace(**{name: as_settings(value) for name, value in changes.items()})
     run.path.mkdir(parents=True, exist_ok=True)
     with folder_lock(run.path):
-        callbacks = [*callbacks, ForwardProgress(progress or Bar())]
-        result = learn(settings, run.path, state, callbacks)
+        result = learn(settings, run.path, state, [*callbacks, ForwardProgress(progress or Bar())])
         training = run_folder.finish(settings, run.path, result)
     return run_folder.hand_on_signal(training)
 
@@ -85,7 +84,7 @@ def learn(
     callbacks: Sequence[Callback],
     replay: FailureReplayTask | None = None,
 ) -> dict[str, Any]:
-    """Train until solved, out of budget or stopped; write checkpoints and metrics.
+    """Clone demonstrations, if any, and train until solved, out of budget or stopped; write files.
 
     Args:
         settings: All settings.
@@ -102,7 +101,7 @@ def learn(
     """
     run, limits = RunFolder(folder), settings.trainer
     largest_reward = as_task(settings.task).largest_reward
-    run.prepare(settings, state)
+    flights = run.prepare(settings, state)
     torch.set_num_threads(limits.num_threads)  # sums depend on it: equal on every machine
     bound_kernels()
     parts = components.make_collector(settings, replay)
@@ -123,6 +122,8 @@ def learn(
     )
     try:
         run.resume(trainer, checkpoints, state)
+        checkpoints.extra |= clone(settings, parts.network, flights, trainer.callbacks)
+        del flights  # release memory
         with trainer.running() as batches:
             for batch in batches:
                 trainer.finish_update(batch, learner.update(batch))  # log, save, other callbacks
@@ -132,7 +133,7 @@ def learn(
         parts.collector.shutdown()
         if confirmation is not None:
             confirmation.close()
-    return run_folder.result_of(trainer, largest_reward, confirmation)
+    return run_folder.result_of(trainer, largest_reward, confirmation, checkpoints)
 
 
 @implements(Episodes)
@@ -176,8 +177,7 @@ def make_groups(
             actions=settings.actions,
             appearance=settings.appearance,
         )
-        transforms: Any = description.make_transforms()
-        env = TransformedEnv(base, Compose(*transforms))
+        env = with_transforms(base, description.make_transforms())
         generator = torch_generator(seed, Stream.ACTIONS, number=number, device=device)
         actor = make_actor(network, env.action_spec, generator)
         groups.append(Group(env, actor, network, generator))

@@ -14,8 +14,9 @@ from drone_rl.utils.readers import read_yaml
 from drone_rl.utils.schema import Kind, Several, Text, shown
 from drone_rl.utils.settings import FORMER_CHOICES, FORMER_NAMES
 
-_OF_ONE_FOLDER = re.compile(r"\+{0,2}(resume|trial|paths(\.\w+)?)")
-"""Overrides of a run's folder and sweep, which do not affect training; a run can be moved."""
+_OF_ONE_FOLDER = re.compile(r"\+{0,2}(resume|trial|demonstrations|paths(\.\w+)?)")
+"""Overrides that do not affect how a run continues: its folder, its sweep, and the demonstrations
+that it has cloned. A run can be moved."""
 MOST_OVERRIDES = 200
 """Largest number of overrides of a run."""
 _LONGEST = 500
@@ -25,7 +26,7 @@ _SCALAR = r"[\w.+-]*"
 _VALUE = rf"({_SCALAR}|\[({_SCALAR}(, ?{_SCALAR})*)?\])"
 _SECTIONS = (
     "task|appearance|dynamics|actions|camera|trainer|network|policy|returns|objective|optimizer|"
-    "scheduler|transforms|provable"
+    "scheduler|transforms|provable|cloning"
 )
 _TAKEN_OVER = (
     r"(seed|evaluate_after)=\w*",

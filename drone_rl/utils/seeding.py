@@ -41,6 +41,8 @@ class Stream(enum.IntEnum):
     """Noise of sensors other than cameras."""
     SCENES = 12
     """Positions of targets in explanations."""
+    CLONING = 13
+    """Held-out demonstrations, and the order of frames, in behavior cloning."""
 
 
 FRESH_BITS = 48

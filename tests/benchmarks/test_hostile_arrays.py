@@ -2,11 +2,14 @@
 
 import io
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks import hostile_arrays
+from drone_rl.training.demonstrations import read_demonstration, read_demonstrations
+from drone_rl.utils.errors import InputError
 
 
 def test_a_directory_that_declares_too_few_bytes():
@@ -42,3 +45,18 @@ def test_a_hand_written_array_is_valid():
         np.load(io.BytesIO(hostile_arrays._data()["episode_2_40"]))["flights/episode"].max()
         == 2**40
     )
+
+
+def test_demonstrations_are_valid_except_for_their_defect(tmp_path):
+    flight = hostile_arrays._flight()
+    np.savez(tmp_path / "flight_00000.npz", **flight)
+    assert len(read_demonstration(tmp_path / "flight_00000.npz")) == 1
+    (tmp_path / "cases").mkdir()
+    archives = {"no_array": hostile_arrays.zipped({"a.npy": b"hello"})}
+    cases = hostile_arrays._demonstrations(tmp_path / "cases", archives)
+    assert len(cases) == 21 and len({name for name, *_ in cases}) == len(cases)
+    for _, command, _ in cases:
+        folder = Path(command[1].partition("=")[2])
+        with pytest.raises(InputError) as error:
+            read_demonstrations(folder)
+        assert "\n" not in str(error.value)

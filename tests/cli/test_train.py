@@ -14,7 +14,10 @@ import time
 import pytest
 import torch
 
+from drone_rl.config import TaskSettings
+from drone_rl.config.training import TrainSettings
 from drone_rl.training import CsvCallback
+from drone_rl.training.demonstrations import record_oracle
 from drone_rl.utils.checkpoint import load_checkpoint
 from drone_rl.utils.overrides import read_overrides
 from tests.cli.running import TINY, drone_rl, error_line
@@ -267,6 +270,26 @@ def test_full_disk_while_saving_keeps_the_previous_checkpoint(run, tmp_path):
     assert sorted(p.name for p in folder.iterdir()) == ["best.pt", "last.pt"]
     assert load_checkpoint(folder / "last.pt")["progress"]["updates"] == 0
     assert os.path.getsize(folder / "last.pt") > 4096
+
+
+def test_demonstrations_are_cloned_and_the_run_continues(in_process, tmp_path):
+    """The folder of the demonstrations is neither read nor needed to resume."""
+    task = TaskSettings(num_cubes=1, first_distance=8.0)
+    record_oracle(tmp_path / "flights", TrainSettings(task=task), flights=2)
+    own = ["task.num_cubes=1", "task.first_distance=8", "cloning.epochs=2", "collector.num_envs=4"]
+    told = ["experiment=imitation", "demonstrations=flights", "logger=csv", *own]
+    assert in_process("train", *told, "trainer.total_frames=0", "hydra.run.dir=run").returncode == 0
+    first = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert (first["frames"], first["cloning"]["demonstrations"]) == (0, 1)
+    shutil.rmtree(tmp_path / "flights")
+    done = in_process("train", "resume=run", "trainer.total_frames=200")
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert result["frames"] >= 200 and result["cloning"] == first["cloning"]
+    line = error_line(in_process("train", *told))
+    assert line.startswith("error: demonstrations=flights can't be read (No such file")
+    line = error_line(in_process("train", "experiment=imitation", "logger=csv"))
+    assert line.startswith("error: demonstrations=outputs/demonstrations can't be read")
 
 
 def test_rounds_of_practice_by_the_command_line(tmp_path):

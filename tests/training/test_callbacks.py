@@ -13,6 +13,7 @@ from drone_rl.training import (
     ProgressCallback,
     callbacks,
 )
+from drone_rl.training.callbacks import ForwardProgress
 from drone_rl.utils.checkpoint import load_checkpoint
 from drone_rl.utils.errors import InputError
 from tests.training_loop import run
@@ -84,6 +85,57 @@ def test_resumed_run_has_each_row_once(make_trainer, tmp_path):
     run(resumed)
     updates = [int(r["update"]) for r in rows(path)]
     assert updates == list(range(1, resumed.progress.updates + 1))
+
+
+def test_a_run_without_updates_has_a_header_that_a_longer_run_replaces(make_trainer, tmp_path):
+    path = tmp_path / "metrics.csv"
+    run(make_trainer(callbacks=[CsvCallback(path)], total_frames=0))
+    assert path.read_text() == "update,frames,episodes,seconds,train/running_reward\n"
+    run(make_trainer(callbacks=[CsvCallback(path)], total_frames=0))
+    assert rows(path) == []
+    longer = make_trainer(callbacks=[CsvCallback(path)], total_frames=100)
+    run(longer)
+    updates = [int(row["update"]) for row in rows(path)]
+    assert updates == list(range(1, longer.progress.updates + 1))
+    assert "loss/grad_norm" in rows(path)[0]
+
+
+METRICS = {"cloning/loss": 0.25, "cloning/held_out_accuracy": 0.5}
+
+
+def test_passes_over_demonstrations_have_rows_of_their_own(tmp_path):
+    (tmp_path / "cloning.csv").write_text("of an earlier run\n" * 9)
+    callback = CsvCallback(tmp_path / "metrics.csv")
+    for epoch in (1, 2):
+        callback.on_clone(epoch, 2, {**METRICS, "cloning/loss": 0.5 / epoch})
+    assert rows(tmp_path / "cloning.csv") == [
+        {"epoch": "1", "cloning/loss": "0.5", "cloning/held_out_accuracy": "0.5"},
+        {"epoch": "2", "cloning/loss": "0.25", "cloning/held_out_accuracy": "0.5"},
+    ]
+    assert not (tmp_path / "metrics.csv").exists()
+
+
+def test_passes_are_logged_by_torchrl_and_forwarded(tmp_path):
+    logger, messages = CSVLogger("run", log_dir=str(tmp_path)), []
+    LoggerCallback([logger]).on_clone(3, 9, METRICS)
+    (path,) = tmp_path.glob("run/scalars/**/*loss*.csv")
+    assert path.read_text().strip() == "3,0.25"
+    ForwardProgress(lambda *message: messages.append(message)).on_clone(
+        3, 9, {"cloning/accuracy": 0.5}
+    )
+    assert messages == [("cloning: accuracy 0.500", 3, 9)]
+
+
+def test_passes_are_logged_as_lines_now_and_then_and_the_last_one(monkeypatch, caplog):
+    caplog.set_level(logging.INFO)
+    clock, callback = Clock(monkeypatch), ProgressCallback(interval_s=5.0)
+    for now, epoch in ((1000.0, 1), (1004.9, 2), (1005.0, 3), (1005.1, 4)):
+        clock.now = now
+        callback.on_clone(epoch, 4, METRICS)
+    lines = [record.getMessage() for record in caplog.records]
+    assert lines == [
+        f"cloning: epoch {epoch} of 4, loss 0.250, held out accuracy 0.500" for epoch in (1, 3, 4)
+    ]
 
 
 def test_torchrl_loggers_are_supported(make_trainer, tmp_path):

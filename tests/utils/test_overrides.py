@@ -33,6 +33,7 @@ def test_settings_of_a_training_are_taken_over(noted):
         *("optimizer.lr=1e-3", "task.spacing=-9.5", "trainer.total_episodes=null"),
         *("task.cube_color=[0.1, 0.2, 0.3]", "transforms.crop.top=3", "~transforms.standardize"),
         *("+optimizer.amsgrad=true", "objective.reduction=sum", "collector.num_envs=8"),
+        "cloning.epochs=5",
     ]
     assert taken_over(noted(settings), []) == settings
 
@@ -49,6 +50,7 @@ def test_what_is_told_anew_is_not_taken_over(noted):
 def test_where_a_run_was_does_not_matter(noted):
     """It may have been moved or copied, or out of a sweep that is not there any more."""
     place = ["paths.outputs=/x", "+paths.outputs=/x", "paths=mine", "resume=x", "trial=3"]
+    place += ["demonstrations=/x"]
     assert taken_over(noted([*place, "seed=1"]), []) == ["seed=1"]
     assert must_be_typed([*place, "seed=1", "collector.make=a"]) == ["collector.make=a"]
 

@@ -35,6 +35,11 @@ def _known_maps(f: Figures) -> str:
     return f"{rate * total:.0f} of {total}"
 
 
+def _imitated(f: Figures) -> str:
+    rates, frames = f["imitation_reinforce_success"], f["imitation_reinforce_frames"]
+    return f"{', '.join(map(percent, rates))}; {', '.join(f'{n:,}' for n in frames)} frames"
+
+
 def _seconds(values: Sequence[float]) -> str:
     return ", ".join(f"{value:.0f}" for value in values)
 
@@ -291,6 +296,19 @@ MAIN = (
         "20 other seeds: number that reach this mean; worst lower end of the 95% CI",
         lambda f: f"{f['seeds_solved_of_20']}; {percent(min(f['seeds_lower95']))}",
         "20",
+    ),
+    Row(
+        "imitation",
+        "policies cloned from 30 flights of the oracle, success rate in 1,000 held-out episodes, "
+        "3 seeds",
+        lambda f: ", ".join(map(percent, f["imitation_success"])),
+        "80%",
+    ),
+    Row(
+        "imitation",
+        "the same after REINFORCE, and the frames that it collected",
+        _imitated,
+        "95%",
     ),
     Row(
         "solve",

@@ -41,7 +41,7 @@ from drone_rl.config.commands import PathsSettings, ProvableSettings
 from drone_rl.config.configuration import Changes, Variant, from_config
 from drone_rl.config.learning import Collector, Objective, Optimizer, Returns, Scheduler
 from drone_rl.config.networks import Network
-from drone_rl.config.training import Logger, TrainerSettings
+from drone_rl.config.training import CloningSettings, Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import USER_ERROR
@@ -54,6 +54,7 @@ GROUPS: dict[str, type[Settings]] = {
     "actions": ActionSettings,
     "camera": CameraSettings,
     "trainer": TrainerSettings,
+    "cloning": CloningSettings,
     "provable": ProvableSettings,
     "paths": PathsSettings,
 }

@@ -42,7 +42,8 @@ _TYPE = re.compile(r"(?:converted to|convert \S+ to|field of type|a valid) '?(?:
 """The type that a setting needs, in OmegaConf's messages."""
 _MAGNITUDES = {"k": 10**3, "m": 10**6, "g": 10**9}
 _TEXTS = re.compile(
-    r"[+~]*(hydra|paths|policy|policies|resume|certificate|explanations|folder|name|shifts|require)"
+    r"[+~]*(hydra|paths|policy|policies|resume|certificate|explanations|folder|name|shifts|require|"
+    r"demonstrations)"
 )
 """Settings whose values are names and paths."""
 _EXPONENT = re.compile(r"(?<=[=,\[(])(\d+(?:\.\d+)?[eE]\+?\d+)(?=[,\])]|$)")

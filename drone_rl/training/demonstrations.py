@@ -1,0 +1,345 @@
+"""Demonstrations: recorded flights that a policy is cloned from, each in a compressed .npz file.
+
+A file contains arrays, see `Demonstration`, and a description in JSON. It may come from a stranger:
+sizes are checked before memory is allocated, and nothing in it is executed.
+"""
+
+import dataclasses
+import functools
+import io
+import json
+import re
+from collections.abc import Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from tensordict.nn import TensorDictModule
+
+from drone_rl.collectors import EpisodeCollector
+from drone_rl.config import (
+    ActionSettings,
+    BaseTaskSettings,
+    CameraSettings,
+    DynamicsSettings,
+    read_task,
+)
+from drone_rl.config.training import TrainSettings
+from drone_rl.envs import DroneEnv
+from drone_rl.evaluation.baselines import oracle_policy
+from drone_rl.sim.actions import Entry
+from drone_rl.sim.dynamics import make_dynamics
+from drone_rl.sim.tasks import as_task
+from drone_rl.utils.archives import read_arrays
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import folder_lock, parse_json, refuse_links, write_atomically
+from drone_rl.utils.limits import ARRAYS_BYTES, Allowance
+from drone_rl.utils.schema import Plain, Record, Text, as_mapping, shown
+
+FORMAT = "drone_rl demonstration"
+FORMAT_VERSION = 1
+MOST_DEMONSTRATIONS = 10_000
+"""Largest number of demonstrations in a folder."""
+_ARRAYS = ("images", "actions", "rewards", "done")
+_CONDITIONS = ("task", "camera", "dynamics", "actions")
+_PILOT = Text(100)
+_ABOUT = Record({name: Plain() for name in ("format", "format_version", "pilot", *_CONDITIONS)})
+_NAME = re.compile(r"flight_([0-9]{5,9})\.npz")
+_PATIENCE_S = 10.0
+"""Seconds to wait for another process that adds a flight to the same folder."""
+
+
+@dataclasses.dataclass(frozen=True)
+class FlightConditions:
+    """Settings under which a flight was recorded, and under which a policy can learn from it."""
+
+    task: BaseTaskSettings
+    camera: CameraSettings
+    """Camera of the policy."""
+    dynamics: DynamicsSettings
+    actions: ActionSettings
+
+    @classmethod
+    def of(cls, settings: TrainSettings) -> Self:
+        """Return the conditions of a training."""
+        return cls(*(getattr(settings, name) for name in _CONDITIONS))
+
+    @classmethod
+    def read(cls, data: Mapping[str, Any]) -> Self:
+        """Read conditions from plain data; see `Settings.read` for errors."""
+        return cls(
+            read_task(data["task"], "task"),
+            CameraSettings.read(data["camera"], "camera"),
+            DynamicsSettings.read(data["dynamics"], "dynamics"),
+            ActionSettings.read(data["actions"], "actions"),
+        )
+
+    def values(self) -> dict[str, dict[str, Any]]:
+        """Return the conditions as plain data."""
+        return {name: getattr(self, name).values() for name in _CONDITIONS}
+
+    def check_same(self, other: "FlightConditions", where: str) -> None:
+        """Raise an `InputError` if `other`, those of a training, differ in a value with an effect.
+
+        `where` is the name of the demonstration for messages.
+        """
+        own, theirs = self._effective, other._effective
+        for name in {**own, **theirs}:
+            recorded, needed = own.get(name), theirs.get(name)
+            if recorded != needed:
+                raise InputError(
+                    f"{where} was recorded with {name}={_text(recorded)}, but this training has "
+                    f"{name}={_text(needed)}; give the training the same value or record again"
+                )
+
+    @property
+    def _effective(self) -> dict[str, Any]:
+        """Values that have an effect, by their names on the command line."""
+        parts = self.values()
+        parts["task"] = {"name": self.task.name, **parts["task"]}
+        if self.dynamics.is_computer_vision:
+            names = ("mode", "control_ticks", "tick") if self._is_continuous else ("mode",)
+            parts["dynamics"] = {name: parts["dynamics"][name] for name in names}
+            if not self._is_continuous:
+                parts["actions"] = {"kind": self.actions.kind}
+        return {f"{part}.{k}": v for part, values in parts.items() for k, v in values.items()}
+
+    @property
+    def _is_continuous(self) -> bool:
+        return self.actions.kind == "velocity"
+
+    @functools.cached_property
+    def action_entry(self) -> Entry:
+        """Shape, type and bounds of one action."""
+        default = as_task(self.task).make_dynamics
+        return make_dynamics(default, self.dynamics, self.actions).actions.entry
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Demonstration:
+    """A recorded flight of T steps, which ends with an episode or before.
+
+    Raises:
+        InputError: An array has the wrong shape or type, or a value is out of bounds.
+    """
+
+    conditions: FlightConditions
+    images: NDArray[np.uint8]  # (T, H, W, 3)
+    """Images of the policy's camera before each action, RGB."""
+    actions: NDArray[Any]  # (T,), then the shape of an action
+    """Actions: int64 if they are discrete, else float32 from -1 to 1."""
+    rewards: NDArray[np.float32]  # (T,)
+    """Reward of each action."""
+    done: NDArray[np.bool_]  # (T,)
+    """Whether the episode ended after the action; false except for the last one."""
+    pilot: str = "person"
+    """Name of what flew, such as "person" or "oracle"."""
+
+    def __post_init__(self) -> None:
+        """Check the arrays."""
+        _PILOT.read(self.pilot, "pilot")
+        steps = len(self.actions) if self.actions.ndim else 0
+        if not steps:
+            raise InputError("a flight has no steps; record at least one")
+        entry, camera = self.conditions.action_entry, self.conditions.camera
+        expected = {
+            "images": ((steps, camera.height, camera.width, 3), np.dtype(np.uint8)),
+            "actions": ((steps, *entry.shape), torch.empty(0, dtype=entry.dtype).numpy().dtype),
+            "rewards": ((steps,), np.dtype(np.float32)),
+            "done": ((steps,), np.dtype(np.bool_)),
+        }
+        for name, (shape, dtype) in expected.items():
+            array = getattr(self, name)
+            if (array.shape, array.dtype) != (shape, dtype):
+                raise InputError(
+                    f"{name} has shape {array.shape} and type {array.dtype}; a flight of {steps} "
+                    f"steps under these conditions has {shape} and {dtype}"
+                )
+        self._check_values(entry)
+
+    def _check_values(self, entry: Entry) -> None:
+        low, high = entry.low, entry.high
+        assert low is not None and high is not None
+        if not ((self.actions >= low) & (self.actions <= high)).all():
+            raise InputError(f"actions are not all from {low} to {high}")
+        if not np.isfinite(self.rewards).all():
+            raise InputError("rewards hold NaN or infinity")
+        if self.done[:-1].any():
+            raise InputError("done is true before the last step; write one file for each episode")
+        size = sum(getattr(self, name).nbytes for name in _ARRAYS)
+        if size > ARRAYS_BYTES:
+            raise InputError(
+                f"a flight of {len(self)} steps takes {size} bytes, more than {ARRAYS_BYTES}; "
+                "record a shorter one"
+            )
+
+    def __len__(self) -> int:
+        """Return the number of steps."""
+        return len(self.actions)
+
+    def to_bytes(self) -> bytes:
+        """Return the content of the file."""
+        about = {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "pilot": self.pilot,
+            **self.conditions.values(),
+        }
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
+        file = io.BytesIO()
+        np.savez_compressed(file, about=json.dumps(about), **arrays)
+        return file.getvalue()
+
+
+def read_demonstration(path: Path, allowance: Allowance | None = None) -> Demonstration:
+    """Read a file strictly.
+
+    Args:
+        path: The file.
+        allowance: Bytes that its arrays may take, shared with those of other files.
+
+    Raises:
+        InputError: It is damaged, too large, or no demonstration of this version.
+    """
+    arrays = read_arrays(path, allowance=allowance or Allowance(ARRAYS_BYTES))
+    try:
+        if arrays.keys() != {*_ARRAYS, "about"}:
+            raise InputError(f"it does not hold exactly about, {', '.join(_ARRAYS)}")
+        about = arrays.pop("about")
+        if about.shape or about.dtype.kind != "U":
+            raise InputError("its description is no text")
+        data = as_mapping(parse_json(about.item(), "its description"), "about")
+        kind, version = data.get("format"), data.get("format_version")
+        if kind != FORMAT or type(version) is not int or version != FORMAT_VERSION:
+            raise InputError(
+                f"it has the format {shown(kind)}, version {shown(version)}, not {FORMAT}, "
+                f"version {FORMAT_VERSION}"
+            )
+        data = _ABOUT.read(data, "about")
+        pilot = _PILOT.read(data["pilot"], "pilot")
+        return Demonstration(FlightConditions.read(data), pilot=pilot, **arrays)
+    except InputError as error:
+        raise InputError(
+            f"{path} can't be used as a demonstration ({error}); remove the file or record again"
+        ) from None
+
+
+def read_demonstrations(
+    folder: str | Path, conditions: FlightConditions | None = None
+) -> list[Demonstration]:
+    """Read all demonstrations of a folder, in the order in which they were recorded.
+
+    Args:
+        folder: Folder with files that `add_demonstration` has written.
+        conditions: Those of the training that learns from them, if they must be the same.
+
+    Raises:
+        InputError: There are none, one is unusable or was recorded under other conditions, or all
+            together are too large.
+    """
+    folder = Path(folder)
+    try:
+        refuse_links(folder, depth=1)
+    except OSError as error:
+        raise InputError(
+            f"demonstrations={folder} can't be read ({error.strerror}); give a folder of recorded "
+            "flights"
+        ) from None
+    paths = sorted(folder.glob("*.npz"), key=lambda path: (len(path.name), path.name))
+    if not 1 <= len(paths) <= MOST_DEMONSTRATIONS:
+        raise InputError(
+            f"demonstrations={folder} holds {len(paths)} files *.npz; give a folder with 1 to "
+            f"{MOST_DEMONSTRATIONS} recorded flights"
+        )
+    allowance, found = Allowance(ARRAYS_BYTES), []
+    for path in paths:
+        demonstration = read_demonstration(path, allowance)
+        if conditions is not None:
+            demonstration.conditions.check_same(conditions, str(path))
+        found.append(demonstration)
+    return found
+
+
+def add_demonstration(folder: str | Path, demonstration: Demonstration) -> Path:
+    """Write a demonstration to a new file of a folder, atomically; return its path.
+
+    The files are numbered from flight_00000.npz. Several processes may write to the folder.
+
+    Raises:
+        OSError: The file can't be written.
+    """
+    folder, content = Path(folder), demonstration.to_bytes()
+    folder.mkdir(parents=True, exist_ok=True)
+    with folder_lock(folder, patience_s=_PATIENCE_S):
+        names = (_NAME.fullmatch(path.name) for path in folder.iterdir())
+        number = max((int(name[1]) for name in names if name), default=-1) + 1
+        path = folder / f"flight_{number:05d}.npz"
+        write_atomically(path, content)
+    return path
+
+
+def record_oracle(
+    folder: str | Path,
+    settings: TrainSettings | None = None,
+    *,
+    flights: int = 30,
+    seed: int = 0,
+) -> list[Path]:
+    """Record flights of the task's oracle, which acts by the true state.
+
+    Args:
+        folder: Folder of the demonstrations; new flights are added to it.
+        settings: Those of the training that shall learn from them; by default the default ones.
+        flights: Number of episodes, which are simulated and rendered together.
+        seed: Root of the environments' random streams.
+
+    Returns:
+        The paths of the new files.
+
+    Raises:
+        InputError: The task has no oracle, or none for these actions.
+    """
+    settings = settings or TrainSettings()
+    env = DroneEnv(
+        flights,
+        settings.task,
+        settings.camera,
+        seed=seed,
+        device=settings.device,
+        dynamics=settings.dynamics,
+        actions=settings.actions,
+        renderer=settings.renderer,
+        appearance=settings.appearance,
+    )
+    with closing(env):
+        oracle = oracle_policy(settings.task, env.worlds.dynamics.actions)
+        act: Any = oracle.module
+        watching = TensorDictModule(
+            lambda pixels, *known: act(*known),
+            in_keys=["pixels", *oracle.in_keys],
+            out_keys=["action"],
+        )
+        batch: Any = EpisodeCollector(env, watching).collect().cpu()  # entries are tensors
+    conditions, paths = FlightConditions.of(settings), []
+    for number in range(flights):
+        steps = batch[batch["collector", "traj_ids"] == number]
+        demonstration = Demonstration(
+            conditions,
+            images=steps["pixels"].numpy(),
+            actions=steps["action"].numpy(),
+            rewards=steps["next", "reward"][:, 0].numpy(),
+            done=steps["next", "done"][:, 0].numpy(),
+            pilot="oracle",
+        )
+        paths.append(add_demonstration(folder, demonstration))
+    return paths
+
+
+def _text(value: Any) -> str:
+    """Return a setting's value for a message."""
+    if isinstance(value, list):
+        return f"[{', '.join(_text(item) for item in value)}]"
+    return "absent" if value is None else shown(value).strip("'")
