@@ -73,6 +73,9 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
 
     episodes: Annotated[int, Whole(1, unit="episodes")] = 3
     """Episodes to record, one file each."""
+    format: Annotated[str, OneOf(("video", "rerun"))] = "video"
+    """video: an MP4 and a GIF file; or rerun: a recording of cameras, poses, action probabilities
+    and heat maps on one timeline, for the viewer of Rerun."""
     greedy: bool = True
     """Whether to take the most probable action instead of sampling."""
     seed: Annotated[int, Whole(0)] = 0
@@ -80,14 +83,26 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
     viewer: bool = False
     """Whether to open dm_control's viewer, which needs a display, instead of recording."""
 
+    def check(self) -> None:
+        """Reject a format of files for the viewer, which writes none."""
+        if self.viewer and self.format != "video":
+            raise InputError(
+                f"format={self.format} is for recordings, which viewer=true does not make; leave "
+                "one of them out"
+            )
+
     def run(self, folder: Path) -> tuple[int, None]:
-        """Record videos of a policy; return the exit status."""
+        """Record a policy's episodes, or open the viewer; return the exit status."""
         policy = self.load_policy()
+        chosen = {k: getattr(self, k) for k in ("greedy", "seed", "device", "renderer")}
         from drone_rl.evaluation.video import film, view  # slow to import
 
-        chosen = {k: getattr(self, k) for k in ("greedy", "seed", "device", "renderer")}
         if self.viewer:
             view(policy, **chosen)
+        elif self.format == "rerun":
+            from drone_rl.explanations.rerun_export import record
+
+            record(policy, folder, self.episodes, **chosen)
         else:
             film(policy, folder, self.episodes, **chosen)
         return 0, None

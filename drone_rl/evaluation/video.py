@@ -54,9 +54,8 @@ INSET_WIDTH = 320
 FRAMES_PER_SECOND = 10
 _STRIP = CHASE_HEIGHT + GAP
 _BOTTOM = _STRIP + STRIP_HEIGHT + 9
-_CAMERAS = tuple(
-    c.name for c in (FRONT_LEFT, FRONT_CENTER, FRONT_RIGHT, BACK_CENTER, BOTTOM_CENTER)
-)
+CAMERAS = tuple(c.name for c in (FRONT_LEFT, FRONT_CENTER, FRONT_RIGHT, BACK_CENTER, BOTTOM_CENTER))
+"""The drone's cameras, as a film shows them from left to right."""
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 _BACKGROUND, _TEXT, _CHOSEN, _BAR = (24, 26, 31), (235, 235, 240), PAPER, MUTED
 
@@ -122,14 +121,14 @@ def view(policy: Policy, *, greedy: bool = True, seed: int = 0, **how: Any) -> N
         viewer.launch(shown, act, title="drone-rl play")
 
 
-class _VideoImages(NamedTuple):
+class StepImages(NamedTuple):
     """Images of one step. Shapes: (height, width, 3); of the strip: (5, height, width, 3)."""
 
     camera: Tensor
     """The policy's camera, before transforms."""
     chase: Tensor
     strip: Tensor
-    """All cameras of the drone."""
+    """The cameras `CAMERAS`."""
     panel: Image.Image | None = None
     """Instruments, if the drone has flight dynamics."""
 
@@ -152,11 +151,11 @@ def film_episode(
         while True:
             acted = actor(state.clone(False))
             caption = _caption(worlds.task, state, earned)
-            yield _compose(_look(base), caption, acted, worlds.dynamics.actions)
+            yield _compose(render_step(base), caption, acted, worlds.dynamics.actions)
             state = env.step(acted)["next"]
             earned += float(state["reward"][0])
             if bool(state["done"].all()):
-                yield _compose(_look(base), _caption(worlds.task, state, earned))
+                yield _compose(render_step(base), _caption(worlds.task, state, earned))
                 return
 
 
@@ -192,21 +191,21 @@ def _caption(task: Task[Any], state: TensorDictBase, earned: float) -> str:
     return f"return {earned:.3g}" + ended.replace("_", " ")
 
 
-def _look(base: DroneEnv) -> _VideoImages:
-    """Render the first environment."""
+def render_step(base: DroneEnv) -> StepImages:
+    """Render what a film shows of the first environment."""
     worlds, look = base.worlds, base.appearances.current()
-    five = worlds.view(_CAMERAS, height=STRIP_HEIGHT, width=(WIDTH + GAP) // len(_CAMERAS) - GAP)
+    five = worlds.view(CAMERAS, height=STRIP_HEIGHT, width=(WIDTH + GAP) // len(CAMERAS) - GAP)
     chase = render_chase(worlds, look, CHASE_HEIGHT, WIDTH)[0]
     strip = worlds.render_all(worlds.state, five, look)["rgb"][0]
     body, dynamics, panel = worlds.state.body, worlds.dynamics, None
     if isinstance(body, FlightState) and isinstance(dynamics, Quadrotor):
         reading, settings = instruments.read(body), dynamics.settings
         panel = instruments.panel(reading, settings.velocity_limit, settings.hover_throttle)
-    return _VideoImages(base.last_pixels[0], chase, strip, panel)
+    return StepImages(base.last_pixels[0], chase, strip, panel)
 
 
 def _compose(
-    seen: _VideoImages, caption: str, acted: TensorDictBase | None = None, actions: Actions = MOVES
+    seen: StepImages, caption: str, acted: TensorDictBase | None = None, actions: Actions = MOVES
 ) -> np.ndarray:
     """Chase view with the observation as inset; below all five cameras, a caption and bars."""
     canvas = Image.new("RGB", (WIDTH, HEIGHT), _BACKGROUND)
@@ -220,8 +219,8 @@ def _compose(
     canvas.paste(inside.resize(size, Image.Resampling.NEAREST), (15, 39))
     if seen.panel is not None:
         canvas.paste(seen.panel, (WIDTH - 12 - instruments.WIDTH, 12))
-    for i, (name, picture) in enumerate(zip(_CAMERAS, seen.strip.cpu().numpy(), strict=True)):
-        x = i * (WIDTH + GAP) // len(_CAMERAS)
+    for i, (name, picture) in enumerate(zip(CAMERAS, seen.strip.cpu().numpy(), strict=True)):
+        x = i * (WIDTH + GAP) // len(CAMERAS)
         canvas.paste(Image.fromarray(picture), (x, _STRIP))
         label = name.replace("_", " ")
         width = draw.textlength(label, font)
@@ -233,13 +232,20 @@ def _compose(
     return np.asarray(canvas)
 
 
+def probabilities(acted: TensorDictBase, actions: Actions) -> Tensor:
+    """Return the probabilities of the parts in the first environment; 1 without "logits". (K,)."""
+    logits = acted.get("logits", None)
+    if logits is None:
+        return torch.eye(len(actions))[int(actions.part(acted["action"][0]))]
+    return actions.probabilities(logits[0])
+
+
 def _draw_bars(
     draw: ImageDraw.ImageDraw, font: Font, acted: TensorDictBase, actions: Actions
 ) -> None:
     """Draw a bar for each action; its length is the probability. The chosen action's is white."""
     chosen, names = int(actions.part(acted["action"][0])), actions.names
-    logits = acted.get("logits", None)
-    probs = torch.eye(len(names))[chosen] if logits is None else actions.probabilities(logits[0])
+    probs = probabilities(acted, actions)
     room = 960 // len(names)
     for i, action in enumerate(actions.order):
         x, y = 300 + room * i, _BOTTOM

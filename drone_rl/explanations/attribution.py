@@ -1,5 +1,6 @@
 """Section "attribution": heat maps of all frames, and of one episode as a film."""
 
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -27,16 +28,10 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     arrays = {f"map_{name}": _normalized(maps) for name, maps in context.frame_maps.items()}
     flights, explainer, film = context.flights, context.explainer, context.film
     first = int(np.flatnonzero(flights.episode == FILMED)[0])
-    methods = [name for name in SHOWN if name in context.maps]
-    methods = methods or [name for name in INSTEAD if name in context.maps][:1]
+    methods = shown_methods(context.maps)
     inputs = film.tensor("observations"), film.tensor("actions")
     every = {n: context.scenes.to_frame(of(*inputs)) for n, of in explainer.methods().items()}
-    heat = torch.zeros(film.frames.shape[:-1])
-    by: list[str | None] = [None] * len(film)
-    for name in methods:
-        for step, one in enumerate(every[name]):
-            if by[step] is None and one.max() > 0:
-                heat[step], by[step] = one, name
+    heat, by = first_heat({name: every[name] for name in methods})
     arrays |= {f"film_heat_{name}": _normalized(maps) for name, maps in every.items()}
     arrays |= {
         "film_frames": film.frames,
@@ -57,6 +52,26 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
         },
     }
     return {"attribution": numbers}, arrays
+
+
+def shown_methods(methods: Collection[str]) -> list[str]:
+    """Return the methods of "film_heat" among those that a policy allows, the first one first."""
+    shown = [name for name in SHOWN if name in methods]
+    return shown or [name for name in INSTEAD if name in methods][:1]
+
+
+def first_heat(maps: Mapping[str, Tensor]) -> tuple[Tensor, list[str | None]]:
+    """Return each step's map by the first method with heat there, and the method; else zeros.
+
+    Shapes: (T, H, W).
+    """
+    heat = torch.zeros_like(next(iter(maps.values())))
+    by: list[str | None] = [None] * len(heat)
+    for name, of_steps in maps.items():
+        for step, one in enumerate(of_steps):
+            if by[step] is None and one.max() > 0:
+                heat[step], by[step] = one, name
+    return heat, by
 
 
 def _normalized(maps: Tensor) -> NDArray:

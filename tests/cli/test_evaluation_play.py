@@ -1,6 +1,7 @@
 """Films, and the viewer that needs a display."""
 
 import os
+import sys
 
 import pytest
 
@@ -21,3 +22,31 @@ def test_play_films(run, in_process):
         "episode_0.mp4",
         "episode_0.gif",
     }
+
+
+def test_play_records_for_rerun(run, in_process):
+    pytest.importorskip("rerun", reason="rerun isn't installed: extra [rerun]")
+    done = in_process(
+        "play", f"policy={run}", "episodes=2", "format=rerun", "hydra.run.dir=r", cwd=run
+    )
+    assert done.returncode == 0, done.stderr
+    assert {p.name for p in (run / "r").glob("episode_*")} == {"episode_0.rrd", "episode_1.rrd"}
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (["format=mp4"], ["format='mp4'", "video, rerun"]),
+        (["format=rerun", "viewer=true"], ["format=rerun", "viewer=true", "leave"]),
+        (["format=rerun", "episodes=0"], ["episodes=0", "1 or more"]),
+    ],
+)
+def test_mistakes_get_one_line(in_process, settings, words):
+    line = error_line(in_process("play", "policy=good", *settings))
+    assert all(word in line for word in words), line
+
+
+def test_play_names_a_missing_extra(in_process, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    line = error_line(in_process("play", "policy=good", "format=rerun"))
+    assert "format=rerun needs rerun" in line and "pip install -e '.[rerun]'" in line

@@ -11,12 +11,12 @@ from drone_rl.config import (
     TaskSettings,
 )
 from drone_rl.evaluation.video import (
+    StepImages,
     _caption,
     _compose,
     _draw_bars,
-    _look,
-    _VideoImages,
     film_episode,
+    render_step,
     write_video,
 )
 from drone_rl.sim.actions import MOVES
@@ -57,7 +57,7 @@ def test_a_film_shows_the_world_as_it_was_drawn(make_pipeline):
     look = AppearanceSettings(ground_color=((0.9, 0.0, 0.0), (1.0, 0.1, 0.1)))
     env, _ = make_pipeline(1, appearance=look)
     env.reset()
-    seen = _look(env.base_env)
+    seen = render_step(env.base_env)
     assert seen.chase.shape == (532, 1280, 3) and seen.strip.shape == (5, 144, 252, 3)
     own = env.base_env.appearances.current().colors[SemanticClass.GROUND][0]
     below = seen.strip[4, -1, 0].double()  # the ground, in full light
@@ -125,7 +125,7 @@ def test_pictures_of_one_moment_by_the_pixel():
     red, green, blue = (
         torch.tensor(c, dtype=torch.uint8) for c in ((200, 0, 0), (0, 200, 0), (0, 0, 200))
     )
-    seen = _VideoImages(
+    seen = StepImages(
         camera=blue.expand(10, 20, 3),
         chase=red.expand(532, 1280, 3),
         strip=green.expand(5, 144, 252, 3),
@@ -149,7 +149,7 @@ def test_pictures_of_one_moment_by_the_pixel():
 def test_a_tall_picture_of_the_policys_is_cut_to_half_the_height():
     red, blue = (torch.tensor(c, dtype=torch.uint8) for c in ((200, 0, 0), (0, 0, 200)))
     five = torch.zeros(5, 144, 252, 3, dtype=torch.uint8)
-    shown = _compose(_VideoImages(blue.expand(40, 20, 3), red.expand(532, 1280, 3), five), "")
+    shown = _compose(StepImages(blue.expand(40, 20, 3), red.expand(532, 1280, 3), five), "")
     rows, _ = (shown == blue.numpy()).all(-1).nonzero()
     assert (rows.min(), rows.max()) == (39, 39 + 266 - 1)
 

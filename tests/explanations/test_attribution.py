@@ -1,6 +1,7 @@
 import numpy as np
+import torch
 
-from drone_rl.explanations.attribution import FILMED, section
+from drone_rl.explanations.attribution import FILMED, first_heat, section, shown_methods
 
 
 def test_maps_of_all_frames_and_a_film_of_the_first_flight(context):
@@ -23,3 +24,18 @@ def test_each_step_of_the_film_says_whose_heat_it_shows(context):
         assert (by is None) == (heat.max() == 0)
     assert {by for by in film["heat_by"] if by} <= {"grad_cam", "grad_cam_logit"}
     assert all(0 <= entry["step"] < len(film["heat_by"]) for entry in film["key_steps"])
+
+
+def test_the_report_shows_grad_cam_and_without_it_the_first_other_method():
+    every = ["occlusion", "saliency", "grad_cam_logit", "grad_cam"]
+    assert shown_methods(every) == ["grad_cam", "grad_cam_logit"]
+    assert shown_methods(["occlusion", "saliency"]) == ["saliency"]
+    assert shown_methods(["occlusion"]) == ["occlusion"] and shown_methods([]) == []
+
+
+def test_a_step_without_heat_shows_the_next_method():
+    one, two = torch.zeros(3, 1, 2), torch.zeros(3, 1, 2)
+    one[0, 0, 1], two[0], two[1, 0, 0] = 0.5, 7.0, 0.25
+    heat, by = first_heat({"one": one, "two": two})
+    assert heat.tolist() == [[[0.0, 0.5]], [[0.25, 0.0]], [[0.0, 0.0]]]
+    assert by == ["one", "two", None]

@@ -152,6 +152,9 @@ def test_rules_skip_shrink_and_replace(write, tmp_path):
     assert commands == ["echo a f x # comment", "echo bc y", "ls"]
     assert rules.is_smaller(blocks[1]) and not rules.is_smaller(blocks[2])
     assert rules.find_unused(blocks) == []
+    needs = Rules(needs={"echo a": "no_such_package", "ls": "json"})
+    found = [needs.why_not_run(block) for block in blocks]
+    assert found == ["needs the package no_such_package", None, None]
     assert Rules(not_run={"cat": ""}, replace={"RUN": ""}).find_unused(blocks) == ["cat", "RUN"]
     both = rules_for(page, {"all": rules, page: Rules(not_run={"x": "y"}, before=["ls"])})
     assert both.not_run == {"ls": "reason", "x": "y"} and both.before == ["ls"]

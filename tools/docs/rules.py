@@ -1,6 +1,7 @@
 """Read pages.toml: blocks that are not run, smaller sizes, placeholders and preparations."""
 
 import dataclasses
+import importlib.util
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,6 +20,8 @@ class Rules:
 
     not_run: Mapping[str, str] = dataclasses.field(default_factory=dict)
     """Reasons."""
+    needs: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    """Packages of extras, without which they are not run."""
     smaller: Mapping[str, str] = dataclasses.field(default_factory=dict)
     """Settings to append to commands that would take too long."""
     replace: Mapping[str, str] = dataclasses.field(default_factory=dict)
@@ -28,6 +31,9 @@ class Rules:
 
     def why_not_run(self, block: Block) -> str | None:
         """Return why a block is not run; None if it is run."""
+        needed = _longest(self.needs, block.code)
+        if needed is not None and importlib.util.find_spec(self.needs[needed]) is None:
+            return f"needs the package {self.needs[needed]}"
         key = _longest(self.not_run, block.code)
         return None if key is None else self.not_run[key]
 
@@ -47,7 +53,7 @@ class Rules:
     def find_unused(self, blocks: Sequence[Block]) -> list[str]:
         """Return the keys that apply to no block of the page."""
         codes = [block.code for block in blocks]
-        keys = [*self.not_run, *self.smaller]
+        keys = [*self.not_run, *self.needs, *self.smaller]
         unused = [key for key in keys if not any(code.startswith(key) for code in codes)]
         return unused + [key for key in self.replace if not any(key in code for code in codes)]
 
@@ -62,7 +68,7 @@ def rules_for(page: str, rules: Mapping[str, Rules]) -> Rules:
     general, own = rules.get(ALL, Rules()), rules.get(page, Rules())
     merged: dict[str, Any] = {
         name: {**getattr(general, name), **getattr(own, name)}
-        for name in ("not_run", "smaller", "replace")
+        for name in ("not_run", "needs", "smaller", "replace")
     }
     return Rules(**merged, before=[*general.before, *own.before])
 

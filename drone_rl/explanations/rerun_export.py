@@ -1,0 +1,343 @@
+"""`drone-rl play format=rerun`: episodes as Rerun recordings, with heat maps.
+
+A recording has one timeline of steps, and one of simulated seconds. At step t it holds what the
+environment shows before action t, the action and its probabilities, and the reward of action t - 1.
+"""
+
+import contextlib
+import logging
+import math
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, cast
+
+import torch
+from numpy.typing import NDArray
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
+from torchrl.envs import TransformedEnv
+from torchrl.envs.utils import set_exploration_type
+
+from drone_rl.envs import DroneEnv
+from drone_rl.evaluation.plots.images import heated, shown_picture
+from drone_rl.evaluation.rollouts import exploration
+from drone_rl.evaluation.video import CAMERAS, probabilities, render_step
+from drone_rl.explanations.attribution import first_heat, shown_methods
+from drone_rl.explanations.heat_maps import Explainer
+from drone_rl.explanations.scenes import Scenes
+from drone_rl.policies import ImageNetwork
+from drone_rl.policies.policy import BasePolicy
+from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S
+from drone_rl.sim.dynamics import Dynamics, Kinematic, Quadrotor
+from drone_rl.sim.rendering import Appearance, Mounting
+from drone_rl.sim.rendering.appearance import product, rotate
+from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.utils import palette
+from drone_rl.utils.errors import InputError, extra
+
+_log = logging.getLogger(__name__)
+APPLICATION = "drone-rl"
+"""Recordings of one application share the layout of the viewer."""
+JPEG_QUALITY = 90
+"""Of images that the policy does not observe; PNGs of textured scenes would be slow and large."""
+CLASS_COLORS: Mapping[SemanticClass, palette.Rgb] = {
+    SemanticClass.SKY: palette.SKY,
+    SemanticClass.GROUND: palette.GROUND,
+    SemanticClass.TARGET: palette.NEXT_CUBE,
+    SemanticClass.OBSTACLE: palette.DOWN,
+    SemanticClass.DRONE: palette.FAINT,
+    SemanticClass.DISTRACTOR: palette.MUTED,
+}
+"""Colours of the segmentation image and of the boxes."""
+
+
+def record(
+    policy: BasePolicy,
+    folder: Path,
+    episodes: int,
+    *,
+    greedy: bool = True,
+    seed: int = 0,
+    **how: Any,
+) -> list[Path]:
+    """Record episodes in held-out environments as Rerun files, and return the files.
+
+    The episodes are those of `drone_rl.evaluation.video.film`. Heat maps are those that a report
+    shows by default, see `drone_rl.explanations.attribution`; recurrent policies and those without
+    gradients have none.
+
+    Args:
+        policy: The policy.
+        folder: Folder of the files `episode_0.rrd`, `episode_1.rrd`, ...
+        episodes: Number of episodes, one file each.
+        greedy: Whether the policy takes the most probable action, or samples it.
+        seed: Root of the environments' random streams.
+        how: Device, renderer and appearance of the environments, see `Policy.make_env`.
+
+    Raises:
+        InputError: There are no episodes, the extra `rerun` is missing, or a file can't be written.
+    """
+    rerun = extra("rerun", "rerun", "format=rerun")
+    if episodes < 1:
+        raise InputError(f"episodes={episodes} records nothing; give 1 or more")
+    files: list[Path] = []
+    with policy.flying(1, seed=seed, **how) as (env, actor):
+        network = policy.make_network(str(env.device or "cpu"))
+        for number in range(episodes):
+            path = folder / f"episode_{number}.rrd"
+            with _open(rerun, path, f"{policy.name}, seed {seed}, episode {number}") as stream:
+                record_episode(env, actor, network, EpisodeLog(rerun, stream, env), greedy=greedy)
+            _log.info("written: %s", path)
+            files.append(path)
+    return files
+
+
+def record_episode(
+    env: TransformedEnv,
+    actor: TensorDictModuleBase,
+    network: ImageNetwork,
+    log: "EpisodeLog",
+    *,
+    greedy: bool = True,
+) -> None:
+    """Run one episode in a single environment and log it."""
+    with torch.no_grad(), set_exploration_type(exploration(greedy)):
+        state = env.reset()
+        while True:
+            log.state(state)
+            if bool(state["done"].all()):
+                break
+            acted = actor(state.clone(False))
+            log.action(acted)
+            state = env.step(acted)["next"]
+    log.observations(network)
+
+
+@contextlib.contextmanager
+def _open(rerun: Any, path: Path, name: str) -> Iterator[Any]:
+    """Yield a stream to a new file; close the file afterwards."""
+    stream = rerun.RecordingStream(APPLICATION)
+    if not stream.is_enabled():
+        raise InputError(
+            f"RERUN={os.environ.get('RERUN')} switches Rerun's recordings off; unset it"
+        )
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"")  # Rerun's own error says neither which file nor why
+        stream.save(path)
+    except OSError as error:
+        raise InputError(
+            f"recording {path} can't be written ({error}); choose another folder"
+        ) from error
+    try:
+        stream.set_log_time_enabled(False)
+        stream.send_recording_name(name)
+        yield stream
+    finally:
+        stream.disconnect()
+
+
+def _layout(rerun: Any, timestep: float) -> Any:
+    """Return the arrangement of a recording's parts in the viewer, which plays in real time."""
+    made = rerun.blueprint
+
+    def image(path: str, name: str) -> Any:
+        return made.Spatial2DView(origin=path, name=name)
+
+    cameras = [image(f"cameras/{name}", name.replace("_", " ")) for name in CAMERAS]
+    return made.Blueprint(
+        made.Horizontal(
+            made.Vertical(
+                made.Spatial3DView(origin="world", name="scene"),
+                image("cameras/chase", "from behind"),
+                made.Horizontal(*cameras),
+                row_shares=[3, 3, 1],
+            ),
+            made.Vertical(
+                made.Grid(
+                    image("world/camera", "policy's camera"),
+                    image("segmentation", "segmentation"),
+                    image("observation", "observation"),
+                    image("heat_map", "heat map"),
+                    grid_columns=2,
+                ),
+                made.TimeSeriesView(origin="action/probabilities", name="action probabilities"),
+                made.TimeSeriesView(origin="reward", name="reward and return"),
+                made.TextLogView(contents=["action/taken", "heat_map/method", "end"], name="log"),
+                row_shares=[2, 1, 1, 1],
+            ),
+            column_shares=[3, 2],
+        ),
+        made.TimePanel(timeline="step", fps=1 / timestep, state="collapsed"),
+        collapse_panels=True,
+    )
+
+
+class EpisodeLog:
+    """Logs one episode of a single environment to a stream of Rerun."""
+
+    def __init__(self, rerun: Any, stream: Any, env: TransformedEnv) -> None:
+        """Log what does not change: classes, axes, the drone's size, names of the actions."""
+        self._rr, self._stream = rerun, stream
+        self._base = cast(DroneEnv, env.base_env)
+        self._worlds, self._scenes = self._base.worlds, Scenes(env)
+        self._actions = self._worlds.dynamics.actions
+        self._timestep = seconds_per_step(self._worlds.dynamics)
+        stream.send_blueprint(_layout(rerun, self._timestep))
+        self._boxes = self._worlds.scene.prop_boxes()
+        kinds = torch.tensor([*self._worlds.scene.semantic_classes, SemanticClass.SKY])
+        self._class_of_geom = kinds.to(torch.uint8)  # geom -1 (the sky) reads the last entry
+        self._places: dict[str, list[float]] = {}
+        """Where each box is shown."""
+        self._path: list[list[float]] = []
+        """The drone's positions."""
+        self._observed: list[Tensor] = []
+        self._parts: list[int] = []
+        """The parts of the actions taken."""
+        self._return = 0.0
+        self._log_static()
+
+    def state(self, state: TensorDictBase) -> None:
+        """Log the environment as it is now, and the reward of the action before."""
+        self._set_step(len(self._path))
+        self._log_images()
+        self._log_poses()
+        self._observed.append(state["pixels"][0].cpu())
+        reward = state.get("reward", None)
+        if reward is not None:
+            self._return += float(reward[0])
+            self._stream.log("reward/step", self._rr.Scalars(float(reward[0])))
+        self._stream.log("reward/return", self._rr.Scalars(self._return))
+        end = self._worlds.task.ends(int(state["info", "end_reason"][0]))
+        if end:
+            self._stream.log("end", self._rr.TextLog(f"end: {end.name.lower()}"))
+
+    def action(self, acted: TensorDictBase) -> None:
+        """Log the action that the policy takes now, and the probabilities of all."""
+        part = int(self._actions.part(acted["action"][0]))
+        self._parts.append(part)
+        probs = probabilities(acted, self._actions).cpu().numpy()
+        self._stream.log("action/probabilities", self._rr.Scalars(probs))
+        self._stream.log("action/taken", self._rr.TextLog(self._actions.names[part]))
+
+    def observations(self, network: ImageNetwork) -> None:
+        """Log all observations, and heat maps of the actions taken laid over them."""
+        observed = torch.stack(self._observed)
+        low, high, channels = float(observed.min()), float(observed.max()), self._scenes.channels
+        images = [shown_picture(one.numpy(), low, high, channels) for one in observed]
+        for step, image in enumerate(images):
+            self._set_step(step)
+            self._stream.log("observation", self._rr.Image(image))
+        if network.is_differentiable and not network.is_recurrent:
+            self._log_heat(network, observed[:-1], images)
+
+    def _log_heat(self, network: ImageNetwork, observed: Tensor, images: list[NDArray]) -> None:
+        """Log the heat map of each action taken, and its method if there is any heat."""
+        # the methods that are shown for a policy with gradients do not read the baseline
+        maps = Explainer(network, absent=observed[0]).methods()
+        inputs = observed.to(self._base.device), torch.tensor(self._parts, device=self._base.device)
+        heat, by = first_heat({name: maps[name](*inputs) for name in shown_methods(maps)})
+        for step, (one, method) in enumerate(zip(heat.cpu().numpy(), by, strict=True)):
+            self._set_step(step)
+            self._stream.log("heat_map", self._rr.Image(heated(images[step], one)))
+            if method is not None:
+                self._stream.log("heat_map/method", self._rr.TextLog(f"heat map: {method}"))
+        self._set_step(len(by))  # the last step, at which no action is taken
+        self._stream.log("heat_map", self._rr.Clear(recursive=False))
+
+    def _set_step(self, step: int) -> None:
+        self._stream.set_time("step", sequence=step)
+        self._stream.set_time("seconds", duration=step * self._timestep)
+
+    def _log_static(self) -> None:
+        rr, half = self._rr, self._worlds.task.drone_size / 2
+        classes = [(kind.value, kind.name.lower(), color) for kind, color in CLASS_COLORS.items()]
+        drone = self._box(SemanticClass.DRONE, half_sizes=[[half] * 3])
+        names, colors = self._actions.names, self._actions.colors
+        for path, value in (
+            ("/", rr.AnnotationContext(classes)),
+            ("world", rr.ViewCoordinates.FLU),
+            ("world/drone", drone),
+            ("action/probabilities", rr.SeriesLines(names=names, colors=colors)),
+            ("reward/step", rr.SeriesLines(names=["reward"], colors=[palette.GOOD])),
+            ("reward/return", rr.SeriesLines(names=["return"], colors=[palette.MUTED])),
+        ):
+            self._stream.log(path, value, static=True)
+
+    def _log_images(self) -> None:
+        rr, seen = self._rr, render_step(self._base)
+        worlds, look = self._worlds, self._base.appearances.current()
+        geoms = worlds.render(worlds.state, worlds.view(modality="segmentation"), look)[0]
+        classes = self._class_of_geom[geoms.long().cpu()].numpy()
+        self._stream.log("world/camera", rr.Image(seen.camera.cpu().numpy()))
+        self._stream.log("segmentation", rr.SegmentationImage(classes))
+        for name, image in zip(("chase", *CAMERAS), (seen.chase, *seen.strip), strict=True):
+            encoded = rr.Image(image.cpu().numpy()).compress(jpeg_quality=JPEG_QUALITY)
+            self._stream.log(f"cameras/{name}", encoded)
+
+    def _log_poses(self) -> None:
+        rr, worlds = self._rr, self._worlds
+        appearance = (self._base.appearances.current() or Appearance()).over(worlds.appearance)
+        body, poses = worlds.state.body, worlds.poses(worlds.state, appearance)
+        self._path.append(body.position[0].tolist())
+        self._log_pose("world/drone", body.position[0], body.attitude[0])
+        self._stream.log("world/trajectory", rr.LineStrips3D([self._path]))
+        self._log_camera(poses.position[0], poses.attitude[0], appearance.camera)
+        sizes = [1.0] * len(self._boxes)
+        if appearance.distractors is not None:  # the last of the props
+            scaled = appearance.distractors.expand(1).sizes[0].tolist()
+            sizes[len(sizes) - len(scaled) :] = scaled
+        for box, place, size in zip(self._boxes, poses.props[0].cpu().numpy(), sizes, strict=True):
+            center, half = place + size * box.center, size * box.half_size
+            self._log_box(box.name, box.semantic_class, center, half)
+
+    def _log_box(self, name: str, kind: SemanticClass, center: NDArray, half: NDArray) -> None:
+        """Log a box where it has moved, or that it has vanished: tasks hide props under the ground.
+
+        Centre and half size: (3,), metres.
+        """
+        path = ["world", "objects", name]
+        is_there = center[2] + half[2] > 0.0
+        if not is_there and self._places.pop(name, None) is not None:
+            self._stream.log(path, self._rr.Clear(recursive=False))
+        if is_there and self._places.get(name) != center.tolist():
+            self._places[name] = center.tolist()
+            self._stream.log(path, self._box(kind, centers=[center], half_sizes=[half]))
+
+    def _box(self, kind: SemanticClass, **sizes: Any) -> Any:
+        """Return a box in the colour of its class."""
+        style = {"fill_mode": "solid", "show_labels": False}
+        return self._rr.Boxes3D(class_ids=[kind.value], **sizes, **style)
+
+    def _log_camera(self, position: Tensor, attitude: Tensor, mounting: Mounting | None) -> None:
+        """Log the pose of the policy's camera, and how it projects. Of the drone: (3,), (4,)."""
+        view, model = self._worlds.policy_view, self._worlds.scene.model
+        number = self._worlds.scene.camera(view.cameras[0])
+        place, turn = (torch.tensor(values[number]) for values in (model.cam_pos, model.cam_quat))
+        zoom = 1.0
+        if mounting is not None and mounting.camera == view.cameras[0]:
+            place = place + torch.as_tensor(mounting.offset).cpu().reshape(3)
+            turn = product(torch.as_tensor(mounting.turn, dtype=turn.dtype).cpu().reshape(4), turn)
+            zoom = 1.0 if mounting.zoom is None else float(mounting.zoom)
+        at, turned = position.cpu(), attitude.cpu()
+        self._log_pose("world/camera", at + rotate(turned, place), product(turned, turn))
+        half_angle = math.radians(float(model.cam_fovy[number])) / 2
+        focal = zoom * view.height / 2 / math.tan(half_angle)
+        axes, size = self._rr.ViewCoordinates.RUB, {"width": view.width, "height": view.height}
+        lens = self._rr.Pinhole(focal_length=focal, camera_xyz=axes, **size)
+        self._stream.log("world/camera", lens)
+
+    def _log_pose(self, path: str, position: Tensor, attitude: Tensor) -> None:
+        w, *xyz = attitude.tolist()
+        turn = self._rr.Quaternion(xyzw=[*xyz, w])
+        pose = self._rr.Transform3D(translation=position.tolist(), quaternion=turn)
+        self._stream.log(path, pose)
+
+
+def seconds_per_step(dynamics: Dynamics) -> float:
+    """Return the simulated seconds of a step; in computer-vision mode nothing depends on them."""
+    if isinstance(dynamics, Quadrotor):
+        return dynamics.settings.control_timestep
+    return dynamics.timestep if isinstance(dynamics, Kinematic) else CONTROL_TIMESTEP_S
