@@ -2,6 +2,7 @@
 
 import io
 import json
+import logging
 import math
 import struct
 import time
@@ -48,6 +49,7 @@ _LOOK_PERIOD = 0.1
 """Seconds between two observations while a person moves freely."""
 _QUALITY = 85
 """Of JPEG images."""
+_log = logging.getLogger(__name__)
 _LONGEST = 0.1
 """Most seconds that pass at once; a slow machine falls behind instead."""
 
@@ -74,6 +76,8 @@ class Flight:
         """Of velocity commands and of moves without dynamics, m/s."""
         self.note = ""
         """What happened last, for the person."""
+        self._problem: str | None = None
+        """Why the last recorded flight could not be written."""
         self.time = 0.0
         """Seconds flown since the start."""
         self._waits_for_saliency, self._shows_saliency = settings.saliency, settings.saliency
@@ -111,7 +115,7 @@ class Flight:
         """Hand over to the policy, or back to a person."""
         if pilot == self.pilot:
             return
-        self.recorder.finish(self.pilot)
+        self._finish_recording()
         self.pilot = pilot
         if pilot == "policy" and self.world.is_over:
             self.reset()
@@ -126,14 +130,14 @@ class Flight:
         if mode == self.mode:
             return
         if self.pilot == "person":
-            self.recorder.finish(self.pilot)
+            self._finish_recording()
         self.mode = mode
         if self.pilot == "person":
             self._change_flyer()
 
     def reset(self) -> None:
         """Start a new episode."""
-        self.recorder.finish(self.pilot)
+        self._finish_recording()
         self.world.reset()
         self._over = 0.0
         self.note = "A new episode begins."
@@ -145,8 +149,9 @@ class Flight:
             self.set_mode("actions")
             self.note = "Demonstrations consist of the policy's actions: you fly by these now."
         if not on:
-            self.recorder.finish(self.pilot)
+            self._finish_recording()
         self.recorder.is_on = on
+        self._problem = None if on else self._problem
 
     def _set_camera(self, camera: str) -> None:
         self.camera = camera
@@ -163,7 +168,7 @@ class Flight:
         elif name == "light":
             self.world.set_light(value)
         else:
-            self.recorder.finish(self.pilot)  # under the wind so far
+            self._finish_recording()  # under the wind so far
             speed, direction = self.world.wind
             chosen = (value, direction) if name == "wind" else (speed, value)
             self.world.set_wind(*chosen)
@@ -186,7 +191,16 @@ class Flight:
         self._flyer = make_pilot(self._kind, self.world, self._note_step)
 
     def _note_step(self, frame: Tensor, action: Tensor, reward: float) -> None:
-        self.recorder.note(frame, action, reward, self.pilot)
+        self.recorder.note(frame, action, reward)
+        if self.world.is_over:
+            self._finish_recording()
+
+    def _finish_recording(self) -> None:
+        try:
+            self.recorder.finish(self.pilot)
+        except InputError as error:
+            self._problem = str(error)
+            _log.error("%s", error)
 
     # Time
 
@@ -206,7 +220,7 @@ class Flight:
 
     def close(self) -> None:
         """Write the recorded steps, end the tests of heat maps, and close the renderer."""
-        self.recorder.finish(self.pilot)
+        self._finish_recording()
         self.saliency.close()
         self.world.close()
 
@@ -278,6 +292,7 @@ class Flight:
                 "on": self.recorder.is_on,
                 "steps": len(self.recorder),
                 "saved": self.recorder.saved,
+                "problem": self._problem,
             },
             "saliency": {
                 "on": self._shows_saliency,

@@ -116,6 +116,7 @@ function describe() {
   $("end").hidden = !c.end;
   set("note", s.note);
   set("recording", c.recording);
+  if (s.recording.problem) set("problem", s.recording.problem);
   set("method", c.saliency);
   $("saliency").checked = s.saliency.on;
   for (const name of Object.keys(SLIDERS)) slider(name);

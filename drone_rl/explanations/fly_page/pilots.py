@@ -32,8 +32,10 @@ _LOWEST = 0.3
 """Height under which poses can't be lowered, metres."""
 _LONG = 1e5
 """Seconds of a command that a new one ends."""
-_BRAKING = 1.0
-"""Seconds of braking before the drone holds its place."""
+_BRAKING = 2.5
+"""Most seconds of braking before the drone holds its place; wind may keep it from standing."""
+_STANDS = 0.25
+"""Speed at which braking is over, m/s."""
 _AXES = (("forward", "backward"), ("left", "right"), ("up", "down"), ("yaw_left", "yaw_right"))
 _HALF = 0.5
 """Deflection from which a stick counts as a held control."""
@@ -263,7 +265,8 @@ class VelocityPilot(FlyPilot):
         elif self._braking > 0.0:
             self._braking -= seconds
             self._command_velocity(0.0, 0.0, 0.0, 0.0)
-            if self._braking <= 0.0:
+            if self._braking <= 0.0 or float(self._vehicle.body.velocity.norm()) < _STANDS:
+                self._braking = 0.0
                 self._hold()
         elif self._vehicle.running is None:  # take-off or landing is over
             self._command = None

@@ -6,6 +6,7 @@ import numpy as np
 from torch import Tensor
 
 from drone_rl.explanations.fly_page.world import World
+from drone_rl.utils.errors import InputError
 
 
 class Recorder:
@@ -23,23 +24,26 @@ class Recorder:
         """Return the number of steps that are not written yet."""
         return len(self._steps)
 
-    def note(self, frame: Tensor, action: Tensor, reward: float, pilot: str) -> None:
-        """Add a step, if recording is on; the end of an episode writes the file.
+    def note(self, frame: Tensor, action: Tensor, reward: float) -> None:
+        """Add a step, if recording is on.
 
         Args:
             frame: Image before the action. Shape: (1, H, W, 3).
             action: The action. Shape: (1,), then that of an action.
             reward: Its reward.
-            pilot: Name of who flies.
         """
-        if not self.is_on:
-            return
-        self._steps.append((frame, action, reward))
-        if self._world.is_over:
-            self.finish(pilot)
+        if self.is_on:
+            self._steps.append((frame, action, reward))
 
     def finish(self, pilot: str) -> None:
-        """Write the steps so far, if there are any, to a new file."""
+        """Write the steps so far, if there are any, to a new file.
+
+        Args:
+            pilot: Name of who flew.
+
+        Raises:
+            InputError: The file can't be written; recording is then off.
+        """
         steps, self._steps = self._steps, []
         if not steps:
             return
@@ -60,5 +64,12 @@ class Recorder:
             done=done,
             pilot=pilot,
         )
-        add_demonstration(self.folder, demonstration)
+        try:
+            add_demonstration(self.folder, demonstration)
+        except OSError as error:
+            self.is_on = False
+            raise InputError(
+                f"demonstrations={self.folder} can't be written ({error.strerror or error}); start "
+                "drone-rl fly with another folder"
+            ) from error
         self.saved += 1
