@@ -28,13 +28,15 @@ class FlyCommand(AppearanceCommandSettings, FlySettings):
         """Serve the page until Ctrl-C; return the exit status."""
         policy = self.load_policy()
         given = self.as_base(FlySettings)
-        with contextlib.suppress(KeyboardInterrupt):
-            with drone_rl.fly(policy, given, outputs=self.paths.outputs) as page:
-                print(f"open {page.url}", flush=True)
-                _log.info("policy %s; end with Ctrl-C", policy.name)
-                if self.browser and _has_display():
-                    threading.Thread(target=webbrowser.open, args=(page.url,), daemon=True).start()
-                page.wait()
+        with (
+            contextlib.suppress(KeyboardInterrupt),
+            drone_rl.fly(policy, given, outputs=self.paths.outputs) as page,
+        ):
+            print(f"open {page.url}", flush=True)
+            _log.info("policy %s; end with Ctrl-C", policy.name)
+            if self.browser and _has_display():
+                threading.Thread(target=webbrowser.open, args=(page.url,), daemon=True).start()
+            page.wait()
         return 0, None
 
 

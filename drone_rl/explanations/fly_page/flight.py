@@ -83,7 +83,9 @@ class Flight:
         self._waits_for_saliency, self._shows_saliency = settings.saliency, settings.saliency
         self._over = 0.0
         self._seen, self._seen_at, self._looks = self.world.see(), 0.0, 0
-        levels = [self.world.scenes.transform(torch.full_like(self._seen.frame, v)) for v in (0, 255)]
+        levels = [
+            self.world.scenes.transform(torch.full_like(self._seen.frame, v)) for v in (0, 255)
+        ]
         self._levels = float(levels[0].min()), float(levels[1].max())
         """What is shown as black and as white."""
         self._images: dict[str, tuple[Any, bytes]] = {}
@@ -252,7 +254,10 @@ class Flight:
         A little-endian uint32 is the length of the JSON text that follows; then come the images
         that its "images" lists by name, type and size.
         """
-        images = [("view", "image/jpeg", self._view()), ("observation", "image/png", self._observed())]
+        images = [
+            ("view", "image/jpeg", self._view()),
+            ("observation", "image/png", self._observed()),
+        ]
         self._number += 1
         state = {
             "frame": self._number,

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from drone_rl.explanations import trust
 from drone_rl.explanations.context import Context
-from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.fly_page.world import Seen, World
+from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.scenes import empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies.policy import Policy
@@ -93,7 +93,9 @@ class LiveSaliency:
         self.trust(method)
         if problem is not None:
             self.state = "failed"
-            _log.warning("the heat maps of policy %s can't be tested: %s", self._world.policy.name, problem)
+            _log.warning(
+                "the heat maps of policy %s can't be tested: %s", self._world.policy.name, problem
+            )
         self.close()
 
     def trust(self, method: str | None) -> None:

@@ -33,6 +33,8 @@ _IN_FLIGHT = 3
 """Frames that a page may have received but not displayed yet."""
 _MOST_WAITING = 256
 """Messages that wait for the simulation; more are refused."""
+_CLOSED = object()
+"""The message that a page was closed."""
 _PATIENCE_S = 30.0
 """Seconds to wait for the server to start, and for its threads to end."""
 _FILES = {"": "text/html", "fly.js": "text/javascript", "fly.css": "text/css"}
@@ -137,10 +139,10 @@ class FlyPage:
         self.url = f"http://{ADDRESS}:{port}/{self._token}/"
         """Address of the page, with its token."""
         self._pages: set[_Page] = set()
-        self._messages: queue.Queue[tuple[Any, _Page]] = queue.Queue(_MOST_WAITING)
+        self._messages: queue.SimpleQueue[tuple[Any, _Page]] = queue.SimpleQueue()
         self._frame: bytes | None = None
-        self._lets_go = False
-        """Whether a page that was closed may have held controls."""
+        self._holder: _Page | None = None
+        """The page whose keys or sticks were the last to change."""
         self._failure: Exception | None = None
         self._is_stopping = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -195,7 +197,9 @@ class FlyPage:
         while not self._server.started:
             if time.monotonic() > until or not self._threads[0].is_alive():
                 self.close()
-                raise InputError(f"port={self._settings.port}: the server did not start; try port=0")
+                raise InputError(
+                    f"port={self._settings.port}: the server did not start; try port=0"
+                )
             time.sleep(0.01)
 
     # The server's thread
@@ -235,7 +239,7 @@ class FlyPage:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
             self._pages.discard(page)
-            self._lets_go = True
+            self._messages.put((_CLOSED, page))
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -252,9 +256,9 @@ class FlyPage:
             if isinstance(given, dict) and given.get("type") == "ack":
                 page.acknowledge()
                 continue
-            try:
-                self._messages.put_nowait((given, page))
-            except queue.Full:
+            if self._messages.qsize() < _MOST_WAITING:
+                self._messages.put((given, page))
+            else:
                 page.tell("too many messages; slow down")
 
     def _publish(self) -> None:
@@ -282,9 +286,6 @@ class FlyPage:
         while not self._is_stopping.is_set():
             now = time.monotonic()
             self._handle_messages()
-            if self._lets_go:
-                self._lets_go = False
-                self._flight.release()
             if self._pages:
                 self._flight.advance(now - before)
                 self._offer(self._flight.frame())
@@ -297,8 +298,14 @@ class FlyPage:
                 given, page = self._messages.get_nowait()
             except queue.Empty:
                 return
+            if given is _CLOSED:
+                if page is self._holder:
+                    self._flight.release()
+                continue
             try:
                 self._flight.handle(given)
+                if given["type"] in ("hold", "sticks"):
+                    self._holder = page
             except InputError as error:
                 if self._loop is not None:
                     self._loop.call_soon_threadsafe(page.tell, str(error))

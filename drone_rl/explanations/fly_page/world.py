@@ -131,7 +131,9 @@ class World:
             return dynamics.settings.control_timestep
         if isinstance(dynamics, Kinematic):
             return dynamics.timestep
-        return dynamics.step_length / speed if isinstance(dynamics, ComputerVision) else _OTHER_PERIOD
+        return (
+            dynamics.step_length / speed if isinstance(dynamics, ComputerVision) else _OTHER_PERIOD
+        )
 
     def align(self) -> None:
         """Prepare the drone, which a person may have turned or lifted, for the policy's actions.
@@ -142,7 +144,9 @@ class World:
         body, start = self.body, self.worlds.dynamics.start(self.body.position)
         altitude = self.task.origin[2]
         if isinstance(start, FlightState):
-            same = body if isinstance(body, FlightState) else start.moved(body.position, body.attitude)
+            same = (
+                body if isinstance(body, FlightState) else start.moved(body.position, body.attitude)
+            )
             flying = same.settled()
             flying.reference[:, _HEADING], flying.reference[:, _ALTITUDE] = 0.0, altitude
             self._place(flying)
@@ -226,7 +230,7 @@ class World:
     # Images
 
     def render(self, camera: str) -> Tensor:
-        """Render one of AirSim's five cameras, or the drone from behind. Shape: (H, W, 3), uint8."""
+        """Render one of AirSim's five cameras, or the drone from behind. (H, W, 3), uint8."""
         if camera == CHASE.name:
             return render_chase(self.worlds, self._look(), HEIGHT, WIDTH)[0]
         view = self.worlds.view(camera, "rgb", HEIGHT, WIDTH)

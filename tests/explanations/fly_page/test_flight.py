@@ -44,7 +44,9 @@ def test_the_observation_has_the_grays_of_the_camera(make_flight):
 def test_images_that_did_not_change_are_encoded_once(make_flight, monkeypatch):
     flight, count = make_flight(), []
     render = flight.world.render
-    monkeypatch.setattr(flight.world, "render", lambda camera: count.append(camera) or render(camera))
+    monkeypatch.setattr(
+        flight.world, "render", lambda camera: count.append(camera) or render(camera)
+    )
     frames = [flight.frame() for _ in range(3)]
     assert count == ["front_center"]
     assert decode(frames[0])[1] == decode(frames[2])[1]

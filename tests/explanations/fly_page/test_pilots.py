@@ -250,7 +250,7 @@ def test_a_person_collects_a_cube_in_flight(make_world):
 
 def test_pillars_stop_a_flying_drone(make_world):
     world, controls = make_world("pillars_good"), Controls()
-    x, y, z = next(place for place in world.objects if place)
+    x, y, _ = next(place for place in world.objects if place)
     start = torch.tensor([[x - 4.0, y, 2.0]]).double()
     world.move(world.body.moved(start))
     pilot = make_pilot("simple_flight", world, Steps().note)

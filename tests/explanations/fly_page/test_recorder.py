@@ -127,7 +127,7 @@ def test_a_folder_that_cannot_be_written_is_reported_and_ends_recording(
     assert "can't be written (No space left on device)" in recording["problem"]
     flight.handle({"type": "record", "on": True})
     assert state_of(flight)["recording"]["problem"] is None
-    press(flight, *["left"] * 8)  # beyond the side boundary: the episode ends
+    press(flight, *["left"] * 60)  # beyond the side boundary: the episode ends
     state = state_of(flight)
     assert state["end"] == "outside the field, left or right" and not state["recording"]["on"]
     assert "can't be written" in state["recording"]["problem"]
