@@ -271,7 +271,7 @@ FLY_MODES = ("actions", "computer_vision", "simple_flight")
 class FlySettings(RendererSettings):
     """Settings of the page to fly from."""
 
-    camera: Annotated[str, OneOf(CAMERAS)] = "front_center"
+    view: Annotated[str, OneOf(CAMERAS)] = "front_center"
     """Camera of the large image: one of AirSim's five, or chase, from behind the drone."""
     mode: Annotated[str, OneOf(FLY_MODES)] = "actions"
     """Controls of a person: actions, those of the policy; computer_vision, steps of 0.25 m and 5

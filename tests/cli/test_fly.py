@@ -24,7 +24,7 @@ def start(tmp_path, *args):
 
 
 def test_it_prints_the_url_and_ends_by_ctrl_c(tmp_path):
-    process = start(tmp_path, "policy=poor", "camera=chase", "task.num_cubes=2")
+    process = start(tmp_path, "policy=poor", "view=chase", "task.num_cubes=2")
     line = process.stdout.readline()
     assert line, process.stderr.read()
     url = re.fullmatch(r"open (http://127\.0\.0\.1:\d+/[\w-]{32}/)\n", line)[1]
@@ -39,7 +39,7 @@ def test_it_prints_the_url_and_ends_by_ctrl_c(tmp_path):
     ("args", "message"),
     [
         (("policy=none",), "policy=none does not exist"),
-        (("mode=hover",), "mode=hover is unknown"),
+        (("mode=hover",), "mode='hover' is unknown"),
         (("frames_per_second=0",), "frames_per_second=0 is out of range"),
         (("dynamics.wind=[5,0,0]",), "moves nothing in computer-vision mode"),
     ],

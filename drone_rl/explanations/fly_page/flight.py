@@ -62,7 +62,7 @@ class Flight:
 
         Args:
             policy: The policy.
-            settings: Camera, mode and seed at the start.
+            settings: View, mode and seed at the start.
             demonstrations: Folder to which recorded flights are added.
         """
         self.world = World(
@@ -71,7 +71,7 @@ class Flight:
         self.controls = Controls()
         self.recorder = Recorder(self.world, demonstrations)
         self.saliency = LiveSaliency(self.world)
-        self.camera, self.mode, self.pilot = settings.camera, settings.mode, "person"
+        self.camera, self.mode, self.pilot = settings.view, settings.mode, "person"
         self.speed = 4.0
         """Of velocity commands and of moves without dynamics, m/s."""
         self.note = ""

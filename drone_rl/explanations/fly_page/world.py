@@ -189,7 +189,7 @@ class World:
         """Put the drone somewhere, without time or rules but one: cubes vanish when touched."""
         self._film.clear()
         self._place(body)
-        state = self.worlds.state
+        state: Any = self.worlds.state
         if isinstance(self.task, CollectCubes):
             away = (body.position[:, None] - state.cubes).abs().amax(-1)
             state.collected |= state.present & (away <= self.task.settings.touch_distance)

@@ -345,7 +345,7 @@ def test_too_many_messages_are_refused(page, monkeypatch):
 
 
 def test_settings_are_checked():
-    with pytest.raises(InputError, match="camera='top' is unknown"):
-        drone_rl.fly("good", camera="top")
+    with pytest.raises(InputError, match="view='top' is unknown"):
+        drone_rl.fly("good", view="top")
     with pytest.raises(InputError, match="policy=none does not exist"):
         drone_rl.fly("none")
