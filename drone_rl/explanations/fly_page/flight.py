@@ -303,6 +303,7 @@ class Flight:
                 "on": self._shows_saliency,
                 "state": self.saliency.state,
                 "method": self.saliency.method,
+                "problem": self.saliency.problem,
             },
             "note": self.note,
         }

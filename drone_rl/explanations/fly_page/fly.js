@@ -136,8 +136,9 @@ function words(s) {
   const method = (s.saliency.method || "").replaceAll("_", " ");
   const saliency = {
     off: "tested when it is switched on", testing: "testing methods on this policy; this takes a minute or so",
-    shown: `${method}: passed all tests on this policy`, none: "no method passes the tests on this policy, so none is shown",
-    failed: "the tests failed; see the terminal",
+    shown: `bright pixels affect the most probable action; method ${method}, which passed the tests on this policy`,
+    none: "no method passes the tests on this policy, so none is shown",
+    failed: `the methods can't be tested: ${s.saliency.problem}`,
   }[s.saliency.state];
   return { end, score, recording, saliency };
 }

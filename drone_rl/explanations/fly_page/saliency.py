@@ -66,6 +66,8 @@ class LiveSaliency:
         """off; testing; shown; none, if no method passed the tests; or failed."""
         self.method: str | None = None
         """The trusted method."""
+        self.problem: str | None = None
+        """Why the tests failed."""
         self._process: Any = None
         self._connection: Connection | None = None
         self._explainer: Explainer | None = None
@@ -92,7 +94,7 @@ class LiveSaliency:
             method, problem = None, "the process ended early"
         self.trust(method)
         if problem is not None:
-            self.state = "failed"
+            self.state, self.problem = "failed", problem
             _log.warning(
                 "the heat maps of policy %s can't be tested: %s", self._world.policy.name, problem
             )

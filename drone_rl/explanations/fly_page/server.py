@@ -160,6 +160,7 @@ class FlyPage:
             ws_per_message_deflate=False,  # images are compressed already
             lifespan="off",
             log_config=None,
+            log_level="warning",
             access_log=False,
             server_header=False,
             timeout_graceful_shutdown=1,

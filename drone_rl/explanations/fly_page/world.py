@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from collections import deque
+from collections.abc import Mapping
 from typing import Any, NamedTuple, cast
 
 import torch
@@ -43,6 +44,8 @@ class Seen(NamedTuple):
     """Of each part of its actions."""
     action: Tensor
     """The action that it takes. Shape: (1,), then that of an action."""
+    memory: Mapping[str, Tensor]
+    """What a policy that remembers frames keeps for the next step, by name."""
 
 
 class World:
@@ -67,6 +70,9 @@ class World:
         self.actions: Actions = self.worlds.dynamics.actions
         self.scenes = Scenes(self._env)
         self._actor = policy.make_actor(self._env, seed=seed)
+        spec = self._env.observation_spec.zero()
+        self._forgotten = {k: spec[k] for k in self._actor.in_keys if k != "pixels"}
+        """Memory of the actor at the start of an episode, by name."""
         self._exploration = exploration(greedy)
         self._film: deque[Tensor] = deque(maxlen=self.scenes.memory)
         self._every = torch.arange(1)
@@ -85,7 +91,7 @@ class World:
         """Start a new episode."""
         self.worlds.state.body = self.worlds.bodies(1)  # a person's drone may be of another kind
         self._base.start()
-        self._film.clear()
+        self._forget()
         self.episode += 1
         self.reward = 0.0
         """Sum of the episode's rewards."""
@@ -165,14 +171,18 @@ class World:
             frame = self.worlds.render(state, appearance=self._look())
             observation = self.scenes.transform(frame, [*self._film])
             with set_exploration_type(self._exploration):
-                acted = self._actor(TensorDict({"pixels": observation}, [1]))
+                acted = self._actor(TensorDict({"pixels": observation, **self._memory}, [1]))
             shares = self.actions.probabilities(acted["logits"])[0]
-            self._seen = Seen(frame, observation, tuple(shares.tolist()), acted["action"])
+            after = acted.get("next", {})
+            memory = {name: after.get(name, start) for name, start in self._forgotten.items()}
+            self._seen = Seen(frame, observation, tuple(shares.tolist()), acted["action"], memory)
         return self._seen
 
     def step(self, action: Tensor) -> float:
         """Take an action, (1,) and then its shape; return the reward."""
-        self._film.append(self.see().frame)
+        seen = self.see()
+        self._film.append(seen.frame)
+        self._memory = seen.memory
         reward = float(self.worlds.step(self._every, action)[0])
         self.reward += reward
         self._change()
@@ -187,7 +197,7 @@ class World:
 
     def move(self, body: BodyState) -> None:
         """Put the drone somewhere, without time or rules but one: cubes vanish when touched."""
-        self._film.clear()
+        self._forget()
         self._place(body)
         state: Any = self.worlds.state
         if isinstance(self.task, CollectCubes):
@@ -250,6 +260,11 @@ class World:
             exposure = self.light * (1.0 if whole.exposure is None else whole.exposure)
             self._lit = dataclasses.replace(whole, exposure=exposure)
         return self._lit
+
+    def _forget(self) -> None:
+        """Let the policy begin without earlier frames."""
+        self._film.clear()
+        self._memory: Mapping[str, Tensor] = self._forgotten
 
     def _place(self, body: BodyState) -> None:
         self.worlds.state.body = body

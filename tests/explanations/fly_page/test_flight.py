@@ -198,7 +198,8 @@ def test_heat_is_laid_over_the_observation_of_a_trusted_method(make_flight):
     assert decode(flight.frame())[1]["observation"] == plain  # it is switched off
     flight._shows_saliency = True
     state, images = decode(flight.frame())
-    assert state["saliency"] == {"on": True, "state": "shown", "method": "saliency"}
+    expected = {"on": True, "state": "shown", "method": "saliency", "problem": None}
+    assert state["saliency"] == expected
     hot = np.asarray(Image.open(io.BytesIO(images["observation"]))).astype(int)
     assert (hot[..., 0] - hot[..., 2]).max() > 60  # warm colours, where all was gray
 

@@ -83,4 +83,5 @@ def test_a_process_that_fails_is_noticed(caplog):
         live.poll()
         time.sleep(0.05)
     assert live.state == "failed" and live.method is None
+    assert live.problem == "the process ended early"
     assert "policy broken can't be tested" in caplog.text

@@ -119,6 +119,37 @@ def test_stacked_frames_are_those_of_the_last_actions(make_world):
     assert torch.equal(after[0, 0], after[0, 1])
 
 
+class Remembering:
+    """An actor that counts the steps since it was last made to forget."""
+
+    def __init__(self):
+        self.seen = []
+
+    def __call__(self, tensordict):
+        """Move forward; remember one more step."""
+        count = tensordict["count"]
+        self.seen.append(int(count))
+        tensordict["logits"] = torch.tensor([[1.0, 0.0, 0.0]])
+        tensordict["action"] = torch.tensor([0])
+        tensordict["next", "count"] = count + 1
+        return tensordict
+
+
+def test_a_policy_that_remembers_keeps_its_memory_from_step_to_step(make_world, monkeypatch):
+    world, actor = make_world(), Remembering()
+    monkeypatch.setattr(world, "_actor", actor)
+    monkeypatch.setattr(world, "_forgotten", {"count": torch.zeros(1, 1)})
+    world.reset()
+    for _ in range(3):
+        world.step(world.see().action)
+    world.see()
+    world.move(world.body)  # a person takes over
+    world.see()
+    world.reset()
+    world.see()
+    assert actor.seen == [0, 1, 2, 3, 0, 0]
+
+
 def test_wind_blows_from_its_direction(make_world):
     world = make_world("flight")
     assert world.wind == (0.0, 0.0)
