@@ -70,8 +70,9 @@ class World:
         self.actions: Actions = self.worlds.dynamics.actions
         self.scenes = Scenes(self._env)
         self._actor = policy.make_actor(self._env, seed=seed)
-        spec = self._env.observation_spec.zero()
-        self._forgotten = {k: spec[k] for k in self._actor.in_keys if k != "pixels"}
+        entries: Any = self._env.observation_spec.zero()
+        names = (str(name) for name in self._actor.in_keys if name != "pixels")
+        self._forgotten: Mapping[str, Tensor] = {name: entries[name] for name in names}
         """Memory of the actor at the start of an episode, by name."""
         self._exploration = exploration(greedy)
         self._film: deque[Tensor] = deque(maxlen=self.scenes.memory)
@@ -173,7 +174,7 @@ class World:
             with set_exploration_type(self._exploration):
                 acted = self._actor(TensorDict({"pixels": observation, **self._memory}, [1]))
             shares = self.actions.probabilities(acted["logits"])[0]
-            after = acted.get("next", {})
+            after: Any = acted.get("next", {})
             memory = {name: after.get(name, start) for name, start in self._forgotten.items()}
             self._seen = Seen(frame, observation, tuple(shares.tolist()), acted["action"], memory)
         return self._seen
