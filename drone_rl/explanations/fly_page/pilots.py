@@ -8,12 +8,12 @@ from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.explanations.fly_page.world import World
-from drone_rl.flight.airsim.settings_file import FLYING, POSING, VehicleChoice
-from drone_rl.flight.airsim.vehicle import Vehicle
+from drone_rl.flight.commands.command import Command, FlightFuture
 from drone_rl.flight.commands.computer_vision import KEYS, STEP, TURN
 from drone_rl.flight.commands.path_following import YawMode
-from drone_rl.sim.coordinates import HOME
-from drone_rl.sim.dynamics import FlightState, Quadrotor
+from drone_rl.flight.commands.pilot import Pilot
+from drone_rl.flight.commands.state import LandedState, Trajectory
+from drone_rl.sim.dynamics import FlightState, Obstacles, Quadrotor
 
 CONTROLS = tuple(KEYS)
 """Names of controls that can be held: those of `Pilot.press`."""
@@ -181,18 +181,45 @@ class ActionPilot(_Steps):
         return [torch.tensor([[2.0 * max(0.0, forward) - 1.0, left, turn]])] * count
 
 
+class _Drone(Pilot):
+    """A drone that is taken over in flight, and whose trajectory is not kept."""
+
+    def take_over(self, body: FlightState) -> None:
+        """Continue with a drone that flies, or is posed, anywhere."""
+        self.body, self._is_armed, self._landed = body, True, LandedState.FLYING
+
+    def set_surroundings(self, dynamics: DynamicsSettings, obstacles: Obstacles | None) -> None:
+        """Take the wind and the obstacles of the present episode."""
+        if dynamics != self.settings:
+            self._quadrotor, self.settings = Quadrotor(dynamics), dynamics
+        self._obstacles = obstacles
+
+    @property
+    def period(self) -> float:
+        """Seconds of a control period."""
+        return self._period * self.settings.tick
+
+    def run(self) -> None:
+        """Advance by a control period."""
+        self._advance(self._period)
+        self.trajectory = Trajectory()  # it would grow as long as the page is open
+
+    def _run(self, name: str, command: Command, wait: bool) -> bool | FlightFuture:
+        """Start a movement, which as in AirSim also takes off a drone on the ground."""
+        self._require_armed(name)
+        return self._start(name, command, wait)
+
+
 class PosePilot(FlyPilot):
     """Computer-vision mode: controls change the pose by steps of 0.25 m and 5 degrees."""
 
     def __init__(self, world: World) -> None:
         """Take over the drone's place and attitude."""
         super().__init__(world)
-        choice = VehicleChoice("", POSING, has_api_control=True)
-        self._vehicle = Vehicle(choice, DynamicsSettings(), None, None, home=HOME)
-        body = self._vehicle.body
-        self._vehicle.body = body.moved(world.body.position, world.body.attitude)
+        self._drone = _Drone(mode="computer_vision")
+        self._drone.body = self._drone.body.moved(world.body.position, world.body.attitude)
         self._left = dict.fromkeys(CONTROLS, 0.0)
-        world.move(self._vehicle.body)
+        world.move(self._drone.body)
 
     def advance(self, seconds: float, controls: Controls, speed: float) -> None:
         """See `FlyPilot`."""
@@ -205,10 +232,11 @@ class PosePilot(FlyPilot):
             self._left[name] -= count
             keys += [name] * count
         for name in keys:
-            if name != "down" or float(self._vehicle.body.position[0, 2]) - STEP >= _LOWEST:
-                self._vehicle.press(name)
+            if name != "down" or float(self._drone.body.position[0, 2]) - STEP >= _LOWEST:
+                self._drone.press(name)
         if keys:
-            self.world.move(self._vehicle.body)
+            self._drone.trajectory = Trajectory()
+            self.world.move(self._drone.body)
 
 
 class VelocityPilot(FlyPilot):
@@ -217,43 +245,37 @@ class VelocityPilot(FlyPilot):
     def __init__(self, world: World) -> None:
         """Take over the drone in flight; one without dynamics begins to hover."""
         super().__init__(world)
-        choice = VehicleChoice("", FLYING, is_armed=True, has_api_control=True)
-        self._vehicle = Vehicle(choice, world.flight_dynamics, None, None, home=HOME)
+        self._drone = _Drone(world.flight_dynamics)
         body = world.body
         if not isinstance(body, FlightState) or not bool(body.rotors.any()):
             start = Quadrotor(world.flight_dynamics).start(body.position)
             body = start.moved(body.position, body.attitude)
-        self._vehicle.body = body
-        self._wind = world.wind
+        self._drone.take_over(body)
         self._command: tuple[float, ...] | None = None
         self._braking = self._left = 0.0
         self._hold()
 
     def take_off(self) -> None:
         """Climb 2 m."""
-        self._vehicle.take_off(wait=False)
+        self._drone.take_off(wait=False)
         self._command = ()
 
     def land(self) -> None:
         """Descend until the drone stands."""
-        self._vehicle.land(wait=False)
+        self._drone.land(wait=False)
         self._command = ()
 
     def advance(self, seconds: float, controls: Controls, speed: float) -> None:
         """See `FlyPilot`."""
-        world, vehicle = self.world, self._vehicle
+        world, drone = self.world, self._drone
         controls.presses.clear()
-        if world.wind != self._wind:
-            self._wind = world.wind
-            vehicle.change_dynamics(world.flight_dynamics)
-        vehicle.set_obstacles(world.task.obstacles(world.worlds.state))
+        drone.set_surroundings(world.flight_dynamics, world.task.obstacles(world.worlds.state))
         self._steer(seconds, controls, speed)
         self._left += seconds
-        period = vehicle.period * vehicle.settings.tick
-        while self._left >= period:
-            vehicle.run(vehicle.period)
-            world.move(vehicle.body)
-            self._left -= period
+        while self._left >= drone.period:
+            drone.run()
+            world.move(drone.body)
+            self._left -= drone.period
 
     def _steer(self, seconds: float, controls: Controls, speed: float) -> None:
         forward, left, up, turn = controls.axes
@@ -265,23 +287,23 @@ class VelocityPilot(FlyPilot):
         elif self._braking > 0.0:
             self._braking -= seconds
             self._command_velocity(0.0, 0.0, 0.0, 0.0)
-            if self._braking <= 0.0 or float(self._vehicle.body.velocity.norm()) < _STANDS:
+            if self._braking <= 0.0 or float(self._drone.body.velocity.norm()) < _STANDS:
                 self._braking = 0.0
                 self._hold()
-        elif self._vehicle.running is None:  # take-off or landing is over
+        elif self._drone.running is None:  # take-off or landing is over
             self._command = None
 
     def _command_velocity(self, *velocity: float) -> None:
         if velocity != self._command:
             forward, left, up, turn = velocity
             yaw = YawMode(True, 0.0 - turn)
-            self._vehicle.move_by_velocity(
+            self._drone.move_by_velocity(
                 forward, left, up, _LONG, frame="body", yaw_mode=yaw, wait=False
             )
             self._command = velocity
 
     def _hold(self) -> None:
-        self._vehicle.hover(_LONG, wait=False)
+        self._drone.hover(_LONG, wait=False)
         self._command = None
 
 
