@@ -47,6 +47,8 @@ _PAUSE = 2.0
 """Seconds after an episode of the policy before the next one begins."""
 _LOOK_PERIOD = 0.1
 """Seconds between two observations while a person moves freely."""
+_SIZE = 1.0
+"""Edge of objects on the map if the task does not state it, metres."""
 _QUALITY = 85
 """Of JPEG images."""
 _log = logging.getLogger(__name__)
@@ -231,10 +233,12 @@ class Flight:
     def hello(self) -> dict[str, Any]:
         """Return what does not change: policy, task, actions, choices."""
         world, actions = self.world, self.world.actions
-        terms = world.task.vocabulary
+        terms, things = world.task.vocabulary, world.policy.task.things
         return {
             "policy": world.policy.name,
             "task": world.task.name,
+            "object": terms.target,
+            "size": things.size if things else _SIZE,
             "goal": terms.goal,
             "reached": terms.reached,
             "actions": list(actions.names),

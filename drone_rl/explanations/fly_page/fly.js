@@ -124,8 +124,9 @@ function describe() {
 }
 
 function words(s) {
-  const [reached, missed] = s.goals || [null, null], goals = `${hello.goal}s`;
+  const [reached, missed] = s.goals || [null, null];
   const of = hello.total === null ? "" : ` of ${hello.total}`;
+  const goals = (hello.total === null ? reached : hello.total) === 1 ? hello.goal : `${hello.goal}s`;
   const isFree = s.pilot === "person" && s.mode !== "actions";
   const end = s.end === null || isFree ? "" : `Episode over, ${s.end}. ` +
     (s.pilot === "person" ? "New episode, or N, starts the next." : "The next one begins.");
@@ -238,7 +239,7 @@ function begin() {
   buildKeys();
   buildBars();
   document.querySelector("details").open = matchMedia("(min-width: 34rem)").matches;
-  set("legend", `Seen from above, ahead is up. Triangle: drone. Line: trail. Squares: ${hello.goal}s, dashed where one has gone.`);
+  set("legend", `Seen from above, ahead is up. Triangle: drone. Line: trail. Squares: ${hello.object}s, dashed where one has gone.`);
   $("deck").focus({ preventScroll: true });
   hint();
 }
@@ -432,7 +433,7 @@ function drawMap() {
   brush.beginPath();
   trail.forEach(([x, y], i) => { const [u, v] = to(x, y); if (i) brush.lineTo(u, v); else brush.moveTo(u, v); });
   brush.stroke();
-  const edge = Math.max(9, 2.5 * scale);
+  const edge = Math.max(6, hello.size * scale);
   places.forEach((place, i) => {
     if (!place) return;
     const [u, v] = to(place[0], place[1]), isThere = Boolean(state.objects[i]);
@@ -447,7 +448,7 @@ function drawMap() {
   arrow(brush, u, v, state.attitude[2] * Math.PI / 180, 11);
   const told = `Map from above. Drone ${state.position[0].toFixed(1)} m ahead of the start and ` +
     `${Math.abs(state.position[1]).toFixed(1)} m to the ${state.position[1] < 0 ? "right" : "left"}, ` +
-    `${state.objects.filter(Boolean).length} ${hello.goal}s left.`;
+    `${state.objects.filter(Boolean).length} ${hello.object}s left.`;
   if ($("map").getAttribute("aria-label") !== told) $("map").setAttribute("aria-label", told);
 }
 

@@ -61,9 +61,12 @@ def test_what_does_not_change_is_said_once(make_flight, tmp_path):
     hello = make_flight().hello()
     assert hello["policy"] == "good" and hello["actions"] == ["forward", "left", "right"]
     assert hello["order"] == [1, 0, 2] and hello["total"] == 3
+    assert hello["size"] == 2.5  # metres
     assert hello["discrete"] and not hello["dynamics"]
     assert hello["demonstrations"] == str(tmp_path / "demonstrations")
-    assert make_flight("pillars_good").hello()["total"] is None
+    pillars = make_flight("pillars_good").hello()
+    assert pillars["total"] is None
+    assert (pillars["object"], pillars["goal"], pillars["reached"]) == ("pillar", "row", "passed")
 
 
 def test_the_policy_collects_the_cubes_and_the_next_episode_begins(make_flight):
