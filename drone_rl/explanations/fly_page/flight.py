@@ -214,6 +214,8 @@ class Flight:
         self.time += seconds
         self.controls.advance(seconds)
         self._flyer.advance(seconds, self.controls, self.speed)
+        if bool(self.world.body.is_lost[0]):
+            self.note = "The simulation has diverged; start a new episode."
         if self.world.is_over and self.pilot == "policy":
             self._over += seconds
             if self._over >= _PAUSE:

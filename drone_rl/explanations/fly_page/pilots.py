@@ -251,6 +251,7 @@ class VelocityPilot(FlyPilot):
             start = Quadrotor(world.flight_dynamics).start(body.position)
             body = start.moved(body.position, body.attitude)
         self._drone.take_over(body)
+        world.move(body)
         self._command: tuple[float, ...] | None = None
         self._braking = self._left = 0.0
         self._hold()
@@ -258,17 +259,19 @@ class VelocityPilot(FlyPilot):
     def take_off(self) -> None:
         """Climb 2 m."""
         self._drone.take_off(wait=False)
-        self._command = ()
+        self._command, self._braking = (), 0.0
 
     def land(self) -> None:
         """Descend until the drone stands."""
         self._drone.land(wait=False)
-        self._command = ()
+        self._command, self._braking = (), 0.0
 
     def advance(self, seconds: float, controls: Controls, speed: float) -> None:
         """See `FlyPilot`."""
         world, drone = self.world, self._drone
         controls.presses.clear()
+        if bool(drone.body.is_lost[0]):
+            return
         drone.set_surroundings(world.flight_dynamics, world.task.obstacles(world.worlds.state))
         self._steer(seconds, controls, speed)
         self._left += seconds

@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from drone_rl.flight.commands.computer_vision import KEYS
+from drone_rl.sim.dynamics.state import LOST
 from drone_rl.utils.errors import InputError
 from tests.explanations.fly_page.conftest import decode
 
@@ -153,6 +154,18 @@ def test_gamepad_sticks_fly_the_drone(make_flight):
     flight.handle({"type": "sticks", "values": [0.5, 0.0, 0.0, 0.0]})
     run(flight, 4.0)
     assert state_of(flight)["velocity"] == pytest.approx(2.0, abs=0.3)  # half of 4 m/s
+
+
+def test_a_simulation_that_diverges_says_so_and_a_new_episode_goes_on(make_flight):
+    flight = make_flight(mode="simple_flight")
+    flight.world.body.numbers[:, LOST] = 1.0
+    flight.handle({"type": "hold", "controls": ["forward"]})
+    run(flight, 0.2)
+    assert "has diverged; start a new episode" in state_of(flight)["note"]
+    flight.handle({"type": "reset"})
+    flight.handle({"type": "hold", "controls": ["forward"]})
+    run(flight, 1.0)
+    assert state_of(flight)["position"][0] > 0.2
 
 
 def test_taking_off_needs_simple_flight(make_flight):

@@ -208,6 +208,18 @@ def test_the_drone_lands_and_takes_off(make_world):
     assert place(world)[2] > 4.0
 
 
+def test_landing_is_not_braking(make_world):
+    world, controls = make_world(), Controls()
+    pilot = make_pilot("simple_flight", world, Steps().note)
+    controls.hold(["forward"])
+    fly(pilot, controls, 1.0)
+    controls.hold([])
+    fly(pilot, controls, 0.1)
+    pilot.land()
+    fly(pilot, controls, 16.0)
+    assert place(world)[2] == pytest.approx(0.3, abs=0.05)
+
+
 def test_wind_drifts_a_braking_drone_and_can_change(make_world):
     world, controls = make_world(), Controls()
     pilot = make_pilot("simple_flight", world, Steps().note)
