@@ -13,6 +13,7 @@ from benchmarks.explain import bench_explain
 from benchmarks.flight_parity import bench_flight_parity
 from benchmarks.flight_paths import bench_flight_paths
 from benchmarks.flight_speed import bench_flight_speed
+from benchmarks.fly_page import bench_fly_page
 from benchmarks.fragile_honest import bench_fragile_honest
 from benchmarks.gamed import bench_gamed
 from benchmarks.gymnasium import bench_gymnasium
@@ -296,6 +297,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_chapter(s.runs / "chapter", s.quick),
         "long",
         (*_TRAINING, "acceleration", "flight/commands", "conf", "benchmarks/chapter"),
+    ),
+    "fly_page": Benchmark(
+        lambda s: bench_fly_page(s.runs / "fly_page", s.quick),
+        "flight",
+        (*_RENDERING, "flight", "policies", "explanations/fly_page", "benchmarks/fly_page"),
     ),
     "mistakes": Benchmark(
         lambda s: bench_mistakes(s.runs / "mistakes"),

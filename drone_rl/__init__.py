@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from drone_rl.config.commands import ChanceSettings as ChanceSettings
     from drone_rl.config.commands import CheckSettings as CheckSettings
     from drone_rl.config.commands import EvaluateSettings as EvaluateSettings
+    from drone_rl.config.commands import FlySettings as FlySettings
     from drone_rl.config.commands import JudgeSettings as JudgeSettings
     from drone_rl.config.commands import PlacesSettings as PlacesSettings
     from drone_rl.config.commands import ProvableSettings as ProvableSettings
@@ -47,6 +48,8 @@ if TYPE_CHECKING:
     from drone_rl.explanations.class_model_gallery import class_models as class_models
     from drone_rl.explanations.explain import Explanations as Explanations
     from drone_rl.explanations.explain import explain as explain
+    from drone_rl.explanations.fly_page.server import FlyPage as FlyPage
+    from drone_rl.explanations.fly_page.server import fly as fly
     from drone_rl.explanations.settings import ClassModelsSettings as ClassModelsSettings
     from drone_rl.explanations.settings import ExplainSettings as ExplainSettings
     from drone_rl.flight.commands.command import FlightFuture as FlightFuture

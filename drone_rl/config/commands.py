@@ -253,3 +253,38 @@ class ProvableSettings(Settings):
     """Most failures that a round replays: the largest boxes of a proof."""
     limit_s: Annotated[float, Real(0.0, unit="s")] | None = None
     """Seconds after which a proof stops and its failures so far are replayed; null for no limit."""
+
+
+CAMERAS = (
+    "front_center",
+    "front_right",
+    "front_left",
+    "bottom_center",
+    "back_center",
+    "chase",
+)
+"""AirSim's five cameras, and the view from behind the drone."""
+FLY_MODES = ("actions", "computer_vision", "simple_flight")
+"""How a person flies: by the policy's actions, by steps of the pose, or by velocities."""
+
+
+class FlySettings(RendererSettings):
+    """Settings of the page to fly from."""
+
+    view: Annotated[str, OneOf(CAMERAS)] = "front_center"
+    """Camera of the large image: one of AirSim's five, or chase, from behind the drone."""
+    mode: Annotated[str, OneOf(FLY_MODES)] = "actions"
+    """Controls of a person: actions, those of the policy; computer_vision, steps of 0.25 m and 5
+    degrees; or simple_flight, velocities of a drone with dynamics."""
+    greedy: bool = True
+    """Whether the policy takes the most probable action instead of sampling."""
+    saliency: bool = True
+    """Whether to test heat maps in the background and show the best one that passes."""
+    seed: Annotated[int, Whole(0)] = 0
+    """Root of the environment's random streams."""
+    port: Annotated[int, Whole(0, 65535)] = 0
+    """Port at 127.0.0.1; 0 for a free one."""
+    frames_per_second: Annotated[int, Whole(1, 60, unit="1/s")] = 40
+    """Images per second that the page is sent; slow browsers get fewer."""
+    demonstrations: str | None = None
+    """Folder to which recorded flights are added; null for outputs/demonstrations."""

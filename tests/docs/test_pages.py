@@ -45,7 +45,7 @@ def test_rules_are_those_of_pages():
 
 def test_a_command_that_is_unknown_is_found():
     with pytest.raises(AssertionError):
-        check_commands("drone-rl fly")
+        check_commands("drone-rl walk")
     with pytest.raises(Exception, match="num_cubs"):
         check_commands("X=1 drone-rl train task.num_cubs=3  # more of them\n")
     check_command("train", "seed=1,2", "returns=reward_to_go,leave_one_out", "-m")

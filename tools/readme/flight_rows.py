@@ -23,6 +23,12 @@ def _trained(f: Figures, name: str) -> str:
 
 FLIGHT = (
     Row(
+        "fly_page",
+        "page to fly from: images of 256x144 displayed per second in Chromium, without a GPU",
+        lambda f: f"{f['fly_page_fps']:.0f}",
+        "30",
+    ),
+    Row(
         "flight_speed",
         "environment steps per second of 256 drones (33 physics steps with all controllers each); "
         "ratio to MuJoCo Warp with the same body and no controller",

@@ -1,0 +1,90 @@
+"""`drone-rl fly` until Ctrl-C, and its refusals."""
+
+import re
+import signal
+import subprocess
+import sys
+import urllib.request
+import webbrowser
+
+import pytest
+
+from drone_rl.cli import fly
+from drone_rl.cli.fly import FlyCommand
+
+pytest.importorskip("uvicorn")
+
+
+def start(tmp_path, *args):
+    command = [sys.executable, "-m", "drone_rl.cli.main", "fly", f"hydra.run.dir={tmp_path}/run"]
+    settings = [f"paths.outputs={tmp_path}", "saliency=false", "browser=false"]
+    return subprocess.Popen(
+        [*command, *settings, *args], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def test_it_prints_the_url_and_ends_by_ctrl_c(tmp_path):
+    process = start(tmp_path, "policy=poor", "view=chase", "task.num_cubes=2")
+    line = process.stdout.readline()
+    assert line, process.stderr.read()
+    url = re.fullmatch(r"open (http://127\.0\.0\.1:\d+/[\w-]{32}/)\n", line)[1]
+    with urllib.request.urlopen(url, timeout=20) as answer:
+        assert answer.status == 200
+    process.send_signal(signal.SIGINT)
+    assert process.wait(30) == 0, process.stderr.read()
+    assert "Traceback" not in process.stderr.read()
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (("policy=none",), "policy=none does not exist"),
+        (("mode=hover",), "mode='hover' is unknown"),
+        (("frames_per_second=0",), "frames_per_second=0 is out of range"),
+        (("dynamics.wind=[5,0,0]",), "moves nothing in computer-vision mode"),
+    ],
+)
+def test_wrong_settings_are_one_line(tmp_path, args, message):
+    process = start(tmp_path, *args)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert message in errors and "Traceback" not in errors
+
+
+class Page:
+    """A page that ends at once."""
+
+    url = "http://127.0.0.1:1/token/"
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exception):
+        pass
+
+    def wait(self):
+        """End as by Ctrl-C."""
+        raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(("display", "opened"), [(":0", [Page.url]), ("", [])])
+def test_a_browser_opens_where_there_is_a_display(monkeypatch, tmp_path, display, opened):
+    found, given = [], {}
+
+    def make(policy, settings, outputs):
+        given.update(policy=policy.name, port=settings.port, outputs=outputs)
+        return Page()
+
+    class Thread:
+        def __init__(self, target, args, daemon):
+            self.start = lambda: target(*args)
+
+    monkeypatch.setattr(fly.drone_rl, "fly", make, raising=False)
+    monkeypatch.setattr(fly.threading, "Thread", Thread)
+    monkeypatch.setattr(webbrowser, "open", found.append)
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    assert FlyCommand(port=8123).run(tmp_path) == (0, None)
+    assert found == opened
+    assert given == {"policy": "good", "port": 8123, "outputs": "outputs"}

@@ -1,0 +1,237 @@
+"""The world of the page: rules, observations, wind, light, and changes of who flies."""
+
+from pathlib import Path
+
+import pytest
+import torch
+
+import drone_rl
+from drone_rl.config.networks import SmallCnn
+from drone_rl.config.transforms import Gray, Stack
+from drone_rl.policies.policy import Policy
+from drone_rl.policies.zoo import PolicyDescription
+from drone_rl.sim.dynamics import FlightState, Quadrotor
+
+FORWARD = torch.tensor([0])
+
+
+def turned(world, x, y, z, yaw):
+    """Move the drone; the heading is in radians to the left."""
+    half = torch.tensor(yaw / 2, dtype=torch.float64)
+    attitude = torch.stack([half.cos(), half * 0, half * 0, half.sin()])[None]
+    place = torch.tensor([[x, y, z]], dtype=torch.float64)
+    world.move(world.body.moved(place, attitude))
+
+
+def test_an_action_moves_the_drone_by_a_metre(make_world):
+    world = make_world()
+    assert world.body.position[0].tolist() == [0.0, 0.0, 2.5]
+    assert [round(place[0]) for place in world.objects] == [15, 24, 33]
+    assert world.step(FORWARD) == 0.0
+    assert world.body.position[0].tolist() == [1.0, 0.0, 2.5]
+    assert (world.goals, world.end, world.is_over) == ((0, 0), None, False)
+
+
+def test_cubes_vanish_when_a_person_touches_them_and_nothing_ends(make_world):
+    world = make_world()
+    x, y, z = world.objects[1]
+    turned(world, x + 1.6, y, z, 0.0)  # touched: 1.65 m = (2.5 + 0.8) / 2
+    assert world.objects[1] is None and world.goals[0] == 1
+    turned(world, 100.0, 50.0, 30.0, 0.0)  # behind all cubes and beyond every boundary
+    assert not world.is_over
+    assert world.objects[0] is not None and world.objects[2] is not None
+    world.align()
+    world.step(FORWARD)
+    assert world.end == "behind the last cube" and world.is_over
+
+
+def test_a_new_episode_has_other_cubes_and_counts(make_world):
+    world = make_world()
+    before = world.objects
+    world.step(FORWARD)
+    world.reset()
+    assert world.episode == 2 and world.reward == 0.0
+    assert world.objects != before
+    assert world.body.position[0].tolist() == [0.0, 0.0, 2.5]
+
+
+def test_a_new_episode_follows_a_flight_of_another_kind_of_body(make_world):
+    world = make_world()
+    world.move(Quadrotor(world.flight_dynamics).start(world.body.position))
+    assert isinstance(world.body, FlightState)
+    world.reset()
+    assert not isinstance(world.body, FlightState)
+    world.step(FORWARD)
+
+
+def test_moves_begin_level_at_the_tasks_altitude(make_world):
+    world = make_world()
+    turned(world, 3.0, -2.0, 9.0, 1.0)
+    world.align()
+    assert world.body.position[0].tolist() == [3.0, -2.0, 2.5]
+    assert world.body.attitude[0].tolist() == [1.0, 0.0, 0.0, 0.0]
+
+
+def test_a_drone_with_dynamics_flies_on_and_gets_targets(make_world):
+    world = make_world("flight")
+    flying = Quadrotor(world.flight_dynamics).start(torch.tensor([[3.0, -2.0, 9.0]]).double())
+    flying.velocity[0, 0] = 2.0
+    world.move(flying)
+    world.align()
+    assert world.body.position[0].tolist() == [3.0, -2.0, 9.0]
+    assert world.body.velocity[0].tolist() == [2.0, 0.0, 0.0]
+    assert world.body.reference[0].tolist() == [3.0, -2.0, 0.0, 2.5]
+
+
+def test_the_observation_is_that_of_the_policys_environment(make_world):
+    world = make_world(seed=4)
+    policy = drone_rl.load_policy("good")
+    env = policy.make_env(1, seed=4)
+    expected = env.reset()["pixels"]
+    env.close()
+    seen = world.see()
+    assert torch.equal(seen.observation, expected)
+    assert int(seen.action) == policy.act(seen.frame[0])
+    assert sum(seen.probabilities) == pytest.approx(1.0)
+    assert world.see() is seen  # computed once for each state
+    world.step(FORWARD)
+    assert world.see() is not seen
+
+
+def test_stacked_frames_are_those_of_the_last_actions(make_world):
+    transforms = (Gray(), Stack(N=2))
+    policy = drone_rl.load_policy("good")
+    description = PolicyDescription(
+        policy.task, policy.description.camera, transforms, SmallCnn(channels=(2,), hidden=(4,))
+    )
+    weights = description.build_network(torch.Generator().manual_seed(0)).state_dict()
+    state = {**policy.state, "policy": weights, "description": description.as_dict()}
+    world = make_world(Policy("stacked", Path("none"), description, state))
+    first = world.see().observation
+    assert torch.equal(first[0, 0], first[0, 1])
+    for _ in range(8):
+        before = world.see().observation[0, 1]
+        world.step(FORWARD)
+    assert torch.equal(world.see().observation[0, 0], before)
+    assert not torch.equal(world.see().observation[0, 1], before)
+    world.move(world.body)  # a person takes over: there are no frames of actions
+    after = world.see().observation
+    assert torch.equal(after[0, 0], after[0, 1])
+
+
+class Remembering:
+    """An actor that counts the steps since it was last made to forget."""
+
+    def __init__(self):
+        self.seen = []
+
+    def __call__(self, tensordict):
+        """Move forward; remember one more step."""
+        count = tensordict["count"]
+        self.seen.append(int(count))
+        tensordict["logits"] = torch.tensor([[1.0, 0.0, 0.0]])
+        tensordict["action"] = torch.tensor([0])
+        tensordict["next", "count"] = count + 1
+        return tensordict
+
+
+def test_a_policy_that_remembers_keeps_its_memory_from_step_to_step(make_world, monkeypatch):
+    world, actor = make_world(), Remembering()
+    monkeypatch.setattr(world, "_actor", actor)
+    monkeypatch.setattr(world, "_forgotten", {"count": torch.zeros(1, 1)})
+    world.reset()
+    for _ in range(3):
+        world.step(world.see().action)
+    world.see()
+    world.move(world.body)  # a person takes over
+    world.see()
+    world.reset()
+    world.see()
+    assert actor.seen == [0, 1, 2, 3, 0, 0]
+
+
+def test_wind_blows_from_its_direction(make_world):
+    world = make_world("flight")
+    assert world.wind == (0.0, 0.0)
+    world.set_wind(5.0, 0.0)
+    assert world.flight_dynamics.wind == pytest.approx((-5.0, 0.0, 0.0))
+    world.set_wind(4.0, 90.0)  # from the right, to the left
+    assert world.worlds.dynamics.settings.wind == pytest.approx((0.0, 4.0, 0.0), abs=1e-12)
+    assert world.conditions[2].wind == pytest.approx((0.0, 4.0, 0.0), abs=1e-12)
+
+
+def test_the_policys_own_wind_is_the_first_one(make_world):
+    policy = drone_rl.load_policy("flight").in_dynamics(wind=(0.0, -3.0, 1.0))
+    world = make_world(policy)
+    assert world.wind == pytest.approx((3.0, 270.0))
+    world.set_wind(2.0, 180.0)
+    assert world.flight_dynamics.wind == pytest.approx((2.0, 0.0, 1.0), abs=1e-12)
+
+
+def test_wind_leaves_a_drone_without_dynamics_alone(make_world):
+    world = make_world()
+    world.set_wind(5.0, 0.0)
+    assert not world.has_dynamics and world.conditions[2].wind == (0.0, 0.0, 0.0)
+    assert world.flight_dynamics.mode == "simple_flight"
+    world.step(FORWARD)
+    assert world.body.position[0].tolist() == [1.0, 0.0, 2.5]
+
+
+def test_light_scales_images_of_all_cameras(make_world):
+    world = make_world()
+    whole, seen = world.render("front_center").double(), world.see().frame.double()
+    version = world.version
+    world.set_light(0.5)
+    assert world.version > version
+    half = world.render("front_center").double()
+    assert (half - 0.5 * whole).abs().max() <= 1.0
+    assert (world.see().frame - 0.5 * seen).abs().max() <= 1.0
+    world.set_light(1.0)
+    assert torch.equal(world.render("front_center").double(), whole)
+
+
+def test_light_multiplies_the_exposure_of_an_appearance_that_varies(make_world):
+    policy = drone_rl.load_policy("good")
+    varied = policy.in_appearance(policy.description.appearance.replace(exposure=(0.5, 0.8)))
+    world = make_world(varied)
+    whole = world.render("front_center").double()
+    world.set_light(0.5)
+    assert (world.render("front_center") - 0.5 * whole).abs().max() <= 1.0
+
+
+@pytest.mark.parametrize("camera", ["front_left", "bottom_center", "back_center", "chase"])
+def test_every_camera_has_an_image_of_its_own(make_world, camera):
+    world = make_world()
+    image = world.render(camera)
+    assert image.shape == (144, 256, 3) and image.dtype == torch.uint8
+    assert not torch.equal(image, world.render("front_center"))
+
+
+@pytest.mark.parametrize(
+    ("policy", "speed", "seconds"),
+    [("good", 4.0, 0.25), ("good", 0.5, 2.0), ("flight", 4.0, 0.198), ("flight", 1.0, 0.198)],
+)
+def test_an_action_lasts_as_long_as_its_move_takes(make_world, policy, speed, seconds):
+    assert make_world(policy).seconds(speed) == pytest.approx(seconds)
+
+
+def test_speeds_without_dynamics_have_a_time_step(make_world):
+    policy = drone_rl.load_policy("flight_velocity").in_dynamics(mode="computer_vision")
+    world = make_world(policy)
+    assert world.seconds(3.0) == pytest.approx(0.198)
+    world.step(torch.tensor([[1.0, 0.0, 0.0]]))
+    assert float(world.body.position[0, 0]) == pytest.approx(0.198 * policy.actions.forward_speed)
+
+
+def test_goals_are_unknown_where_a_task_does_not_count_them(make_world, monkeypatch):
+    world = make_world()
+    monkeypatch.setattr(world, "task", Unexplained())
+    assert world.goals is None
+
+
+class Unexplained:
+    """A task whose goals can't be counted."""
+
+    def tally(self, info):
+        """Refuse, as the base class does."""
+        raise drone_rl.InputError("task=x cannot be explained; define tally in its class")
