@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from benchmarks.accessibility import bench_accessibility
+from benchmarks.airsim import bench_airsim
 from benchmarks.benchmark import Benchmark, Setup
 from benchmarks.chapter import bench_chapter
 from benchmarks.coverage import bench_coverage
@@ -290,6 +291,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_chapter(s.runs / "chapter", s.quick),
         "long",
         (*_TRAINING, "acceleration", "flight/commands", "conf", "benchmarks/chapter"),
+    ),
+    "airsim": Benchmark(
+        lambda s: bench_airsim(s.runs / "airsim", s.quick),
+        "flight",
+        (*_RENDERING, "flight", "benchmarks/airsim"),
     ),
     "mistakes": Benchmark(
         lambda s: bench_mistakes(s.runs / "mistakes"),

@@ -1,0 +1,85 @@
+"""Simulated time: periods, waits, pauses."""
+
+import math
+
+import pytest
+
+from drone_rl.flight.airsim.settings_file import parse_settings
+from drone_rl.flight.airsim.simulation import Simulation, Wait
+from drone_rl.utils.errors import InputError
+
+
+@pytest.fixture
+def make():
+    open_ones = []
+
+    def build(text="{}", **settings):
+        open_ones.append(Simulation(parse_settings(text), "empty", **settings))
+        return open_ones[-1]
+
+    yield build
+    for one in open_ones:
+        one.close()
+
+
+def test_lockstep_runs_while_a_call_waits_and_no_longer(make):
+    simulation, answers = make(clock="lockstep"), []
+    assert simulation.run(1.0) == math.inf and simulation.time == 0.0
+    simulation.wait_for(Wait(lambda: simulation.time >= 1.0, lambda: "done"), answers.append)
+    simulation.run(60.0)
+    assert answers == ["done"]
+    assert 1.0 <= simulation.time < 1.0 + simulation.tick
+    assert not simulation.is_waited_for
+
+
+def test_a_wait_that_is_done_is_answered_at_once(make):
+    simulation, answers = make(clock="lockstep"), []
+    simulation.wait_for(Wait(lambda: True, lambda: 7), answers.append)
+    assert answers == [7] and simulation.time == 0.0
+
+
+def test_a_forgotten_call_is_not_answered(make):
+    simulation, answers = make(clock="lockstep"), []
+    simulation.wait_for(Wait(lambda: False, lambda: 7), answers.append)
+    simulation.forget(answers.append)
+    reply = simulation._waits
+    assert len(reply) <= 1 and answers == []
+
+
+def test_continue_for_a_time_pauses_afterwards(make):
+    simulation, answers = make(clock="lockstep"), []
+    simulation.pause(True)
+    simulation.wait_for(simulation.continue_for(0.5), answers.append)
+    simulation.run(60.0)
+    assert answers == [None] and simulation.is_paused
+    assert simulation.time == pytest.approx(0.5, abs=simulation.tick)
+
+
+def test_paused_wall_time_stands_still(make):
+    simulation = make(clock="wall")
+    simulation.pause(True)
+    assert simulation.run(0.1) == math.inf and simulation.time == 0.0
+    simulation.pause(False)
+    assert 0.0 < simulation.run(0.0) <= simulation.tick
+
+
+def test_vehicles_are_found_by_name(make):
+    simulation = make('{"Vehicles": {"One": {}, "Two": {}}}')
+    assert simulation.find("") is simulation.find("One")
+    with pytest.raises(InputError, match="Vehicle API for 'Tow' is not available"):
+        simulation.find("Tow")
+    with pytest.raises(InputError, match="Vehicle Sim-API for 'Tow' is not available"):
+        simulation.find("Tow", is_pose=True)
+
+
+def test_reset_keeps_the_time_and_drops_api_control(make):
+    simulation = make(clock="lockstep")
+    vehicle = simulation.find("")
+    vehicle.allow(True)
+    future, answers = vehicle.takeoff(20.0), []
+    simulation.wait_for(Wait(lambda: future.done, future.result), answers.append)
+    simulation.run(0.0)
+    before = simulation.time
+    simulation.reset()
+    assert answers == [False]
+    assert simulation.time == before and not vehicle.has_api_control
