@@ -108,7 +108,6 @@ class Simulation:
             choice,
             self._dynamics,
             self.stage.worlds,
-            self.stage.obstacles,
             names=names,
             home=self.settings.home,
             height=self.stage.start_height,
@@ -164,7 +163,6 @@ class Simulation:
         self.stage.reset()
         for vehicle in self.vehicles.values():
             vehicle.reset()
-            vehicle.set_obstacles(self.stage.obstacles)
         self._settle()
 
     # Time

@@ -185,11 +185,6 @@ class Stage:
         self.worlds.reset(torch.arange(1), [self._random])
 
     @property
-    def obstacles(self) -> Obstacles | None:
-        """What vehicles can touch."""
-        return self.task.obstacles(self.worlds.state)
-
-    @property
     def start_height(self) -> float:
         """Height at which a vehicle without dynamics starts, metres."""
         return float(self.task.origin[2])

@@ -14,7 +14,7 @@ from drone_rl.flight.airsim.settings_file import POSING, Offset, VehicleChoice
 from drone_rl.flight.commands.command import Command, FlightFuture, PilotError
 from drone_rl.flight.commands.path_following import Drivetrain, YawMode
 from drone_rl.flight.commands.pilot import MOVING, Pilot, Sticks
-from drone_rl.flight.commands.state import LandedState
+from drone_rl.flight.commands.state import LandedState, Trajectory
 from drone_rl.sim.coordinates import GeoPoint, geo_from_world, world_from_geo
 from drone_rl.sim.dynamics import Obstacles, Quadrotor
 from drone_rl.sim.dynamics.state import (
@@ -45,15 +45,13 @@ class Vehicle(Pilot):
     Movements return a `FlightFuture`, or None where API control is off, which refuses them.
     """
 
-    _most_recorded = 1  # states of the trajectory: a server runs for days
-
     def __init__(
         self,
         choice: VehicleChoice,
         dynamics: DynamicsSettings,
         worlds: Worlds | None,
-        obstacles: Obstacles | None,
         *,
+        obstacles: Obstacles | None = None,
         names: Sequence[str] = (),
         home: GeoPoint,
         height: float = 0.0,
@@ -65,7 +63,7 @@ class Vehicle(Pilot):
             choice: Its kind, start pose and cameras.
             dynamics: Vehicle and wind.
             worlds: A single world that the cameras render; None for nothing to see.
-            obstacles: What it can touch.
+            obstacles: What it can touch; by default the objects of `worlds`, where they stand.
             names: Names of the obstacles.
             home: Place on Earth of the world's origin.
             height: Metres above the ground at which a vehicle without dynamics starts.
@@ -99,6 +97,8 @@ class Vehicle(Pilot):
         self._read_contact = -1.0
         self._before = self.body
         self._is_armed = self.choice.is_armed and not self.is_computer_vision
+        self.trajectory = Trajectory(1)  # a server runs for days
+        self.trajectory.append(self.time, self.body)
 
     def reset(self) -> Any:
         """Put it back to the start pose, without API control."""
@@ -115,10 +115,6 @@ class Vehicle(Pilot):
         """Take other dynamics, such as another wind, from now on."""
         self._quadrotor = Quadrotor(dynamics)
         self.settings = dynamics
-
-    def set_obstacles(self, obstacles: Obstacles | None) -> None:
-        """Take the obstacles of a scene that was placed anew."""
-        self._obstacles = obstacles
 
     @property
     def period(self) -> int:
@@ -183,15 +179,16 @@ class Vehicle(Pilot):
 
     def sees(self, place: GeoPoint) -> bool:
         """Return whether no obstacle stands between it and a place on Earth."""
-        there = torch.tensor(world_from_geo(place, self.geo_home), dtype=torch.float64)
+        there = world_from_geo(torch.tensor(place, dtype=torch.float64), self.geo_home)
         if float(there[2]) < 0.0:
             return False
-        if self._obstacles is None:
+        around = self._around
+        if around is None:
             return True
-        here, half = self.body.position[0], there.new_tensor(self._obstacles.half_sizes)
+        here, half = self.body.position[0], there.new_tensor(around.half_sizes)
         way = there - here
         way = torch.where(way == 0.0, 1e-12, way)
-        away = self._obstacles.centers[0] - here
+        away = around.centers[0] - here
         ends = torch.stack([(away - half) / way, (away + half) / way])
         enters, leaves = ends.amin(0).amax(-1), ends.amax(0).amin(-1)
         return not bool(((enters <= leaves) & (leaves >= 0.0) & (enters <= 1.0)).any())
@@ -391,7 +388,7 @@ class Vehicle(Pilot):
         adaptive: float,
     ) -> FlightFuture | None:
         """Fly to a place on Earth."""
-        there = torch.tensor(world_from_geo(place, self.geo_home), dtype=torch.float64)
+        there = world_from_geo(torch.tensor(place, dtype=torch.float64), self.geo_home)
         target = ned((there - self.home)[None])
         return self.move_path([target], speed, timeout, drivetrain, yaw, lookahead, adaptive)
 
@@ -476,9 +473,10 @@ class Vehicle(Pilot):
         ways = torch.linspace(0.0, 1.0, steps + 1, dtype=torch.float64)[:, None]
         places = here + ways * (there - here)
         free = places[:, 2] >= min(radius, float(here[2])) - 1e-9
-        if self._obstacles is not None:
-            half = places.new_tensor(self._obstacles.half_sizes)
-            apart = (places[:, None] - self._obstacles.centers[0]).abs() - half
+        around = self._around
+        if around is not None:
+            half = places.new_tensor(around.half_sizes)
+            apart = (places[:, None] - around.centers[0]).abs() - half
             inside = apart.clamp(min=0.0).norm(dim=-1) < radius
             free &= ~inside.any(-1)
         free[0] = True

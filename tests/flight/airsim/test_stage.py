@@ -144,8 +144,8 @@ def test_fog_and_night_darken_or_hide(cubes):
 
 def test_blocks_can_be_touched_and_a_file_is_shown(tmp_path):
     blocks = Stage("blocks", 0)
-    assert blocks.obstacles is not None and len(blocks.names) == 35
-    assert tuple(blocks.obstacles.half_sizes) == (2.0, 2.0, 2.0)
+    assert len(blocks.names) == 35
+    assert tuple(blocks.task.obstacles(blocks.worlds.state).half_sizes) == (2.0, 2.0, 2.0)
     blocks.close()
     path = tmp_path / "house.xml"
     path.write_text(

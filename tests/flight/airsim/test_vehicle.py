@@ -24,7 +24,8 @@ BOX = Obstacles(torch.tensor([[[5.0, 0.0, 1.0]]], dtype=torch.float64), (1.0, 1.
 def make(kind="SimpleFlight", obstacles=None, **choice):
     given = VehicleChoice("A", kind, **{"has_api_control": True, **choice})
     dynamics = DynamicsSettings(mode="simple_flight")
-    return Vehicle(given, dynamics, None, obstacles, names=["box"], home=HOME, height=2.5)
+    around = {"obstacles": obstacles, "names": ["box"]}
+    return Vehicle(given, dynamics, None, **around, home=HOME, height=2.5)
 
 
 def fly(vehicle, future, seconds=60.0):
