@@ -8,6 +8,20 @@ import pytest
 from drone_rl.flight.airsim.server import serve
 
 CV = '{"SimMode": "ComputerVision"}'
+SMALL = """{"SimMode": "ComputerVision", "CameraDefaults": {"CaptureSettings": [
+  {"ImageType": -1, "Width": 16, "Height": 8, "FOV_Degrees": 90}]}}"""
+NAN = float("nan")
+LEVEL = {"w_val": 1.0, "x_val": 0.0, "y_val": 0.0, "z_val": 0.0}
+YAW = {"is_rate": True, "yaw_or_rate": 0.0}
+
+
+def pose(x, y, z, orientation=LEVEL):
+    return {"position": {"x_val": x, "y_val": y, "z_val": z}, "orientation": orientation}
+
+
+def request(camera="0", kind=0, *, as_float=False, compress=False, **more):
+    given = {"image_type": kind, "pixels_as_float": as_float, "compress": compress}
+    return {"camera_name": camera, **given, **more}
 
 
 class Client:
