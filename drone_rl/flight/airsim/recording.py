@@ -3,16 +3,13 @@
 import datetime
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from PIL import Image
+from torch import Tensor
 
-from drone_rl.flight.airsim.messages import nanoseconds
-from drone_rl.sim.image_types import ImageType
+from drone_rl.flight.airsim.messages import Pose, nanoseconds
 from drone_rl.utils.errors import InputError
-
-if TYPE_CHECKING:
-    from drone_rl.flight.airsim.simulation import Simulation
 
 INTERVAL = 0.05
 """Simulated seconds between two rows."""
@@ -27,8 +24,8 @@ class Recording:
     numpy reads the table by `numpy.genfromtxt(path, names=True, dtype=None, encoding="utf-8")`.
     """
 
-    def __init__(self, folder: Path, simulation: "Simulation") -> None:
-        """Create the folder and write the first row of each vehicle."""
+    def __init__(self, folder: Path, begin: float) -> None:
+        """Create the folder; rows are due from the simulated time `begin`."""
         now = datetime.datetime.now().strftime("%Y-%m-%d-%H-%M-%S-%f")
         self.path = folder / now
         try:
@@ -41,28 +38,24 @@ class Recording:
                 f"recordings can't be written to {folder} ({error.strerror}); choose another folder"
             ) from error
         self._table.write(_COLUMNS)
-        self._next = simulation.time
-        self.note(simulation)
+        self._next = begin
 
-    def note(self, simulation: "Simulation") -> None:
-        """Write a row of each vehicle if one is due."""
-        if simulation.time < self._next - 1e-9:
-            return
-        self._next = simulation.time + INTERVAL
-        for name, vehicle in simulation.vehicles.items():
-            stamp = nanoseconds(simulation.time)
-            file = f"img_{to_letters(name)}_0_{stamp}.png"
-            pose = vehicle.pose
-            values = (*pose.position, *pose.attitude)
-            row: list[Any] = [name or "Vehicle", stamp, *(f"{v:.6g}" for v in values), file]
-            self._table.write("\t".join(map(str, row)) + "\n")
-            camera = simulation.cameras[name]["front_center"]
-            (found,) = simulation.stage.render(
-                vehicle.body, "front_center", camera, [ImageType.SCENE]
-            )
-            pixels = simulation.stage.image(ImageType.SCENE, found, as_float=False)
-            Image.fromarray(pixels.numpy()).save(self.path / "images" / file, compress_level=1)
+    def is_due(self, time: float) -> bool:
+        """Return whether rows of this simulated time are to be written, and note that they are."""
+        if time < self._next - 1e-9:
+            return False
+        self._next = time + INTERVAL
+        return True
+
+    def write(self, time: float, name: str, pose: Pose, image: Tensor) -> None:
+        """Write the row of a vehicle with its image (H, W, 3), uint8."""
+        stamp = nanoseconds(time)
+        file = f"img_{to_letters(name)}_0_{stamp}.png"
+        values = (*pose.position, *pose.attitude)
+        row: list[Any] = [name or "Vehicle", stamp, *(f"{v:.6g}" for v in values), file]
+        self._table.write("\t".join(map(str, row)) + "\n")
         self._table.flush()
+        Image.fromarray(image.numpy()).save(self.path / "images" / file, compress_level=1)
 
     def close(self) -> None:
         """Close the table."""

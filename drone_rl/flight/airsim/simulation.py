@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from drone_rl.config import DynamicsSettings
+from drone_rl.flight.airsim.cameras import CameraState, make_cameras
 from drone_rl.flight.airsim.messages import Pose, ned, ned_attitude, read_pose
 from drone_rl.flight.airsim.messages import pose as pose_map
 from drone_rl.flight.airsim.recording import Recording
@@ -18,8 +19,9 @@ from drone_rl.flight.airsim.settings_file import (
     Offset,
     VehicleChoice,
 )
-from drone_rl.flight.airsim.stage import CameraState, Stage
+from drone_rl.flight.airsim.stage import Stage
 from drone_rl.flight.airsim.vehicle import Vehicle
+from drone_rl.sim.image_types import ImageType
 from drone_rl.utils.errors import InputError, did_you_mean
 
 _log = logging.getLogger(__name__)
@@ -28,7 +30,7 @@ CLOCKS = ("wall", "lockstep")
 _MOST_VEHICLES = 100
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True)
 class Wait:
     """A call that is answered later, when simulated time has passed."""
 
@@ -114,7 +116,7 @@ class Simulation:
             seed=(self.seed + len(self.vehicles)) % 2**31,
         )
         self.vehicles[choice.name] = vehicle
-        self.cameras[choice.name] = self.stage.make_cameras(self.settings.captures, choice.cameras)
+        self.cameras[choice.name] = make_cameras(self.settings.captures, choice.cameras)
         return vehicle
 
     def add_named(self, name: str, kind: str, pose: Any) -> bool:
@@ -237,8 +239,7 @@ class Simulation:
             vehicle.run(vehicle.period)
             self.stage.touch(vehicle.body.position[0])
         self._periods += 1
-        if self.recording is not None:
-            self.recording.note(self)
+        self._record()
         if self._until is not None and self.time >= self._until - 1e-9:
             self.is_paused, self._until = True, None
         self._settle()
@@ -259,7 +260,17 @@ class Simulation:
         if self._recordings is None:
             raise InputError("there is no folder for recordings; start the server with one")
         if self.recording is None:
-            self.recording = Recording(self._recordings, self)
+            self.recording = Recording(self._recordings, self.time)
+            self._record()
+
+    def _record(self) -> None:
+        if self.recording is None or not self.recording.is_due(self.time):
+            return
+        for name, vehicle in self.vehicles.items():
+            camera = self.cameras[name]["front_center"]
+            (shot,) = self.stage.render(vehicle.body, camera, [ImageType.SCENE])
+            image = self.stage.image(ImageType.SCENE, shot, as_float=False)
+            self.recording.write(self.time, name, vehicle.pose, image)
 
     def stop_recording(self) -> None:
         """End a recording."""

@@ -1,12 +1,14 @@
 """Methods that report, or set, where cameras are and what they see."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any
 
 from drone_rl.flight.airsim import messages
+from drone_rl.flight.airsim.cameras import CameraState
 from drone_rl.flight.airsim.messages import Map, number, read_map, read_pose, text, to_world
-from drone_rl.flight.airsim.methods.registry import method, name_at
+from drone_rl.flight.airsim.methods.registry import method, posed_at
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.sim.entities import find_camera
@@ -34,7 +36,7 @@ def camera_in_world(
 @method("simGetCameraInfo", least=1)
 def _camera_info(simulation: Simulation, args: Sequence[Any]) -> Map:
     camera = read_camera(args[0])
-    vehicle = simulation.find(name_at(args, 1), is_pose=True)
+    vehicle = posed_at(simulation, args, 1)
     place, turn = camera_in_world(simulation, vehicle, camera)
     capture = simulation.cameras[vehicle.choice.name][camera].capture(ImageType.SCENE)
     return {
@@ -57,29 +59,36 @@ def _projection(fov: float, aspect: float, near: float = 0.1) -> list[list[float
 
 @method("simSetCameraPose", least=2)
 def _set_camera_pose(simulation: Simulation, args: Sequence[Any]) -> None:
-    camera, pose = read_camera(args[0]), read_pose(args[1])
-    vehicle = simulation.find(name_at(args, 2), is_pose=True)
-    state = simulation.cameras[vehicle.choice.name][camera]
+    camera, pose = _camera_at(simulation, args), read_pose(args[1])
     given = to_world(pose.position)
     x, y, z = (
-        old if math.isnan(new) else new for old, new in zip(state.position, given, strict=True)
+        old if math.isnan(new) else new for old, new in zip(camera.position, given, strict=True)
     )
+    attitude = camera.attitude
     if not any(map(math.isnan, pose.attitude)):
-        state.attitude = messages.attitude_to_world(pose.attitude)[0]
-    state.position = (x, y, z)
+        attitude = messages.attitude_to_world(pose.attitude)[0]
+    _put(simulation, args, dataclasses.replace(camera, position=(x, y, z), attitude=attitude))
 
 
 @method("simSetCameraOrientation", least=2)
 def _set_camera_orientation(simulation: Simulation, args: Sequence[Any]) -> None:
-    camera = read_camera(args[0])
     keys = ("w_val", "x_val", "y_val", "z_val")
-    attitude = messages.attitude_to_world(read_map(args[1], "orientation", keys))
-    vehicle = simulation.find(name_at(args, 2), is_pose=True)
-    simulation.cameras[vehicle.choice.name][camera].attitude = attitude[0]
+    attitude = messages.attitude_to_world(read_map(args[1], "orientation", keys))[0]
+    camera = _camera_at(simulation, args)
+    _put(simulation, args, dataclasses.replace(camera, attitude=attitude))
 
 
 @method("simSetCameraFov", least=2)
 def _set_camera_fov(simulation: Simulation, args: Sequence[Any]) -> None:
-    camera, fov = read_camera(args[0]), number(args[1], "fov_degrees", 1.0, 170.0)
-    vehicle = simulation.find(name_at(args, 2), is_pose=True)
-    simulation.cameras[vehicle.choice.name][camera].fov = fov
+    fov = number(args[1], "fov_degrees", 1.0, 170.0)
+    _put(simulation, args, dataclasses.replace(_camera_at(simulation, args), fov=fov))
+
+
+def _camera_at(simulation: Simulation, args: Sequence[Any]) -> CameraState:
+    vehicle = posed_at(simulation, args, 2)
+    return simulation.cameras[vehicle.choice.name][read_camera(args[0])]
+
+
+def _put(simulation: Simulation, args: Sequence[Any], camera: CameraState) -> None:
+    vehicle = posed_at(simulation, args, 2)
+    simulation.cameras[vehicle.choice.name][camera.name] = camera

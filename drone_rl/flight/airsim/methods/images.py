@@ -9,9 +9,9 @@ import torch
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.messages import Map, flag, text, whole
 from drone_rl.flight.airsim.methods.cameras import camera_in_world, read_camera
-from drone_rl.flight.airsim.methods.registry import method, name_at
+from drone_rl.flight.airsim.methods.registry import method, posed_at
 from drone_rl.flight.airsim.simulation import Simulation
-from drone_rl.flight.airsim.stage import png
+from drone_rl.flight.airsim.stage import Shot, png
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.sim.image_types import ImageType
 from drone_rl.utils.errors import InputError
@@ -68,22 +68,21 @@ def _images(simulation: Simulation, args: Sequence[Any]) -> list[Map]:
     if not isinstance(args[0], list | tuple) or len(args[0]) > MAX_IMAGES:
         raise InputError(f"requests are not a list of at most {MAX_IMAGES}; give ImageRequests")
     requests = [_read_request(value) for value in args[0]]
-    name = name_at(args, 1)
-    vehicle = simulation.find(name, is_pose=True)
+    vehicle = posed_at(simulation, args, 1)
     cameras = simulation.cameras[vehicle.choice.name]
     found: list[Any] = [None] * len(requests)
     for camera in dict.fromkeys(request.camera for request in requests):
         rows = [i for i, request in enumerate(requests) if request.camera == camera]
         kinds = [requests[i].kind for i in rows]
-        rendered = simulation.stage.render(vehicle.body, camera, cameras[camera], kinds)
+        rendered = simulation.stage.render(vehicle.body, cameras[camera], kinds)
         for i, one in zip(rows, rendered, strict=True):
             found[i] = _response(simulation, vehicle, requests[i], one)
     return found
 
 
-def _response(simulation: Simulation, vehicle: Vehicle, request: _Request, one: Any) -> Map:
+def _response(simulation: Simulation, vehicle: Vehicle, request: _Request, shot: Shot) -> Map:
     stage = simulation.stage
-    image = stage.image(request.kind, one, as_float=request.is_float)
+    image = stage.image(request.kind, shot, as_float=request.is_float)
     numbers: list[float] = []
     content = b""
     if request.is_float:
@@ -103,8 +102,8 @@ def _response(simulation: Simulation, vehicle: Vehicle, request: _Request, one: 
         "message": "",
         "pixels_as_float": request.is_float,
         "compress": request.is_compressed,
-        "width": one["capture"].width,
-        "height": one["capture"].height,
+        "width": shot.capture.width,
+        "height": shot.capture.height,
         "image_type": int(request.kind),
     }
     response["camera_id" if legacy else "camera_name"] = (
@@ -126,7 +125,7 @@ def _raw(image: torch.Tensor, channels: str) -> bytes:
 @method("simGetImage", least=2)
 def _image(simulation: Simulation, args: Sequence[Any]) -> bytes:
     camera, kind = read_camera(args[0]), _image_type(args[1])
-    vehicle = simulation.find(name_at(args, 2), is_pose=True)
+    vehicle = posed_at(simulation, args, 2)
     state = simulation.cameras[vehicle.choice.name][camera]
-    (one,) = simulation.stage.render(vehicle.body, camera, state, [kind])
+    (one,) = simulation.stage.render(vehicle.body, state, [kind])
     return png(simulation.stage.image(kind, one, as_float=False))
