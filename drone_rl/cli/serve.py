@@ -35,7 +35,8 @@ class ServeCommand(CommandSettings):
 
     def run(self, folder: Path) -> tuple[int, None]:
         """Serve until Ctrl-C; return the exit status."""
-        from drone_rl.flight.airsim.server import make_simulation, run  # slow to import
+        from drone_rl.flight.airsim.server import run  # slow to import
+        from drone_rl.flight.airsim.serving import make_simulation
 
         simulation, host, port = make_simulation(
             self.settings,

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks import airsim
 from drone_rl.flight.airsim.methods import METHODS, UNSUPPORTED
-from drone_rl.flight.airsim.server import serve
+from drone_rl.flight.airsim.serving import serve
 
 
 def test_crafted_messages_are_of_all_kinds():

@@ -5,7 +5,7 @@ import socket
 import msgpack
 import pytest
 
-from drone_rl.flight.airsim.server import serve
+from drone_rl.flight.airsim.serving import serve
 
 CV = '{"SimMode": "ComputerVision"}'
 SMALL = """{"SimMode": "ComputerVision", "CameraDefaults": {"CaptureSettings": [
