@@ -8,7 +8,7 @@ from typing import Annotated
 
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config import RendererName
-from drone_rl.utils.schema import OneOf, Whole
+from drone_rl.utils.schema import OneOf, Real, Whole
 
 _log = logging.getLogger(__name__)
 
@@ -24,6 +24,9 @@ class ServeCommand(CommandSettings):
     clock: Annotated[str, OneOf(("wall", "lockstep"))] = "wall"
     """wall, the time of day times ClockSpeed; or lockstep: time passes only while a call waits for
     it, as fast as the machine can, with the same results every time."""
+    patience: Annotated[float, Real(0.0, 60.0, unit="s")] = 0.02
+    """Seconds without a request after which time passes in lockstep. Give more for a client that
+    computes long between the start of a movement and its next request."""
     address: str | None = None
     """Address to listen at; null for that of the settings file, 127.0.0.1 by default."""
     port: Annotated[int, Whole(0, 65535)] | None = None
@@ -55,5 +58,5 @@ class ServeCommand(CommandSettings):
             print(f"ready: AirSim's clients can connect to {address}", flush=True)
 
         with contextlib.suppress(KeyboardInterrupt), contextlib.closing(simulation):
-            asyncio.run(run(simulation, host, port, ready))
+            asyncio.run(run(simulation, host, port, ready, self.patience))
         return 0, None

@@ -2,7 +2,9 @@
 
 import asyncio
 import logging
+import socket
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -22,16 +24,19 @@ MAX_MESSAGE = 2**22
 MAX_PENDING = 1000
 """Calls of one client that wait at a time."""
 MAX_CLIENTS = 1000
+TURN = 0.005
+"""Seconds of work for one client before others have their turn."""
 MAX_UNSENT = 2**25
 """Bytes of replies that a client may leave unread before its requests wait."""
 _MAX_ITEMS = 100_000
+_QUICK_ACK: int | None = getattr(socket, "TCP_QUICKACK", None)
+"""An option of Linux."""
 
 
 class Host(Protocol):
     """What a connection needs of its server."""
 
     simulation: Simulation
-    last_request: float
 
     def admit(self, client: "Connection") -> bool:
         """Take note of a client; return whether there is room for it."""
@@ -41,8 +46,12 @@ class Host(Protocol):
         """Forget a client."""
         ...
 
-    def wait_for(self, wait: Wait, reply: Callable[[Any], None]) -> None:
-        """Answer a call when simulated time has come."""
+    def must_wait(self, client: "Connection") -> bool:
+        """Return whether requests have to wait; the client is then released when they need not."""
+        ...
+
+    def note(self, client: "Connection") -> None:
+        """Take note of a request that was answered, or that waits."""
         ...
 
 
@@ -50,15 +59,21 @@ class Connection(asyncio.Protocol):
     """One connection."""
 
     def __init__(self, server: Host) -> None:
+        """Create a connection of a server."""
         self._server = server
         self._unpacker = _unpacker()
         self._transport: Any = None
         self._name = "client"
         self._pending = 0
         self._is_full = False
-        self._backlog: list[Any] = []
+        """Whether the client leaves too many replies unread."""
+        self._is_held = False
+        """Whether it goes on at a later time."""
+        self._backlog: deque[Any] = deque()
         self._replies: set[Callable[[Any], None]] = set()
         self.is_open = False
+        self.is_pilot = False
+        """Whether one of its calls has ever waited for simulated time."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """See `asyncio.Protocol`."""
@@ -76,6 +91,7 @@ class Connection(asyncio.Protocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """See `asyncio.Protocol`: calls that wait are answered no more."""
         self.is_open = False
+        self._backlog.clear()
         for reply in self._replies:
             self._server.simulation.forget(reply)
         self._replies.clear()
@@ -90,12 +106,11 @@ class Connection(asyncio.Protocol):
     def resume_writing(self) -> None:
         """See `asyncio.Protocol`."""
         self._is_full = False
-        self._transport.resume_reading()
         self._work()
 
     def data_received(self, data: bytes) -> None:
         """See `asyncio.Protocol`."""
-        self._server.last_request = time.monotonic()
+        self._acknowledge()
         try:
             self._unpacker.feed(data)
             self._backlog.extend(self._unpacker)
@@ -104,9 +119,37 @@ class Connection(asyncio.Protocol):
             return
         self._work()
 
+    def _acknowledge(self) -> None:
+        """Acknowledge at once what has come.
+
+        After a request that is not answered yet, a client's system sends the next one only then,
+        and by default this system would take up to 40 ms.
+        """
+        if _QUICK_ACK is not None:
+            self._transport.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, _QUICK_ACK, 1)
+
+    def release(self) -> None:
+        """Go on with the requests that have come."""
+        self._is_held = False
+        self._work()
+
     def _work(self) -> None:
-        while self._backlog and not self._is_full and self.is_open:
-            self._handle(self._backlog.pop(0))
+        """Handle the requests that have come, as long as others need not wait for them."""
+        end = time.monotonic() + TURN
+        while self._backlog and self.is_open and not self._is_full and not self._is_held:
+            if self._server.must_wait(self):
+                self._is_held = True
+            elif time.monotonic() > end:
+                self._is_held = True
+                asyncio.get_running_loop().call_soon(self.release)
+            else:
+                self._handle(self._backlog.popleft())
+                self._server.note(self)
+        if self.is_open and not self._is_full:
+            if self._is_held:
+                self._transport.pause_reading()
+            else:
+                self._transport.resume_reading()
 
     def _break(self, reason: str) -> None:
         _log.warning("%s is disconnected: %s", self._name, reason)
@@ -166,7 +209,8 @@ class Connection(asyncio.Protocol):
             self._answer(number, None, result)
 
         self._replies.add(reply)
-        self._server.wait_for(wait, reply)
+        self.is_pilot = True
+        self._server.simulation.wait_for(wait, reply)
 
     def _fail(self, number: int | None, message: str) -> None:
         _log.warning("%s: %s", self._name, message)
@@ -186,7 +230,7 @@ class Connection(asyncio.Protocol):
 def _unpacker() -> Any:
     return msgpack.Unpacker(
         raw=False,
-        unicode_errors="surrogateescape",
+        unicode_errors="replace",
         strict_map_key=False,
         use_list=True,
         max_buffer_size=MAX_MESSAGE,

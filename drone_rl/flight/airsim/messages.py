@@ -16,6 +16,10 @@ Map = dict[str, Any]
 NANOSECONDS = 1_000_000_000
 MAX_POINTS = 10_000
 """Of a path."""
+MAX_NAME = 50
+"""Letters of a new name."""
+MAX_PATTERN = 200
+"""Letters of a regular expression."""
 _FARTHEST = 3.5e38
 """Largest float32, AirSim's default timeout among them."""
 
@@ -121,12 +125,14 @@ def flag(value: Any, name: str) -> bool:
     raise InputError(f"{name}={shown(value)} is neither true nor false; give one of them")
 
 
-def text(value: Any, name: str) -> str:
-    """Return a text; bytes, which old clients send, are decoded."""
+def text(value: Any, name: str, most: int = 10_000) -> str:
+    """Return a text of at most so many letters; bytes, which old clients send, are decoded."""
     if isinstance(value, bytes):
         value = value.decode("utf-8", "replace")
-    if not isinstance(value, str) or len(value) > 10_000:
-        raise InputError(f"{name}={shown(value)} is not a text; give one of at most 10,000 letters")
+    if not isinstance(value, str) or len(value) > most:
+        raise InputError(
+            f"{name}={shown(value)} is not a text; give one of at most {most:,} letters"
+        )
     return value
 
 

@@ -2,32 +2,25 @@
 
 import asyncio
 import contextlib
-import math
-import time
 from collections.abc import Callable
 from typing import Any
 
 from drone_rl.flight.airsim.connection import MAX_CLIENTS, Connection
-from drone_rl.flight.airsim.simulation import Simulation, Wait
+from drone_rl.flight.airsim.lockstep import PATIENCE, SLICE, Lockstep
+from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.utils.errors import InputError
 
-SLICE = 0.005
-"""Seconds of simulation between two looks at the sockets."""
-PATIENCE = 0.005
-"""Seconds without a request after which lockstep time goes on: what a client asks right after it
-starts a movement is answered at the same simulated time every run."""
-MOST_PATIENCE = 0.02
 _POLL = 0.05
+"""Longest sleep, seconds."""
 
 
 class AirsimServer:
     """Serves one simulation to any number of clients, and advances its time."""
 
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, simulation: Simulation, patience: float = PATIENCE) -> None:
+        """Create a server that does not listen yet; for `patience` see `lockstep`."""
         self.simulation = simulation
-        self.last_request = -math.inf
-        """Time of day of the last request."""
-        self._asked = -math.inf
+        self._lockstep = Lockstep(simulation, patience)
         self._clients: set[Connection] = set()
         self._wake = asyncio.Event()
         self._server: asyncio.Server | None = None
@@ -50,11 +43,17 @@ class AirsimServer:
         """Forget a client."""
         self._clients.discard(client)
 
-    def wait_for(self, wait: Wait, reply: Callable[[Any], None]) -> None:
-        """Answer a call when simulated time has come."""
-        self._asked = time.monotonic()
-        self.simulation.wait_for(wait, reply)
+    def must_wait(self, client: Connection) -> bool:
+        """Return whether requests have to wait; the client is then released when they need not."""
+        if self._lockstep.is_running:
+            self._lockstep.hold(client)
+        return self._lockstep.is_running
+
+    def note(self, client: Connection) -> None:
+        """Take note of a request that was answered, or that waits."""
         self._wake.set()
+        if self.simulation.clock == "lockstep":
+            self._lockstep.note(is_pilot=client.is_pilot)
 
     async def start(self, host: str, port: int) -> None:
         """Listen.
@@ -73,34 +72,16 @@ class AirsimServer:
 
     async def serve(self) -> None:
         """Advance simulated time until cancelled."""
-        simulation = self.simulation
         try:
+            if self.simulation.clock == "lockstep":
+                await self._lockstep.run()
             while True:
-                if simulation.clock == "lockstep":
-                    await self._wait_until_asked()
-                left = simulation.run(SLICE)
-                if left <= 0.0 or simulation.clock == "lockstep":
-                    await asyncio.sleep(0)
-                    continue
-                await self._sleep(min(left, _POLL))
+                await self._sleep(min(self.simulation.follow(SLICE), _POLL))
         finally:
             self.close()
 
-    async def _wait_until_asked(self) -> None:
-        """Wait for a call that needs time, and until its client asks nothing more.
-
-        Another client that asks without pause delays a call by `MOST_PATIENCE` only.
-        """
-        while not self.simulation.is_waited_for or self.simulation.is_paused:
-            await self._sleep(_POLL)
-        while True:
-            quiet = min(self.last_request + PATIENCE, self._asked + MOST_PATIENCE)
-            if (left := quiet - time.monotonic()) <= 0.0:
-                return
-            await asyncio.sleep(left)
-
     async def _sleep(self, seconds: float) -> None:
-        """Sleep until a call waits, at most so long."""
+        """Sleep until a request comes, at most so long."""
         self._wake.clear()
         # not asyncio.wait_for, which can lose a cancellation
         with contextlib.suppress(TimeoutError):
@@ -115,13 +96,15 @@ class AirsimServer:
             client.close()
 
 
-async def run(simulation: Simulation, host: str, port: int, ready: Callable[[str], None]) -> None:
+async def run(
+    simulation: Simulation, host: str, port: int, ready: Callable[[str], Any], patience: float
+) -> None:
     """Serve a simulation until cancelled; `ready` is called with the address once it listens.
 
     Raises:
         InputError: The port is in use.
     """
-    server = AirsimServer(simulation)
+    server = AirsimServer(simulation, patience)
     await server.start(host, port)
     address, number = server.address
     ready(f"{address}:{number}")

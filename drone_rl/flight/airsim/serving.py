@@ -7,11 +7,12 @@ import threading
 from pathlib import Path
 from typing import Self
 
+from drone_rl.flight.airsim.lockstep import PATIENCE
 from drone_rl.flight.airsim.server import AirsimServer
 from drone_rl.flight.airsim.settings_file import AirsimSettings, parse_settings, read_settings
 from drone_rl.flight.airsim.simulation import CLOCKS, Simulation
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import OneOf, Whole
+from drone_rl.utils.schema import OneOf, Real, Whole
 
 _log = logging.getLogger(__name__)
 
@@ -19,8 +20,11 @@ _log = logging.getLogger(__name__)
 class RunningServer:
     """A server in a thread of this process; a context manager that stops it."""
 
-    def __init__(self, simulation: Simulation, host: str, port: int) -> None:
+    def __init__(
+        self, simulation: Simulation, host: str, port: int, patience: float = PATIENCE
+    ) -> None:
         """Start it; see `AirsimServer.start` for errors."""
+        self._patience = patience
         self.simulation = simulation
         """The simulation, which only the server's thread may touch while it runs."""
         self.address = ("", 0)
@@ -55,7 +59,7 @@ class RunningServer:
 
     async def _serve(self, host: str, port: int) -> None:
         self._loop, self._task = asyncio.get_running_loop(), asyncio.current_task()
-        server = AirsimServer(self.simulation)
+        server = AirsimServer(self.simulation, self._patience)
         try:
             await server.start(host, port)
             self.address = server.address
@@ -72,6 +76,7 @@ def serve(
     *,
     scene: str = "cubes",
     clock: str = "wall",
+    patience: float = PATIENCE,
     address: str | None = None,
     port: int | None = None,
     seed: int = 0,
@@ -87,6 +92,7 @@ def serve(
         settings: Path of a settings.json, or its content; by default one multirotor.
         scene: cubes, blocks, pillars, empty, or the path of an MJCF file.
         clock: "wall", or "lockstep", in which time passes only while a call waits for it.
+        patience: Seconds without a request after which time passes in lockstep.
         address: Address to listen at; that of the settings by default.
         port: Port; that of the settings by default, and 0 for a free one.
         seed: Of placements, gusts and sensor noise.
@@ -106,7 +112,8 @@ def serve(
         renderer=renderer,
         recordings=recordings,
     )
-    return RunningServer(simulation, host, number)
+    patience = Real(0.0, 60.0).read(patience, "patience")
+    return RunningServer(simulation, host, number, patience)
 
 
 def make_simulation(

@@ -36,13 +36,15 @@ class Wait:
 
     is_done: Callable[[], bool]
     result: Callable[[], Any]
+    blocks: bool = False
+    """Whether clients do nothing until it is answered: they make this call synchronously."""
 
 
 class Simulation:
-    """Vehicles in one scene. Time advances by `run` only, for all vehicles together.
+    """Vehicles in one scene. Time advances for all of them together.
 
-    With the clock "wall", `run` follows the time of day, times `clock_speed`; with "lockstep", it
-    advances while a call waits, as fast as possible, so that results repeat.
+    With the clock "wall", `follow` makes it follow the time of day, times `clock_speed`; with
+    "lockstep", `advance` advances it as fast as possible, while a call waits.
     """
 
     def __init__(
@@ -179,9 +181,14 @@ class Simulation:
         self._waits = [(w, r) for w, r in self._waits if r is not reply]
 
     @property
-    def is_waited_for(self) -> bool:
-        """Whether a call waits for time to pass."""
-        return bool(self._waits)
+    def is_due(self) -> bool:
+        """Whether a call waits for time to pass, and time is not paused."""
+        return bool(self._waits) and not self.is_paused
+
+    @property
+    def is_blocked(self) -> bool:
+        """Whether the client of such a call does nothing else until it is answered."""
+        return self.is_due and any(wait.blocks for wait, _ in self._waits)
 
     def pause(self, is_paused: bool) -> None:
         """Stop or continue simulated time."""
@@ -193,17 +200,15 @@ class Simulation:
         self.is_paused = False
         end = self._until = self.time + seconds
         self._hold_anchor()
-        return Wait(lambda: self.is_paused or self.time >= end - 1e-9, lambda: None)
+        return Wait(lambda: self.is_paused or self.time >= end - 1e-9, lambda: None, blocks=True)
 
-    def run(self, budget: float) -> float:
-        """Advance time for at most `budget` seconds of real time.
+    def follow(self, budget: float) -> float:
+        """Follow the time of day, for at most `budget` seconds of real time.
 
         Returns:
             Seconds after which there is more to do; infinite if only a call can change that.
         """
         end = time.monotonic() + budget
-        if self.clock == "lockstep":
-            return self._run_lockstep(end)
         if self.is_paused:
             self._hold_anchor()
             return math.inf
@@ -217,12 +222,19 @@ class Simulation:
                 return 0.0
         return left
 
-    def _run_lockstep(self, end: float) -> float:
-        while self._waits and not self.is_paused:
-            self._period()
+    def advance(self, budget: float, until: float) -> bool:
+        """Advance time up to `until`, for at most `budget` seconds of real time.
+
+        Returns:
+            Whether a call was answered, or none waits: clients may have something to ask.
+        """
+        end = time.monotonic() + budget
+        while self.is_due and self.time < until - 1e-9:
+            if self._period():
+                return True
             if time.monotonic() > end:
-                return 0.0
-        return math.inf
+                return False
+        return not self.is_due
 
     def _left(self) -> float:
         """Seconds of real time until the next control period is due."""
@@ -233,8 +245,8 @@ class Simulation:
     def _hold_anchor(self) -> None:
         self._anchor = (time.monotonic(), self.time)
 
-    def _period(self) -> None:
-        """Advance all vehicles by a control period, and answer the calls that are done."""
+    def _period(self) -> bool:
+        """Advance all vehicles by a control period; return whether a call was answered."""
         for vehicle in self.vehicles.values():
             vehicle.run(vehicle.period)
             self.stage.touch(vehicle.body.position[0])
@@ -242,16 +254,18 @@ class Simulation:
         self._record()
         if self._until is not None and self.time >= self._until - 1e-9:
             self.is_paused, self._until = True, None
-        self._settle()
+        return self._settle()
 
-    def _settle(self) -> None:
+    def _settle(self) -> bool:
+        """Answer the calls that are done, in the order in which they came."""
         if not self._waits:
-            return
+            return False
         done = [(wait, reply) for wait, reply in self._waits if wait.is_done()]
         if done:
             self._waits = [pair for pair in self._waits if pair not in done]
             for wait, reply in done:
                 reply(wait.result())
+        return bool(done)
 
     # Recording
 
@@ -270,7 +284,12 @@ class Simulation:
             camera = self.cameras[name]["front_center"]
             (shot,) = self.stage.render(vehicle.body, camera, [ImageType.SCENE])
             image = self.stage.image(ImageType.SCENE, shot, as_float=False)
-            self.recording.write(self.time, name, vehicle.pose, image)
+            try:
+                self.recording.write(self.time, name, vehicle.pose, image)
+            except OSError as error:
+                _log.error("the recording ends: it can't be written (%s)", error.strerror)
+                self.recording = None
+                return
 
     def stop_recording(self) -> None:
         """End a recording."""

@@ -5,7 +5,7 @@ import dataclasses
 import io
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,9 +28,14 @@ from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
 
 SPARE = 12
 """Objects that can be spawned: boxes, balls and cylinders in turn."""
+
+_REPETITION = re.compile(r"(?<!\\)[*+?{]")
+_REPEATED_GROUP = re.compile(r"\)[*+?{]")
+_MOST_REPETITIONS = 3
 
 
 class Shot(NamedTuple):
@@ -113,12 +118,8 @@ class Stage:
         return [geom.name.partition("/")[2] for geom in geoms if geom.name]
 
     def find(self, pattern: str) -> list[str]:
-        """Return the names that match a regular expression, ignoring case, as a whole."""
-        try:
-            compiled = re.compile(pattern, re.IGNORECASE)
-        except re.error as error:
-            raise InputError(f"name={pattern!r} is no regular expression ({error})") from error
-        return [name for name in self.names if compiled.fullmatch(name)]
+        """Return the names that match a regular expression; see `matching`."""
+        return matching(pattern, self.names)
 
     def object_pose(self, name: str) -> Pose:
         """Return the pose in NED, of the world; NaN if there is no such object, or it vanished."""
@@ -292,6 +293,26 @@ class Stage:
     def close(self) -> None:
         """Close the renderer."""
         self.worlds.close()
+
+
+def matching(pattern: str, names: Iterable[str]) -> list[str]:
+    """Return the names that match a regular expression, ignoring case, as a whole.
+
+    Raises:
+        InputError: It is none, or one whose search could take forever.
+    """
+    parts = [pattern] if "(" in pattern else pattern.split("|")
+    most = max(len(_REPETITION.findall(part)) for part in parts)
+    if most > _MOST_REPETITIONS or _REPEATED_GROUP.search(pattern):
+        raise InputError(
+            f"name={shown(pattern)} repeats too much; give at most {_MOST_REPETITIONS} of * + ? "
+            "and {, and none after a group"
+        )
+    try:
+        compiled = re.compile(pattern, re.IGNORECASE)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise InputError(f"name={shown(pattern)} is no regular expression ({error})") from error
+    return [name for name in names if compiled.fullmatch(name)]
 
 
 def png(image: Tensor) -> bytes:

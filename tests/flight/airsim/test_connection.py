@@ -8,7 +8,7 @@ import msgpack
 import pytest
 
 from drone_rl.flight.airsim.connection import MAX_MESSAGE
-from tests.flight.airsim.conftest import CV, Client
+from tests.flight.airsim.conftest import CV, YAW, Client
 
 PING = bytes([0x94, 0x00, 0x00, 0xA4, *b"ping", 0x90])
 PONG = bytes([0x94, 0x01, 0x00, 0xC0, 0xC3])
@@ -104,6 +104,21 @@ def test_a_slow_reader_delays_itself_alone(start):
     assert client.call("ping") is True
     assert time.monotonic() - begin < 30
     slow.close()
+
+
+def test_a_second_request_comes_at_once(start):
+    """Without `TCP_QUICKACK` the client's system would hold it back for some 40 ms."""
+    _, client = start(patience=0.1)
+    client.call("enableApiControl", True)
+    client.call("takeoff", 20.0)
+    seconds = []
+    for _ in range(9):
+        movement = client.send("moveByVelocity", 0.0, 0.0, 0.0, 0.1, 0, YAW, "")
+        begin = time.monotonic()
+        client.call("ping")
+        seconds.append(time.monotonic() - begin)
+        client.receive(movement)
+    assert sorted(seconds)[4] < 0.03
 
 
 def test_a_client_that_dies_in_a_call_is_forgotten(start):

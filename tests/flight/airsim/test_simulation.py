@@ -24,12 +24,14 @@ def make():
 
 def test_lockstep_runs_while_a_call_waits_and_no_longer(make):
     simulation, answers = make(clock="lockstep"), []
-    assert simulation.run(1.0) == math.inf and simulation.time == 0.0
+    assert simulation.advance(1.0, math.inf) and simulation.time == 0.0
     simulation.wait_for(Wait(lambda: simulation.time >= 1.0, lambda: "done"), answers.append)
-    simulation.run(60.0)
+    assert not simulation.advance(60.0, 0.5)
+    assert 0.5 <= simulation.time < 0.5 + simulation.tick and answers == []
+    assert simulation.advance(60.0, math.inf)
     assert answers == ["done"]
     assert 1.0 <= simulation.time < 1.0 + simulation.tick
-    assert not simulation.is_waited_for
+    assert not simulation.is_due
 
 
 def test_a_wait_that_is_done_is_answered_at_once(make):
@@ -40,17 +42,33 @@ def test_a_wait_that_is_done_is_answered_at_once(make):
 
 def test_a_forgotten_call_is_not_answered(make):
     simulation, answers = make(clock="lockstep"), []
-    simulation.wait_for(Wait(lambda: False, lambda: 7), answers.append)
-    simulation.forget(answers.append)
-    reply = simulation._waits
-    assert len(reply) <= 1 and answers == []
+
+    def reply(result):
+        answers.append(result)
+
+    simulation.wait_for(Wait(lambda: simulation.time > 0.1, lambda: 7), reply)
+    assert simulation.is_due
+    simulation.forget(reply)
+    assert not simulation.is_due
+    assert simulation.advance(1.0, math.inf) and simulation.time == 0.0 and answers == []
+
+
+def test_time_stands_at_the_end_of_each_call(make):
+    """The second call, which ends later, is answered by another `advance`."""
+    simulation, answers = make(clock="lockstep"), []
+    simulation.wait_for(Wait(lambda: simulation.time >= 0.2, lambda: "b"), answers.append)
+    simulation.wait_for(Wait(lambda: simulation.time >= 0.1, lambda: "a"), answers.append)
+    assert simulation.advance(60.0, math.inf) and answers == ["a"]
+    assert simulation.time < 0.2 - simulation.tick
+    assert simulation.advance(60.0, math.inf) and answers == ["a", "b"]
 
 
 def test_continue_for_a_time_pauses_afterwards(make):
     simulation, answers = make(clock="lockstep"), []
     simulation.pause(True)
     simulation.wait_for(simulation.continue_for(0.5), answers.append)
-    simulation.run(60.0)
+    assert simulation.is_blocked
+    assert simulation.advance(60.0, math.inf)
     assert answers == [None] and simulation.is_paused
     assert simulation.time == pytest.approx(0.5, abs=simulation.tick)
 
@@ -58,9 +76,9 @@ def test_continue_for_a_time_pauses_afterwards(make):
 def test_paused_wall_time_stands_still(make):
     simulation = make(clock="wall")
     simulation.pause(True)
-    assert simulation.run(0.1) == math.inf and simulation.time == 0.0
+    assert simulation.follow(0.1) == math.inf and simulation.time == 0.0
     simulation.pause(False)
-    assert 0.0 < simulation.run(0.0) <= simulation.tick
+    assert 0.0 < simulation.follow(0.0) <= simulation.tick
 
 
 def test_vehicles_are_found_by_name(make):
@@ -78,7 +96,7 @@ def test_reset_keeps_the_time_and_drops_api_control(make):
     vehicle.allow(True)
     future, answers = vehicle.takeoff(20.0), []
     simulation.wait_for(Wait(lambda: future.done, future.result), answers.append)
-    simulation.run(0.0)
+    simulation.advance(0.0, math.inf)
     before = simulation.time
     simulation.reset()
     assert answers == [False]

@@ -7,6 +7,8 @@ from typing import Any
 
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.messages import (
+    MAX_NAME,
+    MAX_PATTERN,
     NO_POSE,
     Map,
     flag,
@@ -19,6 +21,7 @@ from drone_rl.flight.airsim.messages import (
 )
 from drone_rl.flight.airsim.methods.registry import argument, method
 from drone_rl.flight.airsim.simulation import Simulation
+from drone_rl.flight.airsim.stage import matching
 from drone_rl.utils.errors import InputError
 
 
@@ -44,13 +47,8 @@ def _object_scale(simulation: Simulation, args: Sequence[Any]) -> Map:
 
 @method("simListSceneObjects")
 def _list_objects(simulation: Simulation, args: Sequence[Any]) -> list[str]:
-    pattern = text(argument(args, 0, ".*"), "name_regex")
-    vehicles = [n for n in simulation.vehicles if n and _matches(pattern, n)]
-    return [*simulation.stage.find(pattern), *vehicles]
-
-
-def _matches(pattern: str, name: str) -> bool:
-    return re.fullmatch(pattern, name, re.IGNORECASE) is not None
+    pattern = text(argument(args, 0, ".*"), "name_regex", MAX_PATTERN)
+    return matching(pattern, [*simulation.stage.names, *filter(None, simulation.vehicles)])
 
 
 @method("simListAssets")
@@ -60,7 +58,8 @@ def _list_assets(simulation: Simulation, args: Sequence[Any]) -> list[str]:
 
 @method("simSpawnObject", least=3)
 def _spawn(simulation: Simulation, args: Sequence[Any]) -> str:
-    name, asset, pose = text(args[0], "object_name"), text(args[1], "asset_name"), args[2]
+    name, asset = text(args[0], "object_name", MAX_NAME), text(args[1], "asset_name")
+    pose = args[2]
     place = to_world(read_pose(pose).position)
     if any(map(math.isnan, place)):
         raise InputError("pose has NaN; give the position of a new object")
@@ -77,7 +76,7 @@ def _destroy(simulation: Simulation, args: Sequence[Any]) -> bool:
 
 @method("simSetSegmentationObjectID", least=2)
 def _set_id(simulation: Simulation, args: Sequence[Any]) -> bool:
-    name, found = text(args[0], "mesh_name"), whole(args[1], "object_id", -1, 255)
+    name, found = text(args[0], "mesh_name", MAX_PATTERN), whole(args[1], "object_id", -1, 255)
     is_pattern = flag(argument(args, 2, False), "is_name_regex")
     return simulation.stage.set_id(name, found, is_pattern=is_pattern)
 
@@ -89,7 +88,7 @@ def _get_id(simulation: Simulation, args: Sequence[Any]) -> int:
 
 @method("simAddVehicle", least=3)
 def _add_vehicle(simulation: Simulation, args: Sequence[Any]) -> bool:
-    name, kind = text(args[0], "vehicle_name"), text(args[1], "vehicle_type")
+    name, kind = text(args[0], "vehicle_name", MAX_NAME), text(args[1], "vehicle_type")
     return simulation.add_named(name, kind, args[2])
 
 
