@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from benchmarks.accessibility import bench_accessibility
+from benchmarks.airsim import bench_airsim
 from benchmarks.benchmark import Benchmark, Setup
 from benchmarks.chapter import bench_chapter
 from benchmarks.coverage import bench_coverage
@@ -302,6 +303,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_fly_page(s.runs / "fly_page", s.quick),
         "flight",
         (*_RENDERING, "flight", "policies", "explanations/fly_page", "benchmarks/fly_page"),
+    ),
+    "airsim": Benchmark(
+        lambda s: bench_airsim(s.runs / "airsim", s.quick),
+        "flight",
+        (*_RENDERING, "flight", "benchmarks/airsim"),
     ),
     "mistakes": Benchmark(
         lambda s: bench_mistakes(s.runs / "mistakes"),

@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     from drone_rl.explanations.fly_page.server import fly as fly
     from drone_rl.explanations.settings import ClassModelsSettings as ClassModelsSettings
     from drone_rl.explanations.settings import ExplainSettings as ExplainSettings
+    from drone_rl.flight.airsim.serving import RunningServer as RunningServer
+    from drone_rl.flight.airsim.serving import serve as serve
     from drone_rl.flight.commands.command import FlightFuture as FlightFuture
     from drone_rl.flight.commands.command import PilotError as PilotError
     from drone_rl.flight.commands.path_following import Drivetrain as Drivetrain

@@ -76,12 +76,29 @@ def geo_from_world(position: Values, home: GeoPoint = HOME) -> Values:
     km of home, positions are within 0.1 m of those of the tangent plane.
     """
     library: Any = torch if isinstance(position, Tensor) else np
-    share = 1 - _ECCENTRICITY_2 * math.sin(math.radians(home.latitude)) ** 2
-    across = EQUATOR_RADIUS / math.sqrt(share)  # radii of curvature, metres
-    meridian = across * (1 - _ECCENTRICITY_2) / share
+    across, meridian = _curvature_radii(home)
     north, west, up = position[..., 0], position[..., 1], position[..., 2]
     latitude = home.latitude + math.degrees(1.0) * north / (meridian + home.altitude)
     parallel = library.cos(latitude * math.radians(1.0)) * (across + home.altitude)
     longitude = home.longitude - math.degrees(1.0) * west / parallel
     longitude = (longitude + 180.0) % 360.0 - 180.0
     return library.stack([latitude, longitude, home.altitude + up], -1)
+
+
+def world_from_geo(place: Values, home: GeoPoint = HOME) -> Values:
+    """Return metres from home, north, west and up; the inverse of `geo_from_world`."""
+    library: Any = torch if isinstance(place, Tensor) else np
+    across, meridian = _curvature_radii(home)
+    latitude, longitude, altitude = place[..., 0], place[..., 1], place[..., 2]
+    north = math.radians(1.0) * (latitude - home.latitude) * (meridian + home.altitude)
+    east = (longitude - home.longitude + 180.0) % 360.0 - 180.0
+    parallel = library.cos(latitude * math.radians(1.0)) * (across + home.altitude)
+    west = -math.radians(1.0) * east * parallel
+    return library.stack([north, west, altitude - home.altitude], -1)
+
+
+def _curvature_radii(home: GeoPoint) -> tuple[float, float]:
+    """Return the ellipsoid's radii across and along the meridian, metres."""
+    share = 1 - _ECCENTRICITY_2 * math.sin(math.radians(home.latitude)) ** 2
+    across = EQUATOR_RADIUS / math.sqrt(share)
+    return across, across * (1 - _ECCENTRICITY_2) / share

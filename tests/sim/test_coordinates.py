@@ -2,8 +2,13 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.sim.coordinates import EQUATOR_RADIUS, FLATTENING, HOME, geo_from_world
-from tests.geodesy import world_from_geo
+from drone_rl.sim.coordinates import (
+    EQUATOR_RADIUS,
+    FLATTENING,
+    HOME,
+    geo_from_world,
+    world_from_geo,
+)
 
 KINDS = [np.array, lambda rows: torch.tensor(rows, dtype=torch.float64)]
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from benchmarks.ledger import Ledger
 from benchmarks.registry import BENCHMARKS
+from tools.readme.airsim_methods import list_airsim_methods
 from tools.readme.axes import list_axes
 from tools.readme.blocks import replace_blocks
 from tools.readme.flight_rows import FLIGHT
@@ -31,6 +32,7 @@ MEASURED = ROOT / "outputs" / "bench" / "results.json"
 PLOTS = ("peers.png", "scaling.png")
 PAGES = (
     "README.md",
+    "docs/airsim.md",
     "docs/design.md",
     "docs/learners.md",
     "docs/onnx.md",
@@ -72,6 +74,7 @@ def make_blocks(root: Path) -> dict[str, str]:
         "presets": list_presets(root / "conf"),
         "run_onnx": show_file(root, "examples/run_onnx.py"),
         "recall": show_file(root, "examples/recall.py"),
+        "airsim_methods": list_airsim_methods(),
     }
 
 

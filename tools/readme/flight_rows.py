@@ -29,6 +29,26 @@ FLIGHT = (
         "30",
     ),
     Row(
+        "airsim",
+        "server for AirSim's clients: round trips per second for an image of 144x256, for a pose; "
+        "simulated over real seconds in lockstep; seconds until it is ready",
+        lambda f: (
+            f"{f['airsim_images_per_s']:,.0f}; {f['airsim_calls_per_s']:,.0f}; "
+            f"{f['airsim_lockstep_factor']:,.0f}; {f['airsim_ready_s']:.1f}"
+        ),
+        "400; 4,000; 100; 5",
+    ),
+    Row(
+        "airsim",
+        "methods of the multirotor client 1.8.1 that work (not lidar); crafted messages survived; "
+        "growth over an hour of simulated traffic, MiB; two runs in lockstep are the same",
+        lambda f: (
+            f"{percent(f['airsim_methods_share'])}; {f['airsim_fuzz_survived']:,}; "
+            f"{f['airsim_growth_mib']:.1f}; {'yes' if f['airsim_lockstep_repeats'] else 'no'}"
+        ),
+        "95%; 100,000; 5; yes",
+    ),
+    Row(
         "flight_speed",
         "environment steps per second of 256 drones (33 physics steps with all controllers each); "
         "ratio to MuJoCo Warp with the same body and no controller",

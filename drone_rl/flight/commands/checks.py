@@ -1,12 +1,15 @@
-"""Validation of the numbers that commands take."""
+"""Validation of the numbers that commands take, and of a drone's dynamics."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from drone_rl.config import DynamicsSettings
+from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.utils.errors import InputError
 
 FARTHEST = 1e6
@@ -105,3 +108,14 @@ def path(points: Any) -> Tensor:
             check = height if axis == "z" else real
             check(value.item(), f"path[{number}].{axis}")
     return torch.from_numpy(places.copy())[None]
+
+
+def quadrotor(
+    dynamics: DynamicsSettings | Quadrotor | None, changes: Mapping[str, Any]
+) -> Quadrotor:
+    """Return the dynamics of a drone, AirSim's generic one by default, with settings changed."""
+    if isinstance(dynamics, Quadrotor):
+        if changes:
+            raise InputError(f"{', '.join(changes)} and a Quadrotor are given; give settings alone")
+        return dynamics
+    return Quadrotor((dynamics or DynamicsSettings()).replace(mode="simple_flight", **changes))

@@ -88,7 +88,7 @@ class Drone:
                 dynamics = worlds.dynamics.settings
         self.is_computer_vision = OneOf(_MODES).read(mode, "mode") == "computer_vision"
         """Whether there are no dynamics."""
-        self._quadrotor = _quadrotor(dynamics, changes)
+        self._quadrotor = checks.quadrotor(dynamics, changes)
         self.settings = self._quadrotor.settings
         """Vehicle and wind."""
         height = [] if self.is_computer_vision and len(start) == 3 else [self.settings.radius]
@@ -245,6 +245,12 @@ class Drone:
         return self.worlds, state
 
     @property
+    def _around(self) -> Obstacles | None:
+        if self._obstacles is None and self.worlds is not None:
+            return self.worlds.task.obstacles(self.worlds.state)
+        return self._obstacles
+
+    @property
     def _is_flying(self) -> bool:
         return self._landed == LandedState.FLYING
 
@@ -328,10 +334,7 @@ class Drone:
         elif goals is None:
             goals = all_rotors(_IDLE * self.settings.hover_throttle)
         if not self._is_lost:
-            around = self._obstacles
-            if around is None and self.worlds is not None:
-                around = self.worlds.task.obstacles(self.worlds.state)
-            self.body = self._quadrotor.fly(self.body, goals, ticks, around)
+            self.body = self._quadrotor.fly(self.body, goals, ticks, self._around)
         if self._is_lost:  # the drone stays at its last valid state
             self.body.numbers[:, TICKS] += ticks
         self._record(ticks)
@@ -389,11 +392,3 @@ class Drone:
             self.body.reference[:] = self._place
         if self._place is not None or not self._is_flying:
             self._coasting = 0
-
-
-def _quadrotor(dynamics: DynamicsSettings | Quadrotor | None, changes: dict[str, Any]) -> Quadrotor:
-    if isinstance(dynamics, Quadrotor):
-        if changes:
-            raise InputError(f"{', '.join(changes)} and a Quadrotor are given; give settings alone")
-        return dynamics
-    return Quadrotor((dynamics or DynamicsSettings()).replace(mode="simple_flight", **changes))

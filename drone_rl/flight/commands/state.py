@@ -3,6 +3,7 @@
 import dataclasses
 import enum
 import math
+from collections import deque
 from collections.abc import Sequence
 from typing import Self
 
@@ -201,10 +202,10 @@ class Sensors:
 class Trajectory:
     """States recorded in each control period. World frame, SI units."""
 
-    def __init__(self) -> None:
-        """Create an empty trajectory."""
-        self._times: list[float] = []
-        self._rows: list[np.ndarray] = []
+    def __init__(self, most: int | None = None) -> None:
+        """Create an empty trajectory that keeps the last `most` states, by default all."""
+        self._times: deque[float] = deque(maxlen=most)
+        self._rows: deque[np.ndarray] = deque(maxlen=most)
 
     def __len__(self) -> int:
         """Return the number of recorded times."""
@@ -218,7 +219,7 @@ class Trajectory:
     @property
     def times(self) -> np.ndarray:
         """Simulated seconds. Shape: (T,)."""
-        return np.array(self._times)
+        return np.array(list(self._times))
 
     @property
     def positions(self) -> np.ndarray:
@@ -241,4 +242,4 @@ class Trajectory:
         return self._part(ROTORS, 4)
 
     def _part(self, first: int, count: int) -> np.ndarray:
-        return np.array(self._rows).reshape(len(self), REFERENCE)[:, first : first + count]
+        return np.array(list(self._rows)).reshape(len(self), REFERENCE)[:, first : first + count]

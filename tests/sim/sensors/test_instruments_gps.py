@@ -5,10 +5,9 @@ import pytest
 import torch
 
 from drone_rl.config.sensors import GpsSettings
-from drone_rl.sim.coordinates import HOME
+from drone_rl.sim.coordinates import HOME, world_from_geo
 from drone_rl.sim.dynamics.state import BodyState
 from drone_rl.sim.sensors.instruments import Fix, Gps
-from tests.geodesy import world_from_geo
 
 TICK = 0.003
 

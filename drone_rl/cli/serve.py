@@ -1,0 +1,62 @@
+"""`drone-rl serve`: its settings."""
+
+import asyncio
+import contextlib
+import logging
+from pathlib import Path
+from typing import Annotated
+
+from drone_rl.cli.settings import CommandSettings
+from drone_rl.config import RendererName
+from drone_rl.utils.schema import OneOf, Real, Whole
+
+_log = logging.getLogger(__name__)
+
+
+class ServeCommand(CommandSettings):
+    """Settings of `drone-rl serve`."""
+
+    settings: str | None = None
+    """AirSim's settings.json; null for one multirotor."""
+    scene: str = "cubes"
+    """What stands in the world: cubes, which vanish when touched; blocks; pillars; empty; or the
+    path of an MJCF file, *.xml."""
+    clock: Annotated[str, OneOf(("wall", "lockstep"))] = "wall"
+    """wall, the time of day times ClockSpeed; or lockstep: time passes only while a call waits for
+    it, as fast as the machine can, with the same results every time."""
+    patience: Annotated[float, Real(0.0, 60.0, unit="s")] = 0.02
+    """Seconds without a request after which time passes in lockstep. Give more for a client that
+    computes long between the start of a movement and its next request."""
+    address: str | None = None
+    """Address to listen at; null for that of the settings file, 127.0.0.1 by default."""
+    port: Annotated[int, Whole(0, 65535)] | None = None
+    """Port; null for that of the settings file, 41451 by default; 0 for a free one."""
+    seed: Annotated[int, Whole(0, 2**31 - 1)] = 0
+    """Seed of the cubes' placement, of gusts and of sensor noise."""
+    renderer: RendererName | None = None
+    """raytrace or mujoco_warp; null for the one that fits the scene."""
+
+    def run(self, folder: Path) -> tuple[int, None]:
+        """Serve until Ctrl-C; return the exit status."""
+        from drone_rl.flight.airsim.server import run  # slow to import
+        from drone_rl.flight.airsim.serving import make_simulation
+
+        simulation, host, port = make_simulation(
+            self.settings,
+            scene=self.scene,
+            clock=self.clock,
+            address=self.address,
+            port=self.port,
+            seed=self.seed,
+            renderer=self.renderer,
+            recordings=folder / "recordings",
+        )
+
+        def ready(address: str) -> None:
+            vehicles = ", ".join(name or "(unnamed)" for name in simulation.vehicles)
+            _log.info("scene %s, clock %s, vehicles: %s", self.scene, self.clock, vehicles)
+            print(f"ready: AirSim's clients can connect to {address}", flush=True)
+
+        with contextlib.suppress(KeyboardInterrupt), contextlib.closing(simulation):
+            asyncio.run(run(simulation, host, port, ready, self.patience))
+        return 0, None

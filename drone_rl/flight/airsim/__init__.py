@@ -1,0 +1,1 @@
+"""AirSim's interfaces: its settings file and its RPC server, for clients that were made for it."""

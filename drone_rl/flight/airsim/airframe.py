@@ -1,0 +1,282 @@
+"""A vehicle of the settings file: its start, its frames, and its state as AirSim's messages."""
+
+import copy
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+
+from drone_rl.config import DynamicsSettings
+from drone_rl.flight.airsim import messages
+from drone_rl.flight.airsim.messages import Map, Pose, nanoseconds, ned, to_world
+from drone_rl.flight.airsim.sensors import read_sensor
+from drone_rl.flight.airsim.settings_file import POSING, Offset, VehicleChoice
+from drone_rl.flight.commands.pilot import Pilot
+from drone_rl.flight.commands.state import LandedState, Trajectory
+from drone_rl.sim.coordinates import GeoPoint, geo_from_world, world_from_geo
+from drone_rl.sim.dynamics import Obstacles, Quadrotor
+from drone_rl.sim.dynamics.state import (
+    ATTITUDE,
+    GROUND,
+    NOTHING,
+    POSITION,
+    RATES,
+    TICKS,
+    VELOCITY,
+    BodyState,
+)
+from drone_rl.sim.worlds import Worlds
+
+_SWEEP = 0.05
+"""Metres between two tests for contact along a straight move."""
+_FASTEST = 668.0
+"""Speed of a rotor at full thrust, radians per second."""
+
+
+class Airframe(Pilot):
+    """One vehicle and its state. Values are in NED, relative to the start pose; radians."""
+
+    def __init__(
+        self,
+        choice: VehicleChoice,
+        dynamics: DynamicsSettings,
+        worlds: Worlds | None,
+        *,
+        obstacles: Obstacles | None = None,
+        names: Sequence[str] = (),
+        home: GeoPoint,
+        height: float = 0.0,
+        seed: int = 0,
+    ) -> None:
+        """Create a vehicle of the settings file.
+
+        Args:
+            choice: Its kind, start pose and cameras.
+            dynamics: Vehicle and wind.
+            worlds: A single world that the cameras render; None for nothing to see.
+            obstacles: What it can touch; by default the objects of `worlds`, where they stand.
+            names: Names of the obstacles.
+            home: Place on Earth of the world's origin.
+            height: Metres above the ground at which a vehicle without dynamics starts.
+            seed: Of gusts and sensor noise.
+        """
+        self.choice, self.geo_home, self.names = choice, home, tuple(names)
+        self._home = [0.0, 0.0, 0.0]
+        start = _known(choice.start)
+        x, y, up = to_world((start.x, start.y, start.z))
+        posed = choice.kind == POSING
+        super().__init__(
+            dynamics,
+            mode="computer_vision" if posed else "simple_flight",
+            start=(x, y, up + height) if posed else (x, y),
+            yaw=start.yaw,
+            seed=seed,
+            obstacles=obstacles,
+            worlds=worlds,
+            sensors=None,
+        )
+        if posed and (start.roll or start.pitch):
+            self.set_pose((x, y, up + height), roll=start.roll, pitch=start.pitch, yaw=start.yaw)
+            self.home = self.body.position[0].clone()
+        self._home = self.home.tolist()
+        self._initial = (copy.deepcopy(self.body), None, None)  # the scene resets itself
+        self.begin()
+
+    def begin(self) -> None:
+        """Take the state in which AirSim creates and resets vehicles."""
+        self.has_api_control = self.choice.has_api_control
+        self._read_contact = -1.0
+        self._before = self.body
+        self._is_armed = self.choice.is_armed and not self.is_computer_vision
+        self.trajectory = Trajectory(1)  # a server runs for days
+        self.trajectory.append(self.time, self.body)
+
+    def reset(self) -> Any:
+        """Put it back to the start pose, without API control."""
+        state = super().reset()
+        self.begin()
+        return state
+
+    def run(self, ticks: int) -> None:
+        """Advance simulated time by physics ticks."""
+        self._before = self.body
+        self._advance(ticks)
+
+    def change_dynamics(self, dynamics: DynamicsSettings) -> None:
+        """Take other dynamics, such as another wind, from now on."""
+        self._quadrotor = Quadrotor(dynamics)
+        self.settings = dynamics
+
+    @property
+    def period(self) -> int:
+        """Ticks of one control period."""
+        return self._period
+
+    # Frames
+
+    def _world(self, position: Sequence[float]) -> tuple[float, float, float]:
+        """Return a position in our world; below the ground counts as on it."""
+        x, y, z = to_world(position)
+        home = self.home.tolist()
+        return home[0] + x, home[1] + y, max(0.0, home[2] + z)
+
+    def _height(self, z: float) -> float:
+        return self._world((0.0, 0.0, z))[2]
+
+    def _relative(self, body: BodyState) -> list[float]:
+        return ned(body.position - self.home)
+
+    @property
+    def pose(self) -> Pose:
+        """Pose relative to the start."""
+        row, home = self.body.numbers[0].tolist(), self._home
+        w, i, j, k = row[ATTITUDE : ATTITUDE + 4]
+        x, y, z = (row[POSITION + axis] - home[axis] for axis in range(3))
+        return Pose((x, 0.0 - y, 0.0 - z), (w, i, 0.0 - j, 0.0 - k))
+
+    # State
+
+    def kinematics(self) -> Map:
+        """Return a KinematicsState; accelerations are those of the last control period."""
+        now, before = self.body.numbers[0].tolist(), self._before.numbers[0].tolist()
+        seconds = (now[TICKS] - before[TICKS]) * self.settings.tick
+        rate, pose = 1.0 / seconds if seconds > 0 else 0.0, self.pose
+        velocity, turning = now[VELOCITY : VELOCITY + 3], now[RATES : RATES + 3]
+        pushed, twisted = (
+            [(now[first + axis] - before[first + axis]) * rate for axis in range(3)]
+            for first in (VELOCITY, RATES)
+        )
+        return {
+            "position": messages.vector(pose.position),
+            "orientation": messages.quaternion(pose.attitude),
+            "linear_velocity": messages.vector(to_world(velocity)),
+            "angular_velocity": messages.vector(to_world(turning)),
+            "linear_acceleration": messages.vector(to_world(pushed)),
+            "angular_acceleration": messages.vector(to_world(twisted)),
+        }
+
+    def rotor_states(self) -> Map:
+        """Return RotorStates: thrust in newtons; speed in radians per second."""
+        most = self.settings.rotor_thrust
+        rotors = [
+            {
+                "thrust": share * most,
+                "torque_scaler": 1.0,
+                "speed": _FASTEST * max(share, 0.0) ** 0.5,
+            }
+            for share in self.body.rotors[0].tolist()
+        ]
+        return {"rotors": rotors, "timestamp": nanoseconds(self.time)}
+
+    def sees(self, place: GeoPoint) -> bool:
+        """Return whether no obstacle stands between it and a place on Earth."""
+        there = world_from_geo(torch.tensor(place, dtype=torch.float64), self.geo_home)
+        if float(there[2]) < 0.0:
+            return False
+        around = self._around
+        if around is None:
+            return True
+        here, half = self.body.position[0], there.new_tensor(around.half_sizes)
+        way = there - here
+        way = torch.where(way == 0.0, 1e-12, way)
+        away = around.centers[0] - here
+        ends = torch.stack([(away - half) / way, (away + half) / way])
+        enters, leaves = ends.amin(0).amax(-1), ends.amax(0).amin(-1)
+        return not bool(((enters <= leaves) & (leaves >= 0.0) & (enters <= 1.0)).any())
+
+    def geo_point(self) -> Map:
+        """Return its GeoPoint."""
+        return messages.geo_point(geo_from_world(self.body.position[0], self.geo_home).tolist())
+
+    def multirotor_state(self) -> Map:
+        """Return a MultirotorState; it does not clear the collision."""
+        sticks = self.sticks
+        return {
+            "collision": self.collision(read=False),
+            "kinematics_estimated": self.kinematics(),
+            "gps_location": self.geo_point(),
+            "timestamp": nanoseconds(self.time),
+            "landed_state": int(self._landed == LandedState.FLYING),
+            "rc_data": {
+                "timestamp": 0,
+                "pitch": sticks.pitch,
+                "roll": sticks.roll,
+                "throttle": sticks.throttle,
+                "yaw": sticks.yaw,
+                "left_z": 0.0,
+                "right_z": 0.0,
+                "switches": 0,
+                "vendor_id": "",
+                "is_initialized": False,
+                "is_valid": False,
+            },
+        }
+
+    def collision(self, *, read: bool = True) -> Map:
+        """Return a CollisionInfo; `read` clears `has_collided` until the next contact."""
+        contact = self.body.contact
+        thing, time = int(contact.thing[0]), float(contact.time[0])
+        touched = thing != NOTHING
+        is_new = touched and time > self._read_contact
+        if read and touched:
+            self._read_contact = time
+        if not touched:
+            name, number = "", -1
+        elif thing == GROUND:
+            name, number = "Ground", 0
+        else:
+            name = self.names[thing] if thing < len(self.names) else f"obstacle_{thing}"
+            number = thing + 1
+        nothing = (0.0, 0.0, 0.0)
+        return {
+            "has_collided": is_new,
+            "penetration_depth": float(contact.depth[0]) if touched else 0.0,
+            "time_stamp": nanoseconds(time) if touched else 0,
+            "normal": messages.vector(ned(contact.normal) if touched else nothing),
+            "impact_point": messages.vector(ned(contact.point - self.home) if touched else nothing),
+            "position": messages.vector(self._relative(self.body) if touched else nothing),
+            "object_name": name,
+            "object_id": number,
+        }
+
+    def sensor(self, kind: str) -> Map:
+        """Return ImuData, BarometerData, MagnetometerData or GpsData."""
+        return read_sensor(self.sensors, kind)
+
+    def set_airsim_pose(self, pose: Pose, *, ignore_collision: bool) -> None:
+        """Put it somewhere at once; NaN components stay. Velocities are kept."""
+        now = self.pose
+        place = [
+            n if math.isnan(v) else v for v, n in zip(pose.position, now.position, strict=True)
+        ]
+        turn = pose.attitude if not any(map(math.isnan, pose.attitude)) else now.attitude
+        there = self.home + torch.tensor(to_world(place), dtype=torch.float64)
+        if not ignore_collision:
+            there = self._sweep(there)
+        self.body = self.body.moved(there[None], messages.attitude_to_world(turn))
+        self._place, self._coasting = None, 0
+        self.trajectory.append(self.time, self.body)
+
+    def _sweep(self, there: torch.Tensor) -> torch.Tensor:
+        """Return the last position on the way that touches nothing."""
+        here = self.body.position[0]
+        steps = max(1, math.ceil(float((there - here).norm()) / _SWEEP))
+        radius = self.settings.radius
+        ways = torch.linspace(0.0, 1.0, steps + 1, dtype=torch.float64)[:, None]
+        places = here + ways * (there - here)
+        free = places[:, 2] >= min(radius, float(here[2])) - 1e-9
+        around = self._around
+        if around is not None:
+            half = places.new_tensor(around.half_sizes)
+            apart = (places[:, None] - around.centers[0]).abs() - half
+            inside = apart.clamp(min=0.0).norm(dim=-1) < radius
+            free &= ~inside.any(-1)
+        free[0] = True
+        return places[int(free.long().cumprod(0).sum()) - 1]
+
+
+def _known(offset: Offset) -> Offset:
+    """Return the same with 0 for unknown components."""
+    values = (offset.x, offset.y, offset.z, offset.roll, offset.pitch, offset.yaw)
+    return Offset(*(0.0 if math.isnan(value) else value for value in values))

@@ -1,0 +1,94 @@
+"""Cameras of a vehicle: where they are mounted, and the sizes of their images."""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from drone_rl.flight.airsim.messages import to_world
+from drone_rl.flight.airsim.settings_file import CameraChoice, Capture
+from drone_rl.sim.entities import DRONE_CAMERAS, find_camera
+from drone_rl.sim.image_types import ImageType
+from drone_rl.sim.rendering import Mounting
+from drone_rl.sim.rendering.appearance import product, turned, zoom_for_fov
+
+_BASES = {"back_center": turned("yaw", 180.0), "bottom_center": turned("pitch", 90.0)}
+"""Attitudes of cameras that do not look ahead, drone frame."""
+_LEVEL = (1.0, 0.0, 0.0, 0.0)
+_DEFAULT = Capture()
+
+
+@dataclasses.dataclass(frozen=True)
+class CameraState:
+    """A camera of a vehicle: where it is, and its images by type."""
+
+    name: str
+    """Our name."""
+    captures: Mapping[ImageType, Capture]
+    position: tuple[float, float, float]
+    """Metres, drone frame: x forward, y left, z up."""
+    attitude: Tensor
+    """Drone frame, quaternion (w, x, y, z). Shape: (4,)."""
+    fov: float | None = None
+    """Horizontal, degrees, where it was set; of all types."""
+
+    def capture(self, kind: ImageType) -> Capture:
+        """Return size and field of view of a type."""
+        found = self.captures.get(kind, _DEFAULT)
+        return found if self.fov is None else dataclasses.replace(found, fov=self.fov)
+
+    def mounting(self, capture: Capture, vertical_fov: float) -> Mounting | None:
+        """Return how it differs from the camera of the model, whose field of view is given."""
+        own = math.degrees(
+            2 * math.atan(math.tan(math.radians(vertical_fov) / 2) * capture.width / capture.height)
+        )
+        base = _base(self.name)
+        inverse = base * base.new_tensor([1.0, -1.0, -1.0, -1.0])
+        zoom = zoom_for_fov(own, torch.tensor(capture.fov, dtype=torch.float64))
+        spec = find_camera(self.name)
+        offset = tuple(a - b for a, b in zip(self.position, spec.pos, strict=True))
+        turn = product(self.attitude, inverse)
+        is_zoomed = abs(float(zoom) - 1) > 1e-9
+        is_turned = not torch.allclose(turn.abs(), turn.new_tensor(_LEVEL))
+        if not (any(offset) or is_turned or is_zoomed):
+            return None
+        return Mounting(
+            camera=f"drone/{self.name}",
+            offset=offset,
+            turn=tuple(turn.tolist()),
+            zoom=zoom if is_zoomed else None,
+        )
+
+
+def make_cameras(
+    captures: Mapping[ImageType, Capture], chosen: Mapping[str, CameraChoice]
+) -> dict[str, CameraState]:
+    """Return the cameras of a vehicle, by our names."""
+    return {
+        spec.name: _camera(spec, captures, chosen.get(spec.name, CameraChoice()))
+        for spec in DRONE_CAMERAS
+    }
+
+
+def _camera(spec: Any, captures: Mapping[ImageType, Capture], own: CameraChoice) -> CameraState:
+    offset = own.offset
+    given = to_world((offset.x, offset.y, offset.z))
+    x, y, z = (old if math.isnan(new) else new for old, new in zip(spec.pos, given, strict=True))
+    angles = (offset.yaw, offset.pitch, offset.roll)
+    attitude = _base(spec.name)
+    if not all(map(math.isnan, angles)):
+        attitude = _attitude(*(0.0 if math.isnan(a) else a for a in angles))
+    return CameraState(spec.name, {**captures, **own.captures}, (x, y, z), attitude)
+
+
+def _base(name: str) -> Tensor:
+    return _BASES.get(name, torch.tensor(_LEVEL, dtype=torch.float64))
+
+
+def _attitude(yaw: float, pitch: float, roll: float) -> Tensor:
+    """Return the attitude of AirSim's angles, degrees, in the drone's frame. Shape: (4,)."""
+    parts = (turned("yaw", -yaw), turned("pitch", -pitch), turned("roll", roll))
+    return product(product(parts[0], parts[1]), parts[2])

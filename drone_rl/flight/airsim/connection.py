@@ -1,0 +1,248 @@
+"""One connection of a client: msgpack-rpc in both directions."""
+
+import asyncio
+import logging
+import socket
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import msgpack
+
+from drone_rl.flight.airsim import methods
+from drone_rl.flight.airsim.methods import UnknownMethodError
+from drone_rl.flight.airsim.simulation import Simulation, Wait
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
+
+_log = logging.getLogger(__name__)
+
+REQUEST, RESPONSE, NOTIFICATION = 0, 1, 2
+MAX_MESSAGE = 2**22
+"""Bytes of a request: no method needs more."""
+MAX_PENDING = 1000
+"""Calls of one client that wait at a time."""
+MAX_CLIENTS = 1000
+TURN = 0.005
+"""Seconds of work for one client before others have their turn."""
+MAX_UNSENT = 2**25
+"""Bytes of replies that a client may leave unread before its requests wait."""
+_MAX_ITEMS = 100_000
+_QUICK_ACK: int | None = getattr(socket, "TCP_QUICKACK", None)
+"""An option of Linux."""
+
+
+class Host(Protocol):
+    """What a connection needs of its server."""
+
+    simulation: Simulation
+
+    def admit(self, client: "Connection") -> bool:
+        """Take note of a client; return whether there is room for it."""
+        ...
+
+    def dismiss(self, client: "Connection") -> None:
+        """Forget a client."""
+        ...
+
+    def must_wait(self, client: "Connection") -> bool:
+        """Return whether requests have to wait; the client is then released when they need not."""
+        ...
+
+    def note(self, client: "Connection") -> None:
+        """Take note of a request that was answered, or that waits."""
+        ...
+
+
+class Connection(asyncio.Protocol):
+    """One connection."""
+
+    def __init__(self, server: Host) -> None:
+        """Create a connection of a server."""
+        self._server = server
+        self._unpacker = _unpacker()
+        self._transport: Any = None
+        self._name = "client"
+        self._pending = 0
+        self._is_full = False
+        """Whether the client leaves too many replies unread."""
+        self._is_held = False
+        """Whether it goes on at a later time."""
+        self._backlog: deque[Any] = deque()
+        self._replies: set[Callable[[Any], None]] = set()
+        self.is_open = False
+        self.is_pilot = False
+        """Whether one of its calls has ever waited for simulated time."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """See `asyncio.Protocol`."""
+        self._transport = transport
+        peer = transport.get_extra_info("peername")
+        self._name = f"{peer[0]}:{peer[1]}" if peer else "client"
+        self.is_open = True
+        if not self._server.admit(self):
+            _log.warning("%s is refused: there are %d clients", self._name, MAX_CLIENTS)
+            self._transport.abort()
+            return
+        self._transport.set_write_buffer_limits(high=MAX_UNSENT)
+        _log.info("%s connects", self._name)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """See `asyncio.Protocol`: calls that wait are answered no more."""
+        self.is_open = False
+        self._backlog.clear()
+        for reply in self._replies:
+            self._server.simulation.forget(reply)
+        self._replies.clear()
+        self._server.dismiss(self)
+        _log.info("%s has gone", self._name)
+
+    def pause_writing(self) -> None:
+        """See `asyncio.Protocol`: the client doesn't read its replies."""
+        self._is_full = True
+        self._transport.pause_reading()
+
+    def resume_writing(self) -> None:
+        """See `asyncio.Protocol`."""
+        self._is_full = False
+        self._work()
+
+    def data_received(self, data: bytes) -> None:
+        """See `asyncio.Protocol`."""
+        self._acknowledge()
+        try:
+            self._unpacker.feed(data)
+            self._backlog.extend(self._unpacker)
+        except Exception as error:
+            self._break(f"its bytes are no msgpack ({type(error).__name__})")
+            return
+        self._work()
+
+    def _acknowledge(self) -> None:
+        """Acknowledge at once what has come.
+
+        After a request that is not answered yet, a client's system sends the next one only then,
+        and by default this system would take up to 40 ms.
+        """
+        if _QUICK_ACK is not None:
+            self._transport.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, _QUICK_ACK, 1)
+
+    def release(self) -> None:
+        """Go on with the requests that have come."""
+        self._is_held = False
+        self._work()
+
+    def _work(self) -> None:
+        """Handle the requests that have come, as long as others need not wait for them."""
+        end = time.monotonic() + TURN
+        while self._backlog and self.is_open and not self._is_full and not self._is_held:
+            if self._server.must_wait(self):
+                self._is_held = True
+            elif time.monotonic() > end:
+                self._is_held = True
+                asyncio.get_running_loop().call_soon(self.release)
+            else:
+                self._handle(self._backlog.popleft())
+                self._server.note(self)
+        if self.is_open and not self._is_full:
+            if self._is_held:
+                self._transport.pause_reading()
+            else:
+                self._transport.resume_reading()
+
+    def _break(self, reason: str) -> None:
+        _log.warning("%s is disconnected: %s", self._name, reason)
+        self._backlog.clear()
+        self._transport.abort()
+
+    def _handle(self, message: Any) -> None:
+        if not isinstance(message, list | tuple) or not message:
+            self._break(f"{shown(message)} is no request")
+            return
+        if message[0] == NOTIFICATION and len(message) == 3:
+            self._call(None, message[1], message[2])
+        elif message[0] == REQUEST and len(message) == 4 and isinstance(message[1], int):
+            self._call(message[1], message[2], message[3])
+        elif message[0] != RESPONSE:
+            self._break(f"{shown(message)} is no request")
+
+    def _call(self, number: int | None, name: Any, args: Any) -> None:
+        label = name.decode("utf-8", "replace") if isinstance(name, bytes) else name
+        if not isinstance(label, str) or not isinstance(args, list | tuple):
+            self._break("a request has no name or no list of arguments")
+            return
+        try:
+            if self._pending >= MAX_PENDING:
+                raise InputError(f"{MAX_PENDING} calls of this client wait; join some first")
+            result = methods.call(self._server.simulation, label, args)
+        except UnknownMethodError:
+            hint = methods.suggestion(label)
+            self._fail(
+                number,
+                f"rpclib: server could not find function '{label[:200]}' with argument count "
+                f"{len(args)}.{hint}",
+            )
+            return
+        except InputError as error:
+            self._fail(
+                number,
+                f"rpclib: function '{label}' (called with {len(args)} arg(s)) threw an exception. "
+                f"The exception contained this information: {error}.",
+            )
+            return
+        except Exception as error:
+            _log.exception("%s: %s failed", self._name, label[:200])
+            self._fail(number, f"rpclib: function '{label}' failed: {type(error).__name__}.")
+            return
+        if isinstance(result, Wait):
+            self._wait(number, result)
+        else:
+            self._answer(number, None, result)
+
+    def _wait(self, number: int | None, wait: Wait) -> None:
+        self._pending += 1
+
+        def reply(result: Any) -> None:
+            self._pending -= 1
+            self._replies.discard(reply)
+            self._answer(number, None, result)
+
+        self._replies.add(reply)
+        self.is_pilot = True
+        self._server.simulation.wait_for(wait, reply)
+
+    def _fail(self, number: int | None, message: str) -> None:
+        _log.warning("%s: %s", self._name, message)
+        self._answer(number, message, None)
+
+    def _answer(self, number: int | None, error: str | None, result: Any) -> None:
+        if number is not None and self.is_open:
+            self._transport.write(_packed([RESPONSE, number, error, result]))
+
+    def close(self) -> None:
+        """Answer the calls that wait by an error, and close."""
+        for reply in [*self._replies]:
+            self._server.simulation.forget(reply)
+        self._transport.close()
+
+
+def _unpacker() -> Any:
+    return msgpack.Unpacker(
+        raw=False,
+        unicode_errors="replace",
+        strict_map_key=False,
+        use_list=True,
+        max_buffer_size=MAX_MESSAGE,
+        max_array_len=_MAX_ITEMS,
+        max_map_len=_MAX_ITEMS,
+        max_ext_len=0,
+    )
+
+
+def _packed(message: list[Any]) -> bytes:
+    """Pack a reply: bytes as bin, and the numbers of images as 32 bits."""
+    result = message[3]
+    is_image = isinstance(result, list) and bool(result) and isinstance(result[0], dict)
+    packed: Any = msgpack.packb(message, use_bin_type=True, use_single_float=is_image)
+    return packed

@@ -1,0 +1,199 @@
+"""Values on the wire: maps with AirSim's keys, in NED, from and to the simulator's tensors."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import torch
+from torch import Tensor
+
+from drone_rl.flight.commands.path_following import Drivetrain, YawMode
+from drone_rl.sim.coordinates import GeoPoint, ned_attitude_from_world, ned_from_world
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
+
+Map = dict[str, Any]
+NANOSECONDS = 1_000_000_000
+MAX_POINTS = 10_000
+"""Of a path."""
+MAX_NAME = 50
+"""Letters of a new name."""
+MAX_PATTERN = 200
+"""Letters of a regular expression."""
+_FARTHEST = 3.5e38
+"""Largest float32, AirSim's default timeout among them."""
+
+
+class Pose(NamedTuple):
+    """A pose in NED, metres; attitudes are quaternions (w, x, y, z) of FRD bodies.
+
+    Components may be NaN, for no change or for no such object.
+    """
+
+    position: tuple[float, float, float]
+    attitude: tuple[float, float, float, float]
+
+
+NO_POSE = Pose((math.nan, math.nan, math.nan), (math.nan, math.nan, math.nan, math.nan))
+"""Of an object that does not exist."""
+
+
+def vector(values: Sequence[float]) -> Map:
+    """Return a Vector3r."""
+    x, y, z = values
+    return {"x_val": float(x), "y_val": float(y), "z_val": float(z)}
+
+
+def quaternion(values: Sequence[float]) -> Map:
+    """Return a Quaternionr of (w, x, y, z)."""
+    w, x, y, z = values
+    return {"w_val": float(w), "x_val": float(x), "y_val": float(y), "z_val": float(z)}
+
+
+def pose(of: Pose) -> Map:
+    """Return a Pose; clients of version 1.1 read its keys in this order."""
+    return {"position": vector(of.position), "orientation": quaternion(of.attitude)}
+
+
+def geo_point(of: GeoPoint | Sequence[float]) -> Map:
+    """Return a GeoPoint of degrees and metres."""
+    latitude, longitude, altitude = of
+    return {
+        "latitude": float(latitude),
+        "longitude": float(longitude),
+        "altitude": float(altitude),
+    }
+
+
+def nanoseconds(seconds: float) -> int:
+    """Return a time stamp."""
+    return max(0, round(seconds * NANOSECONDS))
+
+
+def ned(values: Tensor) -> list[float]:
+    """Convert a vector of our world, or of our body's frame, to NED or FRD. Shape: (1, 3)."""
+    return ned_from_world(values[0].double()).tolist()
+
+
+def ned_attitude(values: Tensor) -> list[float]:
+    """Convert an attitude (1, 4) to that of an FRD body in NED."""
+    return ned_attitude_from_world(values[0].double()).tolist()
+
+
+def to_world(values: Sequence[float]) -> tuple[float, float, float]:
+    """Convert a vector in NED to our world; the inverse of `ned`."""
+    x, y, z = values
+    return x, 0.0 - y, 0.0 - z  # not -0.0
+
+
+def attitude_to_world(values: Sequence[float]) -> Tensor:
+    """Convert an attitude of an FRD body in NED, normalized, to ours. Shape: (1, 4).
+
+    Raises an `InputError` if it has no length.
+    """
+    given = torch.tensor([list(values)], dtype=torch.float64)
+    length = float(given.norm())
+    if not 1e-6 < length < math.inf:
+        raise InputError(f"orientation={list(values)} is no rotation; give a unit quaternion")
+    return ned_attitude_from_world(given / length)
+
+
+# What clients send
+
+
+def number(value: Any, name: str, low: float = -_FARTHEST, high: float = _FARTHEST) -> float:
+    """Return a finite number from `low` to `high`, else raise an `InputError`."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"{name}={shown(value)} is not a number; give one")
+    if not low <= value <= high:
+        raise InputError(f"{name}={value} is out of range; give {low:g} to {high:g}")
+    return float(value)
+
+
+def whole(value: Any, name: str, low: int, high: int) -> int:
+    """Return a whole number from `low` to `high`, else raise an `InputError`."""
+    found = number(value, name, low, high)
+    if found != int(found):
+        raise InputError(f"{name}={value} is not a whole number; give {low} to {high}")
+    return int(found)
+
+
+def flag(value: Any, name: str) -> bool:
+    """Return true or false; numbers count as in C++."""
+    if isinstance(value, bool) or type(value) in (int, float):
+        return bool(value)
+    raise InputError(f"{name}={shown(value)} is neither true nor false; give one of them")
+
+
+def text(value: Any, name: str, most: int = 10_000) -> str:
+    """Return a text of at most so many letters; bytes, which old clients send, are decoded."""
+    if isinstance(value, bytes):
+        value = value.decode("utf-8", "replace")
+    if not isinstance(value, str) or len(value) > most:
+        raise InputError(
+            f"{name}={shown(value)} is not a text; give one of at most {most:,} letters"
+        )
+    return value
+
+
+def read_map(
+    value: Any, name: str, keys: Sequence[str], *, can_be_nan: bool = False
+) -> list[float]:
+    """Return the numbers of a map, in the order of its keys; other keys are ignored."""
+    if not isinstance(value, Mapping):
+        raise InputError(f"{name}={shown(value)} is not a map; give {', '.join(keys)}")
+    found = []
+    for key in keys:
+        given = value.get(key, value.get(key.encode()))
+        if can_be_nan and isinstance(given, float) and math.isnan(given):
+            found.append(given)
+        else:
+            found.append(number(given, f"{name}.{key}"))
+    return found
+
+
+def read_vector(value: Any, name: str, *, can_be_nan: bool = False) -> tuple[float, float, float]:
+    """Return the numbers of a Vector3r."""
+    x, y, z = read_map(value, name, ("x_val", "y_val", "z_val"), can_be_nan=can_be_nan)
+    return x, y, z
+
+
+def read_pose(value: Any, name: str = "pose") -> Pose:
+    """Return a Pose, whose components may be NaN."""
+    parts = [_part(value, name, part) for part in ("position", "orientation")]
+    keys = ("w_val", "x_val", "y_val", "z_val")
+    w, x, y, z = read_map(parts[1], f"{name}.orientation", keys, can_be_nan=True)
+    position = read_vector(parts[0], f"{name}.position", can_be_nan=True)
+    return Pose(position, (w, x, y, z))
+
+
+def _part(value: Any, name: str, part: str) -> Any:
+    if not isinstance(value, Mapping):
+        raise InputError(f"{name}={shown(value)} is not a map; give position and orientation")
+    return value.get(part, value.get(part.encode()))
+
+
+def read_path(value: Any, name: str = "path") -> list[tuple[float, float, float]]:
+    """Return the points of a path."""
+    if not isinstance(value, list | tuple) or not 0 < len(value) <= MAX_POINTS:
+        raise InputError(f"{name} is not a list of 1 to {MAX_POINTS} points; give one")
+    return [read_vector(point, f"{name}[{i}]") for i, point in enumerate(value)]
+
+
+def read_yaw_mode(value: Any, drivetrain: Any) -> tuple[str, YawMode]:
+    """Return the drivetrain and the yaw mode of a movement.
+
+    Raises:
+        InputError: Numbers are wrong, or a rate is combined with ForwardOnly.
+    """
+    is_forward = whole(drivetrain, "drivetrain", 0, 1) == 1
+    if not isinstance(value, Mapping):
+        raise InputError(f"yaw_mode={shown(value)} is not a map; give is_rate and yaw_or_rate")
+    is_rate = flag(value.get("is_rate", value.get(b"is_rate")), "yaw_mode.is_rate")
+    (amount,) = read_map(value, "yaw_mode", ("yaw_or_rate",))
+    if is_forward and is_rate:
+        if amount != 0.0:
+            raise InputError("Yaw cannot be specified as rate if drivetrain is ForwardOnly")
+        is_rate = False
+    kind = Drivetrain.FORWARD_ONLY if is_forward else Drivetrain.MAX_DEGREE_OF_FREEDOM
+    return kind, YawMode(is_rate, math.remainder(amount, 360.0) if not is_rate else amount)

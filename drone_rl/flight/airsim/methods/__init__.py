@@ -1,0 +1,19 @@
+"""The RPC methods of AirSim's clients: versions 1.1, 1.2 to 1.8, and Cosys-AirSim 3.5.
+
+A method is found by its name. What dialect a call is in shows in its arguments: version 1.1 names
+no vehicle, and images are requested by camera numbers; Cosys' requests have an annotation name.
+"""
+
+from drone_rl.flight.airsim.methods import cameras as cameras
+from drone_rl.flight.airsim.methods import control as control
+from drone_rl.flight.airsim.methods import images as images
+from drone_rl.flight.airsim.methods import movements as movements
+from drone_rl.flight.airsim.methods import no_effect as no_effect
+from drone_rl.flight.airsim.methods import scene as scene
+from drone_rl.flight.airsim.methods import state as state
+from drone_rl.flight.airsim.methods.registry import METHODS as METHODS
+from drone_rl.flight.airsim.methods.registry import UnknownMethodError as UnknownMethodError
+from drone_rl.flight.airsim.methods.registry import call as call
+from drone_rl.flight.airsim.methods.registry import suggestion as suggestion
+from drone_rl.flight.airsim.methods.support import PARTLY as PARTLY
+from drone_rl.flight.airsim.methods.support import UNSUPPORTED as UNSUPPORTED

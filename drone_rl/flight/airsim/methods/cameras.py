@@ -1,0 +1,94 @@
+"""Methods that report, or set, where cameras are and what they see."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from drone_rl.flight.airsim import messages
+from drone_rl.flight.airsim.cameras import CameraState
+from drone_rl.flight.airsim.messages import Map, number, read_map, read_pose, text, to_world
+from drone_rl.flight.airsim.methods.registry import method, posed_at
+from drone_rl.flight.airsim.simulation import Simulation
+from drone_rl.flight.airsim.vehicle import Vehicle
+from drone_rl.sim.entities import find_camera
+from drone_rl.sim.image_types import ImageType
+from drone_rl.sim.rendering.appearance import product, rotate
+
+
+def read_camera(value: Any) -> str:
+    """Return our name of a camera."""
+    return find_camera(value if isinstance(value, int) else text(value, "camera_name")).name
+
+
+def camera_in_world(
+    simulation: Simulation, vehicle: Vehicle, camera: str
+) -> tuple[list[float], list[float]]:
+    """Return a camera's pose in NED relative to the start: metres, quaternion (w, x, y, z)."""
+    state = simulation.cameras[vehicle.choice.name][camera]
+    body = vehicle.body
+    attitude = body.attitude[0].double()
+    place = body.position[0] + rotate(attitude, attitude.new_tensor(state.position)) - vehicle.home
+    turn = product(attitude, state.attitude)
+    return messages.ned(place[None]), messages.ned_attitude(turn[None])
+
+
+@method("simGetCameraInfo", least=1)
+def _camera_info(simulation: Simulation, args: Sequence[Any]) -> Map:
+    camera = read_camera(args[0])
+    vehicle = posed_at(simulation, args, 1)
+    place, turn = camera_in_world(simulation, vehicle, camera)
+    capture = simulation.cameras[vehicle.choice.name][camera].capture(ImageType.SCENE)
+    return {
+        "pose": {"position": messages.vector(place), "orientation": messages.quaternion(turn)},
+        "fov": capture.fov,
+        "proj_mat": {"matrix": _projection(capture.fov, capture.width / capture.height)},
+    }
+
+
+def _projection(fov: float, aspect: float, near: float = 0.1) -> list[list[float]]:
+    """Return Unreal's reversed projection matrix for a horizontal field of view, degrees."""
+    scale = 1.0 / math.tan(math.radians(fov) / 2)
+    return [
+        [scale, 0.0, 0.0, 0.0],
+        [0.0, scale * aspect, 0.0, 0.0],
+        [0.0, 0.0, 0.0, near],
+        [0.0, 0.0, 1.0, 0.0],
+    ]
+
+
+@method("simSetCameraPose", least=2)
+def _set_camera_pose(simulation: Simulation, args: Sequence[Any]) -> None:
+    camera, pose = _camera_at(simulation, args), read_pose(args[1])
+    given = to_world(pose.position)
+    x, y, z = (
+        old if math.isnan(new) else new for old, new in zip(camera.position, given, strict=True)
+    )
+    attitude = camera.attitude
+    if not any(map(math.isnan, pose.attitude)):
+        attitude = messages.attitude_to_world(pose.attitude)[0]
+    _put(simulation, args, dataclasses.replace(camera, position=(x, y, z), attitude=attitude))
+
+
+@method("simSetCameraOrientation", least=2)
+def _set_camera_orientation(simulation: Simulation, args: Sequence[Any]) -> None:
+    keys = ("w_val", "x_val", "y_val", "z_val")
+    attitude = messages.attitude_to_world(read_map(args[1], "orientation", keys))[0]
+    camera = _camera_at(simulation, args)
+    _put(simulation, args, dataclasses.replace(camera, attitude=attitude))
+
+
+@method("simSetCameraFov", least=2)
+def _set_camera_fov(simulation: Simulation, args: Sequence[Any]) -> None:
+    fov = number(args[1], "fov_degrees", 1.0, 170.0)
+    _put(simulation, args, dataclasses.replace(_camera_at(simulation, args), fov=fov))
+
+
+def _camera_at(simulation: Simulation, args: Sequence[Any]) -> CameraState:
+    vehicle = posed_at(simulation, args, 2)
+    return simulation.cameras[vehicle.choice.name][read_camera(args[0])]
+
+
+def _put(simulation: Simulation, args: Sequence[Any], camera: CameraState) -> None:
+    vehicle = posed_at(simulation, args, 2)
+    simulation.cameras[vehicle.choice.name][camera.name] = camera

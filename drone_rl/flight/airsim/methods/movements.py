@@ -1,0 +1,245 @@
+"""Methods that move a vehicle: they are answered when the movement ends."""
+
+import functools
+import logging
+from collections.abc import Sequence
+from typing import Any
+
+from drone_rl.flight.airsim.messages import number, read_path, read_yaw_mode
+from drone_rl.flight.airsim.methods.registry import argument, method, vehicle_at
+from drone_rl.flight.airsim.simulation import Simulation, Wait
+from drone_rl.flight.commands.command import FlightFuture
+from drone_rl.flight.commands.path_following import AUTOMATIC
+from drone_rl.sim.coordinates import GeoPoint
+from drone_rl.utils.errors import InputError
+
+_log = logging.getLogger(__name__)
+
+
+def _flown(future: FlightFuture | None, name: str) -> Any:
+    """Return a wait for the end of a movement; False if API control is off."""
+    if future is None:
+        _log.warning("%s is ignored: API control is off; call enableApiControl(True)", name)
+        return False
+    return Wait(lambda: future.done, lambda: future.result())
+
+
+@method("takeoff")
+def _takeoff(simulation: Simulation, args: Sequence[Any]) -> Any:
+    timeout = number(argument(args, 0, 20.0), "timeout_sec")
+    return _flown(vehicle_at(simulation, args, 1).takeoff(timeout), "takeoff")
+
+
+@method("land")
+def _land(simulation: Simulation, args: Sequence[Any]) -> Any:
+    timeout = number(argument(args, 0, 60.0), "timeout_sec")
+    return _flown(vehicle_at(simulation, args, 1).land_down(timeout), "land")
+
+
+@method("goHome")
+def _home(simulation: Simulation, args: Sequence[Any]) -> Any:
+    # version 1.1 passes nothing
+    timeout = number(argument(args, 0, 1e6), "timeout_sec")
+    return _flown(vehicle_at(simulation, args, 1).return_home(timeout), "goHome")
+
+
+@method("hover")
+def _hover(simulation: Simulation, args: Sequence[Any]) -> Any:
+    return _flown(vehicle_at(simulation, args, 0).hold(), "hover")
+
+
+def _move_velocity(
+    simulation: Simulation, args: Sequence[Any], *, has_height: bool, in_body: bool, name: str
+) -> Any:
+    third = "z" if has_height else "vz"
+    names = ("vx", "vy", third, "duration")
+    vx, vy, vz, seconds = (number(v, n) for v, n in zip(args, names, strict=False))
+    if seconds <= 0.0:
+        return not has_height
+    drivetrain, yaw = read_yaw_mode(argument(args, 5, _HELD), argument(args, 4, 0))
+    vehicle = vehicle_at(simulation, args, 6)
+    future = vehicle.move_velocity(
+        (vx, vy, 0.0 if has_height else vz),
+        min(seconds, 1e6),
+        drivetrain,
+        yaw,
+        z=vz if has_height else None,
+        in_body=in_body,
+    )
+    return _flown(future, name)
+
+
+_HELD = {"is_rate": True, "yaw_or_rate": 0.0}
+
+for _label, _has_height, _in_body in (
+    ("moveByVelocity", False, False),
+    ("moveByVelocityZ", True, False),
+    ("moveByVelocityBodyFrame", False, True),
+    ("moveByVelocityZBodyFrame", True, True),
+):
+    method(_label, least=4)(
+        functools.partial(_move_velocity, has_height=_has_height, in_body=_in_body, name=_label)
+    )
+
+
+def _lookahead(args: Sequence[Any], index: int) -> tuple[float, float]:
+    lookahead = number(argument(args, index, AUTOMATIC), "lookahead")
+    return lookahead, number(argument(args, index + 1, 1.0), "adaptive_lookahead")
+
+
+@method("moveOnPath", least=2)
+def _move_path(simulation: Simulation, args: Sequence[Any]) -> Any:
+    speed, timeout = number(args[1], "velocity"), number(argument(args, 2, 1e6), "timeout_sec")
+    drivetrain, yaw = read_yaw_mode(argument(args, 4, _HELD), argument(args, 3, 0))
+    vehicle = vehicle_at(simulation, args, 7)
+    path = read_path(args[0])
+    ahead = _lookahead(args, 5)
+    return _flown(vehicle.move_path(path, speed, timeout, drivetrain, yaw, *ahead), "moveOnPath")
+
+
+@method("moveToPosition", least=4)
+def _move_to(simulation: Simulation, args: Sequence[Any]) -> Any:
+    x, y, z, speed = (number(v, n) for v, n in zip(args, ("x", "y", "z", "velocity"), strict=False))
+    timeout = number(argument(args, 4, 1e6), "timeout_sec")
+    drivetrain, yaw = read_yaw_mode(argument(args, 6, _HELD), argument(args, 5, 0))
+    vehicle = vehicle_at(simulation, args, 9)
+    future = vehicle.move_path([(x, y, z)], speed, timeout, drivetrain, yaw, *_lookahead(args, 7))
+    return _flown(future, "moveToPosition")
+
+
+@method("moveToGPS", least=4)
+def _move_geo(simulation: Simulation, args: Sequence[Any]) -> Any:
+    latitude = number(args[0], "latitude", -90.0, 90.0)
+    longitude = number(args[1], "longitude", -360.0, 360.0)
+    place = GeoPoint(latitude, longitude, number(args[2], "altitude"))
+    speed, timeout = number(args[3], "velocity"), number(argument(args, 4, 1e6), "timeout_sec")
+    drivetrain, yaw = read_yaw_mode(argument(args, 6, _HELD), argument(args, 5, 0))
+    vehicle = vehicle_at(simulation, args, 9)
+    future = vehicle.move_geo(place, speed, timeout, drivetrain, yaw, *_lookahead(args, 7))
+    return _flown(future, "moveToGPS")
+
+
+@method("moveToZ", least=2)
+def _move_z(simulation: Simulation, args: Sequence[Any]) -> Any:
+    z, speed = number(args[0], "z"), number(args[1], "velocity")
+    timeout = number(argument(args, 2, 1e6), "timeout_sec")
+    _, yaw = read_yaw_mode(argument(args, 3, _HELD), 0)
+    vehicle = vehicle_at(simulation, args, 6)
+    return _flown(vehicle.move_height(z, speed, timeout, yaw, *_lookahead(args, 4)), "moveToZ")
+
+
+@method("rotateToYaw", least=1)
+def _rotate_to(simulation: Simulation, args: Sequence[Any]) -> Any:
+    yaw, timeout = number(args[0], "yaw"), number(argument(args, 1, 1e6), "timeout_sec")
+    margin = number(argument(args, 2, 5.0), "margin")
+    return _flown(vehicle_at(simulation, args, 3).turn_to(yaw, timeout, margin), "rotateToYaw")
+
+
+@method("rotateByYawRate", least=2)
+def _rotate_by(simulation: Simulation, args: Sequence[Any]) -> Any:
+    rate, seconds = number(args[0], "yaw_rate", -3600.0, 3600.0), number(args[1], "duration")
+    if seconds <= 0.0:
+        return True
+    future = vehicle_at(simulation, args, 2).turn_by(rate, min(seconds, 1e6))
+    return _flown(future, "rotateByYawRate")
+
+
+@method("moveByManual", least=4)
+def _manual(simulation: Simulation, args: Sequence[Any]) -> Any:
+    names = ("vx_max", "vy_max", "z_min", "duration")
+    vx, vy, z, seconds = (number(v, n) for v, n in zip(args, names, strict=False))
+    drivetrain, yaw = read_yaw_mode(argument(args, 5, _HELD), argument(args, 4, 0))
+    vehicle = vehicle_at(simulation, args, 6)
+    future = vehicle.move_manually(vx, vy, z, min(seconds, 1e6), drivetrain, yaw)
+    return _flown(future, "moveByManual")
+
+
+@method("moveByRC", least=1)
+def _by_rc(simulation: Simulation, args: Sequence[Any]) -> None:
+    if not isinstance(args[0], dict):
+        raise InputError("rcdata is not a map; give RCData")
+    vehicle_at(simulation, args, 1).set_sticks(args[0])
+
+
+def _numbers(args: Sequence[Any], *names: str) -> list[float]:
+    return [number(value, name) for value, name in zip(args, names, strict=False)]
+
+
+def _seconds(value: float) -> float:
+    return min(max(value, 0.0), 1e6)
+
+
+@method("moveByRollPitchYawZ", least=5)
+def _roll_pitch_yaw_z(simulation: Simulation, args: Sequence[Any]) -> Any:
+    roll, pitch, yaw, z, seconds = _numbers(args, "roll", "pitch", "yaw", "z", "duration")
+    vehicle = vehicle_at(simulation, args, 5)
+    future = vehicle.tilt(roll, pitch, _seconds(seconds), yaw=yaw, z=z)
+    return _flown(future, "moveByRollPitchYawZ")
+
+
+@method("moveByRollPitchYawThrottle", least=5)
+def _roll_pitch_yaw_throttle(simulation: Simulation, args: Sequence[Any]) -> Any:
+    names = ("roll", "pitch", "yaw", "throttle", "duration")
+    roll, pitch, yaw, throttle, seconds = _numbers(args, *names)
+    vehicle = vehicle_at(simulation, args, 5)
+    future = vehicle.tilt(roll, pitch, _seconds(seconds), yaw=yaw, throttle=throttle)
+    return _flown(future, "moveByRollPitchYawThrottle")
+
+
+@method("moveByRollPitchYawrateThrottle", least=5)
+def _roll_pitch_yawrate_throttle(simulation: Simulation, args: Sequence[Any]) -> Any:
+    names = ("roll", "pitch", "yaw_rate", "throttle", "duration")
+    roll, pitch, rate, throttle, seconds = _numbers(args, *names)
+    vehicle = vehicle_at(simulation, args, 5)
+    future = vehicle.tilt(roll, pitch, _seconds(seconds), yaw_rate=rate, throttle=throttle)
+    return _flown(future, "moveByRollPitchYawrateThrottle")
+
+
+@method("moveByRollPitchYawrateZ", least=5)
+def _roll_pitch_yawrate_z(simulation: Simulation, args: Sequence[Any]) -> Any:
+    names = ("roll", "pitch", "yaw_rate", "z", "duration")
+    roll, pitch, rate, z, seconds = _numbers(args, *names)
+    vehicle = vehicle_at(simulation, args, 5)
+    future = vehicle.tilt(roll, pitch, _seconds(seconds), yaw_rate=rate, z=z)
+    return _flown(future, "moveByRollPitchYawrateZ")
+
+
+@method("moveByAngleRatesZ", least=5)
+def _rates_z(simulation: Simulation, args: Sequence[Any]) -> Any:
+    *rates, z, seconds = _numbers(args, "roll_rate", "pitch_rate", "yaw_rate", "z", "duration")
+    vehicle = vehicle_at(simulation, args, 5)
+    return _flown(vehicle.spin(rates, _seconds(seconds), z=z, throttle=None), "moveByAngleRatesZ")
+
+
+@method("moveByAngleRatesThrottle", least=5)
+def _rates_throttle(simulation: Simulation, args: Sequence[Any]) -> Any:
+    names = ("roll_rate", "pitch_rate", "yaw_rate", "throttle", "duration")
+    *rates, throttle, seconds = _numbers(args, *names)
+    vehicle = vehicle_at(simulation, args, 5)
+    future = vehicle.spin(rates, _seconds(seconds), z=None, throttle=throttle)
+    return _flown(future, "moveByAngleRatesThrottle")
+
+
+@method("moveByAngleZ", "moveByAngle", least=5)
+def _angle_z(simulation: Simulation, args: Sequence[Any]) -> Any:
+    """Move as versions up to 1.5 do: pitch comes first."""
+    pitch, roll, z, yaw, seconds = _numbers(args, "pitch", "roll", "z", "yaw", "duration")
+    vehicle = vehicle_at(simulation, args, 5)
+    return _flown(vehicle.tilt(roll, pitch, _seconds(seconds), yaw=yaw, z=z), "moveByAngleZ")
+
+
+@method("moveByAngleThrottle", least=5)
+def _angle_throttle(simulation: Simulation, args: Sequence[Any]) -> Any:
+    names = ("pitch", "roll", "throttle", "yaw_rate", "duration")
+    pitch, roll, throttle, rate, seconds = _numbers(args, *names)
+    vehicle = vehicle_at(simulation, args, 5)
+    future = vehicle.tilt(roll, pitch, _seconds(seconds), yaw_rate=rate, throttle=throttle)
+    return _flown(future, "moveByAngleThrottle")
+
+
+@method("moveByMotorPWMs", least=5)
+def _motors(simulation: Simulation, args: Sequence[Any]) -> Any:
+    names = ("front_right", "rear_left", "front_left", "rear_right", "duration")
+    *shares, seconds = _numbers(args, *names)
+    vehicle = vehicle_at(simulation, args, 5)
+    return _flown(vehicle.set_rotors(shares, _seconds(seconds)), "moveByMotorPWMs")

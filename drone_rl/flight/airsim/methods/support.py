@@ -1,0 +1,78 @@
+"""What the server does not do, or does in part, of AirSim's methods."""
+
+UNSUPPORTED = {
+    "simGetLidarSegmentation": "lidar",
+    "getLidarData": "lidar; use depth images by simGetImages",
+    "getDistanceSensorData": "distance sensors; use depth images by simGetImages",
+    "setCarControls": "cars; use a multirotor",
+    "getCarState": "cars; use getMultirotorState",
+    "getCarControls": "cars; use a multirotor",
+    "simSetObjectMaterial": "materials of Unreal; set appearance when the server starts",
+    "simSetObjectMaterialFromTexture": "materials of Unreal; set appearance when the server starts",
+    "simSwapTextures": "textures of Unreal; set appearance when the server starts",
+    "simLoadLevel": "levels of Unreal; start a server with another scene",
+    "simSpawnAsset": "assets of Unreal; simSpawnObject makes cubes, spheres and cylinders",
+    "simGetMeshPositionVertexBuffers": "meshes of Unreal; give a scene as an MJCF file",
+    "simSetObjectScale": "scaling; spawn an object of another size",
+    "simCharSetFacePreset": "characters of Unreal",
+    "simGetWorldExtents": "voxel grids",
+    "simCreateVoxelGrid": "voxel grids; use depth images by simGetImages",
+    "simSetKinematics": "setting velocities; use simSetVehiclePose",
+    "simSetLightIntensity": "lights of Unreal; use simSetTimeOfDay",
+    "simGetFilmbackSettings": "film cameras; use simSetCameraFov",
+    "simSetFilmbackSettings": "film cameras; use simSetCameraFov",
+    "simGetLensSettings": "film cameras; use simSetCameraFov",
+    "simSetPresetLensSettings": "film cameras; use simSetCameraFov",
+    "simSetFocalLength": "film cameras; use simSetCameraFov",
+    "simGetFocalLength": "film cameras; use simGetCameraInfo",
+    "simEnableManualFocus": "film cameras",
+    "simSetFocusDistance": "film cameras",
+    "simGetFocusDistance": "film cameras",
+    "simSetFocusAperture": "film cameras",
+    "simGetFocusAperture": "film cameras",
+    "simEnableFocusPlane": "film cameras",
+    "simGetCurrentFieldOfView": "film cameras; use simGetCameraInfo",
+    "simSetDistortionParam": "lens distortion",
+    "simGetDistortionParams": "lens distortion",
+    "simAddDetectionFilterMeshName": "detections; use segmentation images",
+    "simSetDetectionFilterRadius": "detections; use segmentation images",
+    "simClearDetectionMeshNames": "detections; use segmentation images",
+    "simGetDetections": "detections; use segmentation images",
+    "simTestLineOfSightBetweenPoints": "places on Earth in rays; use simTestLineOfSightToPoint",
+}
+"""Methods that AirSim has and this server does not, with what is missing and the alternative."""
+
+
+PARTLY = {
+    "simSpawnObject": "cube, sphere or cylinder, four of each; vehicles fly through them",
+    "simSetObjectPose": "positions, of the scene's objects, spawned ones and vehicles; no rotation",
+    "simGetObjectScale": "always 1",
+    "simSetWeatherParameter": "fog",
+    "simSetTimeOfDay": "the sun's place at that hour, which then stands still",
+    "simAddVehicle": "SimpleFlight and ComputerVision",
+    "simRunConsoleCommand": "returns false",
+    "simGetImages": "types 0 to 7; vehicles do not see each other",
+    "simGetImage": "types 0 to 7; vehicles do not see each other",
+    "simGetGroundTruthEnvironment": "the standard atmosphere",
+    "simContinueForFrames": "a frame is a control period, 21 ms",
+    "simTestLineOfSightToPoint": "boxes that can be touched hide; other objects do not",
+    "simListAssets": "shapes for simSpawnObject",
+    **dict.fromkeys(
+        (
+            "setAngleRateControllerGains",
+            "setAngleLevelControllerGains",
+            "setVelocityControllerGains",
+            "setPositionControllerGains",
+        ),
+        "accepted, without effect: gains are settings of the dynamics",
+    ),
+    **dict.fromkeys(
+        (
+            *("simPrintLogMessage", "simSetTraceLine", "simFlushPersistentMarkers"),
+            *("simPlotPoints", "simPlotLineStrip", "simPlotLineList", "simPlotArrows"),
+            *("simPlotStrings", "simPlotTransforms", "simPlotTransformsWithNames"),
+        ),
+        "accepted, without effect: there is no window",
+    ),
+}
+"""Methods that do not all that AirSim's do, with what they do."""

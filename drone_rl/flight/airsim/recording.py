@@ -1,0 +1,67 @@
+"""Recordings as AirSim writes them: a tab-separated table and an image of each time."""
+
+import datetime
+import io
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+from torch import Tensor
+
+from drone_rl.flight.airsim.messages import Pose, nanoseconds
+from drone_rl.utils.errors import InputError
+
+INTERVAL = 0.05
+"""Simulated seconds between two rows."""
+_COLUMNS = (
+    "VehicleName TimeStamp POS_X POS_Y POS_Z Q_W Q_X Q_Y Q_Z ImageFile".replace(" ", "\t") + "\n"
+)
+
+
+class Recording:
+    """Writes `airsim_rec.txt` and `images/` to a new folder, named by the time of day.
+
+    numpy reads the table by `numpy.genfromtxt(path, names=True, dtype=None, encoding="utf-8")`.
+    """
+
+    def __init__(self, folder: Path, begin: float) -> None:
+        """Create the folder; rows are due from the simulated time `begin`."""
+        now = datetime.datetime.now().strftime("%Y-%m-%d-%H-%M-%S-%f")
+        self.path = folder / now
+        try:
+            (self.path / "images").mkdir(parents=True)
+            self._table: io.TextIOWrapper = (self.path / "airsim_rec.txt").open(
+                "w", encoding="utf-8"
+            )
+        except OSError as error:
+            raise InputError(
+                f"recordings can't be written to {folder} ({error.strerror}); choose another folder"
+            ) from error
+        self._table.write(_COLUMNS)
+        self._next = begin
+
+    def is_due(self, time: float) -> bool:
+        """Return whether rows of this simulated time are to be written, and note that they are."""
+        if time < self._next - 1e-9:
+            return False
+        self._next = time + INTERVAL
+        return True
+
+    def write(self, time: float, name: str, pose: Pose, image: Tensor) -> None:
+        """Write the row of a vehicle with its image (H, W, 3), uint8."""
+        stamp = nanoseconds(time)
+        file = f"img_{to_letters(name)}_0_{stamp}.png"
+        values = (*pose.position, *pose.attitude)
+        row: list[Any] = [name or "Vehicle", stamp, *(f"{v:.6g}" for v in values), file]
+        self._table.write("\t".join(map(str, row)) + "\n")
+        self._table.flush()
+        Image.fromarray(image.numpy()).save(self.path / "images" / file, compress_level=1)
+
+    def close(self) -> None:
+        """Close the table."""
+        self._table.close()
+
+
+def to_letters(name: str) -> str:
+    """Return a name as a part of a file's name."""
+    return "".join(c if c.isascii() and c.isalnum() else "_" for c in name)[:64]

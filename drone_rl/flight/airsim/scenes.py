@@ -1,0 +1,109 @@
+"""Scenes of the server as tasks: cubes, blocks, pillars, an empty field, and MJCF files."""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from dm_control import mjcf
+from torch import Tensor
+
+from drone_rl.config import TaskSettings
+from drone_rl.sim.dynamics import BodyState, Obstacles
+from drone_rl.sim.entities import Pillar, VisualEntity
+from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.tasks import CollectCubes, Task, as_task
+from drone_rl.utils.errors import InputError, did_you_mean
+
+SCENES = ("cubes", "blocks", "pillars", "empty")
+_BLOCK = (4.0, 4.0)
+"""Width and height of a block, metres."""
+
+
+class _Fixed(Task[Any]):
+    """A scene without rules: entities at fixed places."""
+
+    name = "scene"
+
+    def __init__(
+        self, entities: Sequence[Any], places: Tensor, solid: Sequence[float] | None
+    ) -> None:
+        self._entities, self._places, self._solid = entities, places, solid
+
+    def make_props(self) -> Sequence[Any]:
+        """Return the entities."""
+        return self._entities
+
+    def sample(self, random_state: np.random.RandomState) -> Tensor:
+        """Return the places. Shape: (P, 3)."""
+        return self._places.clone()
+
+    def places(self, state: Any) -> Tensor:
+        """Return the places. Shape: (N, P, 3)."""
+        return state.sampled
+
+    def obstacles(self, state: Any) -> Obstacles | None:
+        """Return the boxes that can be touched."""
+        if self._solid is None:
+            return None
+        x, y, z = self._solid
+        return Obstacles(state.sampled, (x, y, z))
+
+    def step(self, state: Any, body: BodyState) -> tuple[Any, Tensor]:
+        """Apply no rule."""
+        reward = torch.zeros(len(state), dtype=torch.float64)
+        return dataclasses.replace(state, body=body), reward
+
+
+class _File(VisualEntity):
+    """A model from a file of MuJoCo's."""
+
+    semantic_class = SemanticClass.OBSTACLE
+
+    def _build(self, path: Path) -> None:
+        try:
+            self._mjcf_root = mjcf.from_path(str(path), escape_separators=True)
+        except (OSError, SyntaxError, ValueError, KeyError, AttributeError, TypeError) as error:
+            reason = str(error).strip().splitlines()[0] if str(error) else type(error).__name__
+            raise InputError(
+                f"scene={path} can't be read as a MuJoCo model ({reason}); give a valid MJCF file"
+            ) from error
+        if self._mjcf_root.model in ("", "unnamed_model"):
+            self._mjcf_root.model = "scene"
+
+
+def make_task(scene: str) -> Task[Any]:
+    """Return the task that a name, or the path of an MJCF file, means.
+
+    Raises:
+        InputError: There is no such scene, or the file can't be read.
+    """
+    if scene == "cubes":
+        return CollectCubes(TaskSettings())
+    if scene == "pillars":
+        return as_task("pillars")
+    if scene == "empty":
+        return _Fixed([], torch.zeros(0, 3, dtype=torch.float64), None)
+    if scene == "blocks":
+        return _blocks()
+    path = Path(scene)
+    if path.suffix == ".xml" and path.is_file():
+        return _Fixed([_File(path)], torch.zeros(1, 3, dtype=torch.float64), None)
+    raise InputError(
+        f"scene={scene} is unknown; give {', '.join(SCENES)}, or the path of an MJCF file, *.xml"
+        f"{did_you_mean(scene, SCENES)}"
+    )
+
+
+def _blocks() -> Task[Any]:
+    """Blocks in a grid around the start, with streets between them."""
+    width, height = _BLOCK
+    grid = [(x, y) for x in range(-24, 49, 12) for y in range(-24, 25, 12) if (x, y) != (0, 0)]
+    places = torch.tensor([(x, y, height / 2) for x, y in grid], dtype=torch.float64)
+    shades = ((0.62, 0.6, 0.56), (0.55, 0.57, 0.62), (0.66, 0.58, 0.5))
+    blocks = [
+        Pillar(width, height, shades[i % len(shades)], name=f"block_{i}") for i in range(len(grid))
+    ]
+    return _Fixed(blocks, places, (width / 2, width / 2, height / 2))

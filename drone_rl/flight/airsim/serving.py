@@ -1,0 +1,147 @@
+"""Servers from settings: in a thread of this process, or for the command line."""
+
+import asyncio
+import contextlib
+import logging
+import threading
+from pathlib import Path
+from typing import Self
+
+from drone_rl.flight.airsim.lockstep import PATIENCE
+from drone_rl.flight.airsim.server import AirsimServer
+from drone_rl.flight.airsim.settings_file import AirsimSettings, parse_settings, read_settings
+from drone_rl.flight.airsim.simulation import CLOCKS, Simulation
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import OneOf, Real, Whole
+
+_log = logging.getLogger(__name__)
+
+
+class RunningServer:
+    """A server in a thread of this process; a context manager that stops it."""
+
+    def __init__(
+        self, simulation: Simulation, host: str, port: int, patience: float = PATIENCE
+    ) -> None:
+        """Start it; see `AirsimServer.start` for errors."""
+        self._patience = patience
+        self.simulation = simulation
+        """The simulation, which only the server's thread may touch while it runs."""
+        self.address = ("", 0)
+        """Address and port at which it listens."""
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._error: Exception | None = None
+        self._ready = threading.Event()
+        self._thread = threading.Thread(target=self._main, args=(host, port), daemon=True)
+        self._thread.start()
+        self._ready.wait()
+        if self._error is not None:
+            raise self._error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Stop it: calls that wait are not answered."""
+        loop, task = self._loop, self._task
+        if loop is not None and task is not None and self._thread.is_alive():
+            loop.call_soon_threadsafe(task.cancel)
+            self._thread.join()
+            self.simulation.close()
+
+    def _main(self, host: str, port: int) -> None:
+        with contextlib.suppress(asyncio.CancelledError):
+            asyncio.run(self._serve(host, port))
+
+    async def _serve(self, host: str, port: int) -> None:
+        self._loop, self._task = asyncio.get_running_loop(), asyncio.current_task()
+        server = AirsimServer(self.simulation, self._patience)
+        try:
+            await server.start(host, port)
+            self.address = server.address
+        except InputError as error:
+            self._error = error
+            return
+        finally:
+            self._ready.set()
+        await server.serve()
+
+
+def serve(
+    settings: str | Path | AirsimSettings | None = None,
+    *,
+    scene: str = "cubes",
+    clock: str = "wall",
+    patience: float = PATIENCE,
+    address: str | None = None,
+    port: int | None = None,
+    seed: int = 0,
+    renderer: str | None = None,
+    recordings: str | Path | None = None,
+) -> RunningServer:
+    """Start a server for AirSim's clients in a thread of this process.
+
+    >>> with drone_rl.serve(scene="blocks", clock="lockstep") as server:
+    ...     client = airsim.MultirotorClient(port=server.address[1])
+
+    Args:
+        settings: Path of a settings.json, or its content; by default one multirotor.
+        scene: cubes, blocks, pillars, empty, or the path of an MJCF file.
+        clock: "wall", or "lockstep", in which time passes only while a call waits for it.
+        patience: Seconds without a request after which time passes in lockstep.
+        address: Address to listen at; that of the settings by default.
+        port: Port; that of the settings by default, and 0 for a free one.
+        seed: Of placements, gusts and sensor noise.
+        renderer: raytrace or mujoco_warp; by default the one that fits the scene.
+        recordings: Folder for recordings; None refuses `startRecording`.
+
+    Raises:
+        InputError: A setting is wrong, or the port is in use.
+    """
+    simulation, host, number = make_simulation(
+        settings,
+        scene=scene,
+        clock=clock,
+        address=address,
+        port=port,
+        seed=seed,
+        renderer=renderer,
+        recordings=recordings,
+    )
+    patience = Real(0.0, 60.0).read(patience, "patience")
+    return RunningServer(simulation, host, number, patience)
+
+
+def make_simulation(
+    settings: str | Path | AirsimSettings | None,
+    *,
+    scene: str,
+    clock: str,
+    address: str | None,
+    port: int | None,
+    seed: int,
+    renderer: str | None,
+    recordings: str | Path | None,
+) -> tuple[Simulation, str, int]:
+    """Return a simulation, and the address and port to serve it at; see `serve`."""
+    if settings is None:
+        settings = parse_settings("{}")
+    elif not isinstance(settings, AirsimSettings):
+        settings = read_settings(Path(settings))
+    clock = OneOf(CLOCKS).read(clock, "clock")
+    seed = Whole(0, 2**31 - 1).read(seed, "seed")
+    host = settings.address if address is None else address
+    number = settings.port if port is None else Whole(0, 65535).read(port, "port")
+    if host not in ("127.0.0.1", "localhost", "::1"):
+        _log.warning(
+            "the server listens at %s: everybody in that network can control the vehicles", host
+        )
+    folder = None if recordings is None else Path(recordings)
+    simulation = Simulation(
+        settings, scene, clock=clock, seed=seed, renderer=renderer, recordings=folder
+    )
+    return simulation, host, number

@@ -1,0 +1,345 @@
+"""AirSim's settings.json: vehicles, cameras, clock, wind and server.
+
+The file may have single quotes, comments and trailing commas, as in the chapter's listings. Keys
+that AirSim has and this package does not need are ignored in silence; others are warned about.
+"""
+
+import dataclasses
+import json
+import logging
+import math
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from drone_rl.sim.coordinates import HOME, GeoPoint
+from drone_rl.sim.entities import find_camera
+from drone_rl.sim.image_types import ImageType
+from drone_rl.utils.errors import InputError, did_you_mean
+from drone_rl.utils.schema import Flag, Kind, Maybe, OneOf, Real, Text, Whole
+
+_log = logging.getLogger(__name__)
+
+PORT, ADDRESS = 41451, "127.0.0.1"
+SIM_MODES = ("Multirotor", "ComputerVision")
+FLYING, POSING, PX4 = "SimpleFlight", "ComputerVision", "PX4Multirotor"
+"""Vehicle types: with dynamics and SimpleFlight's controller, without dynamics, and of PX4."""
+MAX_BYTES = 2**20
+_TYPES = (FLYING, POSING, PX4)
+_STATES = ("Armed", "Disarmed")
+_TOKEN = re.compile(
+    r"""(?P<comment>//[^\n]*|/\*.*?\*/)|(?P<text>"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')"""
+    r"""|(?P<comma>,(?=(?:\s|//[^\n]*|/\*.*?\*/)*[}\]]))|(?P<other>.)""",
+    re.DOTALL,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Capture:
+    """Size and field of view of images of one type from one camera."""
+
+    width: int = 256
+    """Pixels."""
+    height: int = 144
+    fov: float = 90.0
+    """Horizontal, degrees."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Offset:
+    """A pose in NED; metres and degrees. NaN components keep what is there."""
+
+    x: float = math.nan
+    y: float = math.nan
+    z: float = math.nan
+    roll: float = math.nan
+    pitch: float = math.nan
+    yaw: float = math.nan
+
+
+@dataclasses.dataclass(frozen=True)
+class CameraChoice:
+    """Where a camera is mounted, relative to the vehicle, and its images."""
+
+    offset: Offset = Offset()
+    captures: Mapping[ImageType, Capture] = dataclasses.field(default_factory=dict)
+    """By type, where they differ from the defaults."""
+
+
+@dataclasses.dataclass(frozen=True)
+class VehicleChoice:
+    """A vehicle to create."""
+
+    name: str
+    kind: str = FLYING
+    """One of SimpleFlight, ComputerVision and PX4Multirotor."""
+    start: Offset = Offset()
+    """Start pose in the world."""
+    is_armed: bool = True
+    has_api_control: bool = False
+    cameras: Mapping[str, CameraChoice] = dataclasses.field(default_factory=dict)
+    """By our names of cameras."""
+
+
+@dataclasses.dataclass(frozen=True)
+class AirsimSettings:
+    """Content of a settings file."""
+
+    sim_mode: str = SIM_MODES[0]
+    address: str = ADDRESS
+    port: int = PORT
+    clock_speed: float = 1.0
+    """Simulated seconds in a second."""
+    home: GeoPoint = HOME
+    """Place on Earth of the world's origin."""
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Metres per second, NED."""
+    captures: Mapping[ImageType, Capture] = dataclasses.field(default_factory=dict)
+    """Of all cameras, by type."""
+    vehicles: tuple[VehicleChoice, ...] = ()
+    segmentation: str = "CommonObjectsRandomIDs"
+    """How segmentation ids are assigned at the start; "None" for 0 everywhere."""
+    text: str = "{}"
+    """The file, as JSON."""
+
+
+@dataclasses.dataclass(frozen=True)
+class _Table:
+    """The keys of one object of the file."""
+
+    keys: Mapping[str, Any]
+    """Kinds of values; `_Table`, or a one-element list or mapping of it, for nested objects."""
+    unused: frozenset[str] = frozenset()
+    """Keys that AirSim has and that mean nothing here."""
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+_NUMBER = Real(-1e9, 1e9)
+_POSE = dict.fromkeys(("X", "Y", "Z", "Roll", "Pitch", "Yaw"), _NUMBER)
+_CAPTURE = _Table(
+    {
+        "ImageType": Whole(-1, 9),
+        "Width": Whole(1, 4096),
+        "Height": Whole(1, 4096),
+        "FOV_Degrees": Real(1.0, 170.0),
+    },
+    _words(
+        "AutoExposureSpeed AutoExposureBias AutoExposureMaxBrightness AutoExposureMinBrightness "
+        "MotionBlurAmount TargetGamma ProjectionMode OrthoWidth"
+    ),
+)
+_CAMERA = _Table(
+    {**_POSE, "CaptureSettings": [_CAPTURE]}, frozenset({"NoiseSettings", "Gimbal", "UnrealEngine"})
+)
+_VEHICLE = _Table(
+    {
+        **_POSE,
+        "VehicleType": OneOf((*_TYPES, "ArduCopter", "PhysXCar", "ArduRover")),
+        "DefaultVehicleState": OneOf((*_STATES, "")),
+        "AutoCreate": Flag(),
+        "AllowAPIAlways": Flag(),
+        "Cameras": {"": _CAMERA},
+    },
+    _words(
+        "EnableCollisions EnableCollisionPassthrogh EnableTrace RC Sensors PawnPath IsFpvVehicle "
+        "UseSerial UseTcp TcpPort ControlIp ControlPort ControlPortLocal ControlPortRemote UdpIp "
+        "UdpPort SerialPort SerialBaudRate LockStep Parameters Model QgcHostIp LocalHostIp SitlIp "
+        "SitlPort SimSysID SimCompID VehicleSysID VehicleCompID OffboardSysID OffboardCompID"
+    ),
+)
+_FILE = _Table(
+    {
+        "SettingsVersion": _NUMBER,
+        "SimMode": OneOf((*SIM_MODES, "Car", "car", "")),
+        "UsageScenario": Text(),
+        "ApiServerPort": Whole(0, 65535),
+        "LocalHostIp": Text(),
+        "ClockSpeed": Real(0.0, 1000.0, is_above=True),
+        "OriginGeopoint": _Table(
+            {
+                "Latitude": Real(-90.0, 90.0),
+                "Longitude": Real(-180.0, 180.0),
+                "Altitude": Real(-1000.0, 10_000.0),
+            }
+        ),
+        "Wind": _Table(dict.fromkeys(("X", "Y", "Z"), Real(-100.0, 100.0))),
+        "CameraDefaults": _CAMERA,
+        "Vehicles": {"": _VEHICLE},
+        "SegmentationSettings": _Table(
+            {"InitMethod": OneOf(("CommonObjectsRandomIDs", "None", ""))},
+            frozenset({"MeshNamingMethod", "OverrideExisting"}),
+        ),
+    },
+    _words(
+        "ClockType ViewMode SubWindows Recording PawnPaths TimeOfDay LogMessagesVisible RpcEnabled "
+        "PhysicsEngineName EngineSound SpeedUnitFactor SpeedUnitLabel RecordUIVisible "
+        "MoveWorldOrigin PawnPaths CameraDirector DefaultSensors Beacons ExternalCameras "
+        "ShowLosDebugLines InitialInstanceSegmentation ApiServerEndpoint PhysicsEngine"
+    ),
+)
+
+
+def read_settings(path: Path) -> AirsimSettings:
+    """Read a settings file.
+
+    Raises:
+        InputError: It can't be read, or a value is wrong; the message has the key's path.
+    """
+    try:
+        content = path.read_bytes()
+        if len(content) > MAX_BYTES:
+            raise InputError(f"{path} has {len(content)} bytes; give a file of at most {MAX_BYTES}")
+        text = content.decode("utf-8-sig")
+    except OSError as error:
+        raise InputError(
+            f"settings={path} can't be read ({error.strerror}); give the path of a settings.json"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"settings={path} is not text in UTF-8; save it as UTF-8") from error
+    return parse_settings(text, str(path))
+
+
+def parse_settings(text: str, name: str = "settings.json") -> AirsimSettings:
+    """Read settings from the text of a file; see `read_settings` for errors."""
+    try:
+        data = json.loads("".join(_as_json(text)))
+    except json.JSONDecodeError as error:
+        raise InputError(
+            f"{name}: line {error.lineno} is not JSON ({error.msg}); mend it there"
+        ) from error
+    except RecursionError as error:
+        raise InputError(f"{name} is nested too deeply; give fewer levels") from error
+    found = _read(_FILE, data, "", name)
+    if found.get("SimMode", "").lower() == "car":
+        raise InputError(f"{name}: SimMode=Car is not supported; give {' or '.join(SIM_MODES)}")
+    scenario = found.get("UsageScenario", "")
+    posed = "ComputerVision" in (scenario, found.get("SimMode"))
+    mode = SIM_MODES[1] if posed else SIM_MODES[0]
+    defaults = found.get("CameraDefaults", {})
+    vehicles = [
+        _vehicle(vehicle, given, mode, name)
+        for vehicle, given in found.get("Vehicles", {}).items()
+        if given.get("AutoCreate", True)
+    ]
+    default = VehicleChoice("SimpleFlight" if mode == SIM_MODES[0] else "", _kind(mode))
+    origin, wind = found.get("OriginGeopoint", {}), found.get("Wind", {})
+    return AirsimSettings(
+        sim_mode=mode,
+        address=found.get("LocalHostIp") or ADDRESS,
+        port=found.get("ApiServerPort", PORT),
+        clock_speed=float(found.get("ClockSpeed", 1.0)),
+        home=GeoPoint(
+            float(origin.get("Latitude", HOME.latitude)),
+            float(origin.get("Longitude", HOME.longitude)),
+            float(origin.get("Altitude", HOME.altitude)),
+        ),
+        wind=(float(wind.get("X", 0)), float(wind.get("Y", 0)), float(wind.get("Z", 0))),
+        captures=_captures(defaults),
+        vehicles=tuple(vehicles) or (default,),
+        segmentation=found.get("SegmentationSettings", {}).get("InitMethod")
+        or AirsimSettings.segmentation,
+        text=json.dumps(data),
+    )
+
+
+def _as_json(text: str) -> Iterator[str]:
+    """Yield the text as JSON: without comments and trailing commas, with double quotes."""
+    for match in _TOKEN.finditer(text):
+        token = match.group()
+        if match.lastgroup == "text" and token[0] == "'":
+            inner = token[1:-1].replace("\\'", "'")
+            yield '"' + re.sub(r'(?<!\\)"', r"\"", inner) + '"'
+        elif match.lastgroup not in ("comment", "comma"):
+            yield token
+
+
+def _read(table: _Table, data: Any, path: str, name: str) -> dict[str, Any]:
+    """Check the values of one object; warn about unknown keys. Return the known ones."""
+    if not isinstance(data, Mapping):
+        raise InputError(f"{name}: {path or 'the file'} is not an object; write {{...}}")
+    found: dict[str, Any] = {}
+    for key, value in data.items():
+        where = f"{path}.{key}" if path else key
+        kind = table.keys.get(key)
+        if kind is not None:
+            found[key] = _read_as(kind, value, where, name)
+        elif key not in table.unused:
+            meant = did_you_mean(key, (*table.keys, *table.unused))
+            _log.warning("%s: %s is unknown and ignored%s", name, where, meant)
+    return found
+
+
+def _read_as(kind: Any, value: Any, where: str, name: str) -> Any:
+    """Read a value of a kind, which may be a table, or a list or mapping of a table."""
+    if isinstance(kind, _Table):
+        return _read(kind, value, where, name)
+    if isinstance(kind, list):
+        if not isinstance(value, list):
+            raise InputError(f"{name}: {where} is not a list; write [...]")
+        return [_read(kind[0], v, f"{where}[{i}]", name) for i, v in enumerate(value)]
+    if isinstance(kind, Mapping):
+        if not isinstance(value, Mapping):
+            raise InputError(f"{name}: {where} is not an object; write {{...}}")
+        return {k: _read(kind[""], v, f"{where}.{k}", name) for k, v in value.items()}
+    return _value(kind, value, f"{name}: {where}")
+
+
+def _value(kind: Kind, value: Any, where: str) -> Any:
+    # AirSim's files write numbers that are not finite as the texts "NaN"
+    if isinstance(value, float) and math.isnan(value):
+        return None
+    return Maybe(kind).read(value, where)
+
+
+def _kind(mode: str) -> str:
+    return FLYING if mode == SIM_MODES[0] else POSING
+
+
+def _vehicle(vehicle: str, given: Mapping[str, Any], mode: str, name: str) -> VehicleChoice:
+    kind = given.get("VehicleType") or _kind(mode)
+    if kind not in _TYPES:
+        raise InputError(
+            f"{name}: Vehicles.{vehicle}.VehicleType={kind} is not supported; give one of "
+            f"{', '.join(_TYPES)}"
+        )
+    cameras: dict[str, CameraChoice] = {}
+    for camera, own in given.get("Cameras", {}).items():
+        try:
+            spec = find_camera(camera)
+        except InputError as error:
+            raise InputError(f"{name}: Vehicles.{vehicle}.Cameras.{camera}: {error}") from error
+        cameras[spec.name] = CameraChoice(_offset(own), _captures(own))
+    return VehicleChoice(
+        name=vehicle,
+        kind=POSING if mode == SIM_MODES[1] else kind,
+        start=_offset(given),
+        is_armed=given.get("DefaultVehicleState") != "Disarmed",
+        has_api_control=bool(given.get("AllowAPIAlways", False)),
+        cameras=cameras,
+    )
+
+
+def _offset(given: Mapping[str, Any]) -> Offset:
+    values = (given.get(key) for key in _POSE)
+    return Offset(*(math.nan if value is None else float(value) for value in values))
+
+
+def _captures(given: Mapping[str, Any]) -> dict[ImageType, Capture]:
+    found: dict[ImageType, Capture] = {}
+    for own in given.get("CaptureSettings", []):
+        kind = own.get("ImageType", 0)
+        kinds = (
+            list(ImageType) if kind == -1 else [ImageType(kind)] if kind < len(ImageType) else []
+        )
+        for one in kinds:
+            old = found.get(one, Capture())
+            found[one] = Capture(
+                own.get("Width") or old.width,
+                own.get("Height") or old.height,
+                float(own.get("FOV_Degrees") or old.fov),
+            )
+    return found

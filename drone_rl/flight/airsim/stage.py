@@ -1,0 +1,322 @@
+"""The scene of the server: objects by name, what they do when touched, and what cameras show."""
+
+import copy
+import dataclasses
+import io
+import math
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from PIL import Image
+from torch import Tensor
+
+from drone_rl.config import CameraSettings
+from drone_rl.flight.airsim.cameras import CameraState
+from drone_rl.flight.airsim.messages import NO_POSE, Pose, ned, to_world
+from drone_rl.flight.airsim.scenes import make_task
+from drone_rl.flight.airsim.settings_file import Capture
+from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.entities import KINDS
+from drone_rl.sim.image_types import ImageType, pixels, segmentation_ids
+from drone_rl.sim.rendering import Appearance, Distractors
+from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.rendering.view import Modality
+from drone_rl.sim.tasks import CollectCubes
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH
+from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
+
+SPARE = 12
+"""Objects that can be spawned: boxes, balls and cylinders in turn."""
+
+_REPETITION = re.compile(r"(?<!\\)[*+?{]")
+_REPEATED_GROUP = re.compile(r"\)[*+?{]")
+_MOST_REPETITIONS = 3
+
+
+class Shot(NamedTuple):
+    """A rendered image of one type."""
+
+    values: Tensor
+    """As the renderer returns them. Shape: (1, *)."""
+    focal: float
+    """Focal length, pixels."""
+    capture: Capture
+
+
+@dataclasses.dataclass(frozen=True)
+class _Spawned:
+    """An object that a client made."""
+
+    number: int
+    """Of the spare place that it takes."""
+    place: tuple[float, float, float]
+    size: float
+
+
+class Stage:
+    """One world: its task's objects and rules, spawned objects, weather, and a renderer.
+
+    All positions are in our world: metres, x forward, y left, z up.
+    """
+
+    def __init__(self, scene: str, seed: int, *, renderer: str | None = None) -> None:
+        """Make a scene; by default the ray tracer renders it, or MuJoCo Warp's a file's meshes."""
+        self.task = make_task(scene)
+        self.scene_name = scene
+        chosen = renderer or ("mujoco_warp" if scene.endswith(".xml") else "raytrace")
+        usual = Capture()
+        camera = CameraSettings(width=usual.width, height=usual.height, horizontal_fov=usual.fov)
+        self.worlds = Worlds(1, self.task, camera, renderer=chosen, distractors=SPARE)
+        self._random = np.random.RandomState(np.random.PCG64(seed))
+        self._names = [self._name_of(entity) for entity in self.task.make_props()]
+        self._spawned: dict[str, _Spawned] = {}
+        self._weather = Appearance()
+        self._ids = segmentation_ids(self.worlds.scene)
+        self._own_ids: dict[str, int] = {}
+        self.reset()
+
+    @staticmethod
+    def _name_of(entity: Any) -> str:
+        return entity.mjcf_model.model
+
+    def reset(self) -> None:
+        """Put all objects where an episode begins; cubes are placed anew."""
+        self.worlds.reset(torch.arange(1), [self._random])
+
+    @property
+    def start_height(self) -> float:
+        """Height at which a vehicle without dynamics starts, metres."""
+        return float(self.task.origin[2])
+
+    def touch(self, position: Tensor) -> None:
+        """Apply the chapter's rule to a vehicle: cubes vanish when it touches them. (3,)."""
+        state: Any = self.worlds.state
+        task = self.task
+        if not isinstance(task, CollectCubes):
+            return
+        near = (position - state.cubes[0]).abs().amax(-1) <= task.settings.touch_distance
+        if bool((near & ~state.collected[0]).any()):
+            state.collected[0] |= near & state.present[0]
+
+    # Objects
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all objects: the ground, the scene's, and spawned ones."""
+        return ["Ground", *self._names, *self._geoms_of_file(), *self._spawned]
+
+    def _geoms_of_file(self) -> list[str]:
+        if not self.scene_name.endswith(".xml"):
+            return []
+        model = self.worlds.scene.model
+        geoms = (model.geom(i) for i, of in enumerate(self.worlds.scene.props) if of == 0)
+        return [geom.name.partition("/")[2] for geom in geoms if geom.name]
+
+    def find(self, pattern: str) -> list[str]:
+        """Return the names that match a regular expression; see `matching`."""
+        return matching(pattern, self.names)
+
+    def object_pose(self, name: str) -> Pose:
+        """Return the pose in NED, of the world; NaN if there is no such object, or it vanished."""
+        level = (1.0, 0.0, 0.0, 0.0)
+        if name == "Ground":
+            return Pose((0.0, 0.0, 0.0), level)
+        if name in self._spawned:
+            x, y, z = to_world(self._spawned[name].place)
+            return Pose((x, y, z), level)
+        if name in self._names:
+            place = self.task.places(self.worlds.state)[:, self._names.index(name)]
+            if float(place[0, 2]) < -HIDDEN_DEPTH / 2:
+                return NO_POSE
+            x, y, z = ned(place)
+            return Pose((x, y, z), level)
+        return NO_POSE
+
+    def move_object(self, name: str, place: Sequence[float]) -> bool:
+        """Move an object, NaN coordinates excepted; return whether that is possible."""
+        if any(map(math.isnan, self.object_pose(name).position)) or name == "Ground":
+            return False
+        now = to_world(self.object_pose(name).position)
+        x, y, z = (n if math.isnan(v) else v for v, n in zip(place, now, strict=True))
+        if name in self._spawned:
+            self._spawned[name] = dataclasses.replace(self._spawned[name], place=(x, y, z))
+            return True
+        state = self.worlds.state
+        field = getattr(self.task, "props", "sampled")
+        known = getattr(state, field)
+        if known.shape[-2] != len(self._names):
+            return False
+        known[0, self._names.index(name)] = torch.tensor((x, y, z), dtype=known.dtype)
+        return True
+
+    def spawn(self, name: str, asset: str, place: Sequence[float], size: float) -> str:
+        """Make a box, ball or cylinder, which cameras show and vehicles pass through.
+
+        Returns:
+            Its name, with a number if the given one is taken.
+
+        Raises:
+            InputError: There is no such shape, or no spare object of it.
+        """
+        kinds = {"cube": 0, "box": 0, "sphere": 1, "ball": 1, "cylinder": 2}
+        kind = kinds.get(asset.lower().removeprefix("1m_"))
+        if kind is None:
+            raise InputError(f"asset {asset!r} is unknown; give cube, sphere or cylinder")
+        taken = {one.number for one in self._spawned.values()}
+        free = [i for i in range(kind, SPARE, len(KINDS)) if i not in taken]
+        if not free:
+            raise InputError(
+                f"no {asset} is left of {SPARE // len(KINDS)}; call simDestroyObject first"
+            )
+        chosen, count = name, 1
+        while chosen in self.names:
+            chosen, count = f"{name}_{count}", count + 1
+        x, y, z = place
+        self._spawned[chosen] = _Spawned(free[0], (x, y, z), size)
+        return chosen
+
+    def destroy(self, name: str) -> bool:
+        """Remove a spawned object; return whether there was one."""
+        return self._spawned.pop(name, None) is not None
+
+    # Weather and light
+
+    def set_fog(self, share: float) -> None:
+        """Set the density of fog, 0 to 1: at 1 one sees 20 m far."""
+        visibility = None if share <= 0.0 else 20.0 / share
+        self._weather = dataclasses.replace(self._weather, fog_visibility=visibility)
+
+    def set_sun(self, elevation: float, azimuth: float = 127.9) -> None:
+        """Set the sun's height, and its direction to the left of straight ahead, degrees."""
+        up, aside = math.radians(max(elevation, 1.0)), math.radians(azimuth)
+        level = math.cos(up)
+        towards = (-level * math.cos(aside), -level * math.sin(aside), -math.sin(up))
+        light = max(0.0, min(1.0, elevation / 10.0))
+        self._weather = dataclasses.replace(
+            self._weather, sun_direction=towards, sun=(0.75 * light,) * 3
+        )
+
+    def clear_weather(self) -> None:
+        """Return to the scene's own light and air."""
+        self._weather = Appearance()
+
+    # Segmentation
+
+    def set_id(self, name: str, number: int, *, is_pattern: bool) -> bool:
+        """Set the segmentation id of an object, or of all that match; return whether any does."""
+        found = self.find(name) if is_pattern else [n for n in self.names if n == name]
+        for one in found:
+            self._own_ids[one] = number
+        self._ids = self._segmentation()
+        return bool(found)
+
+    def get_id(self, name: str) -> int:
+        """Return the segmentation id of an object; -1 if there is none of that name."""
+        geoms = self._geoms(name)
+        return int(self._ids[geoms[0]]) if geoms else -1
+
+    def clear_ids(self) -> None:
+        """Give every object the id 0."""
+        self._own_ids = dict.fromkeys(self.names, 0)
+        self._ids = torch.zeros_like(self._ids)
+
+    def _segmentation(self) -> Tensor:
+        ids = segmentation_ids(self.worlds.scene)
+        if all(number == 0 for number in self._own_ids.values()) and self._own_ids:
+            ids = torch.zeros_like(ids)
+        for name, number in self._own_ids.items():
+            ids[self._geoms(name)] = max(number, 0)
+        return ids
+
+    def _geoms(self, name: str) -> list[int]:
+        scene = self.worlds.scene
+        if name == "Ground":
+            return scene.geoms(SemanticClass.GROUND)
+        if name in self._names:
+            index = self._names.index(name)
+        elif name in self._spawned:
+            index = len(self._names) + self._spawned[name].number
+        else:
+            names = [scene.model.geom(i).name.partition("/")[2] for i in range(scene.model.ngeom)]
+            return [i for i, of in enumerate(names) if of and of == name]
+        return [i for i, of in enumerate(scene.props) if of == index]
+
+    # Cameras
+
+    def render(
+        self, body: BodyState, camera: CameraState, kinds: Sequence[ImageType]
+    ) -> list[Shot]:
+        """Render images of one camera, of several types.
+
+        Raises an `InputError` if the renderer does not support a type.
+        """
+        found: dict[ImageType, Shot] = {}
+        groups: dict[Capture, list[ImageType]] = {}
+        for kind in dict.fromkeys(kinds):
+            groups.setdefault(camera.capture(kind), []).append(kind)
+        for capture, some in groups.items():
+            wanted: list[Modality] = list(dict.fromkeys(kind.modality for kind in some))
+            view = self.worlds.view(camera.name, wanted, capture.height, capture.width)
+            world = copy.copy(self.worlds.state)
+            world.body = body
+            appearance = dataclasses.replace(
+                self._weather,
+                camera=camera.mounting(capture, self.worlds.camera.vertical_fov),
+                distractors=self._spares(),
+            )
+            rendered = self.worlds.render_all(world, view, appearance)
+            focal = capture.width / 2 / math.tan(math.radians(capture.fov) / 2)
+            for kind in some:
+                values = rendered[kind.modality][:, 0]
+                found[kind] = Shot(values, focal, capture)
+        return [found[kind] for kind in kinds]
+
+    def image(self, kind: ImageType, shot: Shot, *, as_float: bool) -> Tensor:
+        """Return the pixels of a rendered image: (H, W) float32, or (H, W, 3) uint8."""
+        return pixels(kind, shot.values, as_float=as_float, focal=shot.focal, ids=self._ids)[0]
+
+    def _spares(self) -> Distractors | None:
+        if not self._spawned:
+            return None
+        places = torch.tensor([0.0, 0.0, -HIDDEN_DEPTH], dtype=torch.float64).repeat(SPARE, 1)
+        sizes, colors = torch.ones(SPARE), torch.full((SPARE, 3), 0.6)
+        for one in self._spawned.values():
+            places[one.number] = torch.tensor(one.place, dtype=torch.float64)
+            sizes[one.number] = one.size
+        return Distractors(places=places, sizes=sizes.double(), colors=colors.double())
+
+    def close(self) -> None:
+        """Close the renderer."""
+        self.worlds.close()
+
+
+def matching(pattern: str, names: Iterable[str]) -> list[str]:
+    """Return the names that match a regular expression, ignoring case, as a whole.
+
+    Raises:
+        InputError: It is none, or one whose search could take forever.
+    """
+    parts = [pattern] if "(" in pattern else pattern.split("|")
+    most = max(len(_REPETITION.findall(part)) for part in parts)
+    if most > _MOST_REPETITIONS or _REPEATED_GROUP.search(pattern):
+        raise InputError(
+            f"name={shown(pattern)} repeats too much; give at most {_MOST_REPETITIONS} of * + ? "
+            "and {, and none after a group"
+        )
+    try:
+        compiled = re.compile(pattern, re.IGNORECASE)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise InputError(f"name={shown(pattern)} is no regular expression ({error})") from error
+    return [name for name in names if compiled.fullmatch(name)]
+
+
+def png(image: Tensor) -> bytes:
+    """Return red, green, blue (H, W, 3), uint8, as PNG with an opaque fourth channel."""
+    buffer = io.BytesIO()
+    Image.fromarray(image.numpy()).convert("RGBA").save(buffer, "png", compress_level=1)
+    return buffer.getvalue()

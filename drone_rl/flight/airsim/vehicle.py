@@ -1,0 +1,240 @@
+"""A vehicle of the server: a pilot with AirSim's commands, units and permissions."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import torch
+
+from drone_rl.flight.airsim import messages
+from drone_rl.flight.airsim.airframe import Airframe
+from drone_rl.flight.airsim.messages import ned, to_world
+from drone_rl.flight.commands.command import Command, FlightFuture, PilotError
+from drone_rl.flight.commands.path_following import Drivetrain, YawMode
+from drone_rl.flight.commands.pilot import MOVING, Sticks
+from drone_rl.sim.coordinates import GeoPoint, world_from_geo
+from drone_rl.utils.errors import InputError
+
+LONGEST = 1e6
+"""Longest timeout in seconds; clients send up to 3e38."""
+_UNITS = 180.0 / math.pi
+
+
+class Vehicle(Airframe):
+    """One vehicle and its commands. Values are in NED, relative to the start pose; radians.
+
+    Movements return a `FlightFuture`, or None where API control is off, which refuses them.
+    """
+
+    def allow(self, enable: bool) -> None:
+        """Enable API control, or disable it and hover."""
+        self._require_flight("enableApiControl")
+        self.enable_api_control(enable)
+
+    def set_armed(self, arm: bool) -> bool:
+        """Arm or disarm; return whether that was allowed."""
+        self._require_flight("armDisarm")
+        if not self.has_api_control:
+            return False
+        if arm:
+            if not self._is_flying:
+                self.arm()
+        else:
+            self.disarm(force=True)
+        return True
+
+    def _require_flight(self, method: str) -> None:
+        if self.is_computer_vision:
+            raise PilotError(
+                f"{method} needs a vehicle with dynamics, and this one is in ComputerVision mode; "
+                "use simSetVehiclePose"
+            )
+
+    def _run(self, name: str, command: Command, wait: bool) -> bool | FlightFuture:
+        """See `Drone`; as in AirSim a drone on the ground takes off by any movement."""
+        self._require_armed(name)
+        return self._start(name, command, wait)
+
+    def _moved(self, name: str, *args: Any, **kwargs: Any) -> FlightFuture | None:
+        """Start a movement of `Pilot`, unless API control is off."""
+        self._require_flight(name)
+        if not self.has_api_control:
+            return None
+        future = getattr(self, name)(*args, wait=False, **kwargs)
+        assert isinstance(future, FlightFuture)
+        return future
+
+    def takeoff(self, timeout: float) -> FlightFuture | None:
+        """Climb 2 m."""
+        self._require_flight("takeoff")
+        if self._speed > MOVING:
+            raise PilotError(
+                "Cannot perform takeoff because vehicle is already moving with velocity "
+                f"{self._speed:f} m/s"
+            )
+        return self._moved("take_off", _limit(timeout))
+
+    def land_down(self, timeout: float) -> FlightFuture | None:
+        """Descend until it stands."""
+        return self._moved("land", _limit(timeout))
+
+    def return_home(self, timeout: float) -> FlightFuture | None:
+        """Fly over the start point and land there."""
+        return self._moved("go_home", _limit(timeout))
+
+    def hold(self) -> FlightFuture | None:
+        """Hold the position."""
+        return self._moved("hover")
+
+    def move_velocity(
+        self,
+        velocity: Sequence[float],
+        seconds: float,
+        drivetrain: str,
+        yaw: YawMode,
+        *,
+        z: float | None = None,
+        in_body: bool = False,
+    ) -> FlightFuture | None:
+        """Hold a velocity, of the world or of the heading, at the height `z` if given."""
+        vx, vy, vz = to_world(velocity)
+        at: dict[str, Any] = {} if z is None else {"z": self._height(z)}
+        climb = vz if z is None else 0.0
+        if in_body and drivetrain == Drivetrain.FORWARD_ONLY:
+            vx, vy = self._turned(vx, vy)
+            in_body = False
+        return self._moved(
+            "move_by_velocity",
+            *(vx, vy, climb, seconds),
+            frame="body" if in_body else "world",
+            drivetrain=drivetrain,
+            yaw_mode=self._yaw(drivetrain, yaw),
+            **at,
+        )
+
+    def move_path(
+        self,
+        points: Sequence[Sequence[float]],
+        speed: float,
+        timeout: float,
+        drivetrain: str,
+        yaw: YawMode,
+        lookahead: float,
+        adaptive: float,
+    ) -> FlightFuture | None:
+        """Follow a path."""
+        if lookahead == 0.0:
+            raise InputError("lookahead distance cannot be 0; give a distance, or -1 for its own")
+        return self._moved(
+            "move_along",
+            [self._world(point) for point in points],
+            *(speed, _limit(timeout)),
+            drivetrain=drivetrain,
+            yaw_mode=self._yaw(drivetrain, yaw),
+            lookahead=lookahead,
+            adaptive_lookahead=max(0.0, adaptive),
+        )
+
+    def move_height(
+        self,
+        z: float,
+        speed: float,
+        timeout: float,
+        yaw: YawMode,
+        lookahead: float,
+        adaptive: float,
+    ) -> FlightFuture | None:
+        """Fly straight up or down."""
+        x, y, _ = self._relative(self.body)
+        kind = Drivetrain.MAX_DEGREE_OF_FREEDOM
+        return self.move_path([(x, y, z)], speed, timeout, kind, yaw, lookahead, adaptive)
+
+    def move_geo(
+        self,
+        place: GeoPoint,
+        speed: float,
+        timeout: float,
+        drivetrain: str,
+        yaw: YawMode,
+        lookahead: float,
+        adaptive: float,
+    ) -> FlightFuture | None:
+        """Fly to a place on Earth."""
+        there = world_from_geo(torch.tensor(place, dtype=torch.float64), self.geo_home)
+        target = ned((there - self.home)[None])
+        return self.move_path([target], speed, timeout, drivetrain, yaw, lookahead, adaptive)
+
+    def turn_to(self, degrees: float, timeout: float, margin: float) -> FlightFuture | None:
+        """Turn to a heading, degrees."""
+        heading = math.remainder(degrees, 360.0)
+        near = min(max(margin, 0.1), 180.0)
+        return self._moved("rotate_to", heading, _limit(timeout), margin=near)
+
+    def turn_by(self, rate: float, seconds: float) -> FlightFuture | None:
+        """Turn at a rate, degrees per second."""
+        return self._moved("rotate_by", rate, seconds)
+
+    def tilt(
+        self,
+        roll: float,
+        pitch: float,
+        seconds: float,
+        *,
+        yaw: float | None = None,
+        yaw_rate: float | None = None,
+        z: float | None = None,
+        throttle: float | None = None,
+    ) -> FlightFuture | None:
+        """Hold angles, radians."""
+        turn: dict[str, Any] = {}
+        if yaw is not None:
+            turn["yaw"] = yaw * _UNITS
+        if yaw_rate is not None:
+            turn["yaw_rate"] = yaw_rate * _UNITS
+        lift = {"z": self._height(z)} if z is not None else {"throttle": throttle}
+        return self._moved("move_by_angle", roll * _UNITS, pitch * _UNITS, seconds, **turn, **lift)
+
+    def spin(
+        self, rates: Sequence[float], seconds: float, *, z: float | None, throttle: float | None
+    ) -> FlightFuture | None:
+        """Hold body rates, radians per second."""
+        lift = {"z": self._height(z)} if z is not None else {"throttle": throttle}
+        degrees = [rate * _UNITS for rate in rates]
+        return self._moved("move_by_rates", *degrees, seconds, **lift)
+
+    def set_rotors(self, shares: Sequence[float], seconds: float) -> FlightFuture | None:
+        """Set the rotors: front right, rear left, front left, rear right."""
+        return self._moved("move_by_rotors", shares, seconds)
+
+    def move_manually(
+        self, vx: float, vy: float, z: float, seconds: float, drivetrain: str, yaw: YawMode
+    ) -> FlightFuture | None:
+        """Follow the sticks; `z` is the height of full throttle."""
+        return self._moved(
+            "move_by_manual",
+            *(vx, vy, max(0.0, -z), seconds),
+            drivetrain=drivetrain,
+            yaw_mode=self._yaw(drivetrain, yaw),
+        )
+
+    def set_sticks(self, of: Mapping[str, Any]) -> None:
+        """Take the sticks of RCData."""
+        names = ("pitch", "roll", "throttle", "yaw")
+        values = (messages.number(of.get(name, 0.0), f"rcdata.{name}", -1.0, 1.0) for name in names)
+        self.sticks = Sticks(*values)
+
+    def _turned(self, forward: float, left: float) -> tuple[float, float]:
+        heading = float(self.body.heading[0])
+        cos, sin = math.cos(heading), math.sin(heading)
+        return cos * forward - sin * left, sin * forward + cos * left
+
+    @staticmethod
+    def _yaw(drivetrain: str, yaw: YawMode) -> YawMode:
+        if drivetrain == Drivetrain.FORWARD_ONLY and yaw.is_rate:
+            return YawMode(False, 0.0)
+        return yaw
+
+
+def _limit(timeout: float) -> float:
+    """Return a timeout that a pilot takes; negative ones have passed."""
+    return min(max(timeout, 0.0), LONGEST)

@@ -1,0 +1,93 @@
+"""Images by hand, in the orders of channels of the three dialects."""
+
+import struct
+from io import BytesIO
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.flight.airsim.conftest import SMALL, pose, request
+
+
+@pytest.mark.parametrize(
+    ("more", "channels", "order"),
+    [({}, 3, (2, 1, 0)), ({"annotation_name": ""}, 3, (0, 1, 2))],
+)
+def test_raw_pixels_follow_the_dialect(start, more, channels, order):
+    _server, client = start(SMALL)
+    png = client.call("simGetImages", [request(compress=True)], "")[0]
+    raw = client.call("simGetImages", [request(**more)], "")[0]
+    assert len(raw["image_data_uint8"]) == 16 * 8 * channels
+    pixels = np.frombuffer(raw["image_data_uint8"], np.uint8).reshape(8, 16, channels)
+    colors = np.asarray(Image.open(BytesIO(png["image_data_uint8"])))[..., :3]
+    assert np.array_equal(pixels, colors[..., list(order)])
+    assert ("annotation_name" in raw) == bool(more)
+    assert raw["image_data_float"] == [] and png["image_data_float"] == []
+    assert (raw["width"], raw["height"], raw["camera_name"]) == (16, 8, "0")
+
+
+def test_legacy_images_have_four_channels(start):
+    _, client = start(SMALL)
+    legacy = {"camera_id": 0, "image_type": 0, "pixels_as_float": False, "compress": False}
+    (found,) = client.call("simGetImages", [legacy])
+    assert len(found["image_data_uint8"]) == 16 * 8 * 4
+    assert found["image_data_uint8"][3::4] == b"\xff" * (16 * 8)
+    assert found["camera_id"] == 0
+
+
+def test_depth_as_numbers_by_hand(start):
+    """From 10 m up the ground under the camera that looks down is 10 - 0.1 m away."""
+    _, client = start(SMALL)
+    client.call("simSetVehiclePose", pose(0.0, 0.0, -10.0), True, "")
+    (found,) = client.call("simGetImages", [request("bottom_center", 1, as_float=True)], "")
+    assert found["image_data_uint8"] == b""
+    assert len(found["image_data_float"]) == 128
+    height = 10.0 + 1.0 - 0.1  # the scene starts vehicles without dynamics at 1 m
+    assert found["image_data_float"][60] == pytest.approx(height, abs=0.01)
+    assert found["camera_position"]["z_val"] == pytest.approx(-9.9, abs=1e-5)
+
+
+def test_floats_of_images_have_32_bits(start):
+    _server, client = start(SMALL)
+    number = client.send("simGetImages", [request(kind=1, as_float=True)], "")
+    data = b""
+    while number not in client.answers:
+        part = client.socket.recv(2**16)
+        data += part
+        client.unpacker.feed(part)
+        for _, answered, error, result in client.unpacker:
+            client.answers[answered] = (error, result)
+    assert data.count(b"\xcb") == 0 or data.count(b"\xca") > 128
+    first = client.answers[number][1][0]["image_data_float"][0]
+    assert struct.unpack("f", struct.pack("f", first))[0] == first
+
+
+def test_several_cameras_and_types_in_one_call(start):
+    _, client = start(SMALL)
+    wanted = [request(camera, kind) for camera in "01234" for kind in range(7)]
+    found = client.call("simGetImages", wanted, "")
+    assert [(f["camera_name"], f["image_type"]) for f in found] == [
+        (w["camera_name"], w["image_type"]) for w in wanted
+    ]
+    assert client.call("simGetImage", "bottom_center", 0, "").startswith(b"\x89PNG")
+    assert client.call("simGetImage", 0, 0).startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (([request("side")], ""), "camera 'side' is unknown"),
+        (([request(kind=9)], ""), "image_type=9 is not supported"),
+        (([request(kind="rgb")], ""), "image_type='rgb' is not a number"),
+        (([7], ""), "an image request is not a map"),
+        (([{"camera_name": "0"}], ""), "no camera_name or image_type"),
+        ((7, ""), "requests are not a list"),
+        (([request()] * 65, ""), "requests are not a list of at most 64"),
+        (([request()], "Drone9"), "Vehicle Sim-API for 'Drone9' is not available"),
+    ],
+)
+def test_wrong_image_requests(start, args, message):
+    _, client = start(SMALL)
+    with pytest.raises(RuntimeError, match=message):
+        client.call("simGetImages", *args)

@@ -1,0 +1,70 @@
+"""All movements, and their wrong arguments."""
+
+import pytest
+
+from tests.flight.airsim.conftest import NAN, YAW
+
+
+def test_all_movements_run(start):
+    _, client = start()
+    client.call("enableApiControl", True)
+    client.call("takeoff", 20.0)
+    path = [
+        {"x_val": 1.0, "y_val": 1.0, "z_val": -2.0},
+        {"x_val": 2.0, "y_val": 0.0, "z_val": -3.0},
+    ]
+    place = client.call("getMultirotorState")["gps_location"]
+    geo = (place["latitude"], place["longitude"], place["altitude"] + 1.0)
+    for method, args in {
+        "moveByVelocity": (1.0, 0.0, 0.0, 0.3, 0, YAW),
+        "moveByVelocityZ": (1.0, 0.0, -3.0, 0.3, 1, YAW),
+        "moveByVelocityBodyFrame": (1.0, 0.0, 0.0, 0.3, 0, YAW),
+        "moveByVelocityZBodyFrame": (1.0, 0.0, -3.0, 0.3, 0, YAW),
+        "moveOnPath": (path, 2.0, 60.0, 0, YAW, -1.0, 1.0),
+        "moveToGPS": (*geo, 2.0, 60.0, 0, YAW, -1.0, 1.0),
+        "moveToZ": (-3.0, 1.0, 60.0, YAW, -1.0, 1.0),
+        "rotateToYaw": (30.0, 20.0, 5.0),
+        "rotateByYawRate": (20.0, 0.3),
+        "moveByRollPitchYawZ": (0.0, 0.05, 0.0, -3.0, 0.3),
+        "moveByRollPitchYawThrottle": (0.0, 0.0, 0.0, 0.6, 0.2),
+        "moveByRollPitchYawrateThrottle": (0.0, 0.0, 0.1, 0.6, 0.2),
+        "moveByRollPitchYawrateZ": (0.0, 0.0, 0.1, -3.0, 0.2),
+        "moveByAngleRatesZ": (0.0, 0.0, 0.1, -3.0, 0.2),
+        "moveByAngleRatesThrottle": (0.0, 0.0, 0.1, 0.6, 0.1),
+        "moveByAngleZ": (0.05, 0.0, -3.0, 0.0, 0.3),
+        "moveByAngle": (0.05, 0.0, -3.0, 0.0, 0.3),
+        "moveByAngleThrottle": (0.0, 0.0, 0.6, 0.1, 0.1),
+        "moveByMotorPWMs": (0.59, 0.59, 0.59, 0.59, 0.1),
+        "moveByManual": (2.0, 2.0, -3.0, 0.3, 0, YAW),
+        "hover": (),
+        "goHome": (3e38,),
+        "land": (60.0,),
+    }.items():
+        assert client.call(method, *args) is True, method
+    assert client.call("moveByVelocity", 1.0, 0.0, 0.0, 0.0, 0, YAW) is True
+    assert client.call("moveByVelocityZ", 1.0, 0.0, 0.0, 0.0, 0, YAW) is False
+
+
+def test_movements_without_api_control_return_false(start):
+    _, client = start()
+    assert client.call("isApiControlEnabled", "") is False
+    assert client.call("takeoff", 20.0, "") is False
+    assert client.call("armDisarm", True, "") is False
+
+
+@pytest.mark.parametrize(
+    ("method", "args", "message"),
+    [
+        ("moveToPosition", (NAN, 0.0, 0.0, 1.0), "x=nan is out of range"),
+        ("moveToPosition", (0.0, 0.0, -2.0, -1.0), "speed=-1"),
+        ("moveByVelocity", ("fast", 0.0, 0.0, 1.0), "vx='fast' is not a number"),
+        ("moveByVelocity", (500.0, 0.0, 0.0, 1.0), "vx=500"),
+        ("moveOnPath", ([], 1.0), "path is not a list of 1"),
+        ("moveByRollPitchYawZ", (9.0, 0.0, 0.0, -2.0, 1.0), "roll="),
+    ],
+)
+def test_wrong_arguments_are_one_error(start, method, args, message):
+    _, client = start()
+    client.call("enableApiControl", True)
+    with pytest.raises(RuntimeError, match=message):
+        client.call(method, *args)

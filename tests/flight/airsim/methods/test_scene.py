@@ -1,0 +1,95 @@
+"""Objects, added vehicles, wind, weather and light."""
+
+import pytest
+
+from tests.flight.airsim.conftest import NAN, SMALL, YAW, pose
+
+
+def test_objects_and_vehicles_by_name(start):
+    _, client = start(SMALL, scene="cubes")
+    names = client.call("simListSceneObjects", ".*")
+    assert names == ["Ground", "cube_0", "cube_1", "cube_2"]
+    before = client.call("simGetObjectPose", "cube_0")
+    assert before["position"]["x_val"] == 15.0
+    assert client.call("simSetObjectPose", "cube_0", pose(18.0, NAN, NAN), True) is True
+    after = client.call("simGetObjectPose", "cube_0")["position"]
+    assert (after["x_val"], after["y_val"]) == (18.0, before["position"]["y_val"])
+    missing = client.call("simGetObjectPose", "tree")["position"]["x_val"]
+    assert missing != missing
+    # a vehicle that is put into a cube collects it
+    client.call("simSetVehiclePose", pose(18.0, after["y_val"], 0.0), True, "")
+    gone = client.call("simGetObjectPose", "cube_0")["position"]["x_val"]
+    assert gone != gone
+    client.call("reset")
+    assert client.call("simGetObjectPose", "cube_0")["position"]["x_val"] == 15.0
+    assert client.call("simSetSegmentationObjectID", "cube_1", 20, False) is True
+    assert client.call("simGetSegmentationObjectID", "cube_1") == 20
+    assert client.call("simSetSegmentationObjectID", "tree", 20, False) is False
+    assert client.call("simGetSegmentationObjectID", "tree") == -1
+
+
+def test_spawned_objects(start):
+    _, client = start(SMALL)
+    one = {"x_val": 2.0, "y_val": 2.0, "z_val": 2.0}
+    assert (
+        client.call("simSpawnObject", "rock", "Sphere", pose(9.0, 0.0, -2.0), one, False) == "rock"
+    )
+    assert client.call("simGetObjectPose", "rock")["position"]["x_val"] == 9.0
+    assert client.call("simDestroyObject", "rock") is True
+    with pytest.raises(RuntimeError, match=r"scale=.* is not supported"):
+        client.call("simSpawnObject", "r", "Cube", pose(9.0, 0.0, -2.0), {**one, "x_val": 1.0})
+
+
+def test_two_vehicles_fly_on_their_own(start):
+    text = '{"Vehicles": {"A": {"VehicleType": "SimpleFlight", "X": 0}, "B": {"X": 8, "Y": 2}}}'
+    _, client = start(text)
+    assert client.call("listVehicles") == ["A", "B"]
+    for name in "AB":
+        client.call("enableApiControl", True, name)
+    flights = [client.send("takeoff", 20.0, name) for name in "AB"]
+    assert [client.receive(number) for number in flights] == [(None, True)] * 2
+    client.call("moveToPosition", 5.0, 0.0, -3.0, 2.0, 60.0, 0, YAW, -1.0, 1.0, "B")
+    a, b = (client.call("simGetVehiclePose", name)["position"] for name in "AB")
+    assert abs(a["x_val"]) < 0.3 and b["x_val"] == pytest.approx(5.0, abs=0.6)
+    world = client.call("simGetObjectPose", "B")["position"]
+    assert world["x_val"] == pytest.approx(b["x_val"] + 8.0)
+    assert client.call("simAddVehicle", "C", "simpleflight", pose(0.0, 5.0, 0.0), "") is True
+    assert client.call("listVehicles") == ["A", "B", "C"]
+    with pytest.raises(RuntimeError, match="vehicle 'C' is there already"):
+        client.call("simAddVehicle", "C", "simpleflight", pose(0.0, 5.0, 0.0), "")
+    assert client.call("simAddVehicle", "D", "car", pose(0.0, 5.0, 0.0), "") is False
+
+
+def test_weather_light_and_wind(start):
+    _, client = start(SMALL, scene="cubes")
+    plain = client.call("simGetImage", "0", 0, "")
+    client.call("simEnableWeather", True)
+    client.call("simSetWeatherParameter", 7, 0.8)
+    foggy = client.call("simGetImage", "0", 0, "")
+    assert foggy != plain
+    client.call("simEnableWeather", False)
+    assert client.call("simGetImage", "0", 0, "") == plain
+    client.call("simSetTimeOfDay", True, "2018-02-12 23:00:00", False, 1.0, 60.0, True)
+    assert client.call("simGetImage", "0", 0, "") != plain
+
+
+def test_wind_pushes_the_drone(start):
+    _, client = start('{"Wind": {"X": 0, "Y": 6, "Z": 0}}')
+    client.call("enableApiControl", True)
+    client.call("takeoff", 20.0)
+    assert client.call("getMultirotorState")["kinematics_estimated"]["position"]["y_val"] > 0.05
+
+
+@pytest.mark.parametrize(
+    ("method", "args", "message"),
+    [
+        ("simSetWeatherParameter", (0, 0.5), "of the weather only fog"),
+        ("simSetWind", ({"x_val": 99.0, "y_val": 0.0, "z_val": 0.0},), "wind=.*out of range"),
+        ("simSetTimeOfDay", (True, "noon"), "has no time"),
+    ],
+)
+def test_wrong_arguments_are_one_error(start, method, args, message):
+    _, client = start()
+    client.call("enableApiControl", True)
+    with pytest.raises(RuntimeError, match=message):
+        client.call(method, *args)

@@ -1,0 +1,79 @@
+"""Frames and state of a vehicle: NED relative to its start, latches, sight."""
+
+import math
+
+import pytest
+import torch
+
+from drone_rl.flight.airsim.messages import Pose
+from drone_rl.flight.airsim.settings_file import Offset
+from drone_rl.sim.coordinates import HOME, GeoPoint, geo_from_world
+from tests.flight.airsim.flying import BOX, FREE, KEEP, fly, make
+
+HALF = math.sqrt(0.5)
+SAME = (math.nan,) * 4
+
+
+def test_positions_are_relative_to_the_start():
+    vehicle = make(start=Offset(3.0, 4.0, 0.0, yaw=90.0))
+    x, y, z = vehicle.body.position[0].tolist()
+    assert (x, y) == (3.0, -4.0)  # 4 m east is 4 m to the right
+    assert z == pytest.approx(vehicle.settings.radius)
+    assert vehicle.pose.position == (0.0, 0.0, 0.0)
+    assert vehicle.pose.attitude == pytest.approx((HALF, 0.0, 0.0, HALF))  # clockwise from above
+    place = vehicle.geo_point()
+    assert place["latitude"] > HOME.latitude and place["longitude"] > HOME.longitude
+
+
+def test_a_pose_behind_an_obstacle_is_swept_to_the_contact():
+    vehicle = make(obstacles=BOX)
+    there = Pose((10.0, 0.0, 0.0), SAME)
+    vehicle.set_airsim_pose(there, ignore_collision=False)
+    touching = 4.0 - vehicle.settings.radius
+    assert vehicle.pose.position[0] == pytest.approx(touching, abs=0.06)
+    vehicle.set_airsim_pose(there, ignore_collision=True)
+    assert vehicle.pose.position[0] == pytest.approx(10.0)
+
+
+def test_collisions_latch_until_they_are_read():
+    vehicle = make(obstacles=BOX)
+    fly(vehicle, vehicle.move_path([(0.0, 0.0, -1.0)], 1.0, 20.0, FREE, KEEP, -1.0, 1.0))
+    vehicle.collision()
+    fly(vehicle, vehicle.move_velocity((3.0, 0.0, 0.0), 3.0, FREE, KEEP))
+    seen = vehicle.multirotor_state()["collision"]
+    assert seen["has_collided"] and seen["object_name"] == "box"
+    read = vehicle.collision()
+    assert read["has_collided"] and read["object_id"] == 1
+    assert read["normal"]["x_val"] == pytest.approx(-1.0)
+    assert read["impact_point"]["x_val"] == pytest.approx(4.0, abs=0.1)
+    vehicle.set_airsim_pose(Pose((0.0, 0.0, -1.0), SAME), ignore_collision=True)
+    vehicle.run(vehicle.period)
+    assert not vehicle.collision()["has_collided"]
+
+
+def test_line_of_sight():
+    vehicle = make(obstacles=BOX)
+
+    def at(x, y, z):
+        return GeoPoint(*geo_from_world(torch.tensor([x, y, z], dtype=torch.float64)).tolist())
+
+    assert not vehicle.sees(at(10.0, 0.0, 0.5))
+    assert vehicle.sees(at(2.0, 0.0, 0.5))
+    assert vehicle.sees(at(10.0, 10.0, 0.5))
+    assert not vehicle.sees(at(2.0, 0.0, -1.0))
+
+
+def test_rotors_of_a_hovering_drone_carry_its_weight():
+    vehicle = make()
+    fly(vehicle, vehicle.takeoff(20.0))
+    for _ in range(100):
+        vehicle.run(vehicle.period)
+    thrust = sum(rotor["thrust"] for rotor in vehicle.rotor_states()["rotors"])
+    assert thrust == pytest.approx(9.80665 * vehicle.settings.mass, rel=0.02)
+
+
+def test_the_trajectory_does_not_grow():
+    vehicle = make()
+    for _ in range(50):
+        vehicle.run(vehicle.period)
+    assert len(vehicle.trajectory) == 1

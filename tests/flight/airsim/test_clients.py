@@ -1,0 +1,73 @@
+"""AirSim's own clients, unmodified, in environments of their own.
+
+`python -m tools.airsim_clients` makes the environments; without them these tests are skipped.
+"""
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.flight.airsim.conftest import CV
+from tools.airsim_clients import CLIENTS, python_of
+
+SCRIPTS = Path(__file__).parent / "clients"
+
+
+@pytest.fixture(params=[*CLIENTS])
+def run(request, start):
+    """Return a function that runs a script with one of the clients against a server."""
+    name = request.param
+    python = python_of(name)
+    if not python.exists():
+        pytest.skip(f"{name} is not installed; run python -m tools.airsim_clients")
+
+    def call(script, text=None, *args, **settings):
+        server, _client = start(text, **settings)
+        command = [str(python), str(SCRIPTS / script), CLIENTS[name].module, str(server.address[1])]
+        done = subprocess.run(
+            [*command, *map(str, args)], capture_output=True, text=True, timeout=300, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout.splitlines()[-1]), done.stdout
+
+    return call
+
+
+def test_flight(run):
+    found, printed = run("fly.py")
+    assert "Please upgrade" not in printed
+    assert found["armed"] is True
+    assert found["landed"] == 1 and found["height"] == pytest.approx(-2.0, abs=0.15)
+    assert max(found["corners"]) < 0.8
+    assert found["path"] == pytest.approx(12.0, abs=0.8)
+    assert found["orbit"] == pytest.approx(6.0, abs=1.5)
+    assert found["imu"] == pytest.approx(-9.8, abs=1.0)
+    assert found["gps"] == pytest.approx(47.6415, abs=1e-3)
+    assert (found["raw"], found["png"], found["floats"]) == (256 * 144 * 3, "89504e47", 256 * 144)
+    assert found["below"] == pytest.approx(3.0, abs=0.5)
+    assert found["landed_again"] == 0
+    assert found["after_reset"] == [0.0, 0.0, 0.0]
+    assert "getLidarData is not supported" in found["refused"]
+
+
+def test_computer_vision(run):
+    found, _ = run("look.py", CV, scene="cubes")
+    for step, (x, y, z) in enumerate(found["poses"]):
+        assert (x, y) == pytest.approx((step, -step))
+        assert z == pytest.approx([0.0, 0.2588, 0.5, 0.7071, 0.8660][step], abs=1e-4)
+    assert len(found["sizes"]) == 35
+    assert all(size > 0 for size in found["sizes"].values())
+    assert found["objects"] == ["cube_0", "cube_1", "cube_2"]
+    assert found["moved"] is True and found["there"] == 9.0
+    assert found["id"] == 20
+    assert found["fov"] == 90.0
+    assert found["paused"] is True
+
+
+def test_environment_for_reinforcement_learning(run):
+    found, _ = run("gym_env.py", None, 200, scene="cubes")
+    assert found["steps"] == 200
+    assert found["shapes"] == [[144, 256, 3]]
+    assert found["x"] > 5.0

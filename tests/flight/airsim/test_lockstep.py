@@ -1,0 +1,171 @@
+"""Lockstep gives the same states every run, whatever the pace of a client within its patience."""
+
+import random
+import time
+
+import msgpack
+import pytest
+
+from drone_rl.flight.airsim.lockstep import MOST_REQUESTS, STEP, STRIDE
+from tests.flight.airsim.conftest import YAW, Client
+
+IMAGE = {"camera_name": "0", "image_type": 0, "pixels_as_float": False, "compress": False}
+FAR = (90.0, 0.0, -2.0, 1.0, 600.0, 0, YAW, -1.0, 1.0, "")
+
+
+def take_off(client):
+    client.call("enableApiControl", True)
+    assert client.call("takeoff", 20.0) is True
+
+
+def velocity(client, seconds):
+    return client.send("moveByVelocity", 2.0, 1.0, 0.0, seconds, 0, YAW, "")
+
+
+def stamp(client):
+    return client.call("getMultirotorState")["timestamp"] / 1e9
+
+
+@pytest.fixture
+def fly(start):
+    """Return a function that runs a script which asks while movements wait, and its answers."""
+
+    def run(pause):
+        _, client = start(scene="cubes", seed=3, patience=0.3)
+        take_off(client)
+        found = []
+        for i in range(4):
+            movement = velocity(client, 0.5 + 0.1 * i)
+            pause()
+            found.append(client.call("getMultirotorState"))
+            pause()
+            found.append(client.call("simGetImages", [IMAGE], ""))
+            pause()
+            found.append(client.call("getImuData", "", ""))
+            found.append(client.receive(movement))
+            found.append(client.call("simGetGroundTruthKinematics", ""))
+        return msgpack.packb(found)
+
+    return run
+
+
+def test_a_script_that_asks_while_it_moves_repeats(fly):
+    draw = random.Random(0)
+    first = fly(lambda: None)
+    assert all(fly(lambda: None) == first for _ in range(3))
+    assert fly(lambda: time.sleep(draw.uniform(0.0, 0.05))) == first
+
+
+def test_what_is_asked_at_once_is_answered_at_the_start(start):
+    _, client = start(patience=0.3)
+    take_off(client)
+    begin = stamp(client)
+    movement = velocity(client, 2.0)
+    assert stamp(client) == begin
+    assert client.receive(movement) == (None, True)
+    assert stamp(client) == pytest.approx(begin + 2.0, abs=0.05)
+
+
+def test_what_is_asked_later_is_answered_at_the_end(start):
+    """The movement takes some 50 ms of real time; the request comes while it goes on."""
+    _, client = start(patience=0.0)
+    take_off(client)
+    begin = stamp(client)
+    movement = velocity(client, 8.0)
+    time.sleep(0.02)
+    asked = client.send("getMultirotorState")
+    assert client.receive(movement) == (None, True)
+    _, state = client.receive(asked)
+    assert state["timestamp"] / 1e9 == pytest.approx(begin + 8.0, abs=0.05)
+
+
+def test_loops_that_ask_go_on_and_end_at_the_same_time(start):
+    def fly(pause):
+        _, client = start(patience=0.3)
+        take_off(client)
+        begin, seen = stamp(client), []
+        client.send("moveToPosition", *FAR)
+        while True:
+            state = client.call("getMultirotorState")
+            seen.append(round(state["timestamp"] / 1e9 - begin, 6))
+            if state["kinematics_estimated"]["position"]["x_val"] > 0.5:
+                return seen, msgpack.packb(state)
+            pause()
+
+    seen, state = fly(lambda: None)
+    assert seen[: MOST_REQUESTS - 1] == [0.0] * (MOST_REQUESTS - 1)
+    assert STEP <= seen[MOST_REQUESTS] < STEP + 0.022
+    assert fly(lambda: time.sleep(0.001)) == (seen, state)
+
+
+def test_other_clients_are_served_while_a_call_never_ends(start):
+    server, client = start(patience=0.0)
+    take_off(client)
+    client.send("moveToPosition", *FAR)
+    other = Client(server.address[1])
+    for _ in range(5):
+        begin = time.monotonic()
+        assert other.call("ping") is True
+        assert time.monotonic() - begin < 5.0  # STRIDE simulated seconds take some 0.1 s
+    assert other.call("simPause", True) is None
+    one = stamp(other)
+    time.sleep(0.05)
+    assert stamp(other) == one
+    other.close()
+
+
+def test_a_watching_client_changes_nothing(start):
+    def fly(watch):
+        server, client = start(patience=0.3)
+        take_off(client)
+        other = Client(server.address[1])
+        states = []
+        for _ in range(3):
+            movement = velocity(client, 0.5)
+            if watch:
+                for _ in range(3 * MOST_REQUESTS):
+                    other.call("simGetVehiclePose")
+            states.append(client.receive(movement))
+            states.append(client.call("getMultirotorState"))
+        other.close()
+        return msgpack.packb(states)
+
+    assert fly(watch=True) == fly(watch=False)
+
+
+def test_continuing_for_a_time_needs_no_patience(start):
+    _, client = start(patience=30.0)
+    client.call("enableApiControl", True)
+    client.call("simPause", True)
+    client.send("takeoff", 20.0)
+    begin, state = time.monotonic(), stamp(client)
+    client.call("simContinueForTime", 2.0)
+    assert time.monotonic() - begin < 20.0
+    assert stamp(client) == pytest.approx(state + 2.0, abs=0.03)
+
+
+def test_two_vehicles_are_answered_one_after_the_other(start):
+    text = '{"Vehicles": {"A": {"VehicleType": "SimpleFlight"}, "B": {"X": 8, "Y": 2}}}'
+
+    def fly():
+        _, client = start(text, patience=0.3)
+        for name in "AB":
+            client.call("enableApiControl", True, name)
+        first = client.send("moveByVelocity", 1.0, 0.0, -1.0, 1.0, 0, YAW, "A")
+        second = client.send("moveByVelocity", 0.0, 1.0, -1.0, 1.5, 0, YAW, "B")
+        states = [client.receive(first)]
+        states.append(client.call("getMultirotorState", "B"))  # at the end of A's movement
+        third = client.send("moveByVelocity", -1.0, 0.0, 0.0, 0.2, 0, YAW, "A")
+        states += [client.receive(third), client.call("getMultirotorState", "A")]
+        states += [client.receive(second), client.call("getMultirotorState", "B")]
+        return states
+
+    states = fly()
+    assert [states[i]["timestamp"] / 1e9 for i in (1, 3, 5)] == pytest.approx(
+        [1.0, 1.2, 1.5], abs=0.05
+    )
+    assert msgpack.packb(fly()) == msgpack.packb(states)
+
+
+def test_stride_is_longer_than_usual_movements():
+    assert STRIDE >= 10.0

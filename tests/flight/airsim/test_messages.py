@@ -1,0 +1,84 @@
+"""Values on the wire: keys in order, frames by hand, and what is refused."""
+
+import math
+
+import pytest
+import torch
+
+from drone_rl.flight.airsim import messages
+from drone_rl.flight.airsim.messages import Pose
+from drone_rl.utils.errors import InputError
+
+HALF = math.sqrt(0.5)
+
+
+def test_maps_have_the_keys_of_airsim_in_order():
+    made = messages.pose(Pose((1, 2, 3), (1, 0, 0, 0)))
+    assert [*made] == ["position", "orientation"]
+    assert [*made["position"]] == ["x_val", "y_val", "z_val"]
+    assert [*made["orientation"]] == ["w_val", "x_val", "y_val", "z_val"]
+    assert made["position"] == {"x_val": 1.0, "y_val": 2.0, "z_val": 3.0}
+    assert all(type(value) is float for value in made["position"].values())
+    assert messages.geo_point((1, 2, 3)) == {"latitude": 1.0, "longitude": 2.0, "altitude": 3.0}
+    assert messages.nanoseconds(1.5) == 1_500_000_000
+
+
+def test_frames_by_hand():
+    """Two metres to the left and three up are -2 east and -3 down."""
+    assert messages.ned(torch.tensor([[1.0, 2.0, 3.0]])) == [1.0, -2.0, -3.0]
+    assert messages.to_world((1.0, -2.0, -3.0)) == (1.0, 2.0, 3.0)
+    # a quarter turn to the left, seen from above, is one of -90 degrees about the down axis
+    left = torch.tensor([[HALF, 0.0, 0.0, HALF]])
+    assert messages.ned_attitude(left) == pytest.approx([HALF, 0.0, 0.0, -HALF])
+    back = messages.attitude_to_world([2 * HALF, 0.0, 0.0, -2 * HALF])
+    torch.testing.assert_close(back.float(), left)
+
+
+@pytest.mark.parametrize(
+    ("read", "value", "message"),
+    [
+        (lambda v: messages.number(v, "x"), "1", "x='1' is not a number"),
+        (lambda v: messages.number(v, "x"), True, "is not a number"),
+        (lambda v: messages.number(v, "x"), math.nan, "x=nan is out of range"),
+        (lambda v: messages.number(v, "x"), math.inf, "out of range"),
+        (lambda v: messages.number(v, "x", 0, 1), 2, "x=2 is out of range; give 0 to 1"),
+        (lambda v: messages.whole(v, "n", 0, 9), 1.5, "n=1.5 is not a whole number"),
+        (lambda v: messages.flag(v, "b"), "yes", "b='yes' is neither true nor false"),
+        (lambda v: messages.text(v, "t"), 7, "t=7 is not a text"),
+        (lambda v: messages.text(v, "t"), "x" * 10_001, "is not a text"),
+        (messages.read_pose, 7, "pose=7 is not a map"),
+        (messages.read_pose, {"position": {}}, "pose.orientation=None is not a map"),
+        (lambda v: messages.read_vector(v, "v"), {"x_val": 1, "y_val": 2}, "v.z_val=None"),
+        (messages.read_path, [], "path is not a list of 1 to"),
+        (messages.read_path, [{"x_val": 1, "y_val": 2, "z_val": math.nan}], r"path\[0\].z_val=nan"),
+        (messages.attitude_to_world, [0.0, 0.0, 0.0, 0.0], "is no rotation"),
+        (
+            lambda v: messages.read_yaw_mode(v, 1),
+            {"is_rate": True, "yaw_or_rate": 5.0},
+            "ForwardOnly",
+        ),
+        (lambda v: messages.read_yaw_mode({}, v), 2, "drivetrain=2 is out of range"),
+    ],
+)
+def test_wrong_values_are_refused(read, value, message):
+    with pytest.raises(InputError, match=message):
+        read(value)
+
+
+def test_old_clients_send_bytes():
+    assert messages.text(b"fly", "t") == "fly"
+    given = {b"x_val": 1, b"y_val": 2, b"z_val": 3}
+    assert messages.read_vector(given, "v") == (1.0, 2.0, 3.0)
+
+
+def test_nan_in_a_pose_means_no_change():
+    nan = {"x_val": math.nan, "y_val": math.nan, "z_val": math.nan, "w_val": math.nan}
+    pose = messages.read_pose({"position": nan, "orientation": nan})
+    assert all(map(math.isnan, (*pose.position, *pose.attitude)))
+
+
+def test_yaw_modes():
+    held = messages.read_yaw_mode({"is_rate": True, "yaw_or_rate": 0.0}, 1)
+    assert held[0] == "forward_only" and not held[1].is_rate
+    turned = messages.read_yaw_mode({"is_rate": False, "yaw_or_rate": 270.0}, 0)
+    assert turned[1].yaw_or_rate == -90.0

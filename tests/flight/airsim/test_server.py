@@ -1,0 +1,78 @@
+"""Time, calls that wait, and several clients."""
+
+import time
+
+import msgpack
+import pytest
+
+from tests.flight.airsim.conftest import CV, YAW, Client
+
+
+def test_a_movement_is_answered_when_it_ends(start):
+    _, client = start(patience=0.5)
+    client.call("enableApiControl", True, "")
+    rising = client.send("takeoff", 20.0, "")
+    client.call("getMultirotorState", "")  # answered first
+    assert rising not in client.answers
+    assert client.receive(rising) == (None, True)
+    assert client.call("getMultirotorState", "")["landed_state"] == 1
+
+
+def test_lockstep_repeats(start):
+    def fly():
+        _, client = start()
+        client.call("enableApiControl", True)
+        client.call("takeoff", 20.0)
+        client.call("moveByVelocity", 3.0, 1.0, 0.0, 2.0, 0, YAW, "")
+        sensed = [client.call("getImuData", "", "") for _ in range(2)]
+        client.call("simContinueForTime", 0.5)
+        return msgpack.packb([sensed, client.call("getMultirotorState", "")])
+
+    assert fly() == fly()
+
+
+def test_lockstep_time_stands_still_between_calls(start):
+    _, client = start()
+    one = client.call("getMultirotorState")["timestamp"]
+    time.sleep(0.1)
+    assert client.call("getMultirotorState")["timestamp"] == one
+    client.call("simContinueForTime", 1.0)
+    passed = client.call("getMultirotorState")["timestamp"] - one
+    assert passed == pytest.approx(1e9, abs=2.2e7)
+    assert client.call("simIsPaused") is True
+
+
+def test_wall_clock_follows_the_time_of_day(start):
+    _server, client = start('{"ClockSpeed": 5}', clock="wall")
+    one, begin = client.call("timestampNow"), time.monotonic()
+    time.sleep(0.5)
+    passed = (client.call("timestampNow") - one) / 1e9
+    assert passed == pytest.approx(5 * (time.monotonic() - begin), rel=0.3)
+    client.call("simPause", True)
+    one = client.call("timestampNow")
+    time.sleep(0.1)
+    assert client.call("timestampNow") == one
+
+
+def test_a_cancelled_movement_is_answered_false(start):
+    _, client = start()
+    client.call("enableApiControl", True)
+    client.call("takeoff", 20.0)
+    args = (0.0, 60.0, 0, YAW, -1.0, 1.0, "")
+    first = client.send("moveToPosition", 90.0, 0.0, -2.0, 1.0, 600.0, *args[2:])
+    second = client.send("hover", "")
+    assert client.receive(second) == (None, True)
+    assert client.receive(first) == (None, False)
+
+
+def test_clients_do_not_disturb_each_other(start):
+    server, client = start(CV)
+    others = [Client(server.address[1]) for _ in range(20)]
+    for i, other in enumerate(others):
+        assert other.call("ping") is True
+        if i % 2:
+            other.close()
+    assert client.call("ping") is True
+    assert all(other.call("ping") for other in others[::2])
+    for other in others:
+        other.close()

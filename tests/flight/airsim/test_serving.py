@@ -1,0 +1,31 @@
+"""Settings and refusals of a server in a thread."""
+
+import pytest
+
+from drone_rl.flight.airsim.serving import serve
+from drone_rl.utils.errors import InputError
+
+
+def test_a_port_in_use_is_one_error():
+    with (
+        serve(scene="empty", port=0) as server,
+        pytest.raises(InputError, match=r"port \d+ of 127.0.0.1 can't be opened .*another port"),
+    ):
+        serve(scene="empty", port=server.address[1])
+
+
+def test_wrong_settings_are_refused(tmp_path):
+    for given, message in (
+        ({"clock": "fast"}, "clock='fast' is unknown"),
+        ({"port": 70000}, "port=70000 is out of range"),
+        ({"seed": -1}, "seed=-1 is out of range"),
+        ({"scene": "moon"}, "scene=moon is unknown"),
+        ({"settings": tmp_path / "none.json"}, "can't be read"),
+    ):
+        with pytest.raises(InputError, match=message):
+            serve(**given)
+
+
+def test_an_open_address_is_warned_about(caplog):
+    with serve(scene="empty", port=0, address="0.0.0.0"):
+        assert "everybody in that network can control the vehicles" in caplog.text

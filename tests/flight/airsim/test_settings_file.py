@@ -1,0 +1,157 @@
+"""settings.json as AirSim reads it, the chapter's listings verbatim, and wrong values."""
+
+import json
+import logging
+import math
+
+import pytest
+
+from drone_rl.flight.airsim.settings_file import (
+    MAX_BYTES,
+    Capture,
+    VehicleChoice,
+    parse_settings,
+    read_settings,
+)
+from drone_rl.sim.coordinates import HOME, GeoPoint
+from drone_rl.sim.image_types import ImageType
+from drone_rl.utils.errors import InputError
+
+LISTING_1 = """{
+  'SettingsVersion': 1.0
+}
+"""
+LISTING_2 = """{
+  'SettingsVersion': 1.0,
+  'SimMode': 'Multirotor',
+  'UsageScenario': 'ComputerVision'
+}
+"""
+FULL = """
+{
+  // a comment with "quotes" and 'others'
+  "SettingsVersion": 1.2,
+  "SimMode": "Multirotor", /* over
+  lines */
+  "ApiServerPort": 41460, "LocalHostIp": "127.0.0.1", "ClockSpeed": 2,
+  "OriginGeopoint": {"Latitude": 10.5, "Longitude": -20, "Altitude": 30},
+  "Wind": {"X": 1, "Y": -2, "Z": 0.5},
+  "ViewMode": "NoDisplay",
+  "CameraDefaults": {"CaptureSettings": [
+     {"ImageType": 0, "Width": 320, "Height": 240, "FOV_Degrees": 120},
+     {"ImageType": 1, "Width": 64}]},
+  "SegmentationSettings": {"InitMethod": "None"},
+  "Vehicles": {
+    "One": {"VehicleType": "SimpleFlight", "X": 4, "Y": 0, "Z": -2, "Yaw": 90,
+      "Cameras": {"0": {"X": 0.5, "Pitch": -15, "CaptureSettings": [{"Width": 32, "Height": 16}]}}},
+    "Two": {"VehicleType": "ComputerVision", "AllowAPIAlways": true},
+    "Three": {"AutoCreate": false, "VehicleType": "SimpleFlight"},
+  },
+}
+"""
+
+
+def test_listing_1_means_one_multirotor():
+    found = parse_settings(LISTING_1)
+    assert found.sim_mode == "Multirotor"
+    assert [(v.name, v.kind, v.is_armed) for v in found.vehicles] == [
+        ("SimpleFlight", "SimpleFlight", True)
+    ]
+    assert (found.address, found.port, found.clock_speed) == ("127.0.0.1", 41451, 1.0)
+    assert found.home == HOME
+    assert json.loads(found.text) == {"SettingsVersion": 1.0}
+
+
+def test_listing_2_means_computer_vision():
+    (vehicle,) = parse_settings(LISTING_2).vehicles
+    assert vehicle.kind == "ComputerVision"
+
+
+def test_all_parts_of_a_file():
+    found = parse_settings(FULL)
+    assert (found.port, found.clock_speed, found.wind) == (41460, 2.0, (1.0, -2.0, 0.5))
+    assert found.home == GeoPoint(10.5, -20.0, 30.0)
+    assert found.segmentation == "None"
+    assert found.captures == {
+        ImageType.SCENE: Capture(320, 240, 120.0),
+        ImageType.DEPTH_PLANAR: Capture(64, 144, 90.0),
+    }
+    one, two = found.vehicles
+    assert (one.name, one.kind, one.start.x, one.start.z, one.start.yaw) == (
+        *("One", "SimpleFlight", 4.0, -2.0, 90.0),
+    )
+    camera = one.cameras["front_center"]
+    assert (camera.offset.x, camera.offset.pitch) == (0.5, -15.0)
+    assert math.isnan(camera.offset.y)
+    assert camera.captures == {ImageType.SCENE: Capture(32, 16, 90.0)}
+    assert two == VehicleChoice("Two", "ComputerVision", has_api_control=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            "{'a//b': 1, \"c\": 'it\\'s', 'd': 'say \"x\"', }",
+            {"a//b": 1, "c": "it's", "d": 'say "x"'},
+        ),
+        ('{"x": [1, 2, /* two */ ], // end\n}', {"x": [1, 2]}),
+    ],
+)
+def test_quotes_comments_and_commas(text, expected):
+    from drone_rl.flight.airsim.settings_file import _as_json
+
+    assert json.loads("".join(_as_json(text))) == expected
+
+
+def test_unknown_keys_are_warned_about_and_others_are_not(caplog):
+    with caplog.at_level(logging.WARNING):
+        parse_settings('{"SimMod": "Multirotor", "ViewMode": "", "Vehicles": {"A": {"Xx": 1}}}')
+    first, second = (record.getMessage() for record in caplog.records)
+    assert "SimMod is unknown and ignored" in first and "SimMode" in first
+    assert "Vehicles.A.Xx is unknown" in second
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{'SimMode': 'Car'}", "SimMode=Car is not supported; give Multirotor or ComputerVision"),
+        ("{'SimMode': 'Boat'}", "SimMode='Boat' is unknown"),
+        ("{'ApiServerPort': 70000}", "ApiServerPort=70000 is out of range"),
+        ("{'ApiServerPort': '1'}", "ApiServerPort='1' is out of range"),
+        ("{'ClockSpeed': 0}", "ClockSpeed=0 is out of range"),
+        ("{'Vehicles': {'A': {'X': 'far'}}}", "Vehicles.A.X='far'"),
+        (
+            "{'Vehicles': {'A': {'VehicleType': 'PhysXCar'}}}",
+            "VehicleType=PhysXCar is not supported",
+        ),
+        (
+            "{'Vehicles': {'A': {'Cameras': {'side': {}}}}}",
+            "Cameras.side: camera 'side' is unknown",
+        ),
+        ("{'Vehicles': []}", "Vehicles is not an object"),
+        ("{'Vehicles': {'A': 1}}", "Vehicles.A is not an object"),
+        ("{'CameraDefaults': {'CaptureSettings': {}}}", "CaptureSettings is not a list"),
+        ("[]", "the file is not an object"),
+        ("{'SimMode'}", "line 1 is not JSON"),
+        ("{\n\n'a': }", "line 3 is not JSON"),
+        ("[" * 100_000, "nested too deeply|not JSON"),
+    ],
+)
+def test_wrong_values_are_refused_with_their_place(text, message):
+    with pytest.raises(InputError, match=message) as caught:
+        parse_settings(text, "mine.json")
+    assert str(caught.value).startswith("mine.json")
+    assert "\n" not in str(caught.value)
+
+
+def test_files_that_can_not_be_read(tmp_path):
+    with pytest.raises(InputError, match="can't be read"):
+        read_settings(tmp_path / "none.json")
+    (tmp_path / "latin.json").write_bytes(b'{"a": "\xe9"}')
+    with pytest.raises(InputError, match="not text in UTF-8"):
+        read_settings(tmp_path / "latin.json")
+    (tmp_path / "large.json").write_bytes(b" " * (MAX_BYTES + 1))
+    with pytest.raises(InputError, match="at most"):
+        read_settings(tmp_path / "large.json")
+    (tmp_path / "bom.json").write_text("\ufeff" + LISTING_1, "utf-8")
+    assert read_settings(tmp_path / "bom.json").port == 41451

@@ -1,0 +1,103 @@
+"""Simulated time: periods, waits, pauses."""
+
+import math
+
+import pytest
+
+from drone_rl.flight.airsim.settings_file import parse_settings
+from drone_rl.flight.airsim.simulation import Simulation, Wait
+from drone_rl.utils.errors import InputError
+
+
+@pytest.fixture
+def make():
+    open_ones = []
+
+    def build(text="{}", **settings):
+        open_ones.append(Simulation(parse_settings(text), "empty", **settings))
+        return open_ones[-1]
+
+    yield build
+    for one in open_ones:
+        one.close()
+
+
+def test_lockstep_runs_while_a_call_waits_and_no_longer(make):
+    simulation, answers = make(clock="lockstep"), []
+    assert simulation.advance(1.0, math.inf) and simulation.time == 0.0
+    simulation.wait_for(Wait(lambda: simulation.time >= 1.0, lambda: "done"), answers.append)
+    assert not simulation.advance(60.0, 0.5)
+    assert 0.5 <= simulation.time < 0.5 + simulation.tick and answers == []
+    assert simulation.advance(60.0, math.inf)
+    assert answers == ["done"]
+    assert 1.0 <= simulation.time < 1.0 + simulation.tick
+    assert not simulation.is_due
+
+
+def test_a_wait_that_is_done_is_answered_at_once(make):
+    simulation, answers = make(clock="lockstep"), []
+    simulation.wait_for(Wait(lambda: True, lambda: 7), answers.append)
+    assert answers == [7] and simulation.time == 0.0
+
+
+def test_a_forgotten_call_is_not_answered(make):
+    simulation, answers = make(clock="lockstep"), []
+
+    def reply(result):
+        answers.append(result)
+
+    simulation.wait_for(Wait(lambda: simulation.time > 0.1, lambda: 7), reply)
+    assert simulation.is_due
+    simulation.forget(reply)
+    assert not simulation.is_due
+    assert simulation.advance(1.0, math.inf) and simulation.time == 0.0 and answers == []
+
+
+def test_time_stands_at_the_end_of_each_call(make):
+    """The second call, which ends later, is answered by another `advance`."""
+    simulation, answers = make(clock="lockstep"), []
+    simulation.wait_for(Wait(lambda: simulation.time >= 0.2, lambda: "b"), answers.append)
+    simulation.wait_for(Wait(lambda: simulation.time >= 0.1, lambda: "a"), answers.append)
+    assert simulation.advance(60.0, math.inf) and answers == ["a"]
+    assert simulation.time < 0.2 - simulation.tick
+    assert simulation.advance(60.0, math.inf) and answers == ["a", "b"]
+
+
+def test_continue_for_a_time_pauses_afterwards(make):
+    simulation, answers = make(clock="lockstep"), []
+    simulation.pause(True)
+    simulation.wait_for(simulation.continue_for(0.5), answers.append)
+    assert simulation.is_blocked
+    assert simulation.advance(60.0, math.inf)
+    assert answers == [None] and simulation.is_paused
+    assert simulation.time == pytest.approx(0.5, abs=simulation.tick)
+
+
+def test_paused_wall_time_stands_still(make):
+    simulation = make(clock="wall")
+    simulation.pause(True)
+    assert simulation.follow(0.1) == math.inf and simulation.time == 0.0
+    simulation.pause(False)
+    assert 0.0 < simulation.follow(0.0) <= simulation.tick
+
+
+def test_vehicles_are_found_by_name(make):
+    simulation = make('{"Vehicles": {"One": {}, "Two": {}}}')
+    assert simulation.find("") is simulation.find("One")
+    with pytest.raises(InputError, match="Vehicle API for 'Tow' is not available"):
+        simulation.find("Tow")
+    with pytest.raises(InputError, match="Vehicle Sim-API for 'Tow' is not available"):
+        simulation.find("Tow", is_pose=True)
+
+
+def test_reset_keeps_the_time_and_drops_api_control(make):
+    simulation = make(clock="lockstep")
+    vehicle = simulation.find("")
+    vehicle.allow(True)
+    future, answers = vehicle.takeoff(20.0), []
+    simulation.wait_for(Wait(lambda: future.done, future.result), answers.append)
+    simulation.advance(0.0, math.inf)
+    before = simulation.time
+    simulation.reset()
+    assert answers == [False]
+    assert simulation.time == before and not vehicle.has_api_control

@@ -1,0 +1,139 @@
+"""Objects by name, the cubes' rule, spawned objects, ids, weather."""
+
+import math
+import time
+from io import BytesIO
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from drone_rl.flight.airsim.messages import MAX_NAME
+from drone_rl.flight.airsim.stage import SPARE, Stage, matching, png
+from drone_rl.sim.image_types import ImageType, palette
+from drone_rl.utils.errors import InputError
+from tests.flight.airsim.looking import look
+
+
+@pytest.fixture(scope="module")
+def cubes():
+    stage = Stage("cubes", 0)
+    yield stage
+    stage.close()
+
+
+@pytest.fixture(scope="module")
+def empty():
+    stage = Stage("empty", 0)
+    yield stage
+    stage.close()
+
+
+def test_cubes_vanish_when_touched_and_are_placed_again(cubes):
+    cubes.reset()
+    assert cubes.names == ["Ground", "cube_0", "cube_1", "cube_2"]
+    before = cubes.object_pose("cube_0").position
+    assert before[0] == 15.0 and abs(before[1]) <= 6.0 and before[2] == -2.5
+    cubes.touch(torch.tensor([15.0, -before[1] + 1.0, 2.5], dtype=torch.float64))
+    assert all(map(math.isnan, cubes.object_pose("cube_0").position))
+    assert not math.isnan(cubes.object_pose("cube_1").position[0])
+    cubes.reset()
+    assert cubes.object_pose("cube_0").position[1] != before[1]
+
+
+def test_a_miss_leaves_the_cube(cubes):
+    cubes.reset()
+    _, y, _ = cubes.object_pose("cube_0").position
+    distance = cubes.task.settings.touch_distance
+    cubes.touch(torch.tensor([15.0 - distance - 0.01, -y, 2.5], dtype=torch.float64))
+    assert not math.isnan(cubes.object_pose("cube_0").position[0])
+
+
+def test_objects_are_moved_by_name(cubes):
+    cubes.reset()
+    assert cubes.move_object("cube_1", (20.0, -3.0, math.nan))
+    assert cubes.object_pose("cube_1").position == (20.0, 3.0, -2.5)
+    assert not cubes.move_object("tree", (0.0, 0.0, 0.0))
+    assert not cubes.move_object("Ground", (0.0, 0.0, 0.0))
+    assert cubes.find("CUBE_[01]") == ["cube_0", "cube_1"]
+    assert cubes.find(".*cube.*|.*ground.*") == ["Ground", "cube_0", "cube_1", "cube_2"]
+    with pytest.raises(InputError, match="no regular expression"):
+        cubes.find("(")
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        "(a+)+b",
+        "(a|aa)*b",
+        "a?a?a?a?a?a",
+        "(a*){9}",
+        ".*.*.*.*b",
+        "(.*|b)(.*|c)(.*|d)(.*|e)",
+        "(?:a*)+",
+    ],
+)
+def test_searches_that_could_take_forever_are_refused(pattern):
+    with pytest.raises(InputError, match="repeats too much; give at most 3"):
+        matching(pattern, ["a" * 100])
+
+
+def test_the_slowest_search_that_is_allowed_ends():
+    begin = time.monotonic()
+    assert matching(".*.*.*b", ["a" * MAX_NAME] * 20) == []
+    assert time.monotonic() - begin < 5.0
+
+
+def test_spawned_objects_are_seen_and_destroyed(empty):
+    def depth():
+        return float(look(empty, kind=ImageType.DEPTH_PLANAR)[9, 16])
+
+    far = depth()
+    name = empty.spawn("box", "Cube", (10.4, 0.0, 2.5), 2.0)
+    assert depth() == pytest.approx(10.4 - 1.0 - 0.4, abs=0.01)  # the camera is 0.4 m ahead
+    assert empty.spawn("box", "Cube", (50.0, 0.0, 2.5), 1.0) == "box_1"
+    assert empty.move_object(name, (20.4, math.nan, math.nan))
+    assert depth() == pytest.approx(19.0, abs=0.01)
+    assert empty.destroy(name) and empty.destroy("box_1") and not empty.destroy(name)
+    assert depth() == pytest.approx(far)
+    names = [empty.spawn("s", "Sphere", (9.0, 0.0, 2.0), 1.0) for _ in range(SPARE // 3)]
+    with pytest.raises(InputError, match="no Sphere is left of 4"):
+        empty.spawn("s", "Sphere", (9.0, 0.0, 2.0), 1.0)
+    with pytest.raises(InputError, match="asset 'House' is unknown; give cube"):
+        empty.spawn("h", "House", (9.0, 0.0, 2.0), 1.0)
+    assert all(map(empty.destroy, names))
+
+
+def test_segmentation_ids_are_colours(cubes):
+    cubes.reset()
+    assert cubes.set_id("cube_.*", 7, is_pattern=True)
+    assert cubes.get_id("cube_2") == 7
+    assert cubes.get_id("tree") == -1
+    assert not cubes.set_id("tree", 1, is_pattern=False)
+    x, y, _ = cubes.object_pose("cube_0").position
+    image = look(cubes, kind=ImageType.SEGMENTATION, position=(x - 5.0, -y, 2.5))
+    assert image[9, 16].tolist() == palette()[7].tolist()
+    cubes.clear_ids()
+    assert look(cubes, kind=ImageType.SEGMENTATION)[17, 16].tolist() == palette()[0].tolist()
+
+
+def test_fog_and_night_darken_or_hide(cubes):
+    cubes.reset()
+    cubes.clear_weather()
+    clear = look(cubes)
+    cubes.set_fog(1.0)
+    assert not torch.equal(look(cubes), clear)
+    cubes.clear_weather()
+    cubes.set_sun(-20.0)
+    assert look(cubes).float().mean() < clear.float().mean()
+    cubes.clear_weather()
+    assert torch.equal(look(cubes), clear)
+
+
+def test_png_has_four_channels():
+    image = torch.arange(24, dtype=torch.uint8).reshape(2, 4, 3)
+    decoded = np.asarray(Image.open(BytesIO(png(image))))
+    assert decoded.shape == (2, 4, 4)
+    assert (decoded[..., 3] == 255).all()
+    assert np.array_equal(decoded[..., :3], image.numpy())

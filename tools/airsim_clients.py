@@ -1,0 +1,53 @@
+"""Install the clients of AirSim in environments of their own, for tests: `.clients/NAME`.
+
+They can't share an environment with this package: each brings a transport of the same name, and
+airsim 1.8.1 needs numpy 1.
+"""
+
+import subprocess
+import sys
+import venv
+from pathlib import Path
+from typing import NamedTuple
+
+FOLDER = Path(__file__).resolve().parents[1] / ".clients"
+
+
+class ClientPackage(NamedTuple):
+    """A client and the arguments of the pip calls that install it."""
+
+    module: str
+    installs: tuple[tuple[str, ...], ...]
+
+
+CLIENTS = {
+    "airsim-1.8.1": ClientPackage(
+        "airsim",
+        (
+            ("numpy<2", "rpc-msgpack", "setuptools<70", "wheel"),
+            ("--no-build-isolation", "--no-deps", "airsim==1.8.1"),
+        ),
+    ),
+    "cosysairsim-3.5.0": ClientPackage("cosysairsim", (("cosysairsim==3.5.0",),)),
+}
+
+
+def python_of(name: str) -> Path:
+    """Return the interpreter of a client's environment, which may not exist yet."""
+    return FOLDER / name / "bin" / "python"
+
+
+def install(name: str) -> None:
+    """Create the environment of a client, if it isn't there."""
+    if python_of(name).exists():
+        return
+    venv.create(FOLDER / name, with_pip=True)
+    for arguments in CLIENTS[name].installs:
+        command = [str(python_of(name)), "-m", "pip", "install", "-q", *arguments]
+        subprocess.run(command, check=True)
+
+
+if __name__ == "__main__":
+    for one in sys.argv[1:] or CLIENTS:
+        install(one)
+        print(f"{one}: {python_of(one)}")
