@@ -36,7 +36,7 @@ HEADLINES = (
     ),
     Row(
         "gamed",
-        "Policies built to deceive the audit that it judged good or proved",
+        "Deceptive policies that the audit judged good or proved",
         lambda f: f"{f['gamed_verdicts']} of {f['gamed_total']}",
     ),
     Row(
