@@ -154,6 +154,7 @@ def _strip(
     grid = gridded(tiles, _TILES, gap=_GAP)
     canvas = Image.new("RGB", (_TILES * (tiles[0].width + _GAP), grid.height + _HEADING + 6), PAPER)
     canvas.paste(grid, (0, _HEADING))
-    heading = f"{NAMES[name]} ({numbers['axes'][name]['unit']})"
+    along = numbers["axes"][name]
+    heading = f"{NAMES[name]} ({along['unit']}; {_value(along['neutral'])} in training)"
     ImageDraw.Draw(canvas).text((2, 4), heading, INK, ImageFont.load_default(16))
     return canvas

@@ -5,6 +5,13 @@ from collections.abc import Iterable
 
 from tools.readme.tables import Figures, Row, make_cell
 
+
+def _relative_time(f: Figures) -> str:
+    """Format the ratio of training times, and both times."""
+    ratio, ours = f["solve_over_best_peer"], statistics.mean(f["peers"]["reinforce"]["seconds"])
+    return f"{ratio:.2f} ({ours:.1f} s against {ours / ratio:.1f} s)"
+
+
 HEADLINES = (
     Row(
         "solve",
@@ -18,24 +25,23 @@ HEADLINES = (
     ),
     Row(
         "peers",
-        "Seconds from process start until solved (mean of 3 seeds), divided by those of the "
-        "fastest alternative (Stable-Baselines3's PPO and A2C, a loop with TorchRL's Collector)",
-        lambda f: f"{f['solve_over_best_peer']:.2f}",
+        "Time until solved, relative to the fastest of Stable-Baselines3's PPO and A2C and "
+        "TorchRL's Collector (means of 3 seeds)",
+        _relative_time,
     ),
     Row(
         "render",
-        "Rendering speed at 25x64 pixels divided by that of MuJoCo Warp on the same CPU",
+        "Rendering speed at 25x64 pixels relative to MuJoCo Warp, same CPU",
         lambda f: f"{next(iter(f['render_over_warp'].values())):.1f}",
     ),
     Row(
         "gamed",
-        "Policies built to deceive the audit (memorised environments, lucky episodes, rounding "
-        "errors) judged good or proved",
+        "Deceptive policies that the audit judged good or proved",
         lambda f: f"{f['gamed_verdicts']} of {f['gamed_total']}",
     ),
     Row(
         "maps",
-        "Heat maps independent of the policy that pass the placebo tests",
+        "Fake heat maps (noise, blobs, edges and others) that pass the tests",
         lambda f: f"{f['placebo_maps_trusted']} of {f['placebo_maps_total']}",
     ),
     Row(
@@ -45,7 +51,7 @@ HEADLINES = (
     ),
     Row(
         "hostile",
-        "Malicious policy, run and certificate files refused, with nothing executed",
+        "Malicious files refused, with nothing executed",
         lambda f: f"{f['hostile_refused']} of {f['hostile_total']}",
     ),
 )
