@@ -105,11 +105,6 @@ BENCHMARKS: dict[str, Benchmark] = {
         "main",
         (*_TRAINING, "conf", "benchmarks/training"),
     ),
-    "imitation": Benchmark(
-        lambda s: bench_imitation(s.runs / "imitation", s.seeds[:3], s.episodes, s.device, s.quick),
-        "main",
-        (*_TRAINING, "evaluation", "conf", "benchmarks/imitation", "benchmarks/training"),
-    ),
     "size": Benchmark(lambda s: measure(), "main", (".", "conf")),
     "coverage": Benchmark(
         lambda s: bench_coverage(s.quick),
@@ -293,6 +288,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_revisions(s.runs / "revisions", s.quick),
         "system",
         (*_TRAINING, "evaluation", "explanations", "cli", "conf", "benchmarks/revisions"),
+    ),
+    "imitation": Benchmark(
+        lambda s: bench_imitation(s.runs / "imitation", s.seeds[:3], s.episodes, s.device, s.quick),
+        "long",
+        (*_TRAINING, "evaluation", "conf", "benchmarks/imitation", "benchmarks/training"),
     ),
     "chapter": Benchmark(
         lambda s: bench_chapter(s.runs / "chapter", s.quick),

@@ -24,7 +24,7 @@ class ServeCommand(CommandSettings):
     clock: Annotated[str, OneOf(("wall", "lockstep"))] = "wall"
     """wall, the time of day times ClockSpeed; or lockstep: time passes only while a call waits for
     it, as fast as the machine can, with the same results every time."""
-    patience: Annotated[float, Real(0.0, 60.0, unit="s")] = 0.02
+    patience_s: Annotated[float, Real(0.0, 60.0, unit="s")] = 0.02
     """Seconds without a request after which time passes in lockstep. Give more for a client that
     computes long between the start of a movement and its next request."""
     address: str | None = None
@@ -58,5 +58,5 @@ class ServeCommand(CommandSettings):
             print(f"ready: AirSim's clients can connect to {address}", flush=True)
 
         with contextlib.suppress(KeyboardInterrupt), contextlib.closing(simulation):
-            asyncio.run(run(simulation, host, port, ready, self.patience))
+            asyncio.run(run(simulation, host, port, ready, self.patience_s))
         return 0, None

@@ -15,7 +15,7 @@ def test_every_element_of_the_chapter_is_listed_and_shown():
     ("cells", "shown"),
     [
         ("a | `b.py` | `drone-rl train seed=1` | ", 1),
-        ("a | `b.py` | `drone-rl fly` | ", 0),
+        ("a | `b.py` | `drone-rl glide` | ", 0),
         ("a | `b.py` | `tests/here.py` | ", 1),
         ("a | `b.py` | `tests/gone.py` | ", 0),
         ("a | `b.py` | nothing | ", 0),

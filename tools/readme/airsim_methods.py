@@ -9,7 +9,7 @@ def list_airsim_methods() -> str:
     rows = ["| method | works |", "| --- | --- |"]
     for name in sorted({*METHODS_1_8, *UNSUPPORTED} - {n for n in UNSUPPORTED if n in METHODS}):
         if name in UNSUPPORTED:
-            rows.append(f"| `{name}` | no: there is no {UNSUPPORTED[name]} |")
+            rows.append(f"| `{name}` | no {UNSUPPORTED[name]} |")
         elif name in PARTLY:
             rows.append(f"| `{name}` | partly: {PARTLY[name]} |")
         else:

@@ -76,7 +76,7 @@ def serve(
     *,
     scene: str = "cubes",
     clock: str = "wall",
-    patience: float = PATIENCE,
+    patience_s: float = PATIENCE,
     address: str | None = None,
     port: int | None = None,
     seed: int = 0,
@@ -92,7 +92,7 @@ def serve(
         settings: Path of a settings.json, or its content; by default one multirotor.
         scene: cubes, blocks, pillars, empty, or the path of an MJCF file.
         clock: "wall", or "lockstep", in which time passes only while a call waits for it.
-        patience: Seconds without a request after which time passes in lockstep.
+        patience_s: Seconds without a request after which time passes in lockstep.
         address: Address to listen at; that of the settings by default.
         port: Port; that of the settings by default, and 0 for a free one.
         seed: Of placements, gusts and sensor noise.
@@ -112,8 +112,8 @@ def serve(
         renderer=renderer,
         recordings=recordings,
     )
-    patience = Real(0.0, 60.0).read(patience, "patience")
-    return RunningServer(simulation, host, number, patience)
+    patience_s = Real(0.0, 60.0).read(patience_s, "patience_s")
+    return RunningServer(simulation, host, number, patience_s)
 
 
 def make_simulation(

@@ -108,7 +108,7 @@ def test_a_slow_reader_delays_itself_alone(start):
 
 def test_a_second_request_comes_at_once(start):
     """Without `TCP_QUICKACK` the client's system would hold it back for some 40 ms."""
-    _, client = start(patience=0.1)
+    _, client = start(patience_s=0.1)
     client.call("enableApiControl", True)
     client.call("takeoff", 20.0)
     seconds = []

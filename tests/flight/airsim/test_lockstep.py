@@ -31,7 +31,7 @@ def fly(start):
     """Return a function that runs a script which asks while movements wait, and its answers."""
 
     def run(pause):
-        _, client = start(scene="cubes", seed=3, patience=0.3)
+        _, client = start(scene="cubes", seed=3, patience_s=0.3)
         take_off(client)
         found = []
         for i in range(4):
@@ -57,7 +57,7 @@ def test_a_script_that_asks_while_it_moves_repeats(fly):
 
 
 def test_what_is_asked_at_once_is_answered_at_the_start(start):
-    _, client = start(patience=0.3)
+    _, client = start(patience_s=0.3)
     take_off(client)
     begin = stamp(client)
     movement = velocity(client, 2.0)
@@ -68,7 +68,7 @@ def test_what_is_asked_at_once_is_answered_at_the_start(start):
 
 def test_what_is_asked_later_is_answered_at_the_end(start):
     """The movement takes some 50 ms of real time; the request comes while it goes on."""
-    _, client = start(patience=0.0)
+    _, client = start(patience_s=0.0)
     take_off(client)
     begin = stamp(client)
     movement = velocity(client, 8.0)
@@ -81,7 +81,7 @@ def test_what_is_asked_later_is_answered_at_the_end(start):
 
 def test_loops_that_ask_go_on_and_end_at_the_same_time(start):
     def fly(pause):
-        _, client = start(patience=0.3)
+        _, client = start(patience_s=0.3)
         take_off(client)
         begin, seen = stamp(client), []
         client.send("moveToPosition", *FAR)
@@ -99,7 +99,7 @@ def test_loops_that_ask_go_on_and_end_at_the_same_time(start):
 
 
 def test_other_clients_are_served_while_a_call_never_ends(start):
-    server, client = start(patience=0.0)
+    server, client = start(patience_s=0.0)
     take_off(client)
     client.send("moveToPosition", *FAR)
     other = Client(server.address[1])
@@ -116,7 +116,7 @@ def test_other_clients_are_served_while_a_call_never_ends(start):
 
 def test_a_watching_client_changes_nothing(start):
     def fly(watch):
-        server, client = start(patience=0.3)
+        server, client = start(patience_s=0.3)
         take_off(client)
         other = Client(server.address[1])
         states = []
@@ -134,7 +134,7 @@ def test_a_watching_client_changes_nothing(start):
 
 
 def test_continuing_for_a_time_needs_no_patience(start):
-    _, client = start(patience=30.0)
+    _, client = start(patience_s=30.0)
     client.call("enableApiControl", True)
     client.call("simPause", True)
     client.send("takeoff", 20.0)
@@ -148,7 +148,7 @@ def test_two_vehicles_are_answered_one_after_the_other(start):
     text = '{"Vehicles": {"A": {"VehicleType": "SimpleFlight"}, "B": {"X": 8, "Y": 2}}}'
 
     def fly():
-        _, client = start(text, patience=0.3)
+        _, client = start(text, patience_s=0.3)
         for name in "AB":
             client.call("enableApiControl", True, name)
         first = client.send("moveByVelocity", 1.0, 0.0, -1.0, 1.0, 0, YAW, "A")

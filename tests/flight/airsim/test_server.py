@@ -9,7 +9,7 @@ from tests.flight.airsim.conftest import CV, YAW, Client
 
 
 def test_a_movement_is_answered_when_it_ends(start):
-    _, client = start(patience=0.5)
+    _, client = start(patience_s=0.5)
     client.call("enableApiControl", True, "")
     rising = client.send("takeoff", 20.0, "")
     client.call("getMultirotorState", "")  # answered first
