@@ -7,7 +7,7 @@ import pytest
 
 from drone_rl.config.configuration import Variant, locate, variant_of
 from drone_rl.config.learning import Returns
-from drone_rl.config.networks import Mlp, Network, OriginalCnn, SmallCnn
+from drone_rl.config.networks import Lstm, Mlp, Network, OriginalCnn, SmallCnn
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
 
@@ -24,7 +24,7 @@ def test_a_variant_makes_what_it_stands_for():
 
 def test_the_variants_of_a_part():
     ours = {variant for variant in Network.variants() if variant.__module__.startswith("drone_rl.")}
-    assert ours == {SmallCnn, OriginalCnn, Mlp}  # Other tests may have added their own.
+    assert ours == {SmallCnn, OriginalCnn, Lstm, Mlp}  # Other tests may have added their own.
     assert "_Discounted" not in {variant.__name__ for variant in Returns.variants()}
     ours = [v for v in Returns.variants() if v.__module__.startswith("drone_rl.")]
     assert len(ours) == 9
