@@ -18,7 +18,7 @@ from torchrl.envs import Transform
 
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs.transforms import memory_of, pixel_transforms, see_film
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import ImageNetwork
 from drone_rl.policies.actor import distribution_of
 from drone_rl.policies.zoo import describe
 from drone_rl.sim.continuous_actions import MOST_MEAN
@@ -117,7 +117,7 @@ def hold_out(
 class Cloner:
     """Learn the actions of frames, and measure loss and accuracy on others."""
 
-    def __init__(self, settings: TrainSettings, network: PolicyNetwork) -> None:
+    def __init__(self, settings: TrainSettings, network: ImageNetwork) -> None:
         """Take the network, which is trained in place."""
         self.network = network
         self.how, self.limits = settings.cloning, settings.trainer
@@ -164,7 +164,7 @@ class Cloner:
 
 def clone(
     settings: TrainSettings,
-    network: PolicyNetwork,
+    network: ImageNetwork,
     demonstrations: Sequence[Demonstration],
     callbacks: Iterable[Callback] = (),
 ) -> dict[str, Any]:
