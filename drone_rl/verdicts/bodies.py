@@ -231,6 +231,6 @@ def _verdict_cell(verdict: Evidence) -> tuple[str, str | None, list[tuple[float,
         (0.17, f"{kind}{'' if verdict['certain'] else ' ?'}", 9.0, _INK),
         (0.38, percent(success["share"]), 11.0, _INK),
         (0.57, interval(success), 8.5, _INK),
-        (0.81, textwrap.fill(failure(verdict), 24), 7.0, _FAINT),
+        (0.81, textwrap.fill(failure(verdict), 21), 7.0, _FAINT),
     ]
     return color, None if verdict["certain"] else "//", lines
