@@ -18,7 +18,7 @@ MEANINGS = {
     "brightness": "factor of the camera's exposure",
     "fog": "visibility, metres",
     "object_size": "factor of the size in training",
-    "distractors": "number of blue objects next to the task's",
+    "distractors": "number of blue objects at the sides of the task's area",
     "noise": "standard deviation of each pixel's noise, in levels of 255",
     "slow_noise": "the same; consecutive frames correlate by 0.95",
     "blur": "standard deviation of a Gaussian, pixels",
@@ -33,7 +33,7 @@ MEANINGS = {
 
 def list_axes() -> str:
     """Return a Markdown table with group and strengths of each axis of `drone-rl shifts`."""
-    head = "| axis | group | strength | without perturbation | strengths | unit in `domain.yaml` |"
+    head = "| axis | group | a strength is | unperturbed | strengths | unit in `domain.yaml` |"
     lines = [head, "|---|---|---|---|---|---|"]
     for axis in AXES.values():
         neutral = "clear air" if math.isinf(axis.neutral) else f"{axis.neutral:g}"
