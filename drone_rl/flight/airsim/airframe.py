@@ -15,7 +15,7 @@ from drone_rl.flight.airsim.settings_file import POSING, Offset, VehicleChoice
 from drone_rl.flight.commands.pilot import Pilot
 from drone_rl.flight.commands.state import LandedState, Trajectory
 from drone_rl.sim.coordinates import GeoPoint, geo_from_world, world_from_geo
-from drone_rl.sim.dynamics import Obstacles, Quadrotor
+from drone_rl.sim.dynamics import Obstacles, SingleQuadrotor
 from drone_rl.sim.dynamics.state import (
     ATTITUDE,
     GROUND,
@@ -67,7 +67,7 @@ class Airframe(Pilot):
         x, y, up = to_world((start.x, start.y, start.z))
         posed = choice.kind == POSING
         super().__init__(
-            dynamics,
+            SingleQuadrotor(dynamics),
             mode="computer_vision" if posed else "simple_flight",
             start=(x, y, up + height) if posed else (x, y),
             yaw=start.yaw,
@@ -105,7 +105,7 @@ class Airframe(Pilot):
 
     def change_dynamics(self, dynamics: DynamicsSettings) -> None:
         """Take other dynamics, such as another wind, from now on."""
-        self._quadrotor = Quadrotor(dynamics)
+        self._quadrotor = SingleQuadrotor(dynamics)
         self.settings = dynamics
 
     @property

@@ -66,8 +66,11 @@ def goals_of(
     z: float | Tensor,
 ) -> Goals:
     """Build goals from scalars (for all drones) or tensors of shape (num_envs,)."""
-    values = (torch.as_tensor(v, dtype=torch.float64) for v in (x, y, heading, z))
-    return Goals(modes, torch.stack([value.expand(len(body)) for value in values], -1))
+    given, count = (x, y, heading, z), len(body)
+    if count == 1 and body.numbers.device.type == "cpu":
+        return Goals(modes, torch.tensor([[float(value) for value in given]], dtype=torch.float64))
+    values = (torch.as_tensor(value, dtype=torch.float64) for value in given)
+    return Goals(modes, torch.stack([value.expand(count) for value in values], -1))
 
 
 def hold(reference: Tensor) -> Goals:

@@ -24,7 +24,8 @@ from drone_rl.flight.commands.conventions import to_simulator
 from drone_rl.flight.commands.path_following import GoHomeCommand
 from drone_rl.flight.commands.state import LandedState, PilotState, Sensors, Trajectory
 from drone_rl.sim.dynamics import FlightState, Goals, Obstacles, Quadrotor
-from drone_rl.sim.dynamics.state import CLIMB_INTEGRAL, NOTHING, TICKS, twist_about_z
+from drone_rl.sim.dynamics import state as fs
+from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.entities import FRONT_CENTER
 from drone_rl.sim.image_types import ImageRequest, images
 from drone_rl.sim.rendering.view import Modality
@@ -141,7 +142,7 @@ class Drone:
     @property
     def time(self) -> float:
         """Simulated seconds since the drone was created or last reset."""
-        return int(self.body.ticks[0]) * self.settings.tick
+        return int(self.body.numbers[0, fs.TICKS].item()) * self.settings.tick
 
     @property
     def state(self) -> PilotState:
@@ -256,7 +257,7 @@ class Drone:
 
     @property
     def _is_lost(self) -> bool:
-        return bool(self.body.is_lost[0])
+        return self.body.numbers[0, fs.LOST].item() != 0.0
 
     @property
     def _speed(self) -> float:
@@ -326,7 +327,7 @@ class Drone:
 
     def _fly(self, goals: Goals | None, ticks: int) -> None:
         if self.is_computer_vision:
-            self.body.numbers[:, TICKS] += ticks
+            self.body.numbers[:, fs.TICKS] += ticks
             self._record(ticks)
             return
         if not self._is_armed:
@@ -336,7 +337,7 @@ class Drone:
         if not self._is_lost:
             self.body = self._quadrotor.fly(self.body, goals, ticks, self._around)
         if self._is_lost:  # the drone stays at its last valid state
-            self.body.numbers[:, TICKS] += ticks
+            self.body.numbers[:, fs.TICKS] += ticks
         self._record(ticks)
         self._update_landed()
 
@@ -348,22 +349,23 @@ class Drone:
 
     def _update_landed(self) -> None:
         """Detect take-off and landing."""
-        body = self.body
-        pushes = float(body.rotors.mean()) > _LEAST_THRUST
+        row = self.body.numbers[0].tolist()
+        pushes = sum(row[fs.ROTORS : fs.ROTORS + 4]) / 4 > _LEAST_THRUST
         if not self._is_flying:
-            if pushes and abs(float(body.velocity[0, 2])) > _CLIMBS:
+            if pushes and abs(row[fs.VELOCITY + 2]) > _CLIMBS:
                 self._landed = LandedState.FLYING
             return
-        contact, turns = body.contact, float(body.angular_velocity.norm())
-        is_recent = float(contact.time[0]) > self.time - 2.5 * self.settings.tick
-        touches = int(contact.thing[0]) != NOTHING and is_recent
-        if touches and not pushes and max(self._speed, turns) < _AT_REST:
+        is_recent = row[fs.TIME] > self.time - 2.5 * self.settings.tick
+        if pushes or row[fs.THING] == fs.NOTHING or not is_recent:
+            return
+        turns = math.hypot(*row[fs.RATES : fs.ROTORS])
+        if max(math.hypot(*row[fs.VELOCITY : fs.RATES]), turns) < _AT_REST:
             self._settle()
 
     def _settle(self) -> None:
         """Mark the drone as landed and reset the climb controller."""
         self._landed = LandedState.LANDED
-        self.body.numbers[:, CLIMB_INTEGRAL] = 2.0 * self.settings.hover_throttle - 1.0
+        self.body.numbers[:, fs.CLIMB_INTEGRAL] = 2.0 * self.settings.hover_throttle - 1.0
 
     def _check(self, future: FlightFuture) -> None:
         """End the command if it is complete, over time, or the drone is lost."""

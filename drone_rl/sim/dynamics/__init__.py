@@ -8,6 +8,7 @@ from drone_rl.sim.dynamics.dynamics import Kinematic as Kinematic
 from drone_rl.sim.dynamics.dynamics import draw_seeds as draw_seeds
 from drone_rl.sim.dynamics.dynamics import make_dynamics as make_dynamics
 from drone_rl.sim.dynamics.quadrotor import Quadrotor as Quadrotor
+from drone_rl.sim.dynamics.single_quadrotor import SingleQuadrotor as SingleQuadrotor
 from drone_rl.sim.dynamics.state import BodyState as BodyState
 from drone_rl.sim.dynamics.state import Contact as Contact
 from drone_rl.sim.dynamics.state import FlightState as FlightState

@@ -58,7 +58,7 @@ class Quadrotor:
     ) -> FlightState:
         """Return the drones after ticks under their controllers; `body` stays as it is."""
         device, count = body.numbers.device, len(body)
-        _load_kernels(str(device))
+        load_kernels(str(device))
         after = torch.empty_like(body.numbers)
         command = flight_kernel.make_command(self.frame, goals, ticks, obstacles)
         arrays = [wp.from_torch(numbers.contiguous()) for numbers in (body.numbers, after)]
@@ -80,6 +80,7 @@ class Quadrotor:
 
 
 @functools.cache
-def _load_kernels(device: str) -> None:
+def load_kernels(device: str) -> None:
+    """Compile the kernel, or load it, once for a device."""
     start_warp(device)
     wp.load_module(flight_kernel, device=device)

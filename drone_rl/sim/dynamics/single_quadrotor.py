@@ -1,0 +1,64 @@
+"""One drone that flies many short commands: the memory and the launch of its kernel are kept."""
+
+from typing import Any
+
+import torch
+import warp as wp
+
+from drone_rl.config import ActionSettings, DynamicsSettings
+from drone_rl.sim.dynamics import flight_kernel
+from drone_rl.sim.dynamics.control import Goals
+from drone_rl.sim.dynamics.quadrotor import Quadrotor, load_kernels
+from drone_rl.sim.dynamics.state import NUMBERS, FlightState, Obstacles
+
+
+class SingleQuadrotor(Quadrotor):
+    """A `Quadrotor` for one drone on the CPU, with the same states, bit for bit.
+
+    To prepare a launch takes several times as long as the few ticks of a control period. Only one
+    thread may use it at a time.
+    """
+
+    def __init__(self, settings: DynamicsSettings, actions: ActionSettings | None = None) -> None:
+        """See `Quadrotor`."""
+        super().__init__(settings, actions)
+        double = torch.float64
+        self._before = torch.zeros(1, NUMBERS, dtype=double)
+        self._after = torch.zeros(1, NUMBERS, dtype=double)
+        self._values, self._drifts = torch.zeros(2, 1, 4, dtype=double)
+        self._centers = torch.zeros(1, 0, 3, dtype=double)
+        self._prepared: Any = None
+        """What the launch depends on apart from these tensors."""
+        self._launch: Any = None
+
+    def fly(
+        self, body: FlightState, goals: Goals, ticks: int, obstacles: Obstacles | None = None
+    ) -> FlightState:
+        """See `Quadrotor`."""
+        if len(body) != 1 or body.numbers.device.type != "cpu":
+            return super().fly(body, goals, ticks, obstacles)
+        shape = None if obstacles is None else (obstacles.centers.shape, obstacles.half_sizes)
+        wanted = (goals.modes, ticks, shape)
+        if wanted != self._prepared:
+            self._prepare(goals, ticks, obstacles)
+            self._prepared = wanted
+        self._before.copy_(body.numbers)
+        self._values.copy_(goals.values)
+        self._drifts.copy_(goals.drifts)
+        if obstacles is not None:
+            self._centers.copy_(obstacles.centers)
+        self._launch.launch()
+        return FlightState(self._after.clone())
+
+    def _prepare(self, goals: Goals, ticks: int, obstacles: Obstacles | None) -> None:
+        load_kernels("cpu")
+        around = None
+        if obstacles is not None:
+            self._centers = torch.empty_like(obstacles.centers)
+            around = Obstacles(self._centers, obstacles.half_sizes)
+        own = Goals(goals.modes, self._values, self._drifts)
+        command = flight_kernel.make_command(self.frame, own, ticks, around)
+        arrays = [wp.from_torch(numbers) for numbers in (self._before, self._after)]
+        self._launch = wp.launch(
+            flight_kernel.fly, 1, inputs=[0, command, *arrays], device="cpu", record_cmd=True
+        )
