@@ -2,20 +2,22 @@
 
 import copy
 import math
+from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
 import torch
 
 from drone_rl.config import DynamicsSettings
+from drone_rl.config.sensors import SensorSettings
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.messages import Map, Pose, nanoseconds, ned, to_world
 from drone_rl.flight.airsim.sensors import read_sensor
 from drone_rl.flight.airsim.settings_file import POSING, Offset, VehicleChoice
 from drone_rl.flight.commands.pilot import Pilot
-from drone_rl.flight.commands.state import LandedState, Trajectory
+from drone_rl.flight.commands.state import LandedState, Sensors, Trajectory
 from drone_rl.sim.coordinates import GeoPoint, geo_from_world, world_from_geo
-from drone_rl.sim.dynamics import Obstacles, SingleQuadrotor
+from drone_rl.sim.dynamics import FlightState, Obstacles, SingleQuadrotor
 from drone_rl.sim.dynamics.state import (
     ATTITUDE,
     GROUND,
@@ -28,6 +30,8 @@ from drone_rl.sim.dynamics.state import (
 )
 from drone_rl.sim.worlds import Worlds
 
+RECENT = 16
+"""Control periods that sensors look back, a third of a second: longer than any latency."""
 _SWEEP = 0.05
 """Metres between two tests for contact along a straight move."""
 _FASTEST = 668.0
@@ -89,6 +93,8 @@ class Airframe(Pilot):
         self._read_contact = -1.0
         self._before = self.body
         self._is_armed = self.choice.is_armed and not self.is_computer_vision
+        self._unseen: deque[tuple[FlightState, float]] = deque()
+        """States that the sensors have not been updated to, and their seconds."""
         self.trajectory = Trajectory(1)  # a server runs for days
         self.trajectory.append(self.time, self.body)
 
@@ -102,6 +108,30 @@ class Airframe(Pilot):
         """Advance simulated time by physics ticks."""
         self._before = self.body
         self._advance(ticks)
+
+    @property
+    def sensors(self) -> Sensors:
+        """See `Drone`; they run from the start, and are only computed when they are read.
+
+        After a long silence they are updated to the last `RECENT` states, and to the first of these
+        in one step.
+        """
+        if self._sensors is None:
+            body = self._initial[0]
+            self._sensors = Sensors(body, SensorSettings(), self._seed, self.geo_home)
+        for body, seconds in self._unseen:
+            self._sensors.update(body, seconds)
+        self._unseen.clear()
+        return self._sensors
+
+    def _record(self, ticks: int) -> None:
+        self.trajectory.append(self.time, self.body)
+        seconds = ticks * self.settings.tick
+        if len(self._unseen) == RECENT:
+            _, earlier = self._unseen.popleft()
+            body, own = self._unseen[0]
+            self._unseen[0] = (body, own + earlier)
+        self._unseen.append((self.body, seconds))
 
     def change_dynamics(self, dynamics: DynamicsSettings) -> None:
         """Take other dynamics, such as another wind, from now on."""

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from drone_rl.config.sensors import SensorSettings
 from drone_rl.flight.commands.conventions import to_pilot
+from drone_rl.sim.coordinates import HOME, GeoPoint
 from drone_rl.sim.dynamics import FlightState
 from drone_rl.sim.dynamics.state import (
     ATTITUDE,
@@ -161,11 +162,16 @@ class Sensors:
     default, even if a sensor's rate is higher.
     """
 
-    def __init__(self, body: FlightState, settings: SensorSettings, seed: int = 0) -> None:
-        """Turn the sensors of one drone on; `seed` is that of the noise."""
+    def __init__(
+        self, body: FlightState, settings: SensorSettings, seed: int = 0, home: GeoPoint = HOME
+    ) -> None:
+        """Turn the sensors of one drone on.
+
+        `seed` is that of the noise, and `home` the place on Earth of the world's origin.
+        """
         self.settings = settings
         """Rates, latencies and noise."""
-        self._suite = SensorSuite(settings, seed=seed)
+        self._suite = SensorSuite(settings, seed=seed, home=home)
         self._state = self._suite.start(body)
 
     @property

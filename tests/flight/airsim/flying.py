@@ -13,11 +13,11 @@ FREE, KEEP = "max_degree_of_freedom", YawMode()
 BOX = Obstacles(torch.tensor([[[5.0, 0.0, 1.0]]], dtype=torch.float64), (1.0, 1.0, 1.0))
 
 
-def make(kind="SimpleFlight", obstacles=None, **choice):
+def make(kind="SimpleFlight", obstacles=None, home=HOME, **choice):
     given = VehicleChoice("A", kind, **{"has_api_control": True, **choice})
     dynamics = DynamicsSettings(mode="simple_flight")
     around = {"obstacles": obstacles, "names": ["box"]}
-    return Vehicle(given, dynamics, None, **around, home=HOME, height=2.5)
+    return Vehicle(given, dynamics, None, **around, home=home, height=2.5)
 
 
 def fly(vehicle, future, seconds=60.0):

@@ -2,8 +2,9 @@
 
 import pytest
 
-from drone_rl.sim.coordinates import HOME
-from tests.flight.airsim.flying import make
+from drone_rl.flight.airsim.airframe import RECENT
+from drone_rl.sim.coordinates import HOME, GeoPoint
+from tests.flight.airsim.flying import fly, make
 
 
 @pytest.mark.parametrize("kind", ["imu", "barometer", "magnetometer", "gps"])
@@ -18,3 +19,39 @@ def test_sensors_answer(kind):
         assert found["linear_acceleration"]["z_val"] == pytest.approx(-9.81, abs=0.3)
     if kind == "barometer":
         assert found["altitude"] == pytest.approx(HOME.altitude, abs=20.0)
+
+
+def test_gps_knows_the_place_of_a_drone_that_has_flown_before_its_first_reading():
+    """It has had its fix for long; the readings are 0.2 s old."""
+    vehicle = make()
+    assert not vehicle.sensor("gps")["is_valid"]
+    vehicle.reset()
+    vehicle.allow(True)
+    fly(vehicle, vehicle.takeoff(20.0))
+    for _ in range(60):
+        vehicle.run(vehicle.period)
+    found = vehicle.sensor("gps")
+    place = vehicle.geo_point()
+    assert found["is_valid"]
+    assert found["gnss"]["geo_point"]["latitude"] == pytest.approx(place["latitude"], abs=1e-4)
+    assert found["gnss"]["geo_point"]["altitude"] == pytest.approx(place["altitude"], abs=10.0)
+
+
+def test_a_drone_at_rest_feels_its_weight_after_a_silence_of_any_length():
+    for periods in (1, RECENT - 1, RECENT, RECENT + 1, 100):
+        vehicle = make()
+        for _ in range(periods):
+            vehicle.run(vehicle.period)
+        down = vehicle.sensor("imu")["linear_acceleration"]["z_val"]
+        assert down == pytest.approx(-9.81, abs=0.5)
+        seconds = periods * vehicle.period * vehicle.settings.tick
+        assert vehicle.sensors.time == pytest.approx(seconds)
+
+
+def test_gps_counts_from_the_origin_of_the_settings():
+    north = GeoPoint(60.0, 10.0, 0.0)
+    vehicle = make(home=north)
+    for _ in range(100):
+        vehicle.run(vehicle.period)
+    found = vehicle.sensor("gps")["gnss"]["geo_point"]
+    assert (found["latitude"], found["longitude"]) == pytest.approx((60.0, 10.0), abs=1e-3)
