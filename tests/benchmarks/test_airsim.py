@@ -42,3 +42,12 @@ def test_a_server_that_stops_answering_is_noticed():
 def test_every_method_of_the_client_is_accounted_for():
     unknown = airsim.METHODS_1_8 - METHODS.keys() - UNSUPPORTED.keys()
     assert unknown == set()
+
+
+def test_methods_that_the_server_is_to_have():
+    """Of 125 methods 28 need cars, lidar, distance sensors or Unreal."""
+    assert len(airsim.METHODS_1_8) == 125
+    wanted = airsim.asked_for()
+    assert len(wanted) == 97
+    assert not wanted & {"getLidarData", "getDistanceSensorData", "setCarControls", "simLoadLevel"}
+    assert wanted - METHODS.keys() == {"simCreateVoxelGrid", "simGetWorldExtents"}

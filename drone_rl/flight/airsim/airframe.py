@@ -11,6 +11,7 @@ import torch
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.sensors import SensorSettings
 from drone_rl.flight.airsim import messages
+from drone_rl.flight.airsim.cameras import CameraState
 from drone_rl.flight.airsim.messages import Map, Pose, nanoseconds, ned, to_world
 from drone_rl.flight.airsim.sensors import read_sensor
 from drone_rl.flight.airsim.settings_file import POSING, Offset, VehicleChoice
@@ -28,6 +29,7 @@ from drone_rl.sim.dynamics.state import (
     VELOCITY,
     BodyState,
 )
+from drone_rl.sim.rendering.appearance import rotate
 from drone_rl.sim.worlds import Worlds
 
 RECENT = 16
@@ -199,21 +201,29 @@ class Airframe(Pilot):
         ]
         return {"rotors": rotors, "timestamp": nanoseconds(self.time)}
 
-    def sees(self, place: GeoPoint) -> bool:
-        """Return whether no obstacle stands between it and a place on Earth."""
-        there = world_from_geo(torch.tensor(place, dtype=torch.float64), self.geo_home)
-        if float(there[2]) < 0.0:
+    def sees(self, place: GeoPoint, start: GeoPoint | None = None) -> bool:
+        """Return whether no obstacle stands between a place on Earth and it, or the start."""
+        here = self.body.position[0] if start is None else self._from_geo(start)
+        there, around = self._from_geo(place), self._around
+        if min(float(there[2]), float(here[2])) < 0.0:
             return False
-        around = self._around
         if around is None:
             return True
-        here, half = self.body.position[0], there.new_tensor(around.half_sizes)
+        half = there.new_tensor(around.half_sizes)
         way = there - here
         way = torch.where(way == 0.0, 1e-12, way)
         away = around.centers[0] - here
         ends = torch.stack([(away - half) / way, (away + half) / way])
         enters, leaves = ends.amin(0).amax(-1), ends.amax(0).amin(-1)
         return not bool(((enters <= leaves) & (leaves >= 0.0) & (enters <= 1.0)).any())
+
+    def _from_geo(self, place: GeoPoint) -> torch.Tensor:
+        return world_from_geo(torch.tensor(place, dtype=torch.float64), self.geo_home)
+
+    def place_of(self, camera: CameraState) -> torch.Tensor:
+        """Return the position of one of its cameras in our world, metres. Shape: (3,)."""
+        attitude = self.body.attitude[0].double()
+        return self.body.position[0] + rotate(attitude, attitude.new_tensor(camera.position))
 
     def geo_point(self) -> Map:
         """Return its GeoPoint."""
@@ -273,6 +283,12 @@ class Airframe(Pilot):
     def sensor(self, kind: str) -> Map:
         """Return ImuData, BarometerData, MagnetometerData or GpsData."""
         return read_sensor(self.sensors, kind)
+
+    def set_kinematics(self, pose: Pose, velocity: Sequence[float], rates: Sequence[float]) -> None:
+        """Set pose, velocity, and rates about the axes of the FRD body; see `set_airsim_pose`."""
+        self.set_airsim_pose(pose, ignore_collision=True)
+        self.body.numbers[0, VELOCITY : VELOCITY + 3] = torch.tensor(to_world(velocity))
+        self.body.numbers[0, RATES : RATES + 3] = torch.tensor(to_world(rates))
 
     def set_airsim_pose(self, pose: Pose, *, ignore_collision: bool) -> None:
         """Put it somewhere at once; NaN components stay. Velocities are kept."""

@@ -34,6 +34,10 @@ class CameraState:
     """Drone frame, quaternion (w, x, y, z). Shape: (4,)."""
     fov: float | None = None
     """Horizontal, degrees, where it was set; of all types."""
+    detected: tuple[str, ...] = ()
+    """Patterns of the names of objects that `simGetDetections` reports."""
+    detection_radius: float = 200.0
+    """Metres from the camera within which it does."""
 
     def capture(self, kind: ImageType) -> Capture:
         """Return size and field of view of a type."""

@@ -243,6 +243,7 @@ def _unpacker() -> Any:
 def _packed(message: list[Any]) -> bytes:
     """Pack a reply: bytes as bin, and the numbers of images as 32 bits."""
     result = message[3]
-    is_image = isinstance(result, list) and bool(result) and isinstance(result[0], dict)
+    first = result[0] if isinstance(result, list) and result else None
+    is_image = isinstance(first, dict) and "image_data_float" in first
     packed: Any = msgpack.packb(message, use_bin_type=True, use_single_float=is_image)
     return packed

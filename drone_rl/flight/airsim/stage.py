@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
+import mujoco
 import numpy as np
 import torch
 from PIL import Image
@@ -15,7 +16,7 @@ from torch import Tensor
 
 from drone_rl.config import CameraSettings
 from drone_rl.flight.airsim.cameras import CameraState
-from drone_rl.flight.airsim.messages import NO_POSE, Pose, ned, to_world
+from drone_rl.flight.airsim.messages import NO_POSE, Pose, ned, ned_attitude, to_world
 from drone_rl.flight.airsim.scenes import make_task
 from drone_rl.flight.airsim.settings_file import Capture
 from drone_rl.sim.dynamics import BodyState
@@ -78,6 +79,8 @@ class Stage:
         self._weather = Appearance()
         self._ids = segmentation_ids(self.worlds.scene)
         self._own_ids: dict[str, int] = {}
+        self._of_file = self._read_file()
+        """Poses in NED of the named geoms of a file, which stay where they are."""
         self.reset()
 
     @staticmethod
@@ -108,14 +111,25 @@ class Stage:
     @property
     def names(self) -> list[str]:
         """Names of all objects: the ground, the scene's, and spawned ones."""
-        return ["Ground", *self._names, *self._geoms_of_file(), *self._spawned]
+        return ["Ground", *self._names, *self._of_file, *self._spawned]
 
-    def _geoms_of_file(self) -> list[str]:
+    def _read_file(self) -> dict[str, Pose]:
+        """Return the poses of a file's geoms, by their names."""
         if not self.scene_name.endswith(".xml"):
-            return []
+            return {}
         model = self.worlds.scene.model
-        geoms = (model.geom(i) for i, of in enumerate(self.worlds.scene.props) if of == 0)
-        return [geom.name.partition("/")[2] for geom in geoms if geom.name]
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        found = {}
+        for geom in self._geoms(self._names[0]):
+            name = model.geom(geom).name.partition("/")[2]
+            attitude = np.zeros(4)
+            mujoco.mju_mat2Quat(attitude, data.geom_xmat[geom])
+            x, y, z = to_world(data.geom_xpos[geom].tolist())
+            w, i, j, k = ned_attitude(torch.tensor(attitude)[None])
+            if name:
+                found[name] = Pose((x, y, z), (w, i, j, k))
+        return found
 
     def find(self, pattern: str) -> list[str]:
         """Return the names that match a regular expression; see `matching`."""
@@ -126,6 +140,8 @@ class Stage:
         level = (1.0, 0.0, 0.0, 0.0)
         if name == "Ground":
             return Pose((0.0, 0.0, 0.0), level)
+        if name in self._of_file:
+            return self._of_file[name]
         if name in self._spawned:
             x, y, z = to_world(self._spawned[name].place)
             return Pose((x, y, z), level)
@@ -139,7 +155,10 @@ class Stage:
 
     def move_object(self, name: str, place: Sequence[float]) -> bool:
         """Move an object, NaN coordinates excepted; return whether that is possible."""
-        if any(map(math.isnan, self.object_pose(name).position)) or name == "Ground":
+        if any(map(math.isnan, self.object_pose(name).position)) or name in (
+            "Ground",
+            *self._of_file,
+        ):
             return False
         now = to_world(self.object_pose(name).position)
         x, y, z = (n if math.isnan(v) else v for v, n in zip(place, now, strict=True))
@@ -179,6 +198,25 @@ class Stage:
         x, y, z = place
         self._spawned[chosen] = _Spawned(free[0], (x, y, z), size)
         return chosen
+
+    def scale(self, name: str) -> float | None:
+        """Return the size of an object; None if there is none of that name."""
+        if name in self._spawned:
+            return self._spawned[name].size
+        return 1.0 if name in self.names else None
+
+    def set_scale(self, name: str, size: float) -> bool:
+        """Set the size of a spawned object; return whether there is one."""
+        if name not in self._spawned:
+            return False
+        self._spawned[name] = dataclasses.replace(self._spawned[name], size=size)
+        return True
+
+    def radius(self, name: str) -> float:
+        """Return the radius of a ball around an object, metres."""
+        bounds = self.worlds.scene.model.geom_rbound
+        largest = max((float(bounds[geom]) for geom in self._geoms(name)), default=0.0)
+        return largest * (self.scale(name) or 1.0)
 
     def destroy(self, name: str) -> bool:
         """Remove a spawned object; return whether there was one."""
@@ -279,6 +317,14 @@ class Stage:
     def image(self, kind: ImageType, shot: Shot, *, as_float: bool) -> Tensor:
         """Return the pixels of a rendered image: (H, W) float32, or (H, W, 3) uint8."""
         return pixels(kind, shot.values, as_float=as_float, focal=shot.focal, ids=self._ids)[0]
+
+    def box(self, shot: Shot, name: str) -> tuple[int, int, int, int] | None:
+        """Return left, top, right and bottom of an object in a segmentation image, in pixels."""
+        geoms = torch.tensor(self._geoms(name), dtype=torch.int64)
+        rows, columns = torch.isin(shot.values[0].long(), geoms).nonzero(as_tuple=True)
+        if not len(rows):
+            return None
+        return int(columns.min()), int(rows.min()), int(columns.max()), int(rows.max())
 
     def _spares(self) -> Distractors | None:
         if not self._spawned:

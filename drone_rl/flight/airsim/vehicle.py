@@ -4,15 +4,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import torch
-
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.airframe import Airframe
 from drone_rl.flight.airsim.messages import ned, to_world
 from drone_rl.flight.commands.command import Command, FlightFuture, PilotError
 from drone_rl.flight.commands.path_following import Drivetrain, YawMode
 from drone_rl.flight.commands.pilot import MOVING, Sticks
-from drone_rl.sim.coordinates import GeoPoint, world_from_geo
+from drone_rl.sim.coordinates import GeoPoint
 from drone_rl.utils.errors import InputError
 
 LONGEST = 1e6
@@ -160,8 +158,7 @@ class Vehicle(Airframe):
         adaptive: float,
     ) -> FlightFuture | None:
         """Fly to a place on Earth."""
-        there = world_from_geo(torch.tensor(place, dtype=torch.float64), self.geo_home)
-        target = ned((there - self.home)[None])
+        target = ned((self._from_geo(place) - self.home)[None])
         return self.move_path([target], speed, timeout, drivetrain, yaw, lookahead, adaptive)
 
     def turn_to(self, degrees: float, timeout: float, margin: float) -> FlightFuture | None:

@@ -20,6 +20,9 @@ def test_blocks_can_be_touched_and_a_file_is_shown(tmp_path):
     )
     house = Stage(str(path), 0)
     assert "wall" in house.names
+    assert house.object_pose("wall").position == pytest.approx((11.4, 0.0, -4.0))
+    assert house.object_pose("wall").attitude == pytest.approx((1.0, 0.0, 0.0, 0.0))
+    assert not house.move_object("wall", (0.0, 0.0, 0.0))
     assert float(look(house, kind=ImageType.DEPTH_PLANAR)[9, 16]) == pytest.approx(10.0, abs=0.05)
     house.close()
 

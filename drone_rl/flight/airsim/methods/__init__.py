@@ -6,6 +6,7 @@ no vehicle, and images are requested by camera numbers; Cosys' requests have an 
 
 from drone_rl.flight.airsim.methods import cameras as cameras
 from drone_rl.flight.airsim.methods import control as control
+from drone_rl.flight.airsim.methods import detections as detections
 from drone_rl.flight.airsim.methods import images as images
 from drone_rl.flight.airsim.methods import movements as movements
 from drone_rl.flight.airsim.methods import no_effect as no_effect

@@ -13,7 +13,7 @@ from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.sim.entities import find_camera
 from drone_rl.sim.image_types import ImageType
-from drone_rl.sim.rendering.appearance import product, rotate
+from drone_rl.sim.rendering.appearance import product
 
 
 def read_camera(value: Any) -> str:
@@ -26,10 +26,8 @@ def camera_in_world(
 ) -> tuple[list[float], list[float]]:
     """Return a camera's pose in NED relative to the start: metres, quaternion (w, x, y, z)."""
     state = simulation.cameras[vehicle.choice.name][camera]
-    body = vehicle.body
-    attitude = body.attitude[0].double()
-    place = body.position[0] + rotate(attitude, attitude.new_tensor(state.position)) - vehicle.home
-    turn = product(attitude, state.attitude)
+    turn = product(vehicle.body.attitude[0].double(), state.attitude)
+    place = vehicle.place_of(state) - vehicle.home
     return messages.ned(place[None]), messages.ned_attitude(turn[None])
 
 
@@ -59,7 +57,7 @@ def _projection(fov: float, aspect: float, near: float = 0.1) -> list[list[float
 
 @method("simSetCameraPose", least=2)
 def _set_camera_pose(simulation: Simulation, args: Sequence[Any]) -> None:
-    camera, pose = _camera_at(simulation, args), read_pose(args[1])
+    camera, pose = camera_at(simulation, args), read_pose(args[1])
     given = to_world(pose.position)
     x, y, z = (
         old if math.isnan(new) else new for old, new in zip(camera.position, given, strict=True)
@@ -67,28 +65,32 @@ def _set_camera_pose(simulation: Simulation, args: Sequence[Any]) -> None:
     attitude = camera.attitude
     if not any(map(math.isnan, pose.attitude)):
         attitude = messages.attitude_to_world(pose.attitude)[0]
-    _put(simulation, args, dataclasses.replace(camera, position=(x, y, z), attitude=attitude))
+    put_camera(simulation, args, dataclasses.replace(camera, position=(x, y, z), attitude=attitude))
 
 
 @method("simSetCameraOrientation", least=2)
 def _set_camera_orientation(simulation: Simulation, args: Sequence[Any]) -> None:
     keys = ("w_val", "x_val", "y_val", "z_val")
     attitude = messages.attitude_to_world(read_map(args[1], "orientation", keys))[0]
-    camera = _camera_at(simulation, args)
-    _put(simulation, args, dataclasses.replace(camera, attitude=attitude))
+    camera = camera_at(simulation, args)
+    put_camera(simulation, args, dataclasses.replace(camera, attitude=attitude))
 
 
 @method("simSetCameraFov", least=2)
 def _set_camera_fov(simulation: Simulation, args: Sequence[Any]) -> None:
     fov = number(args[1], "fov_degrees", 1.0, 170.0)
-    _put(simulation, args, dataclasses.replace(_camera_at(simulation, args), fov=fov))
+    put_camera(simulation, args, dataclasses.replace(camera_at(simulation, args), fov=fov))
 
 
-def _camera_at(simulation: Simulation, args: Sequence[Any]) -> CameraState:
-    vehicle = posed_at(simulation, args, 2)
+def camera_at(simulation: Simulation, args: Sequence[Any], index: int = 2) -> CameraState:
+    """Return the camera of the first argument, of the vehicle that another one names."""
+    vehicle = posed_at(simulation, args, index)
     return simulation.cameras[vehicle.choice.name][read_camera(args[0])]
 
 
-def _put(simulation: Simulation, args: Sequence[Any], camera: CameraState) -> None:
-    vehicle = posed_at(simulation, args, 2)
+def put_camera(
+    simulation: Simulation, args: Sequence[Any], camera: CameraState, index: int = 2
+) -> None:
+    """Replace a camera of the vehicle that an argument names."""
+    vehicle = posed_at(simulation, args, index)
     simulation.cameras[vehicle.choice.name][camera.name] = camera

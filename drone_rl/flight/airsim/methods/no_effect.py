@@ -23,8 +23,9 @@ simToggleCameraWindow
 method(*_NOT_SHOWN.split())(_accepted)
 
 
-@method("simRunConsoleCommand")
-def _console(simulation: Simulation, args: Sequence[Any]) -> bool:
+@method("simRunConsoleCommand", "simSetLightIntensity")
+def _refuse(simulation: Simulation, args: Sequence[Any]) -> bool:
+    """Return false, as AirSim does for a command or a light that it does not know."""
     return False
 
 

@@ -41,8 +41,20 @@ def _set_object_pose(simulation: Simulation, args: Sequence[Any]) -> bool:
 
 @method("simGetObjectScale", least=1)
 def _object_scale(simulation: Simulation, args: Sequence[Any]) -> Map:
-    is_known = text(args[0], "object_name") in simulation.stage.names
-    return messages.vector((1.0,) * 3 if is_known else NO_POSE.position)
+    size = simulation.stage.scale(text(args[0], "object_name"))
+    return messages.vector(NO_POSE.position if size is None else (size,) * 3)
+
+
+@method("simSetObjectScale", least=2)
+def _set_object_scale(simulation: Simulation, args: Sequence[Any]) -> bool:
+    return simulation.stage.set_scale(text(args[0], "object_name"), _read_scale(args[1]))
+
+
+def _read_scale(value: Any) -> float:
+    scale = read_vector(value, "scale")
+    if len({*scale}) > 1 or not 0.0 < scale[0] <= 100.0:
+        raise InputError(f"scale={list(scale)} is not supported; give one factor, 0 to 100")
+    return scale[0]
 
 
 @method("simListSceneObjects")
@@ -63,10 +75,8 @@ def _spawn(simulation: Simulation, args: Sequence[Any]) -> str:
     place = to_world(read_pose(pose).position)
     if any(map(math.isnan, place)):
         raise InputError("pose has NaN; give the position of a new object")
-    scale = read_vector(argument(args, 3, messages.vector((1.0, 1.0, 1.0))), "scale")
-    if len({*scale}) > 1 or not 0.0 < scale[0] <= 100.0:
-        raise InputError(f"scale={list(scale)} is not supported; give one factor, 0 to 100")
-    return simulation.stage.spawn(name or "object", asset, place, scale[0])
+    size = _read_scale(argument(args, 3, messages.vector((1.0, 1.0, 1.0))))
+    return simulation.stage.spawn(name or "object", asset, place, size)
 
 
 @method("simDestroyObject", least=1)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from drone_rl.flight.airsim import messages
-from drone_rl.flight.airsim.messages import Map, flag, read_map, read_pose
+from drone_rl.flight.airsim.messages import Map, flag, read_map, read_pose, read_vector
 from drone_rl.flight.airsim.methods.registry import method, posed_at, vehicle_at
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
@@ -32,6 +32,18 @@ def _set_pose(simulation: Simulation, args: Sequence[Any]) -> None:
 @method("simGetGroundTruthKinematics")
 def _kinematics(simulation: Simulation, args: Sequence[Any]) -> Map:
     return posed_at(simulation, args, 0).kinematics()
+
+
+@method("simSetKinematics", least=2)
+def _set_kinematics(simulation: Simulation, args: Sequence[Any]) -> None:
+    pose = read_pose(args[0], "state")
+    velocity, rates = (
+        read_vector(args[0].get(name), f"state.{name}")
+        for name in ("linear_velocity", "angular_velocity")
+    )
+    vehicle = vehicle_at(simulation, args, 2)
+    vehicle.set_kinematics(pose, velocity, rates)
+    simulation.stage.touch(vehicle.body.position[0])
 
 
 @method("simGetGroundTruthEnvironment")
@@ -62,9 +74,16 @@ def _rotors(simulation: Simulation, args: Sequence[Any]) -> Map:
 
 @method("simTestLineOfSightToPoint", least=1)
 def _line_of_sight(simulation: Simulation, args: Sequence[Any]) -> bool:
-    keys = ("latitude", "longitude", "altitude")
-    place = GeoPoint(*read_map(args[0], "point", keys))
-    return posed_at(simulation, args, 1).sees(place)
+    return posed_at(simulation, args, 1).sees(_read_place(args[0]))
+
+
+@method("simTestLineOfSightBetweenPoints", least=2)
+def _line_between(simulation: Simulation, args: Sequence[Any]) -> bool:
+    return simulation.find("", is_pose=True).sees(_read_place(args[0]), _read_place(args[1]))
+
+
+def _read_place(value: Any) -> GeoPoint:
+    return GeoPoint(*read_map(value, "point", ("latitude", "longitude", "altitude")))
 
 
 @method("getHomeGeoPoint")

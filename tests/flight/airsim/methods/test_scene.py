@@ -35,6 +35,12 @@ def test_spawned_objects(start):
         client.call("simSpawnObject", "rock", "Sphere", pose(9.0, 0.0, -2.0), one, False) == "rock"
     )
     assert client.call("simGetObjectPose", "rock")["position"]["x_val"] == 9.0
+    assert client.call("simGetObjectScale", "rock") == one
+    three = {"x_val": 3.0, "y_val": 3.0, "z_val": 3.0}
+    assert client.call("simSetObjectScale", "rock", three) is True
+    assert client.call("simGetObjectScale", "rock") == three
+    assert client.call("simSetObjectScale", "Ground", three) is False
+    assert client.call("simGetObjectScale", "Ground")["x_val"] == 1.0
     assert client.call("simDestroyObject", "rock") is True
     with pytest.raises(RuntimeError, match=r"scale=.* is not supported"):
         client.call("simSpawnObject", "r", "Cube", pose(9.0, 0.0, -2.0), {**one, "x_val": 1.0})

@@ -19,8 +19,33 @@ def test_line_of_sight_and_rotors(start):
     home = client.call("getHomeGeoPoint")
     above = {**home, "altitude": home["altitude"] + 10.0}
     assert client.call("simTestLineOfSightToPoint", above, "") is True
+    assert client.call("simTestLineOfSightBetweenPoints", home, above) is True
+    below = {**home, "altitude": home["altitude"] - 1.0}
+    assert client.call("simTestLineOfSightBetweenPoints", below, above) is False
     assert len(client.call("getRotorStates", "")["rotors"]) == 4
     assert client.call("getImuData", "", "")["orientation"]["w_val"] == pytest.approx(1.0)
     assert client.call("simGetGroundTruthEnvironment", "")["gravity"]["z_val"] == pytest.approx(
         9.8, abs=0.02
     )
+
+
+def test_kinematics_are_set_and_go_on(start):
+    """At 3 m/s to the east the drone is some 0.3 m further after 0.1 s."""
+    _, client = start()
+    state = {
+        **pose(1.0, 2.0, -30.0),
+        "linear_velocity": {"x_val": 0.0, "y_val": 3.0, "z_val": 0.0},
+        "angular_velocity": {"x_val": 0.0, "y_val": 0.0, "z_val": 0.25},
+        "linear_acceleration": {},
+        "angular_acceleration": {},
+    }
+    client.call("simSetKinematics", state, True, "")
+    found = client.call("simGetGroundTruthKinematics", "")
+    assert [*found["position"].values()] == pytest.approx([1.0, 2.0, -30.0])
+    assert [*found["linear_velocity"].values()] == [0.0, 3.0, 0.0]
+    assert [*found["angular_velocity"].values()] == [0.0, 0.0, 0.25]
+    client.call("simContinueForTime", 0.1)
+    after = client.call("simGetGroundTruthKinematics", "")["position"]
+    assert after["y_val"] == pytest.approx(2.3, abs=0.05)
+    with pytest.raises(RuntimeError, match=r"state\.linear_velocity"):
+        client.call("simSetKinematics", pose(1.0, 2.0, -30.0), True, "")
