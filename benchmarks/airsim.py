@@ -138,8 +138,9 @@ def bench_airsim(folder: Path, quick: bool) -> dict[str, Any]:
     with served(folder / "flying", "clock=lockstep", "scene=empty") as (port, _, _):
         factor = _factor(port, 600 * share)
     states = [_script(folder / f"script_{i}") for i in range(2)]
-    with served(folder / "fuzzed", "clock=lockstep", "scene=empty") as (port, pid, _):
+    with served(folder / "fuzzed", "clock=lockstep", "scene=empty") as (port, _, _):
         survived = fuzz(port, round(100_000 * share))
+    with served(folder / "growing", "clock=lockstep", "scene=empty") as (port, pid, _):
         growth = _growth(port, pid, 3600 * share)
     known = asked_for()
     return {
@@ -282,7 +283,6 @@ def _value(draw: random.Random, depth: int = 0) -> Any:
 def _growth(port: int, pid: int, seconds: float) -> float:
     """Return the growth of the server's memory over traffic for some simulated seconds, MiB."""
     peer = Peer(port)
-    peer.call("reset")
     peer.call("enableApiControl", True, "")
     peer.call("takeoff", 20.0, "")
 
