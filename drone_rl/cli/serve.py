@@ -38,9 +38,12 @@ class ServeCommand(CommandSettings):
 
     def run(self, folder: Path) -> tuple[int, None]:
         """Serve until Ctrl-C; return the exit status."""
+        import torch
+
         from drone_rl.flight.airsim.server import run  # slow to import
         from drone_rl.flight.airsim.serving import make_simulation
 
+        torch.set_num_threads(1)  # its tensors are too small to share
         simulation, host, port = make_simulation(
             self.settings,
             scene=self.scene,

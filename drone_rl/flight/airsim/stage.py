@@ -34,6 +34,9 @@ from drone_rl.utils.schema import shown
 SPARE = 12
 """Objects that can be spawned: boxes, balls and cylinders in turn."""
 
+_PLAIN = Appearance()
+_MOST_SHOWN = 100
+"""Appearances that are kept."""
 _REPETITION = re.compile(r"(?<!\\)[*+?{]")
 _REPEATED_GROUP = re.compile(r"\)[*+?{]")
 _MOST_REPETITIONS = 3
@@ -76,7 +79,11 @@ class Stage:
         self._random = np.random.RandomState(np.random.PCG64(seed))
         self._names = [self._name_of(entity) for entity in self.task.make_props()]
         self._spawned: dict[str, _Spawned] = {}
-        self._weather = Appearance()
+        self._weather = _PLAIN
+        self._shown: tuple[
+            Appearance, tuple[_Spawned, ...], dict[Any, tuple[CameraState, Appearance | None]]
+        ] = (_PLAIN, (), {})
+        """Weather, spawned objects, and the appearances that were made for them, by camera."""
         self._ids = segmentation_ids(self.worlds.scene)
         self._own_ids: dict[str, int] = {}
         self._of_file = self._read_file()
@@ -241,7 +248,7 @@ class Stage:
 
     def clear_weather(self) -> None:
         """Return to the scene's own light and air."""
-        self._weather = Appearance()
+        self._weather = _PLAIN
 
     # Segmentation
 
@@ -302,17 +309,31 @@ class Stage:
             view = self.worlds.view(camera.name, wanted, capture.height, capture.width)
             world = copy.copy(self.worlds.state)
             world.body = body
-            appearance = dataclasses.replace(
-                self._weather,
-                camera=camera.mounting(capture, self.worlds.camera.vertical_fov),
-                distractors=self._spares(),
-            )
+            appearance = self._appearance(camera, capture)
             rendered = self.worlds.render_all(world, view, appearance)
             focal = capture.width / 2 / math.tan(math.radians(capture.fov) / 2)
             for kind in some:
                 values = rendered[kind.modality][:, 0]
                 found[kind] = Shot(values, focal, capture)
         return [found[kind] for kind in kinds]
+
+    def _appearance(self, camera: CameraState, capture: Capture) -> Appearance | None:
+        """Return the appearance in a camera, the same object as long as nothing changes.
+
+        Renderers need not prepare it again then; None, the scene's own, they prepare only once.
+        """
+        spawned = tuple(self._spawned.values())
+        weather, earlier, known = self._shown
+        if weather is not self._weather or earlier != spawned or len(known) > _MOST_SHOWN:
+            known = {}
+            self._shown = (self._weather, spawned, known)
+        key = (id(camera), capture)
+        if key not in known:
+            mounting = camera.mounting(capture, self.worlds.camera.vertical_fov)
+            found = dataclasses.replace(self._weather, camera=mounting, distractors=self._spares())
+            is_own = self._weather is _PLAIN and mounting is None and not spawned
+            known[key] = (camera, None if is_own else found)  # a camera that is kept has its own id
+        return known[key][1]
 
     def image(self, kind: ImageType, shot: Shot, *, as_float: bool) -> Tensor:
         """Return the pixels of a rendered image: (H, W) float32, or (H, W, 3) uint8."""

@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import torch
 
 from drone_rl.flight.airsim import messages
@@ -115,11 +116,12 @@ def _response(simulation: Simulation, vehicle: Vehicle, request: _Request, shot:
 
 
 def _raw(image: torch.Tensor, channels: str) -> bytes:
+    pixels = image.numpy()
     if channels == "bgr":
-        image = image.flip(-1)
+        pixels = pixels[..., ::-1]
     elif channels == "rgba":
-        image = torch.nn.functional.pad(image, (0, 1), value=255)
-    return image.contiguous().numpy().tobytes()
+        pixels = np.concatenate([pixels, np.full_like(pixels[..., :1], 255)], -1)
+    return pixels.tobytes()
 
 
 @method("simGetImage", least=2)
