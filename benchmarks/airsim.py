@@ -5,7 +5,9 @@ import random
 import re
 import socket
 import subprocess
+import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -110,6 +112,8 @@ def served(folder: Path, *args: str, settings: str = "{}") -> Iterator[tuple[int
         assert process.stdout is not None
         for line in process.stdout:
             if found := _READY.search(line):
+                # a full pipe would block the server, which logs a line for each error
+                threading.Thread(target=deque, args=(process.stdout, 0), daemon=True).start()
                 yield int(found[1]), process.pid, time.perf_counter() - begin
                 break
         else:
