@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
-import mujoco
+import mujoco as _mujoco
 import numpy as np
 import torch
 from PIL import Image
@@ -30,6 +30,8 @@ from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import shown
+
+mujoco: Any = _mujoco  # its stubs lack what is used here
 
 SPARE = 12
 """Objects that can be spawned: boxes, balls and cylinders in turn."""
