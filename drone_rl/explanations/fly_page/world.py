@@ -21,7 +21,6 @@ from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, ComputerVision, FlightState, Kinematic, Quadrotor
 from drone_rl.sim.entities import CHASE
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.utils.errors import InputError
 
@@ -200,10 +199,7 @@ class World:
         """Put the drone somewhere, without time or rules but one: cubes vanish when touched."""
         self._forget()
         self._place(body)
-        state: Any = self.worlds.state
-        if isinstance(self.task, CollectCubes):
-            away = (body.position[:, None] - state.cubes).abs().amax(-1)
-            state.collected |= state.present & (away <= self.task.settings.touch_distance)
+        self.task.touch(self.worlds.state, body.position)
 
     def set_light(self, light: float) -> None:
         """Set the factor by which cameras multiply all colours."""

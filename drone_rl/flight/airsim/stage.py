@@ -25,7 +25,6 @@ from drone_rl.sim.image_types import ImageType, pixels, segmentation_ids
 from drone_rl.sim.rendering import Appearance, Distractors
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.view import Modality
-from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -106,14 +105,8 @@ class Stage:
         return float(self.task.origin[2])
 
     def touch(self, position: Tensor) -> None:
-        """Apply the chapter's rule to a vehicle: cubes vanish when it touches them. (3,)."""
-        state: Any = self.worlds.state
-        task = self.task
-        if not isinstance(task, CollectCubes):
-            return
-        near = (position - state.cubes[0]).abs().amax(-1) <= task.settings.touch_distance
-        if bool((near & ~state.collected[0]).any()):
-            state.collected[0] |= near & state.present[0]
+        """Apply the task's rules to a vehicle: the chapter's cubes vanish when touched. (3,)."""
+        self.task.touch(self.worlds.state, position[None])
 
     # Objects
 

@@ -167,6 +167,13 @@ class CollectCubes(PropTask[WorldState]):
         launch(step_all, self.settings, new, *others)
         return new, reward
 
+    def touch(self, state: WorldState, position: Tensor) -> None:
+        """Collect the cubes that the drones touch, see `Task.touch`."""
+        away = (position[:, None] - state.cubes).abs().amax(-1)
+        near = (away <= self.settings.touch_distance) & state.present
+        if bool(near.any()):
+            state.collected |= near
+
     def fused_rules(self, dynamics: Dynamics, num_envs: int) -> FusedCubes | None:
         """See `Task.fused_rules`."""
         if type(self).step is CollectCubes.step and FusedCubes.supports(dynamics):

@@ -198,6 +198,12 @@ class Task(abc.ABC, Generic[S]):
         `state` is that before the step and stays as it is; `body` are the drones after it.
         """
 
+    def touch(self, state: S, position: Tensor) -> None:
+        """Apply the rules of contact in place, without a step or reward; by default there are none.
+
+        `position` is that of each drone, metres. Shape: (num_envs, 3).
+        """
+
     def fused_rules(self, dynamics: Dynamics, num_envs: int) -> Any:
         """Return arrays for the fused episode kernel, such as `FusedCubes`, or None."""
 

@@ -128,6 +128,17 @@ def test_contact_needs_all_three_axes():
         assert CollectCubes(SETTINGS).step(state, body(0, 0, 0))[1] == 0
 
 
+def test_a_touch_collects_what_stands_without_a_step():
+    """Drones at (15, 0) and elsewhere: the first cube of the first environment, 1.65 m aside."""
+    task, height = CollectCubes(SETTINGS), SETTINGS.altitude
+    state = task.start(torch.tensor([[[15.0, 1.65, height], [15.0, -1.0, height]]] * 2).double())
+    state.passed[0, 1] = True  # removed: it can't be touched
+    steps = state.steps.tolist()
+    task.touch(state, torch.tensor([[15.0, 0.0, height], [15.0, 9.0, height]]).double())
+    assert state.collected.tolist() == [[True, False], [False, False]]
+    assert state.steps.tolist() == steps and state.end_reason.tolist() == [0, 0]
+
+
 def test_reward_is_two_for_two_simultaneous_cubes():
     cubes = torch.tensor([[[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [1.7, 0.0, 0.0]]]).double()
     state, reward = CollectCubes(SETTINGS).step(CollectCubes(SETTINGS).start(cubes), body(0, 0, 0))
