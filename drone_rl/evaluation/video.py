@@ -144,19 +144,29 @@ def film_episode(
     Yields:
         RGB frames, uint8. Shape: (720, 1280, 3).
     """
-    base = cast(DroneEnv, env.base_env)
-    worlds = base.worlds
-    state, earned = env.reset(), 0.0
+    base, earned = cast(DroneEnv, env.base_env), 0.0
+    task, actions = base.worlds.task, base.worlds.dynamics.actions
+    for state, acted in run_episode(env, actor, greedy=greedy):
+        earned += float(state.get("reward", torch.zeros(1))[0])
+        yield _compose(render_step(base), _caption(task, state, earned), acted, actions)
+
+
+@torch.no_grad()
+def run_episode(
+    env: TransformedEnv, actor: TensorDictModuleBase, *, greedy: bool = True
+) -> Iterator[tuple[TensorDictBase, TensorDictBase | None]]:
+    """Run one episode in a single environment; yield each state with what the actor returns for it.
+
+    The environment is then in that state. The last one, in which no action is taken, comes with
+    None.
+    """
+    state = env.reset()
     with set_exploration_type(exploration(greedy)):
-        while True:
+        while not bool(state["done"].all()):
             acted = actor(state.clone(False))
-            caption = _caption(worlds.task, state, earned)
-            yield _compose(render_step(base), caption, acted, worlds.dynamics.actions)
+            yield state, acted
             state = env.step(acted)["next"]
-            earned += float(state["reward"][0])
-            if bool(state["done"].all()):
-                yield _compose(render_step(base), _caption(worlds.task, state, earned))
-                return
+    yield state, None
 
 
 def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:

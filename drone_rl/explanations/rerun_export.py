@@ -18,19 +18,16 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import TransformedEnv
-from torchrl.envs.utils import set_exploration_type
 
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.plots.images import heated, shown_picture
-from drone_rl.evaluation.rollouts import exploration
-from drone_rl.evaluation.video import CAMERAS, probabilities, render_step
+from drone_rl.evaluation.video import CAMERAS, probabilities, render_step, run_episode
 from drone_rl.explanations.attribution import first_heat, shown_methods
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S
-from drone_rl.sim.dynamics import Dynamics, Kinematic, Quadrotor
+from drone_rl.sim.composer_task import seconds_per_step
 from drone_rl.sim.rendering import Appearance, Mounting
 from drone_rl.sim.rendering.appearance import product, rotate
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -103,15 +100,10 @@ def record_episode(
     greedy: bool = True,
 ) -> None:
     """Run one episode in a single environment and log it."""
-    with torch.no_grad(), set_exploration_type(exploration(greedy)):
-        state = env.reset()
-        while True:
-            log.state(state)
-            if bool(state["done"].all()):
-                break
-            acted = actor(state.clone(False))
+    for state, acted in run_episode(env, actor, greedy=greedy):
+        log.state(state)
+        if acted is not None:
             log.action(acted)
-            state = env.step(acted)["next"]
     log.observations(network)
 
 
@@ -334,10 +326,3 @@ class EpisodeLog:
         turn = self._rr.Quaternion(xyzw=[*xyz, w])
         pose = self._rr.Transform3D(translation=position.tolist(), quaternion=turn)
         self._stream.log(path, pose)
-
-
-def seconds_per_step(dynamics: Dynamics) -> float:
-    """Return the simulated seconds of a step; in computer-vision mode nothing depends on them."""
-    if isinstance(dynamics, Quadrotor):
-        return dynamics.settings.control_timestep
-    return dynamics.timestep if isinstance(dynamics, Kinematic) else CONTROL_TIMESTEP_S

@@ -31,6 +31,11 @@ CONTROL_TIMESTEP_S = 0.1
 """Simulated time of one step, seconds. Computer-vision mode has no physics to depend on it."""
 
 
+def seconds_per_step(dynamics: Dynamics) -> float:
+    """Return the simulated seconds of a step; in computer-vision mode nothing depends on them."""
+    return getattr(dynamics, "timestep", None) or CONTROL_TIMESTEP_S
+
+
 class ComposerTask(composer.Task):
     """A field with the drone and a task's props. The discount is 0 at termination, 1 at truncation.
 
@@ -92,8 +97,7 @@ class ComposerTask(composer.Task):
         }
         for info in self._task_observables.values():
             info.enabled = True
-        seconds = getattr(self.dynamics, "timestep", CONTROL_TIMESTEP_S)
-        steps = (seconds, seconds)
+        steps = (seconds_per_step(self.dynamics),) * 2
         self.set_timesteps(*(steps if self._flight is None else self._flight.timesteps))
 
     @property

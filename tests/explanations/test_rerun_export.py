@@ -33,11 +33,10 @@ from drone_rl.explanations.rerun_export import (
     _open,
     record,
     record_episode,
-    seconds_per_step,
 )
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import describe
-from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S
+from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S, seconds_per_step
 from drone_rl.sim.dynamics import ComputerVision, Kinematic, Quadrotor
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.utils.errors import InputError

@@ -18,7 +18,7 @@ from drone_rl.evaluation.video import render_chase
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import Actions
-from drone_rl.sim.dynamics import BodyState, ComputerVision, FlightState, Kinematic, Quadrotor
+from drone_rl.sim.dynamics import BodyState, ComputerVision, FlightState, Quadrotor
 from drone_rl.sim.entities import CHASE
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
@@ -133,13 +133,9 @@ class World:
     def seconds(self, speed: float) -> float:
         """Return the seconds that an action lasts; moves without dynamics have that speed, m/s."""
         dynamics = self.worlds.dynamics
-        if isinstance(dynamics, Quadrotor):
-            return dynamics.settings.control_timestep
-        if isinstance(dynamics, Kinematic):
-            return dynamics.timestep
-        return (
-            dynamics.step_length / speed if isinstance(dynamics, ComputerVision) else _OTHER_PERIOD
-        )
+        if isinstance(dynamics, ComputerVision):
+            return dynamics.step_length / speed
+        return getattr(dynamics, "timestep", None) or _OTHER_PERIOD
 
     def align(self) -> None:
         """Prepare the drone, which a person may have turned or lifted, for the policy's actions.

@@ -48,7 +48,7 @@ class InTheLoopDynamics:
         self.settings = settings
         self._quadrotor = Quadrotor(settings, actions)
         self.actions = self._quadrotor.actions
-        self.mount = self._quadrotor.mount
+        self.mount, self.timestep = self._quadrotor.mount, self._quadrotor.timestep
         self.is_random = self._quadrotor.is_random
         """As without the loop, so that the same worlds are sampled."""
         self.needs_obstacles = True

@@ -26,6 +26,8 @@ class Dynamics(Protocol):
     """Whether `start` uses its `seeds`."""
     needs_obstacles: bool = False
     """Whether `step` needs the obstacles."""
+    timestep: float | None = None
+    """Seconds that an action lasts; None if it is done at once."""
 
     def start(self, position: Tensor, seeds: Tensor | None = None) -> BodyState:
         """Return drones at the start of an episode; by default they are level and at rest.

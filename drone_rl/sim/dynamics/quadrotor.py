@@ -32,6 +32,7 @@ class Quadrotor:
         self.is_random = settings.gusts > 0.0
         """Whether there are gusts, which `seeds` make different."""
         self.needs_obstacles = True
+        self.timestep: float | None = settings.control_timestep
 
     def start(self, position: Tensor, seeds: Tensor | None = None) -> FlightState:
         """Return drones that hover at rest; see `Dynamics`."""
