@@ -7,6 +7,7 @@ import io
 import math
 import random
 from collections.abc import Sequence
+from typing import Any
 
 import torch
 from PIL import Image
@@ -139,13 +140,19 @@ def images(
     return found
 
 
+def encode(image: Image.Image, kind: str, **options: Any) -> bytes:
+    """Return the content of an image file of a format of PIL, such as "png" or "jpeg"."""
+    buffer = io.BytesIO()
+    image.save(buffer, kind, **options)
+    return buffer.getvalue()
+
+
 def _png(images: Tensor) -> Tensor:
     """Encode images (N, H, W, 3) as PNG: bytes, padded with zeros, (N, length), uint8."""
     encoded = []
     for image in images.cpu().numpy():
-        buffer = io.BytesIO()
-        Image.fromarray(image).save(buffer, "png")
-        encoded.append(torch.frombuffer(bytearray(buffer.getvalue()), dtype=torch.uint8))
+        content = bytearray(encode(Image.fromarray(image), "png"))
+        encoded.append(torch.frombuffer(content, dtype=torch.uint8))
     return torch.nn.utils.rnn.pad_sequence(encoded, batch_first=True)
 
 

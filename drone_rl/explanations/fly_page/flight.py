@@ -1,6 +1,5 @@
 """The flight that the page shows: one world, who flies it, and the messages of browsers."""
 
-import io
 import json
 import logging
 import math
@@ -22,6 +21,7 @@ from drone_rl.explanations.fly_page.saliency import LiveSaliency
 from drone_rl.explanations.fly_page.world import Seen, World
 from drone_rl.flight.commands.state import Attitude
 from drone_rl.policies.policy import Policy
+from drone_rl.sim.image_types import encode
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import css
@@ -325,7 +325,8 @@ class Flight:
 
     def _view(self) -> bytes:
         def draw() -> bytes:
-            return _encoded(self.world.render(self.camera).numpy(), "jpeg", quality=_QUALITY)
+            picture = Image.fromarray(self.world.render(self.camera).numpy())
+            return encode(picture, "jpeg", quality=_QUALITY)
 
         return self._kept("view", (self.world.version, self.camera), draw)
 
@@ -338,7 +339,8 @@ class Flight:
             observation = seen.observation[0].numpy()
             picture = shown_picture(observation, *self._levels, self.world.scenes.channels)
             heat = self.saliency.heat(seen) if shows else None
-            return _encoded(picture if heat is None else heated(picture, heat), "png")
+            shown = picture if heat is None else heated(picture, heat)
+            return encode(Image.fromarray(shown), "png")
 
         return self._kept("observation", (self._looks, shows), draw)
 
@@ -352,9 +354,3 @@ class Flight:
 
 def _rounded(values: Any) -> list[float]:
     return [round(value, 3) if math.isfinite(value) else 0.0 for value in values]
-
-
-def _encoded(picture: Any, kind: str, **options: Any) -> bytes:
-    buffer = io.BytesIO()
-    Image.fromarray(picture).save(buffer, kind, **options)
-    return buffer.getvalue()

@@ -2,6 +2,7 @@
 
 import abc
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -184,6 +185,11 @@ class ActionPilot(_Steps):
 class _Drone(Pilot):
     """A drone that is taken over in flight, and whose trajectory is not kept."""
 
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """See `Pilot`."""
+        super().__init__(*args, **options)
+        self.trajectory = Trajectory(1)  # a page may be open for days
+
     def take_over(self, body: FlightState) -> None:
         """Continue with a drone that flies, or is posed, anywhere."""
         self.body, self._is_armed, self._landed = body, True, LandedState.FLYING
@@ -202,7 +208,6 @@ class _Drone(Pilot):
     def run(self) -> None:
         """Advance by a control period."""
         self._advance(self._period)
-        self.trajectory = Trajectory()  # it would grow as long as the page is open
 
     def _run(self, name: str, command: Command, wait: bool) -> bool | FlightFuture:
         """Start a movement, which as in AirSim also takes off a drone on the ground."""
@@ -235,7 +240,6 @@ class PosePilot(FlyPilot):
             if name != "down" or float(self._drone.body.position[0, 2]) - STEP >= _LOWEST:
                 self._drone.press(name)
         if keys:
-            self._drone.trajectory = Trajectory()
             self.world.move(self._drone.body)
 
 

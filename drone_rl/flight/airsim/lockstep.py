@@ -10,7 +10,7 @@ and not when exactly.
 import asyncio
 import contextlib
 import time
-from typing import Protocol
+from collections.abc import Callable
 
 from drone_rl.flight.airsim.simulation import Simulation
 
@@ -26,14 +26,6 @@ SLICE = 0.005
 """Seconds of real time between two looks at the sockets."""
 
 
-class Held(Protocol):
-    """A client that waits until time stands."""
-
-    def release(self) -> None:
-        """Go on with its requests."""
-        ...
-
-
 class Lockstep:
     """Alternates between answering requests and advancing time."""
 
@@ -44,7 +36,7 @@ class Lockstep:
         self._simulation, self._patience = simulation, patience
         self._quiet_since = 0.0
         self._count = 0
-        self._held: dict[Held, None] = {}
+        self._held: dict[Callable[[], None], None] = {}
         self._wake = asyncio.Event()
 
     def note(self, *, is_pilot: bool) -> None:
@@ -60,9 +52,9 @@ class Lockstep:
             if self._count >= MOST_REQUESTS:
                 self.is_running = True
 
-    def hold(self, client: Held) -> None:
-        """Release a client, in the order of these calls, once time stands."""
-        self._held[client] = None
+    def hold(self, release: Callable[[], None]) -> None:
+        """Call a function once, in the order of these calls, when time stands."""
+        self._held[release] = None
 
     async def run(self) -> None:
         """Alternate until cancelled."""
@@ -98,5 +90,5 @@ class Lockstep:
         self.is_running, self._count = False, 0
         self._quiet_since = time.monotonic()
         held, self._held = self._held, {}
-        for client in held:
-            client.release()
+        for release in held:
+            release()

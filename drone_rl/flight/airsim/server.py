@@ -46,7 +46,7 @@ class AirsimServer:
     def must_wait(self, client: Connection) -> bool:
         """Return whether requests have to wait; the client is then released when they need not."""
         if self._lockstep.is_running:
-            self._lockstep.hold(client)
+            self._lockstep.hold(client.release)
         return self._lockstep.is_running
 
     def note(self, client: Connection) -> None:

@@ -2,7 +2,6 @@
 
 import copy
 import dataclasses
-import io
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -21,7 +20,7 @@ from drone_rl.flight.airsim.scenes import make_task
 from drone_rl.flight.airsim.settings_file import Capture
 from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.entities import KINDS
-from drone_rl.sim.image_types import ImageType, pixels, segmentation_ids
+from drone_rl.sim.image_types import ImageType, encode, pixels, segmentation_ids
 from drone_rl.sim.rendering import Appearance, Distractors
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.view import Modality
@@ -379,6 +378,4 @@ def matching(pattern: str, names: Iterable[str]) -> list[str]:
 
 def png(image: Tensor) -> bytes:
     """Return red, green, blue (H, W, 3), uint8, as PNG with an opaque fourth channel."""
-    buffer = io.BytesIO()
-    Image.fromarray(image.numpy()).convert("RGBA").save(buffer, "png", compress_level=1)
-    return buffer.getvalue()
+    return encode(Image.fromarray(image.numpy()).convert("RGBA"), "png", compress_level=1)

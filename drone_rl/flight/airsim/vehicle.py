@@ -192,7 +192,12 @@ class Vehicle(Airframe):
         return self._moved("move_by_angle", roll * _UNITS, pitch * _UNITS, seconds, **turn, **lift)
 
     def spin(
-        self, rates: Sequence[float], seconds: float, *, z: float | None, throttle: float | None
+        self,
+        rates: Sequence[float],
+        seconds: float,
+        *,
+        z: float | None = None,
+        throttle: float | None = None,
     ) -> FlightFuture | None:
         """Hold body rates, radians per second."""
         lift = {"z": self._height(z)} if z is not None else {"throttle": throttle}

@@ -73,7 +73,8 @@ class Kinematic(Dynamics):
     def __init__(self, actions: ActionSettings, timestep: float = 0.1) -> None:
         """Take the greatest speeds, and the seconds that an action lasts."""
         self._continuous = ContinuousActions.of(actions)
-        self.actions, self.timestep = self._continuous, timestep
+        self.actions: Actions = self._continuous
+        self.timestep = self._seconds = timestep
 
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
@@ -83,10 +84,10 @@ class Kinematic(Dynamics):
         heading = heading_of(body.attitude)
         cos, sin, zero = heading.cos(), heading.sin(), torch.zeros_like(heading)
         velocity = torch.stack([cos * forward - sin * left, sin * forward + cos * left, zero], -1)
-        half = (heading + rate * self.timestep) / 2
+        half = (heading + rate * self._seconds) / 2
         return dataclasses.replace(
             body,
-            position=body.position + velocity * self.timestep,
+            position=body.position + velocity * self._seconds,
             attitude=torch.stack([half.cos(), zero, zero, half.sin()], -1),
             velocity=velocity,
             angular_velocity=torch.stack([zero, zero, rate], -1),

@@ -6,6 +6,7 @@ import msgpack
 import pytest
 
 from drone_rl.flight.airsim.serving import serve
+from drone_rl.flight.airsim.stage import Stage
 
 CV = '{"SimMode": "ComputerVision"}'
 SMALL = """{"SimMode": "ComputerVision", "CameraDefaults": {"CaptureSettings": [
@@ -57,6 +58,20 @@ class Client:
 
     def close(self):
         self.socket.close()
+
+
+@pytest.fixture(scope="module")
+def cubes():
+    stage = Stage("cubes", 0)
+    yield stage
+    stage.close()
+
+
+@pytest.fixture(scope="module")
+def empty():
+    stage = Stage("empty", 0)
+    yield stage
+    stage.close()
 
 
 @pytest.fixture

@@ -6,23 +6,8 @@ import pytest
 import torch
 
 from drone_rl.flight.airsim.settings_file import Capture, Offset
-from drone_rl.flight.airsim.stage import Stage
 from drone_rl.sim.image_types import ImageType
 from tests.flight.airsim.looking import look
-
-
-@pytest.fixture(scope="module")
-def cubes():
-    stage = Stage("cubes", 0)
-    yield stage
-    stage.close()
-
-
-@pytest.fixture(scope="module")
-def empty():
-    stage = Stage("empty", 0)
-    yield stage
-    stage.close()
 
 
 def test_cameras_look_where_their_poses_say(empty):

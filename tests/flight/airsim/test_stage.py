@@ -10,24 +10,10 @@ import torch
 from PIL import Image
 
 from drone_rl.flight.airsim.messages import MAX_NAME
-from drone_rl.flight.airsim.stage import SPARE, Stage, matching, png
+from drone_rl.flight.airsim.stage import SPARE, matching, png
 from drone_rl.sim.image_types import ImageType, palette
 from drone_rl.utils.errors import InputError
 from tests.flight.airsim.looking import look
-
-
-@pytest.fixture(scope="module")
-def cubes():
-    stage = Stage("cubes", 0)
-    yield stage
-    stage.close()
-
-
-@pytest.fixture(scope="module")
-def empty():
-    stage = Stage("empty", 0)
-    yield stage
-    stage.close()
 
 
 def test_cubes_vanish_when_touched_and_are_placed_again(cubes):

@@ -24,6 +24,15 @@ def _flown(future: FlightFuture | None, name: str) -> Any:
     return Wait(lambda: future.done, lambda: future.result())
 
 
+def _numbers(args: Sequence[Any], *names: str) -> list[float]:
+    """Return the first arguments, which have these names."""
+    return [number(value, name) for value, name in zip(args, names, strict=False)]
+
+
+def _seconds(value: float) -> float:
+    return min(max(value, 0.0), 1e6)
+
+
 @method("takeoff")
 def _takeoff(simulation: Simulation, args: Sequence[Any]) -> Any:
     timeout = number(argument(args, 0, 20.0), "timeout_sec")
@@ -52,8 +61,7 @@ def _move_velocity(
     simulation: Simulation, args: Sequence[Any], *, has_height: bool, in_body: bool, name: str
 ) -> Any:
     third = "z" if has_height else "vz"
-    names = ("vx", "vy", third, "duration")
-    vx, vy, vz, seconds = (number(v, n) for v, n in zip(args, names, strict=False))
+    vx, vy, vz, seconds = _numbers(args, "vx", "vy", third, "duration")
     if seconds <= 0.0:
         return not has_height
     drivetrain, yaw = read_yaw_mode(argument(args, 5, _HELD), argument(args, 4, 0))
@@ -99,7 +107,7 @@ def _move_path(simulation: Simulation, args: Sequence[Any]) -> Any:
 
 @method("moveToPosition", least=4)
 def _move_to(simulation: Simulation, args: Sequence[Any]) -> Any:
-    x, y, z, speed = (number(v, n) for v, n in zip(args, ("x", "y", "z", "velocity"), strict=False))
+    x, y, z, speed = _numbers(args, "x", "y", "z", "velocity")
     timeout = number(argument(args, 4, 1e6), "timeout_sec")
     drivetrain, yaw = read_yaw_mode(argument(args, 6, _HELD), argument(args, 5, 0))
     vehicle = vehicle_at(simulation, args, 9)
@@ -146,8 +154,7 @@ def _rotate_by(simulation: Simulation, args: Sequence[Any]) -> Any:
 
 @method("moveByManual", least=4)
 def _manual(simulation: Simulation, args: Sequence[Any]) -> Any:
-    names = ("vx_max", "vy_max", "z_min", "duration")
-    vx, vy, z, seconds = (number(v, n) for v, n in zip(args, names, strict=False))
+    vx, vy, z, seconds = _numbers(args, "vx_max", "vy_max", "z_min", "duration")
     drivetrain, yaw = read_yaw_mode(argument(args, 5, _HELD), argument(args, 4, 0))
     vehicle = vehicle_at(simulation, args, 6)
     future = vehicle.move_manually(vx, vy, z, min(seconds, 1e6), drivetrain, yaw)
@@ -161,80 +168,36 @@ def _by_rc(simulation: Simulation, args: Sequence[Any]) -> None:
     vehicle_at(simulation, args, 1).set_sticks(args[0])
 
 
-def _numbers(args: Sequence[Any], *names: str) -> list[float]:
-    return [number(value, name) for value, name in zip(args, names, strict=False)]
-
-
-def _seconds(value: float) -> float:
-    return min(max(value, 0.0), 1e6)
-
-
-@method("moveByRollPitchYawZ", least=5)
-def _roll_pitch_yaw_z(simulation: Simulation, args: Sequence[Any]) -> Any:
-    roll, pitch, yaw, z, seconds = _numbers(args, "roll", "pitch", "yaw", "z", "duration")
+def _tilt(simulation: Simulation, args: Sequence[Any], *, order: str, name: str) -> Any:
+    names = order.split()
+    *values, seconds = _numbers(args, *names, "duration")
+    held = dict(zip(names, values, strict=True))
     vehicle = vehicle_at(simulation, args, 5)
-    future = vehicle.tilt(roll, pitch, _seconds(seconds), yaw=yaw, z=z)
-    return _flown(future, "moveByRollPitchYawZ")
+    return _flown(vehicle.tilt(seconds=_seconds(seconds), **held), name)
 
 
-@method("moveByRollPitchYawThrottle", least=5)
-def _roll_pitch_yaw_throttle(simulation: Simulation, args: Sequence[Any]) -> Any:
-    names = ("roll", "pitch", "yaw", "throttle", "duration")
-    roll, pitch, yaw, throttle, seconds = _numbers(args, *names)
+for _label, _order in (
+    ("moveByRollPitchYawZ", "roll pitch yaw z"),
+    ("moveByRollPitchYawThrottle", "roll pitch yaw throttle"),
+    ("moveByRollPitchYawrateZ", "roll pitch yaw_rate z"),
+    ("moveByRollPitchYawrateThrottle", "roll pitch yaw_rate throttle"),
+    # versions up to 1.5
+    ("moveByAngleZ", "pitch roll z yaw"),
+    ("moveByAngle", "pitch roll z yaw"),
+    ("moveByAngleThrottle", "pitch roll throttle yaw_rate"),
+):
+    method(_label, least=5)(functools.partial(_tilt, order=_order, name=_label))
+
+
+def _spin(simulation: Simulation, args: Sequence[Any], *, lift: str, name: str) -> Any:
+    names = ("roll_rate", "pitch_rate", "yaw_rate", lift, "duration")
+    *rates, value, seconds = _numbers(args, *names)
     vehicle = vehicle_at(simulation, args, 5)
-    future = vehicle.tilt(roll, pitch, _seconds(seconds), yaw=yaw, throttle=throttle)
-    return _flown(future, "moveByRollPitchYawThrottle")
+    return _flown(vehicle.spin(rates, _seconds(seconds), **{lift: value}), name)
 
 
-@method("moveByRollPitchYawrateThrottle", least=5)
-def _roll_pitch_yawrate_throttle(simulation: Simulation, args: Sequence[Any]) -> Any:
-    names = ("roll", "pitch", "yaw_rate", "throttle", "duration")
-    roll, pitch, rate, throttle, seconds = _numbers(args, *names)
-    vehicle = vehicle_at(simulation, args, 5)
-    future = vehicle.tilt(roll, pitch, _seconds(seconds), yaw_rate=rate, throttle=throttle)
-    return _flown(future, "moveByRollPitchYawrateThrottle")
-
-
-@method("moveByRollPitchYawrateZ", least=5)
-def _roll_pitch_yawrate_z(simulation: Simulation, args: Sequence[Any]) -> Any:
-    names = ("roll", "pitch", "yaw_rate", "z", "duration")
-    roll, pitch, rate, z, seconds = _numbers(args, *names)
-    vehicle = vehicle_at(simulation, args, 5)
-    future = vehicle.tilt(roll, pitch, _seconds(seconds), yaw_rate=rate, z=z)
-    return _flown(future, "moveByRollPitchYawrateZ")
-
-
-@method("moveByAngleRatesZ", least=5)
-def _rates_z(simulation: Simulation, args: Sequence[Any]) -> Any:
-    *rates, z, seconds = _numbers(args, "roll_rate", "pitch_rate", "yaw_rate", "z", "duration")
-    vehicle = vehicle_at(simulation, args, 5)
-    return _flown(vehicle.spin(rates, _seconds(seconds), z=z, throttle=None), "moveByAngleRatesZ")
-
-
-@method("moveByAngleRatesThrottle", least=5)
-def _rates_throttle(simulation: Simulation, args: Sequence[Any]) -> Any:
-    names = ("roll_rate", "pitch_rate", "yaw_rate", "throttle", "duration")
-    *rates, throttle, seconds = _numbers(args, *names)
-    vehicle = vehicle_at(simulation, args, 5)
-    future = vehicle.spin(rates, _seconds(seconds), z=None, throttle=throttle)
-    return _flown(future, "moveByAngleRatesThrottle")
-
-
-@method("moveByAngleZ", "moveByAngle", least=5)
-def _angle_z(simulation: Simulation, args: Sequence[Any]) -> Any:
-    """Move as versions up to 1.5 do: pitch comes first."""
-    pitch, roll, z, yaw, seconds = _numbers(args, "pitch", "roll", "z", "yaw", "duration")
-    vehicle = vehicle_at(simulation, args, 5)
-    return _flown(vehicle.tilt(roll, pitch, _seconds(seconds), yaw=yaw, z=z), "moveByAngleZ")
-
-
-@method("moveByAngleThrottle", least=5)
-def _angle_throttle(simulation: Simulation, args: Sequence[Any]) -> Any:
-    names = ("pitch", "roll", "throttle", "yaw_rate", "duration")
-    pitch, roll, throttle, rate, seconds = _numbers(args, *names)
-    vehicle = vehicle_at(simulation, args, 5)
-    future = vehicle.tilt(roll, pitch, _seconds(seconds), yaw_rate=rate, throttle=throttle)
-    return _flown(future, "moveByAngleThrottle")
+for _label, _lift in (("moveByAngleRatesZ", "z"), ("moveByAngleRatesThrottle", "throttle")):
+    method(_label, least=5)(functools.partial(_spin, lift=_lift, name=_label))
 
 
 @method("moveByMotorPWMs", least=5)
