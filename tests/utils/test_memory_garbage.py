@@ -27,7 +27,8 @@ def test_it_keeps_nothing_from_being_collected_later():
     before = gc.get_freeze_count()
     with collecting_no_garbage():
         pass
-    assert gc.get_freeze_count() == before
+    # fewer where objects that an earlier test froze have been freed since
+    assert gc.get_freeze_count() <= before
 
 
 def test_a_program_looks_rarely_and_finds_what_there_is():
