@@ -3,31 +3,51 @@
 `python -m tools.airsim_clients` makes the environments; without them these tests are skipped.
 """
 
+import base64
 import json
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
+import torch
 
+from drone_rl.config import CameraSettings
+from drone_rl.policies.policy import load_policy
+from drone_rl.sim.tasks import CollectCubes
+from drone_rl.sim.worlds import Worlds
 from tests.flight.airsim.conftest import CV
 from tools.airsim_clients import CLIENTS, python_of
 
 SCRIPTS = Path(__file__).parent / "clients"
+POLICY_CAMERA = """{"SettingsVersion": 1.2, "CameraDefaults": {"CaptureSettings": [
+  {"ImageType": 0, "Width": 64, "Height": 25, "FOV_Degrees": 135}]}}"""
+EPISODES, MOST_ACTIONS = 3, 70
 
 
 @pytest.fixture(params=[*CLIENTS])
-def run(request, start):
-    """Return a function that runs a script with one of the clients against a server."""
+def command(request, start):
+    """Return a function: the command of a script with one of the clients, against a server."""
     name = request.param
     python = python_of(name)
     if not python.exists():
         pytest.skip(f"{name} is not installed; run python -m tools.airsim_clients")
 
-    def call(script, text=None, *args, **settings):
+    def make(script, text=None, *args, **settings):
         server, _client = start(text, **settings)
-        command = [str(python), str(SCRIPTS / script), CLIENTS[name].module, str(server.address[1])]
+        known = (python, SCRIPTS / script, CLIENTS[name].module, server.address[1])
+        return [*map(str, (*known, *args))]
+
+    return make
+
+
+@pytest.fixture
+def run(command):
+    """Return a function that runs a script with one of the clients against a server."""
+
+    def call(*args, **settings):
         done = subprocess.run(
-            [*command, *map(str, args)], capture_output=True, text=True, timeout=300, check=False
+            command(*args, **settings), capture_output=True, text=True, timeout=300, check=False
         )
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout.splitlines()[-1]), done.stdout
@@ -71,3 +91,38 @@ def test_environment_for_reinforcement_learning(run):
     assert found["steps"] == 200
     assert found["shapes"] == [[144, 256, 3]]
     assert found["x"] > 5.0
+
+
+@pytest.mark.parametrize("name", ["good", "right_and_forward"])
+def test_a_policy_collects_what_it_collects_here(command, name):
+    policy = load_policy(name)
+    script = command("policy.py", POLICY_CAMERA, EPISODES, MOST_ACTIONS, scene="cubes", seed=4)
+    channels = slice(None, None, -1 if "airsim" in script else 1)  # blue first in airsim's images
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen(script, **pipes) as process:
+        for line in process.stdout:
+            if line.startswith("["):
+                break
+            image = np.frombuffer(base64.b64decode(line), np.uint8).reshape(25, 64, 3)
+            process.stdin.write(f"{policy.act(image[..., channels].copy())}\n")
+            process.stdin.flush()
+        process.stdin.close()
+    assert json.loads(line) == collected(policy)
+
+
+def collected(policy):
+    """Return the cubes that a policy collects in the episodes of the server's seed."""
+    worlds = Worlds(1, CollectCubes(), CameraSettings())
+    random, one = np.random.RandomState(np.random.PCG64(4)), torch.arange(1)
+    worlds.reset(one, [random])  # the server's first placement, before reset
+    found = []
+    for _ in range(EPISODES):
+        worlds.reset(one, [random])
+        for _ in range(MOST_ACTIONS):
+            image = worlds.render(worlds.state)[0]
+            worlds.step(one, torch.tensor([policy.act(image)]))
+            if worlds.state.end_reason[0]:
+                break
+        found.append(worlds.state.collected[0].tolist())
+    worlds.close()
+    return found
