@@ -279,6 +279,10 @@ def _wrong_value(config: DictConfig, key: str, value: Any, text: str, reason: st
         listed = [value] if isinstance(value, int | float) else ([*now] or [1, 2])
         listed = str(listed).replace(" ", "").replace("'", "")
         return InputError(f"{text} has the wrong type; type a list such as {name}={listed}")
+    if now is None:
+        with contextlib.suppress(OmegaConfBaseException):
+            OmegaConf.update(config, key, [value])  # fails unless the setting may be a list
+            return InputError(f"{text} has the wrong type; type a list such as {name}=[{value}]")
     written = re.fullmatch(r"(\d+(?:\.\d+)?)([kKmMgG])", str(value))
     if written and "number" in expected:
         now = f"{float(written[1]) * _MAGNITUDES[written[2].lower()]:.0f}"
