@@ -1,29 +1,24 @@
-"""The chapter's own algorithm, trained to its criterion, and the chapter's elements and signs."""
+"""The speed of the chapter's own algorithm, its elements and signs, and policies with memory."""
 
 import os
 import re
 import statistics
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from benchmarks.commands import call, train
+from benchmarks.original import EPISODES
 from benchmarks.revisions import extract
 from drone_rl.cli.commands import COMMANDS
 from drone_rl.utils.files import read_json
 
 BEFORE = "3e5d8a0b"
 """The last revision that stepped the original network and camera in Python."""
-RATES = (3e-5, 1e-4, 1e-3)
-"""Learning rates; the chapter's program has the middle one."""
-SEEDS = range(5)
 NETWORKS = {"lstm": "lstm", "memoryless": "small_cnn"}
 """Networks that learn a task that needs memory, by the first part of their key."""
-EPISODES = 30_000
-"""Episodes after which the chapter's program stops."""
 _ROOT = Path(__file__).resolve().parents[1]
 _ELEMENT = re.compile(r"^\| ((?:Eq\.|Algorithm|Table|Listing|Fig\.) \d+) \|(.*)\|$", re.MULTILINE)
 _COMMAND = re.compile(r"`drone-rl ([\w-]+)")
@@ -32,32 +27,24 @@ _CONVENTIONS = "tests/flight/commands/test_conventions.py"
 
 
 def bench_chapter(folder: Path, quick: bool, *, root: Path = _ROOT) -> dict[str, Any]:
-    """Train `experiment=original` at three rates, and count elements and conventions.
+    """Time `experiment=original`, and count elements and conventions.
 
     Args:
         folder: Folder of the runs.
-        quick: Whether to train each rate once, for a few episodes.
+        quick: Whether to train for a few episodes.
         root: Checkout.
 
     Returns:
-        "original_runs": by rate, for each seed whether it reached the chapter's criterion, its
-        episodes, seconds, and kind of verdict; "original_rate": the best rate;
-        "original_solved": seeds that it solves; "original_minutes": minutes of 30,000 episodes
-        that stop for no criterion; "original_speedup": frames per second over those of `BEFORE`;
-        "chapter_elements", "chapter_shown", see `count_elements`; "convention_cases" that agree;
-        "lstm_success", "memoryless_success", see `memory`.
+        "original_minutes": minutes of 30,000 episodes that stop for no criterion;
+        "original_speedup": frames per second over those of `BEFORE`; "chapter_elements",
+        "chapter_shown", see `count_elements`; "convention_cases" that agree; "lstm_success",
+        "memoryless_success", see `memory`.
 
     Raises:
         RuntimeError: A command or the tests of conventions failed.
     """
-    seeds = SEEDS[:1] if quick else SEEDS
-    runs = {f"{rate:g}": train_rate(folder / f"{rate:g}", rate, seeds, quick) for rate in RATES}
-    best = max(runs, key=lambda rate: sum(run["solved"] for run in runs[rate]))
     elements, shown = count_elements(root / "docs" / "chapter.md", root)
     return {
-        "original_runs": runs,
-        "original_rate": float(best),
-        "original_solved": sum(run["solved"] for run in runs[best]),
         "original_minutes": minutes(folder / "whole", 100 if quick else EPISODES),
         "original_speedup": speedup(folder / "speed", 1 if quick else 3, root=root),
         "chapter_elements": elements,
@@ -65,29 +52,6 @@ def bench_chapter(folder: Path, quick: bool, *, root: Path = _ROOT) -> dict[str,
         "convention_cases": count_conventions(root),
         **memory(folder / "memory", quick, root=root),
     }
-
-
-def train_rate(
-    folder: Path, rate: float, seeds: Sequence[int], quick: bool
-) -> list[dict[str, Any]]:
-    """Train with a learning rate from each seed, two at a time, and judge the policies."""
-    limit = ["trainer.total_episodes=20"] if quick else []
-
-    def one(seed: int) -> dict[str, Any]:
-        run = folder / str(seed)
-        settings = ["experiment=original", f"optimizer.lr={rate:g}", f"seed={seed}", *limit]
-        seconds, result = train(run, *settings)
-        place = f"hydra.run.dir={run}/verdict"
-        call("verdict", f"policy={run}", "seed=0", place, statuses=tuple(range(20)))
-        verdict = read_json(run / "verdict" / "verdict.json")
-        return {
-            "solved": result["reason"] == "solved",
-            **{"episodes": result["episodes"], "frames": result["frames"], "seconds": seconds},
-            "verdict": f"{verdict['kind']}{'' if verdict['certain'] else ' (not certain)'}",
-        }
-
-    with ThreadPoolExecutor(2) as pool:
-        return list(pool.map(one, seeds))
 
 
 def memory(folder: Path, quick: bool, *, root: Path) -> dict[str, float]:

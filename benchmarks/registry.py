@@ -21,11 +21,13 @@ from benchmarks.gymnasium import bench_gymnasium
 from benchmarks.hostile import bench_hostile
 from benchmarks.imitation import bench_imitation
 from benchmarks.injections import bench_injections
+from benchmarks.ledger import digest_code
 from benchmarks.maps import bench_maps
 from benchmarks.memory import bench_memory
 from benchmarks.mistakes import bench_mistakes
 from benchmarks.mutants import bench_mutants
 from benchmarks.onnx_export import bench_onnx
+from benchmarks.original import bench_original
 from benchmarks.peers.comparison import bench_peers
 from benchmarks.places import bench_places
 from benchmarks.proving import bench_many_cubes, bench_provable, bench_prove, bench_tampering
@@ -56,12 +58,18 @@ _TRAINING = (*_COLLECTING, "objectives", "training")
 _JUDGING = (*_RENDERING, "policies", "evaluation", "verdicts")
 _PROVING = (*_RENDERING, "policies", "verification/prover", "verification/checker")
 _EXPLAINING = (*_JUDGING, "explanations")
+_ORIGINAL = (*_TRAINING, "conf", "benchmarks/original")
 _CLAIMS = ("evaluation", "robustness", "verification", "verdicts", "explanations", "sweeps")
 
 
 def _flight_training(setup: Setup, experiment: str, seeds: Sequence[int]) -> dict[str, Any]:
     runs = setup.runs / experiment
     return bench_flight_training(experiment, runs, seeds, setup.episodes, setup.device, setup.quick)
+
+
+def _original(setup: Setup) -> dict[str, Any]:
+    runs = setup.folder / "original" / digest_code(_ORIGINAL)
+    return bench_original(runs, setup.folder / "original.png", setup.quick)
 
 
 BENCHMARKS: dict[str, Benchmark] = {
@@ -293,6 +301,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_imitation(s.runs / "imitation", s.seeds[:3], s.episodes, s.device, s.quick),
         "long",
         (*_TRAINING, "evaluation", "conf", "benchmarks/imitation", "benchmarks/training"),
+    ),
+    "original": Benchmark(
+        _original,
+        "long",
+        _ORIGINAL,
     ),
     "chapter": Benchmark(
         lambda s: bench_chapter(s.runs / "chapter", s.quick),

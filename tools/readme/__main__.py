@@ -29,7 +29,7 @@ from tools.readme.tables import list_figures, list_origins, make_table
 
 ROOT = Path(__file__).resolve().parents[2]
 MEASURED = ROOT / "outputs" / "bench" / "results.json"
-PLOTS = ("peers.png", "scaling.png")
+PLOTS = ("original.png", "peers.png", "scaling.png")
 PAGES = (
     "README.md",
     "docs/airsim.md",
