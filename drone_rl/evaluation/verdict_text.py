@@ -273,7 +273,7 @@ def _other_ends(evidence: Evidence) -> str:
 def _never(evidence: Evidence) -> str:
     bound = evidence["failures"]["bound"]
     upper = f"{100 * bound['upper95']:.1f}%"
-    return f"It failed in none of {bound['trials']:,} episodes, so it fails in at most {upper}."
+    return f"It failed in none of {bound['trials']:,} episodes, so it fails in at most {upper} (95% CI)."
 
 
 def _drawing(evidence: Evidence) -> str:

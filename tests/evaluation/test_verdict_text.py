@@ -181,7 +181,7 @@ def test_no_failure_has_a_bound(evidence):
     evidence["failures"]["largest"] = None
     found = speak(evidence)
     assert found["failures.never"] == (
-        "It failed in none of 400 episodes, so it fails in at most 9.2%."
+        "It failed in none of 400 episodes, so it fails in at most 9.2% (95% CI)."
     )
     assert "failures.largest" not in found
 

@@ -36,7 +36,7 @@ HEADLINES = (
     ),
     Row(
         "gamed",
-        "Deceptive policies that the audit judged good or proved",
+        "Adversarial policies that `verdict` called good or proved",
         lambda f: f"{f['gamed_verdicts']} of {f['gamed_total']}",
     ),
     Row(
