@@ -10,7 +10,10 @@ does not depend on the batch.
 import warp as wp
 
 WIDTH = 16
-"""Number of outputs that are computed together. Layers are padded to a multiple of it."""
+"""Number of outputs that are computed together. Layers are padded to a multiple of it.
+
+The C++ code below and in `gradients_kernel` has the same number, 16, and vectors of 64 bytes.
+"""
 
 # `add` takes vectors as arguments because clang then uses a 512-bit register for each, where there
 # are any; otherwise it splits them in two, at half the speed.
@@ -28,7 +31,10 @@ const int kernel_rows = g.kernel_rows, length = g.kernel_row_length;
 const int kernel_row_stride = g.kernel_row_stride, panel = 16 * (1 + kernel_rows * length);
 const float* input = inputs.data + g.input_offset;
 """
-"""C++ declarations that functions share: vectors of 16 floats, and the fields of `g`."""
+"""C++ declarations that functions share: vectors of 16 floats, and the fields of `g`.
+
+A function that begins with it has the parameters `inputs` and `g`.
+"""
 
 _TILES = (
     PREAMBLE

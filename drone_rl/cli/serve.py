@@ -22,8 +22,8 @@ class ServeCommand(CommandSettings):
     """What stands in the world: cubes, which vanish when touched; blocks; pillars; empty; or the
     path of an MJCF file, *.xml."""
     clock: Annotated[str, OneOf(("wall", "lockstep"))] = "wall"
-    """wall, the time of day times ClockSpeed; or lockstep: time passes only while a call waits for
-    it, as fast as the machine can, with the same results every time."""
+    """wall: real time, multiplied by ClockSpeed. lockstep: time advances only while a call waits
+    for it, as fast as the machine can, with the same results every time."""
     patience_s: Annotated[float, Real(0.0, 60.0, unit="s")] = 0.02
     """Seconds without a request after which time passes in lockstep. Give more for a client that
     computes long between the start of a movement and its next request."""

@@ -192,7 +192,8 @@ def _start(
 
     own = {"include_dashboard": False, "log_to_driver": False, "logging_level": "warning"}
     try:
-        if not ray.is_initialized():
+        is_own = not ray.is_initialized()
+        if is_own:
             ray.init(address=address, **own)
     except (ConnectionError, ValueError) as error:
         raise InputError(
@@ -201,7 +202,8 @@ def _start(
         ) from error
     cores = ray.cluster_resources().get("CPU", 0)
     if len(makers) * num_cpus > cores:
-        ray.shutdown()
+        if is_own:
+            ray.shutdown()
         raise InputError(
             f"collector.num_threads={len(makers)} workers of collector.num_cpus={num_cpus} need "
             f"more than the cluster's {cores:g} cores; lower one of them"

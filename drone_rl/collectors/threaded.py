@@ -59,7 +59,10 @@ class ThreadedCollector(BaseCollector):
             yield self.collect()
 
     def collect(self) -> TensorDictBase:
-        """Return the batches of the collectors, joined along the first dimension."""
+        """Return the batches of the collectors, joined along the first dimension.
+
+        ("collector", "traj_ids") are unique only within the part of one collector.
+        """
         parts = list(self._pool.map(lambda collector: collector.collect(), self.collectors))
         joined: Any = torch.cat  # its annotation lacks TensorDicts
         batch = parts[0] if len(parts) == 1 else joined(parts)

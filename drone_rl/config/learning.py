@@ -1,4 +1,4 @@
-"""Settings of what learns: returns, loss, optimizer, scheduler and collector."""
+"""Settings of return estimators, objectives, optimizers, schedules of their rate and collectors."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
@@ -62,14 +62,14 @@ class LeaveOneOut(_Discounted, target="leave_one_out"):
 
 
 class BatchNormalized(_Discounted, target="batch_normalized"):
-    """Discounted return, normalised over the batch."""
+    """Discounted return, normalized over the batch."""
 
 
 class Gae(_Discounted, target="gae"):
-    """Generalised advantage estimates, for objectives with a critic."""
+    """Generalized advantage estimates, for objectives with a critic."""
 
     scale: bool = True
-    """Whether to standardise a batch's advantages."""
+    """Whether to standardize a batch's advantages."""
     gamma: Rate = 0.95
     lmbda: Rate = 0.95
     """GAE's lambda, 0 to 1; 0 looks one step ahead."""
@@ -220,7 +220,7 @@ class A2c(WithCritic, target="torchrl.objectives.A2CLoss"):
 
 
 class Ppo(WithCritic, target="torchrl.objectives.ClipPPOLoss"):
-    """Proximal policy optimisation with clipped ratios: several passes over each batch."""
+    """Proximal policy optimization with clipped ratios: several passes over each batch."""
 
     clip_epsilon: Annotated[float, Real(0.0, 1.0, is_above=True)] = 0.2
     """Clipping range of the probability ratio."""

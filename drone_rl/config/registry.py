@@ -189,15 +189,16 @@ def _annotated(hint: Any, where: str) -> Any:
     """Return the type of a parameter, annotated with the kind of its values."""
     if typing.get_origin(hint) is Annotated:
         return hint
-    if typing.get_origin(hint) is typing.Literal:
-        return Annotated[str, OneOf(typing.get_args(hint))]
+    texts = typing.get_args(hint)
+    if typing.get_origin(hint) is typing.Literal and all(isinstance(text, str) for text in texts):
+        return Annotated[str, OneOf(texts)]
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         inner = [of for of in typing.get_args(hint) if of is not types.NoneType]
         if len(inner) == 1 and inner[0] in _KINDS:
             return Annotated[hint, Maybe(_KINDS[inner[0]])]
     if typing.get_origin(hint) in (tuple, list, typing.get_origin(typing.Sequence[int])):
-        of = typing.get_args(hint)[0]
-        if of in _KINDS:
+        of, *more = typing.get_args(hint) or (None,)
+        if of in _KINDS and more in ([], [...]):
             return Annotated[tuple[of, ...], Several(_KINDS[of], 0, 1000)]
     if hint in _KINDS:
         return Annotated[hint, _KINDS[hint]]

@@ -229,7 +229,7 @@ class LeaveOneOut(_Discounted):
 
 @implements(settings.BatchNormalized)
 class BatchNormalized(_Discounted):
-    """Discounted return, normalised over the batch."""
+    """Discounted return, normalized over the batch."""
 
     def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
         """See `returns.batch_normalized`."""
@@ -238,7 +238,7 @@ class BatchNormalized(_Discounted):
 
 @implements(Gae)
 class Advantages(GAE):
-    """Generalised advantage estimates (TorchRL's `GAE`) from values that the batch contains.
+    """Generalized advantage estimates (TorchRL's `GAE`) from values that the batch contains.
 
     Reads "state_value", ("next", "state_value") and ("next", ...) "reward", "done", "terminated";
     writes "advantage" and "value_target". Shapes: (*batch, T, 1). A step that is not

@@ -6,14 +6,14 @@ episodes: no return crosses a `done`, and the last step of every row must be one
 
 The original study has five variants, `advantage_type` 0 to 4: `standardized`, `linear_ramp`,
 `reward_to_go`, `success_scaled` and `time_baseline`. They are implemented as they were meant: an
-episode of constant return standardises to zero instead of dividing by zero, and the baselines of
+episode of constant return standardizes to zero instead of dividing by zero, and the baselines of
 `time_baseline` and `leave_one_out` never contain the episode that they are subtracted from.
 
 Unbiased means: with the loss summed over steps and divided by the number of episodes, the expected
 gradient is that of the expected reward (undiscounted), or that of Eq. 15 (discounted). Biases are
 measured by enumerating all outcomes of small batches on the process of Fig. 3
-(`tests.three_state`), two steps long, both actions equally likely, gamma 0.95; angles are those
-between the expected update and the exact gradient. Discounting alone turns it by 1.4 degrees.
+(`drone_rl.envs.three_state`), two steps long, both actions equally likely, gamma 0.95; angles are
+those between the expected update and the exact gradient. Discounting alone turns it by 1.4 degrees.
 """
 
 import torch

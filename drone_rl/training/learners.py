@@ -87,7 +87,7 @@ class GradientLearner:
     max_grad_norm: float | None = None
     """Clip the gradient to this norm; None for no clipping."""
 
-    def _next_rate(self) -> float:
+    def _step_scheduler(self) -> float:
         """Step the scheduler; return the learning rate of the next update."""
         if self.scheduler is not None:
             self.scheduler.step()
@@ -159,7 +159,7 @@ class ReinforceLearner(GradientLearner):
             self.optimizer.zero_grad()
             raise
         losses = {f"loss/{name}": value for name, value in {**terms, "grad_norm": norm}.items()}
-        return {**losses, "train/learning_rate": self._next_rate()}
+        return {**losses, "train/learning_rate": self._step_scheduler()}
 
 
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
@@ -210,7 +210,7 @@ class ActorCriticLearner(GradientLearner):
             self.optimizer.zero_grad()
             raise
         means = {f"loss/{k}": sum(m[k] for m in metrics) / len(metrics) for k in metrics[0]}
-        return {**means, "loss/entropy": entropy, "train/learning_rate": self._next_rate()}
+        return {**means, "loss/entropy": entropy, "train/learning_rate": self._step_scheduler()}
 
     @torch.no_grad()
     def estimate(self, batch: TensorDictBase) -> TensorDictBase:

@@ -1,4 +1,4 @@
-"""State of a training run: batches, progress, metrics, signals, callbacks."""
+"""What surrounds a loop of training: batches, stop rules, counts, metrics, signals, callbacks."""
 
 import contextlib
 import dataclasses

@@ -55,8 +55,9 @@ class Places:
         window = self.places.window
         if not (window.nearest < ahead < window.farthest and abs(left) < window.sideways):
             raise InputError(
-                f"ahead={ahead}, left={left} is outside of the map; give {window.nearest:g} to "
-                f"{window.farthest:g} metres ahead and up to {window.sideways:g} to either side"
+                f"ahead={ahead}, left={left} is outside of the map; give more than "
+                f"{window.nearest:g} and less than {window.farthest:g} metres ahead, and less than "
+                f"{window.sideways:g} to either side"
             )
         return SHOWN_MOVES.names[self.places.at(np.array([[ahead, left]]))[0]]
 

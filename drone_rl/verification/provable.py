@@ -255,11 +255,11 @@ def _search(journal: Journal, progress: Progress) -> None:
     """Search for failures in episodes, then by a proof, and record them."""
     how = journal.how
     policy = load_policy(last_of(journal.folder))
-    progress(f"{how.flights} flights in search of failures", 0, how.flights)
+    progress(f"{how.flights} episodes in search of failures", 0, how.flights)
     places, flights = np.empty((0, journal.task.num_cubes)), 0
     if how.flights:
         places, flights = _fly(policy, journal)
-    progress(f"{len(places)} of {flights} flights failed", how.flights, how.flights)
+    progress(f"{len(places)} of {flights} episodes failed", how.flights, how.flights)
     proof, boxes = None, np.repeat(places[..., None], 2, -1)
     if not len(places):
         proof = prove(

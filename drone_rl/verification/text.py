@@ -15,7 +15,10 @@ exact_percent = functools.partial(percent, digits=2)
 
 
 def rows(places: Evidence, names: Sequence[str]) -> list[list[str]]:
-    """Return "places" of an explanation, or `places.json`, as a table by side, with a header."""
+    """Return a map of actions by positions as rows of a table, one for each side, the header first.
+
+    `places` is "places" of an explanation, or `places.json`.
+    """
     head = ["one cube", "share of places", *names, "not seen", "blind"]
     every = {**{n: places[n] for n in ("actions", "unseen", "blind")}, "share": 1.0}
     by_side = {WHERE[s]: of for s, of in places["sides"].items()} | {"anywhere": every}
@@ -84,7 +87,7 @@ def _say_closeness(places: Evidence) -> Claims:
 
 
 def describe_proof(certificate: Mapping[str, Any]) -> str:
-    """Summarise a certificate, see `proof_files`, in one sentence that claims no more."""
+    """Summarize a certificate, see `proof_files`, in a sentence that claims only what it proves."""
     task = certificate["policy"]["description"]["task"]
     cubes = all_cubes(task["num_cubes"])
     outcomes, undecided = certificate["outcomes"], certificate["undecided"]
@@ -114,7 +117,7 @@ def why_stopped(setting: str | None) -> str:
 
 def describe_round(search: Mapping[str, Any]) -> str:
     """Describe the search for failures of one round, see `drone_rl.verification.provable.Round`."""
-    text = f"at frame {search['frames']:,}: {search['failures']} of {search['flights']:,} flights"
+    text = f"at frame {search['frames']:,}: {search['failures']} of {search['flights']:,} episodes"
     if search["losing"] is None:
         return f"{text} failed"
     losing, undecided = exact(search["losing"]), exact(search["undecided"])

@@ -63,6 +63,15 @@ def test_the_settings_of_a_network_are_those_of_its_signature(registered):
             settings(**wrong)
 
 
+@pytest.mark.parametrize("hint", [Literal[1, 2], tuple[int, str], tuple[()], dict])
+def test_types_that_are_no_settings_are_refused(hint):
+    def build(in_shape, num_actions, *, size=1, generator=None): ...
+
+    build.__annotations__["size"] = hint
+    with pytest.raises(InputError, match="the parameter size is of type"):
+        register_network("odd")(build)
+
+
 def test_a_network_is_selected_by_name_and_described_by_name_and_values(registered):
     registered(register_network("wide")(Wide))
     training = TrainSettings(network="wide")

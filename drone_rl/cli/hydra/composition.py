@@ -60,7 +60,10 @@ GROUPS: dict[str, type[Settings]] = {
 }
 """Groups whose files start from the schema `base_<group>`."""
 _CHANGED = (DynamicsSettings,)
-"""Groups of which commands accept changes; the schema of their files extends that of changes."""
+"""Settings that commands also accept in part, as in `dynamics.mass=2`.
+
+Hydra merges a file of the group into such a part, so the file's schema extends that of the part.
+"""
 PARTS: dict[str, type[Variant]] = {
     "network": Network,
     "returns": Returns,
@@ -130,10 +133,10 @@ def import_plugins(overrides: Sequence[str]) -> None:
         try:
             importlib.import_module(name)
         except ModuleNotFoundError as error:
-            raise InputError(
-                f"plugins={name} can't be imported ({error}); give a module in this folder or on "
-                "PYTHONPATH"
-            ) from error
+            is_own = f"{name}.".startswith(f"{error.name}.")  # or its package
+            remedy = "give a module in this folder or on PYTHONPATH"
+            remedy = remedy if is_own else f"install {error.name}"
+            raise InputError(f"plugins={name} can't be imported ({error}); {remedy}") from error
 
 
 def schema_of(cls: type[Settings], further: Sequence[tuple[str, Any, Any]] = ()) -> type:
@@ -185,7 +188,7 @@ def _simple(hint: Any) -> Any:
 _MULTIRUN_WORDS = re.compile(r"^[-+~]|^hydra(?!\.run\.)|^sweep|^experiment")
 """Words on a command line that may start many runs, or select a group that does."""
 _MULTIRUN_TEXT = re.compile(r"mode:|sweep: (?!null)")
-"""Text that does so in a file."""
+"""Text of a command's YAML file that may start many runs."""
 _save_config = hydra_utils._save_config
 
 

@@ -146,7 +146,7 @@ def read_comments(path: Path) -> dict[str, str]:
 
 
 def _with_parents(path: Path) -> Iterator[Path]:
-    """The files of its defaults list, recursively, and the file."""
+    """Yield the files in a file's defaults list, recursively, then the file itself."""
     if not path.is_file():
         return
     for entry in (yaml.safe_load(path.read_text()) or {}).get("defaults", ()):

@@ -91,7 +91,7 @@ class SweepLauncher(Launcher):
             path.write_bytes(content)
 
     def _finish(self, sweep: Sweep, runs: Sequence[Run]) -> int:
-        """Return the number of failed runs."""
+        """Run the unfinished runs and write the report; return the number of failed ones."""
         from drone_rl.sweeps.report import write_sweep_report  # slow to import
 
         failed = 0
@@ -212,7 +212,7 @@ def _sigterm_as_interrupt() -> Iterator[None]:
 
 
 class OptunaSweeper(Sweeper):
-    """Maximise the final running mean of rewards, see conf/hydra/sweeper/optuna.yaml."""
+    """Maximize the final running mean of rewards, see conf/hydra/sweeper/optuna.yaml."""
 
     config: DictConfig
     hydra_context: HydraContext
@@ -299,16 +299,29 @@ def check_params(params: Mapping[str, Any], space: Mapping[str, Any]) -> None:
 
 
 def distribution(override: Override) -> Any:
-    """Return Optuna's distribution of a range in Hydra's grammar."""
+    """Return Optuna's distribution of a range in Hydra's grammar.
+
+    Raises:
+        InputError: It is no range that can be searched.
+    """
     d = import_optuna().distributions
     value = override.value()
     if isinstance(value, ChoiceSweep):
         return d.CategoricalDistribution([str(v) for v in override.sweep_string_iterator()])
-    if isinstance(value, RangeSweep):
-        start, step = int(value.start or 0), int(value.step)
-        last = start + (int(value.stop or 0) - 1 - start) // step * step
-        return d.IntDistribution(start, last, step=step)
-    if not isinstance(value, IntervalSweep):
-        raise InputError(f"{override.input_line} can't be searched; give a choice or a range")
-    low, high = cast(float, value.start), cast(float, value.end)  # Hydra's parser wants both
-    return d.FloatDistribution(float(low), float(high), log="log" in value.tags)
+    try:
+        if isinstance(value, RangeSweep):
+            numbers = [int(value.start or 0), int(value.stop or 0), int(value.step)]
+            start, stop, step = numbers
+            if numbers == [value.start or 0, value.stop or 0, value.step] and step > 0:
+                return d.IntDistribution(
+                    start, start + (stop - 1 - start) // step * step, step=step
+                )
+        elif isinstance(value, IntervalSweep):
+            low, high = cast(float, value.start), cast(float, value.end)  # Hydra wants both
+            return d.FloatDistribution(float(low), float(high), log="log" in value.tags)
+    except ValueError:  # from Optuna, for an empty or a negative logarithmic range
+        pass
+    raise InputError(
+        f"{override.input_line} can't be searched; give a choice, interval(LOW,HIGH), or an "
+        "ascending range of whole numbers"
+    )

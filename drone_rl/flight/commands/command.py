@@ -23,7 +23,7 @@ LANDING_SPEED = 0.2
 _STOPPED = 0.05
 """Vertical speed up to which a landing drone counts as standing, m/s."""
 _STOPPED_PERIODS = 10
-"""Control periods without sinking after which a landing is complete."""
+"""A landing is complete after more control periods without sinking."""
 _STILL = 0.01
 """Yaw rate up to which a drone does not turn, radians per second."""
 
@@ -33,7 +33,7 @@ class PilotError(InputError):
 
 
 class Command(abc.ABC):
-    """A command for a batch of drones that starts at once. An instance is used once."""
+    """A command that a batch of drones starts at the same time. An instance is used once."""
 
     limit: float = math.inf
     """Seconds after which the command ends."""
@@ -45,7 +45,10 @@ class Command(abc.ABC):
         """Return the goals for the next control period."""
 
     def is_complete(self, body: FlightState) -> Tensor:
-        """Return which drones have completed the command. Shape: (num_envs,), bool."""
+        """Return which drones have completed the command. Shape: (num_envs,), bool.
+
+        Called once in each control period, so that a command may count periods.
+        """
         return torch.zeros(len(body), dtype=torch.bool)
 
     def rest(self, body: FlightState) -> Tensor | None:
@@ -65,7 +68,10 @@ def goals_of(
     heading: float | Tensor,
     z: float | Tensor,
 ) -> Goals:
-    """Build goals from scalars (for all drones) or tensors of shape (num_envs,)."""
+    """Build goals from scalars (for all drones) or tensors of shape (num_envs,).
+
+    A value is what its mode says: a position, velocity, angle or rate.
+    """
     given, count = (x, y, heading, z), len(body)
     if count == 1 and body.numbers.device.type == "cpu":
         return Goals(modes, torch.tensor([[float(value) for value in given]], dtype=torch.float64))
@@ -176,7 +182,7 @@ class Land(Command):
         return goals_of(body, modes, x, y, heading, -LANDING_SPEED)
 
     def is_complete(self, body: FlightState) -> Tensor:
-        """Count periods without sinking; must be called once per period."""
+        """Count periods without sinking; see `Command`."""
         is_still = body.velocity[:, 2].abs() <= _STOPPED
         self._stopped = torch.where(is_still, self._stopped + 1, 0)
         return self._stopped > _STOPPED_PERIODS

@@ -31,6 +31,22 @@ def test_distributions(text, expected):
     assert distribution(override) == expected
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "optimizer.lr=range(0.001,0.01,0.001)",
+        "seed=range(1.5,4)",
+        "seed=range(5,1,-1)",
+        "seed=range(3,3)",
+        "optimizer.lr=tag(log,interval(0,1))",
+    ],
+)
+def test_ranges_that_cannot_be_searched_are_refused(text):
+    (override,) = OverridesParser.create().parse_overrides([text])
+    with pytest.raises(InputError, match="can't be searched; give a choice, interval"):
+        distribution(override)
+
+
 def test_numbers_below_one_are_refused():
     settings = {"seed": 0, "prune": True, "startup_trials": 1, "report_frames": 1, "params": {}}
     with pytest.raises(InputError, match="num_trials=0"):
