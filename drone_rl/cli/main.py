@@ -50,15 +50,15 @@ def main() -> None:
         sys.stdout.flush()
     except BrokenPipeError:
         status = OUTPUT_CLOSED
-        _let_output_go()
+        _discard_output()
     except OSError as error:
         status = USER_ERROR
         print(f"error: standard output can't be written ({error.strerror})", file=sys.stderr)
-        _let_output_go()
+        _discard_output()
     sys.exit(status)
 
 
-def _let_output_go() -> None:
+def _discard_output() -> None:
     """Discard buffered output, which the interpreter would write at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

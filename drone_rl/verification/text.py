@@ -46,7 +46,7 @@ def say_places(evidence: Evidence) -> Claims:
             blind.append(f"{exact_percent(of['blind'])} of those {WHERE[side]}")
     claims["places.does"] = (
         f"With one cube {window['nearest']:g} to {window['farthest']:g} m ahead of its camera and "
-        f"up to {window['sideways']:g} m to either side, exactly and over all places, it goes "
+        f"up to {window['sideways']:g} m to either side (exact, over all places), it goes "
         f"{listed(parts)}."
     )
     if places["unseen"] > 0:

@@ -98,7 +98,7 @@ def _bare(command: Command, words: Sequence[str], position: int) -> InputError:
         ours = command.instead(word, "" if "=" in after[0] else after[0])
         return InputError(f"{word} has no =; type {ours or 'NAME=VALUE'}")
     named = [g for g in _CHOICES if g in command.groups and word in choices(command.conf, g)]
-    main = _MAIN if not word.endswith(".json") else sorted(_MAIN)  # certificate comes first
+    main = ("certificate", *_MAIN) if word.endswith(".json") else _MAIN
     named += [key for key in main if key in command.keys]
     if named:
         return InputError(f"{word} has no name before it; type {named[0]}={word}")
