@@ -22,15 +22,18 @@ COSTS = (
 """Figures for which lower is better."""
 RATES = ("collector_fps", "collector_fps_16", "learning_fps", "learning_fps_large")
 """Figures for which higher is better."""
+Pair = tuple[Mapping[str, float], Mapping[str, float]]
+"""Figures of the earlier and of the later revision."""
 _ROOT = Path(__file__).resolve().parents[1]
 
 
 def bench_revisions(
     folder: Path, quick: bool, *, before: str = BEFORE, root: Path = _ROOT
 ) -> dict[str, Any]:
-    """Run the benchmarks of both revisions alternately and compare the medians.
+    """Run each benchmark of both revisions, one after the other, and compare the pairs.
 
-    Each revision runs its own benchmarks in separate processes.
+    Each revision runs its own benchmarks in separate processes. The two measurements of a pair
+    are minutes apart, because the speed of a shared machine changes within an hour.
 
     Args:
         folder: Folder of the earlier tree and all results.
@@ -39,8 +42,8 @@ def bench_revisions(
         root: Checkout of the later revision.
 
     Returns:
-        "ratio_before_after": cost ratio of each figure: seconds and memory after / before, frames
-        per second before / after; "revisions": the medians of both revisions.
+        "ratio_before_after": cost ratio of each figure, see `compare`; "revisions": the figures
+        of each pair.
 
     Raises:
         InputError: The earlier revision does not exist.
@@ -48,15 +51,15 @@ def bench_revisions(
     """
     folder = folder.resolve()  # each revision runs in its own tree
     trees = {"before": extract(before, folder / "before", root), "after": root}
-    names = NAMES[:1] if quick else NAMES
-    found: dict[str, list[Mapping[str, float]]] = {name: [] for name in trees}
+    pairs: list[Pair] = []
     for i in range(1 if quick else 3):
-        for name, tree in trees.items():
-            found[name].append(measure(tree, names, folder / f"{name}_{i}", quick))
-    medians = {name: _medians(figures) for name, figures in found.items()}
+        for name in NAMES[:1] if quick else NAMES:
+            of = {tree: folder / f"{name}_{tree}_{i}" for tree in trees}
+            both = {tree: measure(trees[tree], name, of[tree], quick) for tree in trees}
+            pairs.append((both["before"], both["after"]))
     return {
-        "ratio_before_after": compare(medians["before"], medians["after"]),
-        "revisions": {"before": before, **{f"{k}_figures": v for k, v in medians.items()}},
+        "ratio_before_after": compare(pairs),
+        "revisions": {"before": before, "pairs": [list(pair) for pair in pairs]},
     }
 
 
@@ -80,23 +83,23 @@ def extract(revision: str, target: Path, root: Path = _ROOT) -> Path:
     return target
 
 
-def measure(tree: Path, names: Sequence[str], folder: Path, quick: bool) -> dict[str, float]:
-    """Run benchmarks of a tree in a separate process; return the compared figures."""
-    only = f"only=[{','.join(names)}]"
-    places = (f"folder={folder}", f"hydra.run.dir={folder}/log")
-    call("bench", only, f"quick={quick}".lower(), *places, tree=tree)
+def measure(tree: Path, name: str, folder: Path, quick: bool) -> dict[str, float]:
+    """Run a benchmark of a tree in a separate process; return the compared figures."""
+    places = (f"only=[{name}]", f"folder={folder}", f"hydra.run.dir={folder}/log")
+    call("bench", f"quick={quick}".lower(), *places, tree=tree)
     figures = read_json(folder / ("quick" if quick else "") / "results.json", 2**24)
     return {key: figures[key] for key in (*COSTS, *RATES) if figures.get(key) is not None}
 
 
-def compare(before: Mapping[str, float], after: Mapping[str, float]) -> dict[str, float]:
-    """Return the cost ratio of each figure, after over before; 1.1 is ten percent worse."""
-    both = before.keys() & after.keys()
-    return {
-        **{key: after[key] / before[key] for key in COSTS if key in both},
-        **{key: before[key] / after[key] for key in RATES if key in both},
-    }
+def compare(pairs: Sequence[Pair]) -> dict[str, float]:
+    """Return the cost ratio of each figure, the median of all pairs that have it.
 
-
-def _medians(figures: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    return {key: statistics.median(each[key] for each in figures) for key in figures[0]}
+    It is after over before for a cost and before over after for a rate; 1.1 is ten percent worse.
+    """
+    ratios: dict[str, list[float]] = {}
+    for before, after in pairs:
+        for key in before.keys() & after.keys():
+            ratio = after[key] / before[key]
+            ratios.setdefault(key, []).append(ratio if key in COSTS else 1 / ratio)
+    known = (key for key in (*COSTS, *RATES) if key in ratios)
+    return {key: statistics.median(ratios[key]) for key in known}

@@ -39,8 +39,10 @@ def checkout(tmp_path):
 def test_both_revisions_are_measured(checkout, tmp_path, monkeypatch, quick):
     monkeypatch.chdir(tmp_path)
     found = revisions.bench_revisions(Path("out"), quick, before="HEAD~1", root=checkout)
-    assert found["ratio_before_after"] == {"explain_s": 1.2, "collector_fps": 1.25}
-    assert found["revisions"]["before_figures"] == {"explain_s": 10.0, "collector_fps": 100.0}
+    assert found["ratio_before_after"] == pytest.approx({"explain_s": 1.2, "collector_fps": 1.25})
+    pairs = found["revisions"]["pairs"]
+    assert pairs[0][0] == {"explain_s": 10.0, "collector_fps": 100.0}
+    assert len(pairs) == (1 if quick else 3 * len(revisions.NAMES))
     json.dumps(found)
 
 
@@ -52,10 +54,20 @@ def test_an_unknown_revision_is_an_error(checkout, tmp_path):
 def test_a_failed_benchmark_is_an_error(checkout, tmp_path):
     (checkout / "drone_rl" / "cli" / "main.py").write_text("raise SystemExit('out of memory')")
     with pytest.raises(RuntimeError, match="out of memory"):
-        revisions.measure(checkout, ["solve"], tmp_path / "out", quick=False)
+        revisions.measure(checkout, "solve", tmp_path / "out", quick=False)
 
 
 def test_a_figure_that_only_one_revision_has_is_left_out():
-    assert revisions.compare({"explain_s": 1.0}, {"explain_s": 2.0, "verdict_s": 3.0}) == {
-        "explain_s": 2.0
-    }
+    pair = ({"explain_s": 1.0}, {"explain_s": 2.0, "verdict_s": 3.0})
+    assert revisions.compare([pair]) == {"explain_s": 2.0}
+
+
+def test_a_ratio_is_the_median_of_those_of_pairs():
+    """The machine's speed halves and doubles again; 22 / 20 is the median."""
+    pairs = [
+        ({"explain_s": 10.0}, {"explain_s": 12.0}),
+        ({"explain_s": 20.0}, {"explain_s": 22.0}),
+        ({"memory": 1.0}, {"memory": 2.0}),
+        ({"explain_s": 10.0}, {"explain_s": 10.5}),
+    ]
+    assert revisions.compare(pairs) == pytest.approx({"explain_s": 1.1})
