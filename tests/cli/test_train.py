@@ -296,7 +296,7 @@ def test_rounds_of_practice_by_the_command_line(tmp_path):
     rounds = ["provable.rounds=1", "provable.frames=100", "provable.flights=8"]
     done = drone_rl("train", *TINY, *rounds, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert re.search("[1-8] of 8 flights failed", done.stdout), done.stdout
+    assert re.search("[1-8] of 8 episodes failed", done.stdout), done.stdout
     noted = json.loads((tmp_path / "run" / "provable.json").read_text())
     assert noted["how"]["frames"] == 100 and len(noted["rounds"]) == 1  # the frames are spent
     longer = ["trainer.total_frames=2000", "provable.rounds=2"]

@@ -74,4 +74,9 @@ def test_more_workers_than_cores_raise(workers, cores, monkeypatch):
     message = rf"num_threads={workers} workers .*more than the cluster's 2 cores"
     with pytest.raises(InputError, match=message):
         build(Ray(num_envs=6, num_threads=workers, num_cpus=cores))
+    assert ends == []  # the cluster is the caller's
+    monkeypatch.setattr(ray, "is_initialized", lambda: False)
+    monkeypatch.setattr(ray, "init", lambda **settings: None)
+    with pytest.raises(InputError, match=message):
+        build(Ray(num_envs=6, num_threads=workers, num_cpus=cores))
     assert ends == [ray]

@@ -62,7 +62,9 @@ def test_areas_fill_the_window(done):
 def test_what_is_done_about_one_place(done):
     assert done.at(10.0, 0.1) in ("forward", "left", "right")
     for place in ((1.0, 0.0), (10.0, 8.1), (21.0, 0.0)):
-        with pytest.raises(InputError, match=r"outside .* give 2.5 to 20 metres"):
+        with pytest.raises(
+            InputError, match=r"outside .* give more than 2.5 and less than 20 metres"
+        ):
             done.at(*place)
 
 

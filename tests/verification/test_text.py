@@ -12,8 +12,8 @@ def speak(**changes):
 
 def test_what_it_does_by_side():
     assert speak()["places.does"] == (
-        "With one cube 2.5 to 20 m ahead of its camera and up to 8 m to either side, exactly and "
-        "over all places, it goes left for 25.00% of those on its left, forward for 100% of those "
+        "With one cube 2.5 to 20 m ahead of its camera and up to 8 m to either side (exact, over "
+        "all places), it goes left for 25.00% of those on its left, forward for 100% of those "
         "straight ahead and right for 50.00% of those on its right."
     )
 

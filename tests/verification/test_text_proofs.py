@@ -67,9 +67,9 @@ def test_nearly_all_is_never_all_and_all_is():
 
 def test_what_a_training_found():
     search = {"frames": 20_000, "failures": 3, "flights": 4000, "losing": None}
-    assert describe_round(search) == "at frame 20,000: 3 of 4,000 flights failed"
+    assert describe_round(search) == "at frame 20,000: 3 of 4,000 episodes failed"
     proof = {"losing": 0.25, "undecided": 1e-7, "proof_s": 61.6}
     assert describe_round(search | proof) == (
-        "at frame 20,000: 3 of 4,000 flights failed; proof in 62 s: fails from 25% of all "
+        "at frame 20,000: 3 of 4,000 episodes failed; proof in 62 s: fails from 25% of all "
         "placements, 1e-05% undecided"
     )
