@@ -61,7 +61,7 @@ def bench_original(folder: Path, picture: Path, quick: bool) -> dict[str, Any]:
         runs[name] = train_seeds(folder / name, settings, seeds)
     curves = {
         name: [
-            (run["verdict"], read_curve(folder / name / str(seed)))
+            (run, read_curve(folder / name / str(seed)))
             for seed, run in zip(seeds, runs[name], strict=True)
         ]
         for name in runs
@@ -102,7 +102,9 @@ def train_seeds(folder: Path, settings: Sequence[str], seeds: Sequence[int]) -> 
         verdict = read_json(run / "verdict" / "verdict.json")
         outcome = {
             "solved": result["reason"] == "solved",
-            **{"episodes": result["episodes"], "frames": result["frames"], "seconds": seconds},
+            "episodes": result["episodes"],
+            "frames": result["frames"],
+            "seconds": seconds,
             "verdict": f"{verdict['kind']}{'' if verdict['certain'] else ' (not certain)'}",
         }
         write_atomically(run / "outcome.json", json.dumps(outcome))
@@ -128,7 +130,7 @@ def plot(
     """Plot the running reward over episodes: a panel for each training, a line for each seed.
 
     Args:
-        curves: By training, the verdict and the learning curve for each seed.
+        curves: By training, the outcome and the learning curve for each seed.
         path: Path of the image.
     """
     from matplotlib.figure import Figure
@@ -142,14 +144,14 @@ def plot(
             axes.set_axis_off()
             continue
         of_seeds = curves[name]
-        solved = sum(curve[-1][1] >= TARGET for _, curve in of_seeds)
+        solved = sum(run["solved"] for run, _ in of_seeds)
         count = f"reached {TARGET}: {solved} of {len(of_seeds)} seeds"
         if name == DEFAULT:
             count = "drone-rl train; stops at 2.97"
         axes.set_title(f"{name.replace('_', ' ')}\n{count}", fontsize=9, loc="left")
         axes.axhline(TARGET, color=css(FAINT), linewidth=0.8)
-        for verdict, curve in of_seeds:
-            kind = next(kind for kind in _COLORS if verdict.startswith(kind))
+        for run, curve in of_seeds:
+            kind = next(kind for kind in _COLORS if run["verdict"].startswith(kind))
             episodes, rewards = zip(*curve, strict=True)
             axes.plot(episodes, rewards, color=css(_COLORS[kind]), linewidth=1.2)
             axes.plot(episodes[-1], rewards[-1], "o", color=css(_COLORS[kind]), markersize=4)

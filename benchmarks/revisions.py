@@ -99,7 +99,7 @@ def compare(pairs: Sequence[Pair]) -> dict[str, float]:
     ratios: dict[str, list[float]] = {}
     for before, after in pairs:
         for key in before.keys() & after.keys():
-            ratio = after[key] / before[key]
-            ratios.setdefault(key, []).append(ratio if key in COSTS else 1 / ratio)
+            low, high = (before, after) if key in COSTS else (after, before)
+            ratios.setdefault(key, []).append(high[key] / low[key])
     known = (key for key in (*COSTS, *RATES) if key in ratios)
     return {key: statistics.median(ratios[key]) for key in known}

@@ -29,6 +29,17 @@ def test_an_element_is_shown_by_a_command_or_test_that_exists(tmp_path, cells, s
     assert chapter.count_elements(page, tmp_path) == (1, shown)
 
 
+def test_all_figures_are_returned(tmp_path, monkeypatch):
+    monkeypatch.setattr(chapter, "minutes", lambda folder, episodes: 7.0)
+    monkeypatch.setattr(chapter, "speedup", lambda folder, times, root: 4.0)
+    monkeypatch.setattr(chapter, "count_conventions", lambda root: 33)
+    monkeypatch.setattr(chapter, "memory", lambda folder, quick, root: {"lstm_success": 0.9})
+    found = chapter.bench_chapter(tmp_path, False)
+    assert found["lstm_success"] == 0.9
+    assert (found["original_minutes"], found["original_speedup"]) == (7.0, 4.0)
+    assert found["convention_cases"] == 33
+
+
 def test_minutes_are_scaled_to_all_episodes(tmp_path, monkeypatch):
     monkeypatch.setattr(chapter, "train", lambda run, *settings: (6.0, {}))
     assert chapter.minutes(tmp_path, 3000) == pytest.approx(1.0)

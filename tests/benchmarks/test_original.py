@@ -38,6 +38,10 @@ def test_the_best_training_solves_most_seeds_and_is_not_the_default(tmp_path, mo
     assert (tmp_path / "original.png").stat().st_size > 10_000
 
 
+def test_quick_trainings_are_short():
+    assert "trainer.total_episodes=20" in original.trainings(True)["constant 0.0001"]
+
+
 def test_the_schedule_has_ended_where_trainings_with_it_stop():
     """0.99 ** 1000 = 4.3e-5."""
     assert pytest.approx(4.317e-5, rel=1e-3) == 0.99 ** (original.FROZEN / 5)

@@ -94,6 +94,7 @@ def test_an_exported_file_has_names_and_values_only(folder):
 def test_mistakes_are_one_line(folder):
     (folder / "needs_more.py").write_text("import not_installed.part")
     for given, told in (
+        (["plugins=[nowhere]"], "plugins=nowhere can't be imported"),
         (["plugins=[nowhere]"], "give a module in this folder or on PYTHONPATH"),
         (["plugins=[needs_more]"], "install not_installed"),
         (["plugins=[my_parts]", "network=cells", "network.row=3"], "network.row"),

@@ -134,8 +134,8 @@ def import_plugins(overrides: Sequence[str]) -> None:
             importlib.import_module(name)
         except ModuleNotFoundError as error:
             is_own = f"{name}.".startswith(f"{error.name}.")  # or its package
-            remedy = "give a module in this folder or on PYTHONPATH"
-            remedy = remedy if is_own else f"install {error.name}"
+            place = "give a module in this folder or on PYTHONPATH"
+            remedy = place if is_own else f"install {error.name}"
             raise InputError(f"plugins={name} can't be imported ({error}); {remedy}") from error
 
 
