@@ -124,9 +124,7 @@ def read_curve(run: Path) -> Curve:
     return [rows[i] for i in sorted(chosen)]
 
 
-def plot(
-    curves: Mapping[str, Sequence[tuple[str, Sequence[tuple[int, float]]]]], path: Path
-) -> None:
+def plot(curves: Mapping[str, Sequence[tuple[Mapping[str, Any], Curve]]], path: Path) -> None:
     """Plot the running reward over episodes: a panel for each training, a line for each seed.
 
     Args:
