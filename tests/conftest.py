@@ -26,6 +26,15 @@ def one_thread():
     torch.set_num_threads(1)
 
 
+@pytest.fixture(autouse=True)
+def exploration_stays():
+    """Fail a test that leaves another exploration type, which is global, to the next ones."""
+    from torchrl.envs.utils import exploration_type
+
+    yield
+    assert exploration_type() is None
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _no_fork_server_is_left():
     yield

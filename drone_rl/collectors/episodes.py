@@ -10,7 +10,7 @@ from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.collectors import Collector
 from torchrl.envs import Compose, EnvBase, TransformedEnv
-from torchrl.envs.utils import ExplorationType, exploration_type, set_exploration_type
+from torchrl.envs.utils import exploration_type
 
 from drone_rl.collectors.batched_collector import BatchedCollector, take_rows
 from drone_rl.collectors.speedups import Acceleration, accelerated_collector
@@ -141,7 +141,8 @@ class SteppingCollector:
     def collect(self, num_envs: int) -> TensorDictBase:
         """Run an episode in each of the first environments; traj_ids are 0 to num_envs - 1."""
         self._env.num_envs = num_envs
-        self._actor.exploration = exploration_type()
+        # as outside, since TorchRL's collector sets what is global, perhaps in several threads
+        self._collector.exploration_type = exploration_type()
         self._collector.reset_at_each_iter = True
         rollouts = []
         while self._collector.reset_at_each_iter or bool(self._env.active.any()):
@@ -200,8 +201,6 @@ class _ActiveOnly(TensorDictModuleBase):
     def __init__(self, actor: Any, env: _OneEpisode) -> None:
         super().__init__()
         self.in_keys, self.out_keys = actor.in_keys, actor.out_keys
-        self.exploration: ExplorationType | None = None
-        """How actions are chosen."""
         self.keys: set[NestedKey] = set()
         """Entries that the actor reads and writes."""
         self._actor = [actor]  # in a list: its parameters are not this module's
@@ -215,8 +214,7 @@ class _ActiveOnly(TensorDictModuleBase):
         if not len(rows):
             return tensordict.update(self._blank)
         observed = tensordict.select(*self.in_keys)
-        with set_exploration_type(self.exploration):
-            acted = self._actor[0](take_rows(observed, rows))
+        acted = self._actor[0](take_rows(observed, rows))
         self.keys = set(acted.keys(True, True))
         for key in self.keys - set(observed.keys(True, True)):
             value = acted.get(key)

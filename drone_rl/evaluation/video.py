@@ -161,11 +161,11 @@ def run_episode(
     None.
     """
     state = env.reset()
-    with set_exploration_type(exploration(greedy)):
-        while not bool(state["done"].all()):
+    while not bool(state["done"].all()):
+        with set_exploration_type(exploration(greedy)):  # not while the caller has the state
             acted = actor(state.clone(False))
-            yield state, acted
-            state = env.step(acted)["next"]
+        yield state, acted
+        state = env.step(acted)["next"]
     yield state, None
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import torch
 from tensordict import TensorDictBase
-from tensordict.nn import InteractionType, TensorDictModule, dispatch
+from tensordict.nn import InteractionType, TensorDictModule, TensorDictModuleBase, dispatch
 from torch import Tensor, nn
 from torch.distributions import Categorical, Distribution
 from torch.distributions.constraints import Constraint
@@ -204,3 +204,18 @@ def make_actor(
         distribution_class=kind,
         distribution_kwargs={"source": None if generator is None else RandomSource(generator)},
     )
+
+
+def choose_action(
+    actor: TensorDictModuleBase, tensordict: TensorDictBase, *, greedy: bool
+) -> TensorDictBase:
+    """Write what an actor of `make_actor` writes, whatever the exploration type is.
+
+    `set_exploration_type` changes all threads of the process; this may run in any of them.
+    """
+    parts: Any = actor.module  # torch's modules are annotated to hold anything
+    network, head = parts
+    acted = network(tensordict)
+    distribution = head.get_dist(acted)
+    action = distribution.deterministic_sample if greedy else distribution.sample()
+    return acted.set(head.out_keys[0], action)

@@ -4,6 +4,7 @@ import gc
 
 import pytest
 import torch
+from tensordict.nn import probabilistic
 from torchrl.collectors import Collector
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
@@ -68,6 +69,17 @@ def test_outer_exploration_type_is_respected():
     assert torch.equal(batch["action"], batch["logits"].argmax(-1))
     batch = collector.collect(5)
     assert not torch.equal(batch["action"], batch["logits"].argmax(-1))
+
+
+def test_no_other_exploration_type_is_set_for_other_threads(monkeypatch):
+    collector, _ = make()
+    with set_exploration_type(ExplorationType.DETERMINISTIC):
+        kinds, set_mode = set(), probabilistic._interaction_type.set_mode
+        monkeypatch.setattr(
+            probabilistic._interaction_type, "set_mode", lambda k: (kinds.add(k), set_mode(k))
+        )
+        collector.collect(5)
+        assert kinds == {ExplorationType.DETERMINISTIC}
 
 
 def test_observations_are_omitted_and_extra_entries_kept():

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 import torch
 from tensordict import TensorDict
+from torchrl.envs.utils import exploration_type
 
 from drone_rl.config import (
     ActionSettings,
@@ -51,6 +52,12 @@ def test_film_and_files(make_pipeline, tmp_path):
     files = write_video(frames, tmp_path / "sub" / "episode")
     assert [f.suffix for f in files] == [".mp4", ".gif"]
     assert all(f.stat().st_size > 1000 for f in files)
+
+
+def test_a_suspended_film_leaves_the_exploration_type_as_it_was(make_pipeline):
+    film = film_episode(*make_pipeline(1, task=TaskSettings(num_cubes=1)))
+    next(film)
+    assert exploration_type() is None
 
 
 def test_a_film_shows_the_world_as_it_was_drawn(make_pipeline):

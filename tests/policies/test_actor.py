@@ -10,7 +10,13 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from torchrl.modules import ProbabilisticActor
 
 from drone_rl.policies import make_actor
-from drone_rl.policies.actor import RandomSource, SeededCategorical, SquashedNormal, distribution_of
+from drone_rl.policies.actor import (
+    RandomSource,
+    SeededCategorical,
+    SquashedNormal,
+    choose_action,
+    distribution_of,
+)
 
 
 class Fixed(nn.Module):
@@ -61,6 +67,18 @@ def test_samples_use_only_the_own_generator():
     assert torch.equal(torch.get_rng_state(), before)
     assert torch.equal(first, act(build(1)))
     assert not torch.equal(first, act(build(2)))
+
+
+@pytest.mark.parametrize("outer", [None, *ExplorationType])
+def test_an_action_can_be_chosen_whatever_the_exploration_type_is(outer):
+    pixels = TensorDict({"pixels": torch.zeros(500, 1)}, [500])
+    expected = build(3)(pixels.clone())
+    with set_exploration_type(outer):
+        drawn = choose_action(build(3), pixels.clone(), greedy=False)
+        greedy = choose_action(build(3), pixels.clone(), greedy=True)
+    assert set(drawn.keys()) == set(expected.keys())
+    assert all(torch.equal(drawn[key], expected[key]) for key in expected.keys())
+    assert (greedy["action"] == 1).all()
 
 
 def test_copies_share_the_random_stream():

@@ -9,13 +9,12 @@ from typing import Any, NamedTuple, cast
 import torch
 from tensordict import TensorDict
 from torch import Tensor
-from torchrl.envs.utils import set_exploration_type
 
 from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.rollouts import exploration
 from drone_rl.evaluation.video import render_chase
 from drone_rl.explanations.scenes import Scenes
+from drone_rl.policies.actor import choose_action
 from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, ComputerVision, FlightState, Quadrotor
@@ -73,7 +72,7 @@ class World:
         names = (str(name) for name in self._actor.in_keys if name != "pixels")
         self._forgotten: Mapping[str, Tensor] = {name: entries[name] for name in names}
         """Memory of the actor at the start of an episode, by name."""
-        self._exploration = exploration(greedy)
+        self._greedy = greedy
         self._film: deque[Tensor] = deque(maxlen=self.scenes.memory)
         self._every = torch.arange(1)
         self.light = 1.0
@@ -166,8 +165,8 @@ class World:
             state = self.worlds.state
             frame = self.worlds.render(state, appearance=self._look())
             observation = self.scenes.transform(frame, [*self._film])
-            with set_exploration_type(self._exploration):
-                acted = self._actor(TensorDict({"pixels": observation, **self._memory}, [1]))
+            observed = TensorDict({"pixels": observation, **self._memory}, [1])
+            acted = choose_action(self._actor, observed, greedy=self._greedy)
             shares = self.actions.probabilities(acted["logits"])[0]
             after: Any = acted.get("next", {})
             memory = {name: after.get(name, start) for name, start in self._forgotten.items()}
