@@ -106,6 +106,15 @@ def test_a_slow_reader_delays_itself_alone(start):
     slow.close()
 
 
+def test_a_slow_writer_delays_itself_alone(start):
+    server, client = start(CV)
+    with socket.create_connection(server.address, timeout=10) as slow:
+        for byte in PING:
+            slow.sendall(bytes([byte]))
+            assert client.call("ping") is True
+        assert slow.recv(100) == PONG
+
+
 def test_a_second_request_comes_at_once(start):
     """Without `TCP_QUICKACK` the client's system would hold it back for some 40 ms."""
     _, client = start(patience_s=0.1)

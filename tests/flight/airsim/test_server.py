@@ -1,11 +1,12 @@
 """Time, calls that wait, and several clients."""
 
+import contextlib
 import time
 
 import msgpack
 import pytest
 
-from tests.flight.airsim.conftest import CV, YAW, Client
+from tests.flight.airsim.conftest import CV, SMALL, YAW, Client, request
 
 
 def test_a_movement_is_answered_when_it_ends(start):
@@ -65,14 +66,37 @@ def test_a_cancelled_movement_is_answered_false(start):
     assert client.receive(first) == (None, False)
 
 
-def test_clients_do_not_disturb_each_other(start):
-    server, client = start(CV)
-    others = [Client(server.address[1]) for _ in range(20)]
-    for i, other in enumerate(others):
-        assert other.call("ping") is True
+def test_a_hundred_clients_get_their_own_answers(start):
+    """Half of them die with requests unanswered."""
+    server, _ = start(SMALL)
+    clients = [Client(server.address[1]) for _ in range(100)]
+    calls = []
+    for i, client in enumerate(clients):
+        images = client.send("simGetImages", [request()], "")
+        calls.append((images, client.send("getMultirotorState", f"Drone{i}")))
         if i % 2:
-            other.close()
-    assert client.call("ping") is True
-    assert all(other.call("ping") for other in others[::2])
-    for other in others:
-        other.close()
+            client.close()
+    for i, (images, state) in [*enumerate(calls)][::2]:
+        error, found = clients[i].receive(images)
+        assert error is None and len(found[0]["image_data_uint8"]) == 16 * 8 * 3
+        assert f"Vehicle API for 'Drone{i}' is not available" in clients[i].receive(state)[0]
+        clients[i].close()
+
+
+def test_one_client_too_many_is_refused(start, monkeypatch):
+    monkeypatch.setattr("drone_rl.flight.airsim.server.MAX_CLIENTS", 2)
+    server, first = start(CV)
+    second, third = Client(server.address[1]), Client(server.address[1])
+    assert first.call("ping") is second.call("ping") is True
+    with pytest.raises(ConnectionError):
+        third.call("ping")
+    second.close()
+    while not _is_served(server.address[1]):  # until the server notices
+        time.sleep(0.01)
+    third.close()
+
+
+def _is_served(port):
+    with contextlib.closing(Client(port)) as client, contextlib.suppress(ConnectionError):
+        return client.call("ping")
+    return False
