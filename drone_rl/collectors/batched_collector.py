@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from torchrl.collectors import BaseCollector
 from torchrl.envs import EnvBase
 
+from drone_rl.envs import base_env
 from drone_rl.utils.errors import InputError
 
 
@@ -58,7 +59,7 @@ class BatchedCollector(BaseCollector):
     @property
     def base_env(self) -> Any:
         """The environment without its transforms."""
-        return getattr(self.env, "base_env", self.env)
+        return base_env(self.env)
 
     @abc.abstractmethod
     def collect(self) -> TensorDictBase:

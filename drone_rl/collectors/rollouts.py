@@ -12,6 +12,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.collectors.batched_collector import BatchedCollector
 from drone_rl.collectors.speedups import accelerated_stepper
+from drone_rl.envs import base_env
 from drone_rl.envs.direct_renderer import Entries, Reasons
 from drone_rl.utils.errors import InputError
 
@@ -123,10 +124,6 @@ class TorchrlStepper:
         self._dropped = {*env.done_keys, *({env.reward_key, "info"} - read)}
         self._state: TensorDictBase | None = None
 
-    @property
-    def _base_env(self) -> Any:
-        return getattr(self._env, "base_env", self._env)
-
     def observe(self) -> TensorDictBase:
         """Return the observations; the first call starts all environments. Shape: (num_envs,)."""
         return self._begin().select(*self._observed)
@@ -166,9 +163,9 @@ class TorchrlStepper:
     def state_dict(self) -> dict[str, Any]:
         """Return the state of the episodes under way, without observations."""
         carried = self._begin().exclude(*self._observed)
-        is_transformed = self._env is not self._base_env
+        is_transformed = self._env is not base_env(self._env)
         return {
-            "worlds": self._base_env.running_state(),
+            "worlds": base_env(self._env).running_state(),
             "transforms": dict(self._env.state_dict()) if is_transformed else {},
             "carried": carried.to_dict(),
         }
@@ -176,8 +173,8 @@ class TorchrlStepper:
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Resume within the episodes of a `state_dict`; observations are rendered again."""
         self._begin()  # transforms allocate their memory at a reset
-        self._base_env.load_running_state(state["worlds"])
-        if self._env is not self._base_env:
+        base_env(self._env).load_running_state(state["worlds"])
+        if self._env is not base_env(self._env):
             self._env.load_state_dict(state["transforms"])
         nowhere = torch.zeros(*self._env.batch_size, 1, dtype=torch.bool, device=self._env.device)
         rendered = self._env._reset(TensorDict({"_reset": nowhere}, self._env.batch_size))

@@ -8,6 +8,7 @@ from drone_rl.envs.camera_faults import LateFrames as LateFrames
 from drone_rl.envs.camera_faults import Noise as Noise
 from drone_rl.envs.camera_faults import Shift as Shift
 from drone_rl.envs.drone_env import DroneEnv as DroneEnv
+from drone_rl.envs.drone_env import base_env as base_env
 from drone_rl.envs.drone_env import worlds_of as worlds_of
 from drone_rl.envs.transforms import ChromaticityPixels as ChromaticityPixels
 from drone_rl.envs.transforms import CropRows as CropRows

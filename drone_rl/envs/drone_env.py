@@ -229,10 +229,14 @@ class DroneEnv(EnvBase):
 _DONE_KEYS = ("done", "terminated", "truncated")
 
 
+def base_env(env: EnvBase) -> Any:
+    """Return the environment below all transforms."""
+    return getattr(env, "base_env", env)
+
+
 def worlds_of(env: EnvBase) -> Worlds:
     """Return the worlds of an environment, with or without transforms."""
-    base: Any = getattr(env, "base_env", env)
-    return base.worlds
+    return base_env(env).worlds
 
 
 def _action_spec(entry: Entry, num_envs: int) -> TensorSpec:

@@ -152,11 +152,6 @@ def find_failures(
     return np.concatenate(found), episodes
 
 
-def base_env(env: EnvBase) -> Any:
-    """Return the environment below all transforms."""
-    return getattr(env, "base_env", env)
-
-
 def first_difference(one: Tensor, other: Tensor) -> int | None:
     """Return the first step at which two sequences of actions differ, or None."""
     shared = min(len(one), len(other))

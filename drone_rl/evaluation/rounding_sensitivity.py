@@ -10,7 +10,7 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
 
-from drone_rl.envs import worlds_of
+from drone_rl.envs import base_env, worlds_of
 from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.outcomes import (
@@ -22,7 +22,6 @@ from drone_rl.evaluation.outcomes import (
 )
 from drone_rl.evaluation.rollouts import (
     StepLog,
-    base_env,
     episode_batches,
     final_episodes,
     first_difference,

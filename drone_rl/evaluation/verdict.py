@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
-from drone_rl.envs import worlds_of
+from drone_rl.envs import base_env, worlds_of
 from drone_rl.evaluation.baselines import run_baselines
 from drone_rl.evaluation.metrics import Episodes, failure_table, summarise
 from drone_rl.evaluation.outcomes import OutcomeSet, Rounding
-from drone_rl.evaluation.rollouts import StepLog, base_env, run_episodes
+from drone_rl.evaluation.rollouts import StepLog, run_episodes
 from drone_rl.evaluation.rounding_sensitivity import check_rounding
 from drone_rl.evaluation.rule import Kind, Quantity, Rule, decide, kinds_within
 from drone_rl.evaluation.verdict_text import SENTENCES, is_proved

@@ -6,9 +6,9 @@ import pytest
 import torch
 
 import drone_rl
+from drone_rl.envs import base_env
 from drone_rl.evaluation.rollouts import (
     StepLog,
-    base_env,
     episode_batches,
     final_episodes,
     first_difference,
