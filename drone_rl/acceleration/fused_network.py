@@ -59,7 +59,7 @@ class ActivationCache:
     def add(self, rows: Tensor, weights: Tensor, observations: Tensor) -> Tensor:
         """Return the handles of activations, (k,); all are -1 if the memory does not suffice.
 
-        `rows`, (k,), index `outputs`; `weights` are the packed weights of the activations.
+        `rows`, (k,), index `outputs`; `weights` are the packed weights that gave them.
         """
         self._weights = weights
         if int(rows.max()) >= len(self.outputs):

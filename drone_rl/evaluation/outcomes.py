@@ -56,7 +56,7 @@ class Rounding:
     differing: int
     """Episodes in which it took other actions."""
     unexplained: int
-    """Differing episodes without a fragile frame before the first difference."""
+    """Differing episodes without a fragile frame up to the first difference."""
 
     @property
     def is_excessive(self) -> bool:

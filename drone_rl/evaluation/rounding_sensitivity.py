@@ -37,7 +37,6 @@ from drone_rl.policies.rounding import (
     REMEDY,
     Decide,
     Regrouped,
-    RoundingBound,
     arithmetic_on,
     decider,
     require_same_in_any_batch,
@@ -105,28 +104,31 @@ def check_rounding(
     network = getattr(actor, "network", None)
     if not isinstance(network, ImageNetwork):
         return None
+    return _check_rounding(env, network, episodes, greedy, log)[0]
+
+
+def _check_rounding(
+    env: EnvBase, network: ImageNetwork, episodes: int, greedy: Episodes, log: StepLog
+) -> tuple[Rounding, "_Checked"]:
     decide, is_bound = decider(network)
     arithmetic, is_exact = arithmetic_on(worlds_of(env).device)
     episodes, before = min(episodes, len(greedy)), base_env(env).state_dict()
     checked, again = _run_checked(env, decide, network, episodes)
-    # implementations of flight dynamics round differently, so frames are not the same
-    is_counted = isinstance(network.actions, DiscreteActions) and isinstance(
-        worlds_of(env).dynamics, ComputerVision
-    )
+    by_action = _by_action(env, network)
     compared, count, ends = "PyTorch", episodes, checked.episodes
     if log.implementation == "PyTorch":
         base_env(env).load_state_dict(before)
         compared, count = "PyTorch, in other batches", min(COMPARED, episodes)
         again, ends = _run_regrouped(env, network, count)
-    first = _first_differences(greedy, ends, log.actions, again, count, is_counted=is_counted)
+    first = _first_differences(greedy, ends, log.actions, again, count, by_action=by_action)
     differing = {i: step for i, step in enumerate(first) if step is not None}
     unexplained = [i for i, step in differing.items() if not checked.explains(i, step)]
-    if not RoundingBound.find(network):
+    if not is_bound:
         base_env(env).load_state_dict(before)
         _require_function_of_frames(env, network, log, checked)
-    return Rounding(
+    found = Rounding(
         arithmetic=f"{arithmetic}, {log.implementation}",
-        is_bound=is_bound and is_counted and is_exact,
+        is_bound=is_bound and by_action and is_exact,
         frames=sum(map(len, checked.fragile)),
         fragile=int(sum(f.sum() for f in checked.fragile)),
         is_fragile=checked.is_fragile,
@@ -136,6 +138,7 @@ def check_rounding(
         differing=len(differing),
         unexplained=len(unexplained),
     )
+    return found, checked
 
 
 def compare_implementations(
@@ -145,24 +148,33 @@ def compare_implementations(
 
     Arguments, result and errors are those of `check_rounding`; `greedy` was run in PyTorch.
     """
-    state, count = base_env(env).state_dict(), min(COMPARED, len(greedy))
-    found = check_rounding(env, actor, count, greedy=greedy, log=log)
-    if found is None:
+    network = getattr(actor, "network", None)
+    if not isinstance(network, ImageNetwork):
         return None
+    state, count = base_env(env).state_dict(), min(COMPARED, len(greedy))
+    found, checked = _check_rounding(env, network, count, greedy, log)
     base_env(env).load_state_dict(state)
-    again, is_counted = StepLog(), isinstance(worlds_of(env).dynamics, ComputerVision)
+    again, by_action = StepLog(), _by_action(env, network)
     ends = run_episodes(env, actor, count, is_compiled=True, is_exact=True, log=again)
     if again.implementation == log.implementation:
         return found
-    first = _first_differences(
-        greedy, ends, log.actions, again.actions, count, is_counted=is_counted
-    )
-    differing = [i for i, at in enumerate(first) if at is not None]
+    first = _first_differences(greedy, ends, log.actions, again.actions, count, by_action=by_action)
+    differing = {i: step for i, step in enumerate(first) if step is not None}
     return dataclasses.replace(
         found,
         compared=again.implementation,
         differing=len(differing),
-        unexplained=sum(not found.is_fragile[i] for i in differing),
+        unexplained=sum(not checked.explains(i, step) for i, step in differing.items()),
+    )
+
+
+def _by_action(env: EnvBase, network: ImageNetwork) -> bool:
+    """Return whether episodes are compared by action, not only by outcome.
+
+    Implementations of flight dynamics round differently, so frames are not the same.
+    """
+    return isinstance(network.actions, DiscreteActions) and isinstance(
+        worlds_of(env).dynamics, ComputerVision
     )
 
 
@@ -173,10 +185,10 @@ def _first_differences(
     again: Sequence[Tensor],
     count: int,
     *,
-    is_counted: bool,
+    by_action: bool,
 ) -> list[int | None]:
-    """By episode the first step at which actions differ, or the last one where outcomes do."""
-    if is_counted:
+    """By episode the first step with another action, or its length if its outcome differs."""
+    if by_action:
         pairs = zip(actions[:count], again[:count], strict=True)
         return [first_difference(one, other) for one, other in pairs]
     return [outcome_difference(greedy, ends, i) for i in range(count)]
@@ -186,7 +198,7 @@ class _CheckingActor(TensorDictModuleBase):
     """Act greedily, and write whether rounding could change the action."""
 
     def __init__(self, decide: Decide, network: ImageNetwork, *, is_contrary: bool = False) -> None:
-        """Take a network; `is_contrary` takes its second best action where that is possible."""
+        """Take a network; `is_contrary`: take the second best action where two are possible."""
         super().__init__()
         self.in_keys, self.out_keys = ["pixels"], ["action", "fragile"]
         self._decide, self._network, self._is_contrary = decide, network, is_contrary
@@ -245,7 +257,7 @@ def _run_checked(
 ) -> tuple[_Checked, list[Tensor]]:
     """Run episodes and check each frame. Returns also the actions of each episode."""
     renderer = DirectRenderer.try_create(env, ("pixels",), ())
-    is_counted = isinstance(network.actions, DiscreteActions)
+    is_discrete = isinstance(network.actions, DiscreteActions)
     fragile, followed, log, finals, first = [], [], StepLog(), [], 0
     before, actor = base_env(env).state_dict(), _CheckingActor(decide, network)
     for batch in episode_batches(env, actor, episodes, ("fragile",), log=log):
@@ -253,7 +265,7 @@ def _run_checked(
         fragile += cast(Tensor, batch["fragile"]).cpu().split(lengths)
         finals.append(final_episodes(env, batch))
         worlds = torch.tensor([bool(f.any()) for f in fragile[first:]]).nonzero()[:, 0]
-        if is_counted and len(worlds):
+        if is_discrete and len(worlds):
             if len(worlds) > MAX_FRAGILE_EPISODES * len(lengths):
                 found = OutcomeSet(None, worlds[:0], torch.ones_like(worlds, dtype=torch.bool))
             elif not isinstance(renderer, Reasons):
@@ -264,7 +276,7 @@ def _run_checked(
             followed.append((first, found, worlds))
         first += len(lengths)
         before = base_env(env).state_dict()
-    followed = followed if is_counted else None
+    followed = followed if is_discrete else None
     return _Checked(Episodes.joined(finals), fragile, followed), log.actions
 
 

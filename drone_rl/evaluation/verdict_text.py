@@ -24,12 +24,12 @@ def is_quoted(evidence: Evidence) -> bool:
 
 
 def is_stated(evidence: Evidence) -> bool:
-    """Return whether it states success from every placement."""
+    """Return whether the certificate states success from every placement."""
     return is_quoted(evidence) and evidence["proof"]["every"]
 
 
 def is_proved(evidence: Evidence) -> bool:
-    """Return whether it does, and enough rollouts from fresh placements re-checked it."""
+    """Return whether it does, and enough rollouts re-checked it."""
     bound = evidence["proof"].get("wrong_at_most") if is_stated(evidence) else None
     return bound is not None and bound <= MAX_WRONG
 
@@ -50,7 +50,7 @@ def _fraction(evidence: Evidence) -> str:
 
 def _basis(evidence: Evidence) -> str:
     agreeing = evidence["proof"]["agreeing"]
-    own = f" All {agreeing:,} greedy episodes of this verdict whose end it states ended so."
+    own = f" All {agreeing:,} greedy episodes of this verdict whose end it states ended that way."
     return (
         "The certificate is of this network and task, and its boxes are a partition of the "
         f"placements. {_checked(evidence['proof'])}{own if agreeing else ''}"
@@ -130,7 +130,7 @@ def _sides(evidence: Evidence) -> dict[str, str]:
 
 
 def _lost_side(evidence: Evidence) -> str:
-    """Goals on the side that a one-sided policy has lost; nothing of another one."""
+    """Goals on the side that a one-sided policy has lost, else empty."""
     lost = {"one-sided (left)": "right", "one-sided (right)": "left"}.get(evidence["kind"])
     terms = terms_of(evidence)
     return f"{terms.goals} {terms.side(lost)}" if lost else ""
@@ -305,7 +305,7 @@ def quantity_label(name: str, evidence: Evidence) -> str:
 
 
 def unlike(evidence: Evidence) -> str:
-    """Return how dynamics and appearance differ from those that a policy was trained with."""
+    """Return how dynamics and appearance (dotted names) differ from those of training."""
     parts = [
         f"{name if '.' in name else f'dynamics.{name}'}={_said(of['flown'])} instead of "
         f"{_said(of['own'])}"

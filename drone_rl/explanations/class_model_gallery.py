@@ -145,7 +145,7 @@ def class_models(
 
     Args:
         policy: The policy, what `load_policy` takes, or a callable, see `policy_from`.
-        settings: Of the gradient ascent; with `gallery` one row for each refinement.
+        settings: Of the gradient ascent; `gallery` replaces them by each refinement.
         task: Changes to the policy's task.
         outputs: See `load_policy`.
         changes: Changes to the settings, as in `class_models("good", maximize="probability")`.

@@ -155,7 +155,7 @@ def _fly(
         seen, worlds = env.reset(), worlds_of(env)
         actor(seen.clone())  # once before the firmware waits for it
         dynamics.begin(worlds.state.body)
-        left, path = drone.time, [drone.body.position[0].tolist()]
+        start, path = drone.time, [drone.body.position[0].tolist()]
         while True:
             after = env.step(actor(seen))
             path.append(drone.body.position[0].tolist())
@@ -172,7 +172,7 @@ def _fly(
             success=bool(reached.all()),
             end=worlds.task.ends(int(ended.end_reason[0])).name.lower(),
             steps=steps,
-            simulated_s=drone.time - left,
+            simulated_s=drone.time - start,
             wall_s=time.monotonic() - began,
             missed=drone.controller.missed if isinstance(drone.controller, Betaflight) else 0,
             path=tuple(map(tuple, path)),

@@ -67,7 +67,7 @@ def _check_journal(path: Path) -> None:
 
 
 def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> list[Any]:
-    """Return the unfinished trials of an interrupted search, or else `count` new ones.
+    """Return the trials from the first to the last unfinished one, or else `count` new ones.
 
     They are `optuna.trial.FrozenTrial`s with consecutive numbers, in a space of Optuna's
     distributions by name. Each batch has its own seed, derived from the root seed, so that a

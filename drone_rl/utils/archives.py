@@ -66,7 +66,7 @@ def read_arrays(
 ) -> dict[str, NDArray]:
     """Return the arrays of numbers and texts in an .npz file.
 
-    `most` is the largest size of all arrays together, in bytes, and also limits the file itself;
+    `most` is the largest size of all arrays together, in bytes, and of a file over 256 MiB;
     `allowance`, shared with further files, replaces it for the arrays.
 
     Raises:

@@ -125,7 +125,7 @@ def median_bounds(values: ArrayLike, confidence: float = 0.95) -> tuple[float, f
     from scipy.special import bdtr  # see `proportion`
 
     ordered = np.sort(np.asarray(values, np.float64).ravel())
-    below = bdtr(np.arange(len(ordered) + 1), len(ordered), 0.5)  # as many lie below the median
+    below = bdtr(np.arange(len(ordered) + 1), len(ordered), 0.5)  # P(at most so many lie below it)
     rank = int(np.searchsorted(below, (1.0 - confidence) / 2)) if len(ordered) else 0
     if rank < 1:
         return None

@@ -43,7 +43,7 @@ def num_cores() -> int:
 
 
 def machine() -> dict[str, str | int | None]:
-    """Return processor and system."""
+    """Return the system, the kind of processor and the number of cores."""
     names = {"system": platform.platform(), "processor": platform.machine()}
     return {**names, "cores": num_cores()}
 

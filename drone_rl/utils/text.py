@@ -28,6 +28,9 @@ def listed(parts: Sequence[str], last: str = "and") -> str:
     return f"{', '.join(parts[:-1])} {last} {parts[-1]}"
 
 
+_ENDINGS = {1: "st", 2: "nd", 3: "rd"}
+
+
 def plural(count: int, noun: str, several: str = "") -> str:
     """Return a count with its noun; `several` is the plural if it is not regular."""
     return f"{count} {noun}" if count == 1 else f"{count} {several or f'{noun}s'}"
@@ -35,7 +38,11 @@ def plural(count: int, noun: str, several: str = "") -> str:
 
 def ordinal(number: int) -> str:
     """Return the ordinal of an index from 0."""
-    return ORDINALS[number] if number < len(ORDINALS) else f"{number + 1}th"
+    if number < len(ORDINALS):
+        return ORDINALS[number]
+    place = number + 1
+    is_teen = place % 100 in (11, 12, 13)
+    return f"{place}{'th' if is_teen else _ENDINGS.get(place % 10, 'th')}"
 
 
 def all_cubes(count: int) -> str:
@@ -44,7 +51,7 @@ def all_cubes(count: int) -> str:
 
 
 def exact(share: float, is_all: bool = False) -> str:
-    """Return a rate in percent with nine digits; 100% only if it is exactly 1."""
+    """Return a rate in percent with nine digits; "100%" only with `is_all`."""
     text = f"{100 * share:.9g}%"
     return text if is_all or text != "100%" else "more than 99.9999999%"
 

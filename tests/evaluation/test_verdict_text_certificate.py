@@ -19,7 +19,7 @@ def test_every_placement():
         "of the placements. It was re-checked by 1,000 rollouts from fresh placements, seed 17: "
         "all ended as it states, so that with 95% confidence it is wrong about at most 0.31% of "
         "the placements (to prove it again, run drone-rl prove). All 1,000 greedy episodes of "
-        "this verdict whose end it states ended so.",
+        "this verdict whose end it states ended that way.",
     }
     assert "collects the cube from" in speak(1)["proof.every"]
 

@@ -34,6 +34,8 @@ def test_counts():
 
 def test_ordinals_go_on_beyond_their_names():
     assert [ordinal(i) for i in (0, 8, 9, 10)] == ["first", "ninth", "10th", "11th"]
+    assert [ordinal(i) for i in (20, 21, 22, 23)] == ["21st", "22nd", "23rd", "24th"]
+    assert [ordinal(i) for i in (110, 111, 112)] == ["111th", "112th", "113th"]
 
 
 def test_cubes():

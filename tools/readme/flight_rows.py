@@ -40,7 +40,8 @@ FLIGHT = (
     ),
     Row(
         "airsim",
-        "methods of the multirotor client 1.8.1 that work (not lidar); crafted messages survived; "
+        "methods of the multirotor client 1.8.1 that work, wholly or partly, of those that need no "
+        "lidar, distance sensor, car or Unreal; crafted messages survived; "
         "growth over an hour of simulated traffic, MiB; two runs in lockstep are the same",
         lambda f: (
             f"{percent(f['airsim_methods_share'])}; {f['airsim_fuzz_survived']:,}; "

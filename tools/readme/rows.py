@@ -430,7 +430,7 @@ MAIN = (
     ),
     Row(
         "original",
-        "`experiment=original`, best of six trainings: seeds of 5 that reach 2.99 of 3",
+        "`experiment=original`, best of six settings: seeds of 5 that reach 2.99 of 3",
         lambda f: f"{f['original_solved']} ({f['original_best'].replace('_', ' ')})",
         "4",
     ),

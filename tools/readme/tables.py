@@ -84,14 +84,15 @@ def _revision(origin: Origin) -> str:
 
 
 def _short(value: Any) -> str:
-    """Format a number, a string or a short list of them, or the size of a longer container."""
+    """Format a number, a short string or list of them, or the size of what is longer."""
     if isinstance(value, float):
         return f"{value:,.0f}" if abs(value) >= 1e4 else f"{value:.4g}"
     if isinstance(value, list) and len(value) <= 8 and not any(isinstance(v, dict) for v in value):
         return ", ".join(map(_short, value)) or "none"
     if isinstance(value, dict | list):
         return f"{len(value)} entries" if value else "none"
-    return str(value)
+    text = str(value)
+    return text if len(text) <= 100 else f"{len(text)} characters"
 
 
 def make_cell(row: Row, figures: Figures) -> str:

@@ -237,7 +237,7 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
 def _may_be_multirun(name: str, overrides: Sequence[str]) -> bool:
     """Return whether Hydra must determine its mode, which takes another composition of settings.
 
-    Otherwise the mode is a single run. Hydra rejects a file of a group that asks for a multirun.
+    Otherwise the mode is a single run. Hydra rejects a multirun mode in a group's file.
     """
     text = (conf_dir() / f"{name}.yaml").read_text()
     return any(map(_MULTIRUN_WORDS.search, overrides)) or bool(_MULTIRUN_TEXT.search(text))

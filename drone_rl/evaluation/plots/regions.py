@@ -15,13 +15,13 @@ from drone_rl.sim.vocabulary import ShownActions
 from drone_rl.utils.palette import FAINT, INK, MUTED, css
 
 _LINE = 'fill="none" class="line"'
-_CLOSEST = "smallest difference of two logits"
+_CLOSEST = "two highest logits closest"
 
 
 def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: ShownActions) -> Figure:
     """Draw the map as a chart.
 
-    `numbers` are "places" of an explanation; `arrays`: "points", "ends", "labels" of outlines.
+    `numbers` are "places" of an explanation; `arrays` are those of `ActionMap.outlines`.
     """
     window = numbers["window"]
     side, near, far = window["sideways"], window["nearest"], window["farthest"]
@@ -43,7 +43,7 @@ def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: Show
     axis.set_xlabel("metres to the left (+) or right (-)")
     axis.set_ylabel("metres ahead of the camera")
     axis.axhline(near, color=css(INK), lw=0.5)
-    note = f"not tested: closer than {near:g} m"
+    note = f"not covered: closer than {near:g} m"
     axis.text(0.97 * side, 0.5 * near, note, va="center", color=css(FAINT))
     axis.set_title("Action for one cube at each position")
     handles = [Patch(color=names.css(a), label=f"goes {names.names[a]}") for a in names.order]
@@ -82,7 +82,7 @@ def svg(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: ShownA
     box = (-left, -far - unit, left + side + unit, far + unit + below)
     parts = [
         f'<svg class="places" viewBox="{" ".join(f"{v:g}" for v in box)}" role="img" '
-        'aria-label="What it does about one cube at each place" font-family="sans-serif" '
+        'aria-label="Action for one cube at each position" font-family="sans-serif" '
         f'font-size="{unit:g}">',
         '<defs><pattern id="unseen" width=".3" height=".3" patternUnits="userSpaceOnUse" '
         'patternTransform="rotate(45)"><rect width=".1" height=".3" fill="#fff" '

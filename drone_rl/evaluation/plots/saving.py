@@ -67,8 +67,10 @@ def to_png(drawn: Image.Image | Figure) -> bytes:
     buffer = io.BytesIO()
     if isinstance(drawn, Figure):
         width, height = (_DPI * drawn.get_size_inches()).tolist()
-        if not width * height <= _MAX_PIXELS:
-            raise ValueError(f"a chart has {width:.0f} x {height:.0f} pixels")
+        if not width * height <= _MAX_PIXELS:  # nor if a size is NaN
+            raise ValueError(
+                f"a chart has {width:.0f} x {height:.0f} pixels; at most {_MAX_PIXELS} fit"
+            )
         drawn.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
     else:
         drawn.save(buffer, "png", optimize=True)

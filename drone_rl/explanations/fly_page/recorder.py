@@ -1,4 +1,4 @@
-"""Recorded flights: each step of the policy's actions, written as demonstrations."""
+"""Record the steps of a person or a policy, written as demonstrations."""
 
 from pathlib import Path
 

@@ -105,7 +105,7 @@ class LiveSaliency:
         self.method, self.state = method, "shown" if method else "none"
 
     def heat(self, seen: Seen) -> NDArray | None:
-        """Return the map of an observation and the most probable part of the actions.
+        """Return the map of an observation for the likeliest part of an action, see `Actions.part`.
 
         Shape: (h, w), that of the observation; None without a trusted method.
         """

@@ -1,4 +1,4 @@
-"""Report sections "evaluation" and "shifts" (the verdict, robustness), "dataset", and "flaws"."""
+"""Report sections: verdict, robustness, what is left out, rollouts, flaws."""
 
 from PIL import Image
 

@@ -1,4 +1,4 @@
-"""Report sections on one target: "response" and "places" (maps over its place), and "asymmetry"."""
+"""Report sections "response", "places" (maps over one target's place) and "asymmetry"."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -31,7 +31,7 @@ def say_response(evidence: Evidence) -> Claims:
     other = [row for row in rows if row["height"] != 0 and row["places"]]
     if any(row["places"] for row in level):
         claims["response.collected"] = (
-            f"With one {terms.target} alone and its most probable actions, the policy "
+            f"Taking its most probable actions with one {terms.target} alone, the policy "
             f"{terms.handles} from {_collected(level, terms)}."
         )
     if other:

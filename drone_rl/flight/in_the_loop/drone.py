@@ -112,7 +112,7 @@ class DroneInTheLoop:
                     return
             self.hold(AT_REST, 0.5)
         raise FlightControllerError(
-            f"the firmware refuses to arm: no rotor turned in {tries} attempts"
+            f"the firmware refuses to arm: not all rotors turned in {tries} attempts"
         )
 
     def disarm(self, seconds: float = 0.5) -> None:

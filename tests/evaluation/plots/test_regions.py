@@ -43,7 +43,7 @@ def test_the_chart_has_left_on_the_left():
     texts = [text.get_text() for text in axis.get_legend().get_texts()]
     assert texts[:4] == ["goes left", "goes forward", "goes right", "cube not seen"]
     near = NUMBERS["window"]["nearest"]
-    assert [text.get_text() for text in axis.texts] == [f"not tested: closer than {near:g} m"]
+    assert [text.get_text() for text in axis.texts] == [f"not covered: closer than {near:g} m"]
 
 
 def test_what_is_seen_everywhere_has_no_hatch_in_the_key():

@@ -40,7 +40,7 @@ def test_arming_waits_then_turns_the_switch():
 
 def test_a_firmware_that_never_arms():
     flown = drone(Direct(arms=False))
-    with pytest.raises(FlightControllerError, match="no rotor turned in 2 attempts"):
+    with pytest.raises(FlightControllerError, match="not all rotors turned in 2 attempts"):
         flown.arm(tries=2, settle=0.01, within=0.01)
 
 

@@ -47,7 +47,7 @@ def render_images(
     """
     for row in range(first, last):
         env = row // view.count
-        camera = row % view.cameras.shape[0]
+        camera = row % view.cameras.shape[0]  # of each environment, or of all
         render_image(view, camera, geoms, poses, env, materials, scratch, buffer, images, row)
 
 
@@ -103,7 +103,7 @@ def span_end(owners: wp.array[int], start: int, count: int) -> int:
 
 @wp.func
 def _find_plane(job: structs.Job, geom_view: structs.GeomView, geom: int) -> None:
-    """Only rows that end below its horizon; if both ends of a row hit, so does all between."""
+    """Skip rows above its horizon; if both ends of a row hit, so does all between."""
     rays, nearest, owner = job.rays, job.nearest, job.owner
     mark = geom * structs.FACES + UPPER
     width, far = job.view.width, job.view.far
