@@ -1,7 +1,7 @@
 """Check whether a policy's episodes depend on rounding, and whether implementations agree."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, cast
 
 import torch
@@ -101,10 +101,13 @@ def check_rounding(
     Raises:
         InputError: An output is not finite, or a third-party network depends on other frames.
     """
+    network = _network_of(actor)
+    return network and _check_rounding(env, network, episodes, greedy, log)[0]
+
+
+def _network_of(actor: TensorDictModuleBase) -> ImageNetwork | None:
     network = getattr(actor, "network", None)
-    if not isinstance(network, ImageNetwork):
-        return None
-    return _check_rounding(env, network, episodes, greedy, log)[0]
+    return network if isinstance(network, ImageNetwork) else None
 
 
 def _check_rounding(
@@ -120,9 +123,7 @@ def _check_rounding(
         base_env(env).load_state_dict(before)
         compared, count = "PyTorch, in other batches", min(COMPARED, episodes)
         again, ends = _run_regrouped(env, network, count)
-    first = _first_differences(greedy, ends, log.actions, again, count, by_action=by_action)
-    differing = {i: step for i, step in enumerate(first) if step is not None}
-    unexplained = [i for i, step in differing.items() if not checked.explains(i, step)]
+    differing = _differences(greedy, ends, log.actions, again, count, by_action=by_action)
     if not is_bound:
         base_env(env).load_state_dict(before)
         _require_function_of_frames(env, network, log, checked)
@@ -136,7 +137,7 @@ def _check_rounding(
         compared=compared,
         compared_episodes=count,
         differing=len(differing),
-        unexplained=len(unexplained),
+        unexplained=checked.unexplained(differing),
     )
     return found, checked
 
@@ -148,8 +149,8 @@ def compare_implementations(
 
     Arguments, result and errors are those of `check_rounding`; `greedy` was run in PyTorch.
     """
-    network = getattr(actor, "network", None)
-    if not isinstance(network, ImageNetwork):
+    network = _network_of(actor)
+    if network is None:
         return None
     state, count = base_env(env).state_dict(), min(COMPARED, len(greedy))
     found, checked = _check_rounding(env, network, count, greedy, log)
@@ -158,13 +159,12 @@ def compare_implementations(
     ends = run_episodes(env, actor, count, is_compiled=True, is_exact=True, log=again)
     if again.implementation == log.implementation:
         return found
-    first = _first_differences(greedy, ends, log.actions, again.actions, count, by_action=by_action)
-    differing = {i: step for i, step in enumerate(first) if step is not None}
+    differing = _differences(greedy, ends, log.actions, again.actions, count, by_action=by_action)
     return dataclasses.replace(
         found,
         compared=again.implementation,
         differing=len(differing),
-        unexplained=sum(not checked.explains(i, step) for i, step in differing.items()),
+        unexplained=checked.unexplained(differing),
     )
 
 
@@ -178,7 +178,7 @@ def _by_action(env: EnvBase, network: ImageNetwork) -> bool:
     )
 
 
-def _first_differences(
+def _differences(
     greedy: Episodes,
     ends: Episodes,
     actions: Sequence[Tensor],
@@ -186,12 +186,19 @@ def _first_differences(
     count: int,
     *,
     by_action: bool,
-) -> list[int | None]:
-    """By episode the first step with another action, or its length if its outcome differs."""
+) -> dict[int, int]:
+    """By differing episode the first other action's step, or the length if the outcome differs."""
     if by_action:
         pairs = zip(actions[:count], again[:count], strict=True)
-        return [first_difference(one, other) for one, other in pairs]
-    return [outcome_difference(greedy, ends, i) for i in range(count)]
+        steps = [first_difference(one, other) for one, other in pairs]
+    else:
+        steps = [outcome_difference(greedy, ends, i) for i in range(count)]
+    return _differing(steps)
+
+
+def _differing(steps: Iterable[int | None]) -> dict[int, int]:
+    """Return the steps at which episodes differ, by the index of those that do."""
+    return {i: step for i, step in enumerate(steps) if step is not None}
 
 
 class _CheckingActor(TensorDictModuleBase):
@@ -226,9 +233,9 @@ class _Checked:
     """By batch: its first episode, the outcomes of its fragile ones, and which these are. None if
     they cannot be enumerated."""
 
-    def explains(self, episode: int, step: int) -> bool:
-        """Whether a frame was fragile up to that step."""
-        return bool(self.fragile[episode][: step + 1].any())
+    def unexplained(self, differing: Mapping[int, int]) -> int:
+        """Count the episodes without a fragile frame up to the given step of each."""
+        return sum(not self.fragile[i][: step + 1].any() for i, step in differing.items())
 
     @property
     def is_fragile(self) -> Tensor:
@@ -323,12 +330,11 @@ def _require_function_of_frames(
         again, actor = StepLog(), make_actor(Regrouped(network, groups), env.action_spec)
         for batch in episode_batches(env, actor, count, ("pixels",), log=again):
             frames = cast(Tensor, batch["pixels"])
-        pairs = zip(log.actions, again.actions, strict=False)
-        first = enumerate(first_difference(a, b) for a, b in pairs)
-        other = [i for i, at in first if at is not None and not checked.explains(i, at)]
-        if isinstance(network.actions, DiscreteActions) and len(other) > MAX_UNEXPLAINED * count:
+        steps = map(first_difference, log.actions, again.actions)  # until one log ends
+        other = checked.unexplained(_differing(steps))
+        if isinstance(network.actions, DiscreteActions) and other > MAX_UNEXPLAINED * count:
             raise InputError(
                 f"{network.owner} depends on more than the frame: evaluated {how} it takes other "
-                f"actions in {len(other)} of {count} episodes; {REMEDY}"
+                f"actions in {other} of {count} episodes; {REMEDY}"
             )
     require_same_in_any_batch(network, frames, env.batch_size[0])

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
+_ENDINGS = {1: "st", 2: "nd", 3: "rd"}
 
 
 def bounds(interval: Mapping[str, Any], show: Callable[[float], str] = "{:.2f}".format) -> str:
@@ -26,9 +27,6 @@ def listed(parts: Sequence[str], last: str = "and") -> str:
     if len(parts) < 2:
         return "".join(parts)
     return f"{', '.join(parts[:-1])} {last} {parts[-1]}"
-
-
-_ENDINGS = {1: "st", 2: "nd", 3: "rd"}
 
 
 def plural(count: int, noun: str, several: str = "") -> str:

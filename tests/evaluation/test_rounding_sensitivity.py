@@ -107,6 +107,15 @@ def test_frames_are_tried_in_batches_of_many_sizes():
         require_same_in_any_batch(ExternalNetwork(logits, (1, 1, 3), MOVES), frames, 10)
 
 
+def test_a_fragile_frame_explains_no_earlier_difference(make_episodes):
+    ends = make_episodes([[0], [1], [0]], [[True], [True], [True]])
+    fragile = [torch.tensor(of) for of in ([False, True, False], [True, False], [False, False])]
+    checked = rounding_sensitivity._Checked(ends, fragile, None)
+    assert checked.unexplained({0: 0}) == checked.unexplained({2: 1}) == 1
+    assert checked.unexplained({0: 1}) == checked.unexplained({0: 2}) == 0
+    assert checked.unexplained({0: 0, 1: 1, 2: 0}) == 2
+
+
 def test_outcomes_of_several_batches_are_numbered_by_episode(make_episodes):
     ends = make_episodes([[0], [1]], [[True], [False]])
     found = OutcomeSet(ends, torch.tensor([1, 0]), torch.tensor([False, True]))

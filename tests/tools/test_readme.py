@@ -258,7 +258,7 @@ def test_every_figure_is_listed_with_its_origin(tmp_path):
     ledger = Ledger(tmp_path / "r.json")
     figures = {
         "tide_m": 2.0 / 3.0, "days": 3, "moons": [1.0, 0.5], "phases": {"new": 1, "full": 2},
-        "names": ["a"] * 9, "lost": [], "by_day": {},
+        "names": ["a"] * 9, "lost": [], "by_day": {}, "name": "s" * 100, "text": "s" * 101,
     }  # fmt: skip
     origin = Origin(
         revision=None, date="2026-11-22", machine="2 cores", code=None, settings={}, keys=()
@@ -267,7 +267,7 @@ def test_every_figure_is_listed_with_its_origin(tmp_path):
     assert [line.split(" | ")[:2] for line in list_figures(ledger).splitlines()[2:]] == [
         ["| `tide_m`", "0.6667"], ["| `days`", "3"], ["| `moons`", "1, 0.5"],
         ["| `phases`", "2 entries"], ["| `names`", "9 entries"], ["| `lost`", "none"],
-        ["| `by_day`", "none"],
+        ["| `by_day`", "none"], ["| `name`", "s" * 100], ["| `text`", "101 characters"],
     ]  # fmt: skip
     assert "| `days` | 3 | `sea` | unknown | 2026-11-22 |" in list_figures(ledger)
     assert list_origins(ledger, ["moon", "sea"]).splitlines()[2:] == [

@@ -68,7 +68,7 @@ def test_a_cancelled_movement_is_answered_false(start):
 
 def test_a_hundred_clients_get_their_own_answers(start):
     """Half of them die with requests unanswered."""
-    server, _ = start(SMALL)
+    server, first = start(SMALL)
     clients = [Client(server.address[1]) for _ in range(100)]
     calls = []
     for i, client in enumerate(clients):
@@ -80,7 +80,10 @@ def test_a_hundred_clients_get_their_own_answers(start):
         error, found = clients[i].receive(images)
         assert error is None and len(found[0]["image_data_uint8"]) == 16 * 8 * 3
         assert f"Vehicle API for 'Drone{i}' is not available" in clients[i].receive(state)[0]
-        clients[i].close()
+    assert first.call("ping") is True
+    assert all(client.call("ping") for client in clients[::2])
+    for client in clients:
+        client.close()
 
 
 def test_one_client_too_many_is_refused(start, monkeypatch):
