@@ -92,7 +92,9 @@ def check_choices(overrides: Sequence[str], conf: Path) -> None:
             continue
         offered = choices(conf, group)
         for name in re.split(r"[,\s'\"\[\]]+", value.strip("[] '\"")):
-            if name not in (*offered, "null"):
+            if name == "null":
+                raise InputError(f"{override}: leave it out, or give one of: {', '.join(offered)}")
+            if name not in offered:
                 near = difflib.get_close_matches(name, offered, 1)
                 meant = f"did you mean {group}={near[0]}? " if near else ""
                 raise InputError(
@@ -117,7 +119,8 @@ def closest(name: str, known: Sequence[str]) -> str | None:
     ):
         if meant:
             return meant
-    if near := difflib.get_close_matches(word, known, 1, 0.8):
+    others_than_group = [key for key in known if not word.startswith(f"{key}.")]
+    if near := difflib.get_close_matches(word, others_than_group, 1, 0.8):
         return near[0]
     by_last = {**{other: ours for other, ours in others.items() if ours}, **by_last}
     near = difflib.get_close_matches(last, by_last, 1, 0.75)
@@ -146,7 +149,17 @@ class Command:
         """Return the error about a name that this command doesn't have."""
         value = override.partition("=")[2]
         text = f"{override}: drone-rl {self.name} has no setting {name}; "
-        if ours := self.instead(name, value):
+        group = name.rpartition(".")[0]
+        if group in self.groups and self.config[group] is None:
+            offered = ", ".join(choices(self.conf, group))
+            return InputError(
+                f"{override}: {group} is null, which has no settings; type {group}=NAME {override} "
+                f"with one of the names {offered}"
+            )
+        longer = [key for key in self.keys if key.startswith(name)] if "." in name else []
+        if len(longer) > 1:
+            return InputError(f"{text}did you mean one of {', '.join(longer)}? ({self.list_all})")
+        if ours := f"{longer[0]}={value}" if longer else self.instead(name, value):
             return InputError(f"{text}did you mean {ours}? ({self.list_all})")
         prefix = f"{name.rpartition('.')[0]}."
         inside = [k.removeprefix(prefix) for k in self.keys if k.startswith(prefix)]

@@ -103,6 +103,10 @@ def test_whole_numbers_may_have_an_exponent(override, number):
         ("seed=1 device=cpu", "holds two settings"),
         ("seed.=1", "'seed.' is not a valid name; type seed=1"),
         ("network.hidden=(1,2)", "square brackets; type network.hidden=\\[1,2\\]"),
+        ("appearance.sun=1", "one of appearance.sun_elevation, .*, appearance.sun_color\\?"),
+        ("task.num=1", "did you mean task.num_cubes=1\\?"),
+        ("dynamics.w=1", "did you mean dynamics.wind=1\\?"),
+        ("appearance.suns=1", "did you mean appearance.sun_color=1"),
         ("resume=a=b", "need quotes; type \"resume='a=b'\""),
         ("device=cpu", "device=cpu: these settings can't be read; drone-rl train --help all"),
     ],
@@ -110,6 +114,11 @@ def test_whole_numbers_may_have_an_exponent(override, number):
 def test_what_is_wrong_and_what_to_type(override, message):
     found = said("objective=reinforce", override)
     assert re.search(message, found), found
+
+
+def test_a_group_without_a_choice_has_no_settings():
+    found = said("appearance.sun_elevation=9", command="evaluate")
+    assert "type appearance=NAME appearance.sun_elevation=9 with one of the names blocks," in found
 
 
 def test_lists_are_offered_where_they_are_accepted():

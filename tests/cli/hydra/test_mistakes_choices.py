@@ -18,6 +18,7 @@ from drone_rl.utils.errors import InputError
         ("logger=[csv,wandb]", "logger=wandb is unknown; give one of: csv, tensorboard"),
         ("sweep=nope", "sweep=nope is unknown; give one of: cubes, high_rate"),
         ("hydra/launcher=pbs", "hydra/launcher=pbs .*local, ray, slurm"),
+        ("dynamics=null", "^dynamics=null: leave it out, or give one of: computer_vision, "),
     ],
 )
 def test_schemas_and_unknown_choices_are_refused(override, message):
@@ -26,7 +27,7 @@ def test_schemas_and_unknown_choices_are_refused(override, message):
 
 
 def test_all_else_is_accepted():
-    plain = ["task=pillars", "network=mlp,small_cnn", "sweep=seeds", "sweep=null", "-m", "seed=1,2"]
+    plain = ["task=pillars", "network=mlp,small_cnn", "sweep=seeds", "-m", "seed=1,2"]
     check_choices(
         [*plain, "resume=base_x", "task.name=base_x", "--help", "=x", "../x=base_y", "/tmp=x"],
         conf_dir(),
