@@ -109,7 +109,7 @@ class FusedNetwork(ImageNetwork):
         super().__init__()
         self.network, self.in_shape, self.actions = network, network.in_shape, network.actions
         self._num_threads, self._cache = num_threads, cache
-        self._wrt: Wrt = wrt
+        self._differentiates: Wrt = wrt
         self.in_keys = ("pixels",) if cache is None else ("pixels", ACTIVATIONS)
         self._engine: _Engine | None = None
         load_kernels(gradients_kernel)
@@ -148,12 +148,12 @@ class FusedNetwork(ImageNetwork):
         """
         if self._engine is None:
             layers = packed_layers(self.network)
-            self._engine = _Engine(layers, self._num_threads, self._cache, self._wrt)
+            self._engine = _Engine(layers, self._num_threads, self._cache, self._differentiates)
         self.network.check(pixels)
         flat = pixels.reshape(-1, math.prod(self.in_shape))
         handles = None if activations is None else activations.reshape(-1)
-        learning = self._engine.parameters if self._wrt == "weights" else ()
-        logits = _Logits.apply(self._engine, flat, handles, *learning)
+        parameters = self._engine.parameters if self._differentiates == "weights" else ()
+        logits = _Logits.apply(self._engine, flat, handles, *parameters)
         return logits.reshape(*pixels.shape[:-3], -1)
 
 
@@ -171,7 +171,7 @@ class _Logits(torch.autograd.Function):
     def forward(
         ctx: Any, engine: "_Engine", pixels: Tensor, handles: Tensor | None, *parameters: Tensor
     ) -> Tensor:
-        ctx.engine, ctx.is_learning = engine, bool(parameters)
+        ctx.engine, ctx.has_parameters = engine, bool(parameters)
         ctx.pixels = pixels.detach()  # Warp reads .grad, about which torch warns
         ctx.saved = engine.compute(ctx.pixels, handles)
         return engine.logits(ctx.saved)
@@ -183,7 +183,7 @@ class _Logits(torch.autograd.Function):
             raise RuntimeError("a second backward pass is impossible: activations were released")
         saved, ctx.saved = ctx.saved, None
         gradients = ctx.engine.gradients(ctx.pixels, saved, grad_output)
-        return (None, None, None, *gradients) if ctx.is_learning else (None, *gradients, None)
+        return (None, None, None, *gradients) if ctx.has_parameters else (None, *gradients, None)
 
 
 class _Engine:
@@ -197,7 +197,7 @@ class _Engine:
         wrt: Wrt,
     ) -> None:
         load_kernels(gradients_kernel).result()
-        self._layers, self._cache, self._is_fixed = layers, cache, wrt == "pixels"
+        self._layers, self._cache, self._has_fixed_weights = layers, cache, wrt == "pixels"
         self._workers = WorkerPool(num_threads, num_threads)
         self._order = order = Order(layers)
         self._weights = torch.zeros(order.weight_offsets[-1])
@@ -228,7 +228,7 @@ class _Engine:
         for workspace, gradients in zip(self._workspaces, self._gradients, strict=True):
             for name, size in sizes.items():
                 setattr(workspace, name, wp.empty(size, dtype=float, device="cpu"))
-            workspace.gradients = wp.from_torch(gradients[: 0 if self._is_fixed else None])
+            workspace.gradients = wp.from_torch(gradients[: 0 if self._has_fixed_weights else None])
         self._spare: Tensor | None = None
         """Buffer to reuse for outputs; allocating one takes longer than evaluating a layer."""
         order.pack(self._weights, self._transposed)
@@ -240,7 +240,7 @@ class _Engine:
 
     def compute(self, pixels: Tensor, handles: Tensor | None) -> _Activations:
         """Return the outputs of all layers, from the cache if they are there."""
-        if not self._is_fixed:
+        if not self._has_fixed_weights:
             self._order.pack(self._weights, self._transposed)
         if self._cache is not None and handles is not None:
             rows = self._cache.find(handles, self._weights, pixels)
@@ -273,7 +273,7 @@ class _Engine:
         if self._cache is not None and saved.generation not in (None, self._cache.generation):
             raise RuntimeError("a batch was collected between the forward and the backward pass")
         self._gradients.zero_()
-        grad_pixels = torch.empty_like(pixels) if self._is_fixed else torch.empty(0, 0)
+        grad_pixels = torch.empty_like(pixels) if self._has_fixed_weights else torch.empty(0, 0)
         batch: Any = Batch()
         batch.frames, batch.outputs = wp.from_torch(pixels), wp.from_torch(saved.outputs)
         batch.rows, batch.grad_frames = wp.from_torch(saved.rows), wp.from_torch(grad_pixels)
@@ -286,7 +286,9 @@ class _Engine:
         self._workers.map_spans(0, len(pixels), run_span)
         if saved.generation is None:
             self._spare = saved.outputs
-        return [grad_pixels] if self._is_fixed else self._order.unpack(self._gradients.sum(0))
+        return (
+            [grad_pixels] if self._has_fixed_weights else self._order.unpack(self._gradients.sum(0))
+        )
 
 
 def _transposed(layer: PackedLayer) -> dict[str, int]:

@@ -51,8 +51,6 @@ COMPARED = 50
 """Episodes that are run again: by the other implementation, or in other batches."""
 ALONE = 16
 """Episodes that a third-party network runs again one frame at a time and in other batches."""
-_PAIR = 2
-"""Number of possible actions of the frames in which the second best one is tried."""
 
 
 def run_compared(
@@ -218,7 +216,8 @@ class _CheckingActor(TensorDictModuleBase):
         action = self._network.actions.greedy(found.outputs)
         if self._is_contrary:
             second = found.outputs.topk(2).indices[:, 1]
-            action = torch.where(found.possible.sum(-1) == _PAIR, second, action)
+            only_two = found.possible.sum(-1) == 2
+            action = torch.where(only_two, second, action)
         return tensordict.set("action", action)
 
 

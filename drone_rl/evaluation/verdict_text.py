@@ -276,7 +276,7 @@ def _never(evidence: Evidence) -> str:
     return f"It failed in none of {bound['trials']:,} episodes, so it fails in at most {upper}."
 
 
-def _drawing(evidence: Evidence) -> str:
+def _sampled_difference(evidence: Evidence) -> str:
     sampled, greedy = _success(evidence["sampled"]), _success(evidence["greedy"])
     return (
         f"That is for its most probable actions: with sampled actions it {_every(evidence)} in "
@@ -383,7 +383,7 @@ SENTENCES = (
         lambda e: (
             bool(e["drawing"]) and not e["drawing"]["lower95"] <= 0 <= e["drawing"]["upper95"]
         ),
-        _drawing,
+        _sampled_difference,
     ),
     Sentence(
         "unchecked",

@@ -33,13 +33,13 @@ def chart(numbers: Mapping[str, Any]) -> Figure:
     axes = numbers["axes"]
     rows = -(-(len(axes) + 1) // _COLUMNS)
     figure = Figure(figsize=(4.2 * _COLUMNS, 2.9 * rows), layout="constrained")
-    places = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
+    grid = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
     ranges = (numbers["domain"] or {}).get("ranges", {})
-    for place, (name, along) in zip(places, axes.items(), strict=False):
-        _curve(place, name, along, numbers["plain"], ranges.get(name))
-    for place in places[len(axes) :]:
-        place.axis("off")
-    _explain(places[len(axes)], places[: len(axes)])
+    for axis, (name, along) in zip(grid, axes.items(), strict=False):
+        _curve(axis, name, along, numbers["plain"], ranges.get(name))
+    for axis in grid[len(axes) :]:
+        axis.axis("off")
+    _add_legend(grid[len(axes)], grid[: len(axes)])
     return figure
 
 
@@ -47,24 +47,24 @@ def curves(numbers: Mapping[str, Any]) -> dict[str, Figure]:
     """Return a chart of one panel for each axis, by its label, and their legend; see `chart`."""
     ranges = (numbers["domain"] or {}).get("ranges", {})
     charts = {NAMES[name]: new_chart(height=2.9) for name in numbers["axes"]}
-    for (_, place), (name, along) in zip(charts.values(), numbers["axes"].items(), strict=True):
-        _curve(place, name, along, numbers["plain"], ranges.get(name))
-    figure, place = new_chart(height=2.9)
-    place.axis("off")
-    _explain(place, [panel for _, panel in charts.values()])
+    for (_, axis), (name, along) in zip(charts.values(), numbers["axes"].items(), strict=True):
+        _curve(axis, name, along, numbers["plain"], ranges.get(name))
+    figure, axis = new_chart(height=2.9)
+    axis.axis("off")
+    _add_legend(axis, [panel for _, panel in charts.values()])
     return {**{name: chart for name, (chart, _) in charts.items()}, "legend": figure}
 
 
-def _explain(place: Axes, panels: Iterable[Axes]) -> None:
+def _add_legend(axis: Axes, panels: Iterable[Axes]) -> None:
     """Add one legend of several panels."""
     handles: dict[str, Any] = {}
     for panel in panels:
         handles |= dict(zip(*reversed(panel.get_legend_handles_labels()), strict=True))
-    place.legend(handles.values(), handles.keys(), loc="center", frameon=False)
+    axis.legend(handles.values(), handles.keys(), loc="center", frameon=False)
 
 
 def _curve(
-    place: Axes,
+    axis: Axes,
     name: str,
     along: Mapping[str, Any],
     plain: Mapping[str, Any],
@@ -77,40 +77,38 @@ def _curve(
             (v["position"], v["modes"][mode]) for v in levels if mode in v["modes"]
         ]
         if len(points) > 1:
-            _line(place, sorted(points, key=lambda point: point[0]), mode)
+            _line(axis, sorted(points, key=lambda point: point[0]), mode)
     known = [(0.0, plain["oracle"]), *((v["position"], v["oracle"]) for v in levels)]
     if plain["oracle"] is not None:
         where, shares = zip(*sorted((x, o["share"]) for x, o in known), strict=True)
         label = "oracle"
-        place.plot(where, shares, color=_ORACLE, lw=1, label=label, zorder=1)
+        axis.plot(where, shares, color=_ORACLE, lw=1, label=label, zorder=1)
     for level in levels:
         if level["impossible"]:
-            place.plot(level["position"], 0.03, "x", color=css(BAD), label="impossible", ls="")
+            axis.plot(level["position"], 0.03, "x", color=css(BAD), label="impossible", ls="")
     if found is not None and found["positions"] is not None:
         low, high = found["positions"]
-        place.axvspan(
-            low, high, color=_GOOD, alpha=0.13, lw=0, label="certainly good in this range"
-        )
+        axis.axvspan(low, high, color=_GOOD, alpha=0.13, lw=0, label="certainly good in this range")
     ticks.sort(key=lambda tick: tick[0])
-    place.set_xticks([x for x, _ in ticks], [_value(value) for _, value in ticks], fontsize=8)
-    place.set(ylim=(-0.03, 1.05), yticks=[0, 0.5, 1], yticklabels=["0%", "50%", "100%"])
-    place.set_title(NAMES[name], fontsize=11)
-    place.set_xlabel(along["unit"], fontsize=9)
-    place.axvline(0.0, color=css(MUTED), lw=0.8, ls=":", label="as it was trained", zorder=0)
-    place.spines[["top", "right"]].set_visible(False)
+    axis.set_xticks([x for x, _ in ticks], [_value(value) for _, value in ticks], fontsize=8)
+    axis.set(ylim=(-0.03, 1.05), yticks=[0, 0.5, 1], yticklabels=["0%", "50%", "100%"])
+    axis.set_title(NAMES[name], fontsize=11)
+    axis.set_xlabel(along["unit"], fontsize=9)
+    axis.axvline(0.0, color=css(MUTED), lw=0.8, ls=":", label="as it was trained", zorder=0)
+    axis.spines[["top", "right"]].set_visible(False)
 
 
-def _line(place: Axes, points: Sequence[tuple[float, Mapping[str, Any]]], mode: str) -> None:
+def _line(axis: Axes, points: Sequence[tuple[float, Mapping[str, Any]]], mode: str) -> None:
     where = [x for x, _ in points]
     success = [figures["success"] for _, figures in points]
     shares = [s["share"] for s in success]
     if mode in _OTHERS:
         color, style, label = _OTHERS[mode]
-        place.plot(where, shares, style, color=color, lw=1.3, label=label)
+        axis.plot(where, shares, style, color=color, lw=1.3, label=label)
         return
     low, high = ([s[k] for s in success] for k in ("lower95", "upper95"))
-    place.fill_between(where, low, high, color=_POLICY, alpha=0.2, lw=0, label="95% interval")
-    place.plot(where, shares, "o-", color=_POLICY, ms=3.5, label="success rate of the policy")
+    axis.fill_between(where, low, high, color=_POLICY, alpha=0.2, lw=0, label="95% interval")
+    axis.plot(where, shares, "o-", color=_POLICY, ms=3.5, label="success rate of the policy")
 
 
 def _value(value: float | None) -> str:

@@ -101,7 +101,7 @@ def learn(
     """
     run, limits = RunFolder(folder), settings.trainer
     largest_reward = as_task(settings.task).largest_reward
-    flights = run.prepare(settings, state)
+    demonstrations = run.prepare(settings, state)
     torch.set_num_threads(limits.num_threads)  # sums depend on it: equal on every machine
     bound_kernels()
     parts = components.make_collector(settings, replay)
@@ -122,8 +122,8 @@ def learn(
     )
     try:
         run.resume(trainer, checkpoints, state)
-        checkpoints.extra |= clone(settings, parts.network, flights, trainer.callbacks)
-        del flights  # release memory
+        checkpoints.extra |= clone(settings, parts.network, demonstrations, trainer.callbacks)
+        del demonstrations  # release memory
         with trainer.running() as batches:
             for batch in batches:
                 trainer.finish_update(batch, learner.update(batch))  # log, save, other callbacks

@@ -28,9 +28,9 @@ def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: Show
     width = 9.0
     figure = Figure(figsize=(width, 1.6 + 0.88 * width * far / (2 * side)), layout="constrained")
     axis = figure.subplots()
-    for label, ways in _ways(arrays).items():
-        shut = [np.concatenate([way, way[:1]])[:, ::-1] for way in ways]
-        path = Path.make_compound_path(*(Path(way, closed=True) for way in shut))
+    for label, outlines in _by_label(arrays).items():
+        closed = [np.concatenate([line, line[:1]])[:, ::-1] for line in outlines]
+        path = Path.make_compound_path(*(Path(line, closed=True) for line in closed))
         is_action = label < len(names.names)
         style: dict[str, Any] = (
             {"facecolor": names.css(label), "alpha": 0.85}
@@ -88,14 +88,14 @@ def svg(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: ShownA
         'patternTransform="rotate(45)"><rect width=".1" height=".3" fill="#fff" '
         'fill-opacity=".7"/></pattern></defs>',
     ]
-    for label, ways in _ways(arrays).items():
+    for label, outlines in _by_label(arrays).items():
         fill, style, inner = "url(#unseen)", ' pointer-events="none"', ""
         if label < len(names.names):
             fill, style = names.css(label), ""
             inner = f"<title>{escape(f'goes {names.names[label]}')}</title>"
         parts.append(
             f'<path fill="{fill}" fill-opacity=".85" fill-rule="evenodd"{style} '
-            f'd="{"".join(map(_way, ways))}">{inner}</path>'
+            f'd="{"".join(map(_path_data, outlines))}">{inner}</path>'
         )
     parts += [
         f'<path {_LINE} stroke="#fff" stroke-width=".05" stroke-dasharray=".3 .2" '
@@ -154,18 +154,18 @@ def _ticks(most: float) -> list[float]:
     return (step * np.arange(int(most / step + 1e-9) + 1)).tolist()
 
 
-def _ways(arrays: Mapping[str, NDArray]) -> dict[int, list[NDArray]]:
+def _by_label(arrays: Mapping[str, NDArray]) -> dict[int, list[NDArray]]:
     """Outlines by label."""
-    ways: dict[int, list[NDArray]] = {}
+    outlines: dict[int, list[NDArray]] = {}
     parts = np.split(arrays["points"], arrays["ends"][:-1])
-    for label, way in zip(arrays["labels"].tolist(), parts, strict=True):
-        ways.setdefault(label, []).append(way)
-    return dict(sorted(ways.items()))
+    for label, outline in zip(arrays["labels"].tolist(), parts, strict=True):
+        outlines.setdefault(label, []).append(outline)
+    return dict(sorted(outlines.items()))
 
 
-def _way(way: NDArray) -> str:
+def _path_data(outline: NDArray) -> str:
     """An outline as SVG path data, to a tenth of a millimetre."""
-    whole = np.round(-1e4 * way[:, ::-1]).astype(int)
+    whole = np.round(-1e4 * outline[:, ::-1]).astype(int)
     steps: Sequence[Any] = np.diff(whole, axis=0).tolist()
     begin = f"M{_short(whole[0, 0])} {_short(whole[0, 1])}"
     return begin + "l" + " ".join(f"{_short(x)} {_short(y)}" for x, y in steps) + "z"

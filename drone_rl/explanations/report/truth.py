@@ -1,6 +1,5 @@
 """Report section "truth": tests of heat maps, and the effects of changes to a scene."""
 
-import operator
 import textwrap
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
@@ -54,7 +53,7 @@ def truth_charts(explanation: Explanation) -> dict[str, Figure]:
         ("likeness", 0.5, "similarity on shuffled weights\n(must be below 0.5)"),
     )
     for test, bar, title in tests:
-        of = _hardest if test == "placebos" else operator.methodcaller("get", test)
+        of = _hardest if test == "placebos" else lambda method, test=test: method.get(test)
         charts[title.replace("\n", " ")], axis = new_chart()
         _test(axis, truth["methods"], of, bar)
         if not axis.lines[:-1] and not axis.texts:
