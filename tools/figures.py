@@ -43,7 +43,8 @@ def plot_placebos(truth: Mapping[str, Any], path: Path, policy: str) -> None:
     axes.set(
         xlabel="rank correlation with the change of the output\n"
         "when a patch is re-rendered (95% CI)",
-        xlim=(None, 1.2),
+        xlim=(None, 1.2),  # right of 1, the largest correlation, is space for text
+        xticks=[-0.2, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0],
     )
     figure.suptitle(f"Do heat maps of policy {policy} show what it responds to?")
     handles = [

@@ -11,10 +11,10 @@ from tensordict.nn import TensorDictModuleBase
 from drone_rl.config.commands import EvaluateSettings, HeldOutSettings
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.baselines import run_baselines
+from drone_rl.evaluation.conditions_text import unlike as unlike_text
 from drone_rl.evaluation.metrics import summarise
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.evaluation.rounding_sensitivity import run_compared
-from drone_rl.evaluation.verdict_text import unlike as unlike_text
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+from drone_rl.evaluation.conditions_text import unlike
 from drone_rl.sim.vocabulary import terms_of
 from drone_rl.utils.text import Evidence, Sentence, all_cubes, exact, fixed_seed, listed, percent
 
@@ -302,24 +303,6 @@ def quantity_label(name: str, evidence: Evidence) -> str:
             "not above 0)"
         ),
     }.get(kind, name)
-
-
-def unlike(evidence: Evidence) -> str:
-    """Return how dynamics and appearance (dotted names) differ from those of training."""
-    parts = [
-        f"{name if '.' in name else f'dynamics.{name}'}={_said(of['flown'])} instead of "
-        f"{_said(of['own'])}"
-        for name, of in evidence["unlike"].items()
-    ]
-    seen = ["another appearance"] if any("." in name for name in evidence["unlike"]) else []
-    moved = ["other dynamics"] if not all("." in name for name in evidence["unlike"]) else []
-    return f"It was trained with {listed(moved + seen)}: here it flew with {listed(parts)}."
-
-
-def _said(value: Any) -> str:
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_said, value))}]"
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 SENTENCES = (

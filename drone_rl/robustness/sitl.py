@@ -70,8 +70,8 @@ class SitlEvaluation:
     def __str__(self) -> str:
         """Return a line per episode and a summary."""
         lines = [
-            f"world {f.world}: {f.goals} reached, {f.end.replace('_', ' ')}, {f.steps} steps, "
-            f"{f.simulated_s:.1f} s"
+            f"environment {f.world}: {f.goals} reached, {f.end.replace('_', ' ')}, "
+            f"{f.steps} steps, {f.simulated_s:.1f} s"
             for f in self.flights
         ]
         success = self.figures["success"]
