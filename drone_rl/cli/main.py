@@ -77,7 +77,8 @@ def _main(args: list[str]) -> int:
     if name not in ("demo", *COMMANDS):
         from drone_rl.cli.hydra.words import no_command  # slow: imports Hydra
 
-        sys.exit(f"error: {no_command(name, overrides, ['demo', *COMMANDS])}")
+        print(f"error: {no_command(name, overrides, ['demo', *COMMANDS])}", file=sys.stderr)
+        return USER_ERROR
     if name == "demo" and {"-h", "--help"} & set(overrides):
         print(DEMO_USAGE)
         return 0
