@@ -72,7 +72,7 @@ def memory(folder: Path, quick: bool, *, root: Path) -> dict[str, float]:
             judged = (f"policy={run}", own[0], "seed=0", f"hydra.run.dir={run}/evaluation")
             call("evaluate", *judged, "episodes=1000", environment=environment)
             evaluation = read_json(run / "evaluation" / "evaluation.json")
-            rates.append(evaluation["greedy"]["success"]["mean"])
+            rates.append(evaluation["greedy"]["success"]["share"])
         found[f"{key}_success"] = statistics.median(rates)
     return found
 

@@ -26,7 +26,6 @@ from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.training.three_state import sample_gradients, train_three_state
 from drone_rl.utils.display import picture
 from drone_rl.utils.errors import InputError
@@ -286,7 +285,6 @@ def _record(
     """
     frames, episodes = settings.frames or frames, settings.episodes or episodes
     network = subject.make_network()
-    require_memoryless(network, "this figure")
     layer = feature_layer(network)
     with subject.in_task(step_length=STEP_LENGTH).flying(episodes, seed=settings.seed) as made:
         env, actor = made

@@ -58,7 +58,7 @@ def test_networks_learn_the_same_task(tmp_path, monkeypatch):
         folder = given[-1][0] / "evaluation"
         folder.mkdir(parents=True)
         rate = next(rates)
-        (folder / "evaluation.json").write_text(f'{{"greedy": {{"success": {{"mean": {rate}}}}}}}')
+        (folder / "evaluation.json").write_text(f'{{"greedy": {{"success": {{"share": {rate}}}}}}}')
 
     monkeypatch.setattr(chapter, "train", train)
     monkeypatch.setattr(chapter, "call", call)

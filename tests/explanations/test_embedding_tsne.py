@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from openTSNE.affinity import PerplexityBasedNN
 
 from drone_rl.explanations import embedding as module
 from drone_rl.explanations.embedding import embed, faithfulness
@@ -31,6 +32,26 @@ def test_clusters_stay_together(embedding):
     assert faithful["trustworthiness"] > 0.9
     assert faithful["neighbours_kept"] > 3 * faithful["neighbours_chance"]
     assert faithful["neighbours_chance"] == pytest.approx(10 / 119)
+
+
+@pytest.mark.parametrize(("kernel", "other"), [("gaussian", "student"), ("student", "gaussian")])
+def test_each_kernel_ends_where_its_own_gradient_vanishes(kernel, other):
+    """The gradient of KL(P, Q), by Eq. 17's exp(-d²) and by t-SNE's 1 / (1 + d²)."""
+    rng = np.random.default_rng(0)
+    originals = rng.normal(size=(60, 4))
+    p = PerplexityBasedNN(originals, perplexity=10, method="exact").P.toarray()
+    points = embed(originals, perplexity=10, seed=1, kernel=kernel)[0]
+
+    def gradient(name):
+        offsets = points[:, None] - points[None]
+        squares = (offsets**2).sum(-1)
+        similar = np.exp(-squares) if name == "gaussian" else 1 / (1 + squares)
+        np.fill_diagonal(similar, 0.0)
+        pull = similar if name == "student" else 1.0
+        forces = (p - similar / similar.sum()) * pull
+        return np.abs((forces[..., None] * offsets).sum(1)).max()
+
+    assert gradient(kernel) < 0.1 * gradient(other)
 
 
 def test_the_same_seed_gives_the_same_picture(clusters, embedding):

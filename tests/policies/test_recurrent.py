@@ -16,6 +16,7 @@ from drone_rl.config.learning import Ppo, Rollouts
 from drone_rl.config.networks import Lstm
 from drone_rl.config.training import TrainSettings
 from drone_rl.evaluation.rollouts import exploration
+from drone_rl.evaluation.video import view
 from drone_rl.objectives import LeaveOneOut, ReinforceLoss
 from drone_rl.policies import RecurrentNetwork, make_actor
 from drone_rl.policies.policy import load_policy
@@ -264,13 +265,16 @@ REFUSED = {
     "explain": lambda policy, folder: drone_rl.explain(policy, folder=folder),
     "a class model": lambda policy, folder: drone_rl.class_models(policy),
     "proofs": lambda policy, folder: drone_rl.prove(policy, folder=folder),
+    "the viewer": lambda policy, folder: view(policy),
     "the operating domain": lambda policy, folder: drone_rl.shifts(policy, domain_episodes=50),
 }
 
 
 @pytest.mark.parametrize("what", REFUSED)
 def test_analyses_of_single_frames_are_refused(what, trained, tmp_path):
-    with pytest.raises(InputError, match=rf"{what}.*; give (another policy|domain=false)"):
+    with pytest.raises(
+        InputError, match=rf"{what}.*; (give (another policy|domain=false)|leave viewer=false)"
+    ):
         REFUSED[what](trained.policy, tmp_path)
 
 
