@@ -5,7 +5,6 @@ Public names are imported when they are first used, so that `import drone_rl` is
 
 import importlib
 import re
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drone_rl.utils.imports import import_quietly, register, when_imported
@@ -104,7 +103,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 # the imports above are for type checkers, and the list of public names
-_FOUND = re.findall(r"^    from (\S+) import (\w+) as \2$", Path(__file__).read_text(), re.M)
+with open(__file__, encoding="utf-8") as _own_source:  # importing pathlib takes longer
+    _FOUND = re.findall(r"^    from (\S+) import (\w+) as \2$", _own_source.read(), re.M)
 _HOMES = {name: module for module, name in _FOUND}
 
 __all__ = [*_HOMES]  # pyright: ignore[reportUnsupportedDunderAll] (aliases above are public)
