@@ -29,7 +29,7 @@ wp.set_module_options(_OPTIONS)
 
 @wp.struct
 class CameraView:
-    """Renders a frame and standardizes it."""
+    """What is needed to render a frame and standardize it."""
 
     view: View
     geoms: Geoms

@@ -23,10 +23,11 @@ class ServeCommand(CommandSettings):
     path of an MJCF file, *.xml."""
     clock: Annotated[str, OneOf(("wall", "lockstep"))] = "wall"
     """wall: real time, multiplied by ClockSpeed. lockstep: time advances only while a call waits
-    for it, as fast as the machine can, with the same results every time."""
+    for it, as fast as the machine can, with the same results every time if clients send their
+    requests within `patience_s` of each other."""
     patience_s: Annotated[float, Real(0.0, 60.0, unit="s")] = 0.02
-    """Seconds without a request after which time passes in lockstep. Give more for a client that
-    computes long between the start of a movement and its next request."""
+    """Real seconds without a request before time advances for a waiting call in lockstep. Give more
+    for a client that computes long between the start of a movement and its next request."""
     address: str | None = None
     """Address to listen at; null for that of the settings file, 127.0.0.1 by default."""
     port: Annotated[int, Whole(0, 65535)] | None = None
@@ -43,7 +44,7 @@ class ServeCommand(CommandSettings):
         from drone_rl.flight.airsim.server import run  # slow to import
         from drone_rl.flight.airsim.serving import make_simulation
 
-        torch.set_num_threads(1)  # its tensors are too small to share
+        torch.set_num_threads(1)  # its tensors are too small to split over threads
         simulation, host, port = make_simulation(
             self.settings,
             scene=self.scene,

@@ -78,7 +78,7 @@ class AppearanceSettings(Settings):
     camera_offset: Annotated[TripleOrRange, _Place] = (0.0, 0.0, 0.0)
     """Offset of the policy's camera from its default place: forward, left, up, in metres."""
     camera_turn: Annotated[TripleOrRange, _Turn] = (0.0, 0.0, 0.0)
-    """Roll, pitch, yaw of the camera in degrees; positive: right side down, down, to the left."""
+    """Roll, pitch, yaw of the camera in degrees; positive: right side down, nose down, left."""
     camera_widening: Annotated[NumberOrRange, Span(Real(-160.0, 160.0, unit="degrees"))] = 0.0
     """Degrees added to `camera.horizontal_fov`; negative values narrow the field of view."""
     exposure: Annotated[NumberOrRange, Span(Real(0.01, 100.0))] = 1.0

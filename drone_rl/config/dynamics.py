@@ -1,6 +1,6 @@
 """Settings of how drones move: vehicle, controller, wind, and the actions of a policy.
 
-A drone is data: another drone is another file of these values.
+Each file of conf/dynamics describes one drone by these settings.
 """
 
 import math
@@ -27,8 +27,8 @@ class DynamicsSettings(Settings):
     """A drone with four rotors, SimpleFlight's controller that flies it, and the air around it.
 
     The defaults are AirSim's generic X frame and its controller's gains. Body frame: x forward, y
-    left, z up; triples are along, or about, these axes. In computer-vision mode (Table 1) none but
-    the mode counts: there, actions set poses.
+    left, z up; triples are along, or about, these axes. In computer-vision mode (Table 1) actions
+    set poses: only `mode` has an effect and, with `actions=velocity`, `control_ticks` and `tick`.
     """
 
     mode: Annotated[str, OneOf(MODES)] = "computer_vision"
@@ -103,11 +103,11 @@ class DynamicsSettings(Settings):
 
     @property
     def hover_throttle(self) -> float:
-        """Share of all thrust that carries the drone."""
+        """Fraction of the maximum thrust that carries the drone."""
         return self.mass * GRAVITY / (4.0 * self.rotor_thrust)
 
     def check(self) -> None:
-        """Refuse impossible inertia and drones that can't hover."""
+        """Refuse impossible inertia, and a thrust that is too small to control the drone."""
         largest, others = max(self.inertia), sum(self.inertia) - max(self.inertia)
         if largest > others * (1.0 + 1e-9):
             raise InputError(
@@ -117,9 +117,9 @@ class DynamicsSettings(Settings):
         weight, most = self.mass * GRAVITY, 4.0 * self.rotor_thrust
         if most < _HEADROOM * weight:
             raise InputError(
-                f"rotor_thrust={self.rotor_thrust:g} can't hover: four rotors push {most:.3g} N "
-                f"and the drone weighs {weight:.3g} N; give at least "
-                f"{_HEADROOM * weight / 4:.3g}"
+                f"rotor_thrust={self.rotor_thrust:g} is too small to control the drone: four "
+                f"rotors give {most:.3g} N, needed are {_HEADROOM} times its weight, "
+                f"{_HEADROOM * weight:.3g} N; give at least {_HEADROOM * weight / 4:.3g}"
             )
 
     def check_air(self) -> None:

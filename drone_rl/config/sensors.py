@@ -119,7 +119,7 @@ class SensorSettings(Settings):
 
     @property
     def perfect(self) -> "SensorSettings":
-        """The same without any noise; rates, latencies and the stated errors of GPS stay."""
+        """The same without noise; rates, latencies, scales and the stated errors of GPS stay."""
         return SensorSettings(
             imu=self.imu.replace(noise=0.0),
             barometer=self.barometer.replace(noise=0.0),

@@ -18,7 +18,7 @@ from drone_rl.envs.transforms import GrayPixels, PixelTransform, on_pixels, with
 from drone_rl.sim.tasks import State
 
 Entries = dict[NestedKey, Tensor]
-FLAGS = ("reward", "done", "terminated", "truncated")
+STEP_NAMES = ("reward", "done", "terminated", "truncated")
 _END_REASON = ("next", "info", "end_reason")
 
 
@@ -77,7 +77,7 @@ class DirectRenderer:
         transforms: list[Any] = list(one) if isinstance(one, (Compose, tuple)) else [one]
         observed = tuple(observed)
         readable = {"pixels", "done", *(("info", name) for name in base.worlds.entries)}
-        known = {("next", name) for name in FLAGS}
+        known = {("next", name) for name in STEP_NAMES}
         known |= {("next", "info", name) for name in base.worlds.entries}
         reasons = [
             f"transform {type(t).__name__} is not fused"
@@ -130,5 +130,5 @@ class DirectRenderer:
         """
         terminated, truncated = self.worlds.ends(end_reason)
         values = (reward.float(), terminated | truncated, terminated, truncated, end_reason)
-        keys = (*(("next", name) for name in FLAGS), _END_REASON)
+        keys = (*(("next", name) for name in STEP_NAMES), _END_REASON)
         return {key: value[:, None] for key, value in zip(keys, values, strict=True)}

@@ -138,7 +138,8 @@ def shrink(grid: Grid, seed: int, number: int = 0) -> Grid:
     """Move the outermost places inwards by random lengths, and all others in proportion.
 
     These places are unknown beforehand, so no policy can be fitted to their frames. They stay
-    evenly spaced, and symmetric sideways. Each end moves by less than half the distance of two.
+    evenly spaced, and symmetric sideways. Each end moves by less than half the distance of two
+    neighbours.
     """
     generator = torch_generator(seed, Stream.SCENES, number=number)
     near, far, aside = (0.5 * torch.rand(3, dtype=torch.float64, generator=generator)).tolist()

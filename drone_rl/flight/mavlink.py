@@ -197,7 +197,7 @@ class MavlinkBridge:
         self.answer_within = answer_within
         self.connect_within = connect_within
         self.missed = 0
-        """States without controls in time, in lockstep and after the first controls."""
+        """Steps in lockstep, after the first controls, for which no controls came in time."""
         self.is_armed = False
         """Whether the newest controls are armed."""
         self._rotors = np.zeros(4)
@@ -207,14 +207,14 @@ class MavlinkBridge:
         self._next_gps = -np.inf
 
     def __enter__(self) -> Self:
-        """Wait for the autopilot and its first heartbeat, which must come in time."""
+        """Wait for the autopilot and its first message, which must come in time."""
         with contextlib.ExitStack() as stack:
             stack.callback(self.link.close)
             self.link.accept(self.connect_within)
             end = time.monotonic() + self.connect_within
             while self._heard < 0.0:
                 if time.monotonic() > end:
-                    raise FlightControllerError(f"no heartbeat in {self.connect_within:g} seconds")
+                    raise FlightControllerError(f"no message in {self.connect_within:g} seconds")
                 self._beat()
                 self._receive(0.05)
             stack.pop_all()

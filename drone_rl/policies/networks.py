@@ -43,7 +43,7 @@ class ImageNetwork(nn.Module):
 
     @property
     def num_actions(self) -> int:
-        """Number of outputs: logits, where actions are counted."""
+        """Number of outputs: a logit for each discrete action, or for each part of a speed."""
         return self.actions.num_outputs
 
     @property
@@ -97,7 +97,7 @@ class PolicyNetwork(ImageNetwork):
 
     @property
     def num_actions(self) -> int:
-        """Number of outputs: logits, where actions are counted."""
+        """Number of outputs: a logit for each discrete action, or for each part of a speed."""
         return len(self.layers.get_parameter("logits.weight"))
 
     @property

@@ -147,7 +147,7 @@ def _impossible(e: Evidence) -> list[str]:
     return [f"{at}, {share}" for at, share in found.items()]
 
 
-def _untested(e: Evidence) -> list[str]:
+def _without_effect(e: Evidence) -> list[str]:
     return [NAMES[name] for name in e["axes"] if not is_tested(e, name)]
 
 
@@ -197,8 +197,8 @@ SHIFTS = (
     Sentence(
         "shifts.untested",
         "an axis changed neither images nor episodes",
-        lambda e: bool(_untested(e)),
-        lambda e: f"Not tested, because without effect: {listed(_untested(e))}.",
+        lambda e: bool(_without_effect(e)),
+        lambda e: f"Not tested, because without effect: {listed(_without_effect(e))}.",
     ),
     Sentence(
         "shifts.impossible",
@@ -225,18 +225,18 @@ SHIFTS = (
     fixed_seed("shifts.fixed_seed"),
 )
 _OTHERS = {"color": "colours", "light": "light", "object size": "sizes"}
-"""What a verdict does not cover, by the kind of shift that does."""
+"""Names in sentences of the groups of axes that a verdict alone does not cover."""
 NEARLY = 1e-9
 """Relative rounding of a limit."""
 
 
 def is_quoted(evidence: Evidence) -> bool:
-    """Return whether there is such an evaluation that is not refused."""
+    """Return whether the evidence has a robustness evaluation that is not refused."""
     return bool(evidence.get("shifts")) and why_not(evidence) is None
 
 
 def why_not(evidence: Evidence) -> str | None:
-    """Return the reason why an evaluation is refused, or None."""
+    """Return the reason why the robustness evaluation is refused, or None."""
     shifts, verdict = evidence["shifts"], evidence["verdict"]
     if "refused" in shifts:
         return shifts["refused"]
@@ -252,7 +252,7 @@ def why_not(evidence: Evidence) -> str | None:
     return None
 
 
-def untested(evidence: Evidence) -> list[str]:
+def not_evaluated(evidence: Evidence) -> list[str]:
     """Return which of colours, light and sizes were not evaluated."""
     axes = evidence["shifts"]["axes"].values() if is_quoted(evidence) else ()
     tested = {along["group"] for along in axes}
@@ -298,7 +298,10 @@ QUOTED = (
 
 
 def needed_range(along: Evidence, need: Mapping[str, float | None]) -> tuple[float, float]:
-    """Return the ends of a required range on an axis, as in `shifts.json`; see `lacking`."""
+    """Return the ends of a required range on an axis, as in `shifts.json`.
+
+    An end that is None is the value without perturbation, or the other end if that lies beyond it.
+    """
     neutral = _number(along["neutral"])
     given = [end for end in (need["low"], need["high"]) if end is not None]
     low = min([neutral, *given]) if need["low"] is None else need["low"]
@@ -326,8 +329,8 @@ def contradicted(name: str | None, value: float, unit: str, probed: Evidence) ->
 def lacking(shifts: Evidence, name: str, need: Mapping[str, float | None]) -> str | None:
     """Return what an operating domain lacks of a required range of an axis, or None.
 
-    In the range None is the value without perturbation, or the other end. `shifts` are those of
-    `shifts.json`, with ranges.
+    `shifts` is the content of `shifts.json`, which must have a domain; `need` is that of
+    `needed_range`.
     """
     found, along = shifts["domain"]["ranges"].get(name), shifts["axes"].get(name)
     if found is None or along is None:

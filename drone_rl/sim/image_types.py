@@ -42,7 +42,7 @@ def palette() -> Tensor:
 
 
 def segmentation_ids(scene: Scene) -> Tensor:
-    """Return AirSim's ids of geoms, by the letters of their names. Shape: (num_geoms,), int64."""
+    """Return AirSim's ids of geoms, by their classes' names. Shape: (num_geoms,), int64."""
     names = [semantic_class.name.lower() for semantic_class in scene.semantic_classes]
     return torch.tensor([(5 + sum(map(ord, name))) % NUM_IDS for name in names])
 

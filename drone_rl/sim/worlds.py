@@ -150,8 +150,8 @@ class Worlds:
     ) -> Tensor:
         """Render states, of any number of environments, with one camera and one modality.
 
-        The view is the policy's by default, `appearance` has differences from the environments'
-        own. Returns images as `Renderer.render`, without the dimension of cameras.
+        By default the view is the policy's; `appearance` overrides the environments' own. Returns
+        images as `Renderer.render`, without the dimension of cameras.
         """
         view = view or self.policy_view
         if len(view.cameras) * len(view.modalities) > 1:

@@ -104,8 +104,8 @@ class RunFolder:
         """Delete half-written files; return the demonstrations that a new run clones, if any.
 
         Raises:
-            InputError: The checkpoint has other settings, a demonstration is unusable, or the
-                policy is recurrent.
+            InputError: The checkpoint has other settings, a demonstration is unusable, or there are
+                demonstrations for a recurrent policy or for resuming a run that began without any.
         """
         folder, found = settings.demonstrations, []
         if state is not None:
@@ -182,7 +182,7 @@ def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Tra
 
 
 def hand_on_signal(training: Training) -> Training:
-    """Raise the signal that stopped a training run again, now that its state is saved.
+    """Re-raise the signal that stopped a training run, now that its state is saved.
 
     Returns `training` if there was no signal, or if the caller's own handler returns. Ctrl-C raises
     a KeyboardInterrupt and no subclass: Python exits by SIGINT, as shells expect, for it alone.
@@ -218,7 +218,8 @@ def settings_of(config: Mapping[str, Any]) -> TrainSettings:
     for part in (*parts, settings.scheduler, settings.collector, *settings.transforms):
         if not part.is_known:
             raise InputError(
-                f"the checkpoint names {part.target}, which a file may not; give the settings, too"
+                f"the checkpoint uses {part.target}, which is not registered, and files import "
+                "nothing else; pass the settings, too"
             )
     return settings
 

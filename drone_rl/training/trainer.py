@@ -225,13 +225,17 @@ class Trainer:
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
-        """Record the first Ctrl-C or SIGTERM; restore the handlers then and at the end."""
+        """Record the first Ctrl-C or SIGTERM; restore the handlers then and at the end.
+
+        A signal that the process ignores, as Ctrl-C in the background, remains ignored.
+        """
         if threading.current_thread() is not threading.main_thread():
             yield
             return
         watched = (signal.SIGINT, signal.SIGTERM)
         found = {number: signal.getsignal(number) for number in watched}
-        before = {n: handler for n, handler in found.items() if handler is not None}
+        left_alone = (None, signal.SIG_IGN)  # None: set outside Python, can't be restored
+        before = {n: handler for n, handler in found.items() if handler not in left_alone}
 
         def restore() -> None:
             for number, handler in before.items():
@@ -242,7 +246,7 @@ class Trainer:
             self.stop_signal = signal.Signals(number)
             restore()
 
-        for number in before:  # one set outside Python can't be restored, so it is left alone
+        for number in before:
             signal.signal(number, note)
         try:
             yield

@@ -27,7 +27,7 @@ _log = logging.getLogger(__name__)
 def rollout_collector(
     settings: TrainSettings, replay: FailureReplayTask | None = None
 ) -> Components:
-    """Make `collector=rollouts`: the next steps of each environment, from threads.
+    """Make `collector=rollouts`: a fixed number of steps of each environment, in threads.
 
     The learner's `estimate` is the collector's `postproc`, see `actor_critic_learner`.
     """
@@ -78,7 +78,7 @@ def ray_collector(settings: TrainSettings, replay: FailureReplayTask | None = No
     chosen = settings.collector
     assert isinstance(chosen, Ray)
     sizes = group_sizes(settings)
-    (local,) = make_groups(settings, [1])
+    (local,) = make_groups(settings, [1])  # only its actor and network are needed
     local.env.close()
     sent = (as_config(settings), sorted(modules_of(settings)), sizes)
     makers = [functools.partial(_remote_collector, *sent, i, replay) for i in range(len(sizes))]

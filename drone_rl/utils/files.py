@@ -1,4 +1,4 @@
-"""Safe reading of plain files, atomic writing, and locks on folders."""
+"""Safe reading of regular files, atomic writing, and locks on folders."""
 
 import contextlib
 import errno
@@ -34,10 +34,10 @@ _LONGEST_NUMBER = 19
 
 
 def read_bytes(path: Path, most: int) -> bytes:
-    """Return the content of a plain file of at most `most` bytes, opened once and without waiting.
+    """Return the content of a regular file of at most `most` bytes, opened once, without waiting.
 
     Raises:
-        InputError: It can't be read, is no plain file, is empty or too large.
+        InputError: It can't be read, is no regular file, is empty or too large.
     """
     with _open_plain(path) as (file, size):
         content = file.read(most + 1) if size <= most else None
@@ -49,7 +49,7 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 
 def read_tail(path: Path, most: int) -> bytes:
-    """Return the last `most` bytes of a plain file, such as a log; see `read_bytes` for errors."""
+    """Return the last `most` bytes of a regular file, as a log; see `read_bytes` for errors."""
     with _open_plain(path) as (file, size):
         file.seek(max(0, size - most))
         return file.read(most)
@@ -57,12 +57,12 @@ def read_tail(path: Path, most: int) -> bytes:
 
 @contextlib.contextmanager
 def _open_plain(path: Path) -> Iterator[tuple[BinaryIO, int]]:
-    """Open a plain file, without waiting for the writer of a pipe; yield the file and its size."""
+    """Open a regular file, without waiting for a pipe's writer; yield the file and its size."""
     try:
         with open(path, "rb", opener=lambda p, flags: os.open(p, flags | os.O_NONBLOCK)) as file:
             about = os.fstat(file.fileno())
             if not stat.S_ISREG(about.st_mode):
-                raise InputError(f"{path} is no plain file; give the path of a file")
+                raise InputError(f"{path} is no regular file; give the path of a file")
             yield file, about.st_size
     except InputError:
         raise
@@ -72,7 +72,7 @@ def _open_plain(path: Path) -> Iterator[tuple[BinaryIO, int]]:
 
 
 def newest(paths: Iterable[Path]) -> Path | None:
-    """Return the file or folder that was changed last; None of none."""
+    """Return the file or folder that was changed last; None if there are none."""
     return max(paths, key=lambda path: path.stat().st_mtime, default=None)
 
 
@@ -111,7 +111,7 @@ def parse_json(
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     mapping = dict(pairs)
     if len(mapping) < len(pairs):
-        raise ValueError("a name stands there twice")
+        raise ValueError("a name occurs twice")
     return mapping
 
 
@@ -148,8 +148,8 @@ def refuse_links(folder: Path, depth: int = 3, left: Allowance | None = None) ->
         left.take(1, str(folder))
         if not (entry.is_file(follow_symlinks=False) or entry.is_dir(follow_symlinks=False)):
             raise InputError(
-                f"{entry.path} is a link or a device; give a folder of plain files, "
-                "put there what it points to"
+                f"{entry.path} is a link or a device; give a folder of regular files, "
+                "replace it by what it points to"
             )
         if depth > 1 and entry.is_dir(follow_symlinks=False):
             refuse_links(Path(entry.path), depth - 1, left)
@@ -166,7 +166,7 @@ def write_atomically(path: Path, content: str | bytes) -> None:
 
 
 def write_all_atomically(contents: Mapping[Path, str | bytes]) -> None:
-    """Write the contents of several files, or none.
+    """Write several files: all contents are complete on disk before the first file is replaced.
 
     Raises:
         OSError: One can't be written; the error's `filename` is its path.
@@ -239,7 +239,7 @@ def folder_lock(folder: Path, *, patience_s: float = 1.0) -> Iterator[None]:
 
 
 def is_locked(folder: Path) -> bool:
-    """Return whether a process has locked the folder."""
+    """Return whether a process has locked the folder; holds the lock for a moment, to try it."""
     try:
         with _open_lock(folder) as file:
             return not _try_lock(file.fileno())

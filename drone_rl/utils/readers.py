@@ -92,7 +92,7 @@ class _PlainLoader(yaml.SafeLoader):
         """Construct a mapping with each name once."""
         made = super().construct_mapping(node, deep)
         if len(made) < len(node.value):
-            raise InputError("a name stands there twice")
+            raise InputError("a name occurs twice")
         return made
 
 

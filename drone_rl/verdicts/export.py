@@ -15,7 +15,7 @@ from drone_rl.evaluation.verdict_text import best_baseline, is_quoted
 from drone_rl.policies.policy import Policy
 from drone_rl.policies.zoo import certificate_path, shifts_path
 from drone_rl.policies.zoo.files import exported_bytes
-from drone_rl.robustness.shifts_text import QUOTED, untested
+from drone_rl.robustness.shifts_text import QUOTED, not_evaluated
 from drone_rl.robustness.shifts_text import is_quoted as has_domain
 from drone_rl.sim.vocabulary import some_cubes, terms_of
 from drone_rl.sweeps.manifest import read_sweep
@@ -242,7 +242,7 @@ def _chosen(card: Evidence) -> str:
 
 def _tested(card: Evidence) -> str:
     tested = terms_of(card["verdict"]).tested or some_cubes(card["task"])
-    unknown = listed(untested(card), "or")
+    unknown = listed(not_evaluated(card), "or")
     but = f": nothing is known of other {unknown}" if unknown else ", except as stated here"
     what = "The verdict is for" if has_domain(card) else "Tested with"
     return f"{what} {tested}, with this task's appearance only{but}."

@@ -12,11 +12,11 @@ from drone_rl.collectors.rollouts import TorchrlStepper
 from drone_rl.collectors.speedups import accelerated_stepper
 from drone_rl.config import AppearanceSettings, PillarsSettings, TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
-from drone_rl.envs.direct_renderer import FLAGS, Reasons
+from drone_rl.envs.direct_renderer import STEP_NAMES, Reasons
 from drone_rl.policies import SmallCNN, make_actor
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
-KEPT = [("next", name) for name in FLAGS]
+KEPT = [("next", name) for name in STEP_NAMES]
 
 
 def collector(is_direct, task, next_keys=(("next", "info", "end_reason"),), look=None):

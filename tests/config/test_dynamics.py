@@ -18,8 +18,8 @@ FLIGHT = DynamicsSettings(mode="simple_flight")
         ({"mass": -1.0}, r"mass=-1\.0 is out of range"),
         (
             {"mass": 2.0},
-            r"rotor_thrust=4\.17945 can't hover: four rotors push 16\.7 N and the drone "
-            r"weighs 19\.6 N; give at least 5\.4",
+            r"rotor_thrust=4\.17945 is too small to control the drone: four rotors give 16\.7 N, "
+            r"needed are 1\.1 times its weight, 21\.6 N; give at least 5\.4",
         ),
         ({"inertia": (1.0, 1.0, 2.1)}, r"inertia=\[1\.0, 1\.0, 2\.1\] is that of no body"),
         ({"wind": (float("nan"), 0.0, 0.0)}, r"wind\[0\]=nan"),
@@ -77,7 +77,7 @@ def test_what_no_drone_has_is_named(change, message):
 def test_the_thrust_that_is_asked_for_is_enough():
     needed = 1.1 * 2.0 * 9.81 / 4
     dataclasses.replace(FLIGHT, mass=2.0, rotor_thrust=needed * 1.001)
-    with pytest.raises(InputError, match="can't hover"):
+    with pytest.raises(InputError, match="too small to control"):
         dataclasses.replace(FLIGHT, mass=2.0, rotor_thrust=needed * 0.999)
 
 

@@ -13,10 +13,10 @@ from drone_rl.envs import (
     StandardizePixels,
     with_transforms,
 )
-from drone_rl.envs.direct_renderer import FLAGS, DirectRenderer
+from drone_rl.envs.direct_renderer import STEP_NAMES, DirectRenderer
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=5)
-KEPT = [("next", name) for name in FLAGS]
+KEPT = [("next", name) for name in STEP_NAMES]
 
 
 class Dark(GrayPixels):

@@ -107,7 +107,7 @@ def test_nobody_there(stubs):
     with pytest.raises(FlightControllerError, match="no autopilot connected"):
         MavlinkBridge(link, connect_within=0.05).__enter__()
     far, near = pty.openpty()
-    with pytest.raises(FlightControllerError, match=r"no heartbeat in 0\.2 seconds"):
+    with pytest.raises(FlightControllerError, match=r"no message in 0\.2 seconds"):
         MavlinkBridge(SerialLink(os.ttyname(near)), connect_within=0.2).__enter__()
     os.close(near)
     os.close(far)

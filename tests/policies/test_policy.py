@@ -137,7 +137,7 @@ def test_changed_dynamics_change_only_the_environment(monkeypatch):
         ({"mass": -1.0}, r"dynamics\.mass=-1\.0 is out of range"),
         ({"masss": 1}, r"dynamics\.masss is unknown"),
         ({"wind": [1, 0, 0]}, r"dynamics\.wind=\[1\.0, 0\.0, 0\.0\] moves nothing"),
-        ({"mass": 50.0}, r"dynamics\.rotor_thrust=4\.17945 can't hover"),
+        ({"mass": 50.0}, r"dynamics\.rotor_thrust=4\.17945 is too small to control the drone"),
     ],
 )
 def test_invalid_dynamics_changes_raise(changes, message):

@@ -160,7 +160,7 @@ def test_continuous_actions_out_of_bounds_are_refused(number):
         ({"about": np.array(["{}", "{}"])}, "its description is no text"),
         ({"about": np.array("{" * 9)}, "its description is damaged"),
         ({"about": np.array("[" * 100 + "]" * 100)}, "nested"),
-        ({"about": np.array('{"a": 1, "a": 2}')}, "a name stands there twice"),
+        ({"about": np.array('{"a": 1, "a": 2}')}, "a name occurs twice"),
         ({"about": np.array('{"task": NaN}')}, "its description is damaged"),
         ({"about": np.array("3")}, "about=3 must be a mapping"),
         ({"about": about(camera=None)}, "about.camera is missing"),

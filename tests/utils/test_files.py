@@ -104,9 +104,9 @@ def test_plain_files_of_bounded_size_are_read(tmp_path):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda path: os.mkfifo(path), "no plain file"),
+        (lambda path: os.mkfifo(path), "no regular file"),
         (lambda path: path.mkdir(), "Is a directory"),
-        (lambda path: path.symlink_to("/dev/zero"), "no plain file"),
+        (lambda path: path.symlink_to("/dev/zero"), "no regular file"),
         (lambda path: path.symlink_to(path), "symbolic links"),
         (lambda path: path.touch(), "is empty"),
         (lambda path: None, "No such file"),
@@ -207,7 +207,7 @@ def test_the_end_of_a_log(tmp_path):
     (tmp_path / "log").write_bytes(b"x" * 100 + b"end")
     assert read_tail(tmp_path / "log", 5) == b"xxend"
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(InputError, match="no plain file"):
+    with pytest.raises(InputError, match="no regular file"):
         read_tail(tmp_path / "pipe", 5)
     with pytest.raises(InputError, match="can't be read"):
         read_tail(tmp_path, 5)

@@ -41,7 +41,7 @@ def test_what_shifts_leaves_can_be_needed(read):
         ("{}", "is empty; give axes"),
         ("[1, 2]", "must be a mapping"),
         ("fog: [", "no plain YAML"),
-        ("fog: {low: 1}\nfog: {low: 2}", "stands there twice"),
+        ("fog: {low: 1}\nfog: {low: 2}", "occurs twice"),
         ("a: !!python/object/apply:os.getcwd []", "no plain YAML"),
         ("wind: {low: 1, unit: m/s}", "'wind' is not an axis; give one or more of: object_color"),
         ("fog: 60", "fog=60 must be a mapping"),

@@ -25,7 +25,7 @@ from drone_rl.sweeps.manifest import is_sweep, quoted
 from drone_rl.utils.errors import InputError
 
 OTHER_NAMES = tomllib.loads(Path(__file__).parent.with_name("names.toml").read_text("utf-8"))
-"""Names of other projects, and ours."""
+"""Names of other projects' settings and commands, with ours."""
 OWN_FOLDERS = ("--config-dir", "-cd", "hydra.searchpath")
 """Options that add folders of the user, whose files are not known here."""
 SCHEMA = "base_"
@@ -51,7 +51,7 @@ _LARGEST_WHOLE = 10**15
 
 
 def composed(command: str, conf: Path, typed: Sequence[str]) -> DictConfig:
-    """Compose the settings of a command, the name of a file in `conf`."""
+    """Compose the settings of a command; its name is that of a file in `conf`."""
     GlobalHydra.instance().clear()
     with initialize_config_dir(str(conf), version_base="1.3"):
         return compose(command, [*typed], return_hydra_config=True)

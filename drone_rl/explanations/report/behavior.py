@@ -8,7 +8,7 @@ from drone_rl.evaluation.verdict_text import depends_on_rounding
 from drone_rl.explanations.report.explanation import Explanation, Figures, Part
 from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.robustness import charts
-from drone_rl.robustness.shifts_text import QUOTED, is_quoted, rows, untested
+from drone_rl.robustness.shifts_text import QUOTED, is_quoted, not_evaluated, rows
 from drone_rl.sim.vocabulary import shown_actions, terms_of
 from drone_rl.utils.schema import as_mapping
 from drone_rl.utils.text import (
@@ -64,7 +64,7 @@ def say_advice(evidence: Evidence) -> Claims:
 
 def say_scope(evidence: Evidence) -> Claims:
     """Say with which colours, light or sizes the policy was not evaluated."""
-    if not (names := untested(evidence)):
+    if not (names := not_evaluated(evidence)):
         return {}
     start = "The verdict holds for" if is_quoted(evidence) else "Tested in"
     return {

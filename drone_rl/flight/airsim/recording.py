@@ -40,8 +40,8 @@ class Recording:
         self._table.write(_COLUMNS)
         self._next = begin
 
-    def is_due(self, time: float) -> bool:
-        """Return whether rows of this simulated time are to be written, and note that they are."""
+    def take_turn(self, time: float) -> bool:
+        """Return whether rows of this simulated time are due; if so, the next are due later."""
         if time < self._next - 1e-9:
             return False
         self._next = time + INTERVAL

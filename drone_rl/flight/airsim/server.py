@@ -9,6 +9,7 @@ from drone_rl.flight.airsim.connection import MAX_CLIENTS, Connection
 from drone_rl.flight.airsim.lockstep import PATIENCE, SLICE, Lockstep
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
 
 _POLL = 0.05
 """Longest sleep, seconds."""
@@ -69,6 +70,8 @@ class AirsimServer:
                 f"port {port} of {host} can't be opened ({error.strerror}); stop the other server, "
                 "or give another port"
             ) from error
+        except UnicodeError as error:  # of a host that can't be a name in a network
+            raise InputError(f"address={shown(host)} is no address; give 127.0.0.1") from error
 
     async def serve(self) -> None:
         """Advance simulated time until cancelled."""

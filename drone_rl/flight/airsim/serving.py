@@ -11,7 +11,6 @@ from drone_rl.flight.airsim.lockstep import PATIENCE
 from drone_rl.flight.airsim.server import AirsimServer
 from drone_rl.flight.airsim.settings_file import AirsimSettings, parse_settings, read_settings
 from drone_rl.flight.airsim.simulation import CLOCKS, Simulation
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import OneOf, Real, Whole
 
 _log = logging.getLogger(__name__)
@@ -37,6 +36,8 @@ class RunningServer:
         self._thread.start()
         self._ready.wait()
         if self._error is not None:
+            self._thread.join()
+            simulation.close()
             raise self._error
 
     def __enter__(self) -> Self:
@@ -59,11 +60,11 @@ class RunningServer:
 
     async def _serve(self, host: str, port: int) -> None:
         self._loop, self._task = asyncio.get_running_loop(), asyncio.current_task()
-        server = AirsimServer(self.simulation, self._patience)
         try:
+            server = AirsimServer(self.simulation, self._patience)
             await server.start(host, port)
             self.address = server.address
-        except InputError as error:
+        except Exception as error:  # raised again in the thread that started this one
             self._error = error
             return
         finally:
@@ -89,10 +90,11 @@ def serve(
     ...     client = airsim.MultirotorClient(port=server.address[1])
 
     Args:
-        settings: Path of a settings.json, or its content; by default one multirotor.
+        settings: Path of a settings.json, or parsed settings; by default one multirotor.
         scene: cubes, blocks, pillars, empty, or the path of an MJCF file.
         clock: "wall", or "lockstep", in which time passes only while a call waits for it.
-        patience_s: Seconds without a request after which time passes in lockstep.
+        patience_s: Real seconds without a request before time advances for a waiting call in
+            lockstep.
         address: Address to listen at; that of the settings by default.
         port: Port; that of the settings by default, and 0 for a free one.
         seed: Of placements, gusts and sensor noise.

@@ -278,7 +278,7 @@ class Simulation:
             self._record()
 
     def _record(self) -> None:
-        if self.recording is None or not self.recording.is_due(self.time):
+        if self.recording is None or not self.recording.take_turn(self.time):
             return
         for name, vehicle in self.vehicles.items():
             camera = self.cameras[name]["front_center"]

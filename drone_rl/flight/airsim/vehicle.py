@@ -15,13 +15,13 @@ from drone_rl.utils.errors import InputError
 
 LONGEST = 1e6
 """Longest timeout in seconds; clients send up to 3e38."""
-_UNITS = 180.0 / math.pi
+_DEGREES = 180.0 / math.pi
 
 
 class Vehicle(Airframe):
     """One vehicle and its commands. Values are in NED, relative to the start pose; radians.
 
-    Movements return a `FlightFuture`, or None where API control is off, which refuses them.
+    Movements return a `FlightFuture`, or None if API control is off: the movement is refused.
     """
 
     def allow(self, enable: bool) -> None:
@@ -185,11 +185,13 @@ class Vehicle(Airframe):
         """Hold angles, radians."""
         turn: dict[str, Any] = {}
         if yaw is not None:
-            turn["yaw"] = yaw * _UNITS
+            turn["yaw"] = yaw * _DEGREES
         if yaw_rate is not None:
-            turn["yaw_rate"] = yaw_rate * _UNITS
+            turn["yaw_rate"] = yaw_rate * _DEGREES
         lift = {"z": self._height(z)} if z is not None else {"throttle": throttle}
-        return self._moved("move_by_angle", roll * _UNITS, pitch * _UNITS, seconds, **turn, **lift)
+        return self._moved(
+            "move_by_angle", roll * _DEGREES, pitch * _DEGREES, seconds, **turn, **lift
+        )
 
     def spin(
         self,
@@ -201,7 +203,7 @@ class Vehicle(Airframe):
     ) -> FlightFuture | None:
         """Hold body rates, radians per second."""
         lift = {"z": self._height(z)} if z is not None else {"throttle": throttle}
-        degrees = [rate * _UNITS for rate in rates]
+        degrees = [rate * _DEGREES for rate in rates]
         return self._moved("move_by_rates", *degrees, seconds, **lift)
 
     def set_rotors(self, shares: Sequence[float], seconds: float) -> FlightFuture | None:
@@ -211,7 +213,7 @@ class Vehicle(Airframe):
     def move_manually(
         self, vx: float, vy: float, z: float, seconds: float, drivetrain: str, yaw: YawMode
     ) -> FlightFuture | None:
-        """Follow the sticks; `z` is the height of full throttle."""
+        """Follow the sticks; `-z` is the goal's height above the drone at full throttle."""
         return self._moved(
             "move_by_manual",
             *(vx, vy, max(0.0, -z), seconds),
@@ -238,5 +240,5 @@ class Vehicle(Airframe):
 
 
 def _limit(timeout: float) -> float:
-    """Return a timeout that a pilot takes; negative ones have passed."""
+    """Return a timeout that a pilot accepts; a negative one becomes 0."""
     return min(max(timeout, 0.0), LONGEST)

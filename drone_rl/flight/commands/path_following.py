@@ -29,6 +29,7 @@ AUTOMATIC = -1.0
 _TAKEOFF_MARGIN = 0.1
 """A take-off is complete this far below its height, metres. Wind may shift it sideways."""
 _PERIODS_AHEAD = 30.0
+"""Lookahead in control periods if it adapts to the speed."""
 _PERIODS_AHEAD_FIXED = 40.0
 """Lookahead in control periods if it does not adapt."""
 _SLOWEST = 0.6
@@ -63,7 +64,7 @@ class YawMode:
 
 
 class YawControl:
-    """Computes the heading goal, the third of four, in each control period."""
+    """Computes the heading goal, the third of the four `Goals.values`, in each control period."""
 
     def __init__(
         self,
@@ -73,8 +74,8 @@ class YawControl:
     ) -> None:
         """Take the state at the start, a `Drivetrain` and a `YawMode`.
 
-        By default the drone faces its direction of travel with `Drivetrain.FORWARD_ONLY`, which no
-        rate may be combined with, and else holds its heading.
+        By default the drone holds its heading or, with `Drivetrain.FORWARD_ONLY`, faces its
+        direction of travel; the latter can't be combined with a rate.
         """
         drivetrain = OneOf(tuple(Drivetrain)).read(drivetrain, "drivetrain")
         self.is_forward = drivetrain == Drivetrain.FORWARD_ONLY
@@ -160,7 +161,7 @@ class PathCommand(Command):
         return Goals(modes, values, drift)
 
     def is_complete(self, body: FlightState) -> Tensor:
-        """Return which drones are near the last point, with no other waypoint before it."""
+        """Return which drones are near the last point, with the end of the path in lookahead."""
         is_last = self.along + self._ahead >= self.paths.lengths
         return is_last & ((self.paths.ends - body.position).norm(dim=-1) <= ACCURACY)
 
@@ -177,7 +178,7 @@ class PathCommand(Command):
         return torch.minimum(left / self.braking, self.speed)
 
     def _left(self, body: FlightState) -> Tensor:
-        """Return the distance to the end along the path or, beyond the end, back to it."""
+        """Return the distance to the end along the path, near it at least the straight distance."""
         beyond = (self.paths.ends - body.position).norm(dim=-1)
         left = self.paths.lengths - self.along
         return torch.where(left > self._ahead, left, torch.maximum(left, beyond))
@@ -217,7 +218,7 @@ class GoHomeCommand(Command):
         if bool(there.all()):
             self._landing = Land(body, self.limit)
             self._landing.reference[:] = self._path.rest(body)
-        return there & False
+        return torch.zeros_like(there)
 
 
 def lookahead_of(speed: float, lookahead: float = AUTOMATIC, adaptive: float = 1.0) -> float:
@@ -290,7 +291,7 @@ def direction_at(paths: Paths, along: Tensor) -> Tensor:
 
 
 def nearest(paths: Paths, position: Tensor, first: Tensor, last: Tensor) -> Tensor:
-    """Return the arc lengths of the nearest points, between `first` and `last`, at least `first`.
+    """Return the arc lengths of the nearest points between `first` and `last`.
 
     Shapes: (num_envs, 3) of the position, else (num_envs,).
     """

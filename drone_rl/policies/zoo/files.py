@@ -102,8 +102,8 @@ def read_policy(path: Path) -> dict[str, Any]:
 
     Returns:
         "description" (see `drone_rl.policies.zoo.parse`), "policy" (the weights), "progress" and
-        "provenance"; of an exported file also "command" and what `export_policy` was given,
-        unless it is old; of a checkpoint all of its state.
+        "provenance"; of an exported file also "command" and what `export_policy` was given
+        (not in files of old versions); of a checkpoint all of its state.
 
     Raises:
         InputError: The file is missing, damaged or something else.

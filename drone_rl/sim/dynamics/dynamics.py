@@ -42,7 +42,7 @@ class Dynamics(Protocol):
     ) -> BodyState:
         """Return the drones a control step later; `body` stays as it is.
 
-        `action` is one of `actions` for each, shape (num_envs,), then that of `actions.entry`.
+        `action` is one of `actions` for each; shape (num_envs, *actions.entry.shape).
         `obstacles` are given if `needs_obstacles` and there are any.
         """
         ...
@@ -99,10 +99,11 @@ def make_dynamics(
     dynamics: DynamicsSettings | Dynamics | None = None,
     actions: ActionSettings | None = None,
 ) -> Dynamics:
-    """Return dynamics, or those of settings: computer-vision mode and moves by default.
+    """Return the given dynamics, or build them from settings.
 
-    `default` makes those of moves in computer-vision mode, such as `Task.make_dynamics`. Raises an
-    `InputError` if both dynamics and settings of actions are given, or they don't fit each other.
+    `default` builds the task's dynamics for discrete moves in computer-vision mode, which are those
+    without settings. Raises an `InputError` if both dynamics and settings of actions are given, or
+    they don't fit each other.
     """
     if dynamics is not None and not isinstance(dynamics, DynamicsSettings):
         if actions is not None:

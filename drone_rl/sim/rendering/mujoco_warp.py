@@ -62,7 +62,7 @@ class WarpRenderer:
     def render(
         self, view: View, poses: Poses, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
-        """See `Renderer.render`; appearances may have flat colours and light only."""
+        """See `Renderer.render`; appearances may not have fog, shadows or textures."""
         if appearance is not None and not _is_supported(appearance):
             raise InputError(
                 "fog, shadows, textures, a sky of two colours, an exposure and other fields of "
@@ -180,7 +180,7 @@ class Shard:
 
 
 class ModelAppearance:
-    """Writes an appearance into MuJoCo Warp's model, and restores the model afterwards."""
+    """Writes an appearance into MuJoCo Warp's model; restores the model before the next one."""
 
     def __init__(self, scene: Scene, model: Any, capacity: int) -> None:
         """Give each of `capacity` environments its own values in an `mjw.Model`."""

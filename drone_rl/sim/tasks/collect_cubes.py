@@ -66,7 +66,7 @@ class CubeGoals(Goals):
     lateral: Tensor  # (n, C) float64
     """Metres to the left of the drone at which each became the next one; NaN if it never did."""
     height: Tensor  # (n, C) float64
-    """Metres by which each stands higher than the drone."""
+    """Metres by which each stands higher than the drone at the start of the episode."""
 
 
 class CollectCubes(PropTask[WorldState]):
@@ -217,7 +217,7 @@ class CollectCubes(PropTask[WorldState]):
             stratum=info["side"],
             world=info["cube_positions"].flatten(1),
             lateral=info["lateral"],
-            height=(info["cube_positions"][..., 2] - info["drone"][:, None, 2]).double(),
+            height=info["cube_positions"][..., 2].double() - self.settings.altitude,
         )
 
     def classes(self, goals: CubeGoals) -> Iterator[tuple[str, str, Tensor]]:
@@ -320,6 +320,8 @@ class CollectCubes(PropTask[WorldState]):
         away = place_in_view(draw[..., :2], camera, nearest, s.first_distance, widest)
         up = (2 * draw[..., 2:] - 1) * s.vertical_bound
         cubes = state.drone[:, None] + torch.cat([away, up], -1).to(state.drone)
+        nearest_first = cubes[..., :1].argsort(1).expand_as(cubes)
+        cubes = cubes.gather(1, nearest_first)
         standing = torch.zeros_like(state.passed)
         return dataclasses.replace(state, cubes=cubes, passed=standing, collected=standing.clone())
 
@@ -330,7 +332,8 @@ register_task(TaskSettings, CollectCubes)
 class FailureReplayTask(CollectCubes):
     """Cube collection in which a fraction of the episodes have their cubes in given boxes.
 
-    Every episode samples as many numbers from the environment's stream, so that resuming is exact.
+    Every episode takes the same number of random numbers from the environment's stream, in a box or
+    not, so that resuming is exact.
     """
 
     def __init__(self, settings: TaskSettings, boxes: NDArray[np.float64], share: float) -> None:
@@ -343,12 +346,17 @@ class FailureReplayTask(CollectCubes):
         boxes = np.asarray(boxes, np.float64)
         if boxes.shape != (len(boxes), settings.num_cubes, 2) or not len(boxes):
             raise InputError(
-                f"boxes of shape {boxes.shape} are none to draw {settings.num_cubes} cubes from; "
-                f"give at least one, of shape (N, {settings.num_cubes}, 2)"
+                f"boxes has shape {boxes.shape}; give shape (N, {settings.num_cubes}, 2), N at "
+                "least 1"
             )
         bound = settings.lateral_bound
-        if not (boxes[..., 0] <= boxes[..., 1]).all() or np.abs(boxes).max() > bound:
-            raise InputError(f"boxes reach beyond {bound} m to either side; give such within")
+        if not (boxes[..., 0] <= boxes[..., 1]).all():
+            raise InputError("a box has its lower bound above its upper one; give (lower, upper)")
+        if np.abs(boxes).max() > bound:
+            raise InputError(
+                f"boxes extend to {np.abs(boxes).max():g} m; give bounds within {bound:g} m to "
+                "either side"
+            )
         self.boxes, self.share = boxes, share
 
     def sample(self, random_state: np.random.RandomState) -> Tensor:

@@ -28,6 +28,7 @@ FORMAT = "drone_rl certificate"
 FORMAT_VERSION = 1
 _COUNTS = ("num_states", "num_images", "most_boxes", "least_gap", "largest_band", "decided")
 _BOX_SETS = ("waiting", "ended", "ways", "forked", "parts", "part", "done", "undecided")
+"""Names in files, a part of their format."""
 _DAMAGE = (ValueError, TypeError, LookupError, ArithmeticError, AttributeError)  # of damaged files
 _MAX_INTEGER = 2**40  # in a row
 _UNKNOWN = (-1, 0, 0)  # row of an unknown ending

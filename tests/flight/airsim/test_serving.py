@@ -3,7 +3,22 @@
 import pytest
 
 from drone_rl.flight.airsim.serving import serve
+from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.utils.errors import InputError
+
+
+def test_a_host_that_is_no_name_is_one_error():
+    with pytest.raises(InputError, match=r"address='aaaa.* is no address; give 127\.0\.0\.1"):
+        serve(scene="empty", port=0, address="a" * 70)
+
+
+def test_any_error_of_the_start_reaches_the_caller_and_closes_the_simulation(monkeypatch):
+    closed = []
+    monkeypatch.setattr(Simulation, "close", lambda self: closed.append(self))
+    monkeypatch.setattr("drone_rl.flight.airsim.serving.AirsimServer", None)
+    with pytest.raises(TypeError, match="not callable"):
+        serve(scene="empty", port=0)
+    assert len(closed) == 1
 
 
 def test_a_port_in_use_is_one_error():

@@ -32,7 +32,7 @@ def test_settings_one_by_one():
     [
         ({"wind": [math.nan, 0, 0]}, "wind"),
         ({"mass": -1}, "mass=-1"),
-        ({"mass": 3}, "can't hover"),
+        ({"mass": 3}, "too small to control"),
         ({"wings": 2}, "wings is unknown"),
         ({"start": (0, 0, 5)}, r"start=\(0, 0, 5\) is invalid; give 2 numbers"),
         ({"start": 5}, "start=5 is invalid"),

@@ -256,7 +256,11 @@ def test_dynamics_and_actions_are_written_unless_default():
     [
         ("dynamics", {"mode": "simple_flight"}, r"dynamics\.camera_mount is missing"),
         ("dynamics", {**FLIGHT.values(), "mass": -1.0}, r"dynamics\.mass=-1\.0"),
-        ("dynamics", {**FLIGHT.values(), "mass": 50.0}, r"dynamics\.rotor_thrust=.*can't hover"),
+        (
+            "dynamics",
+            {**FLIGHT.values(), "mass": 50.0},
+            r"dynamics\.rotor_thrust=.*too small to control",
+        ),
         ("dynamics", {**FLIGHT.values(), "inertia": [1.0, 1.0, 3.0]}, r"dynamics\.inertia="),
         ("dynamics", {**COMPUTER_VISION.values(), "gusts": 1.0}, r"dynamics\.gusts=1\.0 moves"),
         ("dynamics", {**FLIGHT.values(), "_target_": "os.system"}, "'_target_' is unknown"),

@@ -59,6 +59,7 @@ def test_elsewhere_places_cubes_at_valid_positions():
     state.collected[:, 0] = True
     moved = CollectCubes(task).elsewhere(state, camera, torch.Generator().manual_seed(0))
     assert moved.present.all() and state.collected[:, 0].all()
+    assert (moved.cubes[..., 0].diff(dim=1) >= 0).all()  # as in every state, the nearest first
     ahead, aside, up = (moved.cubes - state.drone[:, None]).flatten(0, 1).unbind(-1)
     nearest, edge = 1.65 + 2.5, math.tan(math.radians(camera.horizontal_fov / 2))
     assert nearest <= ahead.min() < nearest + 0.5 and 14.5 < ahead.max() <= 15.0

@@ -74,10 +74,13 @@ def test_inflated_boxes_stay_within_the_placements():
 @pytest.mark.parametrize(
     ("boxes", "message"),
     [
-        (np.empty((0, 2, 2)), r"boxes of shape \(0, 2, 2\) are none to draw 2 cubes from"),
-        (np.zeros((1, 3, 2)), r"boxes of shape \(1, 3, 2\) are none"),
-        (np.full((1, 2, 2), 6.5), r"boxes reach beyond 6.0 m to either side"),
-        (np.array([[[1.0, 0.0], [0.0, 1.0]]]), "boxes reach beyond"),
+        (np.empty((0, 2, 2)), r"boxes has shape \(0, 2, 2\); give shape \(N, 2, 2\), N at least 1"),
+        (np.zeros((1, 3, 2)), r"boxes has shape \(1, 3, 2\)"),
+        (np.full((1, 2, 2), 6.5), r"boxes extend to 6.5 m; give bounds within 6 m"),
+        (
+            np.array([[[1.0, 0.0], [0.0, 1.0]]]),
+            r"lower bound above its upper one; give \(lower, upper\)",
+        ),
     ],
 )
 def test_invalid_boxes_raise(boxes, message):
