@@ -146,7 +146,7 @@ def load_exported(path: Path) -> dict[str, Any]:
     try:
         return _exported(content)
     except InputError as error:
-        raise InputError(f"policy {path} can't be read: {error}; export it again") from None
+        raise InputError(f"policy {path} can't be read: {error}; give one that drone-rl export wrote") from None
 
 
 def _exported(content: bytes) -> dict[str, Any]:
@@ -156,7 +156,7 @@ def _exported(content: bytes) -> dict[str, Any]:
     header = as_mapping(parse_json(content[8 : 8 + size], "its header"), "header")
     metadata = as_mapping(header.get("__metadata__", {}), "metadata")
     if metadata.get("format") != FORMAT:
-        raise InputError("it is not a drone_rl policy; use one that drone-rl export wrote")
+        raise InputError("it is not one of drone_rl")
     for name in header.keys() - {"__metadata__"}:
         entry = as_mapping(header[name], name)
         if entry.keys() != _ENTRY:
