@@ -156,7 +156,7 @@ def _exported(content: bytes) -> dict[str, Any]:
     header = as_mapping(parse_json(content[8 : 8 + size], "its header"), "header")
     metadata = as_mapping(header.get("__metadata__", {}), "metadata")
     if metadata.get("format") != FORMAT:
-        raise InputError("it is not one of drone_rl")
+        raise InputError("it is not a drone_rl policy")
     for name in header.keys() - {"__metadata__"}:
         entry = as_mapping(header[name], name)
         if entry.keys() != _ENTRY:
