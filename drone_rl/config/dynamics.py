@@ -128,7 +128,7 @@ class DynamicsSettings(Settings):
             name, value = ("wind", list(self.wind)) if any(self.wind) else ("gusts", self.gusts)
             raise InputError(
                 f"dynamics.{name}={value} moves nothing in computer-vision mode; give "
-                "dynamics.mode=simple_flight, too"
+                'dynamics=quadrotor, too (in Python mode="simple_flight")'
             )
 
 

@@ -39,6 +39,11 @@ class BaseTaskSettings(Settings):
     name: ClassVar[str]
     """Name of the task in files."""
 
+    @classmethod
+    def from_name(cls, name: str, where: str) -> "BaseTaskSettings":
+        """Return the default settings of a task by its name; see `Instance`."""
+        return settings_of(name, where)()
+
     @property
     def things(self) -> ObjectRegion | None:
         """Positions of targets and obstacles; None if unknown."""
@@ -65,8 +70,11 @@ def add_task(settings: S) -> S:
 def settings_of(name: object, where: str = "task.name") -> type[BaseTaskSettings]:
     """Return the class of a task's settings; `where` is the setting's name for messages."""
     if not isinstance(name, str) or name not in TASKS:
-        known = ", ".join(TASKS) + did_you_mean(name, TASKS)
-        raise InputError(f"{where}={shown(name)} is unknown; valid names: {known}")
+        known, meant = ", ".join(TASKS), did_you_mean(name, TASKS)
+        raise InputError(
+            f"{where}={shown(name)} is unknown; valid names: {known}; if a module of yours "
+            f"registers it, add plugins=[MODULE], or import it in Python{meant}"
+        )
     return TASKS[name]
 
 

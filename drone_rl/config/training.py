@@ -180,6 +180,11 @@ class Logger(Variant):
                 f"logger _target_={self.target} can't be made ({error}); install the package that "
                 f"it needs{remedy}, or choose another logger"
             ) from error
+        except (TypeError, ValueError) as error:  # an argument is missing, unknown or wrong
+            raise InputError(
+                f"logger _target_={self.target} can't be made ({error}); give its arguments as in "
+                "+logger.NAME.exp_name=first"
+            ) from error
 
 
 class Tensorboard(Logger, target="torchrl.record.loggers.tensorboard.TensorboardLogger"):

@@ -25,6 +25,7 @@ from drone_rl.sim.tasks import Task, as_task
 from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import Stream, get_state, set_state, side_stream, world_random_state
 
 
@@ -77,8 +78,7 @@ class DroneEnv(EnvBase):
             InputError: A setting is out of range, a texture can't be read, there is no room for
                 the camera or for distractors, or `actions` are given with dynamics that have some.
         """
-        if not (isinstance(num_envs, int) and num_envs >= 1):
-            raise InputError(f"num_envs={num_envs} is out of range; give a whole number from 1")
+        Whole(1).read(num_envs, "num_envs")
         check_device(device)
         super().__init__(device=torch.device(device), batch_size=torch.Size([num_envs]))
         task = as_task(task)

@@ -30,6 +30,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import seed_line
 from drone_rl.verdicts.certificate import find_claim
@@ -109,8 +110,7 @@ def explain(
         InputError: A policy or a setting is unusable.
     """
     settings, seed = with_seed((settings or ExplainSettings()).replace(**changes))
-    if num_envs < 1:
-        raise InputError(f"num_envs={num_envs} is out of range; give 1 or more")
+    Whole(1).read(num_envs, "num_envs")
     chosen = _named(policies)
     folder, progress = Path(folder), progress or Bar()
     folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(chosen)}

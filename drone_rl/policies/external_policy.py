@@ -29,6 +29,7 @@ from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
 from drone_rl.utils.settings import Settings, prefixed_errors
 
 
@@ -150,6 +151,12 @@ def policy_from(
         raise InputError(
             f"policy_from got a {type(logits).__name__}; give a callable from images to logits"
         )
+    for i, transform in enumerate(transforms or ()):
+        if not isinstance(transform, Transform):
+            raise InputError(
+                f"transforms[{i}]={shown(transform)} is no transform; give settings such as "
+                "drone_rl.config.transforms.Rgb()"
+            )
     policy = ExternalPolicy(
         name=name or getattr(logits, "__name__", type(logits).__name__),
         logits=logits,

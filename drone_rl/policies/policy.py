@@ -249,7 +249,14 @@ class Policy(BasePolicy):
         Returns:
             The index of the action, or the values of a continuous one.
         """
-        action = self.act_batch(torch.as_tensor(image)[None])[0].numpy()
+        image, camera = torch.as_tensor(image), self.description.camera
+        size = (camera.height, camera.width, 3)
+        if image.dtype != torch.uint8 or image.shape != size:
+            raise InputError(
+                f"an image of shape {tuple(image.shape)} and type {image.dtype} does not fit the "
+                f"policy's camera; give one uint8 image of shape {size}; act_batch takes several"
+            )
+        action = self.act_batch(image[None])[0].numpy()
         return action if action.ndim else int(action)
 
     @torch.no_grad()

@@ -19,8 +19,8 @@ from drone_rl.flight.in_the_loop.dynamics import InTheLoopDynamics
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import RootSeed, root_seed
 from drone_rl.utils.text import LOOPED, interval, say, seed_line
 
@@ -111,8 +111,7 @@ def evaluate_in_the_loop(
         InputError: The policy or a number is unusable, or no firmware was built.
         FlightControllerError: The firmware failed, or the machine was too busy for it.
     """
-    if not (isinstance(flights, int) and flights >= 1):
-        raise InputError(f"flights={flights} is out of range; give a whole number from 1")
+    Whole(1).read(flights, "flights")
     progress, loaded = progress or Bar(), as_policy(policy, outputs)
     root = drawn_seed or root_seed(seed)
     program = find_firmware(firmware)

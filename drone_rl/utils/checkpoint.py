@@ -53,6 +53,10 @@ _INSTRUCTIONS = {
 }
 
 
+_ZIP = b"PK"
+"""First bytes of a checkpoint."""
+
+
 class DamagedError(ValueError):
     """The file is damaged or cut short."""
 
@@ -211,8 +215,14 @@ def load_checkpoint(path: str | Path) -> dict[str, Any]:
     if not path.exists():
         raise InputError(f"checkpoint {path} does not exist; give the path of a .pt file")
     content = read_bytes(path, CHECKPOINT_BYTES)
+    if path.suffix != ".pt" and not content.startswith(_ZIP):
+        raise InputError(
+            f"{path} is no policy file; give a .pt or .safetensors file or a run's folder"
+        )
     try:
         state = unpickle(content, f"checkpoint {path}")
+    except InputError:
+        raise
     except ForeignError as error:
         raise InputError(
             f"checkpoint {path} holds more than tensors and plain values ({error}) and was not "

@@ -41,6 +41,8 @@ class Whole:
 
     def read(self, value: Any, where: str) -> int:
         """See `Kind`."""
+        if isinstance(value, str):
+            raise InputError(f"{where}={shown(value)} is a text; give {self.words}")
         if type(value) is not int or not self.low <= value <= self.high:
             raise InputError(f"{where}={shown(value)} is out of range; give {self.words}")
         return value
@@ -68,6 +70,8 @@ class Real:
 
     def read(self, value: Any, where: str) -> float:
         """See `Kind`."""
+        if isinstance(value, str):
+            raise InputError(f"{where}={shown(value)} is a text; give {self.words}")
         if type(value) not in (int, float) or not self._holds(value):
             raise InputError(f"{where}={shown(value)} is out of range; give {self.words}")
         return float(value)
@@ -125,10 +129,13 @@ class Instance:
 
     def read(self, value: Any, where: str) -> Any:
         """See `Kind`; a class with `from_name` accepts names."""
+        if value == "???":  # OmegaConf's mark of a setting that was removed
+            raise InputError(f"{where} is missing; give {where}=NAME")
         if isinstance(value, str) and hasattr(self.of, "from_name"):
             return self.of.from_name(value, where)
         if not isinstance(value, self.of):
-            raise InputError(f"{where}={shown(value)} is no {self.of.__name__}; give one")
+            name = self.of.__name__
+            raise InputError(f"{where}={shown(value)} is no {name}; give {name}(...)")
         return value
 
 
@@ -196,10 +203,18 @@ class Several:
         """See `Kind`."""
         if not isinstance(value, list | tuple) or not self.least <= len(value) <= self.most:
             raise InputError(
-                f"{where}={shown(value)} is out of range; give a list of {self.least} to "
-                f"{self.most} values"
+                f"{where}={self._shown(value)} does not fit; give a list of {self._count} values"
             )
         return tuple(self.kind.read(item, f"{where}[{i}]") for i, item in enumerate(value))
+
+    @property
+    def _count(self) -> str:
+        return f"{self.least}" if self.least == self.most else f"{self.least} to {self.most}"
+
+    @staticmethod
+    def _shown(value: Any) -> str:
+        is_short = isinstance(value, list | tuple) and len(value) <= 8
+        return f"[{','.join(map(shown, value))}]" if is_short else shown(value)
 
 
 @dataclasses.dataclass(frozen=True)

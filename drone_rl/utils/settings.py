@@ -64,6 +64,7 @@ class Settings(_Frozen):
         dataclasses.dataclass(frozen=True, kw_only=True)(cls)
         for name, field in fields.items():
             setattr(cls, name, field)
+        _refuse_unknown_names(cls)
         if not cls.__dataclass_fields__.keys().isdisjoint(_FORMER_FIELDS.values()):
             _accept_former_names(cls)
         del cls.__setattr__, cls.__delattr__
@@ -144,6 +145,21 @@ def _current_value(name: str, hint: Any, value: Any) -> Any:
     if "_target_" in value:
         value = {**value, "_target_": _current_value(name, str, value["_target_"])}
     return current_names(hint, value) if issubclass(hint, Settings) else value
+
+
+def _refuse_unknown_names(cls: type[Settings]) -> None:
+    """Let the constructor of a class raise an `InputError` for names that it does not have."""
+    construct = cls.__init__
+
+    @functools.wraps(construct)
+    def checked(self: Settings, *args: Any, **given: Any) -> None:
+        try:
+            construct(self, *args, **given)
+        except TypeError:
+            check_names(type(self), given)
+            raise
+
+    setattr(cls, "__init__", checked)  # noqa: B010
 
 
 def _accept_former_names(cls: type[Settings]) -> None:

@@ -149,3 +149,23 @@ def test_a_span_is_a_value_or_two_in_order():
     for kind, value in ((Real(0.0), [2, 1]), (Several(Real(0.0), 2, 2), [[1, 2], [3, 1]])):
         with pytest.raises(InputError, match="x goes from 2 to 1, which is less"):
             Span(kind).read(value, "x")
+
+
+def test_texts_are_no_numbers():
+    for kind in (Whole(1), Real(0.0)):
+        with pytest.raises(InputError, match=r"^n='1' is a text; give a (whole )?number"):
+            kind.read("1", "n")
+
+
+def test_lists_of_a_wrong_length_are_shown():
+    with pytest.raises(InputError, match=r"^wind=\[5\] does not fit; give a list of 3 values"):
+        Several(Real(0.0), 3, 3).read([5], "wind")
+    with pytest.raises(InputError, match=r"^x=\(list\) does not fit; give a list of 1 to 3 values"):
+        Several(Real(0.0), 1, 3).read([0] * 9, "x")
+
+
+def test_missing_settings_and_other_objects_are_named():
+    with pytest.raises(InputError, match=r"^task is missing; give task=NAME"):
+        Instance(Whole).read("???", "task")
+    with pytest.raises(InputError, match=r"^x=3 is no Whole; give Whole\(\.\.\.\)"):
+        Instance(Whole).read(3, "x")

@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 import pytest
 
+import drone_rl
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Several, Text, Whole
 from drone_rl.utils.settings import Settings, kinds_of, plain, prefixed_errors, snake_case, types_of
@@ -120,3 +121,18 @@ def test_names_of_files_and_plain_values():
     assert [snake_case(c) for c in (Inner, Outer)] == ["inner", "outer"]
     assert snake_case(type("SmallCnn", (), {})) == "small_cnn"
     assert plain({"a": (1, (2,)), "b": Inner()}) == {"a": [1, [2]], "b": {"x": 1}}
+
+
+def test_unknown_names_of_a_class_are_refused_with_the_known_ones():
+    with pytest.raises(InputError, match=r"^num_cube is unknown; .*; did you mean num_cubes\?$"):
+        drone_rl.TaskSettings(num_cube=2)  # pyright: ignore[reportCallIssue]
+    with pytest.raises(TypeError, match="positional"):
+        drone_rl.TaskSettings(2)  # pyright: ignore[reportCallIssue]
+
+
+def test_a_task_may_be_given_by_its_name():
+    assert drone_rl.TrainSettings(task="pillars").task == drone_rl.PillarsSettings()  # pyright: ignore[reportArgumentType]
+    with pytest.raises(
+        InputError, match=r"^task='pillar' is unknown.*plugins=\[MODULE\].*pillars\?"
+    ):
+        drone_rl.TrainSettings(task="pillar")  # pyright: ignore[reportArgumentType]

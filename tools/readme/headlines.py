@@ -32,7 +32,7 @@ HEADLINES = (
     Row(
         "render",
         "Rendering speed at 25x64 pixels relative to MuJoCo Warp, same CPU",
-        lambda f: f"{next(iter(f['render_over_warp'].values())):.1f}",
+        lambda f: f"{next(iter(f['render_over_warp'].values())):.1f} times",
     ),
     Row(
         "gamed",

@@ -25,7 +25,13 @@ from omegaconf.errors import OmegaConfBaseException
 
 from drone_rl.cli.hydra.help import next_steps, show_help
 from drone_rl.cli.hydra.messages import input_error, is_output_closed, one_line
-from drone_rl.cli.hydra.mistakes import check_choices, explain, whole_numbers
+from drone_rl.cli.hydra.mistakes import (
+    check_choices,
+    check_launcher,
+    explain,
+    repeated,
+    whole_numbers,
+)
 from drone_rl.cli.hydra.words import check_words
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config import (
@@ -211,6 +217,11 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     import_plugins(overrides)
     register_schemas(**{name: command})
     check_choices(overrides, conf_dir())
+    check_launcher(name, overrides)
+    if "hydra.mode=RUN" not in overrides:  # else a sweep starts it
+        for override in repeated(words):
+            counts = f"{override.partition('=')[0]} is given several times; {override} counts"
+            print(f"warning: {counts}", file=sys.stderr)
     if is_help:
         with _explained(name, overrides):
             show_help(name, conf_dir(), overrides, command, is_all=is_all)

@@ -189,7 +189,8 @@ def _outcome(run: Run) -> str:
     result = read_result(run.folder)
     if result is None:
         return f"failed: {read_failure(run) or 'reason unknown'}"
-    return f"{result['reason']}, running reward {_number(result.get('running_reward'))}"
+    reward = _number(result.get("running_reward"))
+    return f"{result['reason']}, running reward {'none' if reward is None else f'{reward:.3f}'}"
 
 
 def _number(value: object) -> float | None:

@@ -102,6 +102,23 @@ def check_choices(overrides: Sequence[str], conf: Path) -> None:
                 )
 
 
+def check_launcher(command: str, overrides: Sequence[str]) -> None:
+    """Raise an `InputError` for a launcher or sweeper that a single run ignores."""
+    if is_sweep(overrides) or any(o.startswith(("resume=", "hydra.mode=")) for o in overrides):
+        return
+    for override in overrides:
+        if override.startswith(("hydra/launcher=", "hydra/sweeper=")):
+            line = f"drone-rl {command.replace('_', '-')} -m {override}"
+            raise InputError(f"{override} has no effect on a single run; type {line}")
+
+
+def repeated(overrides: Sequence[str]) -> list[str]:
+    """Return the last one of each setting that is given several times: Hydra takes that one."""
+    last = {o.partition("=")[0].lstrip("+"): o for o in overrides if "=" in o}
+    names = [o.partition("=")[0].lstrip("+") for o in overrides if "=" in o]
+    return [override for name, override in last.items() if names.count(name) > 1]
+
+
 def closest(name: str, known: Sequence[str]) -> str | None:
     """Return the known name that was most likely meant, or None."""
     word = name.strip().lstrip("+~").replace("-", "_").lower()
@@ -143,13 +160,18 @@ class Command:
     def instead(self, name: str, value: str) -> str | None:
         """Return the override that was most likely meant."""
         ours = closest(name, self.keys)
+        if ours in self.groups and value not in ("", *choices(self.conf, ours)):
+            return None
         return ours if ours is None or "=" in ours else f"{ours}={value or 'VALUE'}"
 
     def unknown(self, override: str, name: str) -> InputError:
         """Return the error about a name that this command doesn't have."""
         value = override.partition("=")[2]
         text = f"{override}: drone-rl {self.name} has no setting {name}; "
-        group = name.rpartition(".")[0]
+        group, first = name.rpartition(".")[0], name.partition(".")[0]
+        if is_group(self.conf, first) and first not in (*self.groups, *self.keys):
+            cannot = f"drone-rl {self.name} can't change {first}"
+            return InputError(f"{override}: {cannot}; {self.list_all}")
         if group in self.groups and self.config[group] is None:
             offered = ", ".join(choices(self.conf, group))
             return InputError(
@@ -188,6 +210,9 @@ def explain(error: Exception, name: str, conf: Path, overrides: Sequence[str]) -
         return InputError(f"${{{key[1]}}} refers to a setting that does not exist; give a value")
     if not any(o.startswith(OWN_FOLDERS) for o in overrides):
         groups = [o for o in parsed if is_group(conf, o.key_or_group)]
+        own = Command(name, conf)
+        for override in (o for o in groups if o.key_or_group not in own.groups):
+            return own.unknown(str(override.input_line), override.key_or_group)
         alone = [f"{o.key_or_group}={o.value()}" for o in groups if isinstance(o.value(), str)]
         command = Command(name, conf, alone)
         for override in parsed:
@@ -289,7 +314,7 @@ def _wrong_value(config: DictConfig, key: str, value: Any, text: str, reason: st
     if isinstance(now, DictConfig):
         return InputError(f"{text}: {key} is a group of settings; type {key}.NAME=VALUE")
     if isinstance(now, ListConfig):
-        listed = [value] if isinstance(value, int | float) else ([*now] or [1, 2])
+        listed = [value, *now[1:]] if isinstance(value, int | float) else ([*now] or [1, 2])
         listed = str(listed).replace(" ", "").replace("'", "")
         return InputError(f"{text} has the wrong type; type a list such as {name}={listed}")
     if now is None:

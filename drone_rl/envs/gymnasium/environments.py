@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from drone_rl.envs.gymnasium.world_batch import METADATA, Chosen, WorldBatch, read_action
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Whole
 
 Info = dict[str, Any]
 Mask = NDArray[np.bool_]
@@ -48,8 +49,7 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         Raises:
             InputError: An option is unknown or out of range.
         """
-        if not (isinstance(num_envs, int) and num_envs >= 1):
-            raise InputError(f"num_envs={num_envs} is out of range; give a whole number from 1")
+        Whole(1).read(num_envs, "num_envs")
         self.mode = _mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.mode}
         self.batch = WorldBatch(num_envs, task, options)

@@ -146,7 +146,9 @@ def load_exported(path: Path) -> dict[str, Any]:
     try:
         return _exported(content)
     except InputError as error:
-        raise InputError(f"policy {path} can't be read: {error}; give one that drone-rl export wrote") from None
+        raise InputError(
+            f"policy {path} can't be read: {error}; give one that drone-rl export wrote"
+        ) from None
 
 
 def _exported(content: bytes) -> dict[str, Any]:

@@ -6,8 +6,17 @@ import pytest
 from hydra.errors import HydraException
 
 from drone_rl.cli.hydra.composition import conf_dir
-from drone_rl.cli.hydra.mistakes import OTHER_NAMES, Command, closest, explain, whole_numbers
+from drone_rl.cli.hydra.mistakes import (
+    OTHER_NAMES,
+    Command,
+    check_launcher,
+    closest,
+    explain,
+    repeated,
+    whole_numbers,
+)
 from drone_rl.cli.main import COMMANDS
+from drone_rl.utils.errors import InputError
 
 KNOWN = ("seed", "optimizer", "optimizer.lr", "task", "task.num_cubes", "hydra.run.dir", "device")
 
@@ -114,6 +123,37 @@ def test_whole_numbers_may_have_an_exponent(override, number):
 def test_what_is_wrong_and_what_to_type(override, message):
     found = said("objective=reinforce", override)
     assert re.search(message, found), found
+
+
+@pytest.mark.parametrize("override", ["camera=large", "camera.width=9", "+camera=large"])
+def test_groups_that_a_command_lacks_are_those_of_the_policy(override):
+    assert "drone-rl verdict can't change camera" in said(override, command="verdict")
+
+
+def test_suggested_choices_exist():
+    assert "did you mean" not in said("config=foo.yaml")
+    assert "did you mean experiment=smoke?" in said("config=smoke")
+
+
+def test_lists_of_numbers_are_offered_with_the_number_that_was_given():
+    assert "type a list such as dynamics.wind=[5,0.0,0.0]" in said("dynamics.wind=5")
+
+
+@pytest.mark.parametrize("word", ["hydra/launcher=slurm", "hydra/sweeper=optuna"])
+def test_what_a_single_run_ignores_is_refused(word):
+    with pytest.raises(
+        InputError, match=rf"{word} has no effect .*; type drone-rl train -m {word}"
+    ):
+        check_launcher("train", ["seed=1", word])
+    for others in (["-m"], ["sweep=seeds"], ["resume=latest"], ["hydra.mode=RUN"]):
+        check_launcher("train", [*others, word])
+
+
+def test_settings_that_are_given_twice():
+    assert repeated(["seed=1", "policy=good", "+seed=2", "-m", "policy=poor", "x=1"]) == [
+        "+seed=2",
+        "policy=poor",
+    ]
 
 
 def test_a_group_without_a_choice_has_no_settings():
