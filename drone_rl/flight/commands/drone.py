@@ -142,7 +142,7 @@ class Drone:
     @property
     def time(self) -> float:
         """Simulated seconds since the drone was created or last reset."""
-        return int(self.body.numbers[0, fs.TICKS].item()) * self.settings.tick
+        return int(self.body.numbers.numpy()[0, fs.TICKS]) * self.settings.tick
 
     @property
     def state(self) -> PilotState:
@@ -257,7 +257,7 @@ class Drone:
 
     @property
     def _is_lost(self) -> bool:
-        return self.body.numbers[0, fs.LOST].item() != 0.0
+        return bool(self.body.numbers.numpy()[0, fs.LOST])  # faster than an index of a tensor
 
     @property
     def _speed(self) -> float:
@@ -349,7 +349,7 @@ class Drone:
 
     def _update_landed(self) -> None:
         """Detect take-off and landing."""
-        row = self.body.numbers[0].tolist()
+        row = self.body.numbers.numpy()[0].tolist()
         pushes = sum(row[fs.ROTORS : fs.ROTORS + 4]) / 4 > _LEAST_THRUST
         if not self._is_flying:
             if pushes and abs(row[fs.VELOCITY + 2]) > _CLIMBS:

@@ -61,11 +61,10 @@ class Goals:
             if mode not in allowed:
                 known = ", ".join(m.name.lower() for m in allowed)
                 raise InputError(f"modes[{axis}]={mode!r} is unknown; give one of: {known}")
-        names = ", ".join(m.name.lower() for m in self.modes)
         if 0 < self.modes.count(Mode.ROTOR) < len(ALLOWED):
-            raise InputError(f"modes={names}: rotor is for all axes; give it to all or none")
+            raise InputError(f"modes={self._names}: rotor is for all axes; give it to all or none")
         if self.modes[X] != self.modes[Y]:
-            raise InputError(f"modes={names}: the first two go together; give both the same")
+            raise InputError(f"modes={self._names}: the first two go together; give both the same")
         if self.values.dim() != 2 or self.values.shape[1] != len(ALLOWED):
             raise InputError(
                 f"goals of shape {tuple(self.values.shape)} are not (num_envs, 4); give a number "
@@ -76,6 +75,10 @@ class Goals:
                 f"drift of shape {tuple(self.drift.shape)} is not that of the goals; give "
                 f"{tuple(self.values.shape)}"
             )
+
+    @property
+    def _names(self) -> str:
+        return ", ".join(mode.name.lower() for mode in self.modes)
 
     @property
     def drifts(self) -> Tensor:

@@ -116,6 +116,10 @@ class FlightState(BodyState):
         """Take all numbers, see `POSITION` and following. Shape: (num_envs, NUMBERS), float64."""
         self.numbers = numbers
 
+    def __len__(self) -> int:
+        """See `Batch`; asked for in every control period, so without a search for the entries."""
+        return self.numbers.shape[0]
+
     @classmethod
     def at_rest(
         cls, position: Tensor, attitude: Tensor | None = None, seeds: Tensor | None = None
