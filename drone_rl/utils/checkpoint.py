@@ -213,7 +213,7 @@ def load_checkpoint(path: str | Path) -> dict[str, Any]:
     """
     path = Path(path)
     if not path.exists():
-        raise InputError(f"checkpoint {path} does not exist; give the path of a .pt file")
+        raise InputError(f"checkpoint {path} does not exist; give a run's folder or a .pt file")
     content = read_bytes(path, CHECKPOINT_BYTES)
     if path.suffix != ".pt" and not content.startswith(_ZIP):
         raise InputError(

@@ -55,8 +55,8 @@ def say_places(evidence: Evidence) -> Claims:
         )
     if places["blind"] > 0:
         claims["places.blind"] = (
-            f"It is blind to {listed(blind)}: a turn is needed, and it goes "
-            f"{names[places['alone']]}, as without a cube. It may see the cube later."
+            f"It does not react to {listed(blind)}: a turn is needed, and it goes "
+            f"{names[places['alone']]}, as without a cube. It may react when the cube is nearer."
         )
     if places["blind"] == 0:
         claims["places.sees"] = (

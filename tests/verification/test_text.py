@@ -20,8 +20,8 @@ def test_what_it_does_by_side():
 
 def test_blindness_is_told_of_the_sides_that_have_it():
     assert speak()["places.blind"] == (
-        "It is blind to 75.00% of those on its left and 50.00% of those on its right: a turn is "
-        "needed, and it goes forward, as without a cube. It may see the cube later."
+        "It does not react to 75.00% of those on its left and 50.00% of those on its right: a turn "
+        "is needed, and it goes forward, as without a cube. It may react when the cube is nearer."
     )
     assert set(speak(blind=0.0)) - set(speak()) == {"places.sees"}
 
