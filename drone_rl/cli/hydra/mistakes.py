@@ -160,7 +160,7 @@ class Command:
     def instead(self, name: str, value: str) -> str | None:
         """Return the override that was most likely meant."""
         ours = closest(name, self.keys)
-        if ours in self.groups and value not in ("", *choices(self.conf, ours)):
+        if ours is not None and ours in self.groups and value not in ("", *choices(self.conf, ours)):
             return None
         return ours if ours is None or "=" in ours else f"{ours}={value or 'VALUE'}"
 

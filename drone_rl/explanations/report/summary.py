@@ -140,7 +140,7 @@ def _say_heat(truth: Mapping[str, Any]) -> Claims:
 
 def _say_limits(evidence: Evidence) -> Claims:
     parts = ["real cameras and drones"]
-    if evidence.get("verdict") and (names := shifts_text.untested(evidence)):
+    if evidence.get("verdict") and (names := shifts_text.not_evaluated(evidence)):
         parts.append(f"other {listed(names, 'or')}")
     left_out = evidence.get("left_out") or {}
     if left_out:
