@@ -160,9 +160,10 @@ class Command:
     def instead(self, name: str, value: str) -> str | None:
         """Return the override that was most likely meant."""
         ours = closest(name, self.keys)
-        if ours is not None and ours in self.groups and value not in ("", *choices(self.conf, ours)):
-            return None
-        return ours if ours is None or "=" in ours else f"{ours}={value or 'VALUE'}"
+        if ours is None or "=" in ours:
+            return ours
+        is_unknown = ours in self.groups and value not in ("", *choices(self.conf, ours))
+        return None if is_unknown else f"{ours}={value or 'VALUE'}"
 
     def unknown(self, override: str, name: str) -> InputError:
         """Return the error about a name that this command doesn't have."""
