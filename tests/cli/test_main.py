@@ -107,7 +107,7 @@ def test_a_full_disk_is_one_line_with_path_and_remedy(tmp_path, limit, file):
         "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, -1))\n"
     )
-    settings = ["train", *TINY, "logger=tensorboard", "hydra.run.dir=full"]
+    settings = ["train", TINY[0], *TINY[2:], "logger=tensorboard", "hydra.run.dir=full"]
     done = drone_rl(*settings, cwd=tmp_path, setup=limited)
     line = error_line(done)
     assert len(done.stderr.splitlines()) == 1

@@ -128,7 +128,7 @@ def test_headline_cells():
         "5.2",
         "99.1%",
         "0.60 (5.5 s against 9.2 s)",
-        "18.5",
+        "18.5 times",
         "1 of 34",
         *[UNKNOWN] * 3,
     ]

@@ -77,7 +77,7 @@ def test_what_no_file_may_set(noted, setting):
     ("content", "message"),
     [
         ("- !!python/object/apply:os.system ['x']", "damaged"),
-        ("{a: 1}", r"\(dict\) is out of range"),
+        ("{a: 1}", r"\(dict\) does not fit"),
         ("- {a: 1}", r"\[0\]=\(dict\) is no text"),
         ("- " + "x" * 501, "at most 500"),
         ("- a=1\n" * 201, "0 to 200"),

@@ -87,7 +87,7 @@ def test_what_is_taken(kind, value):
         (Text(9), 5, "x=5"),
         (Maybe(Whole(1, 3)), 4, "x=4"),
         (Maybe(Whole(1, 3)), "None", r"^x=None is a text; write null \(None in Python\)$"),
-        (Maybe(Whole(1, 3)), "no", "^x='no' is out of range"),
+        (Maybe(Whole(1, 3)), "no", "^x='no' is a text"),
         (Listed("axis"), 3, "must name an axis or a list of them, each once"),
         (Several(Whole(0, 9), 1, 2), [], "1 to 2 values"),
         (Several(Whole(0, 9), 1, 2), [1, 2, 3], "1 to 2 values"),

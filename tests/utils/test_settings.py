@@ -75,9 +75,9 @@ def test_values_take_their_types():
     ("change", "message"),
     [
         ({"count": 0}, "count=0 is out of range"),
-        ({"count": "2"}, "count='2' is out of range"),
-        ({"size": "x"}, "size='x' is out of range"),
-        ({"widths": [1, 2, 3]}, r"widths=\(list\) is out of range"),
+        ({"count": "2"}, "count='2' is a text"),
+        ({"size": "x"}, "size='x' is a text"),
+        ({"widths": [1, 2, 3]}, r"widths=\[1,2,3\] does not fit"),
         ({"is_on": 1}, "is_on=1 is neither true nor false"),
         ({"name": 5}, "name=5 is no text"),
         ({"inner": 3}, "inner=3 is no Inner"),

@@ -50,7 +50,7 @@ def test_what_shifts_leaves_can_be_needed(read):
         ("fog: {least: 60, unit: m of sight}", "fog.'least' is unknown"),
         ("fog: {unit: m of sight}", "neither low nor high"),
         ("fog: {low: 60, high: 40, unit: m of sight}", "from 60 to 40, which is less"),
-        ("fog: {low: sixty, unit: m of sight}", "fog.low='sixty' is out of range"),
+        ("fog: {low: sixty, unit: m of sight}", "fog.low='sixty' is a text"),
         ("fog: {high: .inf, unit: m of sight}", "fog.high=inf is out of range"),
         (
             "camera_yaw: {low: -5, high: 5, unit: degrees}",

@@ -170,7 +170,7 @@ class Command:
         value = override.partition("=")[2]
         text = f"{override}: drone-rl {self.name} has no setting {name}; "
         group, first = name.rpartition(".")[0], name.partition(".")[0]
-        if is_group(self.conf, first) and first not in (*self.groups, *self.keys):
+        if is_group(self.conf, first) and first not in ("hydra", *self.groups, *self.keys):
             cannot = f"drone-rl {self.name} can't change {first}"
             return InputError(f"{override}: {cannot}; {self.list_all}")
         if group in self.groups and self.config[group] is None:

@@ -34,7 +34,7 @@ def test_a_finished_run_returns_its_running_mean(run):
     (run.folder / "result.json").write_text(json.dumps(result))
     job = _job_return(run)
     assert (job.return_value, job.overrides) == (1.5, ["seed=1"])
-    assert _outcome(run) == "frames, running reward 1.5"
+    assert _outcome(run) == "frames, running reward 1.500"
 
 
 def test_an_unfinished_run_returns_nothing_and_says_why(run):

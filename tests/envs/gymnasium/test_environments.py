@@ -120,7 +120,7 @@ def test_gymnasium_wrappers_work(make):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"num_envs": 0}, "num_envs=0 is out of range; give a whole number from 1"),
+        ({"num_envs": 0}, "num_envs=0 is out of range; give a whole number of 1 or more"),
         ({"num_envs": 1.5}, "num_envs=1.5 is out of range"),
         ({"autoreset_mode": "Later"}, "autoreset_mode='Later' is unknown; give one of: NextStep"),
         ({"wind": 1}, "wind is unknown; valid names: .*observations"),

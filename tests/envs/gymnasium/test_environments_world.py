@@ -152,7 +152,7 @@ def test_rgb_array_list_is_supported(make):
     [
         ({"render_mode": "ansi"}, "render_mode='ansi' is unknown; give rgb_array"),
         ({"wind": 1}, "wind is unknown; valid names: .*observations"),
-        ({"num_cubes": "two"}, "num_cubes='two' is out of range"),
+        ({"num_cubes": "two"}, "num_cubes='two' is a text"),
     ],
 )
 def test_invalid_options_raise_one_line(make, options, message):
