@@ -446,6 +446,12 @@ MAIN = (
         lambda f: f"{f['chapter_shown']} of {f['chapter_elements']}; {f['convention_cases']}",
         "all; 30",
     ),
+    Row(
+        "chapter",
+        "success rate on a task that needs memory (`examples/recall.py`), an LSTM; no memory",
+        lambda f: f"{100 * f['lstm_success']:.1f}%; {100 * f['memoryless_success']:.1f}%",
+        "90%; at most 60%",
+    ),
     Row("explain", "size of report.html", lambda f: f"{f['report_mib']:.1f} MiB", "10 MB"),
     Row(
         "sweeps",
