@@ -134,10 +134,6 @@ class TrainSettings(Settings):
                 f"renderer={self.renderer} supports only appearance=minimal; give "
                 "renderer=raytrace or appearance=minimal"
             )
-        if not self.trainer.total_frames and self.demonstrations is None:
-            raise InputError(
-                "trainer.total_frames=0 trains nothing; give 1 or more, or demonstrations to clone"
-            )
         self.dynamics.check_air()
         check_appearance(self.appearance, self.camera, self.task.things, self.task.name)
         needs, objective = self.objective.needs, self.objective.name

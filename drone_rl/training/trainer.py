@@ -227,15 +227,14 @@ class Trainer:
     def _signals(self) -> Iterator[None]:
         """Record the first Ctrl-C or SIGTERM; restore the handlers then and at the end.
 
-        A signal that the process ignores, as Ctrl-C in the background, remains ignored.
+        A signal that the process ignores, as Ctrl-C in the background, stops a training, too.
         """
         if threading.current_thread() is not threading.main_thread():
             yield
             return
         watched = (signal.SIGINT, signal.SIGTERM)
         found = {number: signal.getsignal(number) for number in watched}
-        left_alone = (None, signal.SIG_IGN)  # None: set outside Python, can't be restored
-        before = {n: handler for n, handler in found.items() if handler not in left_alone}
+        before = {n: handler for n, handler in found.items() if handler is not None}
 
         def restore() -> None:
             for number, handler in before.items():
@@ -246,7 +245,7 @@ class Trainer:
             self.stop_signal = signal.Signals(number)
             restore()
 
-        for number in before:
+        for number in before:  # one set outside Python can't be restored, so it is left alone
             signal.signal(number, note)
         try:
             yield

@@ -144,7 +144,7 @@ def test_mistakes_get_one_line(in_process, command, words):
 def test_a_verdict_under_another_appearance_says_so(in_process, tmp_path):
     done = in_process(*ONE, "appearance=fog", "hydra.run.dir=v")
     assert "It was trained with another appearance: here it flew with " in done.stdout
-    assert "appearance.fog_visibility=40 instead of None" in done.stdout
+    assert "appearance.fog_visibility=40 instead of null" in done.stdout
     kept = json.loads((tmp_path / "v" / "verdict.json").read_text())
     assert kept["unlike"]["appearance.fog_visibility"] == {"own": None, "flown": 40.0}
     proved = ["verdict", "policy=proved", "appearance=fog", "episodes=10", "sampled=false"]

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import pytest
 
-from drone_rl.config.training import Logger, TrainerSettings, TrainSettings
+from drone_rl.config.training import Logger
 from drone_rl.utils.errors import InputError
 
 
@@ -31,10 +31,3 @@ def test_a_missing_package_is_one_line_that_names_it(monkeypatch, error, remedy)
     with pytest.raises(InputError, match=r"^logger _target_=os\.path\.join can't be made") as said:
         Broken().make()
     assert remedy in str(said.value) and "\n" not in str(said.value)
-
-
-def test_a_training_without_frames_needs_demonstrations():
-    nothing = TrainerSettings(total_frames=0)
-    with pytest.raises(InputError, match=r"trainer\.total_frames=0 trains nothing; give 1 or more"):
-        TrainSettings(trainer=nothing)
-    assert TrainSettings(trainer=nothing, demonstrations="flown").trainer == nothing

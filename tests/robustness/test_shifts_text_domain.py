@@ -6,7 +6,7 @@ from drone_rl.robustness.shifts_text import (
     contradicted,
     is_quoted,
     lacking,
-    untested,
+    not_evaluated,
     why_not,
 )
 from drone_rl.utils.text import said
@@ -42,7 +42,7 @@ def test_what_speaks_against_them_is_said_instead(changes, why):
     evidence = changed(GOOD, changes)
     assert not is_quoted(evidence) and why in why_not(evidence)
     assert list(said(QUOTED, evidence)) == ["domain.refused"]
-    assert untested(evidence) == ["colours", "light", "sizes"]
+    assert not_evaluated(evidence) == ["colours", "light", "sizes"]
 
 
 def test_an_open_verdict_and_a_policy_that_is_good_nowhere_go_together():
@@ -51,9 +51,9 @@ def test_an_open_verdict_and_a_policy_that_is_good_nowhere_go_together():
     assert is_quoted(changed(GOOD, nowhere))
 
 
-def test_what_was_not_flown_stays_untested():
-    assert untested(GOOD) == ["colours", "sizes"]
-    assert untested({"verdict": VERDICT}) == ["colours", "light", "sizes"]
+def test_what_was_not_flown_was_not_evaluated():
+    assert not_evaluated(GOOD) == ["colours", "sizes"]
+    assert not_evaluated({"verdict": VERDICT}) == ["colours", "light", "sizes"]
 
 
 @pytest.mark.parametrize(

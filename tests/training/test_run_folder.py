@@ -27,7 +27,7 @@ def test_checkpoint_settings_are_restored_and_validated():
     settings = TrainSettings(seed=3)
     assert settings_of(as_config(settings)) == settings
     foreign = {**as_config(settings), "network": {"_target_": "os.system"}}
-    with pytest.raises(InputError, match=r"the checkpoint names os\.system"):
+    with pytest.raises(InputError, match=r"the checkpoint uses os\.system"):
         settings_of(foreign)
 
 

@@ -71,16 +71,6 @@ def test_signal_saves_and_stops_after_the_update(make_trainer, tmp_path, number)
     assert signal.getsignal(number) == before
 
 
-def test_an_ignored_signal_remains_ignored(make_trainer):
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        trainer = make_trainer(callbacks=[At(1, lambda _: signal.raise_signal(signal.SIGINT))])
-        assert not run(trainer).startswith("SIG")
-        assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
 def test_signal_during_confirmation_stops_after_it(make_trainer):
     """It stops even if the confirmation succeeds, so the signal is reported."""
     calls = []

@@ -190,7 +190,7 @@ def test_taking_off_needs_simple_flight(make_flight):
         ({"type": "hold"}, "hold.controls is missing"),
         ({"type": "hold", "controls": ["jump"]}, r"hold.controls\[0\]='jump' is unknown"),
         ({"type": "hold", "controls": [*KEYS, "up"]}, "give a list of 0 to 12 values"),
-        ({"type": "sticks", "values": [0, 0, 0]}, "give a list of 4 to 4 values"),
+        ({"type": "sticks", "values": [0, 0, 0]}, "give a list of 4 values"),
         ({"type": "sticks", "values": [0, 0, 0, 2.0]}, "out of range"),
         ({"type": "sticks", "values": [0, 0, 0, math.nan]}, "out of range"),
         ({"type": "set", "name": "light", "value": 9.0}, "light=9.0 is out of range"),
