@@ -220,7 +220,7 @@ class Trajectory:
     def append(self, time: float, body: FlightState) -> None:
         """Record the state of one drone at a time in seconds."""
         self._times.append(time)
-        self._rows.append(body.numbers[0, :REFERENCE].numpy().astype(np.float64))
+        self._rows.append(body.numbers.numpy()[0, :REFERENCE].copy())
 
     @property
     def times(self) -> np.ndarray:
