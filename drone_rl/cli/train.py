@@ -20,6 +20,7 @@ from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.training import Logger, Tensorboard, TrainSettings
 from drone_rl.sweeps.manifest import read_result
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.schema import Instance, Several, Whole
 from drone_rl.verification.text import describe_round
@@ -41,6 +42,14 @@ class TrainCommand(CommandSettings, TrainSettings):
     """Training in rounds until a proof succeeds, if provable.rounds is above 0."""
     trial: Annotated[int, Whole(0)] | None = None
     """Number of this run in a search, which hydra/sweeper=optuna sets; null for no search."""
+
+    def check(self) -> None:
+        """Refuse a new run that would learn nothing."""
+        super().check()
+        if not self.trainer.total_frames and self.demonstrations is None and self.resume is None:
+            raise InputError(
+                "trainer.total_frames=0 trains nothing; give 1 or more, or demonstrations to clone"
+            )
 
     @classmethod
     def prepare(cls, overrides: Sequence[str]) -> list[str]:

@@ -41,8 +41,7 @@ class Whole:
 
     def read(self, value: Any, where: str) -> int:
         """See `Kind`."""
-        if isinstance(value, str):
-            raise InputError(f"{where}={shown(value)} is a text; give {self.words}")
+        _refuse_text(value, where, self.words)
         if type(value) is not int or not self.low <= value <= self.high:
             raise InputError(f"{where}={shown(value)} is out of range; give {self.words}")
         return value
@@ -70,8 +69,7 @@ class Real:
 
     def read(self, value: Any, where: str) -> float:
         """See `Kind`."""
-        if isinstance(value, str):
-            raise InputError(f"{where}={shown(value)} is a text; give {self.words}")
+        _refuse_text(value, where, self.words)
         if type(value) not in (int, float) or not self._holds(value):
             raise InputError(f"{where}={shown(value)} is out of range; give {self.words}")
         return float(value)
@@ -328,6 +326,12 @@ def shown(value: Any) -> str:
         return f"(a number of {value.bit_length()} bits)"
     text = repr(value[:80] if isinstance(value, str) else value)
     return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def _refuse_text(value: Any, where: str, words: str) -> None:
+    """Raise an `InputError` for a text where a number belongs."""
+    if isinstance(value, str):
+        raise InputError(f"{where}={shown(value)} is a text; give {words}")
 
 
 def _inside(item: Any, where: str) -> Sequence[Any]:

@@ -265,17 +265,19 @@ REFUSED = {
     "explain": lambda policy, folder: drone_rl.explain(policy, folder=folder),
     "a class model": lambda policy, folder: drone_rl.class_models(policy),
     "proofs": lambda policy, folder: drone_rl.prove(policy, folder=folder),
-    "the viewer": lambda policy, folder: view(policy),
     "the operating domain": lambda policy, folder: drone_rl.shifts(policy, domain_episodes=50),
 }
 
 
 @pytest.mark.parametrize("what", REFUSED)
 def test_analyses_of_single_frames_are_refused(what, trained, tmp_path):
-    with pytest.raises(
-        InputError, match=rf"{what}.*; (give (another policy|domain=false)|leave viewer=false)"
-    ):
+    with pytest.raises(InputError, match=rf"{what}.*; give (another policy|domain=false)"):
         REFUSED[what](trained.policy, tmp_path)
+
+
+def test_the_viewer_refuses_it(trained):
+    with pytest.raises(InputError, match=r"the viewer needs .*; leave viewer=false to film it"):
+        view(trained.policy)
 
 
 def test_success_under_perturbations_is_measured(trained):

@@ -114,9 +114,10 @@ def check_launcher(command: str, overrides: Sequence[str]) -> None:
 
 def repeated(overrides: Sequence[str]) -> list[str]:
     """Return the last one of each setting that is given several times: Hydra takes that one."""
-    last = {o.partition("=")[0].lstrip("+"): o for o in overrides if "=" in o}
-    names = [o.partition("=")[0].lstrip("+") for o in overrides if "=" in o]
-    return [override for name, override in last.items() if names.count(name) > 1]
+    given: dict[str, list[str]] = {}
+    for override in (o for o in overrides if "=" in o):
+        given.setdefault(override.partition("=")[0].lstrip("+"), []).append(override)
+    return [several[-1] for several in given.values() if len(several) > 1]
 
 
 def closest(name: str, known: Sequence[str]) -> str | None:
@@ -211,9 +212,8 @@ def explain(error: Exception, name: str, conf: Path, overrides: Sequence[str]) -
         return InputError(f"${{{key[1]}}} refers to a setting that does not exist; give a value")
     if not any(o.startswith(OWN_FOLDERS) for o in overrides):
         groups = [o for o in parsed if is_group(conf, o.key_or_group)]
-        own = Command(name, conf)
-        for override in (o for o in groups if o.key_or_group not in own.groups):
-            return own.unknown(str(override.input_line), override.key_or_group)
+        if lacking := _lacking(name, conf, groups):
+            return lacking
         alone = [f"{o.key_or_group}={o.value()}" for o in groups if isinstance(o.value(), str)]
         command = Command(name, conf, alone)
         for override in parsed:
@@ -221,6 +221,16 @@ def explain(error: Exception, name: str, conf: Path, overrides: Sequence[str]) -
                 return found
         text = command.list_all
     return InputError(f"{' '.join(overrides)}: these settings can't be read; {text}")
+
+
+def _lacking(name: str, conf: Path, groups: Sequence[Override]) -> InputError | None:
+    """Return the error about the first group of files that a command doesn't have, or None."""
+    if not groups:
+        return None
+    own = Command(name, conf)
+    absent = (o for o in groups if o.key_or_group not in own.groups)
+    found = next(absent, None)
+    return found and own.unknown(str(found.input_line), found.key_or_group)
 
 
 def _syntax(word: str) -> InputError:
