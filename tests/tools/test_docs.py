@@ -10,7 +10,15 @@ from tools.docs.__main__ import main
 from tools.docs.blocks import find_pages, read_blocks
 from tools.docs.outputs import find_difference, find_different_words, normalize
 from tools.docs.rules import Rules, rules_for
-from tools.docs.session import FAILED, NOT_RUN, RAN, SMALLER, Outcome, Session
+from tools.docs.session import (
+    FAILED,
+    NOT_RUN,
+    OTHER_NUMBERS,
+    RAN,
+    SMALLER,
+    Outcome,
+    Session,
+)
 from tools.docs.update import update_page
 
 PAGE = """# Page
@@ -128,6 +136,21 @@ def test_a_page_that_is_not_true_fails(write, old, new, why):
     assert any(why in reason for reason in failed), failed
 
 
+@pytest.mark.parametrize(
+    ("first", "printed", "status"),
+    [
+        ("drone-rl train 2>&1 | true", "reward 4", OTHER_NUMBERS),
+        ("drone-rl train 2>&1 | true", "loss 3", FAILED),
+        ("drone-rl train 2>&1 | true", "reward 3", RAN),
+        ("drone-rl verdict 2>&1 | true", "reward 4", FAILED),
+    ],
+)
+def test_numbers_may_differ_only_after_a_training(write, first, printed, status):
+    write(f"```console\n$ {first}\n$ echo {printed}\nreward 3\n```\n")
+    *_, outcome = Session("docs/page.md").run()
+    assert outcome.status == status
+
+
 def test_outputs_are_compared_in_order_without_line_breaks():
     assert find_difference("a b [...] c", "x a\nb y c z") is None
     assert find_difference("c [...] a", "a b c") == "a"
@@ -176,12 +199,19 @@ def test_pages_are_counted_and_finished_ones_are_kept(monkeypatch, tmp_path):
     def run_in_copy(page, folder, root):
         ran.append(page)
         folder.parent.mkdir(parents=True, exist_ok=True)
-        return [Outcome(1, "a", RAN), Outcome(2, "b", SMALLER), Outcome(3, "c", last, "because")]
+        first = [Outcome(1, "a", RAN), Outcome(2, "b", SMALLER), Outcome(4, "d", OTHER_NUMBERS)]
+        return [*first, Outcome(3, "c", last, "because")]
 
     ran, last = [], NOT_RUN
     monkeypatch.setattr(run, "_run_in_copy", run_in_copy)
     monkeypatch.setattr(run.run_page, "__defaults__", (tmp_path / "kept", run.ROOT))
-    counts = {"docs_blocks": 6, "docs_blocks_run": 4, "docs_blocks_smaller": 2, "docs_pages": 2}
+    counts = {
+        "docs_blocks": 8,
+        "docs_blocks_run": 6,
+        "docs_blocks_smaller": 2,
+        "docs_blocks_other_numbers": 2,
+        "docs_pages": 2,
+    }
     for _ in range(2):
         assert run.measure(["README.md", "docs/tour.md"]) == counts
     assert ran == ["README.md", "docs/tour.md"]

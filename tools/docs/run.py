@@ -1,5 +1,6 @@
 """Run pages, each in a copy of the checkout, and count their blocks."""
 
+import collections
 import hashlib
 import json
 import os
@@ -12,7 +13,7 @@ from typing import Any
 
 from tools.docs.blocks import ROOT, find_pages, read_blocks
 from tools.docs.rules import read_rules, rules_for
-from tools.docs.session import FAILED, NOT_RUN, SMALLER, Outcome
+from tools.docs.session import FAILED, NOT_RUN, OTHER_NUMBERS, SMALLER, Outcome
 
 COPIED = ("drone_rl", "conf", "docs", "examples", "benchmarks", "tools", "README.md")
 RESULTS = ROOT / "outputs" / "docs"
@@ -60,11 +61,12 @@ def measure(pages: Iterable[str] = ()) -> dict[str, Any]:
     if failures:
         raise RuntimeError("; ".join(failures))
     every = [outcome for found in outcomes.values() for outcome in found]
-    skipped = sum(outcome.status == NOT_RUN for outcome in every)
+    count = collections.Counter(outcome.status for outcome in every)
     return {
         "docs_blocks": len(every),
-        "docs_blocks_run": len(every) - skipped,
-        "docs_blocks_smaller": sum(outcome.status == SMALLER for outcome in every),
+        "docs_blocks_run": len(every) - count[NOT_RUN],
+        "docs_blocks_smaller": count[SMALLER],
+        "docs_blocks_other_numbers": count[OTHER_NUMBERS],
         "docs_pages": len(outcomes),
     }
 
