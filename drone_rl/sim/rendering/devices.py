@@ -24,16 +24,17 @@ def check_device(device: str) -> None:
     kind = device.split(":")[0]
     if kind not in ("cpu", "cuda"):
         raise InputError(f"device={device} is unknown; give cpu, cuda or cuda:N")
+    wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)  # the count below starts Warp
     if kind == "cuda" and not (torch.cuda.is_available() and wp.get_cuda_device_count()):
         raise InputError(f"device={device}, but no CUDA GPU is usable here; give device=cpu")
 
 
 @functools.cache
 def start_warp(device: str) -> None:
-    """Initialize Warp once, on a CPU without warnings about CUDA; for errors see `check_device`."""
+    """Start Warp once, on a CPU without warnings about CUDA; for errors see `check_device`."""
     check_device(device)
-    quiet = wp.LOG_ERROR if device == "cpu" else wp.LOG_WARNING
-    wp.config.log_level = max(wp.config.log_level, quiet)
+    if device == "cpu":
+        wp.config.log_level = max(wp.config.log_level, wp.LOG_ERROR)
     with standard_error_closed() if device == "cpu" else nullcontext():
         wp.init()  # its native part ignores the log level
 

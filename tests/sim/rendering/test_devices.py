@@ -30,6 +30,15 @@ def test_warp_starts_without_output(tmp_path):
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
+def test_counting_gpus_does_not_print_the_version_of_warp(tmp_path):
+    code = (
+        "import torch; torch.cuda.is_available = lambda: True\n"
+        "from drone_rl.sim.rendering.devices import check_device; check_device('cuda')"
+    )
+    done = run_forked(code, cwd=tmp_path)
+    assert "initialized" not in done.stdout + done.stderr
+
+
 def test_kernels_are_loaded_once_in_a_thread(monkeypatch):
     loaded = []
     monkeypatch.setattr(devices.wp, "load_module", lambda *_, **__: loaded.append(get_ident()))
