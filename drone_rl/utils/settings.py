@@ -123,8 +123,16 @@ def check_names(cls: type[Settings], given: Mapping[str, Any], prefix: str = "")
     known = kinds_of(cls)
     for name in given:
         if name not in known:
-            meant = did_you_mean(name, known)
+            meant = did_you_mean(name, known) or _inside(cls, name)
             raise InputError(f"{prefix}{name} is unknown; valid names: {', '.join(known)}{meant}")
+
+
+def _inside(cls: type[Settings], name: str) -> str:
+    """Return the end of a message with the default settings inside which a name is, if any are."""
+    for field in dataclasses.fields(cls):
+        if isinstance(field.default, Settings) and name in kinds_of(type(field.default)):
+            return f"; did you mean {field.name}={type(field.default).__name__}({name}=...)?"
+    return ""
 
 
 def current_names(cls: type[Settings], given: Mapping[str, Any]) -> dict[str, Any]:

@@ -40,6 +40,8 @@ _EXPECTED = {
 }
 _TYPE = re.compile(r"(?:converted to|convert \S+ to|field of type|a valid) '?(?:Optional\[)?(\w+)")
 """The type that a setting needs, in OmegaConf's messages."""
+_RANGE = re.compile(r"([\w.]+)=(\d+)(?:\.\.|-|:)(\d+)")
+"""Several whole numbers, as other programs write them."""
 _MAGNITUDES = {"k": 10**3, "m": 10**6, "g": 10**9}
 _TEXTS = re.compile(
     r"[+~]*(hydra|paths|policy|policies|resume|certificate|explanations|folder|name|shifts|require|"
@@ -284,7 +286,12 @@ def _wrong_type(command: Command, override: Override) -> InputError | None:
         except (AttributeError, KeyError):  # from OmegaConf, for a name that it does not know
             return command.unknown(text, key)
         except OmegaConfBaseException as error:
-            return _wrong_value(command.config, key, value, text, str(error).splitlines()[0])
+            reason = str(error).splitlines()[0]
+            found = _wrong_value(command.config, key, value, text, reason)
+            if sweep := _RANGE.fullmatch(text):
+                several = f"{sweep[1]}=range({sweep[2]},{int(sweep[3]) + 1})"
+                return InputError(f"{found}; for one run with each, add -m {shlex.quote(several)}")
+            return found
     return None
 
 

@@ -84,6 +84,7 @@ def test_whole_numbers_may_have_an_exponent(override, number):
     ("override", "message"),
     [
         ("seed=x", "seed=x does not fit; type a whole number, such as seed=0"),
+        ("seed=2..5", r"such as seed=0; for one run with each, add -m 'seed=range\(2,6\)'$"),
         ("seed=null", "seed=null does not fit; type another value, such as seed=0"),
         ("seed=none", "seed=none does not fit; type a whole number, such as seed=0"),
         ("trainer.total_episodes=none", "=none does not fit; type trainer.total_episodes=null$"),
