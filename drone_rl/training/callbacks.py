@@ -180,6 +180,30 @@ class CsvCallback(Callback):
             self.path.write_text("update,frames,episodes,seconds,train/running_reward\n")
 
 
+class CollapseCheck(Callback):
+    """Warn once about a policy that has become deterministic, so that its gradient is zero."""
+
+    SMALLEST = 1e-6
+    """Entropy in nats and norm of the gradient, below which an update can't change a policy."""
+    UPDATES = 20
+    """Consecutive updates without a gradient before the warning."""
+
+    def __init__(self) -> None:
+        self._count = 0
+
+    def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
+        """Count the consecutive updates without a gradient."""
+        values = [metrics.get(f"loss/{name}", 1.0) for name in ("entropy", "grad_norm")]
+        self._count = self._count + 1 if max(values) < self.SMALLEST else 0
+        if self._count == self.UPDATES:
+            _log.warning(
+                "the policy has become deterministic: for %d updates its gradient has been 0, so "
+                "it learns no more; unless its reward is good enough, stop and try a lower "
+                "optimizer.lr, objective.entropy_coeff=0.01 or another seed",
+                self.UPDATES,
+            )
+
+
 class LoggerCallback(Callback):
     """Pass the metrics, by frames, to TorchRL's loggers."""
 

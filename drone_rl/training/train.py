@@ -22,7 +22,7 @@ from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import describe
 from drone_rl.sim.tasks import FailureReplayTask, as_settings, as_task
 from drone_rl.training import components, run_folder
-from drone_rl.training.callbacks import Callback, CsvCallback, ForwardProgress
+from drone_rl.training.callbacks import Callback, CollapseCheck, CsvCallback, ForwardProgress
 from drone_rl.training.cloning import clone
 from drone_rl.training.components import Components, Group
 from drone_rl.training.confirmation import Confirmation
@@ -111,7 +111,7 @@ def learn(
     trainer = Trainer(
         collector=parts.collector,
         learner=learner,
-        callbacks=[CsvCallback(folder / "metrics.csv"), checkpoints, *callbacks],
+        callbacks=[CsvCallback(folder / "metrics.csv"), checkpoints, CollapseCheck(), *callbacks],
         generators=parts.generators,
         target=limits.target_share and limits.target_share * largest_reward,
         confirm=confirmation,

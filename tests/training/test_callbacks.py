@@ -13,7 +13,7 @@ from drone_rl.training import (
     ProgressCallback,
     callbacks,
 )
-from drone_rl.training.callbacks import ForwardProgress
+from drone_rl.training.callbacks import CollapseCheck, ForwardProgress
 from drone_rl.utils.checkpoint import load_checkpoint
 from drone_rl.utils.errors import InputError
 from tests.training_loop import run
@@ -136,6 +136,27 @@ def test_passes_are_logged_as_lines_now_and_then_and_the_last_one(monkeypatch, c
     assert lines == [
         f"cloning: epoch {epoch} of 4, loss 0.250, held out accuracy 0.500" for epoch in (1, 3, 4)
     ]
+
+
+@pytest.mark.parametrize(
+    ("updates", "warnings"),
+    [
+        ([(0.0, 0.0)] * 19, 0),
+        ([(1e-9, 1e-9)] * 60, 1),
+        ([(0.0, 0.0)] * 19 + [(0.1, 0.1)] + [(0.0, 0.0)] * 19, 0),
+        ([(1.0, 0.0)] * 40, 0),  # equal rewards of a policy that still explores
+        ([(0.0, 1e-3)] * 40, 0),
+    ],
+)
+def test_a_deterministic_policy_is_warned_about_once(caplog, updates, warnings):
+    check = CollapseCheck()
+    check.on_update(types.SimpleNamespace(), {})  # of a learner that logs neither
+    for entropy, norm in updates:
+        metrics = {"loss/entropy": entropy, "loss/grad_norm": norm}
+        check.on_update(types.SimpleNamespace(), metrics)
+    assert ["deterministic" in record.getMessage() for record in caplog.records] == [
+        True
+    ] * warnings
 
 
 def test_torchrl_loggers_are_supported(make_trainer, tmp_path):
