@@ -1,5 +1,6 @@
 """Blocks of pages are found, run and compared; a page that is not true fails."""
 
+import dataclasses
 import json
 import sys
 
@@ -173,6 +174,9 @@ def test_rules_skip_shrink_and_replace(write, tmp_path):
     assert [rules.why_not_run(block) for block in blocks] == [None, None, "reason"]
     commands = [rules.make_command(block) for block in blocks]
     assert commands == ["echo a f x # comment", "echo bc y", "ls"]
+    whole = dataclasses.replace(rules, smaller={"echo": "x", "echo b": ""})
+    assert [whole.is_smaller(block) for block in blocks] == [True, False, False]
+    assert whole.make_command(blocks[1]) == "echo bc"
     assert rules.is_smaller(blocks[1]) and not rules.is_smaller(blocks[2])
     assert rules.find_unused(blocks) == []
     needs = Rules(needs={"echo a": "no_such_package", "ls": "json"})

@@ -23,7 +23,7 @@ class Rules:
     needs: Mapping[str, str] = dataclasses.field(default_factory=dict)
     """Packages of extras, without which they are not run."""
     smaller: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    """Settings to append to commands that would take too long."""
+    """Settings to append to commands that would take too long; an empty text for none."""
     replace: Mapping[str, str] = dataclasses.field(default_factory=dict)
     """Values of placeholders: what bash replaces them by."""
     before: Sequence[str] = ()
@@ -39,13 +39,17 @@ class Rules:
 
     def is_smaller(self, block: Block) -> bool:
         """Return whether a block is run with smaller sizes."""
-        return block.kind == COMMAND and _longest(self.smaller, block.code) is not None
+        return block.kind == COMMAND and self._added(block) != ""
+
+    def _added(self, block: Block) -> str:
+        """Return the settings that make a command smaller."""
+        return self.smaller.get(_longest(self.smaller, block.code) or "", "")
 
     def make_command(self, block: Block) -> str:
         """Return the command to run: without placeholders and with smaller sizes."""
         command, mark, comment = block.code.partition(" #")
         if self.is_smaller(block):
-            command = f"{command.rstrip()} {self.smaller[_longest(self.smaller, block.code) or '']}"
+            command = f"{command.rstrip()} {self._added(block)}"
         for placeholder, value in self.replace.items():
             command = command.replace(placeholder, value)
         return command + mark + comment
