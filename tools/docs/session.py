@@ -25,7 +25,7 @@ RAN, SMALLER, NOT_RUN, FAILED = "ran", "ran with smaller sizes", "not run", "fai
 OTHER_NUMBERS = "printed other numbers"
 """Status of a block that prints the page's words with other numbers, after the page has trained: a
 policy trained with the same seed depends on how the processor rounds."""
-_TRAINS = re.compile(r"drone-rl (train|demo)|drone_rl\.train|train\(")
+_TRAINS = re.compile(r"drone-rl (train|demo)|Trainer\(|\btrain\(")
 
 
 @dataclasses.dataclass(frozen=True)
