@@ -29,6 +29,12 @@ if TYPE_CHECKING:
     from drone_rl.training import Callback
 
 _log = logging.getLogger(__name__)
+_TRAIN_LONGER = {
+    "frames": "to train longer, give a larger trainer.total_frames",
+    "episodes": "to train longer, give a larger trainer.total_episodes",
+    "solved": "to train longer, give a larger trainer.target_share, or null",
+}
+"""What to do about a run that has stopped, by the reason."""
 
 
 class TrainCommand(CommandSettings, TrainSettings):
@@ -82,13 +88,13 @@ class TrainCommand(CommandSettings, TrainSettings):
         _log.info("run folder: %s", folder)
         for row in done.result.get("rounds", ()):
             _log.info(describe_round(row))
-        if before is not None and before.get("frames") == done.result["frames"]:
-            _log.info(
-                "the run is already finished (%s, %s frames); to train longer, give a larger "
-                "trainer.total_frames",
-                *(done.reason, f"{done.result['frames']:,}"),
-            )
         if not done.reason.startswith("SIG"):
+            if before is not None and before.get("frames") == done.result["frames"]:
+                _log.info(
+                    "the run is already finished (%s, %s frames); %s",
+                    *(done.reason, f"{done.result['frames']:,}"),
+                    _TRAIN_LONGER.get(done.reason, "start a new one"),
+                )
             return 0, done.running_reward
         _log.info("resume with: %s", resuming.resume_command(folder))
         return 128 + signal.Signals[done.reason].value, done.running_reward

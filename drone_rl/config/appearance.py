@@ -101,7 +101,7 @@ _NARROWEST, _WIDEST = 1.0, 170.0
 
 
 def check_appearance(
-    settings: AppearanceSettings, camera: CameraSettings, things: ObjectRegion | None, task: str
+    settings: AppearanceSettings, camera: CameraSettings, region: ObjectRegion | None, task: str
 ) -> None:
     """Check that appearance, camera and object positions (None if unknown) are compatible.
 
@@ -116,7 +116,7 @@ def check_appearance(
                 f"appearance.camera_widening={widening:g} makes a field of view of "
                 f"{own + widening:g} degrees; give {_NARROWEST - own:g} to {_WIDEST - own:g}"
             )
-    if things is None:
+    if region is None:
         if _ends(settings.distractors)[1]:
             raise InputError(
                 f"appearance.distractors={_ends(settings.distractors)[1]}: task={task} does not "
@@ -124,19 +124,19 @@ def check_appearance(
             )
         return
     (_, forward), (most_right, most_left), (lowest, _) = _sides(settings.camera_offset)
-    if things.altitude + lowest < _LEAST_HEIGHT:
+    if region.altitude + lowest < _LEAST_HEIGHT:
         raise InputError(
             f"appearance.camera_offset={lowest:g} up puts the camera into the ground; give "
-            f"{_LEAST_HEIGHT - things.altitude:g} or more"
+            f"{_LEAST_HEIGHT - region.altitude:g} or more"
         )
     aside = max(most_left, -most_right)
-    reach = things.first - things.size / 2 - FRONT[0]
+    reach = region.first - region.size / 2 - FRONT[0]
     if forward >= reach:
         raise InputError(
             f"appearance.camera_offset={forward:g} forward puts the camera into the first object; "
             f"give less than {reach:g}"
         )
-    limit = things.bound + _ends(settings.distractor_distance)[0]
+    limit = region.bound + _ends(settings.distractor_distance)[0]
     if _ends(settings.distractors)[1] and aside >= limit:
         raise InputError(
             f"appearance.camera_offset={aside:g} sideways puts the camera into a distractor; give "

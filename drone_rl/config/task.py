@@ -45,8 +45,8 @@ class BaseTaskSettings(Settings):
         return settings_of(name, where)()
 
     @property
-    def things(self) -> ObjectRegion | None:
-        """Positions of targets and obstacles; None if unknown."""
+    def object_region(self) -> ObjectRegion | None:
+        """Region, size and color of the task's objects; None if unknown."""
         return None
 
     def values(self) -> dict[str, Any]:
@@ -81,7 +81,7 @@ def settings_of(name: object, where: str = "task.name") -> type[BaseTaskSettings
 def named_settings(data: Any, where: str) -> tuple[type[BaseTaskSettings], Mapping[str, Any]]:
     """Return the class of a task's settings and the values without the name.
 
-    A mapping without "name" describes the first task. See `settings_of` for errors.
+    A mapping without "name" describes `DEFAULT_TASK`. See `settings_of` for errors.
     """
     given = dict(as_mapping(data, where))
     return settings_of(given.pop("name", DEFAULT_TASK), f"{where}.name"), given
@@ -161,8 +161,8 @@ class TaskSettings(BaseTaskSettings):
         return self.vertical_bound + self.touch_distance if self.must_climb else math.inf
 
     @property
-    def things(self) -> ObjectRegion:
-        """The cubes."""
+    def object_region(self) -> ObjectRegion:
+        """Where the cubes are; see `BaseTaskSettings`."""
         first, last = self.first_distance, self.last_distance
         color, bound = self.cube_color, self.lateral_bound
         return ObjectRegion(self.cube_size, color, bound, first, last, self.altitude)
@@ -172,7 +172,7 @@ class TaskSettings(BaseTaskSettings):
         if self.must_climb and self.altitude <= self.height_bound:
             raise InputError(
                 f"altitude={self.altitude} lets the drone fly into the floor; give more than "
-                f"{self.height_bound} (vertical_bound + half of cube_size + drone_size)"
+                f"{self.height_bound} (vertical_bound + (cube_size + drone_size) / 2)"
             )
         if self.altitude - self.vertical_bound - 0.5 * self.cube_size < 0:
             raise InputError(
@@ -181,13 +181,13 @@ class TaskSettings(BaseTaskSettings):
             )
         if self.step_length > self.touch_distance:
             raise InputError(
-                f"step_length={self.step_length} jumps over cubes; give at most "
-                f"{self.touch_distance} (half of cube_size + drone_size)"
+                f"step_length={self.step_length} makes the oracle overshoot cubes to both sides; "
+                f"give at most {self.touch_distance} ((cube_size + drone_size) / 2)"
             )
         if self.first_distance <= self.touch_distance:
             raise InputError(
                 f"first_distance={self.first_distance} starts the drone inside the first "
-                f"cube; give more than {self.touch_distance} (half of cube_size + drone_size)"
+                f"cube; give more than {self.touch_distance} ((cube_size + drone_size) / 2)"
             )
         needed = math.ceil((self.last_distance - self.touch_distance) / self.step_length)
         if self.step_limit < needed:
@@ -264,8 +264,8 @@ class PillarsSettings(BaseTaskSettings):
         return self.last_distance + self.finish_margin
 
     @property
-    def things(self) -> ObjectRegion:
-        """The pillars."""
+    def object_region(self) -> ObjectRegion:
+        """Where the pillars are; see `BaseTaskSettings`."""
         first, last = self.first_distance, self.last_distance
         color, bound = self.pillar_color, self.spread
         return ObjectRegion(self.width, color, bound, first, last, self.altitude)
@@ -273,16 +273,14 @@ class PillarsSettings(BaseTaskSettings):
     def check(self) -> None:
         """Reject fields that can't be simulated or crossed."""
         needed = 2.0 * (self.touch_distance + self.step_length)
-        for name, least in (
-            ("spacing", needed),
-            ("first_distance", self.touch_distance + self.step_length),
-            ("finish_margin", self.touch_distance),
+        sidestep = "leaves no room to move aside before a row"
+        for name, least, problem in (
+            ("spacing", needed, sidestep),
+            ("first_distance", self.touch_distance + self.step_length, sidestep),
+            ("finish_margin", self.touch_distance, "puts the line into the last row"),
         ):
             if getattr(self, name) <= least:
-                raise InputError(
-                    f"{name}={getattr(self, name)} leaves no room to turn before or behind a row; "
-                    f"give more than {least}"
-                )
+                raise InputError(f"{name}={getattr(self, name)} {problem}; give more than {least}")
         if self.height < self.altitude:
             raise InputError(
                 f"height={self.height} puts pillars below the drone; give at least {self.altitude} "
@@ -308,7 +306,7 @@ class PillarsSettings(BaseTaskSettings):
             yield [source.uniform(-self.spread, self.spread) for _ in range(self.row_size)]
 
     def _is_open(self, row: list[float]) -> bool:
-        """Whether a row leaves a lane, see `drone_rl.sim.tasks.pillars.field`."""
+        """Whether a row leaves a lane, see `drone_rl.sim.tasks.pillars_lanes.Lanes.is_open`."""
         most = int(self.spread / self.step_length + 1e-9)
         lanes = (number * self.step_length for number in range(-most, most + 1))
         return any(all(abs(y - lane) > self.touch_distance for y in row) for lane in lanes)

@@ -135,7 +135,7 @@ class TrainSettings(Settings):
                 "renderer=raytrace or appearance=minimal"
             )
         self.dynamics.check_air()
-        check_appearance(self.appearance, self.camera, self.task.things, self.task.name)
+        check_appearance(self.appearance, self.camera, self.task.object_region, self.task.name)
         needs, objective = self.objective.needs, self.objective.name
         for name, part in needs.items():
             given = getattr(self, name)

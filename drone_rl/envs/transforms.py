@@ -212,13 +212,13 @@ def memory_of(transforms: Iterable[Transform]) -> int:
     return max((t.N for t in transforms if isinstance(t, CatFrames)), default=1) - 1
 
 
-def see_film(transforms: Iterable[Transform], film: Sequence[Tensor]) -> Tensor:
+def apply_to_frames(transforms: Iterable[Transform], frames: Sequence[Tensor]) -> Tensor:
     """Apply transforms to the last of consecutive images; stacks repeat the first if needed."""
     for transform in transforms:
         if isinstance(transform, CatFrames):
-            shown = film[-transform.N :]
+            shown = frames[-transform.N :]
             shown = [*shown[:1]] * (transform.N - len(shown)) + [*shown]
-            film = [torch.cat(shown, dim=transform.dim)]
+            frames = [torch.cat(shown, dim=transform.dim)]
         else:
-            film = [transform._apply_transform(pixels) for pixels in film]
-    return film[-1]
+            frames = [transform._apply_transform(pixels) for pixels in frames]
+    return frames[-1]

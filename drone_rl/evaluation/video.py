@@ -19,7 +19,7 @@ from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import set_exploration_type
 
 from drone_rl.envs import DroneEnv
-from drone_rl.envs.transforms import memory_of, pixel_transforms, see_film
+from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
 from drone_rl.evaluation import instruments
 from drone_rl.evaluation.rollouts import exploration
 from drone_rl.policies.policy import Policy
@@ -113,7 +113,9 @@ def view(policy: Policy, *, greedy: bool = True, seed: int = 0, **how: Any) -> N
         state = shown.task.state.to(worlds.device)
         frames.append(worlds.render(state, appearance=shown.task.appearance))
         del frames[: -1 - memory_of(transforms)]
-        seen = TensorDict({"pixels": see_film(transforms, frames)}, [1], device=worlds.device)
+        seen = TensorDict(
+            {"pixels": apply_to_frames(transforms, frames)}, [1], device=worlds.device
+        )
         with set_exploration_type(exploration(greedy)):
             return actor(seen)["action"][0].cpu().numpy()
 

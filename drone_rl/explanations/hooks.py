@@ -52,13 +52,14 @@ def find_layer(network: ImageNetwork, name: str) -> nn.Module:
 def spatial_layers(network: ImageNetwork) -> list[str]:
     """Return layers with a feature map, in order; none in an MLP.
 
-    Each is the layer after a convolution if it keeps the shape, else the convolution itself.
+    Each is the layer after a convolution if it keeps the shape and is none, else the convolution.
     """
     every, found = [*layers(network).items()], []
     for i, (name, (layer, shape)) in enumerate(every):
         if isinstance(layer, nn.Conv2d):
-            after, (_, then) = every[i + 1] if i + 1 < len(every) else ("", (None, ()))
-            found.append(after if then == shape else name)
+            after, (next_layer, then) = every[i + 1] if i + 1 < len(every) else ("", (None, ()))
+            is_kept = then == shape and not isinstance(next_layer, nn.Conv2d)
+            found.append(after if is_kept else name)
     return found
 
 

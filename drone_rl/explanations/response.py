@@ -94,7 +94,7 @@ def response_map(
     num_forward: int = 31,
     seed: int | None = None,
 ) -> ResponseMap:
-    """Evaluate the policy with one target at each place of `Task.grid`; `shrink` uses the seed."""
+    """Evaluate the policy with one target at each place of `Task.grid`; for `seed` see `shrink`."""
     fields, probs = _over_grid(
         scenes,
         (num_forward, num_lateral),
@@ -249,7 +249,9 @@ def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, Any]:
     }
 
 
-_COMPARED = 1000  # rendered frames that are compared with the closed form
+_COMPARED = (
+    1000  # rendered frames that are compared with the closed form; fewer than drone-rl places
+)
 
 
 def places_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:

@@ -9,7 +9,7 @@ from torch.nn import functional
 from torchrl.envs import CatFrames, Transform, TransformedEnv
 
 from drone_rl.envs import ChromaticityPixels, CropRows, RgbPixels, worlds_of
-from drone_rl.envs.transforms import memory_of, pixel_transforms, see_film
+from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import State
@@ -67,7 +67,7 @@ class Scenes:
 
         `earlier` has frames of earlier steps, oldest first; the oldest one replaces missing ones.
         """
-        return see_film(self._transforms, [*earlier, frames])
+        return apply_to_frames(self._transforms, [*earlier, frames])
 
     def to_frame(self, maps: Tensor) -> Tensor:
         """Transform heat maps back to the coordinates of the camera's frame.

@@ -182,8 +182,8 @@ class MavlinkBridge:
         With `lockstep` each step waits for controls with its time stamp or a later one, for
         `answer_within` seconds once there were any (a starting autopilot sends none), and then uses
         the old ones. Without it, as hardware with its own clock needs, it uses the newest controls.
-        An autopilot counts as gone `patience` seconds after its last message, or if its first
-        heartbeat does not come within `connect_within` seconds.
+        An autopilot counts as gone `patience` seconds after its last message, or if no message
+        comes within the first `connect_within` seconds.
 
         Raises:
             InputError: pymavlink isn't installed.

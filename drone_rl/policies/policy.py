@@ -22,7 +22,7 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.config.configuration import Changes
-from drone_rl.envs.transforms import memory_of, pixel_transforms, see_film
+from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
 from drone_rl.policies.recurrent import Memory
 from drone_rl.policies.zoo import PolicyDescription, parse, policy_names, policy_path, read_policy
@@ -168,7 +168,7 @@ class Policy(BasePolicy):
     """Task, camera, transforms and network."""
     state: dict[str, Any] = dataclasses.field(repr=False)
     """Content of its file, see `drone_rl.policies.zoo.read_policy`."""
-    _film: list[Tensor] = dataclasses.field(
+    _earlier_frames: list[Tensor] = dataclasses.field(
         default_factory=list, init=False, repr=False, compare=False
     )
     """Images that `act_batch` remembers, oldest first."""
@@ -282,27 +282,27 @@ class Policy(BasePolicy):
                 f"images of shape {tuple(images.shape)} and type {images.dtype} do not fit the "
                 f"policy's camera; give uint8 of shape (N, {camera.height}, {camera.width}, 3)"
             )
-        known = [*self._film[-1:], *(memory.hidden for memory in self._memory)]
+        known = [*self._earlier_frames[-1:], *(memory.hidden for memory in self._memory)]
         if known and len(known[0]) != len(images):
             raise InputError(
                 f"{len(images)} images follow {len(known[0])}; call reset() before images of "
                 "another number of drones"
             )
         network, transforms = self._network_and_transforms
-        film = [*self._film, images]
-        observation = see_film(transforms, film)
+        frames = [*self._earlier_frames, images]
+        observation = apply_to_frames(transforms, frames)
         if isinstance(network, RecurrentNetwork):
             memory = self._memory[0] if self._memory else network.start(len(images))
             outputs, memory = network.step(observation, memory)
             self._memory[:] = [memory]
         else:
             outputs = network(observation)
-        self._film[:] = film[-memory_of(transforms) :] if memory_of(transforms) else []
+        self._earlier_frames[:] = frames[-memory_of(transforms) :] if memory_of(transforms) else []
         return network.actions.greedy(outputs)
 
     def reset(self) -> None:
         """Forget the images of earlier calls of `act` and `act_batch`, before a new episode."""
-        self._film.clear()
+        self._earlier_frames.clear()
         self._memory.clear()
 
     @functools.cached_property

@@ -9,7 +9,7 @@ from torch import Tensor
 from torchrl.envs import Transform
 
 from drone_rl.envs import GrayPixels
-from drone_rl.envs.transforms import memory_of, pixel_transforms, see_film
+from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
 from drone_rl.policies import ImageNetwork, RecurrentNetwork
 from drone_rl.policies.recurrent import Memory
 from drone_rl.policies.rounding import decider
@@ -46,8 +46,8 @@ class Agent(Protocol):
     """An agent that acts in a batch of environments for one episode each."""
 
     @property
-    def knows_truth(self) -> bool:
-        """Whether only faults that hide objects affect it."""
+    def needs_only_hiding_faults(self) -> bool:
+        """Whether other faults can be left out, because only those that hide objects affect it."""
         ...
 
     def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
@@ -58,7 +58,7 @@ class Agent(Protocol):
 class PolicyAgent:
     """A policy that takes the most probable action."""
 
-    knows_truth = False
+    needs_only_hiding_faults = False
 
     def __init__(
         self,
@@ -75,7 +75,7 @@ class PolicyAgent:
         self._network = network
         self._first, *self._rest = pixel_transforms(transforms)
         self._memory, self._num_envs = memory_of(self._rest), num_envs
-        self._film: list[Tensor] = []
+        self._earlier_frames: list[Tensor] = []
         self._state = network.start(num_envs) if isinstance(network, RecurrentNetwork) else None
 
     def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
@@ -85,12 +85,12 @@ class PolicyAgent:
         else:
             images = self._first._apply_transform(context.render("rgb"))
         images = context.apply_faults(images, context.active)
-        film = [*(earlier[context.active] for earlier in self._film), images]
-        observation = see_film(self._rest, film)
+        frames = [*(earlier[context.active] for earlier in self._earlier_frames), images]
+        observation = apply_to_frames(self._rest, frames)
         if self._memory:
             newest = images.new_zeros(self._num_envs, *images.shape[1:])
             newest[context.active] = images
-            self._film = [*self._film, newest][-self._memory :]
+            self._earlier_frames = [*self._earlier_frames, newest][-self._memory :]
         if self._decide is not None:
             is_fragile = self._decide(observation).is_fragile.cpu()
             self.is_fragile[context.active.cpu()] |= is_fragile
@@ -111,7 +111,7 @@ class PolicyAgent:
 class BaselineAgent:
     """A baseline that takes random actions, or always the same one."""
 
-    knows_truth = True
+    needs_only_hiding_faults = True
 
     def __init__(self, name: str, actions: Actions, generator: torch.Generator) -> None:
         """Take "random" or an action's name, the action space, and a generator for "random"."""
@@ -132,10 +132,11 @@ class OracleAgent:
 
     It reads the segmentation image of the policy's camera, with the same faults. It uses the exact
     position of each cube that is visible in at least one pixel, and nothing about the others. It
-    compensates for delayed actions. If it fails, no policy can succeed.
+    compensates for delayed actions. A strength at which it certainly fails too often counts as
+    impossible, see `possible_share`.
     """
 
-    knows_truth = True
+    needs_only_hiding_faults = True
 
     def __init__(self, *, only_visible: bool = True) -> None:
         """With `only_visible=False`, the oracle uses the positions of all cubes."""

@@ -21,7 +21,7 @@ from drone_rl.robustness.perturbations import (
     frozen_frames,
     mount,
     sun_at,
-    task_things,
+    task_region,
     tint,
     whiten,
 )
@@ -130,7 +130,7 @@ def _rendered(subject: EvaluatedPolicy, condition: Condition) -> Condition:
 
 
 def _cluttered(subject: EvaluatedPolicy, count: int) -> Condition:
-    task_things(subject.task)
+    task_region(subject.task)
     return Condition(clutter=count)
 
 

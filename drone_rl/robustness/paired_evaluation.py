@@ -30,7 +30,7 @@ from drone_rl.robustness.perturbations import (
     clutter,
     sample_distractors,
     scene_appearance,
-    task_things,
+    task_region,
     variations,
 )
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
@@ -162,7 +162,7 @@ class PairedEvaluator:
     def distractor_places(self) -> Tensor:
         """Return positions of distractors, see `perturbations.sample_distractors`."""
         generator = torch_generator(self.seed, Stream.SHIFTS, number=_CLUTTER)
-        places = sample_distractors(task_things(self.subject.task), self.episodes, generator)
+        places = sample_distractors(task_region(self.subject.task), self.episodes, generator)
         return places.to(self.subject.device)
 
     def close(self) -> None:
@@ -183,7 +183,7 @@ class _Stage:
         generator = torch_generator(seed, Stream.SHIFTS)
         self._variations = variations(mode, condition.dimensions, episodes, generator)
         self._faults = FaultPipeline(
-            condition.faults, episodes, seed, hiding_only=agent.knows_truth
+            condition.faults, episodes, seed, hiding_only=agent.needs_only_hiding_faults
         )
         self._own = None if evaluator.appearances.varies else evaluator.appearances.middle
         self._full = scene_appearance(self.worlds.scene) if condition.appearance_changes else None
@@ -202,8 +202,8 @@ class _Stage:
         ):
             appearance = part.change(appearance or Appearance(), by)
         if self._distractors is not None:
-            things = task_things(self._evaluator.subject.task)
+            region = task_region(self._evaluator.subject.task)
             places = self._distractors[active, : condition.clutter]
-            appearance = clutter(appearance, things, places)
+            appearance = clutter(appearance, region, places)
         poses = self.worlds.poses(state, appearance)
         return StepContext(self.worlds, state, active, poses, appearance, self._faults, pending)

@@ -195,11 +195,11 @@ def elevation(direction: Colors) -> float:
     return math.degrees(math.atan2(-z, math.hypot(x, y)))
 
 
-def task_things(settings: BaseTaskSettings) -> ObjectRegion:
+def task_region(settings: BaseTaskSettings) -> ObjectRegion:
     """Return where a task's objects are, their size and colour; an `InputError` without any."""
-    if settings.things is None:
+    if settings.object_region is None:
         raise InputError(f"axes=distractors is not for task={settings.name}; leave it out of axes")
-    return settings.things
+    return settings.object_region
 
 
 def as_bright(color: Sequence[float]) -> tuple[float, ...]:
@@ -208,27 +208,27 @@ def as_bright(color: Sequence[float]) -> tuple[float, ...]:
     return tuple(min(1.0, wanted / has * c) for c in _BLUE)
 
 
-def sample_distractors(things: ObjectRegion, num_envs: int, generator: torch.Generator) -> Tensor:
+def sample_distractors(region: ObjectRegion, num_envs: int, generator: torch.Generator) -> Tensor:
     """Sample positions of distractors next to the area of the task, metres, world frame.
 
     Shape: (num_envs, MAX_DISTRACTORS, 3), float64.
     """
     near, far = _AWAY
     sampled = torch.rand(num_envs, MAX_DISTRACTORS, 3, generator=generator, dtype=torch.float64)
-    ahead = things.first / 2 + sampled[..., 0] * things.last
+    ahead = region.first / 2 + sampled[..., 0] * region.last
     is_left = sampled[..., 2].round().bool()
-    return stand(things, ahead, near + sampled[..., 1] * (far - near), is_left, things.altitude)
+    return stand(region, ahead, near + sampled[..., 1] * (far - near), is_left, region.altitude)
 
 
-def clutter(appearance: Appearance | None, things: ObjectRegion, places: Tensor) -> Appearance:
+def clutter(appearance: Appearance | None, region: ObjectRegion, places: Tensor) -> Appearance:
     """Add distractors of the size, height and luminance of the task's objects.
 
     Their places are in metres, world frame. Shape: (num_envs, count, 3).
     """
-    color = torch.tensor(as_bright(things.color)).to(places)
+    color = torch.tensor(as_bright(region.color)).to(places)
     more = Distractors(
         places=places,
-        sizes=torch.full_like(places[..., 0], things.size),
+        sizes=torch.full_like(places[..., 0], region.size),
         colors=color.expand(places.shape),
     )
     appearance = appearance or Appearance()

@@ -126,7 +126,7 @@ class Suite:
 class FrameRecorder:
     """Fly straight on and record the colour image of one step."""
 
-    knows_truth = False
+    needs_only_hiding_faults = False
 
     def __init__(self) -> None:
         self._step = 0

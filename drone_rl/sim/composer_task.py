@@ -23,7 +23,7 @@ from drone_rl.sim.rendering import Appearance, opengl
 from drone_rl.sim.rendering.opengl import OpenGlAppearance
 from drone_rl.sim.rendering.scene import Scene, SemanticClass
 from drone_rl.sim.tasks import State, Task, as_task
-from drone_rl.sim.visual_randomization import AppearanceSampler, things_of
+from drone_rl.sim.visual_randomization import AppearanceSampler, object_region_of
 
 _SKY = 0.69 * entities.DRAW_DISTANCE
 """Metres behind which there is nothing: MuJoCo's sky is a ball of 0.7 of the drawing distance."""
@@ -234,8 +234,8 @@ class ComposerTask(composer.Task):
 
     def _apply(self, physics: mjcf.Physics, appearance: Appearance) -> None:
         if self._opengl is None:
-            things = things_of(self.rules)
-            middle = 0.0 if things is None else (things.first + things.last) / 2
+            region = object_region_of(self.rules)
+            middle = 0.0 if region is None else (region.first + region.last) / 2
             self._opengl = OpenGlAppearance(self.compile(), middle)
         self._opengl.apply(physics, appearance, self._pixels)
         self._physics = physics

@@ -37,10 +37,10 @@ _TURN = (5**0.5 - 1) / 2
 """The step, as a fraction of the path, that leaves the most even gaps."""
 
 
-def things_of(task: Any) -> ObjectRegion | None:
+def object_region_of(task: Any) -> ObjectRegion | None:
     """Return where the props of a task, or of its settings, stand; None if unknown."""
     settings = task if isinstance(task, BaseTaskSettings) else getattr(task, "settings", None)
-    return getattr(settings, "things", None)
+    return getattr(settings, "object_region", None)
 
 
 def most_distractors(settings: AppearanceSettings) -> int:
@@ -50,25 +50,25 @@ def most_distractors(settings: AppearanceSettings) -> int:
 
 
 def stand(
-    things: ObjectRegion, ahead: Tensor, aside: Tensor, is_left: Tensor, height: float | Tensor
+    region: ObjectRegion, ahead: Tensor, aside: Tensor, is_left: Tensor, height: float | Tensor
 ) -> Tensor:
     """Return positions next to the path, metres, world frame. Shape: (*, 3), float64.
 
     `ahead` and `height` are coordinates, `aside` the distance from the region of the task's props.
     """
-    side = (things.bound + aside) * (2.0 * is_left.double() - 1.0)
+    side = (region.bound + aside) * (2.0 * is_left.double() - 1.0)
     return torch.stack([ahead, side, torch.as_tensor(height).expand(ahead.shape)], -1)
 
 
 def draw_distractors(
-    settings: AppearanceSettings, things: ObjectRegion | None, source: np.random.RandomState | None
+    settings: AppearanceSettings, region: ObjectRegion | None, source: np.random.RandomState | None
 ) -> list[float]:
     """Sample `WIDTH` numbers of each distractor, left and right of the path of the task's props.
 
     Without a random stream, return the middles of all ranges.
     """
     most = most_distractors(settings)
-    if not most or things is None:
+    if not most or region is None:
         return []
     number = torch.arange(most)
     count = _uniform(settings.distractors, source, ())
@@ -79,8 +79,8 @@ def draw_distractors(
     size = _uniform(settings.distractor_size, source, (most,))
     away = _uniform(settings.distractor_distance, source, (most,)) + size / 2
     height = size / 2 - HIDDEN_DEPTH * (number >= count)
-    ahead = share * (things.first + things.last)
-    places = stand(things, ahead, away, number % 2 == 0, height)
+    ahead = share * (region.first + region.last)
+    places = stand(region, ahead, away, number % 2 == 0, height)
     colors = torch.stack([_color(settings, source, i) for i in range(most)])
     return torch.cat([places, size[:, None], colors], -1).flatten().tolist()
 
@@ -128,8 +128,8 @@ class AppearanceSampler:
         can't be read or is too large, or the camera or distractors do not fit into the scene.
         """
         task, self._camera = as_task(task), camera or CameraSettings()
-        self._things = things_of(task)
-        check_appearance(settings, self._camera, self._things, task.name)
+        self._region = object_region_of(task)
+        check_appearance(settings, self._camera, self._region, task.name)
         self.settings, self._device = settings, device
         self.distractors = most_distractors(settings)
         """Largest number of distractors."""
@@ -175,7 +175,7 @@ class AppearanceSampler:
     def _sample(self, source: np.random.RandomState | None) -> list[float]:
         # New numbers are sampled last, so that earlier ones keep their values.
         own = _sample_numbers(self.settings, source)
-        return [*own, *draw_distractors(self.settings, self._things, source)]
+        return [*own, *draw_distractors(self.settings, self._region, source)]
 
     def _to_appearance(self, values: Tensor) -> Appearance:
         """Appearance of rows of `_sample`, or of one. Shape: (num_envs, *) or (*)."""

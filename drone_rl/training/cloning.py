@@ -17,7 +17,7 @@ from torch import Tensor
 from torchrl.envs import Transform
 
 from drone_rl.config.training import TrainSettings
-from drone_rl.envs.transforms import memory_of, pixel_transforms, see_film
+from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.actor import distribution_of
 from drone_rl.policies.zoo import describe
@@ -78,8 +78,8 @@ class Frames(NamedTuple):
         one, as in an episode.
         """
         earlier = range(memory_of(transforms), -1, -1)
-        film = [self.images[torch.maximum(rows - by, self.starts[rows])] for by in earlier]
-        return see_film(transforms, film)
+        frames = [self.images[torch.maximum(rows - by, self.starts[rows])] for by in earlier]
+        return apply_to_frames(transforms, frames)
 
 
 def imitation_loss(outputs: Tensor, actions: Tensor) -> Tensor:

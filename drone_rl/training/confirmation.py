@@ -26,7 +26,7 @@ class Confirmation:
     def __init__(self, settings: TrainSettings, network: nn.Module) -> None:
         self._settings, self._network = settings, network
         self._description = describe(settings)
-        self.flights = 0
+        self.episodes = 0
         """Episodes so far."""
         self.succeeded = 0
         """Successes in the last confirmation."""
@@ -40,7 +40,7 @@ class Confirmation:
         env.set_seed(settings.seed)
         actor = make_actor(self._network, env.action_spec)
         greedy = run_episodes(env, actor, episodes, is_compiled=True)
-        self.flights += episodes
+        self.episodes += episodes
         self.succeeded = int(greedy.success.sum())
         return self.succeeded >= settings.trainer.confirm_share * episodes
 
@@ -63,4 +63,4 @@ class Confirmation:
     @property
     def result(self) -> Mapping[str, Any]:
         """Entries of `result.json`."""
-        return {"confirming_flights": self.flights, "confirming_flights_succeeded": self.succeeded}
+        return {"confirming_flights": self.episodes, "confirming_flights_succeeded": self.succeeded}

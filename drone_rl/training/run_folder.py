@@ -54,7 +54,8 @@ class Training:
 
     folder: Path
     reason: str
-    """Why it stopped: "solved", "frames", "episodes" or a signal's name."""
+    """Why it stopped: "solved", "frames", "episodes", a signal's name, or a callback's
+    `stop_request`, such as "pruned"."""
     result: dict[str, Any]
     """Content of `result.json`."""
 
@@ -181,7 +182,7 @@ def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Tra
     return Training(folder, result["reason"], result)
 
 
-def hand_on_signal(training: Training) -> Training:
+def reraise_signal(training: Training) -> Training:
     """Re-raise the signal that stopped a training run, now that its state is saved.
 
     Returns `training` if there was no signal, or if the caller's own handler returns. Ctrl-C raises

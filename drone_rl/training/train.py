@@ -74,7 +74,7 @@ def train(
     with folder_lock(run.path):
         result = learn(settings, run.path, state, [*callbacks, ForwardProgress(progress or Bar())])
         training = run_folder.finish(settings, run.path, result)
-    return run_folder.hand_on_signal(training)
+    return run_folder.reraise_signal(training)
 
 
 def learn(

@@ -66,8 +66,8 @@ def read_arrays(
 ) -> dict[str, NDArray]:
     """Return the arrays of numbers and texts in an .npz file.
 
-    `most` is the largest size of all arrays together, in bytes, and of a file over 256 MiB;
-    `allowance`, shared with further files, replaces it for the arrays.
+    `most` is the largest size of all arrays together, in bytes; `allowance`, shared with further
+    files, replaces it. The file itself may have as many bytes, and at least 256 MiB.
 
     Raises:
         InputError: The file is unusable, or an array holds objects.

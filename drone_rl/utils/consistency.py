@@ -63,7 +63,7 @@ def check_proportion(given: Any, where: str, trials: int | None = None) -> int:
     given = as_mapping(given, where)
     successes, total = (read_entry(given, key, COUNT, where) for key in ("successes", "trials"))
     if successes > total:
-        raise InputError(f"{where}: {successes} of {total} is no share; measure it again")
+        raise InputError(f"{where}: {successes} of {total} is no fraction; measure it again")
     if trials is not None:
         check_same(total, trials, f"{where}.trials")
     expected = proportion(successes, total)

@@ -27,7 +27,7 @@ class Claim:
     path: Path
     """Its file."""
     certificate: Certificate | None
-    """See `drone_rl.verification.checker.read_validated`; None if it was refused."""
+    """See `drone_rl.verification.checker.checker.read_validated`; None if it was refused."""
     refused: str | None = None
     """The reason, in one line."""
     flights: int = 0
@@ -95,14 +95,14 @@ def find_claim(
     *,
     flights: int = JudgeSettings.certificate_flights,
     seed: RootSeed | None = None,
-    **flying: Any,
+    **options: Any,
 ) -> Claim | None:
     """Find and check the certificate of a policy in its task, see `checker.read_validated`.
 
     It is the given file or the certificate.json of the given folder, by default the file next to
     the policy, see `drone_rl.policies.zoo.certificate_path`. Rollouts from so many other
-    placements, by default of a fresh seed, re-check it; `flying` is "device" and "renderer". Return
-    None if there is none; an invalid one next to the policy is returned as refused.
+    placements, by default of a fresh seed, re-check it with `options`, "device" and "renderer".
+    Return None if there is none; an invalid one next to the policy is returned as refused.
 
     Raises:
         InputError: The given one is unreadable, of another network or task, or refuted.
@@ -118,10 +118,10 @@ def find_claim(
     if given is not None:
         path = Path(given)
         path = path / "certificate.json" if path.is_dir() else path
-        return _try(policy, path, flights, seed, **flying)
+        return _read_and_check(policy, path, flights, seed, **options)
     path = certificate_path(policy.path)
     try:
-        return _try(policy, path, flights, seed, **flying) if path.is_file() else None
+        return _read_and_check(policy, path, flights, seed, **options) if path.is_file() else None
     except InputError as error:
         return Claim(path, None, refused=str(error))
 
@@ -153,12 +153,14 @@ def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:
     ]
 
 
-def _try(policy: Policy, path: Path, flights: int, seed: RootSeed, **flying: Any) -> Claim:
+def _read_and_check(
+    policy: Policy, path: Path, flights: int, seed: RootSeed, **options: Any
+) -> Claim:
     weights = policy.state["policy"]
     certificate = read_validated(path, policy.description, weights)
     if not flights:
         return Claim(path, certificate)
-    found = check_certificate(certificate, weights, flights=flights, seed=seed.value, **flying)
+    found = check_certificate(certificate, weights, flights=flights, seed=seed.value, **options)
     if not found.accepted:
         raise InputError(f"certificate {path} does not hold: {found.lines()[0]}; prove again")
     return Claim(

@@ -27,9 +27,9 @@ from drone_rl.training.run_folder import (
     MAY_CHANGE,
     Training,
     finish,
-    hand_on_signal,
     last_of,
     new_folder,
+    reraise_signal,
     settings_of,
 )
 from drone_rl.training.train import learn
@@ -234,7 +234,7 @@ def train_until_proved(
             result["reason"] = "proved"
         result["rounds"] = [done.values() for done in journal.rounds]
         done = finish(journal.settings, folder, result)
-    return hand_on_signal(done)
+    return reraise_signal(done)
 
 
 def _learn(

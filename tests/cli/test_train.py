@@ -14,10 +14,12 @@ import time
 import pytest
 import torch
 
+from drone_rl.cli.train import TrainCommand
 from drone_rl.config import TaskSettings
 from drone_rl.config.training import TrainSettings
 from drone_rl.training import CsvCallback
 from drone_rl.training.demonstrations import record_oracle
+from drone_rl.training.run_folder import Training
 from drone_rl.utils.checkpoint import load_checkpoint
 from drone_rl.utils.overrides import read_overrides
 from tests.cli.running import TINY, drone_rl, error_line
@@ -127,6 +129,33 @@ def test_a_logger_whose_package_is_missing(in_process, monkeypatch, tmp_path):
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
 def test_cuda_without_a_gpu(in_process):
     assert "give device=cpu" in error_line(in_process("train", "device=cuda"))
+
+
+@pytest.mark.parametrize(
+    ("reason", "shown"),
+    [
+        (
+            "solved",
+            r"already finished \(solved, 1,000 frames\); .*larger trainer.target_share, or null",
+        ),
+        ("episodes", r"already finished \(episodes, .*larger trainer.total_episodes"),
+        ("pruned", r"already finished \(pruned, .*start a new one"),
+        ("SIGTERM", "resume with: drone-rl train resume="),
+    ],
+)
+def test_a_run_that_does_not_go_on_is_told_by_its_reason(
+    reason, shown, in_process, tmp_path, caplog, monkeypatch
+):
+    caplog.set_level("INFO")
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "result.json").write_text('{"frames": 1000}')
+    result = {"frames": 1000, "running_reward": 1.0}
+    done = Training(tmp_path / "run", reason, result)
+    monkeypatch.setattr("drone_rl.cli.train.read_result", lambda folder: result)
+    monkeypatch.setattr("drone_rl.train", lambda *_, **__: done)
+    TrainCommand(resume=str(tmp_path / "run")).run(tmp_path / "run")
+    assert re.search(shown, caplog.text)
+    assert ("already finished" in caplog.text) == (reason != "SIGTERM")
 
 
 def test_resuming_a_finished_run_says_so(run, in_process, tmp_path, caplog):

@@ -10,7 +10,7 @@ from drone_rl.utils.errors import InputError
 def check(task=None, camera=None, **given):
     task = task or TaskSettings()
     camera = camera or CameraSettings()
-    check_appearance(AppearanceSettings(**given), camera, task.things, task.name)
+    check_appearance(AppearanceSettings(**given), camera, task.object_region, task.name)
 
 
 def test_what_has_room():

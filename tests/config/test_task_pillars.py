@@ -16,9 +16,9 @@ def test_what_follows_from_the_settings():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"spacing": 4.0}, "spacing=4.0 leaves no room to turn"),
-        ({"first_distance": 2.0}, "first_distance=2.0 leaves no room to turn"),
-        ({"finish_margin": 1.0}, "finish_margin=1.0 leaves no room"),
+        ({"spacing": 4.0}, "spacing=4.0 leaves no room to move aside"),
+        ({"first_distance": 2.0}, "first_distance=2.0 leaves no room to move aside"),
+        ({"finish_margin": 1.0}, "finish_margin=1.0 puts the line into the last row"),
         ({"height": 2.0}, "height=2.0 puts pillars below the drone; give at least 2.5"),
         ({"step_limit": 33}, "step_limit=33 ends every episode .* at least 34"),
         ({"density": 6.0}, "density=6.0 makes fields too dense to cross: .* lower density"),

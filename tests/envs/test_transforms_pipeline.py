@@ -9,7 +9,7 @@ from drone_rl.envs import (
     on_pixels,
     with_transforms,
 )
-from drone_rl.envs.transforms import memory_of, see_film
+from drone_rl.envs.transforms import apply_to_frames, memory_of
 
 
 def test_transforms_are_applied_in_order():
@@ -38,8 +38,8 @@ def test_film_is_transformed_per_frame_and_stacked():
     standard = StandardizePixels(mean=0.5, std=0.25)
     stack = CatFrames(N=3, dim=-3, in_keys=["pixels"])
     film = [torch.full((2, 1, 2, 2), value) for value in (0.5, 0.75)]
-    seen = see_film([standard, stack], film)
+    seen = apply_to_frames([standard, stack], film)
     assert seen.shape == (2, 3, 2, 2)
     assert seen[0, :, 0, 0].tolist() == [0.0, 0.0, 1.0]  # the first frame fills missing ones
-    assert see_film([standard], film)[0, 0, 0, 0] == 1.0
+    assert apply_to_frames([standard], film)[0, 0, 0, 0] == 1.0
     assert (memory_of([standard, stack]), memory_of([standard])) == (2, 0)

@@ -114,6 +114,23 @@ class Over(nn.Module):
         return x.sum((0, 1, 2, 3)).view(1, 1)
 
 
+class TwoConvolutions(nn.Module):
+    """Convolutions of one shape, with an activation that is a function."""
+
+    def __init__(self):
+        super().__init__()
+        self.a, self.b = nn.Conv2d(1, 2, 3, padding=1), nn.Conv2d(2, 2, 3, padding=1)
+        self.last = nn.Linear(160, 3)
+
+    def forward(self, x):
+        return self.last(self.b(self.a(x).relu()).relu().flatten(1))
+
+
+def test_a_convolution_after_another_one_is_a_layer_of_its_own():
+    network = ExternalNetwork(TwoConvolutions(), (1, 8, 10), MOVES)
+    assert spatial_layers(network) == ["a", "b"]
+
+
 def test_a_convolution_may_be_the_last_and_what_is_of_no_picture_is_no_layer():
     network = ExternalNetwork(Last(), (1, 8, 10), MOVES)
     assert [*layers(network)] == ["conv"]

@@ -10,7 +10,7 @@ from drone_rl.robustness.perturbations import (
     as_bright,
     clutter,
     sample_distractors,
-    task_things,
+    task_region,
 )
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
@@ -32,7 +32,7 @@ def test_they_are_blue_and_as_bright():
 
 
 def test_they_stand_beside_the_way():
-    places = sample_distractors(CUBES.things, 500, torch.Generator().manual_seed(0))
+    places = sample_distractors(CUBES.object_region, 500, torch.Generator().manual_seed(0))
     assert places.shape == (500, MAX_DISTRACTORS, 3)
     x, y, z = places.flatten(0, 1).T
     assert 7.5 <= x.min() < 8 and 40 < x.max() <= 7.5 + 33
@@ -43,10 +43,10 @@ def test_they_stand_beside_the_way():
 
 def test_they_are_as_large_as_what_matters_and_come_after_those_that_were_there():
     places = torch.arange(12.0).reshape(2, 2, 3)
-    look = clutter(None, CUBES.things, places)
+    look = clutter(None, CUBES.object_region, places)
     assert look.distractors.sizes.tolist() == [[2.5, 2.5]] * 2
     assert look.distractors.colors[1, 0].tolist() == pytest.approx(as_bright(CUBES.cube_color))
-    both = clutter(look, CUBES.things, 1 + places[:, :1])
+    both = clutter(look, CUBES.object_region, 1 + places[:, :1])
     assert both.distractors.places.tolist() == torch.cat([places, 1 + places[:, :1]], 1).tolist()
 
 
@@ -70,11 +70,11 @@ def test_who_knows_what_is_what_does_not_mind_them():
 
 
 def test_tasks_of_which_nothing_is_known():
-    assert task_things(PillarsSettings()).size == 1.0
+    assert task_region(PillarsSettings()).size == 1.0
 
     class Other(PillarsSettings):
         name = "other"
-        things = None
+        object_region = None
 
     with pytest.raises(InputError, match="axes=distractors is not for task=other"):
-        task_things(Other())
+        task_region(Other())

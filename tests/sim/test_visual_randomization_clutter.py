@@ -12,8 +12,8 @@ from drone_rl.sim.visual_randomization import (
     WIDTH,
     draw_distractors,
     most_distractors,
+    object_region_of,
     stand,
-    things_of,
 )
 
 CUBES = TaskSettings()
@@ -33,12 +33,12 @@ def test_colors_are_neither_red_nor_brown():
 
 def drawn(settings, seed):
     source = None if seed is None else np.random.RandomState(seed)
-    return torch.tensor(draw_distractors(settings, CUBES.things, source)).reshape(-1, WIDTH)
+    return torch.tensor(draw_distractors(settings, CUBES.object_region, source)).reshape(-1, WIDTH)
 
 
 def test_positions_are_beside_the_path():
     ahead, aside = torch.tensor([1.0, 2.0]), torch.tensor([3.0, 4.0])
-    places = stand(CUBES.things, ahead, aside, torch.tensor([True, False]), 2.5)
+    places = stand(CUBES.object_region, ahead, aside, torch.tensor([True, False]), 2.5)
     assert places.tolist() == [[1.0, 9.0, 2.5], [2.0, -10.0, 2.5]]  # cubes are within 6 m
 
 
@@ -70,13 +70,13 @@ def test_fixed_settings_need_fewer_samples():
 def test_middle_values_and_no_distractors():
     middle = drawn(SOME, None)
     assert (middle[:, 3] == 1.5).all() and (middle[:, 4] - 0.2).abs().max() < 1e-6
-    assert draw_distractors(MINIMAL, CUBES.things, None) == []
+    assert draw_distractors(MINIMAL, CUBES.object_region, None) == []
     assert draw_distractors(SOME, None, None) == []
 
 
 def test_only_tasks_with_objects_have_distractors():
-    assert things_of(CUBES) == things_of(as_task(CUBES)) == CUBES.things
-    assert things_of(object()) is None
+    assert object_region_of(CUBES) == object_region_of(as_task(CUBES)) == CUBES.object_region
+    assert object_region_of(object()) is None
     assert (most_distractors(SOME), most_distractors(MINIMAL)) == (5, 0)
 
 
@@ -93,7 +93,7 @@ def test_fixed_settings_draw_no_random_numbers():
     fixed = AppearanceSettings(distractors=3, distractor_size=2.0, distractor_distance=4.0)
     source, other = np.random.RandomState(0), np.random.RandomState(0)
     begin, shift = other.uniform(0.0, 1.0), other.uniform(-0.5, 0.5, 3)
-    rows = torch.tensor(draw_distractors(fixed, CUBES.things, source)).reshape(-1, WIDTH)
+    rows = torch.tensor(draw_distractors(fixed, CUBES.object_region, source)).reshape(-1, WIDTH)
     assert source.uniform() == other.uniform()
     shares = (begin + np.array([0.0, 0.5, 0.6180339887498949]) + shift / 3) % 1.0
     assert rows[:, 0].tolist() == pytest.approx((48 * shares).tolist(), rel=1e-6)

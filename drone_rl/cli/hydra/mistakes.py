@@ -45,10 +45,10 @@ _RANGE = re.compile(r"([\w.]+)=(\d+)(?:\.\.|-|:)(\d+)")
 _MAGNITUDES = {"k": 10**3, "m": 10**6, "g": 10**9}
 _TEXTS = re.compile(
     r"[+~]*(hydra|paths|policy|policies|resume|certificate|explanations|folder|name|shifts|require|"
-    r"demonstrations)"
+    r"demonstrations)(?=[=.@/]|$)"
 )
 """Settings whose values are names and paths."""
-_EXPONENT = re.compile(r"(?<=[=,\[(])(\d+(?:\.\d+)?[eE]\+?\d+)(?=[,\])]|$)")
+_EXPONENT = re.compile(r"(?<=[=,\[(\s])(\d+(?:\.\d+)?[eE]\+?\d+)(?=[,\])]|$)")
 _LARGEST_WHOLE = 10**15
 
 

@@ -235,12 +235,12 @@ class Flight:
     def hello(self) -> dict[str, Any]:
         """Return what does not change: policy, task, actions, choices."""
         world, actions = self.world, self.world.actions
-        terms, things = world.task.vocabulary, world.policy.task.things
+        terms, region = world.task.vocabulary, world.policy.task.object_region
         return {
             "policy": world.policy.name,
             "task": world.task.name,
             "object": terms.target,
-            "size": things.size if things else _SIZE,
+            "size": region.size if region else _SIZE,
             "goal": terms.goal,
             "reached": terms.reached,
             "actions": list(actions.names),

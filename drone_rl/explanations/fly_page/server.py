@@ -141,6 +141,8 @@ class FlyPage:
         self._pages: set[_Page] = set()
         self._messages: queue.SimpleQueue[tuple[Any, _Page]] = queue.SimpleQueue()
         self._frame: bytes | None = None
+        self._handing = threading.Lock()
+        """Guards the frame that the simulation's thread hands to the server's."""
         self._holder: _Page | None = None
         """The page whose keys or sticks were the last to change."""
         self._failure: Exception | None = None
@@ -264,7 +266,8 @@ class FlyPage:
 
     def _publish(self) -> None:
         """Offer the newest frame to all pages."""
-        frame, self._frame = self._frame, None
+        with self._handing:
+            frame, self._frame = self._frame, None
         if frame is not None:
             for page in self._pages:
                 page.offer(frame)
@@ -313,8 +316,9 @@ class FlyPage:
 
     def _offer(self, frame: bytes) -> None:
         """Hand a frame to the server's thread, unless the last one is still to be taken."""
-        loop, is_waiting = self._loop, self._frame is not None
-        self._frame = frame
+        loop = self._loop
+        with self._handing:
+            is_waiting, self._frame = self._frame is not None, frame
         if loop is not None and not is_waiting:
             loop.call_soon_threadsafe(self._publish)
 

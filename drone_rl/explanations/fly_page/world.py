@@ -73,7 +73,7 @@ class World:
         self._forgotten: Mapping[str, Tensor] = {name: entries[name] for name in names}
         """Memory of the actor at the start of an episode, by name."""
         self._greedy = greedy
-        self._film: deque[Tensor] = deque(maxlen=self.scenes.memory)
+        self._earlier_frames: deque[Tensor] = deque(maxlen=self.scenes.memory)
         self._every = torch.arange(1)
         self.light = 1.0
         self.wind = _to_polar(policy.dynamics.wind)
@@ -164,7 +164,7 @@ class World:
         if self._seen is None:
             state = self.worlds.state
             frame = self.worlds.render(state, appearance=self._look())
-            observation = self.scenes.transform(frame, [*self._film])
+            observation = self.scenes.transform(frame, [*self._earlier_frames])
             observed = TensorDict({"pixels": observation, **self._memory}, [1])
             acted = choose_action(self._actor, observed, greedy=self._greedy)
             shares = self.actions.probabilities(acted["logits"])[0]
@@ -176,7 +176,7 @@ class World:
     def step(self, action: Tensor) -> float:
         """Take an action, (1,) and then its shape; return the reward."""
         seen = self.see()
-        self._film.append(seen.frame)
+        self._earlier_frames.append(seen.frame)
         self._memory = seen.memory
         reward = float(self.worlds.step(self._every, action)[0])
         self.reward += reward
@@ -255,7 +255,7 @@ class World:
 
     def _forget(self) -> None:
         """Let the policy begin without earlier frames."""
-        self._film.clear()
+        self._earlier_frames.clear()
         self._memory: Mapping[str, Tensor] = self._forgotten
 
     def _place(self, body: BodyState) -> None:

@@ -52,7 +52,7 @@ class RunningServer:
         if loop is not None and task is not None and self._thread.is_alive():
             loop.call_soon_threadsafe(task.cancel)
             self._thread.join()
-            self.simulation.close()
+        self.simulation.close()
 
     def _main(self, host: str, port: int) -> None:
         with contextlib.suppress(asyncio.CancelledError):
@@ -104,6 +104,7 @@ def serve(
     Raises:
         InputError: A setting is wrong, or the port is in use.
     """
+    patience_s = Real(0.0, 60.0).read(patience_s, "patience_s")
     simulation, host, number = make_simulation(
         settings,
         scene=scene,
@@ -114,7 +115,6 @@ def serve(
         renderer=renderer,
         recordings=recordings,
     )
-    patience_s = Real(0.0, 60.0).read(patience_s, "patience_s")
     return RunningServer(simulation, host, number, patience_s)
 
 

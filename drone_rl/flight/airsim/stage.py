@@ -84,7 +84,8 @@ class Stage:
             Appearance, tuple[_Spawned, ...], dict[Any, tuple[CameraState, Appearance | None]]
         ] = (_PLAIN, (), {})
         """Weather, spawned objects, and the appearances that were made for them, by camera."""
-        self._ids = segmentation_ids(self.worlds.scene)
+        self._ids = self._first_ids = segmentation_ids(self.worlds.scene)
+        """Segmentation ids of all geoms, and those without the clients' own."""
         self._own_ids: dict[str, int] = {}
         self._of_file = self._read_file()
         """Poses in NED of the named geoms of a file, which stay where they are."""
@@ -95,7 +96,7 @@ class Stage:
         return entity.mjcf_model.model
 
     def reset(self) -> None:
-        """Put all objects where an episode begins; cubes are placed anew."""
+        """Put all objects where an episode begins; cubes get new places."""
         self.worlds.reset(torch.arange(1), [self._random])
 
     @property
@@ -221,13 +222,17 @@ class Stage:
 
     def destroy(self, name: str) -> bool:
         """Remove a spawned object; return whether there was one."""
-        return self._spawned.pop(name, None) is not None
+        if self._spawned.pop(name, None) is None:
+            return False
+        self._own_ids.pop(name, None)
+        self._ids = self._segmentation()
+        return True
 
     # Weather and light
 
-    def set_fog(self, share: float) -> None:
+    def set_fog(self, density: float) -> None:
         """Set the density of fog, 0 to 1: at 1 one sees 20 m far."""
-        visibility = None if share <= 0.0 else 20.0 / share
+        visibility = None if density <= 0.0 else 20.0 / density
         self._weather = dataclasses.replace(self._weather, fog_visibility=visibility)
 
     def set_sun(self, elevation: float, azimuth: float = 127.9) -> None:
@@ -261,13 +266,11 @@ class Stage:
 
     def clear_ids(self) -> None:
         """Give every object the id 0."""
-        self._own_ids = dict.fromkeys(self.names, 0)
-        self._ids = torch.zeros_like(self._ids)
+        self._own_ids = {}
+        self._ids = self._first_ids = torch.zeros_like(self._ids)
 
     def _segmentation(self) -> Tensor:
-        ids = segmentation_ids(self.worlds.scene)
-        if all(number == 0 for number in self._own_ids.values()) and self._own_ids:
-            ids = torch.zeros_like(ids)
+        ids = self._first_ids.clone()
         for name, number in self._own_ids.items():
             ids[self._geoms(name)] = max(number, 0)
         return ids
@@ -280,9 +283,11 @@ class Stage:
             index = self._names.index(name)
         elif name in self._spawned:
             index = len(self._names) + self._spawned[name].number
-        else:
+        elif name in self._of_file:
             names = [scene.model.geom(i).name.partition("/")[2] for i in range(scene.model.ngeom)]
-            return [i for i, of in enumerate(names) if of and of == name]
+            return [i for i, of in enumerate(names) if of == name]
+        else:
+            return []
         return [i for i, of in enumerate(scene.props) if of == index]
 
     # Cameras
@@ -314,7 +319,7 @@ class Stage:
     def _appearance(self, camera: CameraState, capture: Capture) -> Appearance | None:
         """Return the appearance in a camera, the same object as long as nothing changes.
 
-        Renderers need not prepare it again then; None, the scene's own, they prepare only once.
+        Renderers reuse what they have prepared for an object; None is the scene's own appearance.
         """
         spawned = tuple(self._spawned.values())
         weather, earlier, known = self._shown
@@ -326,7 +331,10 @@ class Stage:
             mounting = camera.mounting(capture, self.worlds.camera.vertical_fov)
             found = dataclasses.replace(self._weather, camera=mounting, distractors=self._spares())
             is_own = self._weather is _PLAIN and mounting is None and not spawned
-            known[key] = (camera, None if is_own else found)  # a camera that is kept has its own id
+            known[key] = (
+                camera,
+                None if is_own else found,
+            )  # keeping the camera keeps its id unique
         return known[key][1]
 
     def image(self, kind: ImageType, shot: Shot, *, as_float: bool) -> Tensor:

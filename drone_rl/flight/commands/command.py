@@ -24,7 +24,7 @@ LANDING_SPEED = 0.2
 _STOPPED = 0.05
 """Vertical speed up to which a landing drone counts as standing, m/s."""
 _STOPPED_PERIODS = 10
-"""A landing is complete after more control periods without sinking."""
+"""A landing is complete after more than this many control periods without sinking."""
 _STILL = 0.01
 """Yaw rate up to which a drone does not turn, radians per second."""
 
@@ -86,9 +86,9 @@ def hold(reference: Tensor) -> Goals:
     return Goals(HOLD, reference)
 
 
-def all_rotors(share: float) -> Goals:
+def all_rotors(thrust: float) -> Goals:
     """Return goals for one drone whose rotors all have this fraction of full thrust."""
-    return rotor_goals(torch.full((1, 4), share, dtype=torch.float64))
+    return rotor_goals(torch.full((1, 4), thrust, dtype=torch.float64))
 
 
 class TimedCommand(Command):

@@ -39,7 +39,7 @@ class Course:
     speed: float = 2.0
     """Speed along the square, metres per second."""
     hover: float = 6.0
-    """Seconds of hovering; the first three are not measured."""
+    """Seconds of hovering; the first three are not measured, unless there are no more."""
 
 
 @dataclasses.dataclass(frozen=True)

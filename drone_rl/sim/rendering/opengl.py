@@ -91,7 +91,7 @@ class OpenGlAppearance:
 
     def _light(self, model: Any, appearance: Appearance, exposure: float) -> None:
         lights = appearance.lights(1)
-        model.light_ambient[0] = 0.0  # the headlight's is in its place, also in shadows
+        model.light_ambient[0] = 0.0  # the headlight's ambient light also reaches shadows
         model.vis.headlight.active = 1
         model.vis.headlight.ambient = _row(lights["ambient"]) * exposure
         model.vis.headlight.diffuse = model.vis.headlight.specular = 0.0

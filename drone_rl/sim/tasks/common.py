@@ -84,8 +84,8 @@ def place_in_view(
     """Return random positions in view of a camera, uniform over the image's columns.
 
     `draw` are numbers in [0, 1) for distance and column. Positions are metres ahead of the camera
-    and to its left, from `nearest` to `farthest` ahead, at most `widest` aside, or more
-    where even `nearest` is wider. Shapes: (*, 2).
+    and to its left, from `nearest` to `farthest` ahead and at most `widest` aside; a column that is
+    wider even at `nearest` is used there. Shapes: (*, 2).
     """
     slope = (2 * draw[..., 1] - 1) * math.tan(math.radians(camera.horizontal_fov / 2))
     most = (widest / slope.abs().clamp_min(1e-9)).clamp(max=farthest).clamp(min=nearest)

@@ -123,7 +123,7 @@ class Pillars(common.PropTask[FieldState]):
 
     def sample(self, random_state: np.random.RandomState) -> Tensor:
         """Sample the y of the pillars of a field that can be crossed. Shape: (R, K), metres."""
-        return torch.from_numpy(self.lanes.draw_field(random_state))
+        return torch.from_numpy(self.lanes.sample_field(random_state))
 
     def start(self, sampled: Tensor, body: BodyState) -> FieldState:
         """Return initial states; `sampled` are the y of the pillars, (N, R, K)."""

@@ -22,7 +22,7 @@ class Lanes:
     def __init__(self, settings: PillarsSettings) -> None:
         self.settings = settings
 
-    def draw_field(self, random_state: np.random.RandomState) -> NDArray[np.float64]:
+    def sample_field(self, random_state: np.random.RandomState) -> NDArray[np.float64]:
         """Sample the y of all pillars of a field that can be crossed. Shape: (R, K)."""
         s = self.settings
         rows, closed = np.empty((s.num_rows, s.row_size)), np.ones(s.num_rows, bool)
@@ -40,11 +40,11 @@ class Lanes:
         return np.arange(-most, most + 1, dtype=np.float64) * step
 
     def is_open(self, rows: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return which lanes within the field rows leave open. (*, K) to (*, L)."""
+        """Return which lanes within the field are open in each row. (*, K) to (*, L)."""
         away = np.abs(rows[..., None, :] - self.within_field()[:, None])
         return np.asarray((away > self.settings.touch_distance).all(-1))
 
-    def seen_from(self, rows: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
+    def lanes_from(self, rows: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
         """Return lanes relative to drones, and which of them are open and within the field.
 
         The y of pillars, (N, R, K), and of drones, (N,), to metres to the left of the drone,
@@ -53,23 +53,23 @@ class Lanes:
         step, edge = self.settings.step_length, self.settings.spread + 1e-9
         count = int(2.0 * edge / step) + 1
         first = step * torch.ceil((-edge - y) / step)
-        turns = first[:, None] + step * torch.arange(count, dtype=y.dtype, device=y.device)
-        lane = y[:, None] + turns
+        offsets = first[:, None] + step * torch.arange(count, dtype=y.dtype, device=y.device)
+        lane = y[:, None] + offsets
         away = (rows[:, :, None] - lane[:, None, :, None]).abs().amin(-1)
-        return turns, (away > self.settings.touch_distance) & (lane <= edge)[:, None]
+        return offsets, (away > self.settings.touch_distance) & (lane <= edge)[:, None]
 
     def nearest(self, rows: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
         """Find the nearest open lane of rows; of two, that whose gap's middle is nearer.
 
         From y of pillars, (n, K), and drones, (n,): metres to the left and width of the gap, (n,).
         """
-        turns, is_open = self.seen_from(rows[:, None], y)
-        left, right = self._gap(rows, y[:, None] + turns)
+        offsets, is_open = self.lanes_from(rows[:, None], y)
+        left, right = self._gap(rows, y[:, None] + offsets)
         off_centre = (0.5 * (left + right) - y[:, None]).abs()
-        cost = turns.abs() + 1e-3 * off_centre / self.settings.spread
+        cost = offsets.abs() + 1e-3 * off_centre / self.settings.spread
         best = torch.where(is_open[:, 0], cost, torch.inf).argmin(-1, keepdim=True)
         width = (left - right).gather(-1, best)[:, 0] - self.settings.width
-        return turns.gather(-1, best)[:, 0], width
+        return offsets.gather(-1, best)[:, 0], width
 
     def _gap(self, rows: Tensor, lane: Tensor) -> tuple[Tensor, Tensor]:
         """Return the middles of the pillars, or the field's ends, next to lanes. (n, L) each."""
@@ -80,29 +80,29 @@ class Lanes:
         right = torch.where(is_left, -torch.inf, there).amax(-1).clamp(min=-edge)
         return left, right
 
-    def first_turn(self, rows: Tensor, y: Tensor, next_row: Tensor) -> Tensor:
-        """Plan the path through all rows with the fewest turns, by Bellman's recursion over rows.
+    def first_sidestep(self, rows: Tensor, y: Tensor, next_row: Tensor) -> Tensor:
+        """Plan the path through all rows with the shortest sidesteps, by Bellman's recursion.
 
         The y of pillars, (N, R, K), and of drones, (N,), and the index of the first row ahead,
-        (N,), to metres to turn left before it, (N,); 0 if no row is left or none can be crossed.
+        (N,), to metres to move left before it, (N,); 0 if no row is left or none can be crossed.
         """
-        turns, is_open = self.seen_from(rows, y)
-        between = (turns[:, :, None] - turns[:, None]).abs()
-        cost = torch.zeros_like(turns)  # from each lane, beyond the last row
+        offsets, is_open = self.lanes_from(rows, y)
+        between = (offsets[:, :, None] - offsets[:, None]).abs()
+        cost = torch.zeros_like(offsets)  # from each lane, beyond the last row
         for row in reversed(range(rows.shape[1])):
             through = torch.where(is_open[:, row], cost, torch.inf)
             here = (between + through[:, None]).amin(-1)
             is_ahead = next_row[:, None] < row
             at_next = next_row[:, None] == row
             cost = torch.where(is_ahead, here, torch.where(at_next, through, cost))
-        total = turns.abs() + cost
+        total = offsets.abs() + cost
         best = total.argmin(-1, keepdim=True)
-        turn = turns.gather(-1, best)[:, 0]
+        sidestep = offsets.gather(-1, best)[:, 0]
         is_known = torch.isfinite(total.gather(-1, best)[:, 0]) & (next_row < rows.shape[1])
-        return torch.where(is_known, turn, 0.0)
+        return torch.where(is_known, sidestep, 0.0)
 
     def fly_through(self, drone: Tensor, rows: Tensor, next_row: Tensor) -> Tensor:
-        """Return the oracle's moves, (N,): turn between rows, fly straight through them.
+        """Return the oracle's moves, (N,): sidestep between rows, fly straight through them.
 
         Positions, (N, 3), the y of pillars, (N, R, K), the first row not passed or R, (N, 1).
         """
@@ -110,11 +110,11 @@ class Lanes:
         ahead = s.first_distance + s.spacing * next_row[:, 0] - x
         # once the last row is behind, only the line is left
         row = torch.where(ahead < -s.touch_distance, rows.shape[1], next_row[:, 0])
-        turn = self.first_turn(rows.double(), y, row)
+        sidestep = self.first_sidestep(rows.double(), y, row)
         is_beside = ahead.abs() <= s.touch_distance
         move = torch.full_like(row, Move.FORWARD)
-        move[(turn > 0.5 * s.step_length) & ~is_beside] = Move.LEFT
-        move[(turn < -0.5 * s.step_length) & ~is_beside] = Move.RIGHT
+        move[(sidestep > 0.5 * s.step_length) & ~is_beside] = Move.LEFT
+        move[(sidestep < -0.5 * s.step_length) & ~is_beside] = Move.RIGHT
         return move
 
 
@@ -136,9 +136,9 @@ def meets(touch: float, before: Tensor, now: Tensor, pillars: Tensor) -> Tensor:
     A drone touches a pillar if its centre is at most `touch` metres away along both axes. Its path
     enters all slabs of that square before it leaves any. Shape: (N, P).
     """
-    away, way = pillars[..., :2] - before[:, None, :2], (now - before)[:, None, :2]
-    is_still = way == 0
-    pace = torch.where(is_still, 1.0, way)
+    away, path = pillars[..., :2] - before[:, None, :2], (now - before)[:, None, :2]
+    is_still = path == 0
+    pace = torch.where(is_still, 1.0, path)
     ends = torch.stack([(away - touch) / pace, (away + touch) / pace])
     low, high = ends.amin(0), ends.amax(0)
     inside = away.abs() <= touch

@@ -163,7 +163,10 @@ def map_actions(
 
 
 def find_borders(camera: CameraModel, window: Window) -> Pieces:
-    """Return all borders within a window whose x all exceed half a cube's edge; none overlap."""
+    """Return all borders within a window, whose distances all exceed half a cube's edge.
+
+    No two of them overlap.
+    """
     slopes, half = np.unique(camera.left), camera.half
     with np.errstate(divide="ignore"):
         leaves = half / np.unique(np.abs(camera.up).round(_DIGITS))

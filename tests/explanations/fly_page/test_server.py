@@ -349,3 +349,35 @@ def test_settings_are_checked():
         drone_rl.fly("good", view="top")
     with pytest.raises(InputError, match="policy=none does not exist"):
         drone_rl.fly("none")
+
+
+def test_frames_are_handed_over_under_a_lock():
+    """A frame published between the check and the exchange would stop the page for good."""
+
+    class Page:
+        _handing, _pages = threading.Lock(), ()
+        _publish = server.FlyPage._publish
+
+        def __init__(self):
+            self._loop = types.SimpleNamespace(call_soon_threadsafe=scheduled.append)
+            self._kept = None
+
+        @property
+        def _frame(self):
+            assert self._handing.locked()
+            return self._kept
+
+        @_frame.setter
+        def _frame(self, frame):
+            assert self._handing.locked()
+            self._kept = frame
+
+    scheduled = []
+    page = Page()
+    for frame in (b"1", b"2"):
+        server.FlyPage._offer(page, frame)
+    assert page._kept == b"2" and len(scheduled) == 1
+    scheduled[0]()
+    assert page._kept is None
+    server.FlyPage._offer(page, b"3")
+    assert len(scheduled) == 2

@@ -41,6 +41,22 @@ def test_wrong_settings_are_refused(tmp_path):
             serve(**given)
 
 
+def test_a_wrong_patience_is_refused_before_a_renderer_is_made(monkeypatch):
+    monkeypatch.setattr("drone_rl.flight.airsim.serving.make_simulation", None)
+    with pytest.raises(InputError, match="patience_s=-1"):
+        serve(patience_s=-1)
+
+
+def test_a_server_whose_thread_has_ended_closes_its_simulation(monkeypatch):
+    closed = []
+    monkeypatch.setattr(Simulation, "close", lambda self: closed.append(self))
+    server = serve(scene="empty", port=0)
+    server._loop.call_soon_threadsafe(server._task.cancel)
+    server._thread.join(20)
+    server.close()
+    assert closed == [server.simulation]
+
+
 def test_an_open_address_is_warned_about(caplog):
     with serve(scene="empty", port=0, address="0.0.0.0"):
         assert "everybody in that network can control the vehicles" in caplog.text

@@ -184,7 +184,7 @@ def test_nearest_lane_has_a_side_and_a_gap(field):
 
 
 def test_lanes_are_relative_to_the_drone(settings):
-    turns, is_open = Lanes(settings).seen_from(
+    turns, is_open = Lanes(settings).lanes_from(
         torch.tensor([[[0.0, 20.0]]]).double(), torch.tensor([0.5]).double()
     )
     lanes = (turns + 0.5)[0][is_open[0, 0]]

@@ -28,9 +28,9 @@ def fewest_turns(rows, y, next_row):
 def test_plan_has_the_fewest_turns():
     random_state = np.random.RandomState(0)
     for _ in range(60):
-        rows = LANES.draw_field(random_state)
+        rows = LANES.sample_field(random_state)
         y, row = float(random_state.randint(-4, 5)), random_state.randint(3)
-        turn = LANES.first_turn(
+        turn = LANES.first_sidestep(
             torch.from_numpy(rows)[None], torch.tensor([y]).double(), torch.tensor([row])
         )
         assert float(turn) in fewest_turns(rows, y, row)[1]
@@ -39,7 +39,7 @@ def test_plan_has_the_fewest_turns():
 def test_plan_looks_beyond_the_next_row():
     # the nearest lanes are right, then far to the left
     rows = np.array([[0.2, 0.2, 0.2], [-2.0, -1.0, 1.2], [-2.0, -1.0, 1.2]])
-    turn = LANES.first_turn(
+    turn = LANES.first_sidestep(
         torch.from_numpy(rows)[None], torch.zeros(1).double(), torch.tensor([0])
     )
     total, best = fewest_turns(rows, 0.0, 0)
@@ -48,7 +48,7 @@ def test_plan_looks_beyond_the_next_row():
 
 def test_plan_flies_straight_behind_the_last_row():
     rows = torch.zeros(1, 3, 3).double()
-    assert LANES.first_turn(rows, torch.zeros(1).double(), torch.tensor([3])) == 0
+    assert LANES.first_sidestep(rows, torch.zeros(1).double(), torch.tensor([3])) == 0
     drone = torch.tensor([[SETTINGS.last_distance + 1.5, 0.0, 2.5]])
     assert LANES.fly_through(drone, rows, torch.tensor([[2]])) == Move.FORWARD
 
@@ -62,7 +62,7 @@ def test_plan_flies_straight_within_a_row():
 
 def test_plan_crosses_every_field():
     random_state = np.random.RandomState(7)
-    drawn = np.stack([LANES.draw_field(random_state) for _ in range(300)])
+    drawn = np.stack([LANES.sample_field(random_state) for _ in range(300)])
     dynamics = ComputerVision(SETTINGS.step_length)
     body = dynamics.start(torch.tensor([[0.0, 0.0, 2.5]]).double().repeat(300, 1))
     state = Pillars(SETTINGS).start(torch.from_numpy(drawn), body)
@@ -101,12 +101,12 @@ def test_sampled_fields_are_crossable():
     closed = ~Lanes(dense).is_open(drawn).any(-1)
     assert 50 < closed.sum() < 480  # many sampled rows are closed
     random_state = np.random.RandomState(1)
-    made = np.concatenate([Lanes(dense).draw_field(random_state) for _ in range(200)])
+    made = np.concatenate([Lanes(dense).sample_field(random_state) for _ in range(200)])
     assert Lanes(dense).is_open(made).any(-1).all() and made.shape == (800, dense.row_size)
 
 
 def test_open_rows_are_kept_and_fields_are_seeded():
-    first, again = (NARROW_LANES.draw_field(np.random.RandomState(3)) for _ in range(2))
+    first, again = (NARROW_LANES.sample_field(np.random.RandomState(3)) for _ in range(2))
     np.testing.assert_array_equal(first, again)
     drawn = np.random.RandomState(3).uniform(
         -NARROW.spread, NARROW.spread, (NARROW.num_rows, NARROW.row_size)
@@ -121,4 +121,4 @@ def test_field_without_open_lanes_raises(monkeypatch):
     monkeypatch.setattr(Lanes, "is_open", lambda _, rows: np.zeros((len(rows), 7), bool))
     monkeypatch.setattr(pillars_lanes, "MOST_TRIES", 5)
     with pytest.raises(RuntimeError, match="5 drawings"):
-        NARROW_LANES.draw_field(np.random.RandomState(0))
+        NARROW_LANES.sample_field(np.random.RandomState(0))

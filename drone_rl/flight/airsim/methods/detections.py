@@ -26,7 +26,9 @@ MAX_PATTERNS = 20
 def _add_pattern(simulation: Simulation, args: Sequence[Any]) -> None:
     camera, pattern = camera_at(simulation, args, 3), text(args[2], "mesh_name", MAX_NAME)
     if len(camera.detected) >= MAX_PATTERNS:
-        raise InputError(f"a camera has {MAX_PATTERNS} names; call simClearDetectionMeshNames")
+        raise InputError(
+            f"a camera can have {MAX_PATTERNS} mesh names; call simClearDetectionMeshNames"
+        )
     detected = (*camera.detected, pattern)
     put_camera(simulation, args, dataclasses.replace(camera, detected=detected), 3)
 
