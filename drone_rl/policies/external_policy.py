@@ -140,8 +140,8 @@ def policy_from(
         dynamics: Vehicle dynamics.
         actions: The action space.
         transforms: Transform of the image, or several in order; an empty list for the camera's RGB
-            bytes (N, H, W, 3). By default `Gray` and `Standardize`, or `Rgb` if `logits` was trained on
-            colour frames.
+            bytes (N, H, W, 3). By default `Gray` and `Standardize`, or `Rgb` if `logits` was
+            trained on colour frames.
         name: Name in reports; that of the callable by default.
 
     Raises:

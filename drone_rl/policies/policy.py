@@ -330,8 +330,8 @@ def load_policy(which: str | Path, *, outputs: str | Path = "outputs") -> Policy
     """Load a trained policy.
 
     Args:
-        which: A policy of the package ("good", "poor", "right_and_forward"), a .pt or .safetensors
-            file, the folder of a run (its `last.pt`), or "latest" for the newest.
+        which: The name of a shipped policy such as "good" or "proved", a .pt or .safetensors file,
+            the folder of a run (its `last.pt`), or "latest" for the newest.
         outputs: Folder of the runs.
 
     Raises:

@@ -115,7 +115,7 @@ def _curves(axes: Axes, layout: Layout, groups: list[Group]) -> None:
         else:
             axes.plot(grid, np.median(values, axis=0), color=color, label=label)
             axes.fill_between(grid, *band, color=color, alpha=0.2, linewidth=0)
-    axes.set(xlabel="frames", ylabel="running mean, share of cubes", ylim=(0, 1))
+    axes.set(xlabel="frames", ylabel="running reward / largest reward", ylim=(0, 1))
     if axes.get_legend_handles_labels()[0]:
         axes.legend(title=_literal(layout.axis or ""), fontsize=7, title_fontsize=7)
 
@@ -138,7 +138,7 @@ def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
 def _sides(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     _dots(axes, layout, groups, lambda row: row.lean)
     axes.axhline(0.0, color="0.5", linewidth=0.8, zorder=0)
-    axes.set(ylabel="cubes collected, right minus left", ylim=(-1.1, 1.1))
+    axes.set(ylabel="goals reached, right minus left", ylim=(-1.1, 1.1))
 
 
 def _entropies(axes: Axes, layout: Layout, groups: list[Group]) -> None:

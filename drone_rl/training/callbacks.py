@@ -91,7 +91,7 @@ class CheckpointCallback(Callback):
         self._saved_at = time.monotonic()
 
     def on_start(self, training: OngoingTraining) -> None:
-        """Create the folder before any work is done; delete half-written checkpoints."""
+        """Create the folder before the first update; delete half-written checkpoints."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
