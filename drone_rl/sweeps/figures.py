@@ -46,7 +46,9 @@ class Layout:
     axis: str | None
     """A swept setting; None if only seeds differ."""
     panels: dict[str, list[Group]]
-    """Groups by the values of the other settings."""
+    """Groups by the values of the other settings; at most `MAX_PANELS`."""
+    left_out: int = 0
+    """Number of panels beyond this limit."""
 
 
 def lay_out(groups: Sequence[Group]) -> Layout:
@@ -57,7 +59,8 @@ def lay_out(groups: Sequence[Group]) -> Layout:
     for group in groups:
         rest = [f"{key}={value}" for key, value in group.choice.items() if key != axis]
         panels.setdefault(", ".join(rest), []).append(group)
-    return Layout(axis, dict(list(panels.items())[:MAX_PANELS]))
+    shown = dict(list(panels.items())[:MAX_PANELS])
+    return Layout(axis, shown, len(panels) - len(shown))
 
 
 def draw(layout: Layout, name: str) -> tuple[bytes, bytes]:
