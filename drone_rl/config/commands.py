@@ -227,7 +227,7 @@ class PlacesSettings(RendererSettings):
     """Distinct images of one cube at which the map stops; bounds memory."""
 
     def check(self) -> None:
-        """Refuses a window without places."""
+        """Refuse a window without places."""
         if self.nearest >= self.farthest:
             raise InputError(
                 f"nearest={self.nearest} leaves no place before farthest={self.farthest}; give less"

@@ -154,6 +154,8 @@ class TrainSettings(Settings):
     def replace(self, **changes: Any) -> Self:
         """See `Settings`; a new objective brings the parts that it needs, unless they are given."""
         objective = changes.get("objective")
+        if isinstance(objective, str):
+            objective = Objective.from_name(objective, "objective")
         if isinstance(objective, Objective):
             for name, part in objective.needs.items():
                 if not isinstance(getattr(self, name), type(part)):

@@ -1,4 +1,4 @@
-"""Networks and actors; they see specs, never a simulator."""
+"""Networks, actors and policies: from camera images to actions."""
 
 from drone_rl.policies.actor import make_actor as make_actor
 from drone_rl.policies.critic import ActorCritic as ActorCritic

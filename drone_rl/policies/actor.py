@@ -193,7 +193,7 @@ def make_actor(
     make = CategoricalActor if kind is SeededCategorical else DirectActor
     image_network = network if isinstance(network, ImageNetwork) else ImageNetwork
     if image_network.is_recurrent:
-        make = ProbabilisticActor  # which the direct one shortens for networks with one output
+        make = ProbabilisticActor  # a `DirectActor` supports only networks with one output
     return make(
         TensorDictModule(
             network, in_keys=list(image_network.in_keys), out_keys=list(image_network.out_keys)

@@ -26,7 +26,7 @@ def make_env(
     camera: CameraSettings | None = None,
     dynamics: DynamicsSettings | Dynamics | None = None,
     actions: ActionSettings | None = None,
-    transforms: Sequence[Transform] = DEFAULT_TRANSFORMS,
+    transforms: Transform | Sequence[Transform] = DEFAULT_TRANSFORMS,
     seed: int = 0,
     device: str = "cpu",
     **kwargs: Any,
@@ -39,7 +39,7 @@ def make_env(
         camera: The policy's camera.
         dynamics: Vehicle dynamics; computer-vision mode by default.
         actions: Action space, if `dynamics` are settings; the moves by default.
-        transforms: Transforms of the image, in this order.
+        transforms: Transform of the image, or several in this order.
         seed: Root of the environments' random streams.
         device: Device of the renderer: "cpu", "cuda" or "cuda:N".
         kwargs: See `drone_rl.envs.DroneEnv`, such as renderer="mujoco_warp".
@@ -53,11 +53,12 @@ def make_env(
         _check(dynamics, "dynamics", DynamicsSettings)
     _check(kwargs.get("appearance"), "appearance", AppearanceSettings)
     several = isinstance(transforms, Sequence) and not isinstance(transforms, str)
-    for transform in transforms if several else (transforms,):
+    steps: Any = transforms if several else (transforms,)
+    for transform in steps:
         _check(transform, "transforms", Transform)
     motion = {"dynamics": dynamics, "actions": actions}
     base = envs.DroneEnv(num_envs, task, camera, seed=seed, device=device, **motion, **kwargs)
-    return envs.with_transforms(base, [transform.make() for transform in transforms])
+    return envs.with_transforms(base, [transform.make() for transform in steps])
 
 
 def _check(value: Any, name: str, kind: type) -> None:

@@ -50,14 +50,14 @@ class ExternalNetwork(ImageNetwork):
         self._logits = _copied(logits).to(device) if isinstance(logits, nn.Module) else logits
         self._logit_factor = torch.ones(self.num_actions, device=device)
         self._logit_bias = torch.zeros(self.num_actions, device=device)
-        image = torch.full((1, *self.in_shape), 0.5, device=device, requires_grad=True)
+        image = torch.full((1, *self.in_shape), 0.5, device=device)
         try:
             found = self(image)
         except InputError:
             raise
         except Exception as error:
             what = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-            shown = tuple(self._given(image.detach()).shape)
+            shown = tuple(self._given(image).shape)
             raise InputError(
                 f"the network can't take images of shape {shown} ({what}); give the camera and "
                 "transforms that it was trained with"
@@ -66,7 +66,7 @@ class ExternalNetwork(ImageNetwork):
             raise InputError(
                 "the network returned different logits for one image; give a deterministic network"
             )
-        self.is_differentiable = _depends(found, image)
+        self.is_differentiable = _has_gradients(self, image)
 
     @property
     def parts(self) -> nn.Module:
@@ -120,7 +120,13 @@ def _copied(module: nn.Module) -> nn.Module:
     return own
 
 
-def _depends(logits: Tensor, image: Tensor) -> bool:
+def _has_gradients(network: nn.Module, image: Tensor) -> bool:
+    """Return whether the logits of an image have gradients by its pixels."""
+    image = image.clone().requires_grad_()
+    try:
+        logits = network(image)
+    except RuntimeError:  # NumPy takes no tensor that requires gradients
+        return False
     if not logits.requires_grad:
         return False
     (gradient,) = torch.autograd.grad(logits.sum(), image, allow_unused=True)

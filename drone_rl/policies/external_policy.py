@@ -123,7 +123,7 @@ def policy_from(
     camera: CameraSettings | None = None,
     dynamics: DynamicsSettings = COMPUTER_VISION,
     actions: ActionSettings = MOVES_SETTINGS,
-    transforms: Sequence[Transform] | None = None,
+    transforms: Transform | Sequence[Transform] | None = None,
     name: str | None = None,
 ) -> ExternalPolicy:
     """Return a third-party policy to judge, evaluate and explain.
@@ -139,9 +139,9 @@ def policy_from(
             `logits.observation_shape` if there is one, as in `Sb3Logits`.
         dynamics: Vehicle dynamics.
         actions: The action space.
-        transforms: Transforms of the image, in order; an empty list for the camera's RGB bytes
-            (N, H, W, 3). By default `Gray` and `Standardize`, or `Rgb` if `logits` was trained on
-            colour frames.
+        transforms: Transform of the image, or several in order; an empty list for the camera's RGB
+            bytes (N, H, W, 3). By default `Gray` and `Standardize`, or `Rgb` if `logits` was
+            trained on colour frames.
         name: Name in reports; that of the callable by default.
 
     Raises:
@@ -151,6 +151,8 @@ def policy_from(
         raise InputError(
             f"policy_from got a {type(logits).__name__}; give a callable from images to logits"
         )
+    if isinstance(transforms, Transform):
+        transforms = (transforms,)
     for i, transform in enumerate(transforms or ()):
         if not isinstance(transform, Transform):
             raise InputError(

@@ -22,8 +22,8 @@ from drone_rl.utils.errors import InputError
 class ImageNetwork(nn.Module):
     """Any network from frames to the parameters of the action distribution.
 
-    For discrete actions these are logits, see `Actions.num_outputs`. Frames may have any number of
-    leading batch dimensions.
+    For discrete actions these are logits, for continuous ones see `normal_of` in
+    `drone_rl.sim.continuous_actions`. Frames may have any number of leading batch dimensions.
     """
 
     in_shape: tuple[int, ...]
@@ -43,7 +43,7 @@ class ImageNetwork(nn.Module):
 
     @property
     def num_actions(self) -> int:
-        """Number of outputs: a logit for each discrete action, or for each part of a speed."""
+        """Number of outputs, see `Actions.num_outputs`."""
         return self.actions.num_outputs
 
     @property
@@ -97,7 +97,7 @@ class PolicyNetwork(ImageNetwork):
 
     @property
     def num_actions(self) -> int:
-        """Number of outputs: a logit for each discrete action, or for each part of a speed."""
+        """Number of outputs, see `Actions.num_outputs`."""
         return len(self.layers.get_parameter("logits.weight"))
 
     @property

@@ -156,9 +156,12 @@ class BasePolicy(abc.ABC):
             env.close()
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Policy(BasePolicy):
-    """A trained policy: its task, camera and transforms, network and provenance."""
+    """A trained policy: its task, camera and transforms, network and provenance.
+
+    Policies are equal only if they are the same object: their state holds tensors.
+    """
 
     name: str
     """Name in the zoo, or of the run's folder."""
@@ -249,7 +252,7 @@ class Policy(BasePolicy):
         Returns:
             The index of the action, or the values of a continuous one.
         """
-        image, camera = torch.as_tensor(image), self.description.camera
+        image, camera = _copied(image), self.description.camera
         size = (camera.height, camera.width, 3)
         if image.dtype != torch.uint8 or image.shape != size:
             raise InputError(
@@ -275,7 +278,7 @@ class Policy(BasePolicy):
         Raises:
             InputError: The images do not fit the camera or the images of the last call.
         """
-        images, camera = torch.as_tensor(images), self.description.camera
+        images, camera = _copied(images), self.description.camera
         size = (camera.height, camera.width, 3)
         if images.dtype != torch.uint8 or images.ndim != 4 or images.shape[1:] != size:
             raise InputError(
@@ -326,12 +329,17 @@ class Policy(BasePolicy):
         return table(["policy", self.name], [[name, text] for name, text in rows.items()])
 
 
+def _copied(images: np.ndarray | Tensor) -> Tensor:
+    """Return a copy as a tensor: cameras reuse buffers, and torch has no negative strides."""
+    return images.clone() if isinstance(images, Tensor) else torch.as_tensor(np.array(images))
+
+
 def load_policy(which: str | Path, *, outputs: str | Path = "outputs") -> Policy:
     """Load a trained policy.
 
     Args:
-        which: A policy of the package ("good", "poor", "right_and_forward"), a .pt or .safetensors
-            file, the folder of a run (its `last.pt`), or "latest" for the newest.
+        which: The name of a shipped policy such as "good" or "proved", a .pt or .safetensors file,
+            the folder of a run (its `last.pt`), or "latest" for the newest.
         outputs: Folder of the runs.
 
     Raises:

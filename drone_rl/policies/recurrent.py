@@ -80,7 +80,7 @@ class RecurrentNetwork(ImageNetwork):
 
     @property
     def num_actions(self) -> int:
-        """Number of outputs: a logit for each discrete action, or for each part of a speed."""
+        """Number of outputs, see `Actions.num_outputs`."""
         return self.logits.out_features
 
     def start(self, num_envs: int) -> Memory:

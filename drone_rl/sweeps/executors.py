@@ -63,9 +63,13 @@ class RunProcess:
         return status
 
     def stop(self) -> None:
-        """Ask the run to save its state and exit, and wait."""
+        """Ask the run to save its state and exit; `join` waits for it."""
         if self._process is not None and self._process.poll() is None:
             self._process.send_signal(signal.SIGTERM)
+
+    def join(self) -> None:
+        """Wait until the process of the run has exited, if one was started."""
+        if self._process is not None:
             self._process.wait()
 
     def _start(self) -> subprocess.Popen:
@@ -134,8 +138,10 @@ class LocalExecutor:
                 if not ended:
                     time.sleep(POLL_S)
         finally:
-            for process in active:
+            for process in active:  # all of them first, so that they end at the same time
                 process.stop()
+            for process in active:
+                process.join()
 
 
 class SlurmExecutor:

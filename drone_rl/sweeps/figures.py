@@ -46,7 +46,9 @@ class Layout:
     axis: str | None
     """A swept setting; None if only seeds differ."""
     panels: dict[str, list[Group]]
-    """Groups by the values of the other settings."""
+    """Groups by the values of the other settings; at most `MAX_PANELS`."""
+    left_out: int = 0
+    """Number of panels beyond this limit."""
 
 
 def lay_out(groups: Sequence[Group]) -> Layout:
@@ -57,7 +59,8 @@ def lay_out(groups: Sequence[Group]) -> Layout:
     for group in groups:
         rest = [f"{key}={value}" for key, value in group.choice.items() if key != axis]
         panels.setdefault(", ".join(rest), []).append(group)
-    return Layout(axis, dict(list(panels.items())[:MAX_PANELS]))
+    shown = dict(list(panels.items())[:MAX_PANELS])
+    return Layout(axis, shown, len(panels) - len(shown))
 
 
 def draw(layout: Layout, name: str) -> tuple[bytes, bytes]:
@@ -115,7 +118,7 @@ def _curves(axes: Axes, layout: Layout, groups: list[Group]) -> None:
         else:
             axes.plot(grid, np.median(values, axis=0), color=color, label=label)
             axes.fill_between(grid, *band, color=color, alpha=0.2, linewidth=0)
-    axes.set(xlabel="frames", ylabel="running mean, share of cubes", ylim=(0, 1))
+    axes.set(xlabel="frames", ylabel="running reward / largest reward", ylim=(0, 1))
     if axes.get_legend_handles_labels()[0]:
         axes.legend(title=_literal(layout.axis or ""), fontsize=7, title_fontsize=7)
 
@@ -138,7 +141,7 @@ def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
 def _sides(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     _dots(axes, layout, groups, lambda row: row.lean)
     axes.axhline(0.0, color="0.5", linewidth=0.8, zorder=0)
-    axes.set(ylabel="cubes collected, right minus left", ylim=(-1.1, 1.1))
+    axes.set(ylabel="goals reached, right minus left", ylim=(-1.1, 1.1))
 
 
 def _entropies(axes: Axes, layout: Layout, groups: list[Group]) -> None:

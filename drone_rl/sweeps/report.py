@@ -163,11 +163,13 @@ def _plots(groups: Sequence[Group], sentences: Mapping[str, str]) -> list[dict[s
     if not known:
         return []
     layout, plots = figures.lay_out(groups), []
+    shown, left_out = len(layout.panels), layout.left_out
+    note = f" Only the first {shown} of {shown + left_out} panels are shown." if left_out else ""
     for name, (title, *_) in figures.PLOTS.items():
         if name in ("curves", "costs") or any(row.kind for row in known):
             images = (base64.b64encode(png).decode() for png in figures.draw(layout, name))
             light, dark = (f"data:image/png;base64,{image}" for image in images)
-            text = _paragraph(sentences, f"{name}.")
+            text = _paragraph(sentences, f"{name}.") + note
             plots.append({"title": title, "text": text, "light": light, "dark": dark})
     return plots
 

@@ -25,7 +25,7 @@ _ROUNDING = 1e-6
 LAST_UPDATES = 20
 """Number of last updates over which the entropy is averaged."""
 NOT_OFFERED = "not offered"
-"""Placeholder for the fraction of cubes on a side without cubes."""
+"""Placeholder for the fraction of goals reached on a side without goals."""
 
 
 @dataclasses.dataclass
@@ -80,7 +80,7 @@ class Row:
 
     @property
     def lean(self) -> float | None:
-        """Fraction of the cubes collected on the right minus that on the left."""
+        """Fraction of the goals reached on the right minus that on the left."""
         left, right = self.share("left"), self.share("right")
         return None if left is None or right is None else right - left
 
@@ -90,9 +90,9 @@ class Row:
         return self.result["running_reward"] / self.result["largest_reward"] if self.result else 0.0
 
     def share(self, of: str) -> float | None:
-        """Return the fraction of cubes ("all", "left", "ahead", "right") of the greedy policy.
+        """Return the fraction of goals that the greedy policy reaches: cubes, or rows of pillars.
 
-        None without a verdict, or without such cubes.
+        `of` is "all", "left", "ahead" or "right". None without a verdict, or without such goals.
         """
         return None if self.verdict is None else self.verdict["greedy"]["shares"][of]["mean"]
 

@@ -68,9 +68,9 @@ def _best(rows: Sequence[Row]) -> dict[str, Any] | None:
 
 
 def best_rows(rows: Sequence[Row]) -> list[Row]:
-    """Rank the judged runs by the fraction of cubes collected, then by the fewest frames.
+    """Rank the judged runs by the fraction of goals reached, then by the fewest frames.
 
-    Fractions make tasks with different numbers of cubes comparable.
+    Fractions make tasks with different numbers of goals comparable.
     """
     judged = [row for row in rows if row.verdict is not None]
     return sorted(judged, key=lambda row: (-(row.share("all") or 0.0), row.frames))

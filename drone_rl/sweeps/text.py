@@ -25,8 +25,8 @@ def counts(summary: Evidence) -> dict[str, int]:
 
     "few": settings with readable runs, but too few for an interval of the median; "censored":
     settings of which at least half of the runs never reached the target; "left", "right": runs
-    whose policy collects on this side only; "still": finished runs with a practically deterministic
-    policy; "entropies": judged runs with a known final entropy.
+    whose policy reaches goals on this side only; "still": finished runs with a practically
+    deterministic policy; "entropies": judged runs with a known final entropy.
     """
     runs, groups = summary["runs"], summary["groups"]
     kinds = [run["verdict"] for run in runs]
@@ -180,16 +180,16 @@ SENTENCES = (
         lambda e: e["best"] is not None,
         lambda e: (
             f"Run {e['best']['run']}: {e['best']['verdict']}"
-            f"{'' if e['best']['certain'] else ' (not certain)'}, with "
-            f"{percent(e['best']['share'])} of its cubes; selected by {e['best']['episodes']} "
+            f"{'' if e['best']['certain'] else ' (not certain)'}, which reaches "
+            f"{percent(e['best']['share'])} of its goals; selected by {e['best']['episodes']} "
             "episodes in selection environments."
         ),
     ),
     _if_any(
         "best.equals",
-        "others collect the same share",
+        "others reach the same fraction of goals",
         lambda e: 0 if e["best"] is None else e["best"]["equals"],
-        "{runs} collected the same fraction with at least as many frames.",
+        "{runs} reached the same fraction with at least as many frames.",
     ),
     _if_any(
         "best.flattered",
@@ -239,9 +239,9 @@ SENTENCES = (
     ),
     _if_any(
         "sides.dots",
-        "a policy was offered cubes on both sides",
+        "a policy was offered goals on both sides",
         lambda e: e["judged"] - e["sides_not_offered"],
-        "Each dot is a judged run: the fraction of the cubes on its right that it collects, minus "
+        "Each dot is a judged run: the fraction of the goals on its right that it reaches, minus "
         "the fraction of those on its left.",
     ),
     _if_any(
@@ -258,16 +258,16 @@ SENTENCES = (
     ),
     _if_any(
         "sides.not_offered",
-        "a policy was offered no cube on a side",
+        "a policy was offered no goal on a side",
         "sides_not_offered",
-        "{runs} without a dot: one side had no cubes.",
+        "{runs} without a dot: one side had no goals.",
     ),
     _if_any(
         "entropies.dots",
         "a judged run has an entropy",
         "entropies",
-        "Each dot is a judged run: the mean entropy of its policy over the last updates; the line "
-        "is that of three actions of the same probability.",
+        "Each dot is a judged run: the mean entropy of its policy over the last updates. If "
+        "all are from 0 to ln 3, a line marks ln 3, that of three equally probable actions.",
     ),
     _if_any(
         "entropies.still",

@@ -91,7 +91,7 @@ class CheckpointCallback(Callback):
         self._saved_at = time.monotonic()
 
     def on_start(self, training: OngoingTraining) -> None:
-        """Create the folder before any work is done; delete half-written checkpoints."""
+        """Create the folder before the first update; delete half-written checkpoints."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -118,10 +118,11 @@ class CheckpointCallback(Callback):
     def _save(self, training: OngoingTraining) -> None:
         shared = {"best": self.best, **self.extra}
         state = training.state_dict()
-        save_checkpoint(self.last_path, {**state, **shared})
+        # the best one first: a run that resumes from the last one saves better ones only
         if self._best_state is not None or not self.best_path.exists():
             save_checkpoint(self.best_path, {**(self._best_state or state), **shared})
             self._best_state = None
+        save_checkpoint(self.last_path, {**state, **shared})
         self._saved_at = time.monotonic()
 
 

@@ -11,8 +11,8 @@ from torch import Tensor
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import shown
 
-MAY_DIFFER = ("lr", "initial_lr", "_last_lr", "base_lrs")
-"""Numbers that a scheduler changes."""
+MAY_DIFFER = ("lr", "initial_lr")
+"""Entries of an optimizer's parameter groups that a scheduler changes."""
 
 
 def check_fits(saved: Any, own: Any, where: str) -> None:

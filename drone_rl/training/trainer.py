@@ -1,4 +1,4 @@
-"""What surrounds a loop of training: batches, stop rules, counts, metrics, signals, callbacks."""
+"""The parts around a training loop: batches, stop rules, counts, metrics, signals, callbacks."""
 
 import contextlib
 import dataclasses

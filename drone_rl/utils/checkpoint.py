@@ -1,8 +1,8 @@
 """Checkpoints: written atomically, read without executing code or trusting sizes.
 
 `torch.load(weights_only=True)` runs no code, but it allocates what a file requests, trusts the
-sizes of storages and supports types that a checkpoint never contains. The reader here supports a
-dozen pickle instructions, builds tensors from the bytes that are present, and calls nothing.
+sizes of storages and supports types that a checkpoint never contains. The reader here supports only
+the pickle instructions of checkpoints and builds tensors from the bytes that are present.
 """
 
 import collections
@@ -125,7 +125,7 @@ class _Unpickler(pickle._Unpickler):
         return super().load()
 
     def find_class(self, module: str, name: str) -> Any:
-        """Return one of the three globals of a checkpoint."""
+        """Return one of the three kinds of globals in a checkpoint."""
         if (module, name) == ("torch._utils", "_rebuild_tensor_v2"):
             return _build
         if (module, name) == ("collections", "OrderedDict"):

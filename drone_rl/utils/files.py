@@ -166,7 +166,7 @@ def write_atomically(path: Path, content: str | bytes) -> None:
 
 
 def write_all_atomically(contents: Mapping[Path, str | bytes]) -> None:
-    """Write several files: all contents are complete on disk before the first file is replaced.
+    """Write several files: all contents are written before the first file is replaced.
 
     Raises:
         OSError: One can't be written; the error's `filename` is its path.

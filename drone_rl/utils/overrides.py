@@ -29,12 +29,12 @@ _SECTIONS = (
     "scheduler|transforms|provable|cloning"
 )
 _TAKEN_OVER = (
-    r"(seed|evaluate_after)=\w*",
+    r"(seed|evaluate_after|renderer)=\w*",
     r"device=(cpu|cuda)(:\d+)?",
     rf"({_SECTIONS}|collector|logger|experiment|sweep)=[A-Za-z][\w-]*",
     rf"\+{{0,2}}({_SECTIONS})(\.{_NAME}){{1,2}}={_VALUE}",
     rf"~transforms\.{_NAME}",
-    rf"collector\.(num_envs|num_threads|num_cpus|max_lost_workers)={_SCALAR}",
+    rf"collector\.(num_envs|num_threads|num_cpus|max_lost_workers|compiled)={_SCALAR}",
 )
 """Overrides that a resumed run takes from the file: choices by name and plain values."""
 

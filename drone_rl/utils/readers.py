@@ -63,7 +63,7 @@ def parse_yaml(content: bytes | str, where: str) -> Any:
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """Loads texts, numbers, true, false, none, lists and mappings."""
+    """Loads texts, numbers, dates, true, false, none, lists and mappings."""
 
     def __init__(self, stream: Any) -> None:
         super().__init__(stream)

@@ -84,6 +84,8 @@ class Real:
     def words(self) -> str:
         """The range in words."""
         low, high = f"{self.low:g}", f"{self.high:g}"
+        if (self.low, self.high) == (-math.inf, math.inf):
+            return "a finite number"
         if self.high == math.inf:
             return f"a number above {low}" if self.is_above else f"a number of {low} or more"
         if self.is_above:

@@ -25,6 +25,11 @@ def test_a_new_objective_brings_what_it_needs(objective):
     assert (told.objective, told.seed) == (objective, 3)
 
 
+def test_a_new_objective_may_be_given_by_name():
+    told = TrainSettings().replace(objective="ppo", returns="gae")
+    assert told == TrainSettings().replace(objective=Ppo())
+
+
 def test_what_is_given_stays():
     told = TrainSettings().replace(objective=Ppo(), collector=Rollouts(num_envs=5))
     assert told.collector.num_envs == 5

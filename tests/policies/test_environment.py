@@ -44,6 +44,12 @@ def test_other_image_sizes():
     env.close()
 
 
+def test_a_single_transform_needs_no_list():
+    env = drone_rl.make_env(1, transforms=Gray())
+    assert env.reset()["pixels"].shape == (1, 1, 25, 64)
+    env.close()
+
+
 def test_task_is_selected_by_name():
     env = drone_rl.make_env(1, task="pillars")
     assert isinstance(env.base_env.worlds.task, Pillars)

@@ -38,6 +38,12 @@ def test_numpy_logits_are_accepted_without_gradients():
     assert network(torch.ones(1, *SHAPE)).tolist() == [[1.0, 1.0, 1.0]]
 
 
+def test_numpy_functions_of_frames_are_accepted():
+    network = make(lambda x: x.numpy().reshape(len(x), -1)[:, :3])
+    assert not network.is_differentiable
+    assert network(torch.arange(8.0).reshape(1, *SHAPE)).tolist() == [[0.0, 1.0, 2.0]]
+
+
 def test_function_without_gradients_is_not_differentiable():
     assert not make(torch.no_grad()(left_half)).is_differentiable
     weight = nn.Parameter(torch.zeros(1, 3))

@@ -53,6 +53,12 @@ def test_verdict_does_not_depend_on_the_wrapping(network):
             assert found[key] == own[key], (name, key)
 
 
+def test_a_single_transform_needs_no_list(network):
+    camera = drone_rl.CameraSettings()
+    found = drone_rl.policy_from(network, camera=camera, transforms=Gray())
+    assert found.transforms == (Gray(),)
+
+
 def test_sampled_actions_equal_those_of_the_network(network):
     few = {"episodes": 6, "num_envs": 6, "seed": 0, "progress": silent}
     own, found = drone_rl.evaluate("good", **few), drone_rl.evaluate(network, **few)

@@ -3,6 +3,7 @@
 import os
 import shutil
 
+import numpy as np
 import pytest
 import torch
 from torchrl.envs.utils import ExplorationType, set_exploration_type
@@ -24,6 +25,20 @@ def test_bundled_policy_is_loaded():
     assert "<td>network</td>" in shown
     assert "small_cnn" in shown
     assert repr(policy) == f"Policy(name='good', path={policy.path!r})"  # without its weights
+
+
+def test_policies_can_be_compared_and_hashed():
+    first, second = drone_rl.load_policy("good"), drone_rl.load_policy("good")
+    assert first == first and first != second
+    assert len({first, second}) == 2
+
+
+def test_reversed_channels_are_accepted():
+    policy = drone_rl.load_policy("good")
+    bgr = np.random.default_rng(0).integers(0, 256, (4, 25, 64, 3), np.uint8)
+    rgb = bgr[..., ::-1]  # with a negative stride
+    assert torch.equal(policy.act_batch(rgb), policy.act_batch(rgb.copy()))
+    assert policy.act(rgb[0]) == policy.act(rgb[0].copy())
 
 
 def test_environment_is_closed_at_the_end_or_on_failure():
@@ -162,6 +177,16 @@ def test_act_equals_the_actor_in_its_environment(name):
     one = policy.act(images[0].numpy())
     assert isinstance(one, int) == (name != "flight_velocity")
     assert one == pytest.approx(first[0].numpy())
+
+
+@pytest.mark.parametrize("as_given", [lambda x: x, torch.Tensor.numpy])
+def test_remembered_frames_do_not_share_the_callers_buffer(as_given):
+    policy = drone_rl.load_policy("pillars_good")  # stacks two frames
+    camera = policy.description.camera
+    buffer = torch.full((1, camera.height, camera.width, 3), 7, dtype=torch.uint8)
+    policy.act_batch(as_given(buffer))
+    buffer.zero_()  # a camera writes its next frame
+    assert bool((policy._earlier_frames[-1] == 7).all())
 
 
 def test_images_that_do_not_fit_the_camera_raise():

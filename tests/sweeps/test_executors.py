@@ -1,10 +1,12 @@
 """Runs are begun, gone on with, left alone or given up, each without harm to the others."""
 
 import json
+import sys
 import time
 
 import pytest
 
+from drone_rl.sweeps import executors
 from drone_rl.sweeps.executors import LocalExecutor, RayExecutor, SlurmExecutor, finish_run
 from drone_rl.sweeps.manifest import quoted, read_failure, read_result
 from drone_rl.utils.errors import InputError
@@ -51,6 +53,41 @@ def test_interrupting_a_sweep_stops_its_runs(make_runs):
     ends.close()
     assert time.perf_counter() - begin < 20
     assert read_result(runs[1].folder) is None
+
+
+MEET = """
+import pathlib, signal, sys, time
+folder = pathlib.Path(dict(a.split("=", 1) for a in sys.argv[2:])["hydra.run.dir"].strip("'"))
+
+def wait_for_all(name, count):
+    begin = time.monotonic()
+    while len([*folder.parent.glob(f"*/{name}")]) < count:
+        if time.monotonic() - begin > 20:
+            sys.exit(1)
+        time.sleep(0.01)
+
+def stop(*_):
+    (folder / "stopping").touch()
+    wait_for_all("stopping", 2)
+    (folder / "met").touch()
+    sys.exit(0)
+
+signal.signal(signal.SIGTERM, stop)
+if folder.name == "0":
+    wait_for_all("ready", 2)
+else:
+    (folder / "ready").touch()
+    time.sleep(60)
+"""
+
+
+def test_runs_of_an_interrupted_sweep_stop_at_the_same_time(make_runs, monkeypatch):
+    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", MEET))
+    runs = make_runs("seed=0", "seed=1", "seed=2")
+    ends = LocalExecutor(3).finish(runs)
+    assert next(ends) == (runs[0], 0)
+    ends.close()
+    assert all((run.folder / "met").exists() for run in runs[1:])
 
 
 def slurm(folder):

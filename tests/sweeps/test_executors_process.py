@@ -82,6 +82,7 @@ def test_a_run_that_is_stopped_ends_by_sigterm(make_runs):
     while not (run.folder / "starts").exists():
         time.sleep(0.02)
     started.stop()
+    started.join()
     assert started.poll() == -signal.SIGTERM
     assert read_result(run.folder) is None
 

@@ -13,6 +13,7 @@ def test_report_has_every_sentence_and_escapes_what_it_shows(sweep):
     page = write_sweep_report(sweep)[0].read_text()
     assert "<b>NaN</b>" not in page
     assert "&lt;b&gt;NaN" in page
+    assert "panels are shown" not in page
     assert page.count("data:image/png;base64,") == 10  # five figures, light and dark
     assert "drone-rl train optimizer.lr=1e-3 seed=0" in page
     assert 'href="./2/"' in page
@@ -40,6 +41,12 @@ def test_a_sweep_that_has_hardly_begun_has_a_page(begin_sweep):
     page = write_sweep_report(begin_sweep({"seed=0": None, "seed=1": None}))[0].read_text()
     assert "2 unfinished" in page
     assert "<img" not in page
+
+
+def test_panels_that_are_not_plotted_are_counted(begin_sweep):
+    choices = [f"objective={i} optimizer.lr={lr}" for i in range(8) for lr in ("1e-3", "1e-2")]
+    page = write_sweep_report(begin_sweep({choice: {} for choice in choices}))[0].read_text()
+    assert page.count("Only the first 6 of 8 panels are shown.") == 2  # curves and costs
 
 
 def test_cells():

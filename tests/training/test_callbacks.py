@@ -14,7 +14,7 @@ from drone_rl.training import (
     callbacks,
 )
 from drone_rl.training.callbacks import CollapseCheck, ForwardProgress
-from drone_rl.utils.checkpoint import load_checkpoint
+from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.utils.errors import InputError
 from tests.training_loop import run
 
@@ -31,6 +31,26 @@ def test_last_and_best_checkpoints_are_kept(make_trainer, tmp_path):
     assert last["progress"]["updates"] == trainer.progress.updates
     assert best["progress"]["running_reward"] >= last["progress"]["running_reward"]
     assert best["best"] == best["progress"]["running_reward"]
+
+
+def test_a_best_state_that_was_not_saved_is_not_noted_in_the_last(
+    make_trainer, tmp_path, monkeypatch
+):
+    callback, trainer = CheckpointCallback(tmp_path, interval_s=0.0), make_trainer()
+    callback.on_start(trainer)
+    callback.on_update(trainer, {})
+
+    def save(path, state):
+        if path == callback.best_path:
+            raise InputError("no space left")
+        save_checkpoint(path, state)
+
+    monkeypatch.setattr(callbacks, "save_checkpoint", save)
+    trainer.progress.running_reward += 1.0
+    with pytest.raises(InputError, match="no space left"):
+        callback.on_update(trainer, {})
+    last, best = (load_checkpoint(tmp_path / name) for name in ("last.pt", "best.pt"))
+    assert last["best"] == best["progress"]["running_reward"]
 
 
 def test_first_checkpoint_precedes_the_first_update(make_trainer, tmp_path):

@@ -33,7 +33,7 @@ def test_settings_of_a_training_are_taken_over(noted):
         *("optimizer.lr=1e-3", "task.spacing=-9.5", "trainer.total_episodes=null"),
         *("task.cube_color=[0.1, 0.2, 0.3]", "transforms.crop.top=3", "~transforms.standardize"),
         *("+optimizer.amsgrad=true", "objective.reduction=sum", "collector.num_envs=8"),
-        "cloning.epochs=5",
+        *("cloning.epochs=5", "collector.compiled=false", "renderer=mujoco_warp"),
     ]
     assert taken_over(noted(settings), []) == settings
 

@@ -65,6 +65,7 @@ def test_what_is_taken(kind, value):
         (Real(-1, 2), False, "x=False"),
         (Whole(1), 0, "give a whole number of 1 or more"),
         (Real(0), -1e-9, "give a number of 0 or more"),
+        (Real(float("-inf")), "1", "x='1' is a text; give a finite number$"),
         (Real(0), float("inf"), "x=inf"),
         (Real(0), 10**400, "x=1000"),
         (Real(0, is_above=True), 0, "give a number above 0$"),

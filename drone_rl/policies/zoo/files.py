@@ -86,7 +86,7 @@ def certificate_path(policy: Path) -> Path:
 
 
 def shifts_path(policy: Path) -> Path:
-    """Return the path of a policy's episodes under perturbations, see `_companion`."""
+    """Return the path of a policy's robustness results, see `_companion`."""
     return _companion(policy, "shifts.json")
 
 

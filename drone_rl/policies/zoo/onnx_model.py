@@ -20,7 +20,7 @@ from drone_rl.utils.errors import InputError, extra
 FRAMES, PROBABILITIES, ACTION = "frames", "probabilities", "action"
 STATE, NEXT_STATE = ("hidden", "cell"), ("next_hidden", "next_cell")
 """Names of the model's inputs and outputs; only recurrent models have the states."""
-_ASKED_BY = "format=onnx"
+_SETTING = "format=onnx"
 
 
 class _FullPolicy(nn.Module):
@@ -65,8 +65,8 @@ def make_onnx(
     Raises:
         InputError: The policy needs several frames, ONNX does not support it, or lacks a package.
     """
-    extra("onnxscript", "onnx", _ASKED_BY)  # which torch's exporter needs
-    passes = extra("onnx_ir.passes.common", "onnx", _ASKED_BY)
+    extra("onnxscript", "onnx", _SETTING)  # which torch's exporter needs
+    passes = extra("onnx_ir.passes.common", "onnx", _SETTING)
     policy, camera = _FullPolicy(description, network).eval(), description.camera
     sample = torch.zeros(2, camera.height, camera.width, 3, dtype=torch.uint8)
     state = network.start(2) if isinstance(network, RecurrentNetwork) else ()
@@ -91,10 +91,10 @@ def make_onnx(
             f"the policy can't be written as an ONNX model ({reason}); export it with "
             "format=safetensors"
         ) from error
-    assert program is not None  # torch returns none only where it compiles by halves
+    assert program is not None  # torch returns None only with dynamo=False
     passes.ClearMetadataAndDocStringPass()(program.model)  # the exporter's own notes
-    told = {**description.as_dict(), "actions": list(network.actions.names), **about}
-    program.model.metadata_props.update({key: json.dumps(value) for key, value in told.items()})
+    metadata = {**description.as_dict(), "actions": list(network.actions.names), **about}
+    program.model.metadata_props.update({key: json.dumps(v) for key, v in metadata.items()})
     return program.model_proto.SerializeToString()
 
 
@@ -103,7 +103,7 @@ def open_onnx(content: bytes) -> Callable[..., Tensor]:
 
     A recurrent model is also given which episodes start, bool (N, 1), and keeps its state.
     """
-    runtime = extra("onnxruntime", "onnx", _ASKED_BY)
+    runtime = extra("onnxruntime", "onnx", _SETTING)
     options = runtime.SessionOptions()
     options.intra_op_num_threads = 1  # more would only wait for torch's, and sums depend on them
     session = runtime.InferenceSession(content, options)
