@@ -61,5 +61,5 @@ def test_boxes_out_of_sight_radius_or_names_are_not_detected(client):
 def test_names_of_a_camera_are_limited(client):
     for i in range(20):
         client.call("simAddDetectionFilterMeshName", "0", 0, f"box{i}", "")
-    with pytest.raises(RuntimeError, match="a camera has 20 names"):
+    with pytest.raises(RuntimeError, match="a camera can have 20 mesh names"):
         client.call("simAddDetectionFilterMeshName", "0", 0, "box", "")
