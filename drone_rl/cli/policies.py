@@ -63,8 +63,9 @@ def _row(path: Path, name: str) -> list[str]:
     """Return name, task, verdict, success rate and origin of a policy."""
     try:
         policy = drone_rl.load_policy(path)
-    except InputError:
-        return [name, "", "can't be read", "", ""]
+    except InputError as error:
+        is_plugin = "plugins=" in str(error)
+        return [name, "", "needs plugins=[MODULE]" if is_plugin else "can't be read", "", ""]
     verdict, run = policy.state.get("verdict"), path.parents[1]
     if path.suffix == ".pt":
         verdict = (read_result(run) or {}).get("verdict")

@@ -272,6 +272,13 @@ class Changes:
         return {name: kinds[name].read(v, f"{where}.{name}") for name, v in given.items()}
 
 
+def as_changes(value: Any, where: str) -> Mapping[str, Any]:
+    """Return changes of settings by name: those of a mapping, all of a settings object, or none."""
+    if value is None:
+        return {}
+    return value.values() if isinstance(value, Settings) else as_mapping(value, where)
+
+
 TaskChanges = Annotated[Mapping[str, Any], Changes()]
 DynamicsChanges = Annotated[Mapping[str, Any], Changes(DynamicsSettings)]
 

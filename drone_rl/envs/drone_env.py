@@ -196,7 +196,18 @@ class DroneEnv(EnvBase):
         env_ids = self._indices(tensordict.get("_step", None))
         reward = torch.zeros(*self.batch_size, 1, device=self.device)
         action = tensordict.get(self.action_key)
-        reward[env_ids, 0] = self.worlds.step(env_ids, action[env_ids]).float()
+        if action.shape != self.action_spec.shape:
+            raise InputError(
+                f"actions have the shape {tuple(action.shape)}; give {self.action_spec.shape}, as "
+                "env.action_spec says"
+            )
+        try:
+            reward[env_ids, 0] = self.worlds.step(env_ids, action[env_ids]).float()
+        except IndexError:
+            raise InputError(
+                f"actions from {int(action.min())} to {int(action.max())} are not all in "
+                f"{self.action_spec.space}; give whole numbers of env.action_spec"
+            ) from None
         self._render(env_ids)
         terminated, truncated = (flag[:, None] for flag in self.worlds.ends())
         done = terminated | truncated

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from PIL import Image
 
+from drone_rl.config.configuration import as_changes
 from drone_rl.evaluation.plots import images
 from drone_rl.explanations.class_models import (
     NO_GRADIENTS,
@@ -155,7 +156,7 @@ def class_models(
     """
     settings, seed = with_seed((settings or ClassModelsSettings()).replace(**changes))
     subject = as_policy(policy, outputs=outputs)
-    subject = subject.in_task(**task) if task else subject
+    subject = subject.in_task(**as_changes(task, "task")) if task else subject
     network = subject.make_network()
     require_memoryless(network, "a class model")
     if not network.is_differentiable:

@@ -1,5 +1,6 @@
 """Environments for training, with the transforms of policies."""
 
+import inspect
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -56,6 +57,11 @@ def make_env(
     steps: Any = transforms if several else (transforms,)
     for transform in steps:
         _check(transform, "transforms", Transform)
+    for unknown in kwargs.keys() - inspect.signature(envs.DroneEnv).parameters.keys():
+        raise InputError(
+            f"{unknown} is no argument of make_env; settings of the task are given as "
+            "task=drone_rl.TaskSettings(num_cubes=2), for example"
+        )
     motion = {"dynamics": dynamics, "actions": actions}
     base = envs.DroneEnv(num_envs, task, camera, seed=seed, device=device, **motion, **kwargs)
     return envs.with_transforms(base, [transform.make() for transform in steps])

@@ -29,7 +29,7 @@ from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import shown
+from drone_rl.utils.schema import Instance, shown
 from drone_rl.utils.settings import Settings, prefixed_errors
 
 
@@ -151,6 +151,8 @@ def policy_from(
         raise InputError(
             f"policy_from got a {type(logits).__name__}; give a callable from images to logits"
         )
+    if camera is not None:
+        Instance(CameraSettings).read(camera, "camera")
     if isinstance(transforms, Transform):
         transforms = (transforms,)
     for i, transform in enumerate(transforms or ()):

@@ -30,7 +30,7 @@ from drone_rl.sim.tasks import Task
 from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.files import trained_policies
-from drone_rl.utils.schema import shown
+from drone_rl.utils.schema import Instance, shown
 from drone_rl.utils.seeding import Stream, torch_generator
 
 
@@ -231,6 +231,7 @@ class Policy(BasePolicy):
 
     def in_appearance(self, appearance: AppearanceSettings) -> "Policy":
         """Return the same policy in scenes of another appearance."""
+        Instance(AppearanceSettings).read(appearance, "appearance")
         described = dataclasses.replace(self.description, appearance=appearance)
         return dataclasses.replace(self, description=described)
 

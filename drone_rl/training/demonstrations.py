@@ -37,7 +37,7 @@ from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, parse_json, refuse_links, write_atomically
 from drone_rl.utils.limits import ARRAYS_BYTES, Allowance
-from drone_rl.utils.schema import Plain, Record, Text, Whole, as_mapping, shown
+from drone_rl.utils.schema import Instance, Plain, Record, Text, Whole, as_mapping, shown
 
 FORMAT = "drone_rl demonstration"
 FORMAT_VERSION = 1
@@ -302,7 +302,8 @@ def record_oracle(
     Raises:
         InputError: The task has no oracle, or none for these actions.
     """
-    settings, flights = settings or TrainSettings(), Whole(1).read(flights, "flights")
+    settings = Instance(TrainSettings).read(settings or TrainSettings(), "settings")
+    flights = Whole(1).read(flights, "flights")
     env = DroneEnv(
         flights,
         settings.task,

@@ -27,7 +27,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import remove_leftovers, write_atomically
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.readers import read_table
-from drone_rl.utils.schema import Real
+from drone_rl.utils.schema import Real, shown
 from drone_rl.utils.settings import current_names, kinds_of
 
 MAY_CHANGE = (
@@ -94,10 +94,36 @@ class RunFolder:
 
     @classmethod
     def open(cls, path: str | Path | None, resume: bool) -> tuple[Self, dict[str, Any] | None]:
-        """Return the folder and, to resume, the state of its newest checkpoint."""
+        """Return the folder and, to resume, the state of its newest checkpoint.
+
+        Raises:
+            InputError: The folder holds a finished run that would be lost, or has no checkpoint to
+                resume from, or an argument has the wrong type.
+        """
+        if not isinstance(resume, bool):
+            raise InputError(
+                f"resume={shown(resume)} is neither true nor false; give folder=RUN, resume=True"
+            )
+        if path is not None and not isinstance(path, str | Path):
+            raise InputError(f"folder={shown(path)} is no path; give the folder of the run")
         folder = new_folder() if path is None else Path(path)
-        state = read_checkpoint(last_of(folder)) if resume else None
-        return cls(folder), state
+        if resume:
+            return cls(folder), read_checkpoint(last_of(folder))
+        if (folder / "result.json").exists():
+            raise InputError(
+                f"folder={folder} holds a finished run, which a new one would replace; resume it "
+                "(in Python resume=True, else resume=FOLDER), delete it or give another folder"
+            )
+        return cls(folder), None
+
+    def make(self) -> None:
+        """Make the folder, or raise an `InputError` if that is not possible."""
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"folder={self.path} can't be made ({error.strerror}); give another folder"
+            ) from error
 
     def prepare(
         self, settings: TrainSettings, state: Mapping[str, Any] | None

@@ -70,7 +70,7 @@ def train(
     if settings is None:
         settings = TrainSettings() if state is None else run_folder.settings_of(state["config"])
     settings = settings.replace(**{name: as_settings(value) for name, value in changes.items()})
-    run.path.mkdir(parents=True, exist_ok=True)
+    run.make()
     with folder_lock(run.path):
         result = learn(settings, run.path, state, [*callbacks, ForwardProgress(progress or Bar())])
         training = run_folder.finish(settings, run.path, result)

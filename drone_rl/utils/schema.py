@@ -134,9 +134,19 @@ class Instance:
         if isinstance(value, str) and hasattr(self.of, "from_name"):
             return self.of.from_name(value, where)
         if not isinstance(value, self.of):
-            name = self.of.__name__
-            raise InputError(f"{where}={shown(value)} is no {name}; give {name}(...)")
+            example = _example_of(self.of)
+            raise InputError(
+                f"{where}={shown(value)} is no {self.of.__name__}; give "
+                f"{example.__module__}.{example.__name__}(...)"
+            )
         return value
+
+
+def _example_of(cls: type) -> type:
+    """Return the first class that is derived from one whose choices have names, else the class."""
+    while hasattr(cls, "from_name") and (derived := cls.__subclasses__()):
+        cls = derived[0]
+    return cls
 
 
 @dataclasses.dataclass(frozen=True)

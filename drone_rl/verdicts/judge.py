@@ -12,7 +12,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
 from drone_rl.config.commands import HeldOutSettings, JudgeSettings
-from drone_rl.config.configuration import Changes
+from drone_rl.config.configuration import Changes, as_changes
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, make_baseline
 from drone_rl.evaluation.evaluate import held_out_environments
@@ -29,6 +29,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import NOT_COVERED, PROOF_MISSING
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.schema import Instance
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
 from drone_rl.utils.text import rate, say, seed_line
 from drone_rl.verdicts.certificate import find_claim
@@ -199,11 +200,14 @@ def judge_one(
     Raises:
         InputError: A policy, setting or file is unusable, or a required domain was not measured.
     """
-    settings, seed = with_seed((settings or JudgeSettings()).replace(**changes), drawn_seed)
+    Instance(JudgeSettings).read(settings := settings or JudgeSettings(), "settings")
+    settings, seed = with_seed(settings.replace(**changes), drawn_seed)
     progress = progress or Bar()
     progress("policy and baselines", 0, 1)
     loaded = None if policy in BASELINES else as_policy(policy, outputs)
     name = str(policy) if loaded is None or isinstance(policy, str | Path) else loaded.name
+    if loaded is not None and policy == "latest":
+        name = str(loaded.path)
     claim = measured = coverage = None
     if loaded is None:
         _refuse_files(name, certificate=certificate, shifts=shifts, require_domain=require_domain)
@@ -214,8 +218,8 @@ def judge_one(
         moved.check_air()
         worlds = _baseline(name, TaskSettings(**changed), moved, settings, seed)
     else:
-        loaded = loaded.in_task(**(task or {}))
-        loaded = loaded.in_dynamics(**dynamics) if dynamics else loaded
+        loaded = loaded.in_task(**as_changes(task, "task"))
+        loaded = loaded.in_dynamics(**as_changes(dynamics, "dynamics")) if dynamics else loaded
         loaded = loaded if appearance is None else loaded.in_appearance(appearance)
         measured = find_domain(loaded, shifts, outputs)
         needs = require_domain

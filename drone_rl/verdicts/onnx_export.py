@@ -107,7 +107,7 @@ def export_onnx(
         write_atomically(Path(target), content)
     except OSError as error:
         raise InputError(
-            f"policy {target} can't be written ({error.strerror}); free some space or choose "
-            "another folder with hydra.run.dir=..."
+            f"the ONNX file {target} can't be written ({error.strerror}); free some space or "
+            "choose another folder"
         ) from error
     return found

@@ -14,6 +14,7 @@ from torch import Tensor
 
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ChanceSettings, ProveSettings
+from drone_rl.config.configuration import as_changes
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason
 from drone_rl.utils.display import aligned, table
@@ -184,7 +185,7 @@ def chances(
     settings, seed = with_seed((settings or ChanceSettings()).replace(**changes))
     progress = progress or Bar()
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-    policy = policy.in_task(**(task or {}))
+    policy = policy.in_task(**as_changes(task, "task"))
     task_settings = require_cubes(policy.description, "exact probabilities")
     placed = (
         _sampled(task_settings, settings.placements, seed)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.config.commands import CheckSettings
+from drone_rl.config.configuration import as_changes
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import policy_names
 from drone_rl.utils.display import table
@@ -126,7 +127,10 @@ def check(
         )
     policy = stated.name if policy is None else policy
     loaded = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-    weights, asked = loaded.state["policy"], loaded.in_task(**task).task if task else None
+    weights, asked = (
+        loaded.state["policy"],
+        loaded.in_task(**as_changes(task, "task")).task if task else None,
+    )
     check_same_policy(stated, loaded.description, weights, asked)
     policy = dataclasses.replace(loaded, description=stated.description)
     findings = check_certificate(

@@ -13,6 +13,7 @@ import torch
 from numpy.typing import NDArray
 
 from drone_rl.config.commands import PlacesSettings
+from drone_rl.config.configuration import as_changes
 from drone_rl.evaluation.plots import regions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
@@ -108,7 +109,7 @@ def places(
     """
     settings, progress = (settings or PlacesSettings()).replace(**changes), progress or Bar()
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-    policy = policy.in_task(**(task or {}))
+    policy = policy.in_task(**as_changes(task, "task"))
     begin = time.perf_counter()
     network, gap = policy.make_network(), settings.logit_gap
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)

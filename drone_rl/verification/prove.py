@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from drone_rl.config.commands import ProveSettings
+from drone_rl.config.configuration import as_changes
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.display import aligned, table
 from drone_rl.utils.errors import InputError
@@ -118,7 +119,7 @@ def prove(
     """
     settings = (settings or ProveSettings()).replace(**changes)
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-    policy = policy.in_task(**(task or {}))
+    policy = policy.in_task(**as_changes(task, "task"))
     network, gap = policy.make_network(), settings.logit_gap
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
     with one_thread(), closing(spec), contextlib.ExitStack() as stack:

@@ -29,4 +29,5 @@ def require_cubes(described: PolicyDescription, what: str) -> TaskSettings:
         problem = f"cameras without faults; it simulates faults (transform {described.faults[0]})"
     else:
         return task
-    raise InputError(f"{what} support only {problem}; give another policy")
+    remedy = "give another policy" if dynamics.is_computer_vision else "leave dynamics out"
+    raise InputError(f"{what} support only {problem}; {remedy}")

@@ -4,9 +4,11 @@ import contextlib
 import dataclasses
 import functools
 import importlib
+import logging
 import os
 import re
 import sys
+import traceback
 import types
 import typing
 from collections.abc import Callable, Iterator, Sequence
@@ -82,6 +84,7 @@ PARTS: dict[str, type[Variant]] = {
 SEVERAL: dict[str, type[Variant]] = {"transforms": Transform, "logger": Logger}
 """Groups whose files name several variants, each by `schema@<name>: <the variant's name>`."""
 
+_log = logging.getLogger(__name__)
 _PLUGINS = (("plugins", list[str], dataclasses.field(default_factory=list)),)
 """Modules that register parts; `import_plugins` imports them before Hydra composes."""
 
@@ -129,7 +132,7 @@ def import_plugins(overrides: Sequence[str]) -> None:
     """Import the modules that `plugins=[MODULE, ...]` names on a command line, and none from files.
 
     Raises:
-        InputError: A module is not found.
+        InputError: A module is not found, or fails.
     """
     typed = [o.partition("=")[2] for o in overrides if re.match(r"\+{0,2}plugins=", o)]
     names = re.findall(r"[^\[\]\s,'\"]+", typed[-1]) if typed else []
@@ -143,6 +146,22 @@ def import_plugins(overrides: Sequence[str]) -> None:
             place = "give a module in this folder or on PYTHONPATH"
             remedy = place if is_own else f"install {error.name}"
             raise InputError(f"plugins={name} can't be imported ({error}); {remedy}") from error
+        except InputError:
+            raise
+        except Exception as error:  # any that the user's module raises
+            raise InputError(_plugin_error(name, error)) from error
+
+
+def _plugin_error(name: str, error: Exception) -> str:
+    """Return the message about a plugin that raised an error, with the line of its own files."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = next((f for f in reversed(frames) if "importlib" not in f.filename), frames[-1])
+    file, line = own.filename, own.lineno
+    if isinstance(error, SyntaxError):
+        file, line = error.filename or file, error.lineno
+    reason = " ".join(str(error).split())
+    where = f"line {line} of {file}"
+    return f"plugins={name} failed in {where} ({type(error).__name__}: {reason}); correct it"
 
 
 def schema_of(cls: type[Settings], further: Sequence[tuple[str, Any, Any]] = ()) -> type:
@@ -302,6 +321,8 @@ def _job(
             with _explained(name, overrides):
                 settings = read_settings(command, config)
             folder = Path(HydraConfig.get().runtime.output_dir)
+            if getattr(settings, "policy", None) == "latest":
+                _log.info("policy=latest is %s", settings.used_policy(folder))
             status, value = settings.run(folder)
             if status < 128 and sys.stdout.isatty():  # pipes get only the results
                 print(next_steps(name.replace("_", "-"), settings.used_policy(folder), folder))

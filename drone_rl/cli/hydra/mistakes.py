@@ -126,8 +126,13 @@ def closest(name: str, known: Sequence[str]) -> str | None:
     """Return the known name that was most likely meant, or None."""
     word = name.strip().lstrip("+~").replace("-", "_").lower()
     last = word.rpartition(".")[2]
+    group = word.rpartition(".")[0]
+
+    def is_elsewhere(name: str) -> bool:
+        return not name.startswith(f"{group}.")
+
     others = {
-        other: next((ours for ours in names if ours.partition("=")[0] in known), None)
+        other: next((n for n in sorted(names, key=is_elsewhere) if _key(n) in known), None)
         for other, names in OTHER_NAMES["settings"].items()
     }
     by_last = {key.rpartition(".")[2]: key for key in reversed(known)}
@@ -145,6 +150,10 @@ def closest(name: str, known: Sequence[str]) -> str | None:
     by_last = {**{other: ours for other, ours in others.items() if ours}, **by_last}
     near = difflib.get_close_matches(last, by_last, 1, 0.75)
     return by_last[near[0]] if near else None
+
+
+def _key(override: str) -> str:
+    return override.partition("=")[0]
 
 
 class Command:
@@ -185,7 +194,13 @@ class Command:
         longer = [key for key in self.keys if key.startswith(name)] if "." in name else []
         if len(longer) > 1:
             return InputError(f"{text}did you mean one of {', '.join(longer)}? ({self.list_all})")
-        if ours := f"{longer[0]}={value}" if longer else self.instead(name, value):
+        ours = f"{longer[0]}={value}" if longer else self.instead(name, value)
+        if ours == override or ((ours or "").startswith("task=") and "task" not in self.groups):
+            return InputError(
+                f"{override}: drone-rl {self.name} runs a policy in its own task; change single "
+                f"settings of it, such as task.num_cubes=5 ({self.list_all})"
+            )
+        if ours:
             return InputError(f"{text}did you mean {ours}? ({self.list_all})")
         prefix = f"{name.rpartition('.')[0]}."
         inside = [k.removeprefix(prefix) for k in self.keys if k.startswith(prefix)]
@@ -238,6 +253,10 @@ def _lacking(name: str, conf: Path, groups: Sequence[Override]) -> InputError | 
 def _syntax(word: str) -> InputError:
     """Return the error about a setting whose value has characters with a meaning of their own."""
     key, _, value = word.partition("=")
+    if re.fullmatch(r"[A-Za-z_][\w.]*=[^=]*", value):
+        return InputError(f"{word} has two equals signs; type {key}.{value}")
+    if number := re.fullmatch(r"([\d.]+)[=)\]}].*", value):
+        return InputError(f"{word} is not a number; type {key}={number[1]}")
     if value.startswith("="):
         return InputError(f"{word} has two equals signs; type {key}={value.lstrip('=')}")
     if re.search(r"\s[\w.]+=", value):
@@ -338,7 +357,9 @@ def _wrong_value(config: DictConfig, key: str, value: Any, text: str, reason: st
     if now is None:
         with contextlib.suppress(OmegaConfBaseException):
             OmegaConf.update(config, key, [value])  # fails unless the setting may be a list
-            return InputError(f"{text} has the wrong type; type a list such as {name}=[{value}]")
+            rest = ",0,0" if key in ("dynamics.wind", "dynamics.camera_offset") else ""
+            listed = f"{name}=[{value}{rest}]"
+            return InputError(f"{text} has the wrong type; type a list such as {listed}")
     written = re.fullmatch(r"(\d+(?:\.\d+)?)([kKmMgG])", str(value))
     if written and "number" in expected:
         now = f"{float(written[1]) * _MAGNITUDES[written[2].lower()]:.0f}"

@@ -10,16 +10,27 @@ import yaml
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import OmegaConf
 
+import drone_rl
 from drone_rl.sweeps.manifest import is_sweep, quoted, sweep_name
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import refuse_links, write_atomically
 from drone_rl.utils.overrides import must_be_typed, taken_over, with_current_name
 from drone_rl.utils.settings import FORMER_CHOICES, FORMER_NAMES
 
+_SHIPPED = Path(drone_rl.__file__).parent / "policies" / "zoo"
+"""Folder of the shipped policies, whose package imports torch."""
+
 
 def translate_former(overrides: Sequence[str]) -> list[str]:
     """Translate former setting names: `policy=mlp` to `network=mlp`, and `FORMER_NAMES`."""
-    named = map(with_current_name, overrides)
+    named = [*map(with_current_name, overrides)]
+    shipped = {path.stem for path in _SHIPPED.glob("*.safetensors")}
+    for value in (o.removeprefix("policy=") for o in named if o.startswith("policy=")):
+        if value in ("latest", *shipped) or "/" in value:
+            raise InputError(
+                f"policy={value}: drone-rl train makes a new policy; resume=RUN continues the run "
+                "of one, and network=NAME chooses its network"
+            )
     return [re.sub(r"^(\+{0,2}|~)policy(?=[.=])", r"\1network", o) for o in named]
 
 

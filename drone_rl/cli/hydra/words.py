@@ -15,6 +15,8 @@ _VALUED = {
     *("--config-name", "-cd", "--config-dir", "-sc", "--shell-completion"),
     *("--experimental-rerun",),
 }
+_PRINTED = (["job"], ["hydra"], ["all"])
+"""What `--cfg` prints."""
 _SPACED = re.compile(r"(?:^|\s)([\w.]+)(?: =|= | = )([^\s=]\S*)")
 """A setting with spaces around its equals sign."""
 _DASHES = "-\N{EN DASH}\N{EM DASH}\N{MINUS SIGN}"
@@ -31,6 +33,11 @@ def check_words(name: str, conf: Path, words: Sequence[str]) -> None:
     while position < len(words):
         word = words[position]
         is_flag = word in _FLAGS or any(word.startswith(f"{f}=") for f in _VALUED)
+        if word in ("-c", "--cfg") and words[position + 1 : position + 2] not in _PRINTED:
+            raise InputError(
+                f"{word} prints settings, with job, hydra or all after it; settings are typed "
+                "name=value, and files of settings are chosen by experiment=NAME"
+            )
         if word in _VALUED:
             position += 1
         elif not is_flag and word.startswith(tuple(_DASHES)):
@@ -65,7 +72,8 @@ def _check_brackets(word: str, following: Sequence[str]) -> None:
         return
     joined = word
     for more in following:
-        joined += more if joined.endswith(("[", ",", "(", "{")) else f" {more}"
+        gap = "," if _unclosed(joined) == "]" else " "
+        joined += more if joined.endswith(("[", ",", "(", "{")) else f"{gap}{more}"
         if _unclosed(joined) is None:
             raise InputError(
                 f"{word}: the shell ends a setting at a space; type it without spaces or in "
