@@ -57,7 +57,7 @@ def make_env(
     steps: Any = transforms if several else (transforms,)
     for transform in steps:
         _check(transform, "transforms", Transform)
-    for unknown in kwargs.keys() - inspect.signature(envs.DroneEnv).parameters.keys():
+    for unknown in kwargs.keys() - inspect.signature(envs.DroneEnv.__init__).parameters.keys():
         raise InputError(
             f"{unknown} is no argument of make_env; settings of the task are given as "
             "task=drone_rl.TaskSettings(num_cubes=2), for example"

@@ -229,6 +229,20 @@ def test_invalid_texture_raises_at_construction(tmp_path):
         DroneEnv(1, SHORT, appearance=AppearanceSettings(ground_texture=str(path)))
 
 
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        (torch.tensor([7, 0]), "actions from 0 to 7 are not all in"),
+        (torch.tensor([-5, 0]), "actions from -5 to 0 are not all in"),
+        (torch.zeros(2, 3, dtype=torch.int64), r"shape \(2, 3\); give torch.Size\(\[2\]\)"),
+    ],
+)
+def test_invalid_actions_are_named(action, message):
+    env = DroneEnv(2, SHORT)
+    with pytest.raises(InputError, match=message):
+        env.step(env.reset().set("action", action))
+
+
 @pytest.mark.parametrize("num_envs", [0, -1, 2.0])
 def test_invalid_num_envs_raises(num_envs):
     with pytest.raises(InputError, match="num_envs"):

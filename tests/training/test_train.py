@@ -284,3 +284,23 @@ def test_rejected_resume_changes_no_file(trained, tmp_path):
     with pytest.raises(InputError):
         drone_rl.train(folder=folder, resume=True, trainer=longer)
     assert contents(folder) == before
+
+
+def test_a_finished_run_is_not_replaced(tmp_path):
+    (tmp_path / "result.json").write_text("{}")
+    with pytest.raises(InputError, match=r"holds a finished run, .*resume=True.*another folder"):
+        drone_rl.train(TINY, folder=tmp_path, progress=silent)
+    assert (tmp_path / "result.json").read_text() == "{}"
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"resume": "RUN"}, "resume='RUN' is neither true nor false; give folder=RUN, resume=True"),
+        ({"folder": 5}, "folder=5 is no path"),
+        ({"folder": "/dev/null/x"}, "folder=/dev/null/x can't be made .*give another folder"),
+    ],
+)
+def test_folders_that_do_not_work_are_named(given, message):
+    with pytest.raises(InputError, match=message):
+        drone_rl.train(TINY, progress=silent, **given)

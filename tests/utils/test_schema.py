@@ -168,5 +168,7 @@ def test_lists_of_a_wrong_length_are_shown():
 def test_missing_settings_and_other_objects_are_named():
     with pytest.raises(InputError, match=r"^task is missing; give task=NAME"):
         Instance(Whole).read("???", "task")
-    with pytest.raises(InputError, match=r"^x=3 is no Whole; give Whole\(\.\.\.\)"):
+    with pytest.raises(
+        InputError, match=r"^x=3 is no Whole; give drone_rl.utils.schema.Whole\(\.\.\.\)"
+    ):
         Instance(Whole).read(3, "x")

@@ -253,7 +253,7 @@ def _lacking(name: str, conf: Path, groups: Sequence[Override]) -> InputError | 
 def _syntax(word: str) -> InputError:
     """Return the error about a setting whose value has characters with a meaning of their own."""
     key, _, value = word.partition("=")
-    if re.fullmatch(r"[A-Za-z_][\w.]*=[^=]*", value):
+    if not _TEXTS.match(word) and re.fullmatch(r"[A-Za-z_][\w.]*=[^=]*", value):
         return InputError(f"{word} has two equals signs; type {key}.{value}")
     if number := re.fullmatch(r"([\d.]+)[=)\]}].*", value):
         return InputError(f"{word} is not a number; type {key}={number[1]}")

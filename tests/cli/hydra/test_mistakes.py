@@ -88,6 +88,11 @@ def test_whole_numbers_may_have_an_exponent(override, number):
     ("override", "message"),
     [
         ("seed=x", "seed=x does not fit; type a whole number, such as seed=0"),
+        ("trainer=total_frames=9", "has two equals signs; type trainer.total_frames=9$"),
+        ("seed=1=2", "seed=1=2 is not a number; type seed=1$"),
+        ("seed=1)", r"seed=1\) is not a number; type seed=1$"),
+        ("task.max_steps=0", r"did you mean task\.step_limit=0\?"),
+        ("epochs=10", r"did you mean trainer\.total_frames=VALUE\?"),
         ("seed=2..5", r"such as seed=0; for one run with each, add -m 'seed=range\(2,6\)'$"),
         ("seed=null", "seed=null does not fit; type another value, such as seed=0"),
         ("seed=none", "seed=none does not fit; type a whole number, such as seed=0"),

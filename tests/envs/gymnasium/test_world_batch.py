@@ -46,7 +46,10 @@ def test_options_set_task_and_camera(task):
         ({"render_mode": "human"}, "render_mode='human' is unknown; give rgb_array"),
         ({"camera": {"fov": 3}}, "camera.fov is unknown; valid names: width"),
         ({"camera": {"width": 0}}, "camera.width=0 is out of range"),
-        ({"camera": 64}, "camera=64 is no CameraSettings; give CameraSettings"),
+        (
+            {"camera": 64},
+            "camera=64 is no CameraSettings; give drone_rl.config.camera.CameraSettings",
+        ),
         ({"device": "tpu"}, "device=tpu is unknown"),
     ],
 )
