@@ -258,7 +258,17 @@ def _not_fused_policy(direct: DirectCollector) -> list[str]:
     """Return reasons against fusing the actor."""
     if type(direct.actor) is not CategoricalActor:
         return [f"policy {type(direct.actor).__name__} is not fused"]
-    return unsupported(direct.actor.network)
+    network, renderer = direct.actor.network, direct.renderer
+    if reasons := unsupported(network):
+        return reasons
+    rows, num_actions = _cropped_rows(renderer), renderer.worlds.dynamics.actions.num_outputs
+    shape = (1, rows.stop - rows.start, renderer.view.width)
+    if (network.in_shape, network.num_actions) != (shape, num_actions):
+        return [
+            f"a network from {network.in_shape} to {network.num_actions} outputs is not fused "
+            f"with frames of {shape} and {num_actions} outputs"
+        ]
+    return []
 
 
 class RolloutBuffer:

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from drone_rl.acceleration.layers_kernel import Layers, run_convolutions, run_linear
 from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
 from drone_rl.envs.direct_renderer import Reasons
-from drone_rl.policies.networks import require_finite
+from drone_rl.policies.networks import PolicyNetwork, check_shape, require_finite
 from drone_rl.sim.rendering.devices import load_kernels, start_warp
 
 _TOGETHER = wp.constant(16)
@@ -41,7 +41,8 @@ class BatchedInference:
 
     def __init__(self, network: nn.Module) -> None:
         start_warp("cpu")
-        self._owner = getattr(network, "owner", "the policy")
+        assert isinstance(network, PolicyNetwork)
+        self._in_shape, self._owner = network.in_shape, network.owner
         self._packed = PackedNetwork(network, int(_TOGETHER))
         self._packed.update()
         self._own = threading.local()
@@ -55,7 +56,8 @@ class BatchedInference:
 
     @torch.no_grad()
     def __call__(self, pixels: Tensor) -> Tensor:
-        """Observations (N, C, H, W) to logits (N, num_actions)."""
+        """Observations (N, C, H, W) to logits (N, num_actions); see `PolicyNetwork.forward`."""
+        check_shape(pixels, self._in_shape)
         logits = torch.empty(len(pixels), self._packed.num_actions)
         flat = pixels.flatten(1).contiguous()
         arrays = wp.from_torch(flat), self._workspace(), wp.from_torch(logits)

@@ -202,7 +202,8 @@ def unsupported(network: nn.Module) -> list[str]:
     layers with ReLU, in float32 on a CPU.
     """
     name = type(network).__name__
-    if not isinstance(network, PolicyNetwork):
+    is_plain = getattr(type(network), "forward", None) is PolicyNetwork.forward
+    if not isinstance(network, PolicyNetwork) or not is_plain:
         return [f"network {name} is not fused"]
     if network.in_shape[0] != 1:
         return [f"a network of {network.in_shape[0]} channels is not fused"]

@@ -107,8 +107,8 @@ class Worlds:
         cameras = (camera,) if isinstance(camera, str) else camera
         return View(
             cameras=tuple(f"drone/{name}" for name in cameras),
-            height=height or self.camera.height,
-            width=width or self.camera.width,
+            height=self.camera.height if height is None else height,
+            width=self.camera.width if width is None else width,
             modalities=(modality,) if isinstance(modality, str) else tuple(modality),
             show_drone=show_drone,
         )

@@ -446,3 +446,9 @@ def test_images_without_standardization_equal_rendered_ones():
     env = with_transforms(DroneEnv(5, SHORT), [GrayPixels()])
     assert torch.equal(first, env.reset()["pixels"])
     assert 0.0 <= first.min() < first.max() <= 1.0
+
+
+@pytest.mark.parametrize(("shape", "num_actions"), [((1, 25, 32), 3), ((1, 25, 64), 5)])
+def test_networks_for_other_frames_or_actions_are_not_fused(shape, num_actions):
+    collector = make(network=SmallCNN(shape, num_actions))
+    assert "outputs is not fused with frames of (1, 25, 64) and 3 outputs" in collector.source.name

@@ -7,6 +7,7 @@ import torch
 
 from drone_rl.acceleration.inference_kernel import BatchedInference
 from drone_rl.policies import MLP, SmallCNN
+from drone_rl.utils.errors import InputError
 
 
 @pytest.fixture
@@ -51,3 +52,8 @@ def test_logits_behind_a_first_layer_of_more_outputs():
     wide = SmallCNN((1, 25, 64), 3, channels=(40,), hidden=(), generator=generator)
     frames = torch.randn(18, 1, 25, 64)
     assert torch.allclose(BatchedInference(wide)(frames), wide(frames), atol=1e-5)
+
+
+def test_images_of_another_shape_raise_as_by_the_network(network):
+    with pytest.raises(InputError, match="built for images of shape"):
+        BatchedInference(network)(torch.zeros(3, 1, 12, 64))

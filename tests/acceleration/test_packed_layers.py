@@ -149,3 +149,11 @@ def test_other_networks_are_not_packed():
     assert unsupported(OriginalCNN((3, 25, 64), 3))
     assert unsupported(SmallCNN((3, 25, 64), 3))
     assert unsupported(SmallCNN((1, 25, 64), 3).double())
+
+
+def test_a_network_that_overrides_the_forward_pass_is_unsupported():
+    class Cold(SmallCNN):
+        def forward(self, pixels):
+            return super().forward(pixels) / 2
+
+    assert unsupported(Cold((1, 25, 64), 3)) == ["network Cold is not fused"]

@@ -1,6 +1,7 @@
 """A batch of environments equals single environments in dm_control."""
 
 import numpy as np
+import pytest
 import torch
 
 from drone_rl.config import TaskSettings
@@ -10,6 +11,7 @@ from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
 
 
@@ -81,3 +83,9 @@ def test_combined_appearance_is_cached():
     worlds.appearance = None
     changed = worlds._combine(dark)
     assert changed is not None and (changed.fog_visibility, changed.exposure) == (None, 0.5)
+
+
+@pytest.mark.parametrize("size", [{"height": 0}, {"width": 0}])
+def test_images_without_pixels_are_refused(size):
+    with pytest.raises(InputError, match="give 1 to 4096 each way"):
+        Worlds(1).view(**size)

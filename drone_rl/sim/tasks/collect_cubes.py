@@ -176,7 +176,9 @@ class CollectCubes(PropTask[WorldState]):
 
     def fused_rules(self, dynamics: Dynamics, num_envs: int) -> FusedCubes | None:
         """See `Task.fused_rules`."""
-        if type(self).step is CollectCubes.step and FusedCubes.supports(dynamics):
+        fused = ("step", "places", "obstacles")
+        is_own = all(getattr(type(self), name) is getattr(CollectCubes, name) for name in fused)
+        if is_own and FusedCubes.supports(dynamics):
             return FusedCubes(self.settings, dynamics, num_envs)
         return None
 

@@ -6,7 +6,7 @@ import warp as wp
 from numpy.random import RandomState
 
 from drone_rl.config import ActionSettings, DynamicsSettings, TaskSettings
-from drone_rl.sim.dynamics import ComputerVision, Quadrotor
+from drone_rl.sim.dynamics import ComputerVision, Obstacles, Quadrotor
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import Poses
 from drone_rl.sim.tasks import CollectCubes, Pillars
@@ -112,3 +112,17 @@ def test_other_rules_and_moves_are_unsupported():
     assert CollectCubes().fused_rules(Quadrotor(flight, velocities), 1) is None
     assert Strict().fused_rules(ComputerVision(), 1) is None
     assert Pillars().fused_rules(ComputerVision(), 1) is None
+
+
+def test_tasks_with_other_positions_or_obstacles_are_unsupported():
+    class Raised(CollectCubes):
+        def places(self, state):
+            return super().places(state) + 1.0
+
+    class Solid(CollectCubes):
+        def obstacles(self, state):
+            return Obstacles(self.places(state), (1.0, 1.0, 1.0))
+
+    flight = DynamicsSettings(mode="simple_flight")
+    assert Raised().fused_rules(ComputerVision(), 1) is None
+    assert Solid().fused_rules(Quadrotor(flight), 1) is None
