@@ -141,7 +141,7 @@ class SteppingCollector:
     def collect(self, num_envs: int) -> TensorDictBase:
         """Run an episode in each of the first environments; traj_ids are 0 to num_envs - 1."""
         self._env.num_envs = num_envs
-        # as outside, since TorchRL's collector sets what is global, perhaps in several threads
+        # The caller's type: the collector sets it for the whole process, also for other threads.
         self._collector.exploration_type = exploration_type()
         self._collector.reset_at_each_iter = True
         rollouts = []
@@ -175,7 +175,7 @@ class _OneEpisode(TransformedEnv):
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: Any) -> TensorDictBase:
         self.active = torch.arange(len(self.active), device=self.active.device) < self.num_envs
         self.masks = []
-        if not self.num_envs:  # TorchRL's collector resets when it is made; that draws no episode
+        if not self.num_envs:  # TorchRL's collector resets when it is made; that samples no episode
             return self.fake_tensordict().exclude("next", *self.action_keys)
         return super()._reset(tensordict, **kwargs)
 

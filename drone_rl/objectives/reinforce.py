@@ -90,7 +90,7 @@ class ReinforceLoss(LossModule):
         raise RuntimeError("in_keys follows from set_keys(...) and the actor; change those")
 
     def divisor(self, tensordict: TensorDictBase) -> int:
-        """Return what sums over the steps of a batch are divided by.
+        """Return what sums over the steps of a batch are divided by; it ignores masks.
 
         That is 1 for "sum", the number of steps for "mean" and, for "episode_mean", the number of
         steps that end an episode, at least 1.

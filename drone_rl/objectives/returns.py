@@ -130,7 +130,7 @@ def batch_normalized(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
 
 
 def scale_to_unit(returns: Tensor) -> Tensor:
-    """Divides by the root mean square of the batch, which keeps zero where it is.
+    """Divide by the root mean square of the batch, which keeps zero where it is.
 
     The batch's own returns are in the divisor, so what was unbiased becomes biased, though less the
     larger the batch. `leave_one_out`: by 8.7 degrees with 3 episodes, 2.6 with 8, 0.1 with 64.

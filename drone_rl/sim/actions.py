@@ -95,10 +95,10 @@ class Actions(abc.ABC):
         return probs[..., list(self.lefts)].sum(-1)  # pyright: ignore[reportReturnType] (of both)
 
     def opposition(self, probs: NDArray, other: NDArray) -> NDArray:
-        """Return how opposed two distributions are, 0 to 1; below 0 if the second prefers left.
+        """Return how opposed two distributions are, -1 to 1; below 0 if the second prefers left.
 
         This is the smaller of the changes to the left and to the right, 0 if their signs differ.
-        It is 1 if one is certainly left and the other certainly right. Shape: (*).
+        It is 1 if the first is certainly left and the second certainly right. Shape: (*).
         """
         swing = probs - other
         to_left, to_right = self.prob_left(swing), -self.prob_left(self.mirror(swing))

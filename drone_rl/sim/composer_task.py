@@ -122,11 +122,11 @@ class ComposerTask(composer.Task):
         """Return the model that dm_control simulates, with the semantic classes of its geoms."""
         physics = mjcf.Physics.from_mjcf_model(self._arena.mjcf_model)
         model = physics.model.ptr
-        meanings, props = [SemanticClass.GROUND] * model.ngeom, [-1] * model.ngeom
+        classes, props = [SemanticClass.GROUND] * model.ngeom, [-1] * model.ngeom
         for number, entity in [(-1, self.drone), *enumerate(self._props)]:
             for geom in physics.bind(entity.mjcf_model.find_all("geom")).element_id:
-                meanings[geom], props[geom] = entity.semantic_class, number
-        return Scene(model, tuple(meanings), tuple(props), entities.SKY_COLOR)
+                classes[geom], props[geom] = entity.semantic_class, number
+        return Scene(model, tuple(classes), tuple(props), entities.SKY_COLOR)
 
     def initialize_episode(
         self, physics: mjcf.Physics, random_state: np.random.RandomState

@@ -1,4 +1,4 @@
-"""Entities of a scene, for dm_control; only the drone moves by physics, touching is a rule."""
+"""Entities of a dm_control scene: the field, the drone, and what tasks add to them."""
 
 from typing import Any, NamedTuple
 
@@ -88,7 +88,7 @@ class Field(composer.Arena):
 
 
 class VisualEntity(composer.Entity):
-    """One geom without contacts; `_build` of a subclass adds it."""
+    """One geom, by default without contacts; `_build` of a subclass adds it."""
 
     semantic_class: SemanticClass
 

@@ -26,7 +26,7 @@ from drone_rl.sim.entities import DRONE_CAMERAS, Drone
 mujoco: Any = mujoco_module
 """Its compiled functions have no types."""
 _GROUND, _OBSTACLE = 2, 4
-"""Bits of what touches what."""
+"""Bits of `contype` and `conaffinity`: what can touch the ground, and what obstacles."""
 _UNSEEN = 5
 """A group of geoms that no camera shows."""
 _STIFFNESS = 0.3
@@ -175,6 +175,7 @@ class MujocoFlight:
             model.cam_pos[camera], model.cam_quat[camera] = place, quat
 
     def _rocking(self, physics: mjcf.Physics) -> NDArray:
+        """Return the torque, world frame, whose opposite brakes the spin, see `_CALM`."""
         data, share = physics.data, _CALM / self._settings.tick
         turn = data.xmat[self._body].reshape(3, 3)
         return turn @ (share * np.array(self._settings.inertia) * data.qvel[self._motion][3:])

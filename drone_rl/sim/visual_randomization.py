@@ -144,7 +144,7 @@ class AppearanceSampler:
             if settings.is_minimal
             else self._to_appearance(torch.tensor(middle, dtype=torch.float64))
         )
-        """Appearance of imagined environments; None for the task's own."""
+        """Appearance in the middle of all ranges; None for the task's own."""
         self.values = torch.tensor([middle], dtype=torch.float64).repeat(num_envs, 1)
         """Sampled numbers. Shape: (num_envs, *)."""
         self._now: Appearance | None = None

@@ -182,7 +182,10 @@ def shown_actions(numbers: Mapping[str, Any]) -> ShownActions:
     given = _ACTION_FIELDS.read(numbers["actions"], "actions")
     names, count = given["names"], len(given["names"])
     if len(set(names)) < count or sorted(given["order"]) != list(range(count)):
-        raise InputError(f"actions of order {shown(str(given['order']))} are not all there, once")
+        raise InputError(
+            f"actions.order={shown(str(given['order']))} or a name is invalid; give {count} "
+            "different names, and the index of each once"
+        )
     if not len(given["arrows"]) == len(given["colors"]) == count:
         raise InputError(f"actions have {count} names; give each an arrow and a colour")
     speeds = given.get("speeds")
@@ -195,7 +198,9 @@ class _Name:
     def read(self, value: Any, where: str) -> str:
         text = Text(24).read(value, where)
         if not _NAME.fullmatch(text):
-            raise InputError(f"{where}={shown(value)} is no action's name; give small letters")
+            raise InputError(
+                f"{where}={shown(value)} is not an action's name; give lower-case letters"
+            )
         return text
 
 

@@ -21,10 +21,10 @@ def test_speeds_are_in_meters_and_degrees_per_second():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"names": ["a", "a", "b"]}, "not all there"),
-        ({"names": ["<b>", "left", "right"]}, "no action's name"),
-        ({"names": ["forward", "left"]}, "not all there"),
-        ({"order": [0, 1, 1]}, "not all there"),
+        ({"names": ["a", "a", "b"]}, "give 3 different names, and the index of each once"),
+        ({"names": ["<b>", "left", "right"]}, "not an action's name; give lower-case letters"),
+        ({"names": ["forward", "left"]}, "give 2 different names, and the index of each once"),
+        ({"order": [0, 1, 1]}, "order=.*0, 1, 1.* or a name is invalid"),
         ({"order": [0, 1, 99]}, "out of range"),
         ({"arrows": [[0, 1]]}, "an arrow and a colour"),
         ({"arrows": [[0, 9]] * 3}, "out of range"),

@@ -48,7 +48,7 @@ class Sb3Worlds(VecEnv):
         if strange := [t.name for t in transforms if isinstance(t, Fault)]:
             raise InputError(f"the transform {strange[0]} needs a TorchRL environment; omit it")
         self.env = env
-        self._look = on_pixels([transform.make() for transform in transforms])
+        self._transform = on_pixels([transform.make() for transform in transforms])
         self._actions: NDArray[Any] = np.zeros(env.num_envs, np.int64)
         space = env.single_observation_space
         if transforms:
@@ -119,7 +119,7 @@ class Sb3Worlds(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
     def _seen(self, images: NDArray[Any]) -> NDArray[Any]:
-        return self._look(torch.from_numpy(images)).numpy()
+        return self._transform(torch.from_numpy(images)).numpy()
 
 
 def _of_world(info: dict[str, Any], world: int) -> dict[str, Any]:

@@ -14,9 +14,9 @@ from drone_rl.sim.dynamics.control_kernel import Goal, climb_memory, climb_missi
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _FASTEST, _FARTHEST, _WILDEST = wp.constant(1000.0), wp.constant(1.0e18), wp.constant(10.0)
-"""Metres or radians a second, square metres, and standard deviations of gusts that none exceeds."""
+"""Bounds of speeds (m/s or rad/s), of squared goals and positions, and of gusts (deviations)."""
 _WIDEST = wp.constant(1.0e12)
-"""Square metres: no drone flies 1000 km."""
+"""Square metres: no drone flies 1000 km in a command."""
 
 
 @wp.struct

@@ -21,12 +21,20 @@ _LOADING = threading.Lock()
 
 def check_device(device: str) -> None:
     """Raise an `InputError` unless a device is "cpu" or an available CUDA device."""
-    kind = device.split(":")[0]
-    if kind not in ("cpu", "cuda"):
+    kind, _, number = device.partition(":")
+    if kind not in ("cpu", "cuda") or not (number or "0").isdecimal():
         raise InputError(f"device={device} is unknown; give cpu, cuda or cuda:N")
     wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)  # the count below starts Warp
-    if kind == "cuda" and not (torch.cuda.is_available() and wp.get_cuda_device_count()):
+    if kind == "cpu":
+        return
+    count = torch.cuda.is_available() and wp.get_cuda_device_count()
+    if not count:
         raise InputError(f"device={device}, but no CUDA GPU is usable here; give device=cpu")
+    if int(number or 0) >= count:
+        raise InputError(
+            f"device={device}, but only {count} CUDA GPUs are usable here; give cuda:0 to "
+            f"cuda:{count - 1}"
+        )
 
 
 @functools.cache

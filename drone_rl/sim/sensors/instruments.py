@@ -80,7 +80,7 @@ class Imu(Sensor[ImuState, ImuReading]):
         self.sampling = Sampling(rate=self.settings.rate)
 
     def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> ImuState:
-        """The body was at rest before: its first reading is that of a body that is carried."""
+        """The velocity was constant before: the first reading has no acceleration but gravity's."""
         own = self.settings
         still = torch.zeros_like(body.velocity)
         gyro = own.noise * own.gyro_turn_on_bias * _DEGREES_PER_HOUR * normal(still, generator)

@@ -269,7 +269,7 @@ class Pillars(common.PropTask[FieldState]):
         return torch.where(is_in_way, turn, Move.FORWARD)
 
     def stratum_at(self, offset: Tensor) -> Tensor:
-        """Return the side of the way around it."""
+        """Return the side on which the drone passes it; ahead if it is not in the way."""
         sides = torch.tensor(
             [common.Side.AHEAD, common.Side.LEFT, common.Side.RIGHT], device=offset.device
         )

@@ -13,7 +13,7 @@ from drone_rl.config import PillarsSettings
 from drone_rl.sim.actions import Move
 
 MOST_TRIES = 10_000
-"""Samples of a row until one leaves a lane open."""
+"""Largest number of samples of a row until one leaves a lane open."""
 
 
 class Lanes:
@@ -31,7 +31,7 @@ class Lanes:
             closed = ~self.is_open(rows).any(-1)
             if not closed.any():
                 return rows
-        raise RuntimeError(f"no open field in {MOST_TRIES} drawings")
+        raise RuntimeError(f"no row with an open lane in {MOST_TRIES} samples; lower the density")
 
     def within_field(self) -> NDArray[np.float64]:
         """Return the y of all lanes within the field, from right to left. Shape: (L,)."""

@@ -83,3 +83,15 @@ def test_concurrent_requests_load_once(monkeypatch):
 def test_warp_reports_only_errors_on_cpu():
     devices.start_warp("cpu")
     assert devices.wp.config.log_level >= devices.wp.LOG_ERROR
+
+
+@pytest.mark.parametrize(
+    ("device", "message"),
+    [("cuda:2", "only 2 CUDA GPUs are usable here; give cuda:0 to cuda:1"), ("cuda:x", "unknown")],
+)
+def test_gpus_that_do_not_exist_are_refused(device, message, monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(devices.wp, "get_cuda_device_count", lambda: 2)
+    check_device("cuda:1")
+    with pytest.raises(InputError, match=message):
+        check_device(device)

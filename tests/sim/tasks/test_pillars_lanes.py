@@ -120,5 +120,5 @@ def test_open_rows_are_kept_and_fields_are_seeded():
 def test_field_without_open_lanes_raises(monkeypatch):
     monkeypatch.setattr(Lanes, "is_open", lambda _, rows: np.zeros((len(rows), 7), bool))
     monkeypatch.setattr(pillars_lanes, "MOST_TRIES", 5)
-    with pytest.raises(RuntimeError, match="5 drawings"):
+    with pytest.raises(RuntimeError, match="5 samples; lower the density"):
         NARROW_LANES.sample_field(np.random.RandomState(0))

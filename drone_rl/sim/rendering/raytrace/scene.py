@@ -40,12 +40,12 @@ def check_scene(scene: Scene) -> None:
         if model.geom_type[geom] not in HALF_EXTENTS:
             kind = mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
             raise InputError(
-                f"geom {model.geom(geom).name!r} is a {kind}, which Raytracer can't draw; give "
+                f"geom {model.geom(geom).name!r} is a {kind}, which Raytracer can't render; give "
                 "renderer=mujoco_warp"
             )
     if model.nflex:
         raise InputError(
-            "the scene has soft bodies, which Raytracer can't draw; give renderer=mujoco_warp"
+            "the scene has soft bodies, which Raytracer can't render; give renderer=mujoco_warp"
         )
     if not model.nlight:
         raise InputError("the scene has no light, so nothing could be seen; add one")

@@ -277,7 +277,7 @@ def test_unsupported_geoms_raise_with_their_name(old, new, message):
         ),
         (
             '<flexcomp name="f" type="grid" count="2 2 2" spacing="1 1 1" dim="3"/>',
-            "the scene has soft bodies, which Raytracer can't draw; give renderer=mujoco_warp",
+            "the scene has soft bodies, which Raytracer can't render; give renderer=mujoco_warp",
         ),
     ],
 )
