@@ -302,7 +302,8 @@ def record_oracle(
     Raises:
         InputError: The task has no oracle, or none for these actions.
     """
-    settings = Instance(TrainSettings).read(settings or TrainSettings(), "settings")
+    settings = settings or TrainSettings()
+    Instance(TrainSettings).read(settings, "settings")
     flights = Whole(1).read(flights, "flights")
     env = DroneEnv(
         flights,

@@ -21,7 +21,7 @@ from drone_rl.evaluation.verdict import Verdict, judge_policy
 from drone_rl.evaluation.verdict_text import quantity_label
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
-from drone_rl.policies.policy import BasePolicy
+from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.robustness.shifts_text import QUOTED, why_not
 from drone_rl.utils.display import aligned, paragraph, table
@@ -206,7 +206,7 @@ def judge_one(
     progress("policy and baselines", 0, 1)
     loaded = None if policy in BASELINES else as_policy(policy, outputs)
     name = str(policy) if loaded is None or isinstance(policy, str | Path) else loaded.name
-    if loaded is not None and policy == "latest":
+    if isinstance(loaded, Policy) and policy == "latest":  # which changes with the next run
         name = str(loaded.path)
     claim = measured = coverage = None
     if loaded is None:

@@ -26,6 +26,7 @@ def test_verdicts_are_exit_statuses(in_process, tmp_path, policy, status, verdic
     assert done.stdout.startswith(verdict)
 
 
+LAST = "checkpoints/last.pt"
 ONE = ["verdict", "policy=good", "task.num_cubes=1", "episodes=10", "sampled=false"]
 
 
@@ -159,3 +160,13 @@ def test_figures_under_another_appearance(in_process, tmp_path):
     assert "another appearance" in done.stdout, done.stderr
     kept = json.loads((tmp_path / "e" / "evaluation.json").read_text())
     assert any(name.startswith("appearance.sun") for name in kept["unlike"])
+
+
+def test_latest_is_named_by_its_file(run, in_process, tmp_path, monkeypatch, caplog):
+    """Which run `latest` is changes with the next one."""
+    monkeypatch.setattr("drone_rl.cli.settings.trained_policies", lambda _: [run / "checkpoints/x"])
+    monkeypatch.setattr("drone_rl.policies.policy.trained_policies", lambda _: [run / LAST])
+    caplog.set_level("INFO")
+    in_process("verdict", "policy=latest", "episodes=4", "hydra.run.dir=v")
+    assert f"policy=latest is {run}" in caplog.text
+    assert json.loads((tmp_path / "v" / "verdict.json").read_text())["policy"] == str(run / LAST)

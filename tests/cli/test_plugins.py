@@ -93,10 +93,15 @@ def test_an_exported_file_has_names_and_values_only(folder):
 
 def test_mistakes_are_one_line(folder):
     (folder / "needs_more.py").write_text("import not_installed.part")
+    (folder / "fails.py").write_text("x = 1\ny = x / 0\n")
+    (folder / "unclosed.py").write_text("x = 1\ny = (\n")
     for given, told in (
         (["plugins=[nowhere]"], "plugins=nowhere can't be imported"),
         (["plugins=[nowhere]"], "give a module in this folder or on PYTHONPATH"),
         (["plugins=[needs_more]"], "install not_installed"),
+        (["plugins=[fails]"], "fails.py (ZeroDivisionError: division by zero); correct it"),
+        (["plugins=[fails]"], "plugins=fails failed in line 2 of "),
+        (["plugins=[unclosed]"], "plugins=unclosed failed in line 2 of "),
         (["plugins=[my_parts]", "network=cells", "network.row=3"], "network.row"),
         (["plugins=[my_parts]", "network=cells", "network.rows=many"], "network.rows"),
         (["network=cells"], "network=cells is unknown"),

@@ -8,7 +8,13 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from omegaconf import OmegaConf
 
 from drone_rl.cli.hydra import resuming
-from drone_rl.cli.hydra.resuming import check_folder, complete, note_settings, resume_command
+from drone_rl.cli.hydra.resuming import (
+    check_folder,
+    complete,
+    note_settings,
+    resume_command,
+    translate_former,
+)
 from drone_rl.sweeps.manifest import sweep_name
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.overrides import read_overrides
@@ -127,3 +133,9 @@ def test_a_sweep_with_former_names_goes_on_in_its_folder(tmp_path, monkeypatch, 
     (tmp_path / "outputs" / "train" / "multiruns" / older).mkdir(parents=True)
     for override in (former, current):
         assert complete(["-m", "optimizer.lr=1", override])[-1].endswith(f"/multiruns/{older}")
+
+
+@pytest.mark.parametrize("value", ["good", "latest", "outputs/train/runs/x"])
+def test_a_trained_policy_is_no_setting_of_a_training(value):
+    with pytest.raises(InputError, match=f"policy={value}: .*resume=RUN .*network=NAME"):
+        translate_former([f"policy={value}"])

@@ -33,6 +33,9 @@ pytestmark = pytest.mark.usefixtures("registered")
         ("train device=cpu nothing", "^nothing has no =; settings are typed name=value"),
         ("train network.hidden=[64, 64]", "quotes: 'network.hidden=\\[64,64\\]'"),
         ("train network.hidden=[64", r"has no closing \]; type 'network.hidden=\[64\]'"),
+        ("train -c config.yaml", "^-c prints settings, .* experiment=NAME$"),
+        ("train --cfg", "^--cfg prints settings"),
+        ("explain policy=[good poor]", r"quotes: 'policy=\[good,poor\]'$"),
         ("train device='cpu", "has no closing '; type \"device='cpu'\""),
     ],
 )
