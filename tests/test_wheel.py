@@ -25,7 +25,7 @@ def test_wheel_contains_the_configuration_and_runs_without_the_checkout(tmp_path
     assert {f"drone_rl/policies/zoo/{n}.safetensors" for n in policies} <= names
     assert "drone_rl/policies/zoo/proved.certificate.json" in names
     code = "import sys; sys.path.insert(0, 'site'); from drone_rl.cli.main import main; "
-    code += "from drone_rl.cli.hydra.composition import conf_dir; "
+    code += "from drone_rl.utils.settings import conf_dir; "
     code += "assert str(conf_dir()).endswith('site/drone_rl/conf'), conf_dir(); main()"
     command = [sys.executable, "-c", code, "train", "--cfg", "job"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)

@@ -43,7 +43,8 @@ class TrainCommand(CommandSettings, TrainSettings):
     logger: Annotated[tuple[Logger, ...], Several(Instance(Logger), 0, 16)] = (Tensorboard(),)
     """Loggers in addition to metrics.csv."""
     resume: str | None = None
-    """Folder of a run to resume with its own settings; null starts a new one."""
+    """Folder of a run to resume with its own settings, or latest for the newest run; null starts a
+    new one."""
     provable: ProvableSettings = ProvableSettings()
     """Training in rounds until a proof succeeds, if provable.rounds is above 0."""
     trial: Annotated[int, Whole(0)] | None = None

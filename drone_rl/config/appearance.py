@@ -1,12 +1,14 @@
 """Settings of appearance; each value is fixed or a range that is sampled at every reset."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
+
+import yaml
 
 from drone_rl.config.camera import FRONT, CameraSettings
 from drone_rl.config.task import Color, ObjectRegion
-from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Listed, Real, Several, Span, Whole
-from drone_rl.utils.settings import Settings
+from drone_rl.utils.errors import InputError, did_you_mean
+from drone_rl.utils.schema import Listed, Real, Several, Span, Whole, shown
+from drone_rl.utils.settings import Settings, conf_dir
 
 NumberOrRange = float | tuple[float, float]
 """A number, or a range that is sampled uniformly."""
@@ -83,6 +85,23 @@ class AppearanceSettings(Settings):
     """Degrees added to `camera.horizontal_fov`; negative values narrow the field of view."""
     exposure: Annotated[NumberOrRange, Span(Real(0.01, 100.0))] = 1.0
     """Factor by which the camera multiplies all colours."""
+
+    @classmethod
+    def from_name(cls, name: str, where: str) -> Self:
+        """Return the appearance of a file in conf/appearance, such as "fog".
+
+        Raises:
+            InputError: There is no such file; the message begins with `where`.
+        """
+        files = {path.stem: path for path in sorted((conf_dir() / "appearance").glob("*.yaml"))}
+        if name not in files:
+            raise InputError(
+                f"{where}={shown(name)} is unknown; give one of: {', '.join(files)}"
+                f"{did_you_mean(name, files)}"
+            )
+        values = yaml.safe_load(files[name].read_text("utf-8"))
+        base = values.pop("defaults")[0]
+        return (cls.from_name(base, where) if base in files else cls()).replace(**values)
 
     @property
     def is_minimal(self) -> bool:

@@ -182,10 +182,11 @@ class Logger(Variant):
                 f"logger _target_={self.target} can't be made ({error}); install the package that "
                 f"it needs{remedy}, or choose another logger"
             ) from error
-        except (TypeError, ValueError) as error:  # an argument is missing, unknown or wrong
+        except Exception as error:  # a wrong argument, or any error of the package
+            text = " ".join(f"{error}".split()) or type(error).__name__
             raise InputError(
-                f"logger _target_={self.target} can't be made ({error}); give its arguments as in "
-                "+logger.NAME.exp_name=first"
+                f"logger _target_={self.target} can't be made ({text}); give its arguments as in "
+                "+logger.NAME.exp_name=first, and check that its package works"
             ) from error
 
 
@@ -196,3 +197,25 @@ class Tensorboard(Logger, target="torchrl.record.loggers.tensorboard.Tensorboard
     """Folder of this logger under log_dir."""
     log_dir: str = "outputs"
     """Where the logs go."""
+
+
+class Wandb(Logger, target="torchrl.record.loggers.wandb.WandbLogger"):
+    """Weights & Biases."""
+
+    exp_name: str = "drone_rl"
+    """Name of the run."""
+    project: str = "drone_rl"
+    """Project that the run belongs to."""
+    save_dir: str = "outputs"
+    """Where its files go."""
+    offline: bool = False
+    """Write files alone, for `wandb sync`."""
+
+
+class Mlflow(Logger, target="torchrl.record.loggers.mlflow.MLFlowLogger"):
+    """MLflow."""
+
+    exp_name: str = "drone_rl"
+    """Experiment that the run belongs to."""
+    tracking_uri: str = "sqlite:///outputs/mlflow.db"
+    """A database file, or the address of a server."""

@@ -17,7 +17,7 @@ from drone_rl.config import (
 from drone_rl.config.transforms import DEFAULT_TRANSFORMS, Transform
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import shown
+from drone_rl.utils.schema import Instance, shown
 
 
 def make_env(
@@ -43,7 +43,8 @@ def make_env(
         transforms: Transform of the image, or several in this order.
         seed: Root of the environments' random streams.
         device: Device of the renderer: "cpu", "cuda" or "cuda:N".
-        kwargs: See `drone_rl.envs.DroneEnv`, such as renderer="mujoco_warp".
+        kwargs: See `drone_rl.envs.DroneEnv`, such as renderer="mujoco_warp", and `appearance`, also
+            as a name such as "fog".
 
     Raises:
         InputError: A setting is out of range; the message begins with its name.
@@ -52,7 +53,8 @@ def make_env(
     _check(actions, "actions", ActionSettings)
     if isinstance(dynamics, str | Mapping):
         _check(dynamics, "dynamics", DynamicsSettings)
-    _check(kwargs.get("appearance"), "appearance", AppearanceSettings)
+    if kwargs.get("appearance") is not None:
+        kwargs["appearance"] = Instance(AppearanceSettings).read(kwargs["appearance"], "appearance")
     several = isinstance(transforms, Sequence) and not isinstance(transforms, str)
     steps: Any = transforms if several else (transforms,)
     for transform in steps:

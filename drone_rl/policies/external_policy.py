@@ -149,7 +149,8 @@ def policy_from(
     """
     if not callable(logits):
         raise InputError(
-            f"policy_from got a {type(logits).__name__}; give a callable from images to logits"
+            f"policy={shown(logits)} is no policy; give a callable from images to logits, or the "
+            "name or file of a policy"
         )
     if camera is not None:
         Instance(CameraSettings).read(camera, "camera")

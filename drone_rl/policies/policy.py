@@ -68,7 +68,7 @@ class BasePolicy(abc.ABC):
             own, used = ({"mode": of["mode"]} for of in (own, used))
         return {n: {"own": own[n], "flown": v} for n, v in used.items() if own[n] != v}
 
-    def in_appearance(self, appearance: AppearanceSettings) -> Self:
+    def in_appearance(self, appearance: AppearanceSettings | str) -> Self:
         """Return the same policy in scenes of another appearance.
 
         Raises:
@@ -229,9 +229,9 @@ class Policy(BasePolicy):
         described["dynamics"] = {**self.dynamics.values(), **changed}
         return dataclasses.replace(self, description=parse(described))
 
-    def in_appearance(self, appearance: AppearanceSettings) -> "Policy":
-        """Return the same policy in scenes of another appearance."""
-        Instance(AppearanceSettings).read(appearance, "appearance")
+    def in_appearance(self, appearance: AppearanceSettings | str) -> "Policy":
+        """Return the same policy in scenes of another appearance, which may be a name."""
+        appearance = Instance(AppearanceSettings).read(appearance, "appearance")
         described = dataclasses.replace(self.description, appearance=appearance)
         return dataclasses.replace(self, description=described)
 
@@ -347,6 +347,8 @@ def load_policy(which: str | Path, *, outputs: str | Path = "outputs") -> Policy
         InputError: There is none, or it is unusable.
     """
     if not isinstance(which, str | Path):
+        if not isinstance(which, BasePolicy) and not callable(which):
+            raise InputError(f"policy={shown(which)} is no name and no path; give one of them")
         name = getattr(which, "name", type(which).__name__)
         raise InputError(
             f"policy={name} is in no file of drone-rl's, and a network from elsewhere can only be "

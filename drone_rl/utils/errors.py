@@ -16,8 +16,9 @@ class InputError(ValueError):
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
     """Return the end of a message with the known name that is most like an unknown one."""
-    near = difflib.get_close_matches(str(name)[:100], [*known], 1, 0.7)
-    return f"; did you mean {near[0]}?" if near else ""
+    lower = {one.lower(): one for one in known}
+    near = difflib.get_close_matches(str(name)[:100].lower(), lower, 1, 0.7)
+    return f"; did you mean {lower[near[0]]}?" if near else ""
 
 
 def extra(module: str, name: str, setting: str) -> Any:

@@ -11,6 +11,7 @@ import re
 import types
 import typing
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
 from drone_rl.utils.errors import InputError, did_you_mean
@@ -102,6 +103,13 @@ class Settings(_Frozen):
     def values(self) -> dict[str, Any]:
         """Return the fields by name as plain data."""
         return {f.name: plain(getattr(self, f.name)) for f in dataclasses.fields(self)}
+
+
+def conf_dir() -> Path:
+    """Return the folder conf/ of the checkout, or its copy inside an installed wheel."""
+    package = Path(__file__).resolve().parents[1]
+    checkout = package.parent / "conf"
+    return checkout if (checkout / "train.yaml").is_file() else package / "conf"
 
 
 @functools.cache

@@ -170,7 +170,7 @@ def judge_one(
     *,
     task: Mapping[str, Any] | None = None,
     dynamics: Mapping[str, Any] | None = None,
-    appearance: AppearanceSettings | None = None,
+    appearance: AppearanceSettings | str | None = None,
     certificate: str | Path | None = None,
     shifts: str | Path | None = None,
     require_domain: str | Path | None = None,
@@ -187,7 +187,8 @@ def judge_one(
         settings: Number of episodes, seed, device and so on.
         task: Settings to change of the policy's task or, for a baseline, of the default one.
         dynamics: Settings to change of the dynamics, likewise.
-        appearance: Appearance of the scenes; by default that of the policy's training.
+        appearance: Appearance of the scenes, or the name of one such as "fog"; by default that of
+            the policy's training.
         certificate: Certificate to quote, see `drone_rl.verdicts.certificate.find_claim`.
         shifts: Robustness evaluation to quote, see `drone_rl.verdicts.coverage.find_domain`.
         require_domain: File of the required domain, see

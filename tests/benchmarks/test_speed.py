@@ -6,10 +6,10 @@ import pytest
 import yaml
 
 from benchmarks import speed
-from drone_rl.cli.hydra.composition import conf_dir
 from drone_rl.config import AppearanceSettings
 from drone_rl.config.configuration import from_config
 from drone_rl.sim.rendering import View
+from drone_rl.utils.settings import conf_dir
 
 
 def view(modality=("rgb",), **size):

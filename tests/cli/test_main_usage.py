@@ -1,5 +1,5 @@
-from drone_rl.cli.hydra.composition import conf_dir
 from drone_rl.cli.main import COMMANDS, USAGE, find_command
+from drone_rl.utils.settings import conf_dir
 
 
 def test_every_command_is_told_of_has_a_module_and_a_file():

@@ -98,6 +98,7 @@ def test_mistakes_are_one_line(folder):
     for given, told in (
         (["plugins=[nowhere]"], "plugins=nowhere can't be imported"),
         (["plugins=[nowhere]"], "give a module in this folder or on PYTHONPATH"),
+        (["plugins=[my_parts.py]"], "type the module's name: plugins=[my_parts]"),
         (["plugins=[needs_more]"], "install not_installed"),
         (["plugins=[fails]"], "fails.py (ZeroDivisionError: division by zero); correct it"),
         (["plugins=[fails]"], "plugins=fails failed in line 2 of "),

@@ -120,8 +120,7 @@ def test_an_extra_that_is_not_installed(in_process, monkeypatch, module, extra, 
 
 def test_a_logger_whose_package_is_missing(in_process, monkeypatch, tmp_path):
     monkeypatch.setattr("torchrl.record.loggers.wandb._has_wandb", False)
-    wandb = "+logger.wandb._target_=torchrl.record.loggers.wandb.WandbLogger"
-    told = [*TINY, wandb, "+logger.wandb.exp_name=x", "hydra.run.dir=run"]
+    told = [*TINY, "logger=wandb", "hydra.run.dir=run"]
     assert "pip install wandb" in error_line(in_process("train", *told))
     assert not (tmp_path / "run" / "checkpoints").exists()
 

@@ -16,6 +16,19 @@ def test_each_value_is_fixed_or_a_range():
     assert AppearanceSettings.read(settings.values(), "appearance") == settings
 
 
+def test_an_appearance_has_the_name_of_its_file():
+    fog = AppearanceSettings.from_name("fog", "appearance")
+    assert fog.fog_visibility == 40.0 and fog.ground_texture is None
+    relit = AppearanceSettings.from_name("relit", "appearance")  # of redrawn, of randomized
+    assert relit.sun_elevation == (10.0, 85.0) and relit.distractors == 0
+    assert relit.camera_turn == (0.0, 0.0, 0.0)
+    assert AppearanceSettings.from_name("minimal", "appearance") == MINIMAL
+    with pytest.raises(InputError, match=r"x='Fogg' is unknown; .*minimal.*; did you mean fog\?"):
+        AppearanceSettings.from_name("Fogg", "x")
+    with pytest.raises(InputError, match="unknown"):
+        AppearanceSettings.from_name("../task/pillars", "x")
+
+
 def test_only_the_defaults_are_minimal():
     assert MINIMAL.is_minimal and AppearanceSettings(exposure=1).is_minimal
     assert not AppearanceSettings(fog_visibility=50.0).is_minimal

@@ -31,3 +31,18 @@ def test_a_missing_package_is_one_line_that_names_it(monkeypatch, error, remedy)
     with pytest.raises(InputError, match=r"^logger _target_=os\.path\.join can't be made") as said:
         Broken().make()
     assert remedy in str(said.value) and "\n" not in str(said.value)
+
+
+@pytest.mark.parametrize(
+    "error", [TypeError("no\nexp_name"), RuntimeError("not logged in"), OSError()]
+)
+def test_any_error_of_a_loggers_package_is_one_line(monkeypatch, error):
+    class Broken(Logger):
+        target: ClassVar[str] = "os.path.join"
+        is_known: ClassVar[bool] = False
+
+    monkeypatch.setattr("os.path.join", lambda *args, **kwargs: refuse(error))
+    text = " ".join(str(error).split()) or "OSError"
+    with pytest.raises(InputError, match=rf"can't be made \({text}\); give its arguments") as said:
+        Broken().make()
+    assert "\n" not in str(said.value)

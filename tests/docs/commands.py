@@ -6,11 +6,14 @@ import shlex
 
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
+from hydra.core.hydra_config import HydraConfig
+from omegaconf import open_dict
 
 from drone_rl.cli.hydra import composition
-from drone_rl.cli.hydra.composition import conf_dir, import_plugins, read_settings
+from drone_rl.cli.hydra.composition import import_plugins, read_settings
 from drone_rl.cli.main import COMMANDS, find_command
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.settings import conf_dir
 
 COMMAND = re.compile(r"^(?:[A-Z]+=\S+ )?drone-rl ([a-z-]+)(.*)$", re.MULTILINE)
 _SWEPT = re.compile(r"=(?:range\((\d+)\)|([^\[\]{},]+),.*)$")
@@ -33,8 +36,7 @@ def check_command(name, *words):
     told = [word for word in words if word not in ("-m", "--help") and "resume=" not in word]
     told = [re.sub("[<>]", "", _SWEPT.sub(lambda m: f"={m[2] or 0}", word)) for word in told]
     file = name.replace("-", "_")
-    no_logger = ["logger=csv"] if name == "train" else []  # whose folder only a run knows
-    told = [*no_logger, *command.prepare(told)]
+    told = command.prepare(told)
     if any(word.startswith("plugins=") for word in told):
         try:
             import_plugins(told)
@@ -44,7 +46,13 @@ def check_command(name, *words):
     GlobalHydra.instance().clear()
     with initialize_config_dir(str(conf_dir()), version_base="1.3"):
         config = compose(file, told, return_hydra_config=True)
+    with open_dict(config.hydra.runtime):
+        config.hydra.runtime.output_dir = "folder of the run"  # which loggers refer to
+    HydraConfig.instance().set_config(config)
     del config.hydra
     if "sweep" in config:
         del config.sweep
-    read_settings(command, config)
+    try:
+        read_settings(command, config)
+    finally:
+        HydraConfig.instance().cfg = None

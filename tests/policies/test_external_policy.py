@@ -157,7 +157,7 @@ def test_network_attributes_define_transforms():
 @pytest.mark.parametrize(
     ("given", "options", "message"),
     [
-        (3, {}, "policy_from got a int; give a callable from images to logits"),
+        (3, {}, "policy=3 is no policy; give a callable from images to logits, or the name"),
         (nn.Linear(9, 3), {}, r"the network can't take images of shape \(1, 1, 25, 64\)"),
         (lambda x: left(x)[:, :2], {}, r"the network returned logits of shape \(1, 2\); give one"),
         (left, {"transforms": [Resize()]}, "the transform resize needs floats; put gray before"),

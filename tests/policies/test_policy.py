@@ -116,6 +116,7 @@ def test_missing_policies_raise(tmp_path):
 def test_another_appearance_changes_only_the_environment():
     policy, fog = drone_rl.load_policy("good"), AppearanceSettings(fog_visibility=40.0)
     other = policy.in_appearance(fog)
+    assert policy.in_appearance("fog").description.appearance.fog_visibility == 40.0
     assert other.unlike == {"appearance.fog_visibility": {"own": None, "flown": 40.0}}
     assert other.in_task(num_cubes=1).description.appearance == fog
     assert policy.unlike == {} and other.in_appearance(MINIMAL).unlike == {}

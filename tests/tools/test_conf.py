@@ -60,7 +60,7 @@ def test_a_stale_file_is_reported_and_rewritten(tmp_path, monkeypatch):
 
 
 def test_every_group_has_generated_files():
-    from drone_rl.cli.hydra.composition import conf_dir
+    from drone_rl.utils.settings import conf_dir
 
     groups = {path.parent.name for path, _ in generated_files(conf_dir())}
     assert {"task", "camera", "network", "returns", "objective", "trainer"} <= groups

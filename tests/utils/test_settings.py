@@ -6,9 +6,18 @@ from typing import Annotated, Any
 import pytest
 
 import drone_rl
+from drone_rl.utils import settings as settings_module
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Several, Text, Whole
-from drone_rl.utils.settings import Settings, kinds_of, plain, prefixed_errors, snake_case, types_of
+from drone_rl.utils.settings import (
+    Settings,
+    conf_dir,
+    kinds_of,
+    plain,
+    prefixed_errors,
+    snake_case,
+    types_of,
+)
 
 
 class Inner(Settings):
@@ -136,3 +145,10 @@ def test_a_task_may_be_given_by_its_name():
         InputError, match=r"^task='pillar' is unknown.*plugins=\[MODULE\].*pillars\?"
     ):
         drone_rl.TrainSettings(task="pillar")  # pyright: ignore[reportArgumentType]
+
+
+def test_the_configuration_of_the_checkout_or_of_the_installed_package(monkeypatch, tmp_path):
+    assert (conf_dir() / "train.yaml").is_file()
+    package = tmp_path / "drone_rl"
+    monkeypatch.setattr(settings_module, "__file__", str(package / "utils" / "settings.py"))
+    assert conf_dir() == package / "conf"

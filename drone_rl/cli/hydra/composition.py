@@ -54,7 +54,7 @@ from drone_rl.config.transforms import Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import USER_ERROR
 from drone_rl.utils.schema import Kind
-from drone_rl.utils.settings import Settings, kinds_of, plain, types_of
+from drone_rl.utils.settings import Settings, conf_dir, kinds_of, plain, types_of
 
 GROUPS: dict[str, type[Settings]] = {
     "appearance": AppearanceSettings,
@@ -145,6 +145,8 @@ def import_plugins(overrides: Sequence[str]) -> None:
             is_own = f"{name}.".startswith(f"{error.name}.")  # or its package
             place = "give a module in this folder or on PYTHONPATH"
             remedy = place if is_own else f"install {error.name}"
+            if name.endswith(".py"):
+                remedy = f"type the module's name: plugins=[{name[:-3].replace('/', '.')}]"
             raise InputError(f"plugins={name} can't be imported ({error}); {remedy}") from error
         except InputError:
             raise
@@ -215,13 +217,6 @@ _MULTIRUN_WORDS = re.compile(r"^[-+~]|^hydra(?!\.run\.)|^sweep|^experiment")
 _MULTIRUN_TEXT = re.compile(r"mode:|sweep: (?!null)")
 """Text of a command's YAML file that may start many runs."""
 _save_config = hydra_utils._save_config
-
-
-def conf_dir() -> Path:
-    """Return the folder conf/ of the checkout, or its copy inside an installed wheel."""
-    package = Path(__file__).resolve().parents[2]
-    checkout = package.parent / "conf"
-    return checkout if (checkout / "train.yaml").is_file() else package / "conf"
 
 
 def run_command(name: str, command: type[CommandSettings], overrides: Sequence[str]) -> int:

@@ -97,7 +97,7 @@ def check_choices(overrides: Sequence[str], conf: Path) -> None:
             if name == "null":
                 raise InputError(f"{override}: leave it out, or give one of: {', '.join(offered)}")
             if name not in offered:
-                near = difflib.get_close_matches(name, offered, 1)
+                near = difflib.get_close_matches(name.lower(), offered, 1)
                 meant = f"did you mean {group}={near[0]}? " if near else ""
                 raise InputError(
                     f"{group}={name} is unknown; {meant}give one of: {', '.join(offered)}"
@@ -144,6 +144,8 @@ def closest(name: str, known: Sequence[str]) -> str | None:
     ):
         if meant:
             return meant
+    if last.isdigit():  # the index of a list
+        return None
     others_than_group = [key for key in known if not word.startswith(f"{key}.")]
     if near := difflib.get_close_matches(word, others_than_group, 1, 0.8):
         return near[0]

@@ -13,7 +13,7 @@ from omegaconf import OmegaConf
 import drone_rl
 from drone_rl.sweeps.manifest import is_sweep, quoted, sweep_name
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import refuse_links, write_atomically
+from drone_rl.utils.files import refuse_links, trained_policies, write_atomically
 from drone_rl.utils.overrides import must_be_typed, taken_over, with_current_name
 from drone_rl.utils.settings import FORMER_CHOICES, FORMER_NAMES
 
@@ -68,6 +68,8 @@ def complete(overrides: Sequence[str]) -> list[str]:
     if any(o.startswith("hydra.run.dir=") for o in typed):
         return [*typed, *_NO_EARLY_FILES]  # a sweep's command line has all settings
     folder = Path(_unquoted(folders[-1]))
+    if folders[-1] == "latest":
+        folder = _newest_run(_outputs(typed))
     if not (folder / "checkpoints" / "last.pt").is_file():
         raise InputError(f"resume={folder} has no checkpoints/last.pt; give the folder of a run")
     refuse_links(folder)
@@ -84,9 +86,24 @@ def _sweep_folder(typed: Sequence[str]) -> str:
     for current, former in _RENAMED:
         older = [re.sub(current, former, o) for o in older]
         names.append(sweep_name(older))
-    outputs = [o.partition("=")[2] for o in typed if o.startswith("paths.outputs=")]
-    sweeps = Path((outputs or ["outputs"])[-1]) / "train" / "multiruns"
+    sweeps = _outputs(typed) / "train" / "multiruns"
     return next((name for name in reversed(names) if (sweeps / name).is_dir()), names[0])
+
+
+def _outputs(typed: Sequence[str]) -> Path:
+    """Return the folder of all outputs."""
+    given = [o.partition("=")[2] for o in typed if o.startswith("paths.outputs=")]
+    return Path(_unquoted((given or ["outputs"])[-1]))
+
+
+def _newest_run(outputs: Path) -> Path:
+    """Return the folder of the run that `policy=latest` names too."""
+    newest = next(iter(trained_policies(outputs)), None)
+    if newest is None:
+        raise InputError(
+            f"resume=latest, but there is no run under {outputs}/train; give the folder of a run"
+        )
+    return newest.parents[1]
 
 
 def check_folder(resume: str, folder: Path) -> None:

@@ -106,7 +106,8 @@ def _bare(command: Command, words: Sequence[str], position: int) -> InputError:
         ours = command.instead(word, "" if "=" in after[0] else after[0])
         return InputError(f"{word} has no =; type {ours or 'NAME=VALUE'}")
     named = [g for g in _CHOICES if g in command.groups and word in choices(command.conf, g)]
-    main = ("certificate", *_MAIN) if word.endswith(".json") else _MAIN
+    is_policy = Path(word).suffix in ("", ".pt", ".safetensors")
+    main = _MAIN if is_policy else ("certificate", *_MAIN)
     named += [key for key in main if key in command.keys]
     if named:
         return InputError(f"{word} has no name before it; type {named[0]}={word}")

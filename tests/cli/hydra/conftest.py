@@ -5,8 +5,9 @@ import copy
 import pytest
 from hydra import compose, initialize_config_dir
 
-from drone_rl.cli.hydra.composition import conf_dir, read_settings, register_schemas
+from drone_rl.cli.hydra.composition import read_settings, register_schemas
 from drone_rl.cli.main import COMMANDS, find_command
+from drone_rl.utils.settings import conf_dir
 
 FILES = {c.replace("-", "_"): c for c in COMMANDS}
 

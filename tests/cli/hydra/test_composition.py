@@ -11,7 +11,6 @@ from drone_rl.cli.hydra.composition import (
     HydraConfig,
     _job,
     _may_be_multirun,
-    conf_dir,
     read_settings,
 )
 from drone_rl.cli.settings import CommandSettings
@@ -35,16 +34,6 @@ def job(monkeypatch, tmp_path):
         return _job("mine", Command, statuses), statuses
 
     return make
-
-
-def test_the_configuration_is_there():
-    assert (conf_dir() / "train.yaml").is_file()
-
-
-def test_an_installed_wheel_has_its_configuration_in_the_package(monkeypatch, tmp_path):
-    package = tmp_path / "drone_rl"
-    monkeypatch.setattr(composition, "__file__", str(package / "cli" / "hydra" / "composition.py"))
-    assert conf_dir() == package / "conf"
 
 
 def test_a_job_gets_its_settings_and_its_folder(job, tmp_path):

@@ -13,13 +13,12 @@ from hydra.errors import HydraException
 from omegaconf import ValidationError
 
 from drone_rl.cli.hydra import composition
-from drone_rl.cli.hydra.composition import conf_dir
 from drone_rl.cli.main import COMMANDS
 from drone_rl.config import CameraSettings, DynamicsSettings, PillarsSettings, TaskSettings
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.zoo import describe
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.settings import kinds_of, snake_case, types_of
+from drone_rl.utils.settings import conf_dir, kinds_of, snake_case, types_of
 from tests.cli.hydra.conftest import commands
 
 CONF = Path(__file__).parents[3] / "conf"

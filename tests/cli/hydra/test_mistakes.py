@@ -5,7 +5,6 @@ import re
 import pytest
 from hydra.errors import HydraException
 
-from drone_rl.cli.hydra.composition import conf_dir
 from drone_rl.cli.hydra.mistakes import (
     OTHER_NAMES,
     Command,
@@ -17,6 +16,7 @@ from drone_rl.cli.hydra.mistakes import (
 )
 from drone_rl.cli.main import COMMANDS
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.settings import conf_dir
 
 KNOWN = ("seed", "optimizer", "optimizer.lr", "task", "task.num_cubes", "hydra.run.dir", "device")
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from drone_rl.cli.hydra.composition import conf_dir
 from drone_rl.cli.hydra.mistakes import check_choices, choices
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.settings import conf_dir
 
 
 @pytest.mark.parametrize(
@@ -15,7 +15,7 @@ from drone_rl.utils.errors import InputError
         ("+task@task=base_pillars", "^task=base_pillars is unknown"),
         ("task=collect_one,base_task", "task=base_task"),
         ("task='pillarz'", "task=pillarz"),
-        ("logger=[csv,wandb]", "logger=wandb is unknown; give one of: csv, tensorboard"),
+        ("logger=[csv,aim]", "logger=aim is unknown; give one of: csv, mlflow, tensorboard, wandb"),
         ("sweep=nope", "sweep=nope is unknown; give one of: cubes, high_rate"),
         ("hydra/launcher=pbs", "hydra/launcher=pbs .*local, ray, slurm"),
         ("dynamics=null", "^dynamics=null: leave it out, or give one of: computer_vision, "),

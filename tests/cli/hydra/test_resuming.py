@@ -1,6 +1,8 @@
 """What a training's command line leaves out."""
 
+import os
 import shlex
+import shutil
 
 import pytest
 import yaml
@@ -57,6 +59,20 @@ def test_a_sweep_is_named_by_its_settings():
     assert first[-1] == again[-1] != other[-1]
     assert first[-1].startswith("hydra.sweep.dir=${paths.outputs}/")
     assert complete(["-m", "seed=0,1", "hydra.sweep.dir=x"])[-1] == "hydra.sweep.dir=x"
+
+
+def test_the_newest_run_is_resumed(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="no run under outputs/train"):
+        complete(["resume=latest"])
+    for name, changed in (("a", 20), ("b", 30), ("c", 10)):
+        shutil.copytree(run / ".hydra", folder := tmp_path / "mine" / "train" / "runs" / name)
+        (folder / "checkpoints").mkdir()
+        (folder / "checkpoints" / "last.pt").touch()
+        os.utime(folder / "checkpoints" / "last.pt", (99, changed))
+    found = complete(["resume=latest", "paths.outputs=mine"])
+    assert "resume=mine/train/runs/b" in found
+    assert "hydra.run.dir='mine/train/runs/b'" in found
 
 
 def test_a_folder_in_quotes_is_the_same_folder(run):

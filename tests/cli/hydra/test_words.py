@@ -2,10 +2,10 @@
 
 import pytest
 
-from drone_rl.cli.hydra.composition import conf_dir
 from drone_rl.cli.hydra.words import check_words, no_command
 from drone_rl.cli.main import COMMANDS
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.settings import conf_dir
 
 pytestmark = pytest.mark.usefixtures("registered")
 
@@ -22,6 +22,9 @@ pytestmark = pytest.mark.usefixtures("registered")
         ("verdict --sampled", "type sampled=true$"),
         ("verdict good", "^good has no name before it; type policy=good$"),
         ("check x.json", "type certificate=x.json$"),
+        ("check notes.txt", "type certificate=notes.txt$"),
+        ("check good", "type policy=good$"),
+        ("check a/last.pt", "type policy=a/last.pt$"),
         ("train ppo", "type objective=ppo$"),
         ("train seed 1", "^seed has no =; type seed=1$"),
         ("train seed device=cpu", "type seed=VALUE$"),
