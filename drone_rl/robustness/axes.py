@@ -123,7 +123,7 @@ def _size(subject: EvaluatedPolicy) -> str:
 def _rendered(subject: EvaluatedPolicy, condition: Condition) -> Condition:
     if subject.renderer != "raytrace":
         raise InputError(
-            f"renderer={subject.renderer} can't draw fog and exposure; give axes without fog and "
+            f"renderer={subject.renderer} renders no fog and no exposure; give axes without fog and "
             "brightness, or renderer=raytrace"
         )
     return condition
