@@ -123,8 +123,8 @@ def _size(subject: EvaluatedPolicy) -> str:
 def _rendered(subject: EvaluatedPolicy, condition: Condition) -> Condition:
     if subject.renderer != "raytrace":
         raise InputError(
-            f"renderer={subject.renderer} renders no fog and no exposure; give axes without fog and "
-            "brightness, or renderer=raytrace"
+            f"renderer={subject.renderer} renders no fog and no exposure; give axes without fog "
+            "and brightness, or renderer=raytrace"
         )
     return condition
 

@@ -128,3 +128,9 @@ def test_a_folder_where_a_file_should_be_is_one_line(tmp_path, make, words):
     done = drone_rl("train", *TINY, "hydra.run.dir=run", cwd=tmp_path)
     assert len(done.stderr.splitlines()) == 1
     assert all(word in error_line(done) for word in words), done.stderr
+
+
+def test_a_setting_that_is_given_twice_is_pointed_out(in_process):
+    done = in_process("train", "seed=1", "seed=2", "task.num_cubes=2", "--help")
+    assert done.stderr == "warning: seed is given several times; seed=2 counts\n"
+    assert in_process("train", "seed=1", "--help").stderr == ""

@@ -1,5 +1,7 @@
 """What rounding and batches can change in episodes, with networks made by hand."""
 
+import dataclasses
+
 import pytest
 import torch
 
@@ -41,11 +43,19 @@ def with_unit(by_unit):
     parameter(weights, "fc1.bias")[-1] = 1.0
     parameter(weights, "logits.weight")[Move.LEFT, -1] = by_unit
     policy = drone_rl.load_policy("good")
-    import dataclasses
-
     return dataclasses.replace(
         policy, description=parse(described), state={**policy.state, "policy": weights}
     )
+
+
+_run_checked = rounding_sensitivity._run_checked
+
+
+def without_fragile_frames(*given):
+    """Runs episodes as `_run_checked`, with a bound that misses everything."""
+    checked, actions = _run_checked(*given)
+    none = [torch.zeros_like(of) for of in checked.fragile]
+    return dataclasses.replace(checked, fragile=none), actions
 
 
 def test_an_honest_policy_takes_the_same_actions_in_both_implementations():
@@ -71,7 +81,14 @@ def test_evaluations_compare_with_the_fused_kernel():
     assert (log.implementation, found.compared) == ("PyTorch", "fused kernel")
     assert found.differing == 0
     found, _, _ = examined(with_unit(1000.0), is_compiled=False)
-    assert found.differing == EPISODES
+    assert (found.differing, found.unexplained) == (EPISODES, 0)
+
+
+def test_differences_between_implementations_need_an_explanation(monkeypatch):
+    monkeypatch.setattr(rounding_sensitivity, "_run_checked", without_fragile_frames)
+    found, _, _ = examined(with_unit(1000.0), is_compiled=False)
+    assert (found.compared, found.differing) == ("fused kernel", EPISODES)
+    assert found.unexplained == EPISODES
 
 
 @pytest.mark.parametrize("kind", ["alone", "first", "calls"])

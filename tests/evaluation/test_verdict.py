@@ -13,7 +13,7 @@ from drone_rl.evaluation.baselines import constant_policy, oracle_policy
 from drone_rl.evaluation.outcomes import OutcomeSet, Rounding
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.evaluation.rule import Kind, Rule
-from drone_rl.evaluation.verdict import apply_rule, judge_policy, measure, observe
+from drone_rl.evaluation.verdict import apply_rule, judge_policy, measure, observe, widen
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.utils.intervals import mean_bounds, proportion
@@ -309,3 +309,17 @@ def test_a_tenth_of_the_episodes_makes_it_uncertain(rounded, is_open):
 
 def test_no_certainty_where_all_frames_are_fragile(rounded):
     assert rounded(1, excessive=True).exit_code == 13
+
+
+def test_an_episode_that_may_offer_nothing_on_a_side_may_have_any_share_there(
+    make_episodes, make_baselines
+):
+    flown = make_episodes([[Side.LEFT, Side.LEFT]] * 400, [[True, True]] * 400)
+    ends = make_episodes([[Side.RIGHT, Side.RIGHT]] * 40, [[True, True]] * 40)
+    outcomes = OutcomeSet(ends, torch.arange(40), torch.zeros(400, dtype=torch.bool))
+    baselines, rule = make_baselines(flown), Rule()
+    found = measure(flown, baselines, rule)
+    wider = widen(found, flown, baselines, rule, outcomes)
+    left = rule.quantities.index("collected left")
+    assert found[left].lower > 0.95
+    assert wider[left].lower < 0.9 < wider[left].upper  # 40 of the 400 may have collected none

@@ -101,6 +101,21 @@ def test_continuous_actions_are_outputs():
     torch.testing.assert_close(open_onnx(content)(frames), torch.from_numpy(found["probabilities"]))
 
 
+def test_a_recurrent_model_forgets_where_an_episode_starts():
+    lstm = {"name": "lstm", "channels": [4], "hidden": [8], "memory": 6, "patch": 4}
+    description = describe(8, 16, [GRAY], lstm)
+    network = description.build_network(torch.Generator().manual_seed(0))
+    for parameter in network.parameters():
+        parameter.data.mul_(8.0)
+    model = open_onnx(make_onnx(description, network, {}))
+    frames = torch.randint(0, 256, (2, 8, 16, 3), generator=torch.Generator().manual_seed(1))
+    frames = frames.to(torch.uint8)
+    first = model(frames, torch.tensor([[True], [True]]))
+    second = model(frames, torch.tensor([[True], [False]]))
+    assert torch.equal(second[0], first[0])
+    assert not torch.allclose(second[1], first[1], atol=1e-3)
+
+
 def test_model_is_valid_without_machine_details(linear):
     onnx.checker.check_model(onnx.load_from_string(linear), full_check=True)
     for word in (b"stack_trace", b"onnx_model.py", sys.prefix.encode()):

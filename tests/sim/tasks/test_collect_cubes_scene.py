@@ -74,7 +74,7 @@ def test_goals_use_the_last_info():
         "side": torch.tensor([[2, -1]]),
         "lateral": torch.tensor([[-3.0, torch.nan]]).double(),
         "cube_positions": torch.tensor([[[15.0, -3.0, 2.0], [24.0, 1.0, 3.0]]]),
-        "drone": torch.tensor([[30.0, 0.0, 2.5]]),
+        "drone": torch.tensor([[30.0, 0.0, 9.0]]),  # it has climbed from 2.5 m
     }
     task = CollectCubes(TaskSettings(num_cubes=2))
     goals = task.score(info)
