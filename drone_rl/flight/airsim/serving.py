@@ -47,7 +47,7 @@ class RunningServer:
         self.close()
 
     def close(self) -> None:
-        """Stop it: calls that wait are not answered."""
+        """Stop it; calls that wait are answered with an error."""
         loop, task = self._loop, self._task
         if loop is not None and task is not None and self._thread.is_alive():
             loop.call_soon_threadsafe(task.cancel)

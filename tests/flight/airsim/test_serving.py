@@ -57,6 +57,18 @@ def test_a_server_whose_thread_has_ended_closes_its_simulation(monkeypatch):
     assert closed == [server.simulation]
 
 
+def test_calls_that_wait_when_the_server_stops_are_answered_with_an_error(start):
+    server, client = start(patience_s=60.0)
+    client.call("enableApiControl", True)
+    movement = client.send("takeoff", 20.0)
+    client.call("ping")
+    server.close()
+    error, _ = client.receive(movement)
+    assert error == "the server has stopped; connect again"
+    with pytest.raises(ConnectionError):
+        client.receive(movement)
+
+
 def test_an_open_address_is_warned_about(caplog):
     with serve(scene="empty", port=0, address="0.0.0.0"):
         assert "everybody in that network can control the vehicles" in caplog.text
