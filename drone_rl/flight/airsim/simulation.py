@@ -162,6 +162,14 @@ class Simulation:
             return pose_map(Pose((x, y, z), (w, i, j, k)))
         return pose_map(self.stage.object_pose(name))
 
+    def move_vehicle(self, name: str, pose: Pose) -> None:
+        """Set a vehicle's pose in the world's NED frame; NaN components stay."""
+        vehicle = self.vehicles[name]
+        start = ned(vehicle.home[None])
+        x, y, z = (there - here for there, here in zip(pose.position, start, strict=True))
+        vehicle.set_airsim_pose(Pose((x, y, z), pose.attitude), ignore_collision=True)
+        self.stage.touch(vehicle.body.position[0])
+
     def reset(self) -> None:
         """Reset vehicles and scene; running movements are cancelled."""
         self.stage.reset()
@@ -197,9 +205,8 @@ class Simulation:
 
     def continue_for(self, seconds: float) -> Wait:
         """Let time pass for some seconds, then pause."""
-        self.is_paused = False
+        self.pause(seconds <= 0.0)
         end = self._until = self.time + seconds
-        self._hold_anchor()
         return Wait(lambda: self.is_paused or self.time >= end - 1e-9, lambda: None, blocks=True)
 
     def follow(self, budget: float) -> float:

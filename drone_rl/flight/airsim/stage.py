@@ -231,23 +231,25 @@ class Stage:
     # Weather and light
 
     def set_fog(self, density: float) -> None:
-        """Set the density of fog, 0 to 1: at 1 one sees 20 m far."""
+        """Set the density of fog, from 0 for none to 1 for a visibility of 20 m."""
         visibility = None if density <= 0.0 else 20.0 / density
-        self._weather = dataclasses.replace(self._weather, fog_visibility=visibility)
+        self._change_weather(fog_visibility=visibility)
 
     def set_sun(self, elevation: float, azimuth: float = 127.9) -> None:
-        """Set the sun's height, and its direction to the left of straight ahead, degrees."""
+        """Set the sun's elevation, and its direction to the left of the world's x axis, degrees."""
         up, aside = math.radians(max(elevation, 1.0)), math.radians(azimuth)
         level = math.cos(up)
         towards = (-level * math.cos(aside), -level * math.sin(aside), -math.sin(up))
         light = max(0.0, min(1.0, elevation / 10.0))
-        self._weather = dataclasses.replace(
-            self._weather, sun_direction=towards, sun=(0.75 * light,) * 3
-        )
+        self._change_weather(sun_direction=towards, sun=(0.75 * light,) * 3)
 
-    def clear_weather(self) -> None:
-        """Return to the scene's own light and air."""
-        self._weather = _PLAIN
+    def clear_sun(self) -> None:
+        """Return to the scene's own light."""
+        self._change_weather(sun_direction=None, sun=None)
+
+    def _change_weather(self, **changes: Any) -> None:
+        changed = dataclasses.replace(self._weather, **changes)
+        self._weather = _PLAIN if changed == _PLAIN else changed
 
     # Segmentation
 

@@ -26,7 +26,6 @@ def test_cameras_look_where_their_poses_say(empty):
 
 def test_a_wider_camera_sees_the_same_pixel_closer_to_the_middle(cubes):
     cubes.reset()
-    cubes.clear_weather()
     wide = {"captures": {ImageType.DEPTH_PLANAR: Capture(32, 18, 120.0)}}
     narrow = look(cubes, kind=ImageType.DEPTH_PLANAR)
     broad = look(cubes, kind=ImageType.DEPTH_PLANAR, **wide)

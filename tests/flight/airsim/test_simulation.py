@@ -73,6 +73,12 @@ def test_continue_for_a_time_pauses_afterwards(make):
     assert simulation.time == pytest.approx(0.5, abs=simulation.tick)
 
 
+def test_continue_for_no_time_pauses_at_once(make):
+    simulation, answers = make(clock="lockstep"), []
+    simulation.wait_for(simulation.continue_for(0.0), answers.append)
+    assert answers == [None] and simulation.is_paused and simulation.time == 0.0
+
+
 def test_paused_wall_time_stands_still(make):
     simulation = make(clock="wall")
     simulation.pause(True)
