@@ -25,11 +25,12 @@ def _flown(future: FlightFuture | None, name: str) -> Any:
 
 
 def _numbers(args: Sequence[Any], *names: str) -> list[float]:
-    """Return the first arguments, which have these names."""
+    """Return the first arguments, one for each name, as numbers."""
     return [number(value, name) for value, name in zip(args, names, strict=False)]
 
 
 def _seconds(value: float) -> float:
+    """Return a duration that a pilot accepts; a negative one becomes 0."""
     return min(max(value, 0.0), 1e6)
 
 
@@ -157,7 +158,7 @@ def _manual(simulation: Simulation, args: Sequence[Any]) -> Any:
     vx, vy, z, seconds = _numbers(args, "vx_max", "vy_max", "z_min", "duration")
     drivetrain, yaw = read_yaw_mode(argument(args, 5, _HELD), argument(args, 4, 0))
     vehicle = vehicle_at(simulation, args, 6)
-    future = vehicle.move_manually(vx, vy, z, min(seconds, 1e6), drivetrain, yaw)
+    future = vehicle.move_manually(vx, vy, z, _seconds(seconds), drivetrain, yaw)
     return _flown(future, "moveByManual")
 
 
