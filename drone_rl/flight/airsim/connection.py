@@ -24,6 +24,7 @@ MAX_MESSAGE = 2**22
 MAX_PENDING = 1000
 """Calls of one client that wait at a time."""
 MAX_CLIENTS = 1000
+"""Connections at a time."""
 TURN = 0.005
 """Seconds of work for one client before others have their turn."""
 MAX_UNSENT = 2**25
@@ -70,7 +71,7 @@ class Connection(asyncio.Protocol):
         self._is_full = False
         """Whether the client leaves too many replies unread."""
         self._is_held = False
-        """Whether it goes on at a later time."""
+        """Whether its requests wait for a call of `release`."""
         self._backlog: deque[Any] = deque()
         self._replies: dict[Callable[[Any], None], int | None] = {}
         """Calls that wait, and the numbers of their requests; None for notifications."""

@@ -102,7 +102,7 @@ def serve(
         recordings: Folder for recordings; None refuses `startRecording`.
 
     Raises:
-        InputError: A setting is wrong, or the port is in use.
+        InputError: A setting is wrong, the port is in use, or the address is not this machine's.
     """
     patience_s = Real(0.0, 60.0).read(patience_s, "patience_s")
     simulation, host, number = make_simulation(

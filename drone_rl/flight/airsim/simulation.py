@@ -6,6 +6,7 @@ import logging
 import math
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from drone_rl.config import DynamicsSettings
@@ -63,13 +64,13 @@ class Simulation:
         clock: str = "wall",
         seed: int = 0,
         renderer: str | None = None,
-        recordings: Any = None,
+        recordings: Path | None = None,
     ) -> None:
         """Create the scene and the vehicles of the settings.
 
         Args:
             settings: Content of settings.json.
-            scene: See `stage.make_task`.
+            scene: See `scenes.make_task`.
             clock: "wall" or "lockstep".
             seed: Of placements, gusts and sensor noise.
             renderer: Name of a renderer; by default the one that fits the scene.
@@ -111,7 +112,7 @@ class Simulation:
         return self._periods * self.tick
 
     def add(self, choice: VehicleChoice) -> Vehicle:
-        """Create a vehicle; raise an `InputError` for a name that is taken."""
+        """Create a vehicle; an `InputError` if its name is taken, or there are too many."""
         if choice.name in self.vehicles:
             raise InputError(f"vehicle {choice.name!r} is there already; give another name")
         if len(self.vehicles) >= _MOST_VEHICLES:

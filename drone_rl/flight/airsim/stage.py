@@ -57,7 +57,7 @@ class _Spawned:
     """An object that a client made."""
 
     number: int
-    """Of the spare place that it takes."""
+    """Index of the spare object that it is."""
     place: tuple[float, float, float]
     size: float
 
@@ -254,7 +254,10 @@ class Stage:
     # Segmentation
 
     def set_id(self, name: str, number: int, *, is_pattern: bool) -> bool:
-        """Set the segmentation id of an object, or of all that match; return whether any does."""
+        """Set the segmentation id of all objects that match; return whether any does.
+
+        A negative id counts as 0.
+        """
         found = self.find(name) if is_pattern else [n for n in self.names if n == name]
         for one in found:
             self._own_ids[one] = number
@@ -333,10 +336,8 @@ class Stage:
             mounting = camera.mounting(capture, self.worlds.camera.vertical_fov)
             found = dataclasses.replace(self._weather, camera=mounting, distractors=self._spares())
             is_own = self._weather is _PLAIN and mounting is None and not spawned
-            known[key] = (
-                camera,
-                None if is_own else found,
-            )  # keeping the camera keeps its id unique
+            # keeping the camera keeps its id unique
+            known[key] = camera, None if is_own else found
         return known[key][1]
 
     def image(self, kind: ImageType, shot: Shot, *, as_float: bool) -> Tensor:

@@ -14,7 +14,7 @@ from drone_rl.sim.coordinates import GeoPoint
 from drone_rl.utils.errors import InputError
 
 LONGEST = 1e6
-"""Longest timeout in seconds; clients send up to 3e38."""
+"""Longest timeout or duration in seconds; clients send up to 3e38."""
 _DEGREES = 180.0 / math.pi
 
 
@@ -79,15 +79,15 @@ class Vehicle(Airframe):
                 "Cannot perform takeoff because vehicle is already moving with velocity "
                 f"{self._speed:f} m/s"
             )
-        return self._moved("take_off", _limit(timeout))
+        return self._moved("take_off", limit(timeout))
 
     def land_down(self, timeout: float) -> FlightFuture | None:
         """Descend until it stands."""
-        return self._moved("land", _limit(timeout))
+        return self._moved("land", limit(timeout))
 
     def return_home(self, timeout: float) -> FlightFuture | None:
         """Fly over the start point and land there."""
-        return self._moved("go_home", _limit(timeout))
+        return self._moved("go_home", limit(timeout))
 
     def hold(self) -> FlightFuture | None:
         """Hold the position."""
@@ -141,7 +141,7 @@ class Vehicle(Airframe):
         return self._moved(
             "move_along",
             [self._world(point) for point in points],
-            *(speed, _limit(timeout)),
+            *(speed, limit(timeout)),
             drivetrain=drivetrain,
             yaw_mode=yaw,
             lookahead=lookahead,
@@ -180,7 +180,7 @@ class Vehicle(Airframe):
         """Turn to a heading, degrees clockwise from north, within a margin in degrees."""
         heading = math.remainder(degrees, 360.0)
         near = min(max(margin, 0.1), 180.0)
-        return self._moved("rotate_to", heading, _limit(timeout), margin=near)
+        return self._moved("rotate_to", heading, limit(timeout), margin=near)
 
     def turn_by(self, rate: float, seconds: float) -> FlightFuture | None:
         """Turn at a rate, degrees per second clockwise."""
@@ -254,6 +254,6 @@ class Vehicle(Airframe):
         return cos * forward - sin * left, sin * forward + cos * left
 
 
-def _limit(timeout: float) -> float:
-    """Return a timeout that a pilot accepts; a negative one becomes 0."""
-    return min(max(timeout, 0.0), LONGEST)
+def limit(seconds: float) -> float:
+    """Return a timeout or duration that a pilot accepts; a negative one becomes 0."""
+    return min(max(seconds, 0.0), LONGEST)

@@ -24,7 +24,7 @@ def test_any_error_of_the_start_reaches_the_caller_and_closes_the_simulation(mon
 def test_a_port_in_use_is_one_error():
     with (
         serve(scene="empty", port=0) as server,
-        pytest.raises(InputError, match=r"port \d+ of 127.0.0.1 can't be opened .*another port"),
+        pytest.raises(InputError, match=r"port \d+ of 127.0.0.1 can't be opened .*port or address"),
     ):
         serve(scene="empty", port=server.address[1])
 
