@@ -184,6 +184,10 @@ class Connection(asyncio.Protocol):
             if self._pending >= MAX_PENDING:
                 raise InputError(f"{MAX_PENDING} calls of this client wait; join some first")
             result = methods.call(self._server.simulation, label, args)
+            if isinstance(result, Wait):
+                self._wait(number, result)
+            else:
+                self._answer(number, None, result)
         except UnknownMethodError:
             hint = methods.suggestion(label)
             self._fail(
@@ -191,22 +195,15 @@ class Connection(asyncio.Protocol):
                 f"rpclib: server could not find function '{label}' with argument count "
                 f"{len(args)}.{hint}",
             )
-            return
         except InputError as error:
             self._fail(
                 number,
                 f"rpclib: function '{label}' (called with {len(args)} arg(s)) threw an exception. "
                 f"The exception contained this information: {error}.",
             )
-            return
         except Exception as error:
             _log.exception("%s: %s failed", self._name, label)
             self._fail(number, f"rpclib: function '{label}' failed: {type(error).__name__}.")
-            return
-        if isinstance(result, Wait):
-            self._wait(number, result)
-        else:
-            self._answer(number, None, result)
 
     def _wait(self, number: int | None, wait: Wait) -> None:
         self._pending += 1

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
+from drone_rl.flight.commands.checks import FARTHEST
 from drone_rl.flight.commands.path_following import Drivetrain, YawMode
 from drone_rl.sim.coordinates import GeoPoint, ned_attitude_from_world, ned_from_world
 from drone_rl.utils.errors import InputError
@@ -137,12 +138,17 @@ def text(value: Any, name: str, most: int = 10_000) -> str:
 
 
 def read_map(
-    value: Any, name: str, keys: Sequence[str], *, can_be_nan: bool = False
+    value: Any,
+    name: str,
+    keys: Sequence[str],
+    *,
+    can_be_nan: bool = False,
+    most: float = _FARTHEST,
 ) -> list[float]:
     """Return the numbers of a map, in the order of `keys`; other keys are ignored.
 
-    Raises an `InputError` if it is no map, or a value is missing or no finite number; NaN is
-    accepted if `can_be_nan`.
+    Raises an `InputError` if it is no map, or a value is missing or no number of at most `most` in
+    magnitude; NaN is accepted if `can_be_nan`.
     """
     if not isinstance(value, Mapping):
         raise InputError(f"{name}={shown(value)} is not a map; give {', '.join(keys)}")
@@ -152,22 +158,27 @@ def read_map(
         if can_be_nan and isinstance(given, float) and math.isnan(given):
             found.append(given)
         else:
-            found.append(number(given, f"{name}.{key}"))
+            found.append(number(given, f"{name}.{key}", -most, most))
     return found
 
 
-def read_vector(value: Any, name: str, *, can_be_nan: bool = False) -> tuple[float, float, float]:
+def read_vector(
+    value: Any, name: str, *, can_be_nan: bool = False, most: float = _FARTHEST
+) -> tuple[float, float, float]:
     """Return the numbers of a Vector3r; errors as of `read_map`."""
-    x, y, z = read_map(value, name, ("x_val", "y_val", "z_val"), can_be_nan=can_be_nan)
+    x, y, z = read_map(value, name, ("x_val", "y_val", "z_val"), can_be_nan=can_be_nan, most=most)
     return x, y, z
 
 
 def read_pose(value: Any, name: str = "pose") -> Pose:
-    """Return a Pose, whose components may be NaN; errors as of `read_map`."""
+    """Return a Pose, whose components may be NaN; errors as of `read_map`.
+
+    Coordinates are at most `checks.FARTHEST` in magnitude.
+    """
     parts = [_part(value, name, part) for part in ("position", "orientation")]
     keys = ("w_val", "x_val", "y_val", "z_val")
     w, x, y, z = read_map(parts[1], f"{name}.orientation", keys, can_be_nan=True)
-    position = read_vector(parts[0], f"{name}.position", can_be_nan=True)
+    position = read_vector(parts[0], f"{name}.position", can_be_nan=True, most=FARTHEST)
     return Pose(position, (w, x, y, z))
 
 

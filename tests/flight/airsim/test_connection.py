@@ -88,6 +88,13 @@ def _flood(raw):
         time.sleep(0.01)
 
 
+def test_a_result_that_can_not_be_packed_is_an_error_of_its_call(start):
+    _, client = start('{"Vehicles": {"\\ud800": {}}}')  # half of a letter
+    error, _ = client.receive(client.send("listVehicles"))
+    assert error == "rpclib: function 'listVehicles' failed: UnicodeEncodeError."
+    assert client.call("ping") is True
+
+
 def test_notifications_are_not_answered(start):
     _, client = start(CV)
     client.socket.sendall(msgpack.packb([2, "ping", []]))
