@@ -31,17 +31,24 @@ from drone_rl.sim.dynamics.state import (
 )
 from drone_rl.sim.rendering.appearance import rotate
 from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
 
 RECENT = 16
 """Control periods that sensors look back, a third of a second: longer than any latency."""
 _SWEEP = 0.05
 """Metres between two tests for contact along a straight move."""
+_LONGEST_SWEEP = 2000.0
+"""Metres of such a move: its tests take memory."""
 _FASTEST = 668.0
 """Speed of a rotor at full thrust, radians per second."""
 
 
 class Airframe(Pilot):
-    """One vehicle and its state. Values are in NED, relative to the start pose; radians."""
+    """One vehicle and its state.
+
+    Positions are in NED, relative to the start position, metres; attitudes are those of FRD bodies
+    in NED.
+    """
 
     def __init__(
         self,
@@ -64,7 +71,7 @@ class Airframe(Pilot):
             obstacles: What it can touch; by default the objects of `worlds`, where they stand.
             names: Names of the obstacles.
             home: Place on Earth of the world's origin.
-            height: Metres above the ground at which a vehicle without dynamics starts.
+            height: Metres by which a vehicle without dynamics starts above its start pose.
             seed: Of gusts and sensor noise.
         """
         self.choice, self.geo_home, self.names = choice, home, tuple(names)
@@ -87,6 +94,8 @@ class Airframe(Pilot):
             self.home = self.body.position[0].clone()
         self._home = self.home.tolist()
         self._initial = (copy.deepcopy(self.body), None, None)  # the scene resets itself
+        self.epoch = 0.0
+        """Simulated seconds of the server when the vehicle was created or last reset."""
         self.begin()
 
     def begin(self) -> None:
@@ -101,7 +110,7 @@ class Airframe(Pilot):
         self.trajectory.append(self.time, self.body)
 
     def reset(self) -> Any:
-        """Put it back to the start pose, without API control."""
+        """Put it back to the start pose, with the API control and arming of its settings."""
         state = super().reset()
         self.begin()
         return state
@@ -113,7 +122,7 @@ class Airframe(Pilot):
 
     @property
     def sensors(self) -> Sensors:
-        """See `Drone`; they run from the start, and are only computed when they are read.
+        """See `Drone`; they run from the start, but are only computed when they are read.
 
         After a long silence they are updated to the last `RECENT` states, and to the first of these
         in one step.
@@ -148,7 +157,7 @@ class Airframe(Pilot):
     # Frames
 
     def _world(self, position: Sequence[float]) -> tuple[float, float, float]:
-        """Return a position in our world; below the ground counts as on it."""
+        """Convert a position to our world; below the ground counts as on it."""
         x, y, z = to_world(position)
         home = self.home.tolist()
         return home[0] + x, home[1] + y, max(0.0, home[2] + z)
@@ -161,7 +170,7 @@ class Airframe(Pilot):
 
     @property
     def pose(self) -> Pose:
-        """Pose relative to the start."""
+        """Pose in NED, relative to the start position."""
         row, home = self.body.numbers[0].tolist(), self._home
         w, i, j, k = row[ATTITUDE : ATTITUDE + 4]
         x, y, z = (row[POSITION + axis] - home[axis] for axis in range(3))
@@ -170,7 +179,7 @@ class Airframe(Pilot):
     # State
 
     def kinematics(self) -> Map:
-        """Return a KinematicsState; accelerations are those of the last control period."""
+        """Return a KinematicsState; accelerations are means of the last control period."""
         now, before = self.body.numbers[0].tolist(), self._before.numbers[0].tolist()
         seconds = (now[TICKS] - before[TICKS]) * self.settings.tick
         rate, pose = 1.0 / seconds if seconds > 0 else 0.0, self.pose
@@ -188,6 +197,10 @@ class Airframe(Pilot):
             "angular_acceleration": messages.vector(to_world(twisted)),
         }
 
+    def _stamp(self, seconds: float) -> int:
+        """Return the time stamp of a time of this vehicle."""
+        return nanoseconds(self.epoch + seconds)
+
     def rotor_states(self) -> Map:
         """Return RotorStates: thrust in newtons; speed in radians per second."""
         most = self.settings.rotor_thrust
@@ -199,10 +212,13 @@ class Airframe(Pilot):
             }
             for share in self.body.rotors[0].tolist()
         ]
-        return {"rotors": rotors, "timestamp": nanoseconds(self.time)}
+        return {"rotors": rotors, "timestamp": self._stamp(self.time)}
 
     def sees(self, place: GeoPoint, start: GeoPoint | None = None) -> bool:
-        """Return whether no obstacle stands between a place on Earth and it, or the start."""
+        """Return whether no obstacle stands between a place on Earth and another one.
+
+        `start` is that other place; None for the vehicle's own position.
+        """
         here = self.body.position[0] if start is None else self._from_geo(start)
         there, around = self._from_geo(place), self._around
         if min(float(there[2]), float(here[2])) < 0.0:
@@ -236,7 +252,7 @@ class Airframe(Pilot):
             "collision": self.collision(read=False),
             "kinematics_estimated": self.kinematics(),
             "gps_location": self.geo_point(),
-            "timestamp": nanoseconds(self.time),
+            "timestamp": self._stamp(self.time),
             "landed_state": int(self._landed == LandedState.FLYING),
             "rc_data": {
                 "timestamp": 0,
@@ -272,7 +288,7 @@ class Airframe(Pilot):
         return {
             "has_collided": is_new,
             "penetration_depth": float(contact.depth[0]) if touched else 0.0,
-            "time_stamp": nanoseconds(time) if touched else 0,
+            "time_stamp": self._stamp(time) if touched else 0,
             "normal": messages.vector(ned(contact.normal) if touched else nothing),
             "impact_point": messages.vector(ned(contact.point - self.home) if touched else nothing),
             "position": messages.vector(self._relative(self.body) if touched else nothing),
@@ -282,16 +298,21 @@ class Airframe(Pilot):
 
     def sensor(self, kind: str) -> Map:
         """Return ImuData, BarometerData, MagnetometerData or GpsData."""
-        return read_sensor(self.sensors, kind)
+        return read_sensor(self.sensors, kind, self.epoch)
 
     def set_kinematics(self, pose: Pose, velocity: Sequence[float], rates: Sequence[float]) -> None:
         """Set pose, velocity, and rates about the axes of the FRD body; see `set_airsim_pose`."""
         self.set_airsim_pose(pose, ignore_collision=True)
         self.body.numbers[0, VELOCITY : VELOCITY + 3] = torch.tensor(to_world(velocity))
         self.body.numbers[0, RATES : RATES + 3] = torch.tensor(to_world(rates))
+        self._before = self.body  # the jump is no acceleration
 
     def set_airsim_pose(self, pose: Pose, *, ignore_collision: bool) -> None:
-        """Put it somewhere at once; NaN components stay. Velocities are kept."""
+        """Put it somewhere at once; NaN components stay. Velocities are kept.
+
+        Without `ignore_collision` it stops before the first obstacle on the straight line there;
+        an `InputError` if that is too far.
+        """
         now = self.pose
         place = [
             n if math.isnan(v) else v for v, n in zip(pose.position, now.position, strict=True)
@@ -305,9 +326,15 @@ class Airframe(Pilot):
         self.trajectory.append(self.time, self.body)
 
     def _sweep(self, there: torch.Tensor) -> torch.Tensor:
-        """Return the last position on the way that touches nothing."""
+        """Return the last position on the line to another one that touches nothing. Shape: (3,)."""
         here = self.body.position[0]
-        steps = max(1, math.ceil(float((there - here).norm()) / _SWEEP))
+        distance = float((there - here).norm())
+        if distance > _LONGEST_SWEEP:
+            raise InputError(
+                f"the pose is {distance:.6g} m away; give ignore_collision=True, or at most "
+                f"{_LONGEST_SWEEP:g} m"
+            )
+        steps = max(1, math.ceil(distance / _SWEEP))
         radius = self.settings.radius
         ways = torch.linspace(0.0, 1.0, steps + 1, dtype=torch.float64)[:, None]
         places = here + ways * (there - here)
@@ -323,6 +350,6 @@ class Airframe(Pilot):
 
 
 def _known(offset: Offset) -> Offset:
-    """Return the same with 0 for unknown components."""
+    """Replace NaN components by 0."""
     values = (offset.x, offset.y, offset.z, offset.roll, offset.pitch, offset.yaw)
     return Offset(*(0.0 if math.isnan(value) else value for value in values))

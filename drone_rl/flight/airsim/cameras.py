@@ -9,14 +9,14 @@ import torch
 from torch import Tensor
 
 from drone_rl.flight.airsim.messages import to_world
-from drone_rl.flight.airsim.settings_file import CameraChoice, Capture
+from drone_rl.flight.airsim.settings_file import CameraChoice, Capture, Offset
 from drone_rl.sim.entities import DRONE_CAMERAS, find_camera
 from drone_rl.sim.image_types import ImageType
 from drone_rl.sim.rendering import Mounting
 from drone_rl.sim.rendering.appearance import product, turned, zoom_for_fov
 
-_BASES = {"back_center": turned("yaw", 180.0), "bottom_center": turned("pitch", 90.0)}
-"""Attitudes of cameras that do not look ahead, drone frame."""
+_BASES = {"back_center": (180.0, 0.0, 0.0), "bottom_center": (0.0, -90.0, 0.0)}
+"""AirSim's yaw, pitch and roll of cameras that do not look ahead, degrees."""
 _LEVEL = (1.0, 0.0, 0.0, 0.0)
 _DEFAULT = Capture()
 
@@ -26,30 +26,33 @@ class CameraState:
     """A camera of a vehicle: where it is, and its images by type."""
 
     name: str
-    """Our name."""
+    """One of the names of `DRONE_CAMERAS`."""
     captures: Mapping[ImageType, Capture]
     position: tuple[float, float, float]
     """Metres, drone frame: x forward, y left, z up."""
     attitude: Tensor
     """Drone frame, quaternion (w, x, y, z). Shape: (4,)."""
     fov: float | None = None
-    """Horizontal, degrees, where it was set; of all types."""
+    """Horizontal, degrees, of all types; None for those of `captures`."""
     detected: tuple[str, ...] = ()
     """Patterns of the names of objects that `simGetDetections` reports."""
     detection_radius: float = 200.0
     """Metres from the camera within which it does."""
 
     def capture(self, kind: ImageType) -> Capture:
-        """Return size and field of view of a type."""
+        """Return the size and field of view of images of a type."""
         found = self.captures.get(kind, _DEFAULT)
         return found if self.fov is None else dataclasses.replace(found, fov=self.fov)
 
     def mounting(self, capture: Capture, vertical_fov: float) -> Mounting | None:
-        """Return how it differs from the camera of the model, whose field of view is given."""
+        """Return how it differs from the model's camera; None if it does not.
+
+        `vertical_fov` is that of the model's camera, degrees.
+        """
         own = math.degrees(
             2 * math.atan(math.tan(math.radians(vertical_fov) / 2) * capture.width / capture.height)
         )
-        base = _base(self.name)
+        base = _attitude(self.name, Offset())
         inverse = base * base.new_tensor([1.0, -1.0, -1.0, -1.0])
         zoom = zoom_for_fov(own, torch.tensor(capture.fov, dtype=torch.float64))
         spec = find_camera(self.name)
@@ -70,7 +73,12 @@ class CameraState:
 def make_cameras(
     captures: Mapping[ImageType, Capture], chosen: Mapping[str, CameraChoice]
 ) -> dict[str, CameraState]:
-    """Return the cameras of a vehicle, by our names."""
+    """Return the cameras of a vehicle, by their names in `DRONE_CAMERAS`.
+
+    Args:
+        captures: Sizes and fields of view of all cameras, by type.
+        chosen: What the settings say about single cameras, by name.
+    """
     return {
         spec.name: _camera(spec, captures, chosen.get(spec.name, CameraChoice()))
         for spec in DRONE_CAMERAS
@@ -81,18 +89,14 @@ def _camera(spec: Any, captures: Mapping[ImageType, Capture], own: CameraChoice)
     offset = own.offset
     given = to_world((offset.x, offset.y, offset.z))
     x, y, z = (old if math.isnan(new) else new for old, new in zip(spec.pos, given, strict=True))
-    angles = (offset.yaw, offset.pitch, offset.roll)
-    attitude = _base(spec.name)
-    if not all(map(math.isnan, angles)):
-        attitude = _attitude(*(0.0 if math.isnan(a) else a for a in angles))
+    attitude = _attitude(spec.name, offset)
     return CameraState(spec.name, {**captures, **own.captures}, (x, y, z), attitude)
 
 
-def _base(name: str) -> Tensor:
-    return _BASES.get(name, torch.tensor(_LEVEL, dtype=torch.float64))
-
-
-def _attitude(yaw: float, pitch: float, roll: float) -> Tensor:
-    """Return the attitude of AirSim's angles, degrees, in the drone's frame. Shape: (4,)."""
+def _attitude(name: str, offset: Offset) -> Tensor:
+    """Return a camera's attitude in the drone's frame, at AirSim's angles where given. (4,)."""
+    given = (offset.yaw, offset.pitch, offset.roll)
+    base = _BASES.get(name, (0.0, 0.0, 0.0))
+    yaw, pitch, roll = (b if math.isnan(g) else g for b, g in zip(base, given, strict=True))
     parts = (turned("yaw", -yaw), turned("pitch", -pitch), turned("roll", roll))
     return product(product(parts[0], parts[1]), parts[2])

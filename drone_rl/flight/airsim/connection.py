@@ -24,11 +24,14 @@ MAX_MESSAGE = 2**22
 MAX_PENDING = 1000
 """Calls of one client that wait at a time."""
 MAX_CLIENTS = 1000
+"""Connections at a time."""
 TURN = 0.005
 """Seconds of work for one client before others have their turn."""
 MAX_UNSENT = 2**25
 """Bytes of replies that a client may leave unread before its requests wait."""
 _MAX_ITEMS = 100_000
+_MOST_SHOWN = 200
+"""Letters of a method's name in messages."""
 _QUICK_ACK: int | None = getattr(socket, "TCP_QUICKACK", None)
 """An option of Linux."""
 
@@ -68,9 +71,10 @@ class Connection(asyncio.Protocol):
         self._is_full = False
         """Whether the client leaves too many replies unread."""
         self._is_held = False
-        """Whether it goes on at a later time."""
+        """Whether its requests wait for a call of `release`."""
         self._backlog: deque[Any] = deque()
-        self._replies: set[Callable[[Any], None]] = set()
+        self._replies: dict[Callable[[Any], None], int | None] = {}
+        """Calls that wait, and the numbers of their requests; None for notifications."""
         self.is_open = False
         self.is_pilot = False
         """Whether one of its calls has ever waited for simulated time."""
@@ -114,6 +118,9 @@ class Connection(asyncio.Protocol):
         try:
             self._unpacker.feed(data)
             self._backlog.extend(self._unpacker)
+        except msgpack.BufferFull:
+            self._break(f"a request has more than {MAX_MESSAGE} bytes")
+            return
         except Exception as error:
             self._break(f"its bytes are no msgpack ({type(error).__name__})")
             return
@@ -162,7 +169,7 @@ class Connection(asyncio.Protocol):
             return
         if message[0] == NOTIFICATION and len(message) == 3:
             self._call(None, message[1], message[2])
-        elif message[0] == REQUEST and len(message) == 4 and isinstance(message[1], int):
+        elif _is_request(message):
             self._call(message[1], message[2], message[3])
         elif message[0] != RESPONSE:
             self._break(f"{shown(message)} is no request")
@@ -172,43 +179,41 @@ class Connection(asyncio.Protocol):
         if not isinstance(label, str) or not isinstance(args, list | tuple):
             self._break("a request has no name or no list of arguments")
             return
+        label = label[:_MOST_SHOWN]  # all names of methods are shorter
         try:
             if self._pending >= MAX_PENDING:
                 raise InputError(f"{MAX_PENDING} calls of this client wait; join some first")
             result = methods.call(self._server.simulation, label, args)
+            if isinstance(result, Wait):
+                self._wait(number, result)
+            else:
+                self._answer(number, None, result)
         except UnknownMethodError:
             hint = methods.suggestion(label)
             self._fail(
                 number,
-                f"rpclib: server could not find function '{label[:200]}' with argument count "
+                f"rpclib: server could not find function '{label}' with argument count "
                 f"{len(args)}.{hint}",
             )
-            return
         except InputError as error:
             self._fail(
                 number,
                 f"rpclib: function '{label}' (called with {len(args)} arg(s)) threw an exception. "
                 f"The exception contained this information: {error}.",
             )
-            return
         except Exception as error:
-            _log.exception("%s: %s failed", self._name, label[:200])
+            _log.exception("%s: %s failed", self._name, label)
             self._fail(number, f"rpclib: function '{label}' failed: {type(error).__name__}.")
-            return
-        if isinstance(result, Wait):
-            self._wait(number, result)
-        else:
-            self._answer(number, None, result)
 
     def _wait(self, number: int | None, wait: Wait) -> None:
         self._pending += 1
 
         def reply(result: Any) -> None:
             self._pending -= 1
-            self._replies.discard(reply)
+            del self._replies[reply]
             self._answer(number, None, result)
 
-        self._replies.add(reply)
+        self._replies[reply] = number
         self.is_pilot = True
         self._server.simulation.wait_for(wait, reply)
 
@@ -221,10 +226,23 @@ class Connection(asyncio.Protocol):
             self._transport.write(_packed([RESPONSE, number, error, result]))
 
     def close(self) -> None:
-        """Answer the calls that wait by an error, and close."""
-        for reply in [*self._replies]:
+        """Answer all calls that wait with an error, and close.
+
+        Clients do not notice a closed connection: without an answer they wait for an hour.
+        """
+        for reply in self._replies:
             self._server.simulation.forget(reply)
+        held = [message[1] for message in self._backlog if _is_request(message)]
+        for number in [*self._replies.values(), *held]:
+            self._answer(number, "the server has stopped; connect again", None)
+        self._replies.clear()
+        self._backlog.clear()
         self._transport.close()
+
+
+def _is_request(message: Any) -> bool:
+    is_list = isinstance(message, list | tuple) and len(message) == 4
+    return is_list and message[0] == REQUEST and isinstance(message[1], int)
 
 
 def _unpacker() -> Any:

@@ -20,6 +20,7 @@ MOST_REQUESTS = 20
 """Requests at one simulated time while a call waits; then time runs for `STEP`, so that loops
 which ask until something has happened go on."""
 STEP = 0.1
+"""Simulated seconds; see `MOST_REQUESTS`."""
 STRIDE = 10.0
 """Simulated seconds after which time stands, if requests wait, even if no call has ended."""
 SLICE = 0.005
@@ -40,7 +41,10 @@ class Lockstep:
         self._wake = asyncio.Event()
 
     def note(self, *, is_pilot: bool) -> None:
-        """Take note of a request that was answered, or that waits; pilots' delay time."""
+        """Take note of a request that was handled.
+
+        After one of a client that moves vehicles, time stands for another `patience` seconds.
+        """
         self._wake.set()
         if self._simulation.is_blocked:
             self.is_running = True  # its client asks nothing before it is answered

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
+from drone_rl.flight.commands.checks import FARTHEST
 from drone_rl.flight.commands.path_following import Drivetrain, YawMode
 from drone_rl.sim.coordinates import GeoPoint, ned_attitude_from_world, ned_from_world
 from drone_rl.utils.errors import InputError
@@ -15,13 +16,13 @@ from drone_rl.utils.schema import shown
 Map = dict[str, Any]
 NANOSECONDS = 1_000_000_000
 MAX_POINTS = 10_000
-"""Of a path."""
+"""Most points of a path."""
 MAX_NAME = 50
-"""Letters of a new name."""
+"""Most letters of a new name."""
 MAX_PATTERN = 200
-"""Letters of a regular expression."""
+"""Most letters of a regular expression."""
 _FARTHEST = 3.5e38
-"""Largest float32, AirSim's default timeout among them."""
+"""Above all finite float32, such as AirSim's default timeout of 3e38."""
 
 
 class Pose(NamedTuple):
@@ -66,7 +67,7 @@ def geo_point(of: GeoPoint | Sequence[float]) -> Map:
 
 
 def nanoseconds(seconds: float) -> int:
-    """Return a time stamp."""
+    """Convert seconds to a time stamp of AirSim; negative ones become 0."""
     return max(0, round(seconds * NANOSECONDS))
 
 
@@ -119,7 +120,7 @@ def whole(value: Any, name: str, low: int, high: int) -> int:
 
 
 def flag(value: Any, name: str) -> bool:
-    """Return true or false; numbers count as in C++."""
+    """Return true or false; of numbers only 0 is false."""
     if isinstance(value, bool) or type(value) in (int, float):
         return bool(value)
     raise InputError(f"{name}={shown(value)} is neither true nor false; give one of them")
@@ -137,9 +138,18 @@ def text(value: Any, name: str, most: int = 10_000) -> str:
 
 
 def read_map(
-    value: Any, name: str, keys: Sequence[str], *, can_be_nan: bool = False
+    value: Any,
+    name: str,
+    keys: Sequence[str],
+    *,
+    can_be_nan: bool = False,
+    most: float = _FARTHEST,
 ) -> list[float]:
-    """Return the numbers of a map, in the order of its keys; other keys are ignored."""
+    """Return the numbers of a map, in the order of `keys`; other keys are ignored.
+
+    Raises an `InputError` if it is no map, or a value is missing or no number of at most `most` in
+    magnitude; NaN is accepted if `can_be_nan`.
+    """
     if not isinstance(value, Mapping):
         raise InputError(f"{name}={shown(value)} is not a map; give {', '.join(keys)}")
     found = []
@@ -148,22 +158,27 @@ def read_map(
         if can_be_nan and isinstance(given, float) and math.isnan(given):
             found.append(given)
         else:
-            found.append(number(given, f"{name}.{key}"))
+            found.append(number(given, f"{name}.{key}", -most, most))
     return found
 
 
-def read_vector(value: Any, name: str, *, can_be_nan: bool = False) -> tuple[float, float, float]:
-    """Return the numbers of a Vector3r."""
-    x, y, z = read_map(value, name, ("x_val", "y_val", "z_val"), can_be_nan=can_be_nan)
+def read_vector(
+    value: Any, name: str, *, can_be_nan: bool = False, most: float = _FARTHEST
+) -> tuple[float, float, float]:
+    """Return the numbers of a Vector3r; errors as of `read_map`."""
+    x, y, z = read_map(value, name, ("x_val", "y_val", "z_val"), can_be_nan=can_be_nan, most=most)
     return x, y, z
 
 
 def read_pose(value: Any, name: str = "pose") -> Pose:
-    """Return a Pose, whose components may be NaN."""
+    """Return a Pose, whose components may be NaN; errors as of `read_map`.
+
+    Coordinates are at most `checks.FARTHEST` in magnitude.
+    """
     parts = [_part(value, name, part) for part in ("position", "orientation")]
     keys = ("w_val", "x_val", "y_val", "z_val")
     w, x, y, z = read_map(parts[1], f"{name}.orientation", keys, can_be_nan=True)
-    position = read_vector(parts[0], f"{name}.position", can_be_nan=True)
+    position = read_vector(parts[0], f"{name}.position", can_be_nan=True, most=FARTHEST)
     return Pose(position, (w, x, y, z))
 
 
@@ -174,7 +189,7 @@ def _part(value: Any, name: str, part: str) -> Any:
 
 
 def read_path(value: Any, name: str = "path") -> list[tuple[float, float, float]]:
-    """Return the points of a path."""
+    """Return the points of a path, at least one; errors as of `read_map`."""
     if not isinstance(value, list | tuple) or not 0 < len(value) <= MAX_POINTS:
         raise InputError(f"{name} is not a list of 1 to {MAX_POINTS} points; give one")
     return [read_vector(point, f"{name}[{i}]") for i, point in enumerate(value)]

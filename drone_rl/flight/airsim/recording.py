@@ -2,6 +2,7 @@
 
 import datetime
 import io
+import re
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +20,16 @@ _COLUMNS = (
 
 
 class Recording:
-    """Writes `airsim_rec.txt` and `images/` to a new folder, named by the time of day.
+    """Writes `airsim_rec.txt` and `images/` to a new folder, named by date and time.
 
     numpy reads the table by `numpy.genfromtxt(path, names=True, dtype=None, encoding="utf-8")`.
     """
 
     def __init__(self, folder: Path, begin: float) -> None:
-        """Create the folder; rows are due from the simulated time `begin`."""
+        """Create the folder; rows are due from the simulated time `begin`, seconds.
+
+        Raises an `InputError` if it can't be written.
+        """
         now = datetime.datetime.now().strftime("%Y-%m-%d-%H-%M-%S-%f")
         self.path = folder / now
         try:
@@ -48,11 +52,12 @@ class Recording:
         return True
 
     def write(self, time: float, name: str, pose: Pose, image: Tensor) -> None:
-        """Write the row of a vehicle with its image (H, W, 3), uint8."""
+        """Write the row of a vehicle at a simulated time, with its image (H, W, 3), uint8."""
         stamp = nanoseconds(time)
         file = f"img_{to_letters(name)}_0_{stamp}.png"
         values = (*pose.position, *pose.attitude)
-        row: list[Any] = [name or "Vehicle", stamp, *(f"{v:.6g}" for v in values), file]
+        word = re.sub(r"[\s#]", "_", name) or "Vehicle"  # a column of numpy has no spaces
+        row: list[Any] = [word, stamp, *(f"{v:.6g}" for v in values), file]
         self._table.write("\t".join(map(str, row)) + "\n")
         self._table.flush()
         Image.fromarray(image.numpy()).save(self.path / "images" / file, compress_level=1)
@@ -63,5 +68,5 @@ class Recording:
 
 
 def to_letters(name: str) -> str:
-    """Return a name as a part of a file's name."""
+    """Replace all but ASCII letters and digits by "_"; return at most 64 of them."""
     return "".join(c if c.isascii() and c.isalnum() else "_" for c in name)[:64]

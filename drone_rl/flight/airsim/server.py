@@ -67,8 +67,8 @@ class AirsimServer:
             self._server = await loop.create_server(lambda: Connection(self), host, port)
         except OSError as error:
             raise InputError(
-                f"port {port} of {host} can't be opened ({error.strerror}); stop the other server, "
-                "or give another port"
+                f"port {port} of {host} can't be opened ({error.strerror}); give another port or "
+                "address, or stop the server that has it"
             ) from error
         except UnicodeError as error:  # of a host that can't be a name in a network
             raise InputError(f"address={shown(host)} is no address; give 127.0.0.1") from error
@@ -105,7 +105,7 @@ async def run(
     """Serve a simulation until cancelled; `ready` is called with the address once it listens.
 
     Raises:
-        InputError: The port is in use.
+        InputError: See `AirsimServer.start`.
     """
     server = AirsimServer(simulation, patience)
     await server.start(host, port)

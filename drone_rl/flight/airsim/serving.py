@@ -47,7 +47,7 @@ class RunningServer:
         self.close()
 
     def close(self) -> None:
-        """Stop it: calls that wait are not answered."""
+        """Stop it; calls that wait are answered with an error."""
         loop, task = self._loop, self._task
         if loop is not None and task is not None and self._thread.is_alive():
             loop.call_soon_threadsafe(task.cancel)
@@ -102,7 +102,7 @@ def serve(
         recordings: Folder for recordings; None refuses `startRecording`.
 
     Raises:
-        InputError: A setting is wrong, or the port is in use.
+        InputError: A setting is wrong, the port is in use, or the address is not this machine's.
     """
     patience_s = Real(0.0, 60.0).read(patience_s, "patience_s")
     simulation, host, number = make_simulation(

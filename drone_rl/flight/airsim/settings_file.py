@@ -28,9 +28,11 @@ FLYING, POSING, PX4 = "SimpleFlight", "ComputerVision", "PX4Multirotor"
 MAX_BYTES = 2**20
 _TYPES = (FLYING, POSING, PX4)
 _STATES = ("Armed", "Disarmed")
+_COMMENT = r"//[^\n]*(?![^\n])|/\*(?:(?!\*/).)*\*/"
+"""Matches one comment in one way only, so that a failing search does not take forever."""
 _TOKEN = re.compile(
-    r"""(?P<comment>//[^\n]*|/\*.*?\*/)|(?P<text>"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')"""
-    r"""|(?P<comma>,(?=(?:\s|//[^\n]*|/\*.*?\*/)*[}\]]))|(?P<other>.)""",
+    rf"""(?P<comment>{_COMMENT})|(?P<text>"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')"""
+    rf"""|(?P<comma>,(?=(?:\s|{_COMMENT})*[}}\]]))|(?P<other>.)""",
     re.DOTALL,
 )
 
@@ -90,7 +92,7 @@ class AirsimSettings:
     address: str = ADDRESS
     port: int = PORT
     clock_speed: float = 1.0
-    """Simulated seconds in a second."""
+    """Simulated seconds per second of real time."""
     home: GeoPoint = HOME
     """Place on Earth of the world's origin."""
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -213,6 +215,8 @@ def parse_settings(text: str, name: str = "settings.json") -> AirsimSettings:
         ) from error
     except RecursionError as error:
         raise InputError(f"{name} is nested too deeply; give fewer levels") from error
+    except ValueError as error:  # Python refuses to read more digits
+        raise InputError(f"{name} has a number of too many digits; shorten it") from error
     found = _read(_FILE, data, "", name)
     if found.get("SimMode", "").lower() == "car":
         raise InputError(f"{name}: SimMode=Car is not supported; give {' or '.join(SIM_MODES)}")
@@ -253,12 +257,17 @@ def _as_json(text: str) -> Iterator[str]:
         if match.lastgroup == "text" and token[0] == "'":
             inner = token[1:-1].replace("\\'", "'")
             yield '"' + re.sub(r'(?<!\\)"', r"\"", inner) + '"'
-        elif match.lastgroup not in ("comment", "comma"):
+        elif match.lastgroup == "comment":
+            yield "\n" * token.count("\n")  # errors name lines of the file
+        elif match.lastgroup != "comma":
             yield token
 
 
 def _read(table: _Table, data: Any, path: str, name: str) -> dict[str, Any]:
-    """Check the values of one object; warn about unknown keys. Return the known ones."""
+    """Return the values of the known keys of one object, except null and NaN.
+
+    Unknown keys are warned about; a wrong value is an `InputError` with the key's path.
+    """
     if not isinstance(data, Mapping):
         raise InputError(f"{name}: {path or 'the file'} is not an object; write {{...}}")
     found: dict[str, Any] = {}
@@ -266,7 +275,9 @@ def _read(table: _Table, data: Any, path: str, name: str) -> dict[str, Any]:
         where = f"{path}.{key}" if path else key
         kind = table.keys.get(key)
         if kind is not None:
-            found[key] = _read_as(kind, value, where, name)
+            content = _read_as(kind, value, where, name)
+            if content is not None:
+                found[key] = content
         elif key not in table.unused:
             meant = did_you_mean(key, (*table.keys, *table.unused))
             _log.warning("%s: %s is unknown and ignored%s", name, where, meant)
@@ -274,7 +285,10 @@ def _read(table: _Table, data: Any, path: str, name: str) -> dict[str, Any]:
 
 
 def _read_as(kind: Any, value: Any, where: str, name: str) -> Any:
-    """Read a value of a kind, which may be a table, or a list or mapping of a table."""
+    """Return a value of a kind, which may be a table, or a list or mapping of a table.
+
+    None stands for null and NaN, which mean the default.
+    """
     if isinstance(kind, _Table):
         return _read(kind, value, where, name)
     if isinstance(kind, list):
@@ -289,7 +303,7 @@ def _read_as(kind: Any, value: Any, where: str, name: str) -> Any:
 
 
 def _value(kind: Kind, value: Any, where: str) -> Any:
-    # AirSim's files write numbers that are not finite as the texts "NaN"
+    # AirSim's files may have NaN for a number, which means its default
     if isinstance(value, float) and math.isnan(value):
         return None
     return Maybe(kind).read(value, where)
@@ -324,8 +338,7 @@ def _vehicle(vehicle: str, given: Mapping[str, Any], mode: str, name: str) -> Ve
 
 
 def _offset(given: Mapping[str, Any]) -> Offset:
-    values = (given.get(key) for key in _POSE)
-    return Offset(*(math.nan if value is None else float(value) for value in values))
+    return Offset(*(float(given.get(key, math.nan)) for key in _POSE))
 
 
 def _captures(given: Mapping[str, Any]) -> dict[ImageType, Capture]:

@@ -1,15 +1,23 @@
 """The world behind the server: vehicles, scene, simulated time, and calls that wait for it."""
 
+import contextlib
 import dataclasses
 import logging
 import math
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.flight.airsim.cameras import CameraState, make_cameras
-from drone_rl.flight.airsim.messages import Pose, ned, ned_attitude, read_pose
+from drone_rl.flight.airsim.messages import (
+    Pose,
+    attitude_to_world,
+    ned,
+    ned_attitude,
+    read_pose,
+)
 from drone_rl.flight.airsim.messages import pose as pose_map
 from drone_rl.flight.airsim.recording import Recording
 from drone_rl.flight.airsim.settings_file import (
@@ -21,6 +29,7 @@ from drone_rl.flight.airsim.settings_file import (
 )
 from drone_rl.flight.airsim.stage import Stage
 from drone_rl.flight.airsim.vehicle import Vehicle
+from drone_rl.flight.commands.state import Attitude
 from drone_rl.sim.image_types import ImageType
 from drone_rl.utils.errors import InputError, did_you_mean
 
@@ -55,13 +64,13 @@ class Simulation:
         clock: str = "wall",
         seed: int = 0,
         renderer: str | None = None,
-        recordings: Any = None,
+        recordings: Path | None = None,
     ) -> None:
         """Create the scene and the vehicles of the settings.
 
         Args:
             settings: Content of settings.json.
-            scene: See `stage.make_task`.
+            scene: See `scenes.make_task`.
             clock: "wall" or "lockstep".
             seed: Of placements, gusts and sensor noise.
             renderer: Name of a renderer; by default the one that fits the scene.
@@ -75,9 +84,11 @@ class Simulation:
         self._dynamics = DynamicsSettings().replace(
             mode="simple_flight", camera_mount="body", wind=(x, -y, -z)
         )
+        self._periods = 0
+        """Control periods that have passed."""
         self.vehicles: dict[str, Vehicle] = {}
         self.cameras: dict[str, dict[str, CameraState]] = {}
-        """Of each vehicle, by our names."""
+        """Of each vehicle, by our names of cameras."""
         for choice in settings.vehicles:
             self.add(choice)
         self.is_paused = False
@@ -86,7 +97,6 @@ class Simulation:
         self._waits: list[tuple[Wait, Callable[[Any], None]]] = []
         self._until: float | None = None
         """Time at which `simContinueForTime` pauses."""
-        self._periods = 0
         self._anchor = (time.monotonic(), 0.0)
         """Time of day, and simulated seconds then."""
 
@@ -102,7 +112,7 @@ class Simulation:
         return self._periods * self.tick
 
     def add(self, choice: VehicleChoice) -> Vehicle:
-        """Create a vehicle; raise an `InputError` for a name that is taken."""
+        """Create a vehicle; an `InputError` if its name is taken, or there are too many."""
         if choice.name in self.vehicles:
             raise InputError(f"vehicle {choice.name!r} is there already; give another name")
         if len(self.vehicles) >= _MOST_VEHICLES:
@@ -117,6 +127,7 @@ class Simulation:
             height=self.stage.start_height,
             seed=(self.seed + len(self.vehicles)) % 2**31,
         )
+        vehicle.epoch = self.time if self.vehicles else 0.0
         self.vehicles[choice.name] = vehicle
         self.cameras[choice.name] = make_cameras(self.settings.captures, choice.cameras)
         return vehicle
@@ -126,12 +137,20 @@ class Simulation:
         found = {"simpleflight": FLYING, "computervision": POSING}.get(kind.lower())
         if found is None:
             return False
-        x, y, z = read_pose(pose).position
-        self.add(VehicleChoice(name, found, Offset(x, y, z)))
+        position, attitude = read_pose(pose)
+        angles = Attitude(0.0, 0.0, 0.0)
+        if not any(map(math.isnan, attitude)):
+            angles = Attitude.of(attitude_to_world(attitude)[0].tolist())
+        start = Offset(*position, angles.roll, angles.pitch, angles.yaw)
+        self.add(VehicleChoice(name, found, start))
         return True
 
     def find(self, name: str, *, is_pose: bool = False) -> Vehicle:
-        """Return a vehicle; "" is the first one. Raises AirSim's error for an unknown name."""
+        """Return a vehicle; "" is the first one.
+
+        Raises an `InputError` with AirSim's message for an unknown name, for its Sim-API if
+        `is_pose`.
+        """
         if name == "":
             return next(iter(self.vehicles.values()))
         if name in self.vehicles:
@@ -162,22 +181,31 @@ class Simulation:
             return pose_map(Pose((x, y, z), (w, i, j, k)))
         return pose_map(self.stage.object_pose(name))
 
+    def move_vehicle(self, name: str, pose: Pose) -> None:
+        """Set a vehicle's pose in the world's NED frame; NaN components stay."""
+        vehicle = self.vehicles[name]
+        start = ned(vehicle.home[None])
+        x, y, z = (there - here for there, here in zip(pose.position, start, strict=True))
+        vehicle.set_airsim_pose(Pose((x, y, z), pose.attitude), ignore_collision=True)
+        self.stage.touch(vehicle.body.position[0])
+
     def reset(self) -> None:
         """Reset vehicles and scene; running movements are cancelled."""
         self.stage.reset()
         for vehicle in self.vehicles.values():
             vehicle.reset()
+            vehicle.epoch = self.time
         self._settle()
 
     # Time
 
     def wait_for(self, wait: Wait, reply: Callable[[Any], None]) -> None:
-        """Call `reply` with the result once a call is done."""
+        """Call `reply` with the result once a call is done, perhaps at once."""
         self._waits.append((wait, reply))
         self._settle()
 
     def forget(self, reply: Callable[[Any], None]) -> None:
-        """Answer a call no more: its client has gone."""
+        """Drop the call with this reply."""
         self._waits = [(w, r) for w, r in self._waits if r is not reply]
 
     @property
@@ -196,10 +224,9 @@ class Simulation:
         self._hold_anchor()
 
     def continue_for(self, seconds: float) -> Wait:
-        """Let time pass for some seconds, then pause."""
-        self.is_paused = False
+        """Let time pass for some seconds, then pause; return the wait for that."""
+        self.pause(seconds <= 0.0)
         end = self._until = self.time + seconds
-        self._hold_anchor()
         return Wait(lambda: self.is_paused or self.time >= end - 1e-9, lambda: None, blocks=True)
 
     def follow(self, budget: float) -> float:
@@ -288,6 +315,8 @@ class Simulation:
                 self.recording.write(self.time, name, vehicle.pose, image)
             except OSError as error:
                 _log.error("the recording ends: it can't be written (%s)", error.strerror)
+                with contextlib.suppress(OSError):
+                    self.stop_recording()
                 self.recording = None
                 return
 

@@ -57,7 +57,7 @@ class _Spawned:
     """An object that a client made."""
 
     number: int
-    """Of the spare place that it takes."""
+    """Index of the spare object that it is."""
     place: tuple[float, float, float]
     size: float
 
@@ -231,28 +231,33 @@ class Stage:
     # Weather and light
 
     def set_fog(self, density: float) -> None:
-        """Set the density of fog, 0 to 1: at 1 one sees 20 m far."""
+        """Set the density of fog, from 0 for none to 1 for a visibility of 20 m."""
         visibility = None if density <= 0.0 else 20.0 / density
-        self._weather = dataclasses.replace(self._weather, fog_visibility=visibility)
+        self._change_weather(fog_visibility=visibility)
 
     def set_sun(self, elevation: float, azimuth: float = 127.9) -> None:
-        """Set the sun's height, and its direction to the left of straight ahead, degrees."""
+        """Set the sun's elevation, and its direction to the left of the world's x axis, degrees."""
         up, aside = math.radians(max(elevation, 1.0)), math.radians(azimuth)
         level = math.cos(up)
         towards = (-level * math.cos(aside), -level * math.sin(aside), -math.sin(up))
         light = max(0.0, min(1.0, elevation / 10.0))
-        self._weather = dataclasses.replace(
-            self._weather, sun_direction=towards, sun=(0.75 * light,) * 3
-        )
+        self._change_weather(sun_direction=towards, sun=(0.75 * light,) * 3)
 
-    def clear_weather(self) -> None:
-        """Return to the scene's own light and air."""
-        self._weather = _PLAIN
+    def clear_sun(self) -> None:
+        """Return to the scene's own light."""
+        self._change_weather(sun_direction=None, sun=None)
+
+    def _change_weather(self, **changes: Any) -> None:
+        changed = dataclasses.replace(self._weather, **changes)
+        self._weather = _PLAIN if changed == _PLAIN else changed
 
     # Segmentation
 
     def set_id(self, name: str, number: int, *, is_pattern: bool) -> bool:
-        """Set the segmentation id of an object, or of all that match; return whether any does."""
+        """Set the segmentation id of all objects that match; return whether any does.
+
+        A negative id counts as 0.
+        """
         found = self.find(name) if is_pattern else [n for n in self.names if n == name]
         for one in found:
             self._own_ids[one] = number
@@ -331,15 +336,21 @@ class Stage:
             mounting = camera.mounting(capture, self.worlds.camera.vertical_fov)
             found = dataclasses.replace(self._weather, camera=mounting, distractors=self._spares())
             is_own = self._weather is _PLAIN and mounting is None and not spawned
-            known[key] = (
-                camera,
-                None if is_own else found,
-            )  # keeping the camera keeps its id unique
+            # keeping the camera keeps its id unique
+            known[key] = camera, None if is_own else found
         return known[key][1]
 
     def image(self, kind: ImageType, shot: Shot, *, as_float: bool) -> Tensor:
         """Return the pixels of a rendered image: (H, W) float32, or (H, W, 3) uint8."""
         return pixels(kind, shot.values, as_float=as_float, focal=shot.focal, ids=self._ids)[0]
+
+    def infrared(self, shot: Shot, *, as_float: bool) -> Tensor:
+        """Return a segmentation image with the ids in gray; shapes as of `image`."""
+        geoms = shot.values[0].long().cpu()
+        ids = torch.where(geoms < 0, 0, self._ids[geoms.clamp(min=0)])
+        if as_float:
+            return ids.float() / 255.0
+        return ids.to(torch.uint8)[..., None].expand(-1, -1, 3).contiguous()
 
     def box(self, shot: Shot, name: str) -> tuple[int, int, int, int] | None:
         """Return left, top, right and bottom of an object in a segmentation image, in pixels."""

@@ -14,7 +14,7 @@ from drone_rl.sim.coordinates import GeoPoint
 from drone_rl.utils.errors import InputError
 
 LONGEST = 1e6
-"""Longest timeout in seconds; clients send up to 3e38."""
+"""Longest timeout or duration in seconds; clients send up to 3e38."""
 _DEGREES = 180.0 / math.pi
 
 
@@ -30,23 +30,32 @@ class Vehicle(Airframe):
         self.enable_api_control(enable)
 
     def set_armed(self, arm: bool) -> bool:
-        """Arm or disarm; return whether that was allowed."""
+        """Arm or disarm; return whether it is in that state, False if API control is off.
+
+        A vehicle that falls can't be armed.
+        """
         self._require_flight("armDisarm")
         if not self.has_api_control:
             return False
-        if arm:
-            if not self._is_flying:
-                self.arm()
-        else:
+        if not arm:
             self.disarm(force=True)
-        return True
+        elif not self._is_flying:
+            self.arm()
+        return self._is_armed == arm
 
     def _require_flight(self, method: str) -> None:
         if self.is_computer_vision:
             raise PilotError(
-                f"{method} needs a vehicle with dynamics, and this one is in ComputerVision mode; "
+                f"{method} needs a vehicle with dynamics, but this one is in ComputerVision mode; "
                 "use simSetVehiclePose"
             )
+
+    def _require_armed(self, name: str) -> None:
+        """Raise a `PilotError` with the remedies of AirSim's clients."""
+        if self._is_lost:
+            raise PilotError("the simulation of this vehicle has diverged; call reset")
+        if not self._is_armed:
+            raise PilotError("this vehicle is not armed; call armDisarm(True)")
 
     def _run(self, name: str, command: Command, wait: bool) -> bool | FlightFuture:
         """See `Drone`; as in AirSim a drone on the ground takes off by any movement."""
@@ -55,7 +64,7 @@ class Vehicle(Airframe):
 
     def _moved(self, name: str, *args: Any, **kwargs: Any) -> FlightFuture | None:
         """Start a movement of `Pilot`, unless API control is off."""
-        self._require_flight(name)
+        self._require_flight("a movement")
         if not self.has_api_control:
             return None
         future = getattr(self, name)(*args, wait=False, **kwargs)
@@ -63,22 +72,22 @@ class Vehicle(Airframe):
         return future
 
     def takeoff(self, timeout: float) -> FlightFuture | None:
-        """Climb 2 m."""
+        """Climb 2 m; a `PilotError` if it moves."""
         self._require_flight("takeoff")
         if self._speed > MOVING:
             raise PilotError(
                 "Cannot perform takeoff because vehicle is already moving with velocity "
                 f"{self._speed:f} m/s"
             )
-        return self._moved("take_off", _limit(timeout))
+        return self._moved("take_off", limit(timeout))
 
     def land_down(self, timeout: float) -> FlightFuture | None:
         """Descend until it stands."""
-        return self._moved("land", _limit(timeout))
+        return self._moved("land", limit(timeout))
 
     def return_home(self, timeout: float) -> FlightFuture | None:
         """Fly over the start point and land there."""
-        return self._moved("go_home", _limit(timeout))
+        return self._moved("go_home", limit(timeout))
 
     def hold(self) -> FlightFuture | None:
         """Hold the position."""
@@ -94,7 +103,10 @@ class Vehicle(Airframe):
         z: float | None = None,
         in_body: bool = False,
     ) -> FlightFuture | None:
-        """Hold a velocity, of the world or of the heading, at the height `z` if given."""
+        """Hold a velocity in m/s, at the height of `z` if given.
+
+        With `in_body` it is forward and to the right of the vehicle, else north and east.
+        """
         vx, vy, vz = to_world(velocity)
         at: dict[str, Any] = {} if z is None else {"z": self._height(z)}
         climb = vz if z is None else 0.0
@@ -106,7 +118,7 @@ class Vehicle(Airframe):
             *(vx, vy, climb, seconds),
             frame="body" if in_body else "world",
             drivetrain=drivetrain,
-            yaw_mode=self._yaw(drivetrain, yaw),
+            yaw_mode=yaw,
             **at,
         )
 
@@ -120,15 +132,18 @@ class Vehicle(Airframe):
         lookahead: float,
         adaptive: float,
     ) -> FlightFuture | None:
-        """Follow a path."""
+        """Follow a path of points in metres; `speed` in m/s, `timeout` in seconds.
+
+        For `lookahead` and `adaptive` see `Pilot.move_along`.
+        """
         if lookahead == 0.0:
             raise InputError("lookahead distance cannot be 0; give a distance, or -1 for its own")
         return self._moved(
             "move_along",
             [self._world(point) for point in points],
-            *(speed, _limit(timeout)),
+            *(speed, limit(timeout)),
             drivetrain=drivetrain,
-            yaw_mode=self._yaw(drivetrain, yaw),
+            yaw_mode=yaw,
             lookahead=lookahead,
             adaptive_lookahead=max(0.0, adaptive),
         )
@@ -142,7 +157,7 @@ class Vehicle(Airframe):
         lookahead: float,
         adaptive: float,
     ) -> FlightFuture | None:
-        """Fly straight up or down."""
+        """Fly straight up or down to `z`; see `move_path`."""
         x, y, _ = self._relative(self.body)
         kind = Drivetrain.MAX_DEGREE_OF_FREEDOM
         return self.move_path([(x, y, z)], speed, timeout, kind, yaw, lookahead, adaptive)
@@ -157,18 +172,18 @@ class Vehicle(Airframe):
         lookahead: float,
         adaptive: float,
     ) -> FlightFuture | None:
-        """Fly to a place on Earth."""
+        """Fly to a place on Earth; see `move_path`."""
         target = ned((self._from_geo(place) - self.home)[None])
         return self.move_path([target], speed, timeout, drivetrain, yaw, lookahead, adaptive)
 
     def turn_to(self, degrees: float, timeout: float, margin: float) -> FlightFuture | None:
-        """Turn to a heading, degrees."""
+        """Turn to a heading, degrees clockwise from north, within a margin in degrees."""
         heading = math.remainder(degrees, 360.0)
         near = min(max(margin, 0.1), 180.0)
-        return self._moved("rotate_to", heading, _limit(timeout), margin=near)
+        return self._moved("rotate_to", heading, limit(timeout), margin=near)
 
     def turn_by(self, rate: float, seconds: float) -> FlightFuture | None:
-        """Turn at a rate, degrees per second."""
+        """Turn at a rate, degrees per second clockwise."""
         return self._moved("rotate_by", rate, seconds)
 
     def tilt(
@@ -182,7 +197,10 @@ class Vehicle(Airframe):
         z: float | None = None,
         throttle: float | None = None,
     ) -> FlightFuture | None:
-        """Hold angles, radians."""
+        """Hold roll and pitch, radians; and yaw, or else the yaw rate, radians (per second).
+
+        The lift is the height of `z`, or else the throttle, from 0 to 1.
+        """
         turn: dict[str, Any] = {}
         if yaw is not None:
             turn["yaw"] = yaw * _DEGREES
@@ -201,28 +219,31 @@ class Vehicle(Airframe):
         z: float | None = None,
         throttle: float | None = None,
     ) -> FlightFuture | None:
-        """Hold body rates, radians per second."""
+        """Hold roll, pitch and yaw rates, radians per second; for the lift see `tilt`."""
         lift = {"z": self._height(z)} if z is not None else {"throttle": throttle}
         degrees = [rate * _DEGREES for rate in rates]
         return self._moved("move_by_rates", *degrees, seconds, **lift)
 
     def set_rotors(self, shares: Sequence[float], seconds: float) -> FlightFuture | None:
-        """Set the rotors: front right, rear left, front left, rear right."""
+        """Set the rotors, each from 0 to 1: front right, rear left, front left, rear right."""
         return self._moved("move_by_rotors", shares, seconds)
 
     def move_manually(
         self, vx: float, vy: float, z: float, seconds: float, drivetrain: str, yaw: YawMode
     ) -> FlightFuture | None:
-        """Follow the sticks; `-z` is the goal's height above the drone at full throttle."""
+        """Follow the sticks; `vx` and `vy` are the speeds at full stick, m/s.
+
+        `-z` is the goal's height above the vehicle at full throttle.
+        """
         return self._moved(
             "move_by_manual",
             *(vx, vy, max(0.0, -z), seconds),
             drivetrain=drivetrain,
-            yaw_mode=self._yaw(drivetrain, yaw),
+            yaw_mode=yaw,
         )
 
     def set_sticks(self, of: Mapping[str, Any]) -> None:
-        """Take the sticks of RCData."""
+        """Take the sticks of RCData, each from -1 to 1."""
         names = ("pitch", "roll", "throttle", "yaw")
         values = (messages.number(of.get(name, 0.0), f"rcdata.{name}", -1.0, 1.0) for name in names)
         self.sticks = Sticks(*values)
@@ -232,13 +253,7 @@ class Vehicle(Airframe):
         cos, sin = math.cos(heading), math.sin(heading)
         return cos * forward - sin * left, sin * forward + cos * left
 
-    @staticmethod
-    def _yaw(drivetrain: str, yaw: YawMode) -> YawMode:
-        if drivetrain == Drivetrain.FORWARD_ONLY and yaw.is_rate:
-            return YawMode(False, 0.0)
-        return yaw
 
-
-def _limit(timeout: float) -> float:
-    """Return a timeout that a pilot accepts; a negative one becomes 0."""
-    return min(max(timeout, 0.0), LONGEST)
+def limit(seconds: float) -> float:
+    """Return a timeout or duration that a pilot accepts; a negative one becomes 0."""
+    return min(max(seconds, 0.0), LONGEST)

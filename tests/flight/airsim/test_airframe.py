@@ -8,6 +8,7 @@ import torch
 from drone_rl.flight.airsim.messages import Pose
 from drone_rl.flight.airsim.settings_file import Offset
 from drone_rl.sim.coordinates import HOME, GeoPoint, geo_from_world
+from drone_rl.utils.errors import InputError
 from tests.flight.airsim.flying import BOX, FREE, KEEP, fly, make
 
 HALF = math.sqrt(0.5)
@@ -49,6 +50,23 @@ def test_collisions_latch_until_they_are_read():
     vehicle.set_airsim_pose(Pose((0.0, 0.0, -1.0), SAME), ignore_collision=True)
     vehicle.run(vehicle.period)
     assert not vehicle.collision()["has_collided"]
+
+
+def test_a_long_way_is_refused_before_it_takes_memory():
+    vehicle = make(obstacles=BOX)
+    there = Pose((1e9, 0.0, 0.0), SAME)
+    with pytest.raises(InputError, match=r"the pose is 1e\+09 m away; give ignore_collision=True"):
+        vehicle.set_airsim_pose(there, ignore_collision=False)
+
+
+def test_a_velocity_that_is_set_is_no_acceleration():
+    vehicle = make()
+    vehicle.run(vehicle.period)
+    vehicle.set_kinematics(Pose((0.0, 0.0, -9.0), SAME), (3.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    found = vehicle.kinematics()
+    assert [*found["linear_velocity"].values()] == [3.0, 0.0, 0.0]
+    assert [*found["linear_acceleration"].values()] == [0.0, 0.0, 0.0]
+    assert [*found["angular_acceleration"].values()] == [0.0, 0.0, 0.0]
 
 
 def test_line_of_sight():

@@ -5,8 +5,10 @@ import math
 import pytest
 import torch
 
-from drone_rl.flight.airsim.settings_file import Capture, Offset
+from drone_rl.flight.airsim.cameras import make_cameras
+from drone_rl.flight.airsim.settings_file import CameraChoice, Capture, Offset
 from drone_rl.sim.image_types import ImageType
+from drone_rl.sim.rendering.appearance import rotate
 from tests.flight.airsim.looking import look
 
 
@@ -24,9 +26,30 @@ def test_cameras_look_where_their_poses_say(empty):
     torch.testing.assert_close(same, down, rtol=1e-4, atol=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("camera", "angles", "ahead"),
+    [
+        ("bottom_center", {"yaw": 90.0}, (0.0, 0.0, -1.0)),
+        ("bottom_center", {"pitch": -45.0}, (math.sqrt(0.5), 0.0, -math.sqrt(0.5))),
+        ("back_center", {"pitch": -45.0}, (-math.sqrt(0.5), 0.0, -math.sqrt(0.5))),
+        ("front_center", {"yaw": 90.0}, (0.0, -1.0, 0.0)),
+    ],
+)
+def test_angles_that_are_not_given_stay(camera, angles, ahead):
+    made = make_cameras({}, {camera: CameraChoice(Offset(**angles))})[camera]
+    forward = torch.tensor([1.0, 0.0, 0.0], dtype=torch.float64)
+    assert rotate(made.attitude, forward).tolist() == pytest.approx(ahead, abs=1e-9)
+    assert made.capture(ImageType.SCENE) == Capture()
+
+
+def test_a_camera_without_settings_is_that_of_the_model():
+    for camera in make_cameras({}, {}).values():
+        vertical = 2 * math.degrees(math.atan(144 / 256))
+        assert camera.mounting(Capture(), vertical) is None
+
+
 def test_a_wider_camera_sees_the_same_pixel_closer_to_the_middle(cubes):
     cubes.reset()
-    cubes.clear_weather()
     wide = {"captures": {ImageType.DEPTH_PLANAR: Capture(32, 18, 120.0)}}
     narrow = look(cubes, kind=ImageType.DEPTH_PLANAR)
     broad = look(cubes, kind=ImageType.DEPTH_PLANAR, **wide)

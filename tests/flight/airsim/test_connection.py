@@ -3,11 +3,12 @@
 import contextlib
 import socket
 import time
+from unittest.mock import MagicMock
 
 import msgpack
 import pytest
 
-from drone_rl.flight.airsim.connection import MAX_MESSAGE
+from drone_rl.flight.airsim.connection import MAX_MESSAGE, Connection
 from tests.flight.airsim.conftest import CV, YAW, Client
 
 PING = bytes([0x94, 0x00, 0x00, 0xA4, *b"ping", 0x90])
@@ -87,6 +88,13 @@ def _flood(raw):
         time.sleep(0.01)
 
 
+def test_a_result_that_can_not_be_packed_is_an_error_of_its_call(start):
+    _, client = start('{"Vehicles": {"\\ud800": {}}}')  # half of a letter
+    error, _ = client.receive(client.send("listVehicles"))
+    assert error == "rpclib: function 'listVehicles' failed: UnicodeEncodeError."
+    assert client.call("ping") is True
+
+
 def test_notifications_are_not_answered(start):
     _, client = start(CV)
     client.socket.sendall(msgpack.packb([2, "ping", []]))
@@ -139,3 +147,23 @@ def test_a_client_that_dies_in_a_call_is_forgotten(start):
     again.call("simContinueForTime", 5.0)
     assert again.call("getMultirotorState")["landed_state"] == 1
     again.close()
+
+
+def test_closing_answers_requests_that_have_not_had_their_turn():
+    transport = MagicMock()
+    server = MagicMock(**{"must_wait.return_value": True})
+    connection = Connection(server)
+    connection.connection_made(transport)
+    connection.data_received(PING + msgpack.packb([2, "ping", []]))
+    transport.write.assert_not_called()
+    connection.close()
+    (answer,) = (msgpack.unpackb(call.args[0]) for call in transport.write.call_args_list)
+    assert answer == [1, 0, "the server has stopped; connect again", None]
+    transport.close.assert_called_once()
+
+
+def test_a_request_that_is_too_long_is_named_as_such(caplog):
+    connection = Connection(MagicMock())
+    connection.connection_made(MagicMock())
+    connection.data_received(b"\xc6" + (2**31 - 1).to_bytes(4, "big") + bytes(MAX_MESSAGE))
+    assert f"a request has more than {MAX_MESSAGE} bytes" in caplog.text

@@ -8,6 +8,7 @@ import torch
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.messages import Pose
 from drone_rl.utils.errors import InputError
+from tests.flight.airsim.conftest import pose
 
 HALF = math.sqrt(0.5)
 
@@ -47,6 +48,7 @@ def test_frames_by_hand():
         (lambda v: messages.text(v, "t"), 7, "t=7 is not a text"),
         (lambda v: messages.text(v, "t"), "x" * 10_001, "is not a text"),
         (messages.read_pose, 7, "pose=7 is not a map"),
+        (messages.read_pose, pose(2e6, 0.0, 0.0), "pose.position.x_val=2000000.0 is out of range"),
         (messages.read_pose, {"position": {}}, "pose.orientation=None is not a map"),
         (lambda v: messages.read_vector(v, "v"), {"x_val": 1, "y_val": 2}, "v.z_val=None"),
         (messages.read_path, [], "path is not a list of 1 to"),

@@ -23,5 +23,16 @@ def test_a_recording_is_a_table_and_images(start, tmp_path):
         assert Image.open(folder / "images" / name).size == (256, 144)
 
 
+def test_numpy_reads_rows_of_any_name(start, tmp_path):
+    text = """{"SimMode": "ComputerVision", "Vehicles": {"red drone #1": {}}}"""
+    _server, client = start(text, recordings=tmp_path)
+    client.call("startRecording")
+    client.call("simContinueForTime", 0.1)
+    client.call("stopRecording")
+    (table,) = tmp_path.glob("*/airsim_rec.txt")
+    rows = np.genfromtxt(table, names=True, dtype=None, encoding="utf-8")
+    assert set(rows["VehicleName"]) == {"red_drone__1"}
+
+
 def test_names_of_files_hold_letters_alone():
     assert to_letters("../a b/ü") == "___a_b__"

@@ -24,7 +24,7 @@ def test_any_error_of_the_start_reaches_the_caller_and_closes_the_simulation(mon
 def test_a_port_in_use_is_one_error():
     with (
         serve(scene="empty", port=0) as server,
-        pytest.raises(InputError, match=r"port \d+ of 127.0.0.1 can't be opened .*another port"),
+        pytest.raises(InputError, match=r"port \d+ of 127.0.0.1 can't be opened .*port or address"),
     ):
         serve(scene="empty", port=server.address[1])
 
@@ -55,6 +55,18 @@ def test_a_server_whose_thread_has_ended_closes_its_simulation(monkeypatch):
     server._thread.join(20)
     server.close()
     assert closed == [server.simulation]
+
+
+def test_calls_that_wait_when_the_server_stops_are_answered_with_an_error(start):
+    server, client = start(patience_s=60.0)
+    client.call("enableApiControl", True)
+    movement = client.send("takeoff", 20.0)
+    client.call("ping")
+    server.close()
+    error, _ = client.receive(movement)
+    assert error == "the server has stopped; connect again"
+    with pytest.raises(ConnectionError):
+        client.receive(movement)
 
 
 def test_an_open_address_is_warned_about(caplog):

@@ -1,5 +1,6 @@
 """settings.json as AirSim reads it, the chapter's listings verbatim, and wrong values."""
 
+import dataclasses
 import json
 import logging
 import math
@@ -103,6 +104,22 @@ def test_quotes_comments_and_commas(text, expected):
     assert json.loads("".join(_as_json(text))) == expected
 
 
+def test_many_slashes_after_a_comma_are_one_comment():
+    """A backtracking search would take more than a lifetime."""
+    text = '{"ClockSpeed": 2, ' + "/" * 200 + "\n" + "/* a */" * 50 + '"ApiServerPort": 5}'
+    assert parse_settings(text).port == 5
+
+
+def test_null_and_nan_mean_the_default():
+    given = dict.fromkeys(("SimMode", "UsageScenario", "ClockSpeed", "ApiServerPort"))
+    given["OriginGeopoint"] = {"Latitude": None}
+    text = json.dumps({**given, "Wind": {"X": math.nan, "Y": 2}})
+    plain = parse_settings('{"Wind": {"Y": 2}}')
+    assert dataclasses.replace(parse_settings(text), text=plain.text) == plain
+    (vehicle,) = parse_settings('{"Vehicles": {"A": {"AutoCreate": null}}}').vehicles
+    assert vehicle.name == "A"
+
+
 def test_unknown_keys_are_warned_about_and_others_are_not(caplog):
     with caplog.at_level(logging.WARNING):
         parse_settings('{"SimMod": "Multirotor", "ViewMode": "", "Vehicles": {"A": {"Xx": 1}}}')
@@ -134,6 +151,8 @@ def test_unknown_keys_are_warned_about_and_others_are_not(caplog):
         ("[]", "the file is not an object"),
         ("{'SimMode'}", "line 1 is not JSON"),
         ("{\n\n'a': }", "line 3 is not JSON"),
+        ("{/* a\n\n */\n'a': }", "line 4 is not JSON"),
+        ('{"a": ' + "1" * 5000 + "}", "too many digits"),
         ("[" * 100_000, "nested too deeply|not JSON"),
     ],
 )

@@ -4,9 +4,11 @@ import math
 
 import pytest
 
+from drone_rl.flight.airsim.messages import nanoseconds
 from drone_rl.flight.airsim.settings_file import parse_settings
 from drone_rl.flight.airsim.simulation import Simulation, Wait
 from drone_rl.utils.errors import InputError
+from tests.flight.airsim.conftest import pose
 
 
 @pytest.fixture
@@ -73,6 +75,12 @@ def test_continue_for_a_time_pauses_afterwards(make):
     assert simulation.time == pytest.approx(0.5, abs=simulation.tick)
 
 
+def test_continue_for_no_time_pauses_at_once(make):
+    simulation, answers = make(clock="lockstep"), []
+    simulation.wait_for(simulation.continue_for(0.0), answers.append)
+    assert answers == [None] and simulation.is_paused and simulation.time == 0.0
+
+
 def test_paused_wall_time_stands_still(make):
     simulation = make(clock="wall")
     simulation.pause(True)
@@ -88,6 +96,37 @@ def test_vehicles_are_found_by_name(make):
         simulation.find("Tow")
     with pytest.raises(InputError, match="Vehicle Sim-API for 'Tow' is not available"):
         simulation.find("Tow", is_pose=True)
+
+
+def test_time_stamps_of_vehicles_go_on_after_a_reset_and_from_their_creation(make):
+    simulation = make(clock="lockstep")
+    simulation.wait_for(simulation.continue_for(1.0), [].append)
+    simulation.advance(60.0, math.inf)
+    simulation.add_named("B", "simpleflight", pose(0.0, 5.0, 0.0))
+    now = nanoseconds(simulation.time)
+    assert now >= 1e9
+    assert simulation.find("B").multirotor_state()["timestamp"] == now
+    simulation.reset()
+    for vehicle in simulation.vehicles.values():
+        assert vehicle.multirotor_state()["timestamp"] == now
+        assert vehicle.rotor_states()["timestamp"] == now
+    simulation.wait_for(simulation.continue_for(1.0), [].append)
+    simulation.advance(60.0, math.inf)
+    read = [simulation.find("").sensor(kind)["time_stamp"] for kind in ("imu", "barometer")]
+    read.append(simulation.find("").collision()["time_stamp"])
+    assert min(read) > now and max(read) <= nanoseconds(simulation.time + 1e-6)  # float32
+
+
+def test_added_vehicles_have_the_heading_of_their_pose(make):
+    """They look east, 90 degrees to the right."""
+    simulation, half = make(), math.sqrt(0.5)
+    east = {"w_val": half, "x_val": 0.0, "y_val": 0.0, "z_val": half}
+    for kind in ("simpleflight", "computervision"):
+        simulation.add_named(kind, kind, pose(0.0, 5.0, 0.0, east))
+        assert simulation.find(kind).pose.attitude == pytest.approx((half, 0.0, 0.0, half))
+    unknown = dict.fromkeys(east, math.nan)
+    simulation.add_named("C", "simpleflight", pose(0.0, 9.0, 0.0, unknown))
+    assert simulation.find("C").pose.attitude == (1.0, 0.0, 0.0, 0.0)
 
 
 def test_reset_keeps_the_time_and_drops_api_control(make):

@@ -128,14 +128,13 @@ def test_ids_are_those_of_their_objects_only():
 
 def test_fog_and_night_darken_or_hide(cubes):
     cubes.reset()
-    cubes.clear_weather()
     clear = look(cubes)
     cubes.set_fog(1.0)
     assert not torch.equal(look(cubes), clear)
-    cubes.clear_weather()
+    cubes.set_fog(0.0)
     cubes.set_sun(-20.0)
     assert look(cubes).float().mean() < clear.float().mean()
-    cubes.clear_weather()
+    cubes.clear_sun()
     assert torch.equal(look(cubes), clear)
 
 

@@ -7,6 +7,7 @@ import pytest
 from drone_rl.flight.airsim.messages import Pose
 from drone_rl.flight.airsim.settings_file import Offset
 from drone_rl.flight.commands.command import PilotError
+from drone_rl.sim.dynamics.state import LOST
 from drone_rl.utils.errors import InputError
 from tests.flight.airsim.flying import FREE, KEEP, fly, make
 
@@ -75,6 +76,22 @@ def test_without_api_control_nothing_moves():
     vehicle.reset()
     assert not vehicle.has_api_control
     assert vehicle.pose.position == (0.0, 0.0, 0.0)
+
+
+def test_a_falling_vehicle_is_not_armed_and_says_so():
+    vehicle = make()
+    fly(vehicle, vehicle.takeoff(20.0))
+    assert vehicle.set_armed(True) is True
+    assert vehicle.set_armed(False) is True
+    vehicle.run(vehicle.period)
+    assert vehicle.set_armed(True) is False
+
+
+def test_a_lost_vehicle_asks_for_a_reset():
+    vehicle = make()
+    vehicle.body.numbers[:, LOST] = 1.0
+    with pytest.raises(PilotError, match="has diverged; call reset"):
+        vehicle.takeoff(20.0)
 
 
 def test_a_new_movement_cancels_the_old_one():

@@ -1,7 +1,7 @@
 """The RPC methods of AirSim's clients: versions 1.1, 1.2 to 1.8, and Cosys-AirSim 3.5.
 
-A method is found by its name. What dialect a call is in shows in its arguments: version 1.1 names
-no vehicle, and images are requested by camera numbers; Cosys' requests have an annotation name.
+A method is found by its name, and a client's version by the arguments: calls of version 1.1 name
+no vehicle and request images by camera numbers; Cosys' image requests have an annotation name.
 """
 
 from drone_rl.flight.airsim.methods import cameras as cameras

@@ -1,24 +1,25 @@
-"""Methods that render images, in the orders of channels of the three dialects."""
+"""Methods that render images, with the channel orders of the three dialects."""
 
 import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import torch
+from torch import Tensor
 
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.messages import Map, flag, text, whole
 from drone_rl.flight.airsim.methods.cameras import camera_in_world, read_camera
 from drone_rl.flight.airsim.methods.registry import method, posed_at
 from drone_rl.flight.airsim.simulation import Simulation
-from drone_rl.flight.airsim.stage import Shot, png
+from drone_rl.flight.airsim.stage import Shot, Stage, png
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.sim.image_types import ImageType
 from drone_rl.utils.errors import InputError
 
 MAX_IMAGES = 64
 """Images in one call."""
+_INFRARED = 7
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,13 +28,15 @@ class _Request:
     given: Any
     """The camera as the client called it."""
     kind: ImageType
+    is_infrared: bool
+    """Whether segmentation ids are shown in gray."""
     is_float: bool
     is_compressed: bool
     channels: str
     """Order of a raw image's channels: "rgba" in version 1.1, "bgr", or Cosys' "rgb"."""
 
 
-def _read_request(value: Any, channels: str | None = None) -> _Request:
+def _read_request(value: Any) -> _Request:
     if not isinstance(value, dict):
         raise InputError(
             "an image request is not a map; give ImageRequest(camera, image_type, ...)"
@@ -46,22 +49,29 @@ def _read_request(value: Any, channels: str | None = None) -> _Request:
     order = "rgba" if legacy else "rgb" if "annotation_name" in given else "bgr"
     return _Request(
         read_camera(camera),
-        camera,
-        _image_type(given["image_type"]),
+        camera if isinstance(camera, int) else text(camera, "camera_name"),
+        *_image_type(given["image_type"]),
         flag(given.get("pixels_as_float", False), "pixels_as_float"),
         flag(given.get("compress", True), "compress"),
-        channels or order,
+        order,
     )
 
 
-def _image_type(value: Any) -> ImageType:
+def _image_type(value: Any) -> tuple[ImageType, bool]:
+    """Return the type to render, and whether infrared is made from it."""
     found = whole(value, "image_type", 0, 10)
-    if found == 7:  # infrared: the segmentation id as gray
-        return ImageType.SEGMENTATION
+    if found == _INFRARED:
+        return ImageType.SEGMENTATION, True
     if found > ImageType.SURFACE_NORMALS:
         names = ", ".join(f"{kind.value} ({kind.name.lower()})" for kind in ImageType)
         raise InputError(f"image_type={found} is not supported; give one of: {names}")
-    return ImageType(found)
+    return ImageType(found), False
+
+
+def _pixels(stage: Stage, shot: Shot, kind: ImageType, is_infrared: bool, as_float: bool) -> Tensor:
+    if is_infrared:
+        return stage.infrared(shot, as_float=as_float)
+    return stage.image(kind, shot, as_float=as_float)
 
 
 @method("simGetImages", least=1)
@@ -82,8 +92,7 @@ def _images(simulation: Simulation, args: Sequence[Any]) -> list[Map]:
 
 
 def _response(simulation: Simulation, vehicle: Vehicle, request: _Request, shot: Shot) -> Map:
-    stage = simulation.stage
-    image = stage.image(request.kind, shot, as_float=request.is_float)
+    image = _pixels(simulation.stage, shot, request.kind, request.is_infrared, request.is_float)
     numbers: list[float] = []
     content = b""
     if request.is_float:
@@ -105,17 +114,17 @@ def _response(simulation: Simulation, vehicle: Vehicle, request: _Request, shot:
         "compress": request.is_compressed,
         "width": shot.capture.width,
         "height": shot.capture.height,
-        "image_type": int(request.kind),
+        "image_type": _INFRARED if request.is_infrared else int(request.kind),
     }
     response["camera_id" if legacy else "camera_name"] = (
-        request.given if legacy else text(str(request.given), "camera_name")
+        request.given if legacy else str(request.given)
     )
     if request.channels == "rgb":
         response["annotation_name"] = ""
     return response
 
 
-def _raw(image: torch.Tensor, channels: str) -> bytes:
+def _raw(image: Tensor, channels: str) -> bytes:
     pixels = image.numpy()
     if channels == "bgr":
         pixels = pixels[..., ::-1]
@@ -126,8 +135,8 @@ def _raw(image: torch.Tensor, channels: str) -> bytes:
 
 @method("simGetImage", least=2)
 def _image(simulation: Simulation, args: Sequence[Any]) -> bytes:
-    camera, kind = read_camera(args[0]), _image_type(args[1])
+    camera, (kind, is_infrared) = read_camera(args[0]), _image_type(args[1])
     vehicle = posed_at(simulation, args, 2)
     state = simulation.cameras[vehicle.choice.name][camera]
     (one,) = simulation.stage.render(vehicle.body, state, [kind])
-    return png(simulation.stage.image(kind, one, as_float=False))
+    return png(_pixels(simulation.stage, one, kind, is_infrared, as_float=False))

@@ -8,6 +8,7 @@ from typing import Any
 from drone_rl.flight.airsim.messages import number, read_path, read_yaw_mode
 from drone_rl.flight.airsim.methods.registry import argument, method, vehicle_at
 from drone_rl.flight.airsim.simulation import Simulation, Wait
+from drone_rl.flight.airsim.vehicle import limit
 from drone_rl.flight.commands.command import FlightFuture
 from drone_rl.flight.commands.path_following import AUTOMATIC
 from drone_rl.sim.coordinates import GeoPoint
@@ -25,12 +26,8 @@ def _flown(future: FlightFuture | None, name: str) -> Any:
 
 
 def _numbers(args: Sequence[Any], *names: str) -> list[float]:
-    """Return the first arguments, which have these names."""
+    """Return the first arguments, one for each name, as numbers."""
     return [number(value, name) for value, name in zip(args, names, strict=False)]
-
-
-def _seconds(value: float) -> float:
-    return min(max(value, 0.0), 1e6)
 
 
 @method("takeoff")
@@ -68,7 +65,7 @@ def _move_velocity(
     vehicle = vehicle_at(simulation, args, 6)
     future = vehicle.move_velocity(
         (vx, vy, 0.0 if has_height else vz),
-        min(seconds, 1e6),
+        limit(seconds),
         drivetrain,
         yaw,
         z=vz if has_height else None,
@@ -148,7 +145,7 @@ def _rotate_by(simulation: Simulation, args: Sequence[Any]) -> Any:
     rate, seconds = number(args[0], "yaw_rate", -3600.0, 3600.0), number(args[1], "duration")
     if seconds <= 0.0:
         return True
-    future = vehicle_at(simulation, args, 2).turn_by(rate, min(seconds, 1e6))
+    future = vehicle_at(simulation, args, 2).turn_by(rate, limit(seconds))
     return _flown(future, "rotateByYawRate")
 
 
@@ -157,7 +154,7 @@ def _manual(simulation: Simulation, args: Sequence[Any]) -> Any:
     vx, vy, z, seconds = _numbers(args, "vx_max", "vy_max", "z_min", "duration")
     drivetrain, yaw = read_yaw_mode(argument(args, 5, _HELD), argument(args, 4, 0))
     vehicle = vehicle_at(simulation, args, 6)
-    future = vehicle.move_manually(vx, vy, z, min(seconds, 1e6), drivetrain, yaw)
+    future = vehicle.move_manually(vx, vy, z, limit(seconds), drivetrain, yaw)
     return _flown(future, "moveByManual")
 
 
@@ -173,7 +170,7 @@ def _tilt(simulation: Simulation, args: Sequence[Any], *, order: str, name: str)
     *values, seconds = _numbers(args, *names, "duration")
     held = dict(zip(names, values, strict=True))
     vehicle = vehicle_at(simulation, args, 5)
-    return _flown(vehicle.tilt(seconds=_seconds(seconds), **held), name)
+    return _flown(vehicle.tilt(seconds=limit(seconds), **held), name)
 
 
 for _label, _order in (
@@ -193,7 +190,7 @@ def _spin(simulation: Simulation, args: Sequence[Any], *, lift: str, name: str) 
     names = ("roll_rate", "pitch_rate", "yaw_rate", lift, "duration")
     *rates, value, seconds = _numbers(args, *names)
     vehicle = vehicle_at(simulation, args, 5)
-    return _flown(vehicle.spin(rates, _seconds(seconds), **{lift: value}), name)
+    return _flown(vehicle.spin(rates, limit(seconds), **{lift: value}), name)
 
 
 for _label, _lift in (("moveByAngleRatesZ", "z"), ("moveByAngleRatesThrottle", "throttle")):
@@ -205,4 +202,4 @@ def _motors(simulation: Simulation, args: Sequence[Any]) -> Any:
     names = ("front_right", "rear_left", "front_left", "rear_right", "duration")
     *shares, seconds = _numbers(args, *names)
     vehicle = vehicle_at(simulation, args, 5)
-    return _flown(vehicle.set_rotors(shares, _seconds(seconds)), "moveByMotorPWMs")
+    return _flown(vehicle.set_rotors(shares, limit(seconds)), "moveByMotorPWMs")

@@ -5,22 +5,16 @@ from collections.abc import Sequence
 from typing import Any
 
 from drone_rl.flight.airsim.methods.registry import method
+from drone_rl.flight.airsim.methods.support import GAINS, NOT_SHOWN
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.utils.errors import InputError
 
 _log = logging.getLogger(__name__)
 
 
-def _accepted(simulation: Simulation, args: Sequence[Any]) -> None:
+@method(*NOT_SHOWN)
+def _accept(simulation: Simulation, args: Sequence[Any]) -> None:
     """Do nothing: what the call changes is only seen in Unreal's window."""
-
-
-_NOT_SHOWN = """
-simPrintLogMessage simSetTraceLine simFlushPersistentMarkers simPlotPoints simPlotLineStrip
-simPlotLineList simPlotArrows simPlotStrings simPlotTransforms simPlotTransformsWithNames
-simToggleCameraWindow
-"""
-method(*_NOT_SHOWN.split())(_accepted)
 
 
 @method("simRunConsoleCommand", "simSetLightIntensity")
@@ -29,13 +23,7 @@ def _refuse(simulation: Simulation, args: Sequence[Any]) -> bool:
     return False
 
 
-@method(
-    "setAngleRateControllerGains",
-    "setAngleLevelControllerGains",
-    "setVelocityControllerGains",
-    "setPositionControllerGains",
-    least=3,
-)
+@method(*GAINS, least=3)
 def _gains(simulation: Simulation, args: Sequence[Any]) -> None:
     """Accept the gains of AirSim's controller, which are fixed here."""
     for value, name in zip(args, ("kp", "ki", "kd"), strict=False):

@@ -17,7 +17,7 @@ class Method:
 
     compute: Callable[..., Any]
     least: int
-    """Fewest arguments; more than all are ignored."""
+    """Fewest arguments; surplus ones are ignored."""
 
 
 class UnknownMethodError(Exception):
@@ -73,10 +73,10 @@ def name_at(args: Sequence[Any], index: int) -> str:
 
 
 def vehicle_at(simulation: Simulation, args: Sequence[Any], index: int) -> Vehicle:
-    """Return the vehicle that an argument names, for its API."""
+    """Return the vehicle that an argument names; errors name its API, as in AirSim."""
     return simulation.find(name_at(args, index))
 
 
 def posed_at(simulation: Simulation, args: Sequence[Any], index: int) -> Vehicle:
-    """Return the vehicle that an argument names, for its API of the simulation."""
+    """Return the vehicle that an argument names; errors name its Sim-API, as in AirSim."""
     return simulation.find(name_at(args, index), is_pose=True)

@@ -34,7 +34,7 @@ def _object_pose(simulation: Simulation, args: Sequence[Any]) -> Map:
 def _set_object_pose(simulation: Simulation, args: Sequence[Any]) -> bool:
     name, pose = text(args[0], "object_name"), read_pose(args[1])
     if name in simulation.vehicles:
-        simulation.vehicles[name].set_airsim_pose(pose, ignore_collision=True)
+        simulation.move_vehicle(name, pose)
         return True
     return simulation.stage.move_object(name, to_world(pose.position))
 
@@ -53,7 +53,7 @@ def _set_object_scale(simulation: Simulation, args: Sequence[Any]) -> bool:
 def _read_scale(value: Any) -> float:
     scale = read_vector(value, "scale")
     if len({*scale}) > 1 or not 0.0 < scale[0] <= 100.0:
-        raise InputError(f"scale={list(scale)} is not supported; give one factor, 0 to 100")
+        raise InputError(f"scale={list(scale)} is not supported; give one factor up to 100")
     return scale[0]
 
 
@@ -113,7 +113,7 @@ def _set_wind(simulation: Simulation, args: Sequence[Any]) -> None:
 @method("simEnableWeather", least=1)
 def _enable_weather(simulation: Simulation, args: Sequence[Any]) -> None:
     if not flag(args[0], "enable"):
-        simulation.stage.clear_weather()
+        simulation.stage.set_fog(0.0)
 
 
 _FOG = 7
@@ -131,15 +131,15 @@ def _weather(simulation: Simulation, args: Sequence[Any]) -> None:
 @method("simSetTimeOfDay", least=1)
 def _time_of_day(simulation: Simulation, args: Sequence[Any]) -> None:
     if not flag(args[0], "is_enabled"):
-        simulation.stage.clear_weather()
+        simulation.stage.clear_sun()
         return
     hour = 12.0
     given = text(argument(args, 1, ""), "start_datetime")
-    found = re.search(r"(\d{1,2}):(\d{2})", given)
+    found = re.search(r"\b(\d|[01]\d|2[0-3]):([0-5]\d)", given)
     if given and not found:
         raise InputError(f"start_datetime={given!r} has no time; give YYYY-MM-DD HH:MM:SS")
     if found:
         hour = int(found[1]) + int(found[2]) / 60
     angle = (hour - 12.0) / 12.0 * 180.0
     elevation = math.degrees(math.asin(math.cos(math.radians(angle)) * 0.82))
-    simulation.stage.set_sun(elevation, 90.0 - angle)
+    simulation.stage.set_sun(elevation, 180.0 - angle)  # at noon in the south, behind

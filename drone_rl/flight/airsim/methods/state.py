@@ -46,10 +46,14 @@ def _set_kinematics(simulation: Simulation, args: Sequence[Any]) -> None:
     simulation.stage.touch(vehicle.body.position[0])
 
 
+_STRATOSPHERE = 11_000.0
+"""Altitude in metres from which temperature and pressure count as constant."""
+
+
 @method("simGetGroundTruthEnvironment")
 def _environment(simulation: Simulation, args: Sequence[Any]) -> Map:
     vehicle = posed_at(simulation, args, 0)
-    altitude = vehicle.geo_point()["altitude"]
+    altitude = min(vehicle.geo_point()["altitude"], _STRATOSPHERE)
     kelvin = 288.15 - 0.0065 * altitude
     pressure = 101325.0 * (kelvin / 288.15) ** 5.25588
     return {

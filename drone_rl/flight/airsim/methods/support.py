@@ -36,11 +36,24 @@ UNSUPPORTED = {
     "simGetDistortionParams": "lens distortion of Unreal",
 }
 """Methods that AirSim has and this server does not, with what is missing and the alternative."""
-
+GAINS = (
+    "setAngleRateControllerGains",
+    "setAngleLevelControllerGains",
+    "setVelocityControllerGains",
+    "setPositionControllerGains",
+)
+"""Methods that set the gains of AirSim's controller."""
+NOT_SHOWN = (
+    *("simPrintLogMessage", "simSetTraceLine", "simFlushPersistentMarkers"),
+    *("simPlotPoints", "simPlotLineStrip", "simPlotLineList", "simPlotArrows"),
+    *("simPlotStrings", "simPlotTransforms", "simPlotTransformsWithNames"),
+    "simToggleCameraWindow",
+)
+"""Methods that change only what Unreal's window shows."""
 
 PARTLY = {
     "simSpawnObject": "cube, sphere or cylinder, four of each; vehicles fly through them",
-    "simSetObjectPose": "positions, of the scene's objects, spawned ones and vehicles; no rotation",
+    "simSetObjectPose": "poses of vehicles; only positions of other objects",
     "simGetObjectScale": "one factor; 1 for objects that were not spawned",
     "simSetObjectScale": "one factor, of spawned objects",
     "simSetLightIntensity": "returns false: there are no lights by name; use simSetTimeOfDay",
@@ -60,22 +73,7 @@ PARTLY = {
     "simContinueForFrames": "a frame is a control period, 21 ms",
     "simTestLineOfSightToPoint": "boxes that can be touched hide; other objects do not",
     "simListAssets": "shapes for simSpawnObject",
-    **dict.fromkeys(
-        (
-            "setAngleRateControllerGains",
-            "setAngleLevelControllerGains",
-            "setVelocityControllerGains",
-            "setPositionControllerGains",
-        ),
-        "accepted, without effect: gains are settings of the dynamics",
-    ),
-    **dict.fromkeys(
-        (
-            *("simPrintLogMessage", "simSetTraceLine", "simFlushPersistentMarkers"),
-            *("simPlotPoints", "simPlotLineStrip", "simPlotLineList", "simPlotArrows"),
-            *("simPlotStrings", "simPlotTransforms", "simPlotTransformsWithNames"),
-        ),
-        "accepted, without effect: there is no window",
-    ),
+    **dict.fromkeys(GAINS, "accepted, without effect: gains are settings of the dynamics"),
+    **dict.fromkeys(NOT_SHOWN, "accepted, without effect: there is no window"),
 }
-"""Methods that do not all that AirSim's do, with what they do."""
+"""Methods that do only a part of what AirSim's do, with that part."""

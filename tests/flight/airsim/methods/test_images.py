@@ -48,6 +48,20 @@ def test_depth_as_numbers_by_hand(start):
     assert found["camera_position"]["z_val"] == pytest.approx(-9.9, abs=1e-5)
 
 
+def test_infrared_shows_segmentation_ids_in_gray(start):
+    _, client = start(SMALL)
+    client.call("simSetSegmentationObjectID", "Ground", 51, False)
+    raw, numbers = (
+        client.call("simGetImages", [request("3", 7, as_float=is_float)], "")[0]
+        for is_float in (False, True)
+    )
+    assert raw["image_type"] == numbers["image_type"] == 7
+    assert raw["image_data_uint8"] == b"\x33" * (16 * 8 * 3)
+    assert numbers["image_data_float"] == pytest.approx([0.2] * 128)
+    pixels = np.asarray(Image.open(BytesIO(client.call("simGetImage", "3", 7, ""))))
+    assert (pixels == (51, 51, 51, 255)).all()
+
+
 def test_floats_of_images_have_32_bits(start):
     _server, client = start(SMALL)
     number = client.send("simGetImages", [request(kind=1, as_float=True)], "")

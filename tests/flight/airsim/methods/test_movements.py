@@ -43,6 +43,15 @@ def test_all_movements_run(start):
         assert client.call(method, *args) is True, method
     assert client.call("moveByVelocity", 1.0, 0.0, 0.0, 0.0, 0, YAW) is True
     assert client.call("moveByVelocityZ", 1.0, 0.0, 0.0, 0.0, 0, YAW) is False
+    assert client.call("moveByManual", 2.0, 2.0, -3.0, -1.0, 0, YAW) is True
+
+
+def test_a_disarmed_vehicle_names_the_method_that_arms(start):
+    _, client = start()
+    client.call("enableApiControl", True)
+    client.call("armDisarm", False)
+    with pytest.raises(RuntimeError, match=r"not armed; call armDisarm\(True\)"):
+        client.call("takeoff", 20.0)
 
 
 def test_movements_without_api_control_return_false(start):

@@ -1,5 +1,7 @@
 """Objects, added vehicles, wind, weather and light."""
 
+import math
+
 import pytest
 
 from tests.flight.airsim.conftest import NAN, SMALL, YAW, pose
@@ -79,6 +81,47 @@ def test_weather_light_and_wind(start):
     assert client.call("simGetImage", "0", 0, "") != plain
 
 
+def test_the_pose_of_a_vehicle_as_an_object_is_in_the_world(start):
+    _, client = start('{"SimMode": "ComputerVision", "Vehicles": {"A": {"X": 8, "Y": 2, "Z": -1}}}')
+    found = client.call("simGetObjectPose", "A")
+    assert client.call("simSetObjectPose", "A", found, True) is True
+    assert client.call("simGetObjectPose", "A") == found
+    assert client.call("simSetObjectPose", "A", pose(9.0, NAN, -4.0), True) is True
+    assert [*client.call("simGetObjectPose", "A")["position"].values()] == [9.0, 2.0, -4.0]
+
+
+def test_a_vehicle_that_is_put_into_a_cube_as_an_object_collects_it(start):
+    _, client = start(SMALL, scene="cubes")
+    there = client.call("simGetObjectPose", "cube_0")
+    client.call("simAddVehicle", "A", "computervision", pose(0.0, 0.0, 0.0), "")
+    client.call("simSetObjectPose", "A", there, True)
+    gone = client.call("simGetObjectPose", "cube_0")["position"]["x_val"]
+    assert gone != gone
+
+
+def test_weather_and_time_of_day_end_apart(start):
+    _, client = start(SMALL, scene="cubes")
+    client.call("simSetWeatherParameter", 7, 0.8)
+    foggy = client.call("simGetImage", "0", 0, "")
+    client.call("simSetTimeOfDay", True, "2018-02-12 23:00:00")
+    client.call("simSetTimeOfDay", False)
+    assert client.call("simGetImage", "0", 0, "") == foggy
+    client.call("simSetTimeOfDay", True, "2018-02-12 23:00:00")
+    client.call("simEnableWeather", False)
+    night = client.call("simGetImage", "0", 0, "")
+    client.call("simSetTimeOfDay", True, "2018-02-12 23:00:00")
+    assert client.call("simGetImage", "0", 0, "") == night
+
+
+@pytest.mark.parametrize(("hour", "north", "west"), [(6, 0, -1), (12, -1, 0), (18, 0, 1)])
+def test_the_sun_rises_in_the_east_and_passes_the_south(start, hour, north, west):
+    server, client = start(SMALL)
+    given = []
+    server.simulation.stage.set_sun = lambda *angles: given.append(math.radians(angles[1]))
+    client.call("simSetTimeOfDay", True, f"2018-02-12 {hour:02}:00:00")
+    assert (math.cos(given[0]), math.sin(given[0])) == pytest.approx((north, west), abs=1e-9)
+
+
 def test_wind_pushes_the_drone(start):
     _, client = start('{"Wind": {"X": 0, "Y": 6, "Z": 0}}')
     client.call("enableApiControl", True)
@@ -92,6 +135,7 @@ def test_wind_pushes_the_drone(start):
         ("simSetWeatherParameter", (0, 0.5), "of the weather only fog"),
         ("simSetWind", ({"x_val": 99.0, "y_val": 0.0, "z_val": 0.0},), "wind=.*out of range"),
         ("simSetTimeOfDay", (True, "noon"), "has no time"),
+        ("simSetTimeOfDay", (True, "2018-02-12 99:99:00"), "has no time"),
     ],
 )
 def test_wrong_arguments_are_one_error(start, method, args, message):

@@ -29,6 +29,16 @@ def test_line_of_sight_and_rotors(start):
     )
 
 
+def test_the_stratosphere_has_an_air_of_its_own(start):
+    """216.65 K and 226 hPa from 11 km on, by the standard atmosphere."""
+    _, client = start(CV)
+    for height in (12e3, 9e5):
+        client.call("simSetVehiclePose", pose(0.0, 0.0, -height), True)
+        found = client.call("simGetGroundTruthEnvironment", "")
+        assert found["temperature"] == pytest.approx(216.65)
+        assert found["air_pressure"] == pytest.approx(22_632.0, rel=1e-3)
+
+
 def test_kinematics_are_set_and_go_on(start):
     """At 3 m/s to the east the drone is some 0.3 m further after 0.1 s."""
     _, client = start()
