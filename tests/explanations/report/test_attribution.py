@@ -109,6 +109,9 @@ def test_the_page_does_not_say_that_untested_maps_failed():
     )
     pictures = {"episode": "", "untrusted": {"1. first": ""}}
     found = {"attribution": ["No heat map was tested."], "untrusted": []}
-    html = template.render(policies=[{"name": "x", "found": found, "pictures": pictures}])
+    policy = {"name": "x", "numbers": {}, "found": found, "pictures": pictures}
+    html = template.render(policies=[policy])
     assert "Maps that are not trusted" in html
-    assert "did not pass" not in html
+    assert "did not pass" not in html and "tests the maps" not in html
+    policy["numbers"] = {"truth": {"trusted": None}}
+    assert "tests the maps" in template.render(policies=[policy])
