@@ -151,7 +151,7 @@ class Flight:
         """Turn recording on or off; a person then flies by the policy's actions."""
         if on and self.mode != "actions":
             self.set_mode("actions")
-            self.note = "Demonstrations consist of the policy's actions: you fly by these now."
+            self.note = "Demonstrations consist of the policy's actions, now your controls."
         if not on:
             self._finish_recording()
         self.recorder.is_on = on

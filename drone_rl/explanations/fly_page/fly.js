@@ -50,7 +50,7 @@ function connect() {
   socket.binaryType = "arraybuffer";
   socket.onopen = () => connection("connected", false);
   socket.onclose = () => {
-    held.clear();
+    letGoOfAll();
     connection("no connection: drone-rl fly has ended, or is too busy", true);
     setTimeout(connect, 2000);
   };
@@ -79,13 +79,18 @@ async function frame(buffer) {
     at += length;
     return createImageBitmap(blob).then(bitmap => [name, bitmap]);
   });
-  for (const [name, bitmap] of await Promise.all(parts)) {
+  const bitmaps = await Promise.all(parts);
+  pendingAcks += 1;
+  if (state && next.frame <= state.frame) { // a newer frame was decoded faster
+    bitmaps.forEach(([, bitmap]) => bitmap.close());
+    return;
+  }
+  for (const [name, bitmap] of bitmaps) {
     if (images[name]) images[name].close();
     images[name] = bitmap;
     fresh.add(name);
   }
-  pendingAcks += 1;
-  if (!state || next.frame > state.frame || next.episode !== state.episode) take(next);
+  take(next);
 }
 
 // State
@@ -232,6 +237,7 @@ $("saliency").addEventListener("change", () => send({ type: "saliency", on: $("s
 // Built once
 
 function begin() {
+  state = null; // the next frame updates what is built here, also after a lost connection
   set("name", hello.policy);
   set("task", `Task: ${hello.task.replaceAll("_", " ")}. The policy's actions: ${hello.actions.join(", ")}.`);
   buildPad();

@@ -1,6 +1,6 @@
 """Live heat maps: the method that passes the report's tests on this policy, if any does.
 
-The tests take some seconds. They run in another process, so that the flight goes on meanwhile.
+The tests take up to a minute. They run in another process, so that the flight goes on meanwhile.
 """
 
 import logging

@@ -5,6 +5,7 @@ own name: other pages in the same browser can't fly the drone.
 """
 
 import asyncio
+import contextlib
 import hmac
 import json
 import logging
@@ -13,6 +14,7 @@ import secrets
 import socket
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self
 
@@ -230,15 +232,15 @@ class FlyPage:
         if len(self._pages) >= MAX_PAGES:
             await socket.close(1013, f"{MAX_PAGES} pages are open")
             return
-        await socket.accept()
-        await socket.send_text(self._hello)
         page, self._loop = _Page(), asyncio.get_running_loop()
-        self._pages.add(page)
-        tasks = [
-            asyncio.create_task(page.send(socket)),
-            asyncio.create_task(self._receive(socket, page)),
-        ]
+        self._pages.add(page)  # before the first await: several pages may open at once
+        tasks: list[asyncio.Task[None]] = []
         try:
+            await socket.accept()
+            await socket.send_text(self._hello)
+            tasks = [
+                asyncio.create_task(of) for of in (page.send(socket), self._receive(socket, page))
+            ]
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
             self._pages.discard(page)
@@ -311,16 +313,23 @@ class FlyPage:
                 if given["type"] in ("hold", "sticks"):
                     self._holder = page
             except InputError as error:
-                if self._loop is not None:
-                    self._loop.call_soon_threadsafe(page.tell, str(error))
+                _call_soon(self._loop, page.tell, str(error))
 
     def _offer(self, frame: bytes) -> None:
         """Hand a frame to the server's thread, unless the last one is still to be taken."""
-        loop = self._loop
         with self._handing:
             is_waiting, self._frame = self._frame is not None, frame
-        if loop is not None and not is_waiting:
-            loop.call_soon_threadsafe(self._publish)
+        if not is_waiting:
+            _call_soon(self._loop, self._publish)
+
+
+def _call_soon(
+    loop: asyncio.AbstractEventLoop | None, function: Callable[..., None], *values: Any
+) -> None:
+    """Call a function in a loop's thread; do nothing if there is no loop, or it is closed."""
+    if loop is not None:
+        with contextlib.suppress(RuntimeError):  # closed: the server ended first
+            loop.call_soon_threadsafe(function, *values)
 
 
 def _listen(port: int) -> socket.socket:

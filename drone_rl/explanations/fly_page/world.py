@@ -191,7 +191,7 @@ class World:
     # What a person does
 
     def move(self, body: BodyState) -> None:
-        """Put the drone somewhere, without time or rules but one: cubes vanish when touched."""
+        """Put the drone somewhere. No time passes; the only rule is that touched cubes vanish."""
         self._forget()
         self._place(body)
         self.task.touch(self.worlds.state, body.position)
@@ -209,8 +209,7 @@ class World:
         """
         self.wind = speed, direction
         if self.has_dynamics:
-            own, chosen = self.flight_dynamics, self.policy.actions
-            self.worlds.dynamics = Quadrotor(own, chosen)
+            self.worlds.dynamics = Quadrotor(self.flight_dynamics, self.policy.actions)
             self._change()
 
     @property

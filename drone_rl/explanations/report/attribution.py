@@ -29,6 +29,11 @@ def is_shown(evidence: Evidence) -> bool:
     return trusted_method(evidence) in evidence["attribution"]["film"].get("heat_of", ())
 
 
+def _has_passed(evidence: Evidence, method: str) -> bool:
+    """Return whether a method passed the tests, also if another one did better."""
+    return bool(evidence["truth"]["methods"].get(method, {}).get("trusted"))
+
+
 def say_attribution(evidence: Evidence) -> Claims:
     """Say which heat map passed the tests, or that none is to be trusted."""
     name = trusted_method(evidence)
@@ -122,7 +127,8 @@ def _draw(explanation: Explanation) -> Figures:
     numbers = explanation.numbers
     method = trusted_method(numbers) if is_shown(numbers) else None
     drawn: dict[str, Any] = {"sequence": key_frames(explanation, method)} if method else {}
-    if method != numbers["attribution"].get("shown", "grad_cam"):
+    default = numbers["attribution"].get("shown", "grad_cam")
+    if not method or not (method == default or _has_passed(numbers, default)):
         drawn["untrusted"] = key_frames(explanation, None)
     return {**drawn, "episode": film(explanation, method)}
 

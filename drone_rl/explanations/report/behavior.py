@@ -223,8 +223,8 @@ def say_loops(evidence: Evidence) -> Claims:
 
 def pairs(explanation: Explanation, kind: str) -> dict[str, Image.Image]:
     """Return images of the worst pairs of a kind, left and right in turn, by caption."""
-    listed = explanation.numbers["contradictions"]["list"]
-    shown = [pair for pair in listed if pair["kind"] == kind][:MAX_PAIRS]
+    found = explanation.numbers["contradictions"]["list"]
+    shown = [pair for pair in found if pair["kind"] == kind][:MAX_PAIRS]
     return {
         f"pair {i}, frame {pair[side]}: more {side}": images.frame_with_probabilities(
             explanation.data, pair[side], f"frame {pair[side]}: more {side}", explanation.actions
@@ -243,6 +243,6 @@ FLAWS_PART = Part(
     needs=("contradictions", "loops"),
     text={"contradictions": say_contradictions, "loops": say_loops},
     draw=lambda explanation: {
-        f"pairs_{kind}": images for kind in KINDS if (images := pairs(explanation, kind))
+        f"pairs_{kind}": shown for kind in KINDS if (shown := pairs(explanation, kind))
     },
 )

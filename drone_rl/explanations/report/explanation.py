@@ -101,7 +101,7 @@ class Explanation:
 Media = Image.Image | Figure | NDArray
 """An image, a chart, or a film (T, H, W, 3), uint8, with sizes that are multiples of 16."""
 Figures = Mapping[str, Media | Mapping[str, Media]]
-"""Pictures by name; several under one name, by caption, are laid out side by side."""
+"""Figures by name; several under one name, by caption, are laid out side by side."""
 
 
 def _nothing(_: Any) -> dict[str, Any]:
@@ -132,7 +132,7 @@ class Part:
     extras: Callable[[Explanation], Mapping[str, Any]] = _nothing
     """Returns further values for the template."""
     compare: Callable[[Sequence[Explanation]], Figures] = _nothing
-    """Returns figures of all policies together."""
+    """Returns figures of all policies together; they are saved but not on the page."""
 
     def fits(self, explanation: Explanation) -> bool:
         """Return whether an explanation has the entries that this part shows."""

@@ -224,9 +224,8 @@ def _render(template: jinja2.Template, part: Part, policies: Sequence[Policy]) -
     """Return one part with all policies that it fits; None if there is none."""
     if not (fitting := [policy for policy in policies if part.fits(policy.explanation)]):
         return None
-    together = part.compare([policy.explanation for policy in fitting])
-    shared = _save(together, fitting[0].folder, "")
-    return Markup(template.render(policies=[p.show(part) for p in fitting], shared=shared))
+    _save(part.compare([policy.explanation for policy in fitting]), fitting[0].folder, "")
+    return Markup(template.render(policies=[policy.show(part) for policy in fitting]))
 
 
 def _save(drawn: Figures, folder: Path, prefix: str) -> dict[str, str | dict[str, str]]:
@@ -235,9 +234,10 @@ def _save(drawn: Figures, folder: Path, prefix: str) -> dict[str, str | dict[str
     for name, one in drawn.items():
         path = folder / f"{prefix}{name}"
         if isinstance(one, Mapping):
-            files = [path.with_name(f"{path.name}_{i}") for i in range(1, len(one) + 1)]
-            pairs = zip(one.items(), files, strict=True)
-            saved[name] = {caption: save_drawn(drawn, file) for (caption, drawn), file in pairs}
+            saved[name] = {
+                caption: save_drawn(media, path.with_name(f"{path.name}_{i}"))
+                for i, (caption, media) in enumerate(one.items(), start=1)
+            }
         else:
             saved[name] = save_drawn(one, path)
     return saved

@@ -21,14 +21,14 @@ LINES: Mapping[str, tuple[str, str]] = {
 }
 """Label and section of each line, by the word after "summary." in the names of its claims."""
 _SECTIONS = {
-    "dataset": "rollouts",
-    "tsne": "t-SNE",
-    "class_model": "class models",
-    "attribution": "heat maps",
-    "response": "response map",
-    "asymmetry": "asymmetry",
+    "dataset": ("dataset", "rollouts"),
+    "embedding": ("tsne", "t-SNE"),
+    "class_models": ("class_model", "class models"),
+    "attribution": ("attribution", "heat maps"),
+    "response": ("response", "response map"),
+    "asymmetry": ("asymmetry", "asymmetry"),
 }
-"""Names of sections that only the line "Not shown" mentions, by entry of explanation.json."""
+"""Sections that only the line "Not shown" mentions: entry of explanation.json, and display name."""
 
 
 def say_summary(evidence: Evidence) -> Claims:
@@ -146,8 +146,12 @@ def _say_limits(evidence: Evidence) -> Claims:
     if left_out:
         names = [name.replace("_", " ") for name in left_out]
         parts.append(f"what was left out ({', '.join(names)})")
-    missing = [label for key, label in _SECTIONS.items() if evidence.get(key) is None]
-    if missing and not left_out:
+    missing = [
+        label
+        for section, (key, label) in _SECTIONS.items()
+        if section not in left_out and evidence.get(key) is None
+    ]
+    if missing:
         parts.append(f"what was not run ({', '.join(missing)}; drone-rl explain adds it)")
     text = listed(parts)
     return {"summary.limits": f"{text[0].upper()}{text[1:]}."}

@@ -113,7 +113,7 @@ def heat_chart(explanation: Explanation) -> Figure:
     """Plot the fraction of each method's heat in each region of the frame."""
     figure, axis = new_chart()
     heat = explanation.numbers["truth"]["heat"]
-    first = next(iter(heat.values()))
+    first, *_ = heat.values()
     bars = [*((shares, "share") for shares in heat.values()), (first, "chance")]
     for y, (shares, of) in zip(range(len(heat), -1, -1), bars, strict=True):
         left = 0.0

@@ -143,7 +143,8 @@ def _check_values(arrays: Mapping[str, NDArray], data: Mapping[str, NDArray], co
     for given, most in ((data, limits), (arrays, {**limits, "places_ends": ends})):
         for name in most.keys() & given.keys():
             check_indices(given[name], max(1, most[name]), name)
-    if (np.diff(arrays.get("places_ends", np.empty(0))) < 0).any():
+    outlines = arrays.get("places_ends", np.empty(0)).astype(np.int64)  # unsigned ones can't fall
+    if (np.diff(outlines) < 0).any():
         raise InputError("places_ends decrease; run drone-rl explain again")
 
 

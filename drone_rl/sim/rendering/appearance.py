@@ -36,7 +36,10 @@ class Mounting:
 
 
 def moved(mounting: Mounting | None, offset: Tensor, turn: Tensor) -> Mounting:
-    """Translate a camera, (num_envs, 3), metres, then rotate it about itself, (num_envs, 4)."""
+    """Translate a camera, (num_envs, 3), metres, then rotate it about itself, (num_envs, 4).
+
+    Both are in the drone frame as the mounting has turned it.
+    """
     own = mounting or Mounting()
     before = torch.as_tensor(own.turn, dtype=offset.dtype).to(offset.device)
     there = torch.as_tensor(own.offset, dtype=offset.dtype).to(offset.device)

@@ -2,9 +2,10 @@
 
 import functools
 import os
+import re
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, nullcontext
 from types import ModuleType
 
@@ -21,16 +22,15 @@ _LOADING = threading.Lock()
 
 def check_device(device: str) -> None:
     """Raise an `InputError` unless a device is "cpu" or an available CUDA device."""
-    kind, _, number = device.partition(":")
-    if kind not in ("cpu", "cuda") or not (number or "0").isdecimal():
+    if not re.fullmatch("cpu|cuda(:[0-9]+)?", device):
         raise InputError(f"device={device} is unknown; give cpu, cuda or cuda:N")
     wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)  # the count below starts Warp
-    if kind == "cpu":
+    if device == "cpu":
         return
     count = torch.cuda.is_available() and wp.get_cuda_device_count()
     if not count:
         raise InputError(f"device={device}, but no CUDA GPU is usable here; give device=cpu")
-    if int(number or 0) >= count:
+    if int(device.partition(":")[2] or 0) >= count:
         raise InputError(
             f"device={device}, but only {count} CUDA GPUs are usable here; give cuda:0 to "
             f"cuda:{count - 1}"
@@ -79,7 +79,10 @@ class WorkerPool:
         self._executor = None if self.size == 1 else ThreadPoolExecutor(self.size, "render")
 
     def map_spans(self, first: int, last: int, work: Callable[[int, int, int], None]) -> None:
-        """Call `work(worker, begin, end)` for each worker's span of [first, last), and wait."""
+        """Call `work(worker, begin, end)` for each worker's span of [first, last), and wait.
+
+        An error of a worker is raised once all have ended.
+        """
         length = -(-(last - first) // self.size)
         spans = [(i, min(i + length, last)) for i in range(first, last, max(length, 1))]
         if self._executor is None or len(spans) < 2:
@@ -87,7 +90,10 @@ class WorkerPool:
                 work(worker, *span)
             return
         others = [self._executor.submit(work, i, *span) for i, span in enumerate(spans[1:], 1)]
-        work(0, *spans[0])
+        try:
+            work(0, *spans[0])
+        finally:
+            wait(others)
         for other in others:
             other.result()
 

@@ -71,7 +71,11 @@ class OpenGlAppearance:
         self._sizes = model.geom_size.copy()
 
     def apply(self, physics: mjcf.Physics, appearance: Appearance, upload: bool) -> None:
-        """Write the appearance of one environment; `upload` sends new textures to OpenGL."""
+        """Write the appearance of one environment; `upload` sends new textures to OpenGL.
+
+        It must give ambient light, sun, its direction and the sky's colour. Other colours, camera
+        and distractors stay as written before if it does not give them.
+        """
         model: Any = physics.model
         exposure = 1.0 if appearance.exposure is None else float(appearance.exposure)
         self._light(model, appearance, exposure)

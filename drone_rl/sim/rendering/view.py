@@ -55,8 +55,8 @@ class View:
             if modality not in supported:
                 known = ", ".join(name for name in MODALITIES if name in supported)
                 raise InputError(
-                    f"view {modality!r} can't be rendered by {type(renderer).__name__}; "
-                    f"ask for one of: {known}"
+                    f"modality={modality!r} can't be rendered by {type(renderer).__name__}; "
+                    f"give one of: {known}"
                 )
 
     def new_images(

@@ -235,6 +235,27 @@ def test_a_lost_connection_is_shown(tmp_path):
         until(browser, "return $('connection').classList.contains('bad')")
 
 
+def test_a_page_that_connects_again_shows_the_same_controls(browser):
+    browser.execute_script("window.earlier = hello; hold('test', 'forward'); socket.close()")
+    until(browser, "return !document.querySelector('#pad .held')")
+    until(browser, "return hello !== earlier")
+    until(browser, "return document.querySelector('#pad [data-control=up]').hidden", seconds=10)
+    assert "100%" in browser.find_element(By.ID, "sliders").text
+
+
+def test_a_frame_that_is_decoded_late_does_not_bring_back_the_last_episode(browser):
+    late, shown = browser.execute_async_script(
+        """const done = arguments[0], late = {...state, episode: state.episode - 1, images: []};
+        late.frame -= 1;
+        const text = new TextEncoder().encode(JSON.stringify(late));
+        const message = new Uint8Array(4 + text.length);
+        new DataView(message.buffer).setUint32(0, text.length, true);
+        message.set(text, 4);
+        frame(message.buffer).then(() => done([late.episode, state.episode]));"""
+    )
+    assert shown == late + 1
+
+
 def test_no_error_in_the_console(session):
     severe = [one["message"] for one in session.get_log("browser") if one["level"] == "SEVERE"]
     assert severe == []

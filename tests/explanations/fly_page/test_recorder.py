@@ -77,7 +77,7 @@ def test_recording_switches_to_the_policys_actions(make_flight, written):
     flight = make_flight(mode="simple_flight")
     flight.handle({"type": "record", "on": True})
     state = state_of(flight)
-    assert state["mode"] == "actions" and "by these now" in state["note"]
+    assert state["mode"] == "actions" and "now your controls" in state["note"]
     press(flight, "forward")
     flight.handle({"type": "mode", "mode": "computer_vision"})  # ends this demonstration
     press(flight, "forward")

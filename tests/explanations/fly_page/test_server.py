@@ -1,7 +1,10 @@
 """The server: refusals, slow pages, wrong messages, and flights through the page's protocol."""
 
+import asyncio
 import contextlib
+import functools
 import json
+import queue
 import socket
 import sys
 import threading
@@ -381,3 +384,42 @@ def test_frames_are_handed_over_under_a_lock():
     assert page._kept is None
     server.FlyPage._offer(page, b"3")
     assert len(scheduled) == 2
+
+
+def test_pages_that_open_at_the_same_time_are_counted():
+    """More pages than allowed, all of which wait to be accepted, must not be let in."""
+
+    class Socket:
+        async def accept(self):
+            await asyncio.sleep(0.01)
+            accepted.append(self)
+
+        async def send_text(self, text):
+            pass
+
+        async def receive(self):
+            return {"type": "websocket.disconnect"}
+
+        async def close(self, code, reason):
+            refused.append(code)
+
+    async def open_all():
+        await asyncio.gather(*(page._talk(Socket()) for _ in range(server.MAX_PAGES + 2)))
+
+    accepted, refused = [], []
+    page = types.SimpleNamespace(_pages=set(), _hello="{}", _messages=queue.SimpleQueue())
+    page._talk = functools.partial(server.FlyPage._talk, page)
+    page._receive = functools.partial(server.FlyPage._receive, page)
+    asyncio.run(open_all())
+    assert len(accepted) == server.MAX_PAGES and refused == [1013, 1013]
+    assert not page._pages
+
+
+def test_a_frame_that_is_ready_after_the_server_has_ended_is_dropped():
+    loop = asyncio.new_event_loop()
+    loop.close()
+    page = types.SimpleNamespace(
+        _loop=loop, _handing=threading.Lock(), _frame=None, _publish=lambda: None
+    )
+    server.FlyPage._offer(page, b"1")
+    assert page._frame == b"1"

@@ -11,6 +11,7 @@ from drone_rl.explanations.report.attribution import (
     say_attribution,
     say_untrusted,
 )
+from drone_rl.utils.display import page_environment
 
 STEPS = 5
 
@@ -91,3 +92,26 @@ def test_empty_maps_are_counted_and_no_reason_is_made_up():
     assert found["attribution.stand_in"].startswith("On 1 of the 4 steps")
     assert found["attribution.no_heat"] == "On 1 of the 4 steps, the map is zero everywhere."
     assert "because" not in " ".join(found.values())
+
+
+def test_a_map_that_passed_but_is_not_the_best_is_not_called_untrusted(explanation):
+    methods = {"saliency": {"trusted": True}, "grad_cam": {"trusted": True}}
+    explanation.numbers["truth"] = {"trusted": "saliency", "methods": methods}
+    explanation.numbers["attribution"]["film"]["heat_of"] = ["saliency"]
+    assert [*PART.draw(explanation)] == ["sequence", "episode"]
+    methods["grad_cam"]["trusted"] = False
+    assert [*PART.draw(explanation)] == ["sequence", "untrusted", "episode"]
+
+
+def test_the_page_does_not_say_that_untested_maps_failed():
+    template = page_environment("drone_rl.explanations.report").get_template(
+        "sections/attribution.html"
+    )
+    pictures = {"episode": "", "untrusted": {"1. first": ""}}
+    found = {"attribution": ["No heat map was tested."], "untrusted": []}
+    policy = {"name": "x", "numbers": {}, "found": found, "pictures": pictures}
+    html = template.render(policies=[policy])
+    assert "Maps that are not trusted" in html
+    assert "did not pass" not in html and "tests the maps" not in html
+    policy["numbers"] = {"truth": {"trusted": None}}
+    assert "tests the maps" in template.render(policies=[policy])

@@ -86,6 +86,9 @@ def test_the_exact_map_is_zoomed_and_shown_whole_again(browser):
     assert [float(v) for v in element.get_dom_attribute("viewBox").split()] == [
         float(v) for v in whole
     ]
+    margin = element.size["width"] // 2 - 2, element.size["height"] // 2 - 2
+    ActionChains(browser).move_to_element_with_offset(element, *margin).perform()
+    assert "goes " not in browser.find_element(By.CSS_SELECTOR, "#places .where").text
 
 
 def test_it_fits_a_phone(browser):

@@ -1,5 +1,6 @@
 """Where explanations are found, and what becomes of those that lack something."""
 
+import json
 import os
 
 import pytest
@@ -44,3 +45,13 @@ def test_what_lacks_something_is_a_mistake_of_the_file(monkeypatch, tmp_path, er
     monkeypatch.setattr(page, "write_report", fail)
     with pytest.raises(InputError, match="lack entries that a report needs"):
         report([tmp_path], tmp_path)
+
+
+def test_an_explanation_without_heat_of_any_method_is_refused(explanations, tmp_path):
+    numbers = json.loads((explanations[0] / "explanation.json").read_text())
+    numbers["truth"]["heat"] = {}
+    for name in ("arrays.npz", "dataset.npz"):
+        (tmp_path / name).write_bytes((explanations[0] / name).read_bytes())
+    (tmp_path / "explanation.json").write_text(json.dumps(numbers))
+    with pytest.raises(InputError, match="lack entries that a report needs"):
+        report([tmp_path], tmp_path / "report")

@@ -46,3 +46,10 @@ def test_what_was_not_run_is_said_with_the_command_that_adds_it():
     assert speak()["summary.limits"] == (
         "Real cameras and drones, other colours, light or sizes and what was left out (embedding)."
     )
+
+
+def test_sections_that_were_not_run_are_named_also_if_others_were_left_out():
+    assert speak(tsne=None, response=None)["summary.limits"] == (
+        "Real cameras and drones, other colours, light or sizes, what was left out (embedding) and "
+        "what was not run (response map; drone-rl explain adds it)."
+    )

@@ -104,3 +104,9 @@ def test_a_wrong_number(path, value, message):
 def test_an_array_that_fits_no_other(name, value, message):
     with pytest.raises(InputError, match=message):
         check_files(NUMBERS, {**ARRAYS, name: value}, DATA, SHOWN_MOVES)
+
+
+def test_unsigned_ends_of_outlines_may_not_decrease_either():
+    outlines = {"places_ends": np.array([5, 3], np.uint64), "places_labels": np.zeros(2, int)}
+    with pytest.raises(InputError, match="places_ends decrease"):
+        check_files(NUMBERS, {**ARRAYS, **outlines}, DATA, SHOWN_MOVES)

@@ -13,9 +13,10 @@ from drone_rl.utils.errors import InputError
 from tests.forked import run_forked
 
 
-def test_unknown_device_raises():
-    with pytest.raises(InputError, match="device=tpu is unknown; give cpu, cuda or cuda:N"):
-        check_device("tpu")
+@pytest.mark.parametrize("device", ["tpu", "cpu:0", "cuda:", "cuda:0x"])
+def test_unknown_device_raises(device):
+    with pytest.raises(InputError, match=f"device={device} is unknown; give cpu, cuda or cuda:N"):
+        check_device(device)
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")

@@ -1,4 +1,5 @@
 import threading
+import time
 
 import pytest
 
@@ -44,3 +45,17 @@ def test_worker_exceptions_reach_the_caller(pool):
 
     with pytest.raises(KeyError, match="2"):
         pool.map_spans(0, 3, fail)
+
+
+def test_the_callers_own_error_is_raised_after_the_others_have_ended(pool):
+    ended = []
+
+    def fail_first(worker, first, last):
+        if worker == 0:
+            raise KeyError(first)
+        time.sleep(0.05)
+        ended.append(worker)
+
+    with pytest.raises(KeyError, match="0"):
+        pool.map_spans(0, 3, fail_first)
+    assert sorted(ended) == [1, 2]

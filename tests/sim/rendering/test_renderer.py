@@ -48,7 +48,7 @@ def test_worlds_use_a_custom_renderer():
 def test_unsupported_view_raises_one_line():
     worlds = Worlds(2, renderer=OneColour)
     with pytest.raises(
-        InputError, match="'depth' can't be rendered by OneColour; ask for one of: rgb"
+        InputError, match="modality='depth' can't be rendered by OneColour; give one of: rgb"
     ):
         worlds.render(worlds.state, worlds.view(modality="depth"))
 

@@ -131,7 +131,7 @@ def test_invalid_views_raise(worlds):
 def test_unsupported_view_raises_one_line(worlds, renderer):
     view = worlds.view()
     object.__setattr__(view, "modalities", ("heat",))  # as a view for another renderer
-    with pytest.raises(InputError, match=f"'heat' can't be rendered by {renderer.__name__}; ask"):
+    with pytest.raises(InputError, match=f"'heat' can't be rendered by {renderer.__name__}; give"):
         worlds.prepare(view)
 
 

@@ -56,6 +56,6 @@ def test_unsupported_modality_raises():
     VIEW.check_modalities(object(), {"rgb"})
     depth = dataclasses.replace(VIEW, modalities=("rgb", "depth"))
     with pytest.raises(
-        InputError, match=r"'depth' can't be rendered by object; ask for one of: rgb$"
+        InputError, match=r"modality='depth' can't be rendered by object; give one of: rgb$"
     ):
         depth.check_modalities(object(), {"rgb"})

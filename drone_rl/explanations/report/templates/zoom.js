@@ -19,11 +19,11 @@ document.querySelectorAll(".exact").forEach(figure => {
     event.preventDefault();
   }, { passive: false });
   map.addEventListener("pointerdown", event => { held = at(event); map.setPointerCapture(event.pointerId); });
-  map.addEventListener("pointerup", () => { held = null; });
+  for (const end of ["pointerup", "pointercancel"]) map.addEventListener(end, () => { held = null; });
   map.addEventListener("pointermove", event => {
     const { x, y } = at(event);
     if (held) { box[0] -= x - held.x; box[1] -= y - held.y; show(); }
-    const action = event.target.querySelector("title");
+    const action = event.target.querySelector(":scope > title"); // none while the map itself is held
     where.textContent = `${(-y).toFixed(3)} m ahead, ${Math.abs(x).toFixed(3)} m to the ${x < 0 ? "left" : "right"}` +
       (action ? `: ${action.textContent}` : "");
   });
