@@ -246,7 +246,7 @@ def _class_models(settings: FigureSettings, subjects: list[Policy]) -> _Made:
 def _attributions(settings: FigureSettings, subjects: list[Policy]) -> _Made:
     """Figs. 13 to 15: Grad-CAM of the sampled action in six frames."""
     (subject,) = subjects
-    data, network, scenes = _record(subject, settings, 1, 20, every=True)
+    data, network, scenes = _record(subject, settings, None, 20)
     task: Any = scenes.task
     rows = _spread_by_side(data.offset(task)[:, 1], task.settings.touch_distance)
     explainer = Explainer(network, scenes.observe(empty_scene(scenes))[0])
@@ -276,25 +276,27 @@ _MAKERS: Mapping[int, _Maker] = {
 
 
 def _record(
-    subject: Policy, settings: FigureSettings, frames: int, episodes: int, *, every: bool = False
+    subject: Policy, settings: FigureSettings, frames: int | None, episodes: int
 ) -> tuple[RolloutDataset, Any, Scenes]:
     """Return frames of episodes with sampled actions, the network and the scenes.
 
-    The numbers of frames and episodes are those of the settings, or the given ones. `every`
-    returns all frames.
+    The numbers of frames and episodes are those of the settings, or the given ones. If `frames` is
+    None, all frames are returned.
     """
-    frames, episodes = settings.frames or frames, settings.episodes or episodes
+    episodes = settings.episodes or episodes
+    if frames is not None:
+        frames = settings.frames or frames
     network = subject.make_network()
     layer = feature_layer(network)
     with subject.in_task(step_length=STEP_LENGTH).flying(episodes, seed=settings.seed) as made:
         env, actor = made
         flights, scenes = collect(env, actor, num_episodes=episodes), Scenes(env)
-        if frames > len(flights):
+        if frames is not None and frames > len(flights):
             raise InputError(
                 f"frames={frames} is more than the {len(flights)} of {episodes} episodes of policy "
                 f"{subject.name}; give fewer frames or more episodes"
             )
-        rows = np.arange(len(flights)) if every else select_frames(flights.episode, frames)
+        rows = select_frames(flights.episode, frames or len(flights))
         return (
             render_frames(flights, rows, scenes, network, (layer,) if layer else ()),
             network,

@@ -273,7 +273,7 @@ def gaussian_blur(images: Tensor, sigma: float) -> Tensor:
 
 
 def _differences(images: Tensor) -> Tensor:
-    """Return the mean absolute difference of neighbouring pixels. Shape: (N,)."""
+    """Return the mean absolute difference of vertical plus that of horizontal neighbours. (N,)."""
     down = (images[..., 1:, :] - images[..., :-1, :]).abs().mean((1, 2, 3))
     across = (images[..., 1:] - images[..., :-1]).abs().mean((1, 2, 3))
     return down + across

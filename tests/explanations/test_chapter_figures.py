@@ -44,7 +44,7 @@ def test_class_models_have_the_chapters_settings():
 
 
 def test_attributions_show_cubes_to_both_sides():
-    found = drone_rl.reproduce(15)
+    found = drone_rl.reproduce(15, frames=10**6)  # only of t-SNE and of the search for a pair
     assert len(found.numbers["frames"]) == 6 and "<img" in found._repr_html_()
 
 
