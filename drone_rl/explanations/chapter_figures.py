@@ -138,7 +138,8 @@ _Maker = Callable[[FigureSettings, list[Policy]], _Made]
 def _three_states(settings: FigureSettings, subjects: list[Policy]) -> _Made:
     """Fig. 3: REINFORCE on the process, and its gradient next to the exact one."""
     del subjects
-    runs = [train_three_state(60, seed=settings.seed + i) for i in range(5)]
+    seeds = [(settings.seed + i) % 2**64 for i in range(5)]  # torch's generators take 64 bits
+    runs = [train_three_state(60, seed=seed) for seed in seeds]
     figure = Figure(figsize=(9, 3.4), layout="constrained")
     left, right = figure.subplots(1, 2)
     for run in runs:
@@ -148,7 +149,7 @@ def _three_states(settings: FigureSettings, subjects: list[Policy]) -> _Made:
     left.axhline(1.0, color=css(MUTED), linestyle="--", label="optimal policy")
     left.set(xlabel="updates of 8 episodes", ylabel="probability of a1 in s0", ylim=(0, 1.04))
     left.legend(loc="lower right", frameon=False)
-    estimates = sample_gradients(300, seed=settings.seed)
+    estimates = sample_gradients(300, seed=seeds[0])
     exact = float(exact_gradient([0.5] * 3).sum())
     spread = 1.96 * float(estimates.std()) / len(estimates) ** 0.5
     right.hist(estimates.numpy(), bins=25, color=css(MUTED), label="estimates (Eq. 12)")
