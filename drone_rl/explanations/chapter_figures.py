@@ -120,7 +120,8 @@ def reproduce(
         changes: Changes to the settings, as in `reproduce(8, tint="sampled")`.
 
     Raises:
-        InputError: There is no such figure, or the episodes have fewer frames than asked for.
+        InputError: There is no such figure, the episodes have fewer frames than asked for, or in
+            Fig. 9 the policy moves to one side only.
     """
     settings = (settings or FigureSettings()).replace(figure=figure, **changes)
     if figure not in _MAKERS:
