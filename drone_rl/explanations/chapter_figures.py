@@ -120,7 +120,8 @@ def reproduce(
         changes: Changes to the settings, as in `reproduce(8, tint="sampled")`.
 
     Raises:
-        InputError: There is no such figure, or the episodes have fewer frames than asked for.
+        InputError: There is no such figure, the episodes have fewer frames than asked for, or in
+            Fig. 9 the policy moves to one side only.
     """
     settings = (settings or FigureSettings()).replace(figure=figure, **changes)
     if figure not in _MAKERS:
@@ -138,7 +139,8 @@ _Maker = Callable[[FigureSettings, list[Policy]], _Made]
 def _three_states(settings: FigureSettings, subjects: list[Policy]) -> _Made:
     """Fig. 3: REINFORCE on the process, and its gradient next to the exact one."""
     del subjects
-    runs = [train_three_state(60, seed=settings.seed + i) for i in range(5)]
+    seeds = [(settings.seed + i) % 2**64 for i in range(5)]  # torch's generators take 64 bits
+    runs = [train_three_state(60, seed=seed) for seed in seeds]
     figure = Figure(figsize=(9, 3.4), layout="constrained")
     left, right = figure.subplots(1, 2)
     for run in runs:
@@ -148,7 +150,7 @@ def _three_states(settings: FigureSettings, subjects: list[Policy]) -> _Made:
     left.axhline(1.0, color=css(MUTED), linestyle="--", label="optimal policy")
     left.set(xlabel="updates of 8 episodes", ylabel="probability of a1 in s0", ylim=(0, 1.04))
     left.legend(loc="lower right", frameon=False)
-    estimates = sample_gradients(300, seed=settings.seed)
+    estimates = sample_gradients(300, seed=seeds[0])
     exact = float(exact_gradient([0.5] * 3).sum())
     spread = 1.96 * float(estimates.std()) / len(estimates) ** 0.5
     right.hist(estimates.numpy(), bins=25, color=css(MUTED), label="estimates (Eq. 12)")
@@ -246,7 +248,7 @@ def _class_models(settings: FigureSettings, subjects: list[Policy]) -> _Made:
 def _attributions(settings: FigureSettings, subjects: list[Policy]) -> _Made:
     """Figs. 13 to 15: Grad-CAM of the sampled action in six frames."""
     (subject,) = subjects
-    data, network, scenes = _record(subject, settings, 1, 20, every=True)
+    data, network, scenes = _record(subject, settings, None, 20)
     task: Any = scenes.task
     rows = _spread_by_side(data.offset(task)[:, 1], task.settings.touch_distance)
     explainer = Explainer(network, scenes.observe(empty_scene(scenes))[0])
@@ -276,25 +278,27 @@ _MAKERS: Mapping[int, _Maker] = {
 
 
 def _record(
-    subject: Policy, settings: FigureSettings, frames: int, episodes: int, *, every: bool = False
+    subject: Policy, settings: FigureSettings, frames: int | None, episodes: int
 ) -> tuple[RolloutDataset, Any, Scenes]:
     """Return frames of episodes with sampled actions, the network and the scenes.
 
-    The numbers of frames and episodes are those of the settings, or the given ones. `every`
-    returns all frames.
+    The numbers of frames and episodes are those of the settings, or the given ones. If `frames` is
+    None, all frames are returned.
     """
-    frames, episodes = settings.frames or frames, settings.episodes or episodes
+    episodes = settings.episodes or episodes
+    if frames is not None:
+        frames = settings.frames or frames
     network = subject.make_network()
     layer = feature_layer(network)
     with subject.in_task(step_length=STEP_LENGTH).flying(episodes, seed=settings.seed) as made:
         env, actor = made
         flights, scenes = collect(env, actor, num_episodes=episodes), Scenes(env)
-        if frames > len(flights):
+        if frames is not None and frames > len(flights):
             raise InputError(
                 f"frames={frames} is more than the {len(flights)} of {episodes} episodes of policy "
                 f"{subject.name}; give fewer frames or more episodes"
             )
-        rows = np.arange(len(flights)) if every else select_frames(flights.episode, frames)
+        rows = select_frames(flights.episode, frames or len(flights))
         return (
             render_frames(flights, rows, scenes, network, (layer,) if layer else ()),
             network,

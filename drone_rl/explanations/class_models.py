@@ -18,6 +18,7 @@ from drone_rl.explanations.hooks import actions_of
 from drone_rl.explanations.settings import ClassModelSettings
 from drone_rl.policies import ImageNetwork
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import plain_generator
 
 OBJECTIVES: tuple[Objective, ...] = ("probability", "logit")
 NO_GRADIENTS = (
@@ -144,7 +145,7 @@ def visualise(
     seed: int = 0,
 ) -> Attempts:
     """Optimize observations for each action from random starts; the network is not changed."""
-    generator, shape = torch.Generator().manual_seed(seed), network.in_shape
+    generator, shape = plain_generator(seed), network.in_shape
     num_actions = len(actions_of(network).names)
     start = torch.rand(settings.starts, *shape, generator=generator)
     start = statistics.low + (statistics.high - statistics.low) * start
@@ -273,7 +274,7 @@ def gaussian_blur(images: Tensor, sigma: float) -> Tensor:
 
 
 def _differences(images: Tensor) -> Tensor:
-    """Return the mean absolute difference of neighbouring pixels. Shape: (N,)."""
+    """Return the mean absolute difference of vertical plus that of horizontal neighbours. (N,)."""
     down = (images[..., 1:, :] - images[..., :-1, :]).abs().mean((1, 2, 3))
     across = (images[..., 1:] - images[..., :-1]).abs().mean((1, 2, 3))
     return down + across

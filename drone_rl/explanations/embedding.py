@@ -63,6 +63,8 @@ def embed(
     """
     flat = originals.reshape(len(originals), -1).astype(np.float64)
     check_perplexity(perplexity, len(flat))
+    if flat.shape[1] == 1:
+        flat = flat.repeat(2, 1)  # openTSNE starts from two principal components
     if not np.isfinite(flat).all():
         raise InputError("features hold a value that is not finite; the policy's weights are bad")
     centred = flat - flat.mean(0)

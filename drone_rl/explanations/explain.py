@@ -107,7 +107,7 @@ def explain(
         changes: Settings to change, as in `explain("good", frames=100)`.
 
     Raises:
-        InputError: A policy or a setting is unusable.
+        InputError: A policy or a setting is unusable, or the folder can't be written.
     """
     settings, seed = with_seed((settings or ExplainSettings()).replace(**changes))
     Whole(1).read(num_envs, "num_envs")

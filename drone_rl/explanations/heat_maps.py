@@ -72,7 +72,7 @@ class Explainer:
         return _in_batches(attribute, observations, actions).sum(1)
 
     def saliency(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """Return the absolute gradient of the probability. Shape: (T, H, W)."""
+        """Return the absolute gradient of the probability, summed over channels. (T, H, W)."""
         method = Saliency(self._forward("probability"))
         attributed = _in_batches(lambda x, a: method.attribute(x, target=a), observations, actions)
         return attributed.abs().sum(1)

@@ -41,12 +41,12 @@ def layers(network: ImageNetwork) -> dict[str, tuple[nn.Module, tuple[int, ...]]
 
 
 def find_layer(network: ImageNetwork, name: str) -> nn.Module:
-    """Return the layer of that name; if there is none, raise InputError with those that exist."""
-    found = dict(network.parts.named_modules()).get(name) if name else None
-    if found is None or [*found.children()]:
-        there = ", ".join(layers(network)) or "none, because it is no torch module made of layers"
+    """Return one of `layers` by name; if there is none, raise InputError with those that exist."""
+    found = layers(network)
+    if name not in found:
+        there = ", ".join(found) or "none, because it is no torch module made of layers"
         raise InputError(f"layer={name} is not in the policy; choose from: {there}")
-    return found
+    return found[name][0]
 
 
 def spatial_layers(network: ImageNetwork) -> list[str]:

@@ -19,6 +19,7 @@ from torch.nn import functional
 from drone_rl.explanations.hooks import BATCH, actions_of, probabilities
 from drone_rl.policies import ImageNetwork
 from drone_rl.utils.intervals import episode_means, mean_bounds
+from drone_rl.utils.seeding import plain_generator
 
 PATCHES = 40  # approximate number of patches of a frame
 UNMOVED = 1e-4  # frames on which every patch has a smaller effect are left out of tests of maps
@@ -174,7 +175,7 @@ def placebo_maps(
     Observations and `others`, see `alternatives`, are (T, C, h, w), `absent` is (C, h, w).
     """
     count, _, height, width = observations.shape
-    generator = torch.Generator().manual_seed(seed)
+    generator = plain_generator(seed)
     differs = difference(observations, absent)
     return {
         "ones": torch.ones(count, height, width),
@@ -233,7 +234,7 @@ def shuffled_networks(
     unless constant, are rescaled to the policy's mean and standard deviation on observations
     (T, C, h, w). The first copies do not depend on `count`.
     """
-    generator = torch.Generator().manual_seed(seed)
+    generator = plain_generator(seed)
     with torch.no_grad():
         wanted_deviation, wanted_mean = torch.std_mean(network(observations), 0, correction=0)
     for _ in range(count):

@@ -249,9 +249,8 @@ def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, Any]:
     }
 
 
-_COMPARED = (
-    1000  # rendered frames that are compared with the closed form; fewer than drone-rl places
-)
+_COMPARED = 1000
+"""Rendered frames that are compared with the closed form; fewer than in `drone-rl places`."""
 
 
 def places_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:

@@ -118,7 +118,9 @@ def collect(
     Only observations are rendered. `meta` is the origin of the policy.
     """
     worlds = worlds_of(env)
-    collector = EpisodeCollector(env, _WithTruth(actor, (*worlds.task.entries, *_POSE)))
+    after = [("next", "info", name) for name in worlds.task.entries]
+    reader = _WithTruth(actor, (*worlds.task.entries, *_POSE))
+    collector = EpisodeCollector(env, reader, next_keys=after)
     batches = []
     with set_exploration_type(ExplorationType.RANDOM):
         while collector.episodes < num_episodes or collector.frames < num_frames:
@@ -200,7 +202,7 @@ def _arrays(batch: TensorDictBase, task: Task[Any], actions: Actions) -> dict[st
         "observations": cast(Tensor, batch["pixels"]),
         **actions.kept(cast(Tensor, batch["action"])),
         "rewards": cast(Tensor, batch["next", "reward"])[:, 0],
-        "event": _events(task, info, starts, end_reason),
+        "event": _events(task, info, cast(Mapping[str, Tensor], batch["next", "info"])),
         **{name: info[name] for name in _POSE},
         **task.remember(info),
         "episode": number,
@@ -210,15 +212,11 @@ def _arrays(batch: TensorDictBase, task: Task[Any], actions: Actions) -> dict[st
     return {name: value.cpu().numpy() for name, value in arrays.items()}
 
 
-def _events(
-    task: Task[Any], info: Mapping[str, Tensor], starts: Tensor, end_reason: Tensor
-) -> Tensor:
+def _events(task: Task[Any], before: Mapping[str, Tensor], after: Mapping[str, Tensor]) -> Tensor:
     """Return 1 where an action reaches a goal, -1 where it misses one, else 0. Shape: (T,)."""
-    is_last = torch.cat([starts[1:], starts.new_ones(1)])
-    reached, missed = (
-        torch.where(is_last, 0, torch.diff(count, append=count[-1:])) for count in task.tally(info)
-    )
-    is_reached = (reached > 0) | (is_last & (end_reason == task.success_end))
+    counts = zip(task.tally(before), task.tally(after), strict=True)
+    reached, missed = (then - now for now, then in counts)
+    is_reached = (reached > 0) | (after["end_reason"][:, 0] == task.success_end)
     return torch.where(is_reached, 1, -(missed > 0).long()).to(torch.int8)
 
 

@@ -13,6 +13,7 @@ from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transform
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import State
+from drone_rl.utils.seeding import plain_generator
 
 DARK_GROUND = Appearance(colors={SemanticClass.GROUND: (0.25, 0.25, 0.22)})
 DARK = Appearance(colors={**DARK_GROUND.colors, SemanticClass.SKY: (0.3, 0.36, 0.45)})
@@ -144,7 +145,7 @@ def alternatives(scenes: Scenes, state: State, seed: int = 0) -> dict[str, Tenso
     These are: no targets; targets at random places, `PLACEMENTS` times; ground and sky darker, and
     brighter. Unlike a gray box, they are similar to observations that the policy was trained on.
     """
-    generator = torch.Generator().manual_seed(seed)
+    generator = plain_generator(seed)
     found = {"no targets": scenes.observe(scenes.task.without_targets(state))}
     for i in range(PLACEMENTS):
         other = scenes.task.elsewhere(state, scenes.worlds.camera, generator)

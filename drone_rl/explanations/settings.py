@@ -97,6 +97,8 @@ class ClassModelsSettings(ClassModelSettings):
 def check_perplexity(perplexity: float, count: int) -> None:
     """Raise InputError if a perplexity is not possible for `count` points."""
     largest = (count - 1) // 3
+    if largest < 1:
+        raise InputError(f"t-SNE needs 4 or more points, got {count}; record more frames")
     if not 1 <= perplexity <= largest:
         raise InputError(
             f"perplexity={perplexity:g} does not fit {count} points; give 1 to {largest} or "

@@ -39,7 +39,8 @@ def check_counts(numbers: Mapping[str, Any], task: Task[Any]) -> None:
             _refuse(_wrong_level(level, numbers, task), f"{where}.levels.{i}")
         share = plain["success"]["share"]
         areas = {mode: success_area(along["levels"], share, Mode(mode)) for mode in along["areas"]}
-        if not all(_is_same(areas[mode], along["areas"][mode]) for mode in areas):
+        is_same = all(_is_same(areas[mode], along["areas"][mode]) for mode in areas)
+        if not is_same or "constant" not in areas:
             raise InputError(f"{where}.areas is not that of its shares; {_REMEDY}")
     _refuse(_wrong_level(numbers["together"], numbers, task), "together")
 
@@ -70,6 +71,9 @@ def check_probe(found: Mapping[str, Any], episodes: int, where: str) -> None:
     Raises:
         InputError: It contradicts itself.
     """
+    for name in ("success", "worst"):
+        if found["refused"] is None and name not in found:
+            raise InputError(f"{where} is not refused, and has no {name}; {_REMEDY}")
     success = found.get("success")
     if success is not None and abs(success * episodes - round(success * episodes)) > 1e-6:
         raise InputError(f"{where}.success is not a fraction of {episodes} episodes; {_REMEDY}")

@@ -250,9 +250,7 @@ def _check_axis(axis: Axis, along: Mapping[str, Any], of: Any, where: str) -> No
     strengths = [axis.strengths[level["number"] - 1] for level in levels]
     tested = [(level["value"], level["position"]) for level in levels]
     if not is_own or tested != [(axis.value(s, of), axis.position(s)) for s in strengths]:
-        raise InputError(f"{where} has other strengths or units than drone-rl shifts flies")
-    if any(not level["refused"] and MODES[0] not in level["modes"] for level in levels):
-        raise InputError(f"{where} tells nothing of constant conditions")
+        raise InputError(f"{where} has other strengths or units than drone-rl shifts tests")
 
 
 def _check_domain(numbers: Mapping[str, Any], of: Any) -> None:
@@ -263,7 +261,10 @@ def _check_domain(numbers: Mapping[str, Any], of: Any) -> None:
     check_probe(domain["plain"], episodes, "domain.plain")
     for name, found in domain["ranges"].items():
         if name not in numbers["axes"]:
-            raise InputError(f"domain.ranges.{name} contradicts its tested strengths")
+            raise InputError(
+                f"domain.ranges.{name} is of an axis that axes does not have; run drone-rl shifts "
+                "again"
+            )
         check_range(AXES[name].of(of), found, of, numbers)
         for failure in found["failed"]:
             check_probe(failure, episodes, f"domain.ranges.{name}.failed")

@@ -350,7 +350,9 @@ def lacking(shifts: Evidence, name: str, need: Mapping[str, float | None]) -> st
         return None
     lost = [f for f in found["failed"] if f["impossible"] and short[f["end"]]]
     more = "; more is impossible even for the oracle" if lost else ""
-    return f"{needed}, good {_span(*good, along['unit'])}{more}"
+    is_clear = math.isinf(good[0])  # only air without fog has an infinite lower limit
+    where = f"only without {NAMES[name]}" if is_clear else _span(*good, along["unit"])
+    return f"{needed}, good {where}{more}"
 
 
 def _number(value: float | None) -> float:

@@ -98,7 +98,10 @@ class Suite:
         }
 
     def _fly_oracle(self, condition: Condition) -> ConditionResult:
-        """Run the oracle without light, colours and noise, which do not affect it."""
+        """Run the oracle; if a condition changes nothing that affects it, reuse the first run.
+
+        Light, colours and faults that hide nothing do not affect it.
+        """
         faults = tuple(fault for fault in condition.faults if fault.hides)
         kept = dataclasses.replace(condition, appearance_changes=(), faults=faults)
         if kept == Condition() and self.oracle is not None:

@@ -128,6 +128,11 @@ def side_stream(random_state: np.random.RandomState, *key: int) -> np.random.Gen
     return np.random.Generator(np.random.PCG64(child))
 
 
+def plain_generator(seed: int) -> torch.Generator:
+    """Return a torch generator seeded by the seed itself, of which it uses the last 64 bits."""
+    return torch.Generator().manual_seed(seed % 2**64)
+
+
 def torch_generator(
     seed: int, stream: Stream, *, number: int = 0, device: torch.device | str = "cpu"
 ) -> torch.Generator:

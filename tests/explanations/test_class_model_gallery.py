@@ -42,6 +42,11 @@ def test_gallery_shows_each_refinement():
     assert height > len(GALLERY) * 25 and width > 3 * 64
 
 
+def test_a_seed_may_be_longer_than_64_bits():
+    found = drone_rl.class_models("good", steps=1, starts=1, episodes=1, seed=2**64)
+    assert found.seed.value == 2**64
+
+
 def test_images_that_diverge_are_an_error():
     with pytest.raises(InputError, match="lr=1e\\+09 the images diverge"):
         drone_rl.class_models(

@@ -176,7 +176,7 @@ def test_points_that_are_equal_are_moved_by_next_to_nothing():
 def test_smallest_and_largest_perplexity():
     module.check_perplexity(1, 4)
     module.check_perplexity(33, 100)
-    for perplexity, count in ((0.9, 100), (33.1, 100), (1, 3)):
+    for perplexity, count in ((0.9, 100), (33.1, 100)):
         with pytest.raises(InputError, match="does not fit"):
             module.check_perplexity(perplexity, count)
 
@@ -210,3 +210,14 @@ def test_cells_are_spread_over_all_rows_and_columns():
         [2, 0],
         [3, 1],
     ]
+
+
+def test_features_of_one_dimension_are_embedded():
+    points, found = embed(np.linspace(0.0, 1.0, 40)[:, None], perplexity=5)
+    assert points.shape == (40, 2)
+    assert found["neighbours_kept"] > 2 * found["neighbours_chance"]
+
+
+def test_too_few_points_for_any_perplexity_are_counted(clusters):
+    with pytest.raises(InputError, match="t-SNE needs 4 or more points, got 3"):
+        embed(clusters[:3], perplexity=1)

@@ -82,7 +82,7 @@ def test_layers_from_elsewhere_stand_in_the_order_in_which_they_act(elsewhere):
     torch.testing.assert_close(features(elsewhere, x, "body.1"), body[1](body[0](x)))
 
 
-@pytest.mark.parametrize("name", ["head", "", "body"])
+@pytest.mark.parametrize("name", ["head", "", "body", "twice", "never", "memory"])
 def test_what_is_no_layer(elsewhere, name):
     with pytest.raises(InputError, match=r"choose from: body\.0, body\.1, .*, head\.last$"):
         find_layer(elsewhere, name)

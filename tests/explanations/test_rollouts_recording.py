@@ -1,8 +1,16 @@
+from contextlib import closing
+
 import numpy as np
 import pytest
+import torch
 
+from drone_rl.config import TaskSettings
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.explanations.rollouts import collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes
+from drone_rl.policies import ExternalNetwork, make_actor
+from drone_rl.sim.actions import MOVES
+from drone_rl.sim.tasks import CollectCubes
 
 
 @pytest.fixture
@@ -48,3 +56,19 @@ def test_drawn_frames_are_those_that_were_asked_for(flights, world):
     np.testing.assert_array_equal(seen.observations, flights.observations[rows])
     assert len(seen.features["relu1"]) == len(seen.frames) == 2
     np.testing.assert_allclose(seen.probabilities.sum(-1), 1, atol=1e-6)
+
+
+def test_a_cube_missed_by_the_last_step_is_an_event():
+    task = TaskSettings(num_cubes=1, first_distance=10.0, lateral_bound=8.0, front_margin=0.5)
+    env = with_transforms(DroneEnv(20, seed=0, task=task), [GrayPixels(), StandardizePixels()])
+    with closing(env):
+        network = ExternalNetwork(always_forward, (1, 25, 64), MOVES)
+        flown = collect(env, make_actor(network, env.action_spec), num_episodes=20)
+    ends = np.append(flown.episode[1:] != flown.episode[:-1], True)
+    is_reached = flown.end_reason[ends] == CollectCubes.success_end
+    assert 0 < is_reached.sum() < 20
+    np.testing.assert_array_equal(flown.event[ends], np.where(is_reached, 1, -1))
+
+
+def always_forward(observations):
+    return torch.tensor([100.0, 0.0, 0.0]).repeat(len(observations), 1)

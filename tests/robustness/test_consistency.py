@@ -71,10 +71,22 @@ def test_no_strength_is_good_at_which_the_counts_say_otherwise(good, numbers):
     ],
 )
 def test_a_strength_has_to_agree_with_itself(change, message):
-    found = {"good": False, "bad": True, "refused": None, "success": 0.5, "oracle": share(1, 400)}
+    found = {"good": False, "bad": True, "refused": None, "success": 0.5, "worst": None}
+    found["oracle"] = share(1, 400)
     check_probe(found, 400, "here")
     with pytest.raises(InputError, match=message):
         check_probe({**found, **change}, 400, "here")
+
+
+@pytest.mark.parametrize("name", ["success", "worst"])
+def test_a_strength_that_is_allowed_has_figures(name):
+    refused = {"good": False, "bad": True, "refused": "task.cube_size=9"}
+    check_probe(refused, 400, "here")
+    found = {**refused, "refused": None, "success": 0.5, "worst": None}
+    check_probe(found, 400, "here")
+    del found[name]
+    with pytest.raises(InputError, match=f"here is not refused, and has no {name}; run drone-rl"):
+        check_probe(found, 400, "here")
 
 
 def test_numbers_are_compared_up_to_rounding():

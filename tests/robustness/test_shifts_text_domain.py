@@ -82,6 +82,9 @@ def test_fog_is_needed_up_to_none():
     assert lacking(shifts, "fog", {"low": 80.0, "high": None}) is None
     found = lacking(shifts, "fog", {"low": 60.0, "high": None})
     assert "needed 60 and more m of sight, good 80 and more m of sight" in found
+    clear = changed(shifts, {"domain.ranges.fog.low": None, "domain.ranges.fog.positions": [0, 0]})
+    found = lacking(clear, "fog", {"low": 60.0, "high": None})
+    assert found == "fog: needed 60 and more m of sight, good only without fog"
 
 
 def test_what_new_episodes_say_against_a_file():

@@ -13,6 +13,7 @@ from drone_rl.utils.seeding import (
     fresh_seed,
     get_state,
     legacy_seed,
+    plain_generator,
     root_seed,
     seed_sequence,
     set_state,
@@ -169,6 +170,12 @@ def test_a_part_of_an_analysis_has_the_seed_of_the_whole():
     whole = RootSeed(2**47, is_fixed=False)
     part, seed = with_seed(JudgeSettings(seed=3), whole)
     assert (part.seed, seed) == (2**47, whole)
+
+
+def test_seeds_of_any_length_have_a_generator():
+    one, long = (torch.rand(3, generator=plain_generator(seed)) for seed in (5, 2**64 + 5))
+    assert torch.equal(one, torch.rand(3, generator=torch.Generator().manual_seed(5)))
+    assert torch.equal(one, long)
 
 
 def test_a_long_seed_is_shortened_for_generators_of_32_bits():
