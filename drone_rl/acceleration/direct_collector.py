@@ -34,7 +34,7 @@ class DirectCollector:
         self.renderer, self.actor, self.action_key = renderer, actor, action_key
         self.keep_actor_entries = keep_actor_entries
         self.reasons = Reasons()
-        """Why the collector is not fused; empty if it need not be."""
+        """Why the collector is not fused; empty if no fused collector was requested."""
         self._actor_keys = tuple(actor_keys)
 
     @property

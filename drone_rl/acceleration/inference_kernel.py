@@ -66,7 +66,7 @@ class BatchedInference:
         return logits
 
     def _workspace(self) -> wp.array:
-        """Each thread has one."""
+        """Return this thread's workspace."""
         if not hasattr(self._own, "workspace"):
             self._own.workspace = wp.empty(self._packed.workspace_size, dtype=float, device="cpu")
         return self._own.workspace

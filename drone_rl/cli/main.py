@@ -26,7 +26,7 @@ examples
   drone-rl train -m seed=0,1,2         one run for each value, in parallel
   drone-rl train resume=RUN_FOLDER     resume an interrupted run
   drone-rl evaluate                    evaluate the newest policy
-  drone-rl explain policy=good         explain a policy of the package
+  drone-rl explain policy=good         explain a shipped policy
   drone-rl COMMAND --help              the most used settings of a command, and examples
   drone-rl COMMAND --help all          every setting of a command
   drone-rl --version                   the version

@@ -33,7 +33,7 @@ class ServeCommand(CommandSettings):
     port: Annotated[int, Whole(0, 65535)] | None = None
     """Port; null for that of the settings file, 41451 by default; 0 for a free one."""
     seed: Annotated[int, Whole(0, 2**31 - 1)] = 0
-    """Seed of the cubes' placement, of gusts and of sensor noise."""
+    """Seed of the placement of cubes and pillars, of gusts and of sensor noise."""
     renderer: RendererName | None = None
     """raytrace or mujoco_warp; null for the one that fits the scene."""
 

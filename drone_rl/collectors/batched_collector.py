@@ -39,7 +39,7 @@ class BatchedCollector(BaseCollector):
         """
         if len(env.batch_size) != 1:
             raise InputError(
-                f"env has batch size {list(env.batch_size)}; give a batch of environments"
+                f"env has batch size {list(env.batch_size)}; give one with one batch dimension"
             )
         super().__init__()
         self.env = env

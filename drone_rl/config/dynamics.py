@@ -112,14 +112,14 @@ class DynamicsSettings(Settings):
         if largest > others * (1.0 + 1e-9):
             raise InputError(
                 f"inertia={list(self.inertia)} is that of no body: {largest:g} is more than the "
-                f"other two together; give at most {others:g}"
+                f"other two together; give at most {_rounded(others, up=False):g}"
             )
         weight, most = self.mass * GRAVITY, 4.0 * self.rotor_thrust
         if most < _HEADROOM * weight:
             raise InputError(
                 f"rotor_thrust={self.rotor_thrust:g} is too small to control the drone: four "
-                f"rotors give {most:.3g} N, needed are {_HEADROOM} times its weight, "
-                f"{_HEADROOM * weight:.3g} N; give at least {_HEADROOM * weight / 4:.3g}"
+                f"rotors give {most:.4g} N, needed are {_HEADROOM} times its weight, "
+                f"{_HEADROOM * weight:.4g} N; give at least {_rounded(_HEADROOM * weight / 4):g}"
             )
 
     def check_air(self) -> None:
@@ -130,6 +130,12 @@ class DynamicsSettings(Settings):
                 f"dynamics.{name}={value} moves nothing in computer-vision mode; give "
                 'dynamics=quadrotor, too (in Python mode="simple_flight")'
             )
+
+
+def _rounded(bound: float, *, up: bool = True) -> float:
+    """Round a positive bound to three digits, to the side that satisfies it."""
+    scale = 10.0 ** (2 - math.floor(math.log10(bound)))
+    return (math.ceil if up else math.floor)(bound * scale) / scale
 
 
 COMPUTER_VISION = DynamicsSettings()
@@ -150,7 +156,8 @@ class ActionSettings(Settings):
     """Speed of the position setpoint during a move, in m/s; in computer-vision mode a move is the
     task's step."""
     move_lead: Annotated[float, Real(0.01, 100.0, unit="m")] = 0.5
-    """Largest distance from the drone to the position setpoint, in metres."""
+    """Largest distance along x and along y from the drone to the position setpoint at the start of
+    a move, in metres."""
     forward_speed: Speed = 4.0
     """Largest forward speed command, in m/s; there is no backward command."""
     sideways_speed: Speed = 3.0

@@ -1,4 +1,4 @@
-"""Settings of return estimators, objectives, optimizers, schedules of their rate and collectors."""
+"""Settings of return estimators, objectives, optimizers, learning-rate schedules and collectors."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
@@ -41,7 +41,7 @@ class SuccessScaled(_Discounted, target="success_scaled"):
     """Discounted return scaled by exp(reward - max_reward) (variant 3)."""
 
     max_reward: Annotated[float, Real(0.0, 1e6)] = 3.0
-    """Reward of a perfect episode: the task's cubes."""
+    """Reward of a perfect episode: the task's `largest_reward`."""
 
 
 class TimeBaseline(_Discounted, target="time_baseline"):
@@ -83,7 +83,7 @@ class Collector(Variant):
     number of steps of each."""
     num_threads: Annotated[int, Whole(1, unit="threads")] = 1
     """Groups of environments that are collected in parallel, each by its own thread or worker. Each
-    samples actions from its own stream, so results for a seed differ."""
+    samples actions from its own stream, so results for a seed depend on their number."""
 
     def arguments(self) -> dict[str, Any]:
         """Return nothing: the factory takes the settings of the whole training."""
@@ -95,7 +95,7 @@ class CompleteEpisodes(Collector):
 
     compiled: bool = True
     """Run whole episodes in one fused kernel if it supports task, camera and network, which is much
-    faster on a CPU. It samples actions in a different order, so results for a seed differ."""
+    faster on a CPU. It samples actions in a different order, so results for a seed depend on it."""
 
 
 class Episodes(CompleteEpisodes, target="episodes"):

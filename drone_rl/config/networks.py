@@ -14,7 +14,7 @@ class Network(Variant):
 
 
 class SmallCnn(Network, target="small_cnn"):
-    """Network for small images, at a tenth of the original network's cost."""
+    """Network for small images: two convolutions without pooling."""
 
     patch: Annotated[int, Whole(1, 64, "pixels")] = 4
     """Size and stride of the first convolution, pixels."""

@@ -201,18 +201,25 @@ class DroneEnv(EnvBase):
                 f"actions have the shape {tuple(action.shape)}; give {self.action_spec.shape}, as "
                 "env.action_spec says"
             )
-        try:
-            reward[env_ids, 0] = self.worlds.step(env_ids, action[env_ids]).float()
-        except IndexError:
-            raise InputError(
-                f"actions from {int(action.min())} to {int(action.max())} are not all in "
-                f"{self.action_spec.space}; give whole numbers of env.action_spec"
-            ) from None
+        taken = action[env_ids]
+        self._check_range(taken)
+        reward[env_ids, 0] = self.worlds.step(env_ids, taken).float()
         self._render(env_ids)
         terminated, truncated = (flag[:, None] for flag in self.worlds.ends())
         done = terminated | truncated
         flags = {"done": done, "terminated": terminated, "truncated": truncated}
         return self._observe({"reward": reward, **flags})
+
+    def _check_range(self, action: Tensor) -> None:
+        """Raise an `InputError` for indices of actions that there are not."""
+        if action.is_floating_point() or not len(action):
+            return
+        count, low, high = self.action_spec.space.n, int(action.min()), int(action.max())
+        if low < 0 or high >= count:
+            raise InputError(
+                f"actions from {low} to {high} are not all in 0 to {count - 1}; give indices of "
+                "env.action_spec"
+            )
 
     def _render(self, env_ids: Tensor) -> None:
         if not self.pixels:

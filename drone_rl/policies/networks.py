@@ -188,7 +188,7 @@ class OriginalCNN(PolicyNetwork):
 
 @implements(SmallCnn)
 class SmallCNN(PolicyNetwork):
-    """A patch convolution, 3x3 convolutions and linear layers: a tenth of `OriginalCNN`'s cost.
+    """A patch convolution, 3x3 convolutions and linear layers.
 
     Initial weights are orthogonal, the logits near zero (a uniform first policy).
     """

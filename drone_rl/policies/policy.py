@@ -64,8 +64,9 @@ class BasePolicy(abc.ABC):
     def unlike(self) -> dict[str, dict[str, Any]]:
         """Settings of `dynamics` that differ from its own: "own" and "flown" values by name."""
         own, used = self.own_dynamics.values(), self.dynamics.values()
-        if self.dynamics.is_computer_vision:  # where nothing else counts
-            own, used = ({"mode": of["mode"]} for of in (own, used))
+        if self.dynamics.is_computer_vision:  # where little else counts
+            timing = ("control_ticks", "tick") if self.actions.kind == "velocity" else ()
+            own, used = ({n: of[n] for n in ("mode", *timing)} for of in (own, used))
         return {n: {"own": own[n], "flown": v} for n, v in used.items() if own[n] != v}
 
     def in_appearance(self, appearance: AppearanceSettings | str) -> Self:
@@ -129,7 +130,8 @@ class BasePolicy(abc.ABC):
     ) -> TensorDictModuleBase:
         """Return a TorchRL actor, which samples its actions from the stream of `seed` and `stream`.
 
-        It has the device and action space of `env`, from `make_env`; by default those of a CPU.
+        It has the device and action space of `env`, from `make_env`; by default the CPU and its own
+        action space.
 
         Raises:
             InputError: The environment is not one of TorchRL's.
@@ -164,7 +166,7 @@ class Policy(BasePolicy):
     """
 
     name: str
-    """Name in the zoo, or of the run's folder."""
+    """Name in the zoo, of the run's folder, or of its file; see `load_policy`."""
     path: Path
     """Its file."""
     description: PolicyDescription = dataclasses.field(repr=False)
@@ -351,18 +353,27 @@ def load_policy(which: str | Path, *, outputs: str | Path = "outputs") -> Policy
             raise InputError(f"policy={shown(which)} is no name and no path; give one of them")
         name = getattr(which, "name", type(which).__name__)
         raise InputError(
-            f"policy={name} is in no file of drone-rl's, and a network from elsewhere can only be "
-            "judged, evaluated and explained; give a policy that drone-rl trained"
+            f"policy={name} is not stored in a file of drone_rl's, and a network from elsewhere "
+            "can only be judged, evaluated and explained; give a policy that drone-rl trained"
         )
     path = find_policy(which, outputs)
     state = read_policy(path)
-    is_run = path.suffix == ".pt" and len(path.parents) > 1
-    name = path.absolute().parents[1].name if is_run else path.stem
-    return Policy(name, path, parse(state["description"]), state)
+    return Policy(_name_of(path.absolute()), path, parse(state["description"]), state)
+
+
+def _name_of(path: Path) -> str:
+    """Return the run's name for its `last.pt`, with the file's name for another checkpoint."""
+    if path.suffix != ".pt" or path.parent.name != "checkpoints":
+        return path.stem
+    run = path.parents[1].name
+    return run if path.stem == "last" else f"{run}_{path.stem}"
 
 
 def find_policy(which: str | Path, outputs: str | Path = "outputs") -> Path:
-    """Return the file of a policy, see `load_policy`; raise an `InputError` if there is none."""
+    """Return the file of a policy, see `load_policy`; raise an `InputError` if there is none.
+
+    The checkpoint of a folder may be missing.
+    """
     if which == "latest":
         trained = trained_policies(outputs)
         if not trained:

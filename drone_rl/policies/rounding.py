@@ -42,7 +42,7 @@ class Decisions:
     """Of the network, in float32. Shape: (N, outputs)."""
     possible: Tensor
     """Whether some order of summation makes an action the best one. For continuous actions, all
-    are where a frame is fragile. Shape: (N, outputs), bool."""
+    entries of a fragile frame are True, and those of any other False. Shape: (N, outputs), bool."""
 
     @property
     def is_fragile(self) -> Tensor:
@@ -230,7 +230,7 @@ def _pixel_error(largest: Tensor) -> Tensor:
 REMEDY = (
     "give a callable without state, whose logits for a frame depend on no other frame of its batch"
 )
-"""What to do about a callable that acts by its batch."""
+"""What to do about a callable whose outputs depend on the batch."""
 
 
 class Regrouped(ImageNetwork):
@@ -262,14 +262,16 @@ class Regrouped(ImageNetwork):
         outputs = pixels.new_empty(len(pixels), self.num_actions)
         order = torch.randperm(len(pixels), generator=self._generator)
         while len(order):
-            size = self._draw(len(order))
+            size = self._sample_size(len(order))
             rows, order = order[:size], order[size:]
-            again = torch.randint(size, (self._draw(size + 1) - 1,), generator=self._generator)
+            repeats = self._sample_size(size + 1) - 1
+            again = torch.randint(size, (repeats,), generator=self._generator)
             given = torch.cat([rows, rows[again]]).to(pixels.device)
             outputs[rows.to(pixels.device)] = self.network(pixels[given])[:size]
         return outputs
 
-    def _draw(self, most: int) -> int:
+    def _sample_size(self, most: int) -> int:
+        """Return a random number from 1 to `most`, small ones more often."""
         share = float(torch.rand((), generator=self._generator))
         return min(most, 1 + int((most + 1) ** share - 1))
 

@@ -26,7 +26,7 @@ from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.visual_randomization import AppearanceSampler, object_region_of
 
 _SKY = 0.69 * entities.DRAW_DISTANCE
-"""Metres behind which there is nothing: MuJoCo's sky is a ball of 0.7 of the drawing distance."""
+"""Metres beyond which only sky is rendered, a ball of 0.7 of MuJoCo's drawing distance."""
 CONTROL_TIMESTEP_S = 0.1
 """Simulated time of one step, seconds. Computer-vision mode has no physics to depend on it."""
 
@@ -64,8 +64,9 @@ class ComposerTask(composer.Task):
             distractors: Their number, if no appearance is given.
             appearance: Visual appearance, see `OpenGlAppearance`; the task's by default.
 
-        Raises an `InputError` if a texture can't be read, camera or distractors do not fit, or
-        dynamics with actions of their own are given other ones.
+        Raises:
+            InputError: A texture can't be read, camera or distractors do not fit, or dynamics with
+                actions of their own are given other ones.
         """
         self.rules = as_task(task)
         self.dynamics = make_dynamics(self.rules.make_dynamics, dynamics, actions)

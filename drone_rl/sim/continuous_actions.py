@@ -35,6 +35,7 @@ _FIRST_LOG = -0.5
 """The logarithm for an output of 0."""
 _SHIFT = math.log((_FIRST_LOG - LEAST_LOG) / (MOST_LOG - _FIRST_LOG))
 _SLANTED = math.sqrt(0.5)
+"""Components of a diagonal arrow."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -104,7 +105,7 @@ class ContinuousActions(Actions):
         return torch.stack([(1 - aside) * (1 - turned), *shares], -1)
 
     def scores(self, outputs: Tensor) -> Tensor:
-        """Return the means' outputs, signed to each part; that of forward is its speed."""
+        """Return the means' outputs, signed to each part; that of forward is its mean's output."""
         forward, left, turn_left = outputs[..., :3].unbind(-1)
         every = (forward, left, -left, turn_left, -turn_left)
         return torch.stack(every[: len(self)], -1)
@@ -167,4 +168,4 @@ def normal_of(outputs: Tensor) -> tuple[Tensor, Tensor]:
 
 def _above(distance: Tensor) -> Tensor:
     """Return the standard normal distribution function."""
-    return 0.5 * (1 + torch.erf(distance * _SLANTED))
+    return 0.5 * (1 + torch.erf(distance / math.sqrt(2.0)))

@@ -24,7 +24,7 @@ FORMAT = "drone_rl sweep"
 MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s", "renderer")
 """Settings that may differ when a sweep is resumed."""
 THREADS = {"OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "PASSIVE"}
-"""Environment of every run, so that parallel runs don't compete for the cores.
+"""Environment variables of every run, so that parallel runs don't compete for the cores.
 
 Training sets torch's threads itself, so that its result does not depend on this.
 """
@@ -208,7 +208,7 @@ def open_sweep(
     return sweep
 
 
-_ELSEWHERE = ("hydra.", "hydra/", "paths.", "+hydra", "-")
+_NOT_IDENTIFYING = ("hydra.", "hydra/", "paths.", "+hydra", "-")
 """Prefixes of overrides that do not identify a sweep."""
 
 
@@ -220,11 +220,11 @@ def is_sweep(overrides: Sequence[str]) -> bool:
 
 
 def sweep_name(overrides: Sequence[str]) -> str:
-    """Return a folder name that two commands share if and only if they define the same runs.
+    """Return a folder name for the overrides in any order, without those of Hydra and of paths.
 
     It contains the file in conf/sweep, or else the swept settings, and a hash of the overrides.
     """
-    what = sorted(o for o in overrides if not o.startswith(_ELSEWHERE))
+    what = sorted(o for o in overrides if not o.startswith(_NOT_IDENTIFYING))
     files = [o.partition("=")[2] for o in what if o.startswith("sweep=")]
     keys = [o.partition("=")[0] for o in what if "," in o or "range(" in o]
     label = re.sub(r"[^\w.-]+", "-", "+".join(files or keys))[:60]

@@ -86,7 +86,7 @@ def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> 
 
 
 def note_outcome(study: Any, number: int, result: Mapping[str, Any] | None) -> None:
-    """Report the outcome of a trial: its running mean of rewards, pruned or failed."""
+    """Report the outcome of a trial: its running reward, pruned or failed."""
     states = import_optuna().trial.TrialState
     if study.trials[number].state != states.RUNNING:
         return

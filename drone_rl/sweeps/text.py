@@ -6,7 +6,7 @@ from drone_rl.utils.text import Evidence, Sentence, percent, plural
 
 MIN_RUNS = 6
 """Fewest runs whose median has an exact 95% interval."""
-STILL = 0.01
+DETERMINISTIC = 0.01
 """Entropy in nats below which a policy is practically deterministic."""
 
 
@@ -40,7 +40,7 @@ def counts(summary: Evidence) -> dict[str, int]:
         "censored": sum(group["frames_to_solve"]["more_than"] is not None for group in groups),
         "left": kinds.count("one-sided (left)"),
         "right": kinds.count("one-sided (right)"),
-        "still": sum(run["state"] == "finished" and run["entropy"] < STILL for run in known),
+        "still": sum(r["state"] == "finished" and r["entropy"] < DETERMINISTIC for r in known),
         "entropies": sum(run["certain"] is not None for run in known),
     }
 
@@ -158,15 +158,15 @@ SENTENCES = (
         "verdicts.older_rule",
         "a run has an evaluation, but no verdict by the present rule",
         "judged_by_older_rule",
-        "{runs} judged by an older rule: not counted; the intervals of kinds allow for any. Judge "
-        "again: `{e[judge_command]}`",
+        "{runs} judged by an older rule: not counted; the intervals of verdicts allow for any "
+        "verdict of these runs. Judge again: `{e[judge_command]}`",
     ),
     _if_any(
         "verdicts.missing",
         "a finished run was never judged",
         "never_judged",
-        "{runs} finished and not judged; the intervals of kinds allow for any. Judge: "
-        "`{e[judge_command]}`",
+        "{runs} finished and not judged; the intervals of verdicts allow for any verdict of these "
+        "runs. Judge: `{e[judge_command]}`",
     ),
     _if_any(
         "best.none",
@@ -271,9 +271,9 @@ SENTENCES = (
     ),
     _if_any(
         "entropies.still",
-        f"a finished run ended below {STILL} nats",
+        f"a finished run ended below {DETERMINISTIC} nats",
         "still",
-        f"{{runs}} ended below {STILL} nats: these policies are practically deterministic.",
+        f"{{runs}} ended below {DETERMINISTIC} nats: these policies are practically deterministic.",
     ),
     _if_any(
         "costs.dots",
@@ -285,7 +285,8 @@ SENTENCES = (
         "costs.open",
         "a run ended without reaching its target",
         "unsolved",
-        "Each open triangle is a run that ended without (red: failed): it needs more than that.",
+        "Each open triangle is a run that ended without reaching its target (red: failed): it "
+        "needs more than the value shown.",
     ),
     _if_any(
         "settings.intervals",

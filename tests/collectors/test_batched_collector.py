@@ -113,7 +113,7 @@ def test_unbatched_environment_raises(make):
     env = DroneEnv(1, TASK, pixels=False)
     env.batch_size = torch.Size([])
     for kind in KINDS.values():
-        with pytest.raises(InputError, match=r"batch size \[\]; give a batch of environments"):
+        with pytest.raises(InputError, match=r"batch size \[\]; give one with one batch dimension"):
             kind(env, oracle_policy(TASK))
 
 

@@ -18,8 +18,8 @@ FLIGHT = DynamicsSettings(mode="simple_flight")
         ({"mass": -1.0}, r"mass=-1\.0 is out of range"),
         (
             {"mass": 2.0},
-            r"rotor_thrust=4\.17945 is too small to control the drone: four rotors give 16\.7 N, "
-            r"needed are 1\.1 times its weight, 21\.6 N; give at least 5\.4",
+            r"rotor_thrust=4\.17945 is too small to control the drone: four rotors give 16\.72 N, "
+            r"needed are 1\.1 times its weight, 21\.58 N; give at least 5\.4$",
         ),
         ({"inertia": (1.0, 1.0, 2.1)}, r"inertia=\[1\.0, 1\.0, 2\.1\] is that of no body"),
         ({"wind": (float("nan"), 0.0, 0.0)}, r"wind\[0\]=nan"),
@@ -29,6 +29,21 @@ FLIGHT = DynamicsSettings(mode="simple_flight")
 def test_what_can_not_fly_is_named(changes, message):
     with pytest.raises(InputError, match=f"^{message}"):
         dataclasses.replace(FLIGHT, **changes)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("rotor_thrust", {"mass": 1.41, "rotor_thrust": 3.0}),
+        ("inertia", {"inertia": (0.0123457, 0.0123457, 1.0)}),
+    ],
+)
+def test_the_value_that_a_message_advises_is_accepted(name, values):
+    with pytest.raises(InputError) as refused:
+        dataclasses.replace(FLIGHT, **values)
+    advised = float(str(refused.value).split()[-1])
+    allowed = advised if name == "rotor_thrust" else (0.0123457, 0.0123457, advised)
+    dataclasses.replace(FLIGHT, **{**values, name: allowed})
 
 
 def test_figures_of_the_generic_drone_by_hand():

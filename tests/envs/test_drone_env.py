@@ -234,6 +234,8 @@ def test_invalid_texture_raises_at_construction(tmp_path):
     [
         (torch.tensor([7, 0]), "actions from 0 to 7 are not all in"),
         (torch.tensor([-5, 0]), "actions from -5 to 0 are not all in"),
+        (torch.tensor([0, -1]), "actions from -1 to 0 are not all in 0 to 2; give indices of"),
+        (torch.tensor([3, 2]), "actions from 2 to 3 are not all in 0 to 2"),
         (torch.zeros(2, 3, dtype=torch.int64), r"shape \(2, 3\); give torch.Size\(\[2\]\)"),
     ],
 )

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 import drone_rl
 from drone_rl.config import MINIMAL, AppearanceSettings
 from drone_rl.policies.external_policy import policy_from
-from drone_rl.policies.policy import find_policy
+from drone_rl.policies.policy import _name_of, find_policy
 from drone_rl.policies.zoo import policy_path
 from drone_rl.utils.errors import InputError
 from tests.fake_flight import FLIGHT, Floating, floating
@@ -25,6 +26,20 @@ def test_bundled_policy_is_loaded():
     assert "<td>network</td>" in shown
     assert "small_cnn" in shown
     assert repr(policy) == f"Policy(name='good', path={policy.path!r})"  # without its weights
+
+
+@pytest.mark.parametrize(
+    ("path", "name"),
+    [
+        ("/a/mine.pt", "mine"),
+        ("/mine.pt", "mine"),
+        ("/a/mine.safetensors", "mine"),
+        ("/a/checkpoints/last.pt", "a"),
+        ("/a/checkpoints/best.pt", "a_best"),
+    ],
+)
+def test_a_policy_has_the_name_of_its_run_or_of_its_file(path, name):
+    assert _name_of(Path(path)) == name
 
 
 def test_policies_can_be_compared_and_hashed():
@@ -111,6 +126,14 @@ def test_missing_policies_raise(tmp_path):
         drone_rl.load_policy("latest", outputs=tmp_path)
     with pytest.raises(InputError, match=r"policy=nobody does not exist.*good, .*poor"):
         drone_rl.load_policy("nobody")
+
+
+def test_timing_counts_in_computer_vision_mode_where_actions_are_velocities():
+    policy = drone_rl.load_policy("flight_velocity").in_dynamics(mode="computer_vision")
+    slower = policy.in_dynamics(control_ticks=330)
+    assert slower.unlike["control_ticks"] == {"own": 66, "flown": 330}
+    assert "control_ticks" not in policy.unlike
+    assert drone_rl.load_policy("good").in_dynamics(control_ticks=330).unlike == {}
 
 
 def test_another_appearance_changes_only_the_environment():

@@ -52,7 +52,7 @@ SAID = {
     "sides.dots": "dot",
     "entropies.dots": "dot",
     "costs.dots": "reached its target",
-    "costs.open": "needs more than that",
+    "costs.open": "needs more than the value",
     "settings.intervals": "Fractions are of all runs that ended",
 }
 """Part of each sentence that is said of this sweep."""

@@ -91,12 +91,15 @@ def is_output_closed() -> bool:
 def file_error(error: OSError) -> str:
     """Return an error of the file system as one line: path, reason and remedy."""
     reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
-    path = error.filename
-    if path is None and HydraConfig.initialized():
-        runtime = HydraConfig.get().runtime
-        path = None if OmegaConf.is_missing(runtime, "output_dir") else runtime.output_dir
+    where = error.filename
+    if where is None:
+        where = "standard output or a file"
+        if HydraConfig.initialized():
+            runtime = HydraConfig.get().runtime
+            is_known = not OmegaConf.is_missing(runtime, "output_dir")
+            where += f" in {runtime.output_dir}" if is_known else ""
     remedy = _REMEDIES.get(error.errno or 0, f"check the path or {_FOLDER}")
-    where = "a file" if path is None else os.fsdecode(path) if isinstance(path, bytes) else path
+    where = os.fsdecode(where) if isinstance(where, bytes) else where
     text = f"{where} can't be opened or written ({reason}); {remedy}"
     return "".join(c if c.isprintable() else "?" for c in text)
 

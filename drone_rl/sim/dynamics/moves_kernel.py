@@ -66,7 +66,7 @@ def is_lost(fleet: Fleet, world: int) -> bool:
 
 
 def make_fleet(quadrotor: Quadrotor | None, numbers: Tensor) -> Fleet:
-    """Return drones whose `FlightState.numbers` are given; of no rows without a quadrotor."""
+    """Return drones whose `FlightState.numbers` are given; of no rows if `quadrotor` is None."""
     fleet = Fleet()
     fleet.numbers = wp.from_torch(numbers)
     if quadrotor is not None:

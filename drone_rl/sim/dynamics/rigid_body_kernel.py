@@ -17,7 +17,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class Airframe:
-    """The fields of `DynamicsSettings`, in single precision and SI units."""
+    """Fields of `DynamicsSettings` and what follows from them, in single precision and SI units."""
 
     tick: float
     weight: float
@@ -53,7 +53,7 @@ class Airframe:
 def make_airframe(settings: DynamicsSettings) -> Airframe:
     """Return the numbers of settings, and what follows from them."""
     frame = Airframe()
-    same = set(vars(frame)) & {*settings.values()}
+    same = set(vars(frame)) & settings.values().keys()
     for name in same:
         value = getattr(settings, name)
         setattr(frame, name, wp.vec3(*value) if isinstance(value, tuple) else value)
@@ -69,7 +69,7 @@ def make_airframe(settings: DynamicsSettings) -> Airframe:
 
 @wp.struct
 class Motion:
-    """Of one drone; the attitude is a quaternion (w, x, y, z)."""
+    """Motion of one drone; the attitude is a quaternion (w, x, y, z)."""
 
     position: wp.vec3
     """From where the command began, metres: so that single precision loses nothing."""
@@ -206,17 +206,17 @@ REST_SPEED = wp.constant(0.1)
 
 @wp.struct
 class Overlap:
-    """Of a ball and a thing."""
+    """Overlap of a ball with an object."""
 
     normal: wp.vec3
-    """Out of the thing."""
+    """Out of the object."""
     depth: float
     """Metres; below 0 where they are apart."""
 
 
 @wp.func
 def box_overlap(center: wp.vec3, radius: float, half: wp.vec3) -> Overlap:
-    """Return the overlap of a ball, at `center` from the middle of a box, with it. Metres."""
+    """Return how far a ball overlaps a box; `center` is in the box's frame. Metres."""
     found = Overlap()
     nearest = wp.vec3(
         wp.clamp(center[0], -half[0], half[0]),

@@ -30,7 +30,7 @@ class Mounting:
     offset: tuple[float, ...] | Tensor = (0.0, 0.0, 0.0)
     """Metres, drone frame. Shape: (3,) or (num_envs, 3)."""
     turn: tuple[float, ...] | Tensor = (1.0, 0.0, 0.0, 0.0)
-    """Rotation about the camera's position, as `offset`, quaternion (w, x, y, z). Shape: (*, 4)."""
+    """Rotation about the camera's position, drone frame: quaternion (w, x, y, z). Shape: (*, 4)."""
     zoom: float | Tensor | None = None
     """Magnification at the centre of the image. Shape: () or (num_envs,)."""
 

@@ -33,8 +33,8 @@ class Sampling:
     """When readings are taken and delivered. Times: seconds, shape (num_envs,), float64.
 
     Reading k = 0, 1, ... is due `startup + k / rate` seconds after the start, and is taken at the
-    first update from then on, so the mean rate is `rate` at any tick length. If several are due at
-    once, one is taken.
+    first update from then on, so the mean rate is `rate` if ticks are no longer than 1 / `rate`. If
+    several are due at once, one is taken: longer ticks have one reading each.
     """
 
     rate: float
@@ -115,15 +115,16 @@ class Sensor(abc.ABC, Generic[State, Reading]):
         return self._reading(*self.sampling.read(state.samples, time))
 
     @abc.abstractmethod
-    def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> State: ...
+    def _initial(self, body: BodyState, time: Tensor, generator: Generator) -> State:
+        """Return the state of sensors that are switched on now, see `start`."""
 
     @abc.abstractmethod
-    def _sample(
-        self, state: State, body: BodyState, time: Tensor, generator: Generator
-    ) -> State: ...
+    def _sample(self, state: State, body: BodyState, time: Tensor, generator: Generator) -> State:
+        """Take a reading where one is due, see `update`."""
 
     @abc.abstractmethod
-    def _reading(self, time: Tensor, rows: Tensor) -> Reading: ...
+    def _reading(self, time: Tensor, rows: Tensor) -> Reading:
+        """Return readings from the rows that `_sample` stored; see `read`."""
 
 
 def select(condition: Tensor, chosen: Tensor, other: Tensor) -> Tensor:

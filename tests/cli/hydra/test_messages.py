@@ -73,6 +73,7 @@ def test_statuses(capsys):
             ["a/b", "No space left", "free some space"],
         ),
         (OSError(errno.EFBIG, "File too large", "a"), ["a ", "free some space"]),
+        (OSError(errno.ENOSPC, "No space left"), ["standard output or a file can't", "free some"]),
         (OSError(errno.EROFS, "Read-only file system", b"a"), ["a ", "who may write"]),
         (OSError(errno.EISDIR, "Is a directory", "a"), ["a ", "move it away"]),
         (OSError(errno.EIO, "Input/output error"), ["a file", "check the path"]),
@@ -88,7 +89,8 @@ def test_a_job_that_has_no_folder_yet_names_none(monkeypatch):
     job = OmegaConf.create({"runtime": {"output_dir": "???"}})
     monkeypatch.setattr(HydraConfig, "initialized", lambda: True)
     monkeypatch.setattr(HydraConfig, "get", lambda: job)
-    assert file_error(OSError(errno.EIO, "Input/output error")).startswith("a file can't be opened")
+    found = file_error(OSError(errno.EIO, "Input/output error"))
+    assert found.startswith("standard output or a file can't be opened")
 
 
 def test_a_path_can_not_leave_its_line():

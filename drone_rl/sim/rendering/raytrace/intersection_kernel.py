@@ -166,7 +166,10 @@ def _radii(kind: int, size: wp.vec3) -> wp.vec3:
 
 @wp.func
 def intersect_plane(size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> float:
-    """Return the distance to a rectangle of the plane z = 0 from above; size 0 is infinite."""
+    """Return the distance to a rectangle of the plane z = 0 from above; size 0 is infinite.
+
+    The distance is negative for a miss.
+    """
     if ray[2] >= -_PARALLEL:
         return -1.0
     along = -point[2] / ray[2]

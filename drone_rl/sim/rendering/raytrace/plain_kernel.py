@@ -1,8 +1,9 @@
 """The ray tracer on a CPU, for flat colours and light: one image at a time, geom by geom.
 
 Rays are cast at each geom, in the geom's own frame, within the rectangle of pixels around its
-projection; the nearest hit owns the pixel. Then pixels are shaded, once for a span of pixels in a
-row that show the same flat face. Warp's `for` loops are several times as slow as `while` on a CPU.
+projection; the nearest hit owns the pixel. Then pixels are shaded, once for a span of consecutive
+pixels, also across rows, that show the same flat face or the sky. Warp's `for` loops are several
+times as slow as `while` on a CPU.
 """
 
 import warp as wp
@@ -115,8 +116,8 @@ def _find_plane(job: structs.Job, geom_view: structs.GeomView, geom: int) -> Non
         if left[2] < 0.0 or right[2] < 0.0:
             pixel = start
             if _hits(far, geom_view, leftmost, left) and _hits(far, geom_view, rightmost, right):
-                down, height = geom_view.into[2], -geom_view.eye[2]
-                intersect_level_plane(nearest, owner, start, end, rays, down, height, SAME, mark)
+                down, below = geom_view.into[2], -geom_view.eye[2]
+                intersect_level_plane(nearest, owner, start, end, rays, down, below, SAME, mark)
                 pixel = end
             while pixel < end:
                 ray = rays[pixel]

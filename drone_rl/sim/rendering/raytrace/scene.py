@@ -30,7 +30,8 @@ HALF_EXTENTS: Mapping[int, Callable[[NDArray], NDArray]] = MappingProxyType(
         solids.CYLINDER: lambda size: size[[0, 0, 1]],
     }
 )
-"""Half extents of the bounding box of each kind of geom, from MuJoCo's size; a plane has none."""
+"""Half extents of the bounding box of each supported kind of geom, from MuJoCo's size; for a plane
+the size itself."""
 
 
 def check_scene(scene: Scene) -> None:
@@ -53,8 +54,9 @@ def check_scene(scene: Scene) -> None:
     is_fixed = model.light_bodyid == 0
     if not (is_distant & is_fixed & (model.light_castshadow == 0)).all():
         raise InputError(
-            "a light of the scene is near, moves or has castshadow=true, which Raytracer does not "
-            "support (appearance.shadows casts shadows); give renderer=mujoco_warp"
+            "a light of the scene is not directional, is attached to a body or has "
+            "castshadow=true, which Raytracer does not support (appearance.shadows casts shadows); "
+            "give renderer=mujoco_warp"
         )
     if model.vis.headlight.active:
         raise InputError("the scene's headlight is on; switch it off or give renderer=mujoco_warp")
@@ -80,9 +82,10 @@ class Frames:
     def place(
         self, body: int, position: NDArray, attitude: NDArray
     ) -> tuple[int, NDArray, NDArray]:
-        """Convert a pose relative to a body into the body's frame and the pose in that frame.
+        """Return the reference frame that a body is fixed to, and the pose in it.
 
-        Positions are in metres, attitudes quaternions (w, x, y, z).
+        The given pose is relative to the body. Positions are in metres, attitudes quaternions
+        (w, x, y, z).
         """
         data, frame = self._data, int(self._of_body[body])
         root = self._model.body_rootid[body] if frame else 0
