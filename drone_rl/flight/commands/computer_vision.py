@@ -78,7 +78,7 @@ class ComputerVisionDrone(Drone):
             )
         count, state = Whole(1, 100_000, "times").read(times, "times"), self.state
         move, turn = KEYS[key]
-        heading = float(self.body.heading[0])
+        *_, heading = to_simulator(0.0, 0.0, math.radians(state.attitude.yaw))
         cos, sin = math.cos(heading), math.sin(heading)
         forward, left, up = (count * part for part in move)
         x, y, z = state.position
@@ -105,7 +105,12 @@ class ComputerVisionDrone(Drone):
         return (x, y, z) if present is None or bool(present[0, index]) else _GONE
 
     def set_object_position(self, name: str, position: Sequence[float]) -> None:
-        """Move an object; see `object_position` for errors."""
+        """Move an object to a position, metres, world frame.
+
+        Raises:
+            InputError: The name is unknown or a number is invalid.
+            PilotError: The drone has no worlds, or their task does not let objects move.
+        """
         worlds, index = self._object(name)
         place = checks.numbers(position, "position", 3, -checks.FARTHEST, checks.FARTHEST)
         task = worlds.task

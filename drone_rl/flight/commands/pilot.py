@@ -151,7 +151,7 @@ class Pilot(ComputerVisionDrone):
             raise InputError(f"yaw={yaw} and yaw_rate={yaw_rate} are both given; give one of them")
         tilt = checks.radians(roll, "roll", 90.0), checks.radians(pitch, "pitch", 90.0)
         name, given = ("yaw", yaw) if yaw_rate is None else ("yaw_rate", yaw_rate)
-        x, y, wanted = to_simulator(*tilt, checks.radians(given or 0.0, name))
+        x, y, wanted = to_simulator(*tilt, checks.radians(0.0 if given is None else given, name))
         turn = self.body.heading if given is None else wanted
         turn_mode = Mode.ANGLE if yaw_rate is None else Mode.RATE
         lift_mode, lift = self._lift(z, throttle)
