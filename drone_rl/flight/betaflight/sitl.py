@@ -124,7 +124,12 @@ class Betaflight:
 
     def __enter__(self) -> Self:
         """Start the firmware; set it up first if the folder has no settings."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"folder={self.folder} can't be created: {error.strerror}; give another"
+            ) from error
         with contextlib.ExitStack() as stack:
             self._process = stack.enter_context(FirmwareProcess(isolated=self.isolated))
             if not (self.folder / MEMORY).exists():
@@ -144,7 +149,8 @@ class Betaflight:
         """Send a state and sticks; return the rotor commands as `unpack_rotors` does.
 
         Raises:
-            FlightControllerError: The firmware has ended, or has been silent for too long.
+            FlightControllerError: The firmware has ended, has been silent for too long, or sent an
+                invalid packet.
         """
         if readings.time >= self._next_sticks:
             self._next_sticks = readings.time + STICKS_EVERY
@@ -160,6 +166,8 @@ class Betaflight:
             self._silence += time.monotonic() - begin
             if self._silence > self.patience:
                 raise self._failure(f"has been silent for {self.patience:g} s") from None
+        except ValueError as error:
+            raise self._failure(f"sent an invalid packet ({error})") from error
         return self._rotors
 
     def _failure(self, what: str) -> FlightControllerError:
@@ -303,7 +311,7 @@ def betaflight_drone(
         isolated: See `FirmwareProcess`.
 
     Raises:
-        InputError: No firmware was built, or a port is in use.
+        InputError: No firmware was built, the folder can't be created, or a port is in use.
         FlightControllerError: The firmware can't be started.
     """
     program = find_firmware(firmware)
