@@ -116,14 +116,13 @@ class Betaflight:
         self.answer_within = answer_within
         self.missed = 0
         """States that were not answered in time."""
-        self._rotors = np.zeros(4)
-        self._next_sticks = -np.inf
         self._silence = 0.0
         """Seconds that were waited in vain since the last answer."""
         self._open = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
         """Start the firmware; set it up first if the folder has no settings."""
+        self._rotors, self._next_sticks = np.zeros(4), -np.inf
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:

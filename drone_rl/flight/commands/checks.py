@@ -57,9 +57,9 @@ def numbers(values: Any, name: str, count: int, low: float, high: float) -> list
     return [real(value, f"{name}[{i}]", low, high) for i, value in enumerate(given)]
 
 
-def duration(value: Any) -> float:
+def duration(value: Any, name: str = "duration") -> float:
     """Return a duration in seconds, which must not be negative."""
-    return real(value, "duration", 0.0, unit="s")
+    return real(value, name, 0.0, unit="s")
 
 
 def speed(value: Any, name: str = "speed") -> float:
@@ -79,7 +79,7 @@ def time_limit(timeout: float | None, length: float, speed: float) -> float:
     """
     if timeout is None:
         return 10.0 + 3.0 * length / speed
-    return real(timeout, "timeout", 0.0, unit="s")
+    return duration(timeout, "timeout")
 
 
 def height(value: Any, name: str = "z") -> float:

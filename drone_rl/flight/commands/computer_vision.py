@@ -84,7 +84,8 @@ class ComputerVisionDrone(Drone):
         x, y, z = state.position
         there = (x + cos * forward - sin * left, y + sin * forward + cos * left, z + up)
         now = (state.attitude.roll, state.attitude.pitch, state.attitude.yaw)
-        roll, pitch, yaw = (old + count * part for old, part in zip(now, turn, strict=True))
+        after = (old + count * part for old, part in zip(now, turn, strict=True))
+        roll, pitch, yaw = (math.remainder(angle, 360.0) for angle in after)
         return self.set_pose(there, roll=roll, pitch=pitch, yaw=yaw)
 
     @property

@@ -181,7 +181,7 @@ class Drone:
 
     def advance(self, seconds: float) -> PilotState:
         """Advance simulated time and return the state; a negative duration is an `InputError`."""
-        self._advance(self._ticks_of(checks.duration(seconds)))
+        self._advance(self._ticks_of(checks.duration(seconds, "seconds")))
         return self.state
 
     def cancel(self) -> None:
@@ -342,7 +342,7 @@ class Drone:
         self._update_landed()
 
     def _record(self, ticks: int) -> None:
-        """Note the state, and show it to the sensors."""
+        """Record the state and update the sensors."""
         self.trajectory.append(self.time, self.body)
         if self._sensors is not None:
             self._sensors.update(self.body, ticks * self.settings.tick)

@@ -34,6 +34,16 @@ def test_it_is_set_up_once_and_then_armed(stub, tmp_path):
     assert firmware.log.read_text().startswith("stub")
 
 
+def test_it_can_be_started_again(stub, tmp_path):
+    """The time begins again at 0, and so do the packets of sticks."""
+    firmware, armed = Betaflight(stub(), tmp_path), RcSticks(armed=True, throttle=0.5)
+    for first in (100, 0):
+        with firmware:
+            for step in range(first, first + 40):
+                rotors = firmware.step(standing(step), armed)
+        assert rotors == pytest.approx([0.5] * 4)
+
+
 def test_sides_are_not_swapped(stub, tmp_path):
     with Betaflight(stub(), tmp_path) as firmware:
         told = RcSticks(armed=True, throttle=0.5, roll=0.1)

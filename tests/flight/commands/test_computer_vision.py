@@ -59,6 +59,11 @@ def test_keys_turn(pilot, key):
     assert vars(found) == pytest.approx(expected)
 
 
+def test_a_key_may_turn_the_drone_many_times(pilot):
+    """A thousand steps of 5 degrees are 13 turns and 320 degrees."""
+    assert pilot.press("yaw_right", 1000).attitude.yaw == pytest.approx(-40.0)
+
+
 def test_keys_with_the_nose_straight_up(pilot):
     """The drone keeps its heading, and moves in it."""
     pilot.set_pose([0, 0, 5], yaw=15)
