@@ -161,7 +161,7 @@ class Drone:
         return self._sensors
 
     def enable_api_control(self, enable: bool = True) -> None:
-        """Accept commands and arming, or cancel the command and refuse them by a `PilotError`."""
+        """Accept commands and arming, or refuse both (`PilotError`) and cancel the running one."""
         self.has_api_control = enable
         if not enable:
             self.cancel()

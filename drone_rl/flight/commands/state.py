@@ -35,7 +35,7 @@ from drone_rl.utils.display import table
 
 Triple = tuple[float, float, float]
 _VERTICAL = 1.0 - 1e-12
-"""Sine of the pitch above which roll and yaw can't be told apart."""
+"""Sine of the pitch above which roll and yaw can't be distinguished."""
 
 
 class LandedState(enum.StrEnum):

@@ -130,7 +130,8 @@ class DroneInTheLoop:
     ) -> bool:
         """Fly by setpoints for so many seconds at most; return whether `until` ended the flight.
 
-        The guidance is called at once and then every `every` seconds, and `until` before each call.
+        The guidance is called at once and then every `every` seconds; `until` is called before each
+        call and at the end.
 
         Raises:
             FlightControllerError: See `tick`; or the guidance took longer than the firmware's
