@@ -106,7 +106,7 @@ class SerialLink(Link):
             InputError: The device can't be opened, is no serial port, or the speed is invalid.
         """
         speed = getattr(termios, f"B{baud}", None)
-        if speed is None:
+        if not speed:  # B0, which is 0, hangs up
             raise InputError(f"baud={baud} is no serial speed; give one such as 921600")
         if not Path(device).exists():
             raise InputError(f"device={device} doesn't exist; is the controller plugged in?")
@@ -132,7 +132,7 @@ class TcpLink(Link):
         """Listen at a port (0 for any free one); by default only this machine can connect.
 
         Raises:
-            InputError: The port is in use.
+            InputError: The port is in use, or the port or the host is invalid.
         """
         super().__init__("the autopilot", patience=1.0)
         self._listener = socket.socket()
@@ -141,7 +141,9 @@ class TcpLink(Link):
             self._listener.bind((host, port))
         except (OSError, OverflowError) as error:
             self._listener.close()
-            raise InputError(f"can't listen at port={port}: {error}; give another") from error
+            raise InputError(
+                f"can't listen at port={port} of host={host}: {error}; give another port or host"
+            ) from error
         self._listener.listen(1)
         self.port: int = self._listener.getsockname()[1]
         """The port."""
@@ -189,7 +191,7 @@ class MavlinkBridge:
             InputError: pymavlink isn't installed.
         """
         self._dialect = extra(_DIALECT, "hil", "hardware in the loop")
-        self._codec: Any = self._dialect.MAVLink(None, srcSystem=1, srcComponent=200)
+        self._codec: Any = self._dialect.MAVLink(link, srcSystem=1, srcComponent=200)
         self._codec.robust_parsing = True  # skip invalid bytes
         self.link = link
         self.lockstep = lockstep
@@ -266,14 +268,13 @@ class MavlinkBridge:
         self._send("heartbeat", {**sender, **status})
 
     def _send(self, name: str, fields: dict[str, Any]) -> None:
-        message = getattr(self._codec, f"{name}_encode")(**fields)
-        self.link.write(message.pack(self._codec))
+        self._codec.send(getattr(self._codec, f"{name}_encode")(**fields))
 
     def _receive(self, within: float) -> None:
         data = self.link.read(within)
         for message in (self._codec.parse_buffer(data) or ()) if data else ():
             kind = message.get_type()
-            if kind in ("BAD_DATA", "UNKNOWN"):
+            if kind == "BAD_DATA" or kind.startswith("UNKNOWN_"):  # without a check of the sum
                 continue
             self._heard = time.monotonic()
             if kind == "HIL_ACTUATOR_CONTROLS" and message.time_usec >= self._controls_time:

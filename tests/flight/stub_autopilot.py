@@ -27,7 +27,7 @@ class StubAutopilot(threading.Thread):
         self.mute_after, self.beats = mute_after, beats
         self.codec = common.MAVLink(None, srcSystem=1, srcComponent=1)
         self.codec.robust_parsing = True
-        self.heard = {}
+        self.heard, self.sequence = {}, []
         self.last_gps = None
         self.first = self.altitude = None
         self.climb, self.answered = 0.0, 0
@@ -43,6 +43,7 @@ class StubAutopilot(threading.Thread):
     def take(self, message):
         kind = message.get_type()
         self.heard[kind] = self.heard.get(kind, 0) + 1
+        self.sequence.append(message.get_seq())
         if kind == "HEARTBEAT" and self.beats:
             beat = self.codec.heartbeat_encode(
                 common.MAV_TYPE_QUADROTOR, common.MAV_AUTOPILOT_PX4, 0, 0, common.MAV_STATE_ACTIVE

@@ -51,6 +51,7 @@ def test_it_hovers_over_tcp(stubs):
     assert (bridge.patience, bridge.answer_within, bridge.connect_within) == (5.0, 1.0, 30.0)
     stub.link.close()
     assert stub.heard["HIL_SENSOR"] == 2000
+    assert stub.sequence == [k % 256 for k in range(len(stub.sequence))]
     assert stub.heard["HIL_GPS"] == 80
     assert stub.last_gps.alt == pytest.approx(124_000, abs=50)
     assert stub.heard["HEARTBEAT"] >= 1
@@ -109,6 +110,17 @@ def test_nobody_there(stubs):
     far, near = pty.openpty()
     with pytest.raises(FlightControllerError, match=r"no message in 0\.2 seconds"):
         MavlinkBridge(SerialLink(os.ttyname(near)), connect_within=0.2).__enter__()
+    os.close(near)
+    os.close(far)
+
+
+def test_noise_is_no_message(stubs):
+    """A message of an unknown kind, whose check sum can't be computed, may be noise."""
+    far, near = pty.openpty()
+    link = SerialLink(os.ttyname(near))
+    os.write(far, bytes.fromhex("fd 01 00 00 05 01 01 60ea00 07 0000"))
+    with pytest.raises(FlightControllerError, match=r"no message in 0\.2 seconds"):
+        MavlinkBridge(link, connect_within=0.2).__enter__()
     os.close(near)
     os.close(far)
 

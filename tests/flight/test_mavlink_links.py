@@ -50,6 +50,8 @@ def test_serial_ports_that_are_none(tmp_path):
         SerialLink(str(tmp_path / "file"))
     with pytest.raises(InputError, match="baud=12345 is no serial speed"):
         SerialLink(str(tmp_path / "file"), baud=12345)
+    with pytest.raises(InputError, match="baud=0 is no serial speed"):
+        SerialLink(str(tmp_path / "file"), baud=0)
     with pytest.raises(InputError, match="can't be opened"):
         SerialLink(str(tmp_path))
 
@@ -80,4 +82,6 @@ def test_ports_that_are_taken():
         TcpLink(link.port)
     with pytest.raises(InputError, match="port=70000"):
         TcpLink(70000)
+    with pytest.raises(InputError, match=r"host=192\.0\.2\.1.* give another port or host"):
+        TcpLink(0, "192.0.2.1")  # of no machine
     link.close()

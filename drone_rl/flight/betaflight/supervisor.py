@@ -83,7 +83,7 @@ class Supervisor:
         return {"pid": self.firmware.pid}
 
     def poll(self) -> dict[str, Any]:
-        """Return the firmware's exit status; None while it runs."""
+        """Return the firmware's exit status: None while it runs, 0 before the first start."""
         return {"status": self.firmware.poll() if self.firmware else 0}
 
     def stop(self) -> dict[str, Any]:
@@ -124,7 +124,7 @@ def serve(link: socket.socket, lines: IO[bytes]) -> None:
             given, reply = [], {}
             try:
                 name = request.pop("request")
-                if name == "socket":
+                if name == "connect":
                     given = [make_socket(**request)]
                 else:
                     reply = getattr(supervisor, name)(**request)

@@ -11,9 +11,10 @@ from torch import Tensor
 from drone_rl.config import DynamicsSettings
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
 
 FARTHEST = 1e6
-"""Greatest distance of a position from the origin, metres."""
+"""Greatest magnitude of a coordinate, metres, and by default of any number."""
 
 
 def real(
@@ -32,12 +33,12 @@ def real(
     """
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not low <= number <= high or (is_above and number == low):
         least = f"above {low:g}" if is_above else f"of {low:g} or more"
-        words = f"a finite number {least}, up to {high:g}" if low > -FARTHEST else "a finite number"
-        raise InputError(f"{name}={value!r} is invalid; give {words}{f' ({unit})' if unit else ''}")
+        words = f"a finite number {least}, up to {high:g}{f' ({unit})' if unit else ''}"
+        raise InputError(f"{name}={_shown(value)} is invalid; give {words}")
     return number
 
 
@@ -52,13 +53,13 @@ def numbers(values: Any, name: str, count: int, low: float, high: float) -> list
     except TypeError:
         given = []
     if len(given) != count:
-        raise InputError(f"{name}={values!r} is invalid; give {count} numbers")
+        raise InputError(f"{name}={_shown(values)} is invalid; give {count} numbers")
     return [real(value, f"{name}[{i}]", low, high) for i, value in enumerate(given)]
 
 
-def duration(value: Any) -> float:
+def duration(value: Any, name: str = "duration") -> float:
     """Return a duration in seconds, which must not be negative."""
-    return real(value, "duration", 0.0, unit="s")
+    return real(value, name, 0.0, unit="s")
 
 
 def speed(value: Any, name: str = "speed") -> float:
@@ -78,7 +79,7 @@ def time_limit(timeout: float | None, length: float, speed: float) -> float:
     """
     if timeout is None:
         return 10.0 + 3.0 * length / speed
-    return real(timeout, "timeout", 0.0, unit="s")
+    return duration(timeout, "timeout")
 
 
 def height(value: Any, name: str = "z") -> float:
@@ -97,8 +98,8 @@ def path(points: Any) -> Tensor:
     """
     try:
         places = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"path={points!r} is invalid; give points (x, y, z)") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"path={_shown(points)} is invalid; give points (x, y, z)") from error
     if places.size == 0:
         raise InputError("path has no points; give at least one (x, y, z)")
     if places.ndim != 2 or places.shape[1] != 3:
@@ -119,3 +120,9 @@ def quadrotor(
             raise InputError(f"{', '.join(changes)} and a Quadrotor are given; give settings alone")
         return dynamics
     return Quadrotor((dynamics or DynamicsSettings()).replace(mode="simple_flight", **changes))
+
+
+def _shown(value: Any) -> str:
+    """Return a value for a message, on one line."""
+    is_simple = isinstance(value, str | int | float)
+    return shown(value) if is_simple else " ".join(repr(value).split())

@@ -14,7 +14,7 @@ from drone_rl.sim.dynamics.control import Modes, rotor_goals
 from drone_rl.utils.errors import InputError
 
 PERIOD = 0.02
-"""Control period in seconds, at least."""
+"""Least control period, seconds."""
 ACCURACY = 0.5
 """Distance in metres within which a position counts as reached."""
 HOLD = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)

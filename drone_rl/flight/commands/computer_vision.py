@@ -78,13 +78,14 @@ class ComputerVisionDrone(Drone):
             )
         count, state = Whole(1, 100_000, "times").read(times, "times"), self.state
         move, turn = KEYS[key]
-        heading = float(self.body.heading[0])
+        *_, heading = to_simulator(0.0, 0.0, math.radians(state.attitude.yaw))
         cos, sin = math.cos(heading), math.sin(heading)
         forward, left, up = (count * part for part in move)
         x, y, z = state.position
         there = (x + cos * forward - sin * left, y + sin * forward + cos * left, z + up)
         now = (state.attitude.roll, state.attitude.pitch, state.attitude.yaw)
-        roll, pitch, yaw = (old + count * part for old, part in zip(now, turn, strict=True))
+        after = (old + count * part for old, part in zip(now, turn, strict=True))
+        roll, pitch, yaw = (math.remainder(angle, 360.0) for angle in after)
         return self.set_pose(there, roll=roll, pitch=pitch, yaw=yaw)
 
     @property
@@ -105,7 +106,12 @@ class ComputerVisionDrone(Drone):
         return (x, y, z) if present is None or bool(present[0, index]) else _GONE
 
     def set_object_position(self, name: str, position: Sequence[float]) -> None:
-        """Move an object; see `object_position` for errors."""
+        """Move an object to a position, metres, world frame.
+
+        Raises:
+            InputError: The name is unknown or a number is invalid.
+            PilotError: The drone has no worlds, or their task does not let objects move.
+        """
         worlds, index = self._object(name)
         place = checks.numbers(position, "position", 3, -checks.FARTHEST, checks.FARTHEST)
         task = worlds.task

@@ -112,7 +112,7 @@ class Drone:
         self.has_api_control = True
         """Whether commands are accepted; see `enable_api_control`."""
         self.trajectory = Trajectory()
-        """The states of all control periods so far."""
+        """The states since the drone was created or last reset."""
         self.trajectory.append(self.time, self.body)
         self._sensors = None if sensors is None else Sensors(self.body, sensors, self._seed)
         self._is_armed, self._landed = False, LandedState.LANDED
@@ -161,7 +161,7 @@ class Drone:
         return self._sensors
 
     def enable_api_control(self, enable: bool = True) -> None:
-        """Accept commands, or refuse them by a `PilotError` after cancelling the running one."""
+        """Accept commands and arming, or refuse both (`PilotError`) and cancel the running one."""
         self.has_api_control = enable
         if not enable:
             self.cancel()
@@ -181,7 +181,7 @@ class Drone:
 
     def advance(self, seconds: float) -> PilotState:
         """Advance simulated time and return the state; a negative duration is an `InputError`."""
-        self._advance(self._ticks_of(checks.duration(seconds)))
+        self._advance(self._ticks_of(checks.duration(seconds, "seconds")))
         return self.state
 
     def cancel(self) -> None:
@@ -191,14 +191,14 @@ class Drone:
             self._end(None)
 
     def arm(self) -> None:
-        """Start the rotors; a `PilotError` in the air."""
+        """Start the rotors; a `PilotError` in the air, without dynamics or with API control off."""
         self._require_dynamics("arm")
         if self._is_flying and not self._is_armed:
             raise PilotError("can't arm in the air; wait until the drone lies on the ground")
         self._is_armed = True
 
     def disarm(self, *, force: bool = False) -> None:
-        """Stop the rotors; a `PilotError` in the air, unless `force` lets the drone fall."""
+        """Stop the rotors, even with API control off; a `PilotError` in the air without `force`."""
         if self._is_flying and not force:
             raise PilotError("can't disarm in the air; land first, or let it fall by force=True")
         self._is_armed = False
@@ -232,7 +232,7 @@ class Drone:
         The size, in pixels, is the worlds' by default. A drone without worlds raises `PilotError`.
 
         Returns:
-            One tensor a request. Shapes: (H, W, 3), uint8; or (H, W), float32, for `as_float`.
+            One tensor per request. Shapes: (H, W, 3), uint8; or (H, W), float32, for `as_float`.
         """
         worlds, state = self._scene("images")
         return [found[0] for found in images(worlds, state, requests, height=height, width=width)]
@@ -342,7 +342,7 @@ class Drone:
         self._update_landed()
 
     def _record(self, ticks: int) -> None:
-        """Note the state, and show it to the sensors."""
+        """Record the state and update the sensors."""
         self.trajectory.append(self.time, self.body)
         if self._sensors is not None:
             self._sensors.update(self.body, ticks * self.settings.tick)

@@ -21,7 +21,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import OneOf
 
 TAKEOFF_HEIGHT = 2.0
-"""Height of a take-off above the ground, metres."""
+"""Climb of a take-off, metres."""
 TAKEOFF_SPEED = 0.5
 """Metres per second."""
 AUTOMATIC = -1.0

@@ -151,7 +151,7 @@ class Pilot(ComputerVisionDrone):
             raise InputError(f"yaw={yaw} and yaw_rate={yaw_rate} are both given; give one of them")
         tilt = checks.radians(roll, "roll", 90.0), checks.radians(pitch, "pitch", 90.0)
         name, given = ("yaw", yaw) if yaw_rate is None else ("yaw_rate", yaw_rate)
-        x, y, wanted = to_simulator(*tilt, checks.radians(given or 0.0, name))
+        x, y, wanted = to_simulator(*tilt, checks.radians(0.0 if given is None else given, name))
         turn = self.body.heading if given is None else wanted
         turn_mode = Mode.ANGLE if yaw_rate is None else Mode.RATE
         lift_mode, lift = self._lift(z, throttle)
@@ -284,7 +284,7 @@ class Pilot(ComputerVisionDrone):
         It fails after 20 s by default. `margin` is the heading error in degrees at which it
         succeeds, once the drone no longer turns.
         """
-        limit = 20.0 if timeout is None else checks.duration(timeout)
+        limit = 20.0 if timeout is None else checks.duration(timeout, "timeout")
         near = math.radians(checks.real(margin, "margin", 0.0, 180.0, is_above=True))
         *_, heading = to_simulator(0.0, 0.0, checks.radians(yaw, "yaw"))
         command = RotateToCommand(self.body, heading, near, limit)
@@ -313,7 +313,7 @@ class Pilot(ComputerVisionDrone):
         sideways, m/s; `z_max` is the goal's height above the drone at full throttle, metres.
         """
         fastest = checks.speed(vx_max, "vx_max"), checks.speed(vy_max, "vy_max")
-        climb = checks.height(z_max, "z_max")
+        climb = checks.real(z_max, "z_max", 0.0, unit="m")
         control = YawControl(self.body, drivetrain, yaw_mode)
         modes: Modes = (Mode.VELOCITY, Mode.VELOCITY, control.mode, Mode.POSITION)
         cos, sin = self.body.heading.cos(), self.body.heading.sin()

@@ -34,6 +34,8 @@ from drone_rl.sim.sensors import (
 from drone_rl.utils.display import table
 
 Triple = tuple[float, float, float]
+_VERTICAL = 1.0 - 1e-12
+"""Sine of the pitch above which roll and yaw can't be distinguished."""
 
 
 class LandedState(enum.StrEnum):
@@ -56,10 +58,14 @@ class Attitude:
 
     @classmethod
     def of(cls, quaternion: Sequence[float]) -> Self:
-        """Convert a unit quaternion (w, x, y, z)."""
+        """Convert a unit quaternion (w, x, y, z); straight up or down the roll is 0."""
         w, x, y, z = quaternion
+        sine = 2.0 * (w * y - z * x)
+        if abs(sine) > _VERTICAL:  # roll and yaw turn about the same axis
+            pitch, yaw = math.copysign(math.pi / 2, sine), 2.0 * math.atan2(z, w)
+            return cls(*np.degrees(to_pilot(0.0, pitch, math.remainder(yaw, math.tau))).tolist())
         roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-        pitch = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
+        pitch = math.asin(sine)
         yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         return cls(*np.degrees(to_pilot(roll, pitch, yaw)).tolist())
 

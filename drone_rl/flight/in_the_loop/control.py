@@ -55,6 +55,7 @@ class RcSticks:
     yaw: float = 0.0
     """Fraction of `FULL_YAW_RATE` to the left, -1 to 1."""
     armed: bool = False
+    """Whether the arming switch is on."""
 
     @property
     def channels(self) -> list[int]:
@@ -70,6 +71,7 @@ class RcSticks:
 
 
 AT_REST = RcSticks()
+"""Centred sticks, throttle low, arming switch off."""
 
 
 def velocity_to(

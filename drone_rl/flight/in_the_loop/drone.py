@@ -36,7 +36,7 @@ class Controller(Protocol):
     """A flight controller, such as `Betaflight`."""
 
     def step(self, readings: Readings, sticks: RcSticks) -> Vector:
-        """Return thrust fractions: front right, rear left, front left, rear right."""
+        """Return thrust fractions: front right, rear left, front left, rear right. Shape: (4,)."""
         ...
 
 
@@ -67,6 +67,7 @@ class DroneInTheLoop:
         self.settings = settings
         self.readings = measure(body, body, settings.tick, 0.0)
         self.rotors: Vector = np.zeros(4)
+        """The controller's last thrust fractions, in the order of `Controller.step`."""
         self.trace: list[Readings] = []
         """The measurements at each setpoint."""
         self._ticks = 0
@@ -129,7 +130,8 @@ class DroneInTheLoop:
     ) -> bool:
         """Fly by setpoints for so many seconds at most; return whether `until` ended the flight.
 
-        The guidance is called at once and then every `every` seconds, and `until` before each call.
+        The guidance is called at once and then every `every` seconds; `until` is called before each
+        call and at the end.
 
         Raises:
             FlightControllerError: See `tick`; or the guidance took longer than the firmware's

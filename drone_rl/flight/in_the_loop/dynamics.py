@@ -62,7 +62,7 @@ class InTheLoopDynamics:
         """Arm the drone, take off and hover where the episode begins, at the state from `start`.
 
         Raises:
-            NotReadyError: The drone doesn't arm, or doesn't hover there.
+            NotReadyError: The drone doesn't arm or hover there, or the flight controller failed.
         """
         assert isinstance(body, FlightState)
         drone, place = self.drone, body.position[0].numpy()
@@ -75,16 +75,19 @@ class InTheLoopDynamics:
         try:
             drone.arm(tries=_ARM_TRIES)
             take_off(drone, place)
+            is_there = drone.fly(hold_position(place, drone.settings), _HOVER_WITHIN, until=hovers)
         except FlightControllerError as error:
             raise NotReadyError(str(error)) from error
-        if not drone.fly(hold_position(place, drone.settings), _HOVER_WITHIN, until=hovers):
+        if not is_there:
             raise NotReadyError(f"the drone doesn't hover {_HOVER_WITHIN:g} s after its take-off")
         self._last = time.monotonic()
 
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> FlightState:
-        """Fly for one action, shape (1, *); see `Dynamics`. Only the reference of `body` counts.
+        """Fly for one action, shape (1, *); see `Dynamics`.
+
+        Of `body` only the position and the reference count; `drone` has the state.
 
         Raises:
             FlightControllerError: See `DroneInTheLoop.tick`; or the policy took too long.

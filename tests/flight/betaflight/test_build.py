@@ -50,6 +50,13 @@ def test_a_source_that_does_not_compile(tools, tmp_path):
     assert not (tmp_path / "firmware").exists()
 
 
+def test_places_that_no_program_can_have(tools, tmp_path):
+    (tmp_path / "file").write_text("")
+    for place in (tmp_path / "file" / "firmware", tmp_path):
+        with pytest.raises(InputError, match=f"can't be written to {place}: .*; give another path"):
+            build_firmware(place, tools)
+
+
 def test_what_is_missing(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="has no Makefile"):
         build_firmware(tmp_path / "x", tmp_path)

@@ -1,3 +1,5 @@
+import os
+import signal
 import socket
 import sys
 
@@ -45,7 +47,7 @@ def test_one_that_answers_nobody_is_given_up(own_network, tmp_path):
     with FirmwareProcess() as process:
         program = [sys.executable, "-c", "import time; time.sleep(60)"]
         process.start(program, tmp_path, tmp_path / "log")
-        with pytest.raises(FlightControllerError, match="can't socket"):
+        with pytest.raises(FlightControllerError, match=r"can't connect: .*Connection refused"):
             process.connect_within("tcp", 5761, 0.1)
         assert process.status() is None
 
@@ -59,6 +61,17 @@ def test_a_supervisor_that_is_gone(tmp_path):
     with pytest.raises(FlightControllerError, match="supervisor is gone"):
         process.status()
     process.close()
+
+
+def test_a_late_answer_is_not_that_of_the_next_request(own_network, tmp_path):
+    with FirmwareProcess(patience=5.0) as process:
+        process._link.settimeout(0.1)
+        os.kill(process._process.pid, signal.SIGSTOP)
+        with pytest.raises(FlightControllerError, match="doesn't answer"):
+            process.start([sys.executable, "-c", ""], tmp_path, tmp_path / "log")
+        os.kill(process._process.pid, signal.SIGCONT)
+        with pytest.raises(FlightControllerError, match="supervisor is gone"):
+            process.status()
 
 
 def test_ports_that_are_taken_are_named():

@@ -7,6 +7,7 @@ from drone_rl.flight.betaflight.sitl import MEMORY, STARTS, Betaflight
 from drone_rl.flight.in_the_loop.control import AT_REST, RcSticks
 from drone_rl.flight.in_the_loop.drone import FlightControllerError
 from drone_rl.flight.in_the_loop.instruments import Readings
+from drone_rl.utils.errors import InputError
 
 ZEROS = np.zeros(3)
 
@@ -33,6 +34,16 @@ def test_it_is_set_up_once_and_then_armed(stub, tmp_path):
     assert firmware.log.read_text().startswith("stub")
 
 
+def test_it_can_be_started_again(stub, tmp_path):
+    """The time begins again at 0, and so do the packets of sticks."""
+    firmware, armed = Betaflight(stub(), tmp_path), RcSticks(armed=True, throttle=0.5)
+    for first in (100, 0):
+        with firmware:
+            for step in range(first, first + 40):
+                rotors = firmware.step(standing(step), armed)
+        assert rotors == pytest.approx([0.5] * 4)
+
+
 def test_sides_are_not_swapped(stub, tmp_path):
     with Betaflight(stub(), tmp_path) as firmware:
         told = RcSticks(armed=True, throttle=0.5, roll=0.1)
@@ -46,7 +57,12 @@ def test_sides_are_not_swapped(stub, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("how", "words"), [("dies", "ended with status 3"), ("mute", "silent for 0.2 s")]
+    ("how", "words"),
+    [
+        ("dies", "ended with status 3"),
+        ("mute", "silent for 0.2 s"),
+        ("babbles", "sent an invalid packet .*not finite"),
+    ],
 )
 def test_a_firmware_that_is_lost(stub, tmp_path, how, words):
     with Betaflight(stub(), tmp_path):
@@ -62,6 +78,12 @@ def test_one_that_does_not_understand_leaves_no_memory(stub, tmp_path):
     with pytest.raises(FlightControllerError, match=r"can't be set up.*refuses 'set p_yaw = 250'"):
         Betaflight(stub("refuses"), tmp_path).__enter__()
     assert not (tmp_path / MEMORY).exists()
+
+
+def test_a_folder_that_is_a_file(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=r"folder=.*file can't be created: File exists"):
+        Betaflight(["sh"], tmp_path / "file").__enter__()
 
 
 def test_programs_that_are_none(own_network, tmp_path):

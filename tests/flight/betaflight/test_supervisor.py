@@ -67,7 +67,7 @@ def test_what_can_not_be_is_an_answer(tmp_path):
     ours, lines, process, _ = started("shared")
     told = {"program": ["/nowhere/x"], "folder": str(tmp_path), "log": str(tmp_path / "log")}
     assert "/nowhere/x" in ask(ours, lines, request="start", **told)["error"]
-    assert "error" in ask(ours, lines, request="socket", kind="tcp", port=1)
+    assert "error" in ask(ours, lines, request="connect", kind="tcp", port=1)
     assert ask(ours, lines, request="stop") == {}
     lines.close()
     ours.close()
@@ -90,7 +90,7 @@ def test_a_network_of_its_own_is_another(own_network):
     """Two in networks of their own have the same port at the same time; ours stays free."""
     both = [started("own") for _ in range(2)]
     for ours, lines, _, _ in both:
-        assert ask(ours, lines, request="socket", kind="bound", port=9002) == {}
+        assert ask(ours, lines, request="connect", kind="bound", port=9002) == {}
     for ours, lines, process, _ in both:
         lines.close()
         ours.close()
@@ -112,7 +112,7 @@ def test_sockets_of_each_kind():
 
 
 def test_each_request_has_an_answer_of_one_line_and_its_socket():
-    requests = [{"request": "poll"}, {"request": "socket", "kind": "bound", "port": 0}]
+    requests = [{"request": "poll"}, {"request": "connect", "kind": "bound", "port": 0}]
     lines = io.BytesIO(b"".join(json.dumps(request).encode() + b"\n" for request in requests))
     near, far = socket.socketpair()
     with near, far:

@@ -59,6 +59,24 @@ def test_keys_turn(pilot, key):
     assert vars(found) == pytest.approx(expected)
 
 
+def test_a_key_may_turn_the_drone_many_times(pilot):
+    """A thousand steps of 5 degrees are 13 turns and 320 degrees."""
+    assert pilot.press("yaw_right", 1000).attitude.yaw == pytest.approx(-40.0)
+
+
+def test_keys_with_the_nose_straight_up(pilot):
+    """The drone keeps its heading, and moves in it."""
+    pilot.set_pose([0, 0, 5], yaw=15)
+    for _ in range(18):
+        pilot.press("pitch_up")
+    assert vars(pilot.state.attitude) == pytest.approx({"roll": 0, "pitch": 90, "yaw": 15})
+    forward, right = STEP * math.cos(math.radians(15)), STEP * math.sin(math.radians(15))
+    assert pilot.press("forward").position == pytest.approx((forward, -right, 5))
+    for _ in range(18):
+        pilot.press("pitch_down")
+    assert vars(pilot.state.attitude) == pytest.approx({"roll": 0, "pitch": 0, "yaw": 15}, abs=1e-6)
+
+
 def test_images_of_all_types_are_those_of_the_pose(pilot):
     types = range(7)
     requests = [drone_rl.ImageRequest(0, kind, False, False) for kind in types]

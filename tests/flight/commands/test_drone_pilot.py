@@ -88,7 +88,7 @@ def test_a_lost_drone_is_told_nothing(flying):
 def test_time_passes_as_it_is_told(flying):
     before = flying.time
     assert flying.advance(0.3).time == pytest.approx(before + 0.3)
-    with pytest.raises(InputError, match="duration=-1"):
+    with pytest.raises(InputError, match="seconds=-1"):
         flying.advance(-1)
 
 

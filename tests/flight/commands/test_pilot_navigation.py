@@ -101,8 +101,10 @@ def test_sticks_are_read_while_time_passes(flying):
         ("move_by_rotors", ([0.5, 0.5, 2, 0.5], 1), {}, r"shares\[2\]=2"),
         ("rotate_to", (math.nan,), {}, "yaw=nan"),
         ("rotate_to", (9,), {"margin": 0}, "margin=0"),
+        ("rotate_to", (9,), {"timeout": -1}, "timeout=-1"),
         ("rotate_by", (9, -1), {}, "duration=-1"),
         ("move_by_manual", (0, 1, 1, 1), {}, "vx_max=0"),
+        ("move_by_manual", (1, 1, -1, 1), {}, "z_max=-1 is invalid; give a finite number of 0"),
     ],
 )
 def test_what_is_refused_before_anything_moves(flying, name, given, choices, told):

@@ -16,6 +16,10 @@ HALF = math.sqrt(0.5)
         ((HALF, HALF, 0, 0), (90, 0, 0)),
         ((math.cos(0.25), 0, math.sin(0.25), 0), (0, -math.degrees(0.5), 0)),
         ((HALF, 0, 0, HALF), (0, 0, -90)),
+        ((HALF, 0, -HALF, 0), (0, 90, 0)),
+        ((0.5, 0.5, -0.5, 0.5), (0, 90, -90)),  # nose up, turned to the left
+        ((0, -HALF, 0, HALF), (0, -90, -180)),
+        ((0.5, -0.5, 0.5, 0.5), (0, -90, -90)),
     ],
 )
 def test_angles(quaternion, angles):

@@ -108,6 +108,22 @@ def test_a_firmware_that_never_arms(monkeypatch):
         dynamics.begin(dynamics.start(PLACE))
 
 
+def test_a_firmware_that_fails_while_the_drone_rises(monkeypatch):
+    """`begin` flies twice: to the height, and until the drone hovers."""
+    dynamics, flights = InTheLoopDynamics(drone(), SETTINGS), []
+
+    def fly(*args, **kwargs):
+        flights.append(args)
+        if len(flights) == 2:
+            raise FlightControllerError("the firmware ended with status 3")
+        return True
+
+    monkeypatch.setattr(dynamics.drone, "fly", fly)
+    arm_at_once(monkeypatch)
+    with pytest.raises(NotReadyError, match="ended with status 3"):
+        dynamics.begin(dynamics.start(PLACE))
+
+
 def test_a_policy_that_thinks_for_too_long(begun, monkeypatch):
     dynamics, body = begun
     monkeypatch.setattr(module, "LONGEST_DECISION", 0.0)
