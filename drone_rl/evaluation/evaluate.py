@@ -37,8 +37,8 @@ class Evaluation:
     seed: RootSeed
     """Root of the environments' random streams."""
     rounding: dict[str, Any] | None = None
-    """The implementation that computed the actions, and whether another one takes the same actions;
-    see `drone_rl.evaluation.outcomes.Rounding`."""
+    """The implementation that computed the actions, and the comparison with another one; see
+    `drone_rl.evaluation.outcomes.Rounding`."""
 
     @property
     def success(self) -> float:
@@ -46,9 +46,9 @@ class Evaluation:
         return self.figures["greedy"]["success"]["share"]
 
     def rows(self) -> list[list[str]]:
-        """Return the figures as rows of text: a header, then one row per figure.
+        """Return the figures as rows of text: a header, the figures, and intervals of rates.
 
-        Intervals are those of the policy only, so that the table fits a terminal.
+        The intervals are those of the policy only, so that the table fits a terminal.
         """
         figures = self.figures.values()
         terms = as_task(self.policy.task).vocabulary
@@ -152,16 +152,18 @@ def held_out_environments(
 
 def _same(evidence: Evidence) -> str:
     found = evidence["rounding"]
+    what = "All actions" if found.get("bound", True) else "The outcomes"
     return (
-        f"All actions of the first {found['compared_episodes']:,} greedy episodes were the same "
+        f"{what} of the first {found['compared_episodes']:,} greedy episodes were the same "
         f"when computed again ({found['compared']})."
     )
 
 
 def _other(evidence: Evidence) -> str:
     found = evidence["rounding"]
+    what = "Actions" if found.get("bound", True) else "Actions or outcomes"
     return (
-        f"Actions differed in {found['differing']:,} of the first {found['compared_episodes']:,} "
+        f"{what} differed in {found['differing']:,} of the first {found['compared_episodes']:,} "
         f"greedy episodes when computed again ({found['compared']}): decisions depend on rounding."
     )
 
@@ -185,13 +187,13 @@ EVALUATION = (
     ),
     Sentence(
         "computed.same",
-        "another implementation took the same actions",
+        "another implementation took the same actions or, without a bound, had the same outcomes",
         lambda e: bool(e.get("rounding")) and not e["rounding"]["differing"],
         _same,
     ),
     Sentence(
         "computed.other",
-        "another implementation took other actions",
+        "another implementation took other actions or, without a bound, had other outcomes",
         lambda e: bool(e.get("rounding")) and e["rounding"]["differing"] > 0,
         _other,
     ),
