@@ -22,6 +22,7 @@ from drone_rl.sim.tasks import as_task
 from drone_rl.utils.display import aligned, table
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.schema import Instance
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import Evidence, Sentence, fixed_seed, interval, percent, say, seed_line
 
@@ -122,7 +123,8 @@ def evaluate(
     Raises:
         InputError: The policy or a setting is unusable.
     """
-    settings, seed = with_seed((settings or EvaluateSettings()).replace(**changes))
+    Instance(EvaluateSettings).read(settings := settings or EvaluateSettings(), "settings")
+    settings, seed = with_seed(settings.replace(**changes))
     progress = progress or Bar()
     policy = as_policy(policy)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2

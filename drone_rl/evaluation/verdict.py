@@ -227,8 +227,8 @@ def widen(
         np.fmax.at(upper, owner[is_known], ends[is_known])
         lower[is_open], upper[is_open] = low, high
         least, most = (estimate(i, v[~np.isnan(v)], rule) for v in (lower, upper))
-        ends = {"lower": min(quantity.lower, least.lower), "upper": max(quantity.upper, most.upper)}
-        widened.append(quantity._replace(**ends))
+        low, high = min(quantity.lower, least.lower), max(quantity.upper, most.upper)
+        widened.append(quantity._replace(lower=low, upper=high))
     return tuple(widened)
 
 

@@ -30,7 +30,7 @@ def is_stated(evidence: Evidence) -> bool:
 
 
 def is_proved(evidence: Evidence) -> bool:
-    """Return whether it does, and enough rollouts re-checked it."""
+    """Return whether a certificate states so, and enough rollouts re-checked it."""
     bound = evidence["proof"].get("wrong_at_most") if is_stated(evidence) else None
     return bound is not None and bound <= MAX_WRONG
 
