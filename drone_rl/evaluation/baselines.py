@@ -105,7 +105,7 @@ def run_baselines(
     policy's batch size. The task's default dynamics are used by default.
 
     Raises:
-        InputError: The task has no oracle.
+        InputError: The task has no oracle; no episode was run.
     """
     task = as_task(task)
     env = DroneEnv(num_envs, task, pixels=False, device=device, dynamics=dynamics)
@@ -113,9 +113,11 @@ def run_baselines(
     env.load_state_dict(worlds)
     source = env.side_streams(torch.tensor([0]), _RANDOM_ACTIONS)[0]
     generator = torch.Generator(env.device).manual_seed(int(source.integers(2**63)))
+    names = (*task.blind_baselines, "oracle")
+    actors = {name: make_baseline(name, task, generator, actions) for name in names}
     results = {}
-    for name in (*task.blind_baselines, "oracle"):
+    for name, actor in actors.items():
         env.load_state_dict(worlds)
-        results[name] = run_episodes(env, make_baseline(name, task, generator, actions), episodes)
+        results[name] = run_episodes(env, actor, episodes)
     env.close()
     return results

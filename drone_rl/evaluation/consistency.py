@@ -15,6 +15,7 @@ from drone_rl.utils.consistency import (
     read_entry,
 )
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.intervals import proportion
 from drone_rl.utils.schema import Flag, OneOf, Plain, Real, Several, Whole, as_mapping, shown
 
@@ -128,8 +129,9 @@ def _quantity(
         check_width(interval, offered, where)
     else:
         check_mean_width((lower, upper), value, count, bounds, rule.confidence, where)
-    Several(Real(-1.0, 1.0), 1, 8).read(given.get("thresholds"), f"{where}.thresholds")
-    for one, other in zip(given["thresholds"], thresholds, strict=False):
+    count = len(thresholds)
+    Several(Real(-1.0, 1.0), count, count).read(given.get("thresholds"), f"{where}.thresholds")
+    for one, other in zip(given["thresholds"], thresholds, strict=True):
         check_same(one, other, f"{where}.thresholds")
     return Quantity(value, lower, upper, thresholds)
 
@@ -141,19 +143,20 @@ def _expected(
     greedy, baselines, good = verdict["greedy"], verdict["baselines"], rule.good_share
     ours, best = (of["success"]["share"] for of in (greedy, baselines["oracle"]))
     every, most = (of["shares"]["all"]["mean"] for of in (greedy, baselines["oracle"]))
-    episodes, what = greedy["episodes"], name.rpartition(" ")[2]
-    if name == "success":
+    episodes, (kind, _, what) = greedy["episodes"], name.partition(" ")
+    if kind == "success":
         return ours - good * best, (-good, 1.0), episodes
-    if name.startswith("offered "):
+    if kind == "offered":
         return greedy["shares"][what]["count"] / episodes, (0.0, 1.0), episodes
-    if name.startswith("collected "):
+    if kind == "collected":
         stratum = greedy["shares"][what]
         return stratum["mean"], (0.0, 1.0), stratum["count"]
-    if name.startswith("above "):
+    if kind == "above":
         blind = baselines[what]["shares"]["all"]["mean"]
         share = every - (1 - rule.poor_margin) * blind - rule.poor_margin * most
         return share, (-1.0, 1.0), episodes
-    return good * best - baselines[what]["success"]["share"], (-1.0, good), episodes
+    rate = baselines[what.removeprefix("by ")]["success"]["share"]
+    return good * best - rate, (-1.0, good), episodes
 
 
 def _check_kind(verdict: Mapping[str, Any], found: list[Quantity], rule: Rule) -> None:
@@ -167,7 +170,7 @@ def _check_kind(verdict: Mapping[str, Any], found: list[Quantity], rule: Rule) -
     if is_certain and len(kinds_within(box, len(rule.strata))) > 1:
         raise InputError(f"verdict.certain=true, but its intervals allow for more than {kind}")
     status = read_entry(verdict, "exit_code", Whole(0, 255), "verdict")
-    if status != kind.exit_code if is_certain else status == 0:
+    if status != (kind.exit_code if is_certain else NOT_CERTAIN):
         raise InputError(f"verdict.exit_code={status} is not that of its kind; judge again")
 
 

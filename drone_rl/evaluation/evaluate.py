@@ -22,6 +22,7 @@ from drone_rl.sim.tasks import as_task
 from drone_rl.utils.display import aligned, table
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.schema import Instance
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import Evidence, Sentence, fixed_seed, interval, percent, say, seed_line
 
@@ -37,8 +38,8 @@ class Evaluation:
     seed: RootSeed
     """Root of the environments' random streams."""
     rounding: dict[str, Any] | None = None
-    """The implementation that computed the actions, and whether another one takes the same actions;
-    see `drone_rl.evaluation.outcomes.Rounding`."""
+    """The implementation that computed the actions, and the comparison with another one; see
+    `drone_rl.evaluation.outcomes.Rounding`."""
 
     @property
     def success(self) -> float:
@@ -46,9 +47,9 @@ class Evaluation:
         return self.figures["greedy"]["success"]["share"]
 
     def rows(self) -> list[list[str]]:
-        """Return the figures as rows of text: a header, then one row per figure.
+        """Return the figures as rows of text: a header, the figures, and intervals of rates.
 
-        Intervals are those of the policy only, so that the table fits a terminal.
+        The intervals are those of the policy only, so that the table fits a terminal.
         """
         figures = self.figures.values()
         terms = as_task(self.policy.task).vocabulary
@@ -122,7 +123,8 @@ def evaluate(
     Raises:
         InputError: The policy or a setting is unusable.
     """
-    settings, seed = with_seed((settings or EvaluateSettings()).replace(**changes))
+    Instance(EvaluateSettings).read(settings := settings or EvaluateSettings(), "settings")
+    settings, seed = with_seed(settings.replace(**changes))
     progress = progress or Bar()
     policy = as_policy(policy)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
@@ -152,16 +154,18 @@ def held_out_environments(
 
 def _same(evidence: Evidence) -> str:
     found = evidence["rounding"]
+    what = "All actions" if found.get("bound", True) else "The outcomes"
     return (
-        f"All actions of the first {found['compared_episodes']:,} greedy episodes were the same "
+        f"{what} of the first {found['compared_episodes']:,} greedy episodes were the same "
         f"when computed again ({found['compared']})."
     )
 
 
 def _other(evidence: Evidence) -> str:
     found = evidence["rounding"]
+    what = "Actions" if found.get("bound", True) else "Actions or outcomes"
     return (
-        f"Actions differed in {found['differing']:,} of the first {found['compared_episodes']:,} "
+        f"{what} differed in {found['differing']:,} of the first {found['compared_episodes']:,} "
         f"greedy episodes when computed again ({found['compared']}): decisions depend on rounding."
     )
 
@@ -185,13 +189,13 @@ EVALUATION = (
     ),
     Sentence(
         "computed.same",
-        "another implementation took the same actions",
+        "another implementation took the same actions or, without a bound, had the same outcomes",
         lambda e: bool(e.get("rounding")) and not e["rounding"]["differing"],
         _same,
     ),
     Sentence(
         "computed.other",
-        "another implementation took other actions",
+        "another implementation took other actions or, without a bound, had other outcomes",
         lambda e: bool(e.get("rounding")) and e["rounding"]["differing"] > 0,
         _other,
     ),

@@ -112,9 +112,9 @@ def failure_table(episodes: Episodes, confidence: float = 0.95) -> dict[str, Any
     Returns:
         "rows": each with "by", "value", "episodes" (that offered such a goal at or before their
         first failure), "failed" (whose first failure it was), "share" and its interval; "largest":
-        the row with the greatest product of failures and lower bound, None if nothing failed,
-        without the end to which every missed goal leads; "expected_end": that end; "bound": the
-        fraction of episodes that failed, with its exact interval.
+        the row with the greatest product of failures and lower bound, None if nothing failed; the
+        end to which every missed goal leads only if no other row has failures; "expected_end": that
+        end; "bound": the fraction of episodes that failed, with its exact interval.
     """
     reached, task = episodes.goals.reached, episodes.task
     first = reached.long().cumprod(-1).sum(-1)  # number of goals where none failed
@@ -133,8 +133,9 @@ def failure_table(episodes: Episodes, confidence: float = 0.95) -> dict[str, Any
     each = 1.0 - (1.0 - confidence) / len(counts)
     rows = [_row(*count, confidence=each) for count in counts]
     expected = task.ends(task.expected_end).name.lower()
-    hit = [row for row in rows if row["failed"] and row["value"] != expected]
-    largest = max(hit, key=lambda row: row["failed"] * row["lower95"], default=None)
+    hit = [row for row in rows if row["failed"]]
+    telling = [row for row in hit if (row["by"], row["value"]) != ("end", expected)]
+    largest = max(telling or hit, key=lambda row: row["failed"] * row["lower95"], default=None)
     return {
         "rows": rows,
         "largest": largest,

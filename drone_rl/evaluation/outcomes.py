@@ -54,9 +54,11 @@ class Rounding:
     """Implementation that ran the episodes again."""
     compared_episodes: int
     differing: int
-    """Episodes in which it took other actions."""
+    """Episodes in which it took other actions or, of continuous actions and with flight dynamics,
+    that ended differently."""
     unexplained: int
-    """Differing episodes without a fragile frame up to the first difference."""
+    """Differing episodes without a fragile frame up to the first other action, or at all if
+    outcomes were compared."""
 
     @property
     def is_excessive(self) -> bool:

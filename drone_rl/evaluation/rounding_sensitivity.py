@@ -203,7 +203,7 @@ class _CheckingActor(TensorDictModuleBase):
     """Act greedily, and write whether rounding could change the action."""
 
     def __init__(self, decide: Decide, network: ImageNetwork, *, is_contrary: bool = False) -> None:
-        """Take a network; `is_contrary`: take the second best action where two are possible."""
+        """Take a network; `is_contrary`: take the other action where two are possible."""
         super().__init__()
         self.in_keys, self.out_keys = ["pixels"], ["action", "fragile"]
         self._decide, self._network, self._is_contrary = decide, network, is_contrary
@@ -215,9 +215,8 @@ class _CheckingActor(TensorDictModuleBase):
         tensordict.set("fragile", found.is_fragile)
         action = self._network.actions.greedy(found.outputs)
         if self._is_contrary:
-            second = found.outputs.topk(2).indices[:, 1]
-            only_two = found.possible.sum(-1) == 2
-            action = torch.where(only_two, second, action)
+            others = found.possible.scatter(1, action[:, None], False)
+            action = torch.where(others.sum(-1) == 1, others.int().argmax(-1), action)
         return tensordict.set("action", action)
 
 
@@ -278,7 +277,8 @@ def _run_checked(
                 found = enumerate_outcomes(renderer, decide, worlds.to(env.device))
             else:
                 contrary = _CheckingActor(decide, network, is_contrary=True)
-                found = _run_second_best(env, contrary, before, fragile[first:], worlds)
+                taken = log.actions[first:]
+                found = _run_other_actions(env, contrary, before, taken, fragile[first:], worlds)
             followed.append((first, found, worlds))
         first += len(lengths)
         before = base_env(env).state_dict()
@@ -286,26 +286,31 @@ def _run_checked(
     return _Checked(Episodes.joined(finals), fragile, followed), log.actions
 
 
-def _run_second_best(
+def _run_other_actions(
     env: EnvBase,
     actor: TensorDictModuleBase,
     before: dict[str, Any],
+    taken: Sequence[Tensor],
     fragile: Sequence[Tensor],
     env_ids: Tensor,
 ) -> OutcomeSet:
-    """Run a batch again with the second best action in fragile frames.
+    """Run a batch again with the other action in fragile frames where two are possible.
 
     For policies whose observations cannot be rendered from a state. If each of the two rollouts
-    has a single fragile frame, the same one, there are no other outcomes. `before` has the random
-    streams at the start of the batch, `env_ids` the episodes with fragile frames.
+    has a single fragile frame, in which they take different actions, there are no other outcomes.
+    `before` has the random streams at the start of the batch, `taken` the first rollout's actions,
+    and `env_ids` are the episodes with fragile frames.
     """
     after, log = base_env(env).state_dict(), StepLog()
     base_env(env).load_state_dict(before)
     (batch,) = episode_batches(env, actor, len(fragile), ("fragile",), log=log)
     base_env(env).load_state_dict(after)
     again = cast(Tensor, batch["fragile"]).cpu().split([len(a) for a in log.actions])
-    pairs = [(only_index(fragile[i]), only_index(again[i])) for i in env_ids.tolist()]
-    is_open = torch.tensor([one is None or one != other for one, other in pairs])
+    steps = [
+        (only_index(fragile[i]), only_index(again[i]), first_difference(taken[i], log.actions[i]))
+        for i in env_ids.tolist()
+    ]
+    is_open = torch.tensor([None in three or len(set(three)) > 1 for three in steps])
     return OutcomeSet(final_episodes(env, batch)[env_ids], torch.arange(len(env_ids)), is_open)
 
 

@@ -78,9 +78,15 @@ def judge_policy(
 
     Initial states are the same. `sampled` also runs the policy with sampled actions; `known` are
     the arguments "rule", "claim", "unlike" and "seed" of `apply_rule`.
+
+    Raises:
+        InputError: The task has no oracle, or see `check_rounding`.
     """
     base, worlds = base_env(env), worlds_of(env)
     state = base.state_dict()
+    baselines = run_baselines(
+        env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
+    )
     log, drawn = StepLog(), None
     greedy = run_episodes(env, actor, episodes, is_compiled=True, log=log)
     if sampled:
@@ -88,9 +94,6 @@ def judge_policy(
         drawn = run_episodes(env, actor, episodes, greedy=False)
     base.load_state_dict(state)
     rounding = check_rounding(env, actor, episodes, greedy=greedy, log=log)
-    baselines = run_baselines(
-        env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
-    )
     return apply_rule(greedy, baselines, sampled=drawn, rounding=rounding, **known)
 
 
@@ -227,8 +230,8 @@ def widen(
         np.fmax.at(upper, owner[is_known], ends[is_known])
         lower[is_open], upper[is_open] = low, high
         least, most = (estimate(i, v[~np.isnan(v)], rule) for v in (lower, upper))
-        ends = {"lower": min(quantity.lower, least.lower), "upper": max(quantity.upper, most.upper)}
-        widened.append(quantity._replace(**ends))
+        low, high = min(quantity.lower, least.lower), max(quantity.upper, most.upper)
+        widened.append(quantity._replace(lower=low, upper=high))
     return tuple(widened)
 
 

@@ -30,7 +30,7 @@ def is_stated(evidence: Evidence) -> bool:
 
 
 def is_proved(evidence: Evidence) -> bool:
-    """Return whether it does, and enough rollouts re-checked it."""
+    """Return whether a certificate states so, and enough rollouts re-checked it."""
     bound = evidence["proof"].get("wrong_at_most") if is_stated(evidence) else None
     return bound is not None and bound <= MAX_WRONG
 
@@ -202,7 +202,8 @@ def _rounding(evidence: Evidence) -> str:
     )
     if found["unexplained"]:
         count = f"{found['unexplained']:,} of {found['compared_episodes']:,} episodes"
-        text += f"; {found['compared']} took other actions in {count} for no such reason"
+        took = "took other actions" if found.get("bound", True) else "gave other results"
+        text += f"; {found['compared']} {took} in {count} for no such reason"
     return f"{text}."
 
 
@@ -219,6 +220,8 @@ def _shares(evidence: Evidence) -> str:
     terms = terms_of(evidence)
     goals = f"the {terms.goals}"
     parts = [f"{p} of {'those' if i else goals} {v}" for i, (p, v) in enumerate(met)]
+    if not met:
+        return f"No {terms.goals} were offered {listed(none, 'or')}."
     text = f"It {terms.reaches} {listed(parts)}"
     return text + (f"; none were offered {listed(none, 'or')}." if none else ".")
 

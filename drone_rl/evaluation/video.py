@@ -245,7 +245,10 @@ def _compose(
 
 
 def probabilities(acted: TensorDictBase, actions: Actions) -> Tensor:
-    """Return the probabilities of the parts in the first environment; 1 without "logits". (K,)."""
+    """Return the probabilities of the parts in the first environment. Shape: (K,).
+
+    Without "logits", that of the chosen part is 1.
+    """
     logits = acted.get("logits", None)
     if logits is None:
         return torch.eye(len(actions))[int(actions.part(acted["action"][0]))]

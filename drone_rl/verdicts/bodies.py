@@ -21,6 +21,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import BAD, EMPTY, FAINT, GOOD, INK, ONE_SIDED, css, light
 from drone_rl.utils.progress import Bar, Progress, silent
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.schema import Instance
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import BODIES, Evidence, interval, percent, rate, say, seed_line
 from drone_rl.verdicts.judge import judge
@@ -82,7 +83,8 @@ def bodies(
     """Judge policies in computer-vision mode, in flight, in wind, and with worse drones.
 
     Args:
-        policies: One or several of what `judge` takes; those of the settings by default.
+        policies: One or several of what `judge` takes, except baselines; those of the settings by
+            default.
         settings: Policies, dynamics, number of episodes and so on.
         outputs: See `load_policy`.
         progress: Called with what is running; a progress bar by default.
@@ -91,7 +93,8 @@ def bodies(
     Raises:
         InputError: A policy or a setting is unusable.
     """
-    settings, seed = with_seed((settings or BodiesSettings()).replace(**changes))
+    Instance(BodiesSettings).read(settings := settings or BodiesSettings(), "settings")
+    settings, seed = with_seed(settings.replace(**changes))
     progress = progress or Bar()
     given = list(settings.policies) if policies is None else policies
     listed = given if isinstance(given, list | tuple) else [given]

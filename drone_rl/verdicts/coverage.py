@@ -55,7 +55,8 @@ class DomainRecheck:
     contradictions: tuple[str, ...]
     """What contradicts the file, one line each."""
     fewest: int
-    """Fewest successes at a strength that do not contradict the file."""
+    """Fewest successes at a strength that do not contradict the file if the oracle always succeeds
+    and rounding changes no episode."""
 
     @property
     def count(self) -> int:
@@ -68,7 +69,7 @@ class DomainRecheck:
         kind = "fixed" if self.seed_is_fixed else "fresh"
         return (
             f"re-checked by {self.episodes:,} episodes at each of {self.count} strengths, ends of "
-            f"the ranges and random ones ({kind} seed {self.seed}{fitted}); fewer than "
+            f"the ranges and random ones ({kind} seed {self.seed}{fitted}); fewer than about "
             f"{self.fewest:,} successes at one would have contradicted the file"
         )
 

@@ -155,10 +155,11 @@ def judge(
         return judge_one(cast("Any", policy), settings, **how)
     if not policy:
         raise InputError("policy=[] is empty; give one or more policies")
+    Instance(JudgeSettings).read(settings := settings or JudgeSettings(), "settings")
     for one in policy:  # a wrong one is refused before any episode
         if one not in BASELINES:
             as_policy(one, how.get("outputs", "outputs"))
-    given = how.pop("seed", (settings or JudgeSettings()).seed)
+    given = how.pop("seed", settings.seed)
     seed = how.pop("drawn_seed", None) or root_seed(given)  # all in the same environments
     done = (judge_one(one, settings, drawn_seed=seed, **how) for one in policy)
     return Judgements(tuple(done))

@@ -8,6 +8,7 @@ import pytest
 from benchmarks.evidence import changed
 from drone_rl.evaluation.consistency import check_verdict
 from drone_rl.evaluation.verdict import apply_rule
+from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.utils.errors import InputError
 
@@ -84,6 +85,8 @@ LIES = [
     {"quantities.success.lower": 0.1},
     {"quantities.success.upper": math.inf},
     {"quantities.success.thresholds": [-1.0]},
+    {"quantities.success.thresholds": [0.0, 0.5]},
+    {"quantities.collected left.thresholds": [0.3]},
     {"quantities.offered left.value": 0.0},
     {"quantities.offered left.lower": 0.75},
     {"quantities.collected left.value": 1.0},
@@ -136,3 +139,26 @@ def test_sides_in_another_order_are_the_same_sides(judged):
     shares = verdict["greedy"]["shares"]
     verdict["greedy"]["shares"] = dict(reversed(shares.items()))
     check_verdict(verdict)
+
+
+def test_an_uncertain_verdict_has_the_exit_code_of_uncertainty(judged):
+    verdict = judged(lambda i, side: True, number=5)
+    with pytest.raises(InputError, match="exit_code=10 is not that of its kind"):
+        check_verdict({**verdict, "exit_code": 10})
+
+
+def test_names_of_several_words_are_read_whole(make_episodes, make_baselines):
+    """Of a task with the baseline "turn left" and the stratum "far right"."""
+
+    class Worded(CollectCubes):
+        strata = ("left", "ahead", "far right")
+        blind_baselines = ("random", "turn left")
+
+    sides = [LAYOUTS[i % 4] for i in range(40)]
+    flown = make_episodes(sides, [[True, side != LEFT] for _, side in sides], task=Worded())
+    baselines = make_baselines(flown)
+    named = {name.replace("left", "turn left"): of for name, of in baselines.items()}
+    named = {name: named[name] for name in ("random", "turn left", "oracle")}
+    for of in named.values():
+        of.task = flown.task
+    check_verdict(json.loads(json.dumps(apply_rule(flown, named).as_dict())))

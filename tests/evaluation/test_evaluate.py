@@ -132,3 +132,8 @@ def test_an_evaluation_says_what_its_seed_is(good):
     assert "Fixed seed 3: a policy could" in str(fixed)
     assert "Fixed seed" not in str(fresh)
     assert f"environments: seed {fresh.seed.value} (fresh)" in fresh._repr_html_()
+
+
+def test_settings_of_another_class_are_refused(good):
+    with pytest.raises(InputError, match=r"^settings=\(dict\) is no EvaluateSettings"):
+        drone_rl.evaluate(good, {"episodes": 2}, progress=silent)

@@ -30,3 +30,10 @@ def test_few_frames_and_other_differences_are_not_called_fragile():
     for changes in ({"excessive": False}, {"fragile": 0, "differing": 9}):
         assert "only" not in said(**changes)
     assert "decisions depend on rounding" in said(fragile=0, differing=9)
+
+
+def test_without_a_bound_the_comparison_may_be_of_outcomes_only():
+    assert "All actions of the first 50 greedy episodes were the same" in said(bound=True)
+    assert "The outcomes of the first 50 greedy episodes were the same" in said(bound=False)
+    assert " Actions differed in 9 of " in said(bound=True, differing=9)
+    assert " Actions or outcomes differed in 9 of " in said(bound=False, differing=9)

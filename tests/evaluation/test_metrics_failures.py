@@ -125,3 +125,24 @@ def test_another_task_has_classes_and_ends_of_its_own():
     assert row(table, "side", "right") == (2, 1)
     assert row(table, "end", "touched") == row(table, "end", "time") == (3, 1)
     assert table["largest"]["by"] == "side"  # of the ends, time is what is expected
+
+
+def test_the_expected_end_is_the_largest_if_no_class_has_the_missed_goals():
+    """Both episodes end before the post that they miss comes up, so that it has no side."""
+    goals = Goals(
+        reached=torch.tensor([[True, False], [True, False]]),
+        stratum=torch.tensor([[0, -1], [1, -1]]),
+        world=torch.zeros(2, 1),
+    )
+    ends = torch.tensor([End.TIME, End.TIME])
+    largest = failure_table(Episodes(Posts(), goals, ends, torch.tensor([12, 12])))["largest"]
+    assert (largest["by"], largest["value"], largest["failed"]) == ("end", "time", 2)
+
+
+def test_a_class_with_the_name_of_the_expected_end_can_be_the_largest(make_episodes):
+    class Named(CollectCubes):
+        def classes(self, goals):
+            yield "side", "front_boundary", goals.stratum >= 0
+
+    table = failure_table(make_episodes([[LEFT]] * 4, [[0]] * 4, task=Named()))
+    assert table["largest"]["by"] == "side"

@@ -4,8 +4,10 @@ import dataclasses
 
 import pytest
 import torch
+from tensordict import TensorDict
 
 import drone_rl
+from drone_rl.config.transforms import Gray, Stack
 from drone_rl.evaluation import rounding_sensitivity
 from drone_rl.evaluation.outcomes import OutcomeSet
 from drone_rl.evaluation.rollouts import StepLog, run_episodes
@@ -16,6 +18,7 @@ from drone_rl.evaluation.rounding_sensitivity import (
 )
 from drone_rl.policies.external_network import ExternalNetwork
 from drone_rl.policies.external_policy import policy_from
+from drone_rl.policies.rounding import Decisions
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.utils.errors import InputError
 
@@ -142,3 +145,51 @@ def test_outcomes_of_several_batches_are_numbered_by_episode(make_episodes):
     assert outcomes.owner.tolist() == [2, 0, 7, 5]
     assert outcomes.is_open.nonzero()[:, 0].tolist() == [2, 7]
     assert outcomes.episodes.success.tolist() == [1, 0, 1, 0]
+
+
+@pytest.fixture
+def with_fragile_starts(monkeypatch):
+    """Outcomes of a policy of two frames, which flies straight on after a fragile first frame.
+
+    They are found even if all episodes have such a frame.
+    """
+    monkeypatch.setattr(rounding_sensitivity, "MAX_FRAGILE_EPISODES", 1.0)
+
+    def with_fragile_starts(possible):
+        sizes = [0]
+
+        def decide(pixels):
+            sizes.append(len(pixels))  # falls as episodes end
+            is_first = sizes[-1] > sizes[-2]
+            outputs = torch.tensor([[3.0, 2.0, 1.0]]).repeat(len(pixels), 1)
+            is_possible = torch.tensor(possible if is_first else [True, False, False])
+            return Decisions(outputs, is_possible.repeat(len(pixels), 1))
+
+        policy = policy_from(lambda x: x[:, 0, 10:13, 5], transforms=[Gray(), Stack(N=2)])
+        with policy.flying(EPISODES, seed=1) as (env, actor):
+            checked, _ = rounding_sensitivity._run_checked(env, decide, actor.network, EPISODES)
+        assert [of.nonzero().tolist() for of in checked.fragile] == [[[0]]] * EPISODES
+        return checked.outcomes()
+
+    return with_fragile_starts
+
+
+def test_the_other_action_of_a_single_fragile_frame_is_followed(with_fragile_starts):
+    found = with_fragile_starts([True, True, False])
+    assert not found.is_open.any()
+    assert found.owner.tolist() == list(range(EPISODES))
+
+
+def test_a_frame_with_three_possible_actions_leaves_the_outcomes_open(with_fragile_starts):
+    assert with_fragile_starts([True, True, True]).is_open.all()
+
+
+def test_the_other_action_is_the_possible_one_even_if_another_has_a_greater_logit():
+    network = ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 1, 3), MOVES)
+    outputs = torch.tensor([[3.0, 2.0, 1.0], [3.0, 2.0, 1.0]])
+    possible = torch.tensor([[True, False, True], [True, True, True]])
+    actor = rounding_sensitivity._CheckingActor(
+        lambda _: Decisions(outputs, possible), network, is_contrary=True
+    )
+    given = TensorDict({"pixels": torch.zeros(2, 1, 1, 3)}, [2])
+    assert actor(given)["action"].tolist() == [2, 0]

@@ -16,6 +16,7 @@ from drone_rl.evaluation.rule import Kind, Rule
 from drone_rl.evaluation.verdict import apply_rule, judge_policy, measure, observe, widen
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import Side
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
 from tests.fake_flight import floating
 from tests.second_task import Posts
@@ -262,6 +263,20 @@ def test_a_policy_is_flown_greedily_and_with_drawn_actions_in_the_same_worlds(mo
     flown.clear()
     judge_policy(env, oracle_policy(task), 3, sampled=False)
     assert [greedy for greedy, *_ in flown] == [True]
+
+
+def test_a_task_without_an_oracle_is_refused_before_any_episode(monkeypatch):
+    class Blind(Posts):
+        name, oracle = "fog", None
+
+    def refused(*_, **__):
+        raise AssertionError("episodes were flown")
+
+    for module in ("verdict", "baselines"):
+        monkeypatch.setattr(f"drone_rl.evaluation.{module}.run_episodes", refused)
+    env = DroneEnv(2, Blind(), pixels=False)
+    with pytest.raises(InputError, match="task=fog has no oracle"):
+        judge_policy(env, constant_policy(Move.LEFT), 2)
 
 
 @pytest.fixture

@@ -115,6 +115,11 @@ def test_sides(evidence):
     for side in ("left", "ahead", "right"):
         shares[side] = {"mean": 1.0, "count": 10}
     assert "shares" not in speak(evidence)  # nothing to tell
+    for side in ("left", "ahead", "right"):
+        shares[side] = {"mean": None, "count": 0}
+    assert speak(evidence)["shares"] == (
+        "No cubes were offered on its left, ahead or on its right."
+    )
 
 
 def test_luck_that_is_enough(evidence):
@@ -238,3 +243,22 @@ def test_a_verdict_says_where_effects_of_rounding_have_no_bound(evidence):
     for bound, more in ((True, "."), (False, "; effects of rounding were estimated, not bounded.")):
         text = speak({**evidence, "rounding": {**found, "bound": bound}})["arithmetic"]
         assert text == f"The verdict holds for float32 on cpu, PyTorch{more}"
+
+
+def test_without_a_bound_unexplained_differences_may_be_of_outcomes_only(evidence):
+    found = {
+        "arithmetic": "float32 on cpu, PyTorch",
+        "decides": True,
+        "frames": 9000,
+        "fragile": 90,
+        "fragile_rate": 0.01,
+        "episodes": 400,
+        "fragile_episodes": 4,
+        "compared": "fused kernel",
+        "compared_episodes": 50,
+        "unexplained": 3,
+    }
+    evidence["certain"] = False
+    for bound, what in ((True, "took other actions"), (False, "gave other results")):
+        text = speak({**evidence, "rounding": {**found, "bound": bound}})["rounding"]
+        assert text.endswith(f"fused kernel {what} in 3 of 50 episodes for no such reason.")

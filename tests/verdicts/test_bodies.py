@@ -83,3 +83,8 @@ def test_it_tells_what_is_being_flown():
 def test_mistakes(policies, told, message):
     with pytest.raises(InputError, match=message):
         drone_rl.bodies(policies, progress=silent, **told)
+
+
+def test_settings_of_another_class_are_refused():
+    with pytest.raises(InputError, match=r"^settings=\(dict\) is no BodiesSettings"):
+        drone_rl.bodies("good", {"episodes": 2}, progress=silent)

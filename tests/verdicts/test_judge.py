@@ -53,6 +53,9 @@ def test_several_at_once(good):
         drone_rl.judge([])
     with pytest.raises(InputError, match="policy=nope does not exist"):
         drone_rl.judge(["oracle", "nope"], progress=refused)
+    for policies in ("oracle", ["oracle"]):
+        with pytest.raises(InputError, match=r"^settings=\(dict\) is no JudgeSettings"):
+            drone_rl.judge(policies, {"episodes": 2}, progress=refused)
 
 
 def test_a_verdict_with_proof(good, tmp_path):

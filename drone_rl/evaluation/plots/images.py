@@ -19,13 +19,13 @@ _CHANNELS = {"gray": 1, "rgb": 3, "chromaticity": 2}
 
 
 def tint(frame: NDArray, color: Rgb, strength: float = 0.4) -> NDArray:
-    """Tint a frame with its action's colour. Shape: (H, W, 3), uint8."""
+    """Tint a frame, (H, W, 3), uint8, with its action's colour. Shape and type kept."""
     wash = np.array(color, dtype=np.float64)
     return (frame * (1 - strength) + wash * strength).astype(np.uint8)
 
 
 def heated(frame: NDArray, heat: NDArray) -> NDArray:
-    """Overlay a heat map on a frame in gray. Shape: (H, W, 3), uint8."""
+    """Overlay a heat map, (H, W), 0 or more, on a frame in gray. Shape: (H, W, 3), uint8."""
     gray = np.repeat(frame.mean(-1, keepdims=True), 3, -1) * 0.75
     top = float(heat.max())
     share = heat.astype(np.float64) / top if top > 0 else np.zeros(heat.shape)

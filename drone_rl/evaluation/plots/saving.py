@@ -34,7 +34,8 @@ def new_chart(width: float = 4.5, height: float = 3.2) -> tuple[Figure, Axes]:
 def save_drawn(drawn: Image.Image | Figure | NDArray, path: Path) -> str:
     """Save an image as PNG, a chart as PNG and SVG, a video as MP4; return it as a data URI.
 
-    The path is without suffix. See `drone_rl.explanations.report.explanation.Media`.
+    The path is without suffix. See `drone_rl.explanations.report.explanation.Media`. Raises a
+    `ValueError` for a chart that is too large.
     """
     if isinstance(drawn, (Image.Image, Figure)):
         if isinstance(drawn, Figure):
@@ -63,7 +64,11 @@ def save_numbers(numbers: Any, path: Path) -> None:
 
 
 def to_png(drawn: Image.Image | Figure) -> bytes:
-    """Encode an image or chart as PNG."""
+    """Encode an image or chart as PNG.
+
+    Raises:
+        ValueError: The chart is too large.
+    """
     buffer = io.BytesIO()
     if isinstance(drawn, Figure):
         width, height = (_DPI * drawn.get_size_inches()).tolist()
