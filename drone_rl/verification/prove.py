@@ -107,15 +107,16 @@ def prove(
     Args:
         policy: The policy, or an argument of `load_policy`.
         settings: Settings of the proof.
-        folder: Where to save the certificate, and the state if the proof is stopped; an unfinished
-            proof there is resumed. Nothing is saved by default.
+        folder: Where to save the certificate and, until the proof is finished, its state; an
+            unfinished proof there is resumed. Nothing is saved by default.
         task: Changes to the policy's task.
         outputs: See `load_policy`.
         progress: Called with the progress; a bar by default.
         changes: Changes to the settings, as in `prove("good", limit_s=60)`.
 
     Raises:
-        InputError: The policy, its task or a setting is not supported; the message says why.
+        InputError: The policy, its task or a setting is not supported, or the folder holds an
+            unfinished proof of another policy, task, logit_gap or renderer; the message says why.
     """
     settings = (settings or ProveSettings()).replace(**changes)
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
@@ -140,7 +141,8 @@ def _prove(
 ) -> Proof:
     prover = Prover(spec, settings.most_combinations)
     weights = fingerprint(policy.state["policy"])
-    proof_id = json.dumps([weights, policy.description.as_dict(), settings.logit_gap])
+    subject = [weights, policy.description.as_dict(), settings.logit_gap, settings.renderer]
+    proof_id = json.dumps(subject)
     state = None if folder is None else folder / "state.npz"
     if state is not None and state.exists():
         boxes = settings.most_boxes * policy.description.task.values()["num_cubes"]

@@ -7,6 +7,7 @@ import pytest
 import torch
 
 import drone_rl
+from drone_rl.sim.rendering.renderer import _CLASSES
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 
@@ -71,6 +72,14 @@ def test_a_state_of_another_policy_is_refused(tmp_path):
     prove(folder=tmp_path, limit_s=0.0)
     with pytest.raises(InputError, match="belongs to another proof"):
         prove("good", folder=tmp_path)
+
+
+def test_a_state_by_another_renderer_is_refused(tmp_path, monkeypatch):
+    """A certificate names one renderer; here the other name stands for the same one."""
+    monkeypatch.setitem(_CLASSES, "mujoco_warp", _CLASSES["raytrace"])
+    prove(folder=tmp_path, limit_s=0.0)
+    with pytest.raises(InputError, match="belongs to another proof"):
+        prove(folder=tmp_path, renderer="mujoco_warp")
 
 
 def test_progress_is_told():

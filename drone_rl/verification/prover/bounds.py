@@ -23,8 +23,8 @@ class NetworkBounds:
 
     Interval bound propagation (Gowal et al., 2018): the sum of an interval's ends passes through a
     linear layer as it is, their difference through the absolute weights. The last layer's weights
-    are subtracted pairwise first, so that common terms cancel. ReLU, pooling and flattening are
-    positively homogeneous, so biases are scaled instead of halving the sums.
+    are subtracted pairwise first, so that common terms cancel. ReLU and pooling are positively
+    homogeneous, so biases are scaled instead of halving the sums.
     """
 
     def __init__(self, network: PolicyNetwork, gap: float) -> None:
@@ -47,7 +47,7 @@ class NetworkBounds:
         scale, self._steps = 2, []
         for layer in inner:
             self._steps.append((_step(layer, scale), scale))
-            scale *= 1 if isinstance(layer, _AFFINE) else 2
+            scale *= 1 if isinstance(layer, _LINEAR) else 2
         self._scale = scale
         weight, bias = last.weight.detach(), last.bias.detach()
         self.num_actions = len(weight)
@@ -115,7 +115,10 @@ class NetworkBounds:
         return gap
 
     def _error(self, largest: Sequence[Tensor]) -> Tensor:
-        """Return twice the rounding error of logit differences. Shape: (pairs,), float64."""
+        """Return the rounding error of logit differences, and of their bounds. Shape: (pairs,).
+
+        Each is at most the sum of the two logits' errors.
+        """
         error = PIXEL_UNITS * UNIT * largest[0].amax().clamp(min=UNIT).expand_as(largest[0])
         for layer, size in zip(self._errors, largest, strict=True):
             error = layer.bound(size, error)
@@ -147,6 +150,7 @@ def _size(total: Tensor, width: Tensor) -> Tensor:
 
 
 _AFFINE = (nn.Conv2d, nn.Linear)
+_LINEAR = (*_AFFINE, nn.Flatten)  # sums and differences pass through them separately
 Step = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]  # of sums and differences of interval ends
 
 
@@ -157,7 +161,9 @@ def _step(layer: nn.Module, scale: int) -> Step:
         bias = None if bias is None else scale * bias.detach()
         apply = layer._conv_forward if isinstance(layer, nn.Conv2d) else functional.linear
         return lambda total, width: (apply(total, weight, bias), apply(width, weight.abs(), None))
-    return functools.partial(_monotone, layer)  # ReLU, pooling and flattening
+    if isinstance(layer, nn.Flatten):  # without arithmetic, so without rounding
+        return lambda total, width: (layer(total), layer(width))
+    return functools.partial(_monotone, layer)  # ReLU and pooling
 
 
 def _monotone(layer: nn.Module, total: Tensor, width: Tensor) -> tuple[Tensor, Tensor]:
