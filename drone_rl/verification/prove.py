@@ -24,7 +24,7 @@ from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import plural
 from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.prover.policy_spec import PolicySpec, make_policy_spec, one_thread
-from drone_rl.verification.prover.proof_files import certify, load, save
+from drone_rl.verification.prover.proof_files import FORMAT, certify, load, save
 from drone_rl.verification.prover.prover import Prover
 from drone_rl.verification.text import describe_proof, why_stopped
 
@@ -188,7 +188,7 @@ def _advance(
 
 
 def load_proof(path: str | Path) -> Proof:
-    """Load a proof from its certificate.
+    """Load a proof from its certificate, a file or its folder, without checking it; see `check`.
 
     Raises:
         InputError: There is none.
@@ -196,7 +196,10 @@ def load_proof(path: str | Path) -> Proof:
     path = Path(path)
     path = path / "certificate.json" if path.is_dir() else path
     try:
-        return Proof(json.loads(path.read_text()), path.parent)
+        found = json.loads(path.read_text())
+        if not isinstance(found, dict) or found.get("format") != FORMAT:
+            raise ValueError(f"its format is not {FORMAT!r}")
+        return Proof(found, path.parent)
     except (OSError, ValueError) as error:
         raise InputError(
             f"certificate={path} can't be read ({error}); give a certificate"

@@ -52,6 +52,13 @@ def test_it_is_loaded_again(proof):
         drone_rl.load_proof(proof.folder / "nothing.json")
 
 
+@pytest.mark.parametrize("content", ["[]", '{"format": "another"}'])
+def test_a_file_that_is_no_certificate_is_refused(tmp_path, content):
+    (tmp_path / "certificate.json").write_text(content)
+    with pytest.raises(InputError, match="its format is not 'drone_rl certificate'"):
+        drone_rl.load_proof(tmp_path)
+
+
 def test_stopped_and_gone_on_with(proof, tmp_path):
     stopped = prove(folder=tmp_path, limit_s=0.0)
     assert not stopped.certificate["finished"]
