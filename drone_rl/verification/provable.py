@@ -61,7 +61,7 @@ class Round(Settings):
     failures: _Count  # failed episodes
     losing: _Share | None = None  # fraction of all placements proved to fail; None without a proof
     undecided: _Share | None = None  # fraction of all placements that the proof leaves open
-    proof_s: _Seconds | None = None  # duration of the proof, seconds
+    proof_s: _Seconds | None = None  # duration of the proof since its last resume, seconds
     boxes: _Count  # number of boxes of failures to train on
 
 

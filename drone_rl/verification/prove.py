@@ -4,7 +4,7 @@ import contextlib
 import dataclasses
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -43,12 +43,12 @@ class Proof:
     @property
     def success(self) -> float:
         """Fraction of all placements from which all cubes are certainly collected."""
-        return sum(o["share"] for o in self.certificate["outcomes"] if o["end"] == "all_cubes")
+        return self._share_of(lambda end: end == "all_cubes")
 
     @property
     def lost(self) -> float:
         """Fraction of all placements from which they certainly are not."""
-        return sum(o["share"] for o in self.certificate["outcomes"] if o["end"] != "all_cubes")
+        return self._share_of(lambda end: end != "all_cubes")
 
     @property
     def undecided(self) -> float:
@@ -69,6 +69,10 @@ class Proof:
     def open(self) -> np.ndarray:
         """Return the undecided boxes. Shape: (N, num_cubes, 2), metres."""
         return self._boxes(self.certificate["undecided"]["boxes"])
+
+    def _share_of(self, chosen: Callable[[str], bool]) -> float:
+        outcomes = self.certificate["outcomes"]
+        return min(1.0, sum(o["share"] for o in outcomes if chosen(o["end"])))  # of rounded shares
 
     def _boxes(self, boxes: list[Any]) -> np.ndarray:
         num_cubes = self.certificate["policy"]["description"]["task"]["num_cubes"]

@@ -10,6 +10,7 @@ import drone_rl
 from drone_rl.sim.rendering.renderer import _CLASSES
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
+from drone_rl.verification.prove import Proof
 
 ONE = {"num_cubes": 1}
 
@@ -50,6 +51,14 @@ def test_it_is_loaded_again(proof):
     assert not (proof.folder / "state.npz").exists()
     with pytest.raises(InputError, match="can't be read"):
         drone_rl.load_proof(proof.folder / "nothing.json")
+
+
+def test_fractions_do_not_exceed_one_by_rounding():
+    shares = (0.07, 0.8725, 0.0575)
+    assert sum(shares) > 1
+    for end, found in (("all_cubes", "success"), ("front_boundary", "lost")):
+        outcomes = [{"end": end, "share": share} for share in shares]
+        assert getattr(Proof({"outcomes": outcomes}), found) == 1.0
 
 
 @pytest.mark.parametrize("content", ["[]", '{"format": "another"}'])

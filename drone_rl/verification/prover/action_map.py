@@ -129,7 +129,7 @@ def map_actions(
     `touch_distance` metres to the side requires a turn.
 
     Raises:
-        InputError: The window reaches into the cube, or there are more cells.
+        InputError: The camera would be in the cube, or there are more cells than `most_cells`.
     """
     if window.nearest <= camera.half:
         raise InputError(

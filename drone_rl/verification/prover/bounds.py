@@ -177,7 +177,7 @@ _FACES = 4
 
 
 class Compositor:
-    """Composes images of cubes, nearer ones in front, before a uniform background."""
+    """Composes images of cubes, nearer ones in front, before the background of all images."""
 
     def __init__(
         self, background: Tensor, faces: Tensor, rest: Callable[[Tensor], Tensor] | None = None
@@ -237,7 +237,10 @@ class Compositor:
 
 
 class ImageRanges:
-    """The images of one cube in order; each range of them is looked up in two steps."""
+    """The images of one cube in order; each range of them is looked up in two steps.
+
+    Ranges are pairs of first and last image, shape (N, 2).
+    """
 
     def __init__(self, images: Tensor) -> None:
         """Prepare masks of ranges of power-of-two length, from faces (images, height, width)."""
@@ -258,12 +261,15 @@ class ImageRanges:
         """By first and last image; -1 where not yet counted."""
 
     def of(self, ranges: NDArray) -> tuple[Tensor, Tensor]:
-        """Return the masks of the distinct ranges, and the index of each range among them."""
+        """Return the masks of the distinct ranges, and the index of each range among them.
+
+        Shapes: (distinct ranges, rows, columns), uint8, and (N,).
+        """
         code, case = np.unique(self._code(ranges), return_inverse=True)
         return self._masks(code), torch.from_numpy(case)
 
     def doubts(self, ranges: NDArray) -> NDArray[np.int64]:
-        """Return the number of pixels with several possible faces in each range."""
+        """Return the number of pixels with several possible faces in each range. Shape: (N,)."""
         code, counts = self._code(ranges), self._doubts.reshape(-1)
         unknown = np.unique(code[counts[code] < 0])
         if len(unknown):

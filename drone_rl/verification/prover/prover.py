@@ -85,7 +85,7 @@ class Prover:
         return not self.waiting and not len(self.parts)
 
     def advance(self) -> LatticeState:
-        """Visit the next state and return it."""
+        """Visit the next state and return it; the proof must not be finished."""
         if not self.waiting:
             self.part, self.parts = self.parts[:1], self.parts[1:]
             self.wait(LatticeState(0, 0), self.part)
