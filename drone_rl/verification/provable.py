@@ -25,10 +25,10 @@ from drone_rl.training import Callback
 from drone_rl.training.callbacks import ForwardProgress, OngoingTraining
 from drone_rl.training.run_folder import (
     MAY_CHANGE,
+    RunFolder,
     Training,
     finish,
     last_of,
-    new_folder,
     reraise_signal,
     settings_of,
 )
@@ -61,7 +61,7 @@ class Round(Settings):
     failures: _Count  # failed episodes
     losing: _Share | None = None  # fraction of all placements proved to fail; None without a proof
     undecided: _Share | None = None  # fraction of all placements that the proof leaves open
-    proof_s: _Seconds | None = None  # duration of the proof, seconds
+    proof_s: _Seconds | None = None  # duration of the proof since its last resume, seconds
     boxes: _Count  # number of boxes of failures to train on
 
 
@@ -209,14 +209,15 @@ def train_until_proved(
         changes: Changes to the settings of the training run.
 
     Raises:
-        InputError: A setting is unusable, proofs do not support the policy, or training diverged.
+        InputError: A setting is unusable, the folder holds a finished run, proofs do not support
+            the policy, or training diverged.
         KeyboardInterrupt: Ctrl-C stopped it, see `train`; a search for failures ends at once and is
             repeated on resume.
         SystemExit: SIGTERM stopped it, see `train`.
     """
-    folder = new_folder() if folder is None else Path(folder)
-    state = read_checkpoint(last_of(folder)) if resume else None
-    folder.mkdir(parents=True, exist_ok=True)
+    run, state = RunFolder.open(folder, resume)
+    run.make()
+    folder = run.path
     progress = progress or Bar()
     with folder_lock(folder):
         journal = Journal.open(folder, settings, how, state, changes)

@@ -4,7 +4,7 @@ import contextlib
 import dataclasses
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import plural
 from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.prover.policy_spec import PolicySpec, make_policy_spec, one_thread
-from drone_rl.verification.prover.proof_files import certify, load, save
+from drone_rl.verification.prover.proof_files import FORMAT, certify, load, save
 from drone_rl.verification.prover.prover import Prover
 from drone_rl.verification.text import describe_proof, why_stopped
 
@@ -43,12 +43,12 @@ class Proof:
     @property
     def success(self) -> float:
         """Fraction of all placements from which all cubes are certainly collected."""
-        return sum(o["share"] for o in self.certificate["outcomes"] if o["end"] == "all_cubes")
+        return self._share_of(lambda end: end == "all_cubes")
 
     @property
     def lost(self) -> float:
         """Fraction of all placements from which they certainly are not."""
-        return sum(o["share"] for o in self.certificate["outcomes"] if o["end"] != "all_cubes")
+        return self._share_of(lambda end: end != "all_cubes")
 
     @property
     def undecided(self) -> float:
@@ -69,6 +69,10 @@ class Proof:
     def open(self) -> np.ndarray:
         """Return the undecided boxes. Shape: (N, num_cubes, 2), metres."""
         return self._boxes(self.certificate["undecided"]["boxes"])
+
+    def _share_of(self, chosen: Callable[[str], bool]) -> float:
+        outcomes = self.certificate["outcomes"]
+        return min(1.0, sum(o["share"] for o in outcomes if chosen(o["end"])))  # of rounded shares
 
     def _boxes(self, boxes: list[Any]) -> np.ndarray:
         num_cubes = self.certificate["policy"]["description"]["task"]["num_cubes"]
@@ -107,15 +111,16 @@ def prove(
     Args:
         policy: The policy, or an argument of `load_policy`.
         settings: Settings of the proof.
-        folder: Where to save the certificate, and the state if the proof is stopped; an unfinished
-            proof there is resumed. Nothing is saved by default.
+        folder: Where to save the certificate and, until the proof is finished, its state; an
+            unfinished proof there is resumed. Nothing is saved by default.
         task: Changes to the policy's task.
         outputs: See `load_policy`.
         progress: Called with the progress; a bar by default.
         changes: Changes to the settings, as in `prove("good", limit_s=60)`.
 
     Raises:
-        InputError: The policy, its task or a setting is not supported; the message says why.
+        InputError: The policy, its task or a setting is not supported, or the folder holds an
+            unfinished proof of another policy, task, logit_gap or renderer; the message says why.
     """
     settings = (settings or ProveSettings()).replace(**changes)
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
@@ -140,7 +145,8 @@ def _prove(
 ) -> Proof:
     prover = Prover(spec, settings.most_combinations)
     weights = fingerprint(policy.state["policy"])
-    proof_id = json.dumps([weights, policy.description.as_dict(), settings.logit_gap])
+    subject = [weights, policy.description.as_dict(), settings.logit_gap, settings.renderer]
+    proof_id = json.dumps(subject)
     state = None if folder is None else folder / "state.npz"
     if state is not None and state.exists():
         boxes = settings.most_boxes * policy.description.task.values()["num_cubes"]
@@ -186,7 +192,7 @@ def _advance(
 
 
 def load_proof(path: str | Path) -> Proof:
-    """Load a proof from its certificate.
+    """Load a proof from its certificate, a file or its folder, without checking it; see `check`.
 
     Raises:
         InputError: There is none.
@@ -194,7 +200,10 @@ def load_proof(path: str | Path) -> Proof:
     path = Path(path)
     path = path / "certificate.json" if path.is_dir() else path
     try:
-        return Proof(json.loads(path.read_text()), path.parent)
+        found = json.loads(path.read_text())
+        if not isinstance(found, dict) or found.get("format") != FORMAT:
+            raise ValueError(f"its format is not {FORMAT!r}")
+        return Proof(found, path.parent)
     except (OSError, ValueError) as error:
         raise InputError(
             f"certificate={path} can't be read ({error}); give a certificate"

@@ -195,6 +195,13 @@ def test_a_proved_run_that_is_resumed_is_left_alone(whole):
     assert all(torch.equal(before[name], after[name]) for name in before)
 
 
+def test_a_finished_run_is_not_replaced(whole):
+    before = (whole.folder / "provable.json").read_bytes()
+    with pytest.raises(InputError, match="holds a finished run, which a new one would replace"):
+        train(whole.folder)
+    assert (whole.folder / "provable.json").read_bytes() == before
+
+
 def test_a_budget_ends_it_unproved_and_more_of_it_goes_on(whole, tmp_path):
     done = train(tmp_path, HOW.replace(rounds=1))
     assert done.reason == "frames" and len(done.result["rounds"]) == 2

@@ -7,8 +7,10 @@ import pytest
 import torch
 
 import drone_rl
+from drone_rl.sim.rendering.renderer import _CLASSES
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
+from drone_rl.verification.prove import Proof
 
 ONE = {"num_cubes": 1}
 
@@ -51,6 +53,21 @@ def test_it_is_loaded_again(proof):
         drone_rl.load_proof(proof.folder / "nothing.json")
 
 
+def test_fractions_do_not_exceed_one_by_rounding():
+    shares = (0.07, 0.8725, 0.0575)
+    assert sum(shares) > 1
+    for end, found in (("all_cubes", "success"), ("front_boundary", "lost")):
+        outcomes = [{"end": end, "share": share} for share in shares]
+        assert getattr(Proof({"outcomes": outcomes}), found) == 1.0
+
+
+@pytest.mark.parametrize("content", ["[]", '{"format": "another"}'])
+def test_a_file_that_is_no_certificate_is_refused(tmp_path, content):
+    (tmp_path / "certificate.json").write_text(content)
+    with pytest.raises(InputError, match="its format is not 'drone_rl certificate'"):
+        drone_rl.load_proof(tmp_path)
+
+
 def test_stopped_and_gone_on_with(proof, tmp_path):
     stopped = prove(folder=tmp_path, limit_s=0.0)
     assert not stopped.certificate["finished"]
@@ -71,6 +88,14 @@ def test_a_state_of_another_policy_is_refused(tmp_path):
     prove(folder=tmp_path, limit_s=0.0)
     with pytest.raises(InputError, match="belongs to another proof"):
         prove("good", folder=tmp_path)
+
+
+def test_a_state_by_another_renderer_is_refused(tmp_path, monkeypatch):
+    """A certificate names one renderer; here the other name stands for the same one."""
+    monkeypatch.setitem(_CLASSES, "mujoco_warp", _CLASSES["raytrace"])
+    prove(folder=tmp_path, limit_s=0.0)
+    with pytest.raises(InputError, match="belongs to another proof"):
+        prove(folder=tmp_path, renderer="mujoco_warp")
 
 
 def test_progress_is_told():

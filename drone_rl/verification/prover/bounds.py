@@ -23,8 +23,8 @@ class NetworkBounds:
 
     Interval bound propagation (Gowal et al., 2018): the sum of an interval's ends passes through a
     linear layer as it is, their difference through the absolute weights. The last layer's weights
-    are subtracted pairwise first, so that common terms cancel. ReLU, pooling and flattening are
-    positively homogeneous, so biases are scaled instead of halving the sums.
+    are subtracted pairwise first, so that common terms cancel. ReLU and pooling are positively
+    homogeneous, so biases are scaled instead of halving the sums.
     """
 
     def __init__(self, network: PolicyNetwork, gap: float) -> None:
@@ -47,7 +47,7 @@ class NetworkBounds:
         scale, self._steps = 2, []
         for layer in inner:
             self._steps.append((_step(layer, scale), scale))
-            scale *= 1 if isinstance(layer, _AFFINE) else 2
+            scale *= 1 if isinstance(layer, _LINEAR) else 2
         self._scale = scale
         weight, bias = last.weight.detach(), last.bias.detach()
         self.num_actions = len(weight)
@@ -115,7 +115,10 @@ class NetworkBounds:
         return gap
 
     def _error(self, largest: Sequence[Tensor]) -> Tensor:
-        """Return twice the rounding error of logit differences. Shape: (pairs,), float64."""
+        """Return the rounding error of logit differences, and of their bounds. Shape: (pairs,).
+
+        Each is at most the sum of the two logits' errors.
+        """
         error = PIXEL_UNITS * UNIT * largest[0].amax().clamp(min=UNIT).expand_as(largest[0])
         for layer, size in zip(self._errors, largest, strict=True):
             error = layer.bound(size, error)
@@ -147,6 +150,7 @@ def _size(total: Tensor, width: Tensor) -> Tensor:
 
 
 _AFFINE = (nn.Conv2d, nn.Linear)
+_LINEAR = (*_AFFINE, nn.Flatten)  # sums and differences pass through them separately
 Step = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]  # of sums and differences of interval ends
 
 
@@ -157,7 +161,9 @@ def _step(layer: nn.Module, scale: int) -> Step:
         bias = None if bias is None else scale * bias.detach()
         apply = layer._conv_forward if isinstance(layer, nn.Conv2d) else functional.linear
         return lambda total, width: (apply(total, weight, bias), apply(width, weight.abs(), None))
-    return functools.partial(_monotone, layer)  # ReLU, pooling and flattening
+    if isinstance(layer, nn.Flatten):  # without arithmetic, so without rounding
+        return lambda total, width: (layer(total), layer(width))
+    return functools.partial(_monotone, layer)  # ReLU and pooling
 
 
 def _monotone(layer: nn.Module, total: Tensor, width: Tensor) -> tuple[Tensor, Tensor]:
@@ -171,7 +177,7 @@ _FACES = 4
 
 
 class Compositor:
-    """Composes images of cubes, nearer ones in front, before a uniform background."""
+    """Composes images of cubes, nearer ones in front, before the background of all images."""
 
     def __init__(
         self, background: Tensor, faces: Tensor, rest: Callable[[Tensor], Tensor] | None = None
@@ -231,7 +237,10 @@ class Compositor:
 
 
 class ImageRanges:
-    """The images of one cube in order; each range of them is looked up in two steps."""
+    """The images of one cube in order; each range of them is looked up in two steps.
+
+    Ranges are pairs of first and last image, shape (N, 2).
+    """
 
     def __init__(self, images: Tensor) -> None:
         """Prepare masks of ranges of power-of-two length, from faces (images, height, width)."""
@@ -252,12 +261,15 @@ class ImageRanges:
         """By first and last image; -1 where not yet counted."""
 
     def of(self, ranges: NDArray) -> tuple[Tensor, Tensor]:
-        """Return the masks of the distinct ranges, and the index of each range among them."""
+        """Return the masks of the distinct ranges, and the index of each range among them.
+
+        Shapes: (distinct ranges, rows, columns), uint8, and (N,).
+        """
         code, case = np.unique(self._code(ranges), return_inverse=True)
         return self._masks(code), torch.from_numpy(case)
 
     def doubts(self, ranges: NDArray) -> NDArray[np.int64]:
-        """Return the number of pixels with several possible faces in each range."""
+        """Return the number of pixels with several possible faces in each range. Shape: (N,)."""
         code, counts = self._code(ranges), self._doubts.reshape(-1)
         unknown = np.unique(code[counts[code] < 0])
         if len(unknown):

@@ -91,11 +91,13 @@ class Cells:
 def _bands(
     camera: CameraModel, ahead: float, lowest: float, highest: float, narrower: float
 ) -> NDArray:
-    """Return the bands that intersect an interval. Shape: (N, 2)."""
-    places, errors = camera.borders(ahead)
-    errors = errors / narrower + camera.rounding(places)
+    """Return the bands that would intersect an interval if none were narrower. Shape: (N, 2)."""
+    places, widest = camera.borders(ahead)
+    errors = widest / narrower + camera.rounding(places)
     bands = unite(np.stack([places - errors, places + errors], -1), 4 * SLIVER)
-    return bands[(bands[:, 1] > lowest) & (bands[:, 0] < highest)]
+    # the renderer is to confirm narrow bands, also of borders just outside of the interval
+    aside = (widest - widest / narrower).max(initial=0.0)
+    return bands[(bands[:, 1] + aside > lowest) & (bands[:, 0] - aside < highest)]
 
 
 def _limits(bands: NDArray, lowest: float, highest: float) -> NDArray[np.float64]:

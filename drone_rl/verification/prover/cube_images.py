@@ -138,7 +138,7 @@ class CubeImages:
     """Images of cubes at given positions, rendered and in closed form."""
 
     def __init__(self, worlds: Worlds, lattice: Lattice, camera: CameraModel) -> None:
-        """Read the colours; raise InputError if a face has several, or shares one."""
+        """Read the colours; raise InputError if a face has several or none, or shares one."""
         self._worlds, self._lattice, self._camera = worlds, lattice, camera
         task = lattice.task
         self.num_cubes = task.num_cubes
@@ -157,7 +157,13 @@ class CubeImages:
         faces = camera.faces(ahead, left)
         for face in (FRONT, LEFT_SIDE, RIGHT_SIDE):
             shown = images[torch.from_numpy(faces == face)]
-            if not len(shown) or (shown != shown[0]).any():
+            if not len(shown):
+                raise InputError(
+                    f"the camera does not show all faces of cubes {ahead:g} m ahead and up to "
+                    f"{left[1]:g} m to the side, so their colours are unknown; prove a policy with "
+                    "a larger camera.horizontal_fov"
+                )
+            if (shown != shown[0]).any():
                 raise InputError(
                     "a face of a cube has more than one colour, so its image has no closed form; "
                     "prove the policy in an environment without textures and shadows"

@@ -242,6 +242,8 @@ def _reachable(spec: PolicySpec, box: Boxes) -> tuple[list[LatticeState], NDArra
     A target is 0 for failure, 1 for success, else 2 plus the index of the state.
     """
     lattice, index_of = spec.lattice, {LatticeState(0, 0): 0}
+    # moves cut half-open boxes, but the upper ends belong to this one
+    box = np.stack([box[:, 0], np.nextafter(box[:, 1], np.inf)], -1)
     states, found = [LatticeState(0, 0)], []
     for state in states:  # the loop appends to `states`
         for move in _MOVES:

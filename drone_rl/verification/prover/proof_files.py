@@ -48,32 +48,34 @@ def certify(
     """Return the certificate of what is known so far, as plain data.
 
     `description` has the task of the proof, `weights` is the SHA-256 hash of the network's weights,
-    and `stopped_by` is the setting that stopped the proof early.
+    `seconds` the time since the proof was started or resumed, and `stopped_by` the setting that
+    stopped it early.
     """
     findings, task = prover.findings(), prover.lattice.task
     total = (2 * task.lateral_bound) ** task.num_cubes
 
-    def share(boxes: Boxes) -> float:
-        return float(volumes(boxes).sum()) / total
+    def share(volume: float) -> float:
+        return min(1.0, float(volume) / total)  # sums of volumes are rounded
 
     outcomes = [
         {
             "end": ending.reason.name.lower(),
             "collected": [bool(ending.collected >> k & 1) for k in range(task.num_cubes)],
             "loops": ending.loops,
-            "share": share(boxes),
-            "steps": {str(k): v / total for k, v in sorted(findings.steps.get(ending, {}).items())},
+            "share": share(volumes(boxes).sum()),
+            "steps": {str(k): share(v) for k, v in sorted(findings.steps.get(ending, {}).items())},
             "boxes": boxes.tolist(),
         }
         for ending, boxes in sorted(findings.endings.items())
         if len(boxes)
     ]
+    undecided = findings.undecided
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
         "policy": {"name": name, "weights": weights, "description": description.as_dict()},
         "outcomes": outcomes,
-        "undecided": {"share": share(findings.undecided), "boxes": findings.undecided.tolist()},
+        "undecided": {"share": share(volumes(undecided).sum()), "boxes": undecided.tolist()},
         "finished": prover.is_finished,
         "stated": {
             "logit_gap": prover.spec.bounds.gap,

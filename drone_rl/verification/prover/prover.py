@@ -85,7 +85,7 @@ class Prover:
         return not self.waiting and not len(self.parts)
 
     def advance(self) -> LatticeState:
-        """Visit the next state and return it."""
+        """Visit the next state and return it; the proof must not be finished."""
         if not self.waiting:
             self.part, self.parts = self.parts[:1], self.parts[1:]
             self.wait(LatticeState(0, 0), self.part)
@@ -180,9 +180,12 @@ class Prover:
             pieces = boxes[owner]
             for k, cube in enumerate(cubes):
                 limits = table.cells[k].limits + y
-                first, last = ranges[:, k].T
-                pieces[:, cube, 0] = np.maximum(pieces[:, cube, 0], limits[first])
-                pieces[:, cube, 1] = np.minimum(pieces[:, cube, 1], limits[last + 1])
+                (first, last), (begin, end) = ranges[:, k].T, spans[owner, k].T
+                # the ends of a box stay, though they were rounded to find its cells
+                low = np.where(first == begin, -np.inf, limits[first])
+                high = np.where(last == end, np.inf, limits[last + 1])
+                pieces[:, cube, 0] = np.maximum(pieces[:, cube, 0], low)
+                pieces[:, cube, 1] = np.minimum(pieces[:, cube, 1], high)
             is_some = (pieces[..., 0] < pieces[..., 1]).all(-1)
             pieces, bits = pieces[is_some], bits[is_some]
             for kind in np.flatnonzero(np.bincount(bits)):

@@ -8,7 +8,7 @@ from torch import nn
 
 from drone_rl.policies import OriginalCNN, SmallCNN
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.bounds import NetworkBounds
+from drone_rl.verification.prover.bounds import NetworkBounds, _step
 
 
 class Linear(nn.Module):
@@ -84,6 +84,12 @@ def test_without_doubt_bounds_decide_like_the_network():
     bounds = NetworkBounds(network, gap=1e-4)
     assert bounds.possible(seen.clone(), seen.clone()).tolist() == bounds.decide(seen)[0].tolist()
     assert bounds.decide(seen)[0].tolist() == (1 << network(seen).argmax(-1)).tolist()
+
+
+def test_flattening_rounds_nothing():
+    total, width = torch.tensor([[[2.0**24, 5.0]]]), torch.tensor([[[1.0, 2.0]]])
+    step = _step(nn.Flatten(), 2)
+    assert [v.tolist() for v in step(total, width)] == [[[2.0**24, 5.0]], [[1.0, 2.0]]]
 
 
 def test_other_layers_are_refused():

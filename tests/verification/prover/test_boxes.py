@@ -143,3 +143,9 @@ def test_intervals_that_touch_are_united():
     assert unite(intervals, 0.0).tolist() == [[0.0, 2.0], [2.5, 4.0]]
     assert unite(intervals, 0.5).tolist() == [[0.0, 4.0]]
     assert unite(intervals[:0], 0.5).shape == (0, 2)
+
+
+def test_a_wide_interval_joins_all_that_it_reaches():
+    """In the order of their middles, the last one reaches back over the second to the first."""
+    intervals = np.array([[0.0, 1.0], [1.5, 1.6], [0.5, 3.0]])
+    assert unite(intervals, 0.0).tolist() == [[0.0, 3.0]]

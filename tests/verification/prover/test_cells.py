@@ -125,5 +125,11 @@ def test_bands_that_an_interval_ends_in_belong_to_it(lowest, highest, count):
     assert len(_bands(Borders(), 3.0, lowest, highest, 1.0)) == count
 
 
+def test_narrow_bands_belong_to_an_interval_that_wide_ones_would_reach():
+    bands = _bands(Borders(), 3.0, 1.05, 4.95, 10.0)
+    assert bands.round(9).tolist() == [[0.99, 1.01], [4.99, 5.01]]
+    assert not len(_bands(Borders(), 3.0, 1.2, 4.8, 10.0))
+
+
 def test_the_faces_of_a_cell_are_those_of_its_middle():
     assert _middle_faces(Borders(), 3.0, np.array([0.0, 2.0, 3.0, 7.0])).tolist() == [1.0, 5.0]

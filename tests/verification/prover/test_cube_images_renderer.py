@@ -45,6 +45,11 @@ def test_colours_are_the_renderers(images):
     ]
 
 
+def test_a_camera_too_narrow_for_the_sides_is_refused():
+    with pytest.raises(InputError, match=r"5\.6 m ahead and up to 5 m .*larger camera\.horizontal"):
+        make(camera=CameraSettings(horizontal_fov=30.0))
+
+
 def test_a_picture_that_is_another_is_told(images, monkeypatch):
     """One pixel of one image, one step brighter."""
     render = images.render

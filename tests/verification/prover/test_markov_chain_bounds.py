@@ -5,7 +5,8 @@ import pytest
 
 import drone_rl
 from drone_rl.utils.progress import silent
-from drone_rl.verification.prover.markov_chain import _least_mean, bound_success
+from drone_rl.verification.prover.lattice import AHEAD, LatticeState
+from drone_rl.verification.prover.markov_chain import _WON, _least_mean, _reachable, bound_success
 from drone_rl.verification.prover.policy_spec import make_policy_spec
 
 
@@ -71,3 +72,19 @@ def test_small_boxes_are_exact_and_more_parts_are_closer():
 def test_a_box_of_no_width_has_the_bounds_of_its_placement():
     found = bounds_over("right_and_forward", [[1.6, 1.6]], most=2)
     assert 0 <= found.mean_least == found.least <= found.most == found.mean_most <= 1
+
+
+@pytest.mark.parametrize("lowest", [-1.7, -1.65])
+def test_a_box_includes_its_ends(lowest):
+    """A cube at -1.65 m is touched straight ahead, and no other one of the box from -1.7 m."""
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
+    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
+    states, targets = _reachable(spec, np.array([[lowest, -1.65]]))
+    spec.close()
+    assert _WON in targets[states.index(LatticeState(13, 0)), AHEAD]
+
+
+def test_a_box_at_the_edge_of_touch_has_the_bounds_of_its_placement():
+    found = bounds_over("right_and_forward", [[-1.65, -1.65]])
+    exact = chances_at("right_and_forward", np.array([[-1.65]]))
+    assert found.least <= float(exact[0]) <= found.most

@@ -3,14 +3,18 @@
 import json
 from contextlib import closing
 
+import numpy as np
 import pytest
 
 import drone_rl
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.provenance import provenance
 from drone_rl.verification.checker.certificate import fingerprint
+from drone_rl.verification.prover.boxes import volumes
+from drone_rl.verification.prover.lattice import Ending
 from drone_rl.verification.prover.policy_spec import make_policy_spec
 from drone_rl.verification.prover.proof_files import certify
-from drone_rl.verification.prover.prover import Prover
+from drone_rl.verification.prover.prover import ProofFindings, Prover
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +31,21 @@ def test_shares_add_up(proof):
     assert found["finished"] is True
     for outcome in found["outcomes"]:
         assert sum(outcome["steps"].values()) <= outcome["share"] + 1e-12
+
+
+def test_no_fraction_exceeds_one_by_rounding():
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
+    ends = np.sort([-6.0, 6.0, *np.random.RandomState(57).uniform(-6, 6, 50)])
+    boxes = np.stack([ends[:-1], ends[1:]], -1)[:, None]
+    volume = float(volumes(boxes).sum())
+    assert volume > 12
+    ending = Ending(EndReason.FRONT_BOUNDARY, 0)
+    found = ProofFindings({ending: boxes}, boxes[:0], {ending: {26: volume}})
+    with closing(make_policy_spec(policy.description, policy.make_network(), 1e-4)) as spec:
+        prover = Prover(spec)
+        prover.findings = lambda: found
+        (outcome,) = certify("name", policy.description, "", prover, 1.0)["outcomes"]
+    assert outcome["share"] == outcome["steps"]["26"] == 1.0
 
 
 def test_it_is_data(proof):

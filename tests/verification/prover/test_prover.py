@@ -6,6 +6,7 @@ import pytest
 import drone_rl
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.prover.boxes import volumes
+from drone_rl.verification.prover.lattice import LatticeState
 from drone_rl.verification.prover.policy_spec import make_policy_spec
 from drone_rl.verification.prover.prover import Prover
 
@@ -68,6 +69,24 @@ def test_part_by_part_it_comes_to_the_same(narrow):
     )
     assert parts == pytest.approx(whole, abs=1e-12) and undecided == pytest.approx(left, abs=1e-12)
     assert partition_placements.findings().steps.keys() == narrow.findings().steps.keys()
+
+
+def test_no_part_of_a_box_is_lost_to_rounding():
+    """Less than a unit roundoff from a cell, an end of the box counts as in the next cell."""
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
+    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
+    prover, tried = Prover(spec), 0
+    for left in range(-12, 13):
+        state = LatticeState(10, left)
+        limits = prover._all_cells(state, [0], np.array([[[-20.0, 20.0]]]))[0].limits[1:-1]
+        below = np.nextafter(limits + left, -np.inf)
+        lost = (below - left >= limits) & (abs(below) < 5.9)
+        for low in below[lost][:2]:
+            parts = [part for _, part in prover._cut(state, np.array([[[low, 6.0]]]))]
+            assert np.concatenate(parts)[:, 0, 0].min() == low
+            tried += 1
+    spec.close()
+    assert tried
 
 
 def test_steps_are_counted(one_sided):
