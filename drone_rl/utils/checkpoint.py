@@ -233,7 +233,7 @@ def load_checkpoint(path: str | Path) -> dict[str, Any]:
         InputError: The file is missing, damaged, holds code, or is not a checkpoint of ours.
     """
     path = Path(path)
-    if not path.exists():
+    if not os.path.exists(path):  # `Path.exists` raises an error for a name that is too long
         raise InputError(f"checkpoint {path} does not exist; give a run's folder or a .pt file")
     content = read_bytes(path, CHECKPOINT_BYTES)
     if path.suffix != ".pt" and not content.startswith(_ZIP):
