@@ -37,5 +37,5 @@ def _ambiguity(described: PolicyDescription) -> str:
     if described.faults:
         return f"cameras without faults; it simulates faults (transform {described.faults[0]})"
     if described.appearance.varies:
-        return "one appearance for all episodes; that of this policy is sampled in each episode"
+        return "appearances without ranges; this policy's differs between episodes"
     return ""

@@ -52,7 +52,7 @@ def test_memory_and_camera_faults_are_refused(transform, message):
 def test_a_sampled_appearance_is_refused(appearance):
     policy = drone_rl.load_policy("good")
     sampled = policy.in_appearance(AppearanceSettings(**appearance)).description
-    with pytest.raises(InputError, match="proofs support only one appearance for all episodes"):
+    with pytest.raises(InputError, match="proofs support only appearances without ranges"):
         require_cubes(sampled, "proofs")
     fixed = policy.in_appearance("fog").description
     assert require_cubes(fixed, "exact probabilities") is fixed.task

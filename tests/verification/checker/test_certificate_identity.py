@@ -70,7 +70,7 @@ def test_a_policy_with_a_memory_has_no_certificate(one_sided):
 def test_a_policy_in_sampled_appearances_has_no_certificate(one_sided):
     """The checker would simulate one of them, and the others could end otherwise."""
     sampled = AppearanceSettings(exposure=(0.01, 1.99)).values()
-    with pytest.raises(InputError, match="certificates support only one appearance"):
+    with pytest.raises(InputError, match="certificates support only appearances without ranges"):
         changed(one_sided, "appearance", sampled)
 
 
