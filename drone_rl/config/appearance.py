@@ -108,6 +108,18 @@ class AppearanceSettings(Settings):
         """Whether this is the default appearance."""
         return self == MINIMAL
 
+    @property
+    def varies(self) -> bool:
+        """Whether it differs between episodes: a value is sampled, or distractors are placed."""
+        values = {n: v for n, v in self.values().items() if not n.startswith("distractor")}
+        ranges = [v for v in values.values() if isinstance(v, list) and len(v) == 2]
+        return (
+            any(low != high for low, high in ranges)
+            or any(len(names or ()) > 1 for names in (self.ground_texture, self.object_texture))
+            or 0.0 < self.shadows < 1.0
+            or _ends(self.distractors)[1] > 0
+        )
+
 
 MINIMAL = AppearanceSettings()
 """The default appearance."""

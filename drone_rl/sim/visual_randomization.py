@@ -137,8 +137,8 @@ class AppearanceSampler:
             if name != NO_TEXTURE:
                 textures.load(name)
         middle = self._sample(None)
-        self.varies = self._sample(np.random.RandomState(0)) != middle
-        """Whether appearances differ between episodes."""
+        self.varies = settings.varies
+        """See `AppearanceSettings.varies`."""
         self.middle = (
             None
             if settings.is_minimal

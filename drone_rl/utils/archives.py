@@ -41,7 +41,7 @@ _HEADER = re.compile(
 """NumPy's header."""
 _DAMAGE = (
     *(zipfile.BadZipFile, zlib.error, struct.error),
-    *(RuntimeError, EOFError, OSError, ValueError),
+    *(RuntimeError, EOFError, OSError, OverflowError, ValueError),
 )
 """Errors of damaged archives."""
 _ENTRY = b"PK\x01\x02"
@@ -67,7 +67,7 @@ def read_arrays(
     """Return the arrays of numbers and texts in an .npz file.
 
     `most` is the largest size of all arrays together, in bytes; `allowance`, shared with further
-    files, replaces it. The file itself may have as many bytes, and at least 256 MiB.
+    files, replaces it. The file may have as many bytes, or 256 MiB if that is more.
 
     Raises:
         InputError: The file is unusable, or an array holds objects.
@@ -122,10 +122,10 @@ def _array(file: Any, size: int, where: str) -> NDArray:
     begin = file.read(12)
     start = {b"\x93NUMPY\x01": 10, b"\x93NUMPY\x02": 12}.get(begin[:7], 0)
     length = int.from_bytes(begin[8:start], "little")
-    header_size = min(length, _LONGEST_HEADER + 1)
-    text = begin[start:] + file.read(max(0, start + header_size - len(begin)))
+    read = min(length, _LONGEST_HEADER)
+    text = begin[start:] + file.read(max(0, start + read - len(begin)))
     header = _HEADER.fullmatch(text.decode("latin1"))
-    if start == 0 or header is None:
+    if start == 0 or length > read or header is None:
         raise InputError(f"{where} is no array of numbers or texts; it was not loaded")
     dtype = np.dtype(header["dtype"])
     shape = tuple(int(length) for length in header["shape"].split(",") if length.strip())

@@ -12,7 +12,7 @@ import math
 import os
 import pickle
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn
 
@@ -66,7 +66,13 @@ class ForeignError(ValueError):
 
 
 def unpickle(content: bytes, where: str) -> Any:
-    """Return the saved object, on the CPU, or raise an error; `where` is the file's name."""
+    """Return the object that `torch.save` wrote, on the CPU; `where` is the file's name.
+
+    Raises:
+        InputError: The archive is damaged or exceeds a limit.
+        DamagedError: Its instructions or storages are damaged.
+        ForeignError: It contains more than tensors and plain values.
+    """
     members: dict[str, bytes] = {}
     for name, data in read_members(content, where, most=CHECKPOINT_BYTES):
         if not _MEMBER.fullmatch(name):
@@ -155,7 +161,22 @@ class _Unpickler(pickle._Unpickler):
         """Drop the versions of layers."""
         self.stack.pop()  # pyright: ignore[reportAttributeAccessIssue] (not in typeshed)
 
+    def _set_item(self) -> None:
+        self._check_names(self.stack[-2:-1])  # pyright: ignore[reportAttributeAccessIssue]
+        pickle._Unpickler.dispatch[_INSTRUCTIONS["SETITEM"]](self)
+
+    def _set_items(self) -> None:
+        self._check_names(self.stack[::2])  # pyright: ignore[reportAttributeAccessIssue]
+        pickle._Unpickler.dispatch[_INSTRUCTIONS["SETITEMS"]](self)
+
+    def _check_names(self, names: Sequence[Any]) -> None:
+        """Refuse tuples: Python crashes when it hashes a deeply nested one."""
+        if any(isinstance(name, tuple) for name in names):
+            raise ForeignError("a tuple as a name")
+
     dispatch[_INSTRUCTIONS["BUILD"]] = _ignore_state
+    dispatch[_INSTRUCTIONS["SETITEM"]] = _set_item
+    dispatch[_INSTRUCTIONS["SETITEMS"]] = _set_items
 
 
 class _Watched(dict):
@@ -212,7 +233,7 @@ def load_checkpoint(path: str | Path) -> dict[str, Any]:
         InputError: The file is missing, damaged, holds code, or is not a checkpoint of ours.
     """
     path = Path(path)
-    if not path.exists():
+    if not os.path.exists(path):  # `Path.exists` raises an error for a name that is too long
         raise InputError(f"checkpoint {path} does not exist; give a run's folder or a .pt file")
     content = read_bytes(path, CHECKPOINT_BYTES)
     if path.suffix != ".pt" and not content.startswith(_ZIP):

@@ -92,7 +92,7 @@ def parse_json(
 ) -> Any:
     """Return plain data from JSON with unique names, finite numbers and bounded integers.
 
-    `where` is its name for messages, `most_values` the largest number of values and names.
+    `where` is its name for messages, `most_values` the largest number of values.
 
     Raises:
         InputError: It is no such JSON.

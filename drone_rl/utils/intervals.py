@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 def proportion(successes: int, trials: int, confidence: float = 0.95) -> dict[str, Any]:
     """Return a rate with its exact (Clopper-Pearson) interval.
 
-    Without trials the rate is None and the interval [0, 1]. `confidence` is the coverage.
+    Returns:
+        "share" (None without trials), "lower95" and "upper95" (0 and 1 without trials; whatever
+        the coverage, `confidence`, is), "successes" and "trials".
     """
     from scipy.special import betaincinv  # slow to import, and trainings report no interval
 

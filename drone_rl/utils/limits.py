@@ -32,7 +32,7 @@ ARCHIVE_BYTES = 2**28  # an .npz file, compressed
 ARRAYS_BYTES = 5 * 2**26  # the .npz files of one command together, unpacked
 
 # Counts
-JSON_VALUES = 2**18  # values and names in a JSON file
+JSON_VALUES = 2**18  # values in a JSON file, without names
 EXPLANATION_VALUES = 2**16  # those in explanation.json
 CERTIFICATE_VALUES = 3 * 2**19  # those in a certificate, nearly all of them borders of boxes
 JSON_DEPTH = 64  # levels of lists and mappings in a JSON file

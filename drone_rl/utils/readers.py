@@ -86,7 +86,7 @@ class _PlainLoader(yaml.SafeLoader):
         return node
 
     def flatten_mapping(self, node: yaml.MappingNode) -> None:
-        """Leave a mapping as it is: "<<" is a name like any other."""
+        """Merge nothing: a quoted "<<" is a name like any other, and PyYAML refuses a plain one."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         """Construct a mapping with each name once."""

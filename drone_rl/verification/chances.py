@@ -180,7 +180,8 @@ def chances(
         changes: Changes to the settings, as in `chances("good", placements=20)`.
 
     Raises:
-        InputError: An input is unusable, the policy has memory, or the task has too many nodes.
+        InputError: An input is unusable, `require_cubes` refuses the policy, or the task has too
+            many nodes.
     """
     settings, seed = with_seed((settings or ChanceSettings()).replace(**changes))
     progress = progress or Bar()

@@ -109,7 +109,8 @@ def check(
         policy: The policy, or an argument of `load_policy`; by default the policy that the
             certificate names, if it is shipped with the package.
         settings: Settings of the check.
-        task: Settings of the task that the certificate must have; any by default.
+        task: Changes to the policy's task; the certificate must be for the changed task. Without
+            changes, it may be for any task.
         outputs: Folder of runs.
         progress: Called with the progress; a bar by default.
         changes: Changes to the settings, as in `check("certificate.json", flights=10_000)`.

@@ -15,19 +15,27 @@ def require_cubes(described: PolicyDescription, what: str) -> TaskSettings:
             position of the drone does not determine the observation.
     """
     task, dynamics, actions = described.task, described.dynamics, described.actions
+    remedy = "give another policy"
     if not isinstance(task, TaskSettings):
         problem = f"task={TaskSettings.name}, got task={task.name}"
     elif not dynamics.is_computer_vision:
         problem = f"dynamics=computer_vision, got dynamics.mode={dynamics.mode}"
+        remedy = "leave dynamics out or give another policy"
     elif actions.kind != "moves":
         problem = f"actions=moves, got actions.kind={actions.kind}"
-    elif any(choice.name == "stack" for choice in described.transforms):
-        problem = "policies that observe one frame; this one stacks frames (transform stack)"
-    elif described.is_recurrent:
-        problem = "policies that observe one frame; this one remembers earlier ones (network=lstm)"
-    elif described.faults:
-        problem = f"cameras without faults; it simulates faults (transform {described.faults[0]})"
-    else:
+    elif not (problem := _ambiguity(described)):
         return task
-    remedy = "give another policy" if dynamics.is_computer_vision else "leave dynamics out"
     raise InputError(f"{what} support only {problem}; {remedy}")
+
+
+def _ambiguity(described: PolicyDescription) -> str:
+    """Return what is supported if one position can have several observations, else nothing."""
+    if any(choice.name == "stack" for choice in described.transforms):
+        return "policies that observe one frame; this one stacks frames (transform stack)"
+    if described.is_recurrent:
+        return "policies that observe one frame; this one remembers earlier ones (network=lstm)"
+    if described.faults:
+        return f"cameras without faults; it simulates faults (transform {described.faults[0]})"
+    if described.appearance.varies:
+        return "appearances without ranges; this policy's differs between episodes"
+    return ""

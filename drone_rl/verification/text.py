@@ -93,7 +93,7 @@ def describe_proof(certificate: Mapping[str, Any]) -> str:
     outcomes, undecided = certificate["outcomes"], certificate["undecided"]
     success = sum(o["share"] for o in outcomes if o["end"] == "all_cubes")
     text = f"Proved: with its most probable actions it collects {cubes} from"
-    if not undecided["boxes"] and all(o["end"] == "all_cubes" for o in outcomes):
+    if not undecided["boxes"] and {o["end"] for o in outcomes} == {"all_cubes"}:
         return f"{text} every placement."
     lost = sum(o["share"] for o in outcomes if o["end"] != "all_cubes")
     lost = exact(lost, is_all=not success and not undecided["boxes"])

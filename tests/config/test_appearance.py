@@ -65,3 +65,21 @@ def test_what_can_not_be_is_refused_in_one_line(given, words):
     with pytest.raises(InputError, match=words) as refused:
         AppearanceSettings(**given)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("given", "varies"),
+    [
+        ({}, False),
+        ({"fog_visibility": 50.0, "ground_texture": "grid", "shadows": 1.0}, False),
+        ({"sun_strength": (0.5, 0.5), "distractor_size": (1.0, 2.0)}, False),
+        ({"distractors": (0, 0)}, False),
+        ({"distractors": 1}, True),
+        ({"sun_strength": (0.5, 0.6)}, True),
+        ({"sky_zenith": ((0.0, 0.5, 1.0), (1.0, 0.5, 1.0))}, True),
+        ({"object_texture": ("none", "grid", "bricks")}, True),
+        ({"shadows": 0.6}, True),
+    ],
+)
+def test_whether_episodes_differ(given, varies):
+    assert AppearanceSettings(**given).varies is varies

@@ -63,6 +63,14 @@ def test_samples_fill_their_ranges():
     assert all(100 < (ground.choice == which).sum() < 170 for which in (-1, 0, 1))
 
 
+@pytest.mark.parametrize(
+    "settings", [{"ground_texture": ("grid", "bricks")}, {"shadows": 0.6}, {"exposure": (1, 2)}]
+)
+def test_every_random_value_is_sampled(settings):
+    looks = reset(AppearanceSettings(**settings), 20)
+    assert looks.varies and len(looks.values.unique(dim=0)) > 1
+
+
 def test_middle_appearance_is_the_center_of_ranges():
     middle = AppearanceSampler(DRAWN, 2).middle
     assert middle.fog_visibility == 75.0 and middle.zenith.tolist() == [0.5, 0.5, 1.0]

@@ -23,8 +23,9 @@ def archive(members, method=zipfile.ZIP_STORED):
     return file.getvalue()
 
 
-def npy(shape, dtype="<f4", data=b"", by_column=False):
+def npy(shape, dtype="<f4", data=b"", by_column=False, padding=0):
     header = f"{{'descr': '{dtype}', 'fortran_order': {by_column}, 'shape': {shape}, }}".encode()
+    header += b" " * padding
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header) + 1) + header + b"\n" + data
 
 
@@ -49,6 +50,18 @@ def test_members_come_in_order():
 def test_damaged_or_too_large(content, message):
     with pytest.raises(InputError, match=message):
         list(read_members(content, "x", most=2))
+
+
+def test_an_offset_beyond_any_file():
+    content = bytearray(archive([("a", b"1")]))
+    entry, end = content.find(b"PK\x01\x02"), content.find(b"PK\x05\x06")
+    wide = struct.pack("<HHQ", 1, 8, 2**63)  # the offset of the file, in 64 bits
+    content[entry + 30 : entry + 32] = struct.pack("<H", len(wide))
+    content[entry + 42 : entry + 46] = b"\xff" * 4
+    content[end + 12 : end + 16] = struct.pack("<L", end - entry + len(wide))
+    content[end:end] = wide
+    with pytest.raises(InputError, match="is damaged or cut short"):
+        list(read_members(bytes(content), "x", most=2))
 
 
 @pytest.mark.parametrize(
@@ -88,6 +101,7 @@ def test_arrays_come_back(tmp_path, value, save):
         (b"\x93NUMPY", "no array"),
         (b"", "no array"),
         (b"\x93NUMPY\x01\x00\x10\x00" + b"(" * 16, "no array"),
+        (npy("(2,)", data=b"12345678", padding=2000), "no array"),
     ],
 )
 def test_arrays_that_lie(tmp_path, data, message):

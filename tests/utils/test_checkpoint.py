@@ -67,9 +67,10 @@ def test_folder_that_is_not_there(tmp_path):
         save_checkpoint(tmp_path / "no" / "last.pt", {})
 
 
-def test_missing(tmp_path):
+@pytest.mark.parametrize("name", ["last.pt", "x" * 300 + ".pt"])
+def test_missing(tmp_path, name):
     with pytest.raises(InputError, match="does not exist"):
-        load_checkpoint(tmp_path / "last.pt")
+        load_checkpoint(tmp_path / name)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9])

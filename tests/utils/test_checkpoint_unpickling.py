@@ -179,3 +179,12 @@ def test_one_storage_has_one_type_and_length(kind, length):
         unpickle(archive(b"\x80\x02]" + one + b"a" + other + b"a.", [FOUR]), "x")
     found = unpickle(archive(b"\x80\x02]" + one + b"a" + one + b"a.", [FOUR]), "x")
     assert found[0].data_ptr() == found[1].data_ptr()
+
+
+@pytest.mark.parametrize("items", [b"K\x01s", b"K\x01u"])
+def test_tuples_are_no_names(items):
+    """Python crashes when it hashes a tuple that is nested so deeply."""
+    mark = b"(" if items.endswith(b"u") else b""
+    program = b"\x80\x02}" + mark + b"N" + b"\x85" * 1_000_000 + items + b"."
+    with pytest.raises(ForeignError, match="a tuple as a name"):
+        unpickle(archive(program), "x")

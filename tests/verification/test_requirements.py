@@ -1,7 +1,9 @@
+import re
+
 import pytest
 
 import drone_rl
-from drone_rl.config import ActionSettings, DynamicsSettings, PillarsSettings
+from drone_rl.config import ActionSettings, AppearanceSettings, DynamicsSettings, PillarsSettings
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.zoo import describe, parse
 from drone_rl.utils.errors import InputError
@@ -42,3 +44,22 @@ def test_memory_and_camera_faults_are_refused(transform, message):
     described["transforms"] = [{"name": "gray"}, transform]
     with pytest.raises(InputError, match=message):
         require_cubes(parse(described), "proofs")
+
+
+@pytest.mark.parametrize(
+    "appearance", [{"sun_strength": (0.2, 0.9)}, {"ground_texture": ("grid", "bricks")}]
+)
+def test_a_sampled_appearance_is_refused(appearance):
+    policy = drone_rl.load_policy("good")
+    sampled = policy.in_appearance(AppearanceSettings(**appearance)).description
+    with pytest.raises(InputError, match="proofs support only appearances without ranges"):
+        require_cubes(sampled, "proofs")
+    fixed = policy.in_appearance("fog").description
+    assert require_cubes(fixed, "exact probabilities") is fixed.task
+
+
+def test_the_remedy_is_that_of_the_problem():
+    other = {"task": PillarsSettings(), "dynamics": DynamicsSettings(mode="simple_flight")}
+    message = re.escape("task=collect_cubes, got task=pillars; give another policy") + "$"
+    with pytest.raises(InputError, match=message):
+        require_cubes(describe(TrainSettings().replace(**other)), "proofs")

@@ -26,6 +26,11 @@ def test_all_placements():
     assert "the cube from every" in describe_proof(certificate(cubes=1))
 
 
+def test_a_certificate_without_statements_proves_nothing():
+    empty = {**certificate(), "outcomes": []}
+    assert "every placement" not in describe_proof(empty)
+
+
 @pytest.mark.parametrize("undecided", [0.5, 1e-12])
 def test_what_is_undecided_is_never_proved(undecided):
     text = describe_proof(certificate(won=1 - undecided, undecided=undecided))

@@ -127,6 +127,7 @@ def parse_certificate(data: Any) -> Certificate:
 
 _LATER = schema.Instance(object)  # anything; parsed once the number of cubes is known
 _SHARE = schema.Real(0.0, 1.0)
+_STATED_SHARE = schema.Real(0.0, 1.0, is_above=True)  # else any number of steps would be stated
 _OUTCOME = schema.Record(
     {
         "end": schema.OneOf(_ENDS),
@@ -178,14 +179,14 @@ def _read_outcome(read: Mapping[str, Any], where: str, cubes: int) -> Outcome:
 
 
 def _read_steps(value: Any, where: str) -> dict[int, float]:
-    """Parse fractions by number of steps; the numbers have no leading zeros."""
+    """Parse fractions above 0 by number of steps; the numbers have no leading zeros."""
     steps = {}
     for name, share in schema.Plain(deepest=1).read(schema.as_mapping(value, where), where).items():
         if not (name.isascii() and name.isdigit() and len(name) <= _DIGITS and name[0] != "0"):
             raise InputError(
                 f"{where}.{schema.shown(name)} is not a number of steps; give one above 0"
             )
-        steps[int(name)] = _SHARE.read(share, f"{where}.{name}")
+        steps[int(name)] = _STATED_SHARE.read(share, f"{where}.{name}")
     return steps
 
 

@@ -47,6 +47,7 @@ def test_where_it_comes_from_may_be_told(one_sided):
         (["outcomes", 0, "share"], 1.5, r"outcomes\[0\]\.share=1\.5"),
         (["outcomes", 0, "steps"], {"007": 0.1}, "'007' is not a number of steps"),
         (["outcomes", 0, "steps"], {"12": -0.1}, r"steps\.12=-0\.1"),
+        (["outcomes", 0, "steps"], {"12": 0.0}, r"steps\.12=0\.0 is out of range; give .* above 0"),
         (["outcomes", 0, "steps"], [], "must be a mapping"),
         (["outcomes", 0, "boxes"], {}, "the wrong shape"),
         (["outcomes", 0, "boxes"], [[[1.0, 2.0, 3.0]]], "the wrong shape; give a list of boxes"),

@@ -5,6 +5,7 @@ import pytest
 import torch
 
 import drone_rl
+from drone_rl.config import AppearanceSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.checker.certificate import (
     check_same_policy,
@@ -64,6 +65,13 @@ def test_other_eyes_are_refused(one_sided, policy, part, value):
 def test_a_policy_with_a_memory_has_no_certificate(one_sided):
     with pytest.raises(InputError, match=r"certificates support only .* stacks frames"):
         changed(one_sided, "transforms", [{"name": "gray"}, {"name": "stack", "N": 2}])
+
+
+def test_a_policy_in_sampled_appearances_has_no_certificate(one_sided):
+    """The checker would simulate one of them, and the others could end otherwise."""
+    sampled = AppearanceSettings(exposure=(0.01, 1.99)).values()
+    with pytest.raises(InputError, match="certificates support only appearances without ranges"):
+        changed(one_sided, "appearance", sampled)
 
 
 def test_a_policy_in_another_body_has_no_certificate(parsed, policy):
