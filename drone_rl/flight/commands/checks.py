@@ -32,12 +32,12 @@ def real(
     """
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not low <= number <= high or (is_above and number == low):
         least = f"above {low:g}" if is_above else f"of {low:g} or more"
-        words = f"a finite number {least}, up to {high:g}" if low > -FARTHEST else "a finite number"
-        raise InputError(f"{name}={value!r} is invalid; give {words}{f' ({unit})' if unit else ''}")
+        words = f"a finite number {least}, up to {high:g}{f' ({unit})' if unit else ''}"
+        raise InputError(f"{name}={value!r} is invalid; give {words}")
     return number
 
 
@@ -97,7 +97,7 @@ def path(points: Any) -> Tensor:
     """
     try:
         places = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"path={points!r} is invalid; give points (x, y, z)") from error
     if places.size == 0:
         raise InputError("path has no points; give at least one (x, y, z)")
@@ -113,7 +113,10 @@ def path(points: Any) -> Tensor:
 def quadrotor(
     dynamics: DynamicsSettings | Quadrotor | None, changes: Mapping[str, Any]
 ) -> Quadrotor:
-    """Return the dynamics of a drone, AirSim's generic one by default, with settings changed."""
+    """Return the dynamics of a drone, AirSim's generic one by default, with settings changed.
+
+    Changes to a `Quadrotor`, whose settings are fixed, are an `InputError`.
+    """
     if isinstance(dynamics, Quadrotor):
         if changes:
             raise InputError(f"{', '.join(changes)} and a Quadrotor are given; give settings alone")

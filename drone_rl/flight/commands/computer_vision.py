@@ -78,7 +78,7 @@ class ComputerVisionDrone(Drone):
             )
         count, state = Whole(1, 100_000, "times").read(times, "times"), self.state
         move, turn = KEYS[key]
-        heading = float(self.body.heading[0])
+        heading = -math.radians(state.attitude.yaw)
         cos, sin = math.cos(heading), math.sin(heading)
         forward, left, up = (count * part for part in move)
         x, y, z = state.position

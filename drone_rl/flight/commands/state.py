@@ -34,6 +34,8 @@ from drone_rl.sim.sensors import (
 from drone_rl.utils.display import table
 
 Triple = tuple[float, float, float]
+_VERTICAL = 1.0 - 1e-12
+"""Sine of the pitch from which the nose counts as straight up or down."""
 
 
 class LandedState(enum.StrEnum):
@@ -45,7 +47,10 @@ class LandedState(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Attitude:
-    """Orientation in degrees, applied in the order yaw, pitch, roll; signs as in `conventions`."""
+    """Orientation in degrees, applied in the order yaw, pitch, roll; signs as in `conventions`.
+
+    With the nose straight up or down, where yaw and roll turn about the same axis, roll is 0.
+    """
 
     roll: float
     """Positive with the right side down."""
@@ -58,9 +63,13 @@ class Attitude:
     def of(cls, quaternion: Sequence[float]) -> Self:
         """Convert a unit quaternion (w, x, y, z)."""
         w, x, y, z = quaternion
-        roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-        pitch = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
-        yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        sine = 2.0 * (w * y - z * x)
+        pitch = math.asin(min(max(sine, -1.0), 1.0))
+        if abs(sine) > _VERTICAL:
+            roll, yaw = 0.0, math.remainder(2.0 * math.atan2(z, w), math.tau)
+        else:
+            roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+            yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         return cls(*np.degrees(to_pilot(roll, pitch, yaw)).tolist())
 
 

@@ -7,15 +7,18 @@ import torch
 from drone_rl.flight.commands import checks
 from drone_rl.utils.errors import InputError
 
+HUGE = pytest.param(10**400, id="huge")
+BOUNDS = r"a finite number of -1e\+06 or more, up to 1e\+06"
+
 
 def test_numbers_of_any_kind_are_taken():
     assert checks.real(np.float32(1.5), "x") == 1.5
     assert checks.real(torch.tensor(2), "x") == 2.0
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, "far", None, [1.0, 2.0]])
+@pytest.mark.parametrize("value", [math.nan, math.inf, "far", None, [1.0, 2.0], HUGE, 2e6])
 def test_what_is_no_finite_number_is_refused(value):
-    with pytest.raises(InputError, match=r"^x=.* is invalid; give a finite number$"):
+    with pytest.raises(InputError, match=rf"^x=.* is invalid; give {BOUNDS}$"):
         checks.real(value, "x")
 
 
@@ -52,6 +55,7 @@ def test_a_path():
         ([(0, 0, -1)], r"path\[0\].z=-1 is below the ground"),
         ("home", "path='home' is invalid"),
         ([(1, 2, 3), (1, 2)], "is invalid"),
+        ([(10**400, 0, 0)], "is invalid"),
     ],
 )
 def test_what_is_no_path(path, told):

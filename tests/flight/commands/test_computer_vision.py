@@ -59,6 +59,26 @@ def test_keys_turn(pilot, key):
     assert vars(found) == pytest.approx(expected)
 
 
+@pytest.mark.parametrize("yaw", [30, 77, -120])
+def test_keys_of_a_drone_that_looks_straight_down(pilot, yaw):
+    """Moving it does not turn it, and it moves in its heading."""
+    pilot.set_pose([0, 0, 5], yaw=yaw)
+    pilot.press("pitch_down", 18)
+    before = pilot.body.attitude.clone()
+    state = pilot.press("forward", 4)
+    assert float((before * pilot.body.attitude).sum().abs()) == pytest.approx(1.0)
+    heading = math.radians(-yaw)
+    assert state.position == pytest.approx((math.cos(heading), math.sin(heading), 5.0))
+
+
+def test_images_show_roll_and_pitch(pilot):
+    level = pilot.picture()
+    pilot.set_pose([1, 2, 3], pitch=-30)
+    down = pilot.picture()
+    pilot.set_pose([1, 2, 3], pitch=-30, roll=20)
+    assert (down != level).any() and (pilot.picture() != down).any()
+
+
 def test_images_of_all_types_are_those_of_the_pose(pilot):
     types = range(7)
     requests = [drone_rl.ImageRequest(0, kind, False, False) for kind in types]
