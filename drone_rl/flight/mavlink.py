@@ -106,7 +106,7 @@ class SerialLink(Link):
             InputError: The device can't be opened, is no serial port, or the speed is invalid.
         """
         speed = getattr(termios, f"B{baud}", None)
-        if speed is None:
+        if not speed:  # B0 would hang up
             raise InputError(f"baud={baud} is no serial speed; give one such as 921600")
         if not Path(device).exists():
             raise InputError(f"device={device} doesn't exist; is the controller plugged in?")
@@ -132,7 +132,7 @@ class TcpLink(Link):
         """Listen at a port (0 for any free one); by default only this machine can connect.
 
         Raises:
-            InputError: The port is in use.
+            InputError: The port is in use or invalid, or the host is unknown.
         """
         super().__init__("the autopilot", patience=1.0)
         self._listener = socket.socket()
@@ -151,7 +151,7 @@ class TcpLink(Link):
         self._listener.settimeout(within)
         try:
             link, _ = self._listener.accept()
-        except TimeoutError:
+        except (TimeoutError, BlockingIOError):  # the latter with a limit of 0
             raise FlightControllerError(
                 f"no autopilot connected to port {self.port} in {within:g} s"
             ) from None
@@ -276,7 +276,7 @@ class MavlinkBridge:
             if kind in ("BAD_DATA", "UNKNOWN"):
                 continue
             self._heard = time.monotonic()
-            if kind == "HIL_ACTUATOR_CONTROLS" and message.time_usec >= self._controls_time:
+            if kind == "HIL_ACTUATOR_CONTROLS":
                 self._began = True
                 self._controls_time = message.time_usec
                 self.is_armed = bool(message.mode & ARMED)

@@ -1,6 +1,7 @@
 """A program that answers as Betaflight's SITL does: its command line, its packets, its memory.
 
-python stub_firmware.py [HOW]: what is wrong with it, if anything: mute, never-arms, dies, refuses.
+python stub_firmware.py [HOW]: what is wrong with it, if anything: mute, never-arms, dies, refuses,
+garbles.
 """
 
 import math
@@ -83,6 +84,8 @@ def main():
             if HOW == "mute" and told > 300:
                 continue
             rotors = rotor_outputs(state, channels) if armed else [0.0] * 4
+            if HOW == "garbles" and told > 300:
+                rotors[0] = math.nan
             out.sendto(struct.pack("<4f", *rotors), ("127.0.0.1", 9002))
 
 

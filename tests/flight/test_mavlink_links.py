@@ -50,6 +50,8 @@ def test_serial_ports_that_are_none(tmp_path):
         SerialLink(str(tmp_path / "file"))
     with pytest.raises(InputError, match="baud=12345 is no serial speed"):
         SerialLink(str(tmp_path / "file"), baud=12345)
+    with pytest.raises(InputError, match="baud=0 is no serial speed"):
+        SerialLink(str(tmp_path / "file"), baud=0)
     with pytest.raises(InputError, match="can't be opened"):
         SerialLink(str(tmp_path))
 
@@ -62,6 +64,8 @@ def test_tcp_links():
         FlightControllerError, match=r"no autopilot connected to port \d+ in 0.01 s"
     ):
         link.accept(0.01)
+    with pytest.raises(FlightControllerError, match="no autopilot connected"):
+        link.accept(0.0)
     with socket.create_connection(("127.0.0.1", link.port)) as far:
         link.accept(5.0)
         link.write(b"abc")

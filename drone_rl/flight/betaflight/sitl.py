@@ -119,11 +119,16 @@ class Betaflight:
         self._rotors = np.zeros(4)
         self._next_sticks = -np.inf
         self._silence = 0.0
-        """Seconds that were waited in vain since the last answer."""
+        """Seconds of waiting since the last answer."""
         self._open = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
-        """Start the firmware; set it up first if the folder has no settings."""
+        """Start the firmware; set it up first if the folder has no settings.
+
+        Raises:
+            InputError: See `FirmwareProcess`.
+            FlightControllerError: The firmware can't be started or set up, or doesn't answer.
+        """
         self.folder.mkdir(parents=True, exist_ok=True)
         with contextlib.ExitStack() as stack:
             self._process = stack.enter_context(FirmwareProcess(isolated=self.isolated))
@@ -144,7 +149,8 @@ class Betaflight:
         """Send a state and sticks; return the rotor commands as `unpack_rotors` does.
 
         Raises:
-            FlightControllerError: The firmware has ended, or has been silent for too long.
+            FlightControllerError: The firmware has ended, has been silent for too long, or answers
+                by an invalid packet.
         """
         if readings.time >= self._next_sticks:
             self._next_sticks = readings.time + STICKS_EVERY
@@ -160,6 +166,8 @@ class Betaflight:
             self._silence += time.monotonic() - begin
             if self._silence > self.patience:
                 raise self._failure(f"has been silent for {self.patience:g} s") from None
+        except ValueError as error:
+            raise self._failure(f"answers by an invalid packet: {error}") from error
         return self._rotors
 
     def _failure(self, what: str) -> FlightControllerError:

@@ -46,7 +46,12 @@ def test_sides_are_not_swapped(stub, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("how", "words"), [("dies", "ended with status 3"), ("mute", "silent for 0.2 s")]
+    ("how", "words"),
+    [
+        ("dies", "ended with status 3"),
+        ("mute", "silent for 0.2 s"),
+        ("garbles", "answers by an invalid packet: .*nan"),
+    ],
 )
 def test_a_firmware_that_is_lost(stub, tmp_path, how, words):
     with Betaflight(stub(), tmp_path):
