@@ -30,7 +30,7 @@ def is_stated(evidence: Evidence) -> bool:
 
 
 def is_proved(evidence: Evidence) -> bool:
-    """Return whether it does, and enough rollouts re-checked it."""
+    """Return whether the certificate does, and enough rollouts re-checked it."""
     bound = evidence["proof"].get("wrong_at_most") if is_stated(evidence) else None
     return bound is not None and bound <= MAX_WRONG
 
@@ -350,14 +350,14 @@ SENTENCES = (
     ),
     Sentence(
         "failures.largest",
-        "an episode failed",
+        "an episode failed in a way that the table names",
         lambda e: e["failures"]["largest"] is not None,
         _largest,
     ),
     Sentence(
         "failures.never",
         "no episode failed",
-        lambda e: e["failures"]["largest"] is None,
+        lambda e: not e["failures"]["bound"]["successes"] and e["failures"]["largest"] is None,
         _never,
     ),
     Sentence(

@@ -84,6 +84,7 @@ LIES = [
     {"quantities.success.lower": 0.1},
     {"quantities.success.upper": math.inf},
     {"quantities.success.thresholds": [-1.0]},
+    {"quantities.collected left.thresholds": [0.3]},
     {"quantities.offered left.value": 0.0},
     {"quantities.offered left.lower": 0.75},
     {"quantities.collected left.value": 1.0},
@@ -129,6 +130,19 @@ def test_a_second_evaluation_of_a_name_does_not_divert_the_check(judged):
     lie = changed(verdict, {"baselines.oracle.success.share": 0.1})
     with pytest.raises(InputError):
         check_verdict({**lie, "oracle": verdict["baselines"]["oracle"]})
+
+
+def test_a_baseline_named_as_the_policy_does_not_divert_the_check(judged):
+    verdict = judged(lambda i, side: side != LEFT)
+    for part in ("baselines", "skill", "quantities"):
+        renamed = {k.replace("random", "greedy"): v for k, v in verdict[part].items()}
+        verdict[part] = renamed
+    check_verdict(verdict)
+    with pytest.raises(InputError, match=r"greedy\.mean_goals"):
+        check_verdict(changed(verdict, {"greedy.mean_goals": 3}))
+    with pytest.raises(InputError, match=r"sampled\.mean_goals"):
+        named = {k.replace("forward", "sampled"): v for k, v in verdict["baselines"].items()}
+        check_verdict(changed({**verdict, "baselines": named}, {"baselines.sampled.mean_goals": 3}))
 
 
 def test_sides_in_another_order_are_the_same_sides(judged):
