@@ -6,7 +6,7 @@ from typing import Any
 from drone_rl.utils.text import Evidence, listed
 
 _MAX_NAMED = 4
-"""Settings named in a sentence; more are counted."""
+"""Greatest number of items in a sentence; the last one counts the settings that do not fit."""
 
 
 def unlike(evidence: Evidence) -> str:

@@ -5,6 +5,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, Self
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -92,7 +93,7 @@ class Drone:
         self._quadrotor = checks.quadrotor(dynamics, changes)
         self.settings = self._quadrotor.settings
         """Vehicle and wind."""
-        height = [] if self.is_computer_vision and len(start) == 3 else [self.settings.radius]
+        height = [] if self.is_computer_vision and np.size(start) == 3 else [self.settings.radius]
         given = checks.numbers(start, "start", 3 - len(height), -checks.FARTHEST, checks.FARTHEST)
         place = [[*given, *height]]
         degrees = checks.real(yaw, "yaw", unit="degrees")

@@ -70,6 +70,7 @@ class RcSticks:
 
 
 AT_REST = RcSticks()
+"""Throttle low, disarmed."""
 
 
 def velocity_to(
