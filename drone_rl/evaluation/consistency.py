@@ -142,19 +142,20 @@ def _expected(
     greedy, baselines, good = verdict["greedy"], verdict["baselines"], rule.good_share
     ours, best = (of["success"]["share"] for of in (greedy, baselines["oracle"]))
     every, most = (of["shares"]["all"]["mean"] for of in (greedy, baselines["oracle"]))
-    episodes, what = greedy["episodes"], name.rpartition(" ")[2]
-    if name == "success":
+    episodes, (kind, _, what) = greedy["episodes"], name.partition(" ")
+    if kind == "success":
         return ours - good * best, (-good, 1.0), episodes
-    if name.startswith("offered "):
+    if kind == "offered":
         return greedy["shares"][what]["count"] / episodes, (0.0, 1.0), episodes
-    if name.startswith("collected "):
+    if kind == "collected":
         stratum = greedy["shares"][what]
         return stratum["mean"], (0.0, 1.0), stratum["count"]
-    if name.startswith("above "):
+    if kind == "above":
         blind = baselines[what]["shares"]["all"]["mean"]
         share = every - (1 - rule.poor_margin) * blind - rule.poor_margin * most
         return share, (-1.0, 1.0), episodes
-    return good * best - baselines[what]["success"]["share"], (-1.0, good), episodes
+    blind = baselines[what.removeprefix("by ")]["success"]["share"]
+    return good * best - blind, (-1.0, good), episodes
 
 
 def _check_kind(verdict: Mapping[str, Any], found: list[Quantity], rule: Rule) -> None:
