@@ -29,5 +29,5 @@ def _said(value: Any) -> str:
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_said, value))}]"
     if isinstance(value, float):
-        return f"{value:g}"
+        return f"{value:.12g}"  # without ".0"
     return value if isinstance(value, str) else json.dumps(value)
