@@ -62,6 +62,7 @@ OF_VERDICTS = (
     ("failures.largest", {"failures.rows.1.lower95": 0.0}),
     ("failures.never", {"failures.largest": VERDICT["failures"]["largest"]}, _NO_FAILURES),
     ("failures.never", {"failures.bound.upper95": 0.2}, _NO_FAILURES),
+    ("failures.never", {"failures.bound.successes": 1}, _NO_FAILURES),
     ("unlike", {"unlike": {}}, _IN_WIND),
     ("unlike", {"unlike": {"wind": {"own": [0.0, 0.0, 0.0], "flown": [8.0, 0.0, 0.0]}}}, _IN_WIND),
     ("unlike", {"unlike": {}}, _IN_FOG),

@@ -6,7 +6,7 @@ from typing import Any
 from drone_rl.utils.text import Evidence, listed
 
 _MAX_NAMED = 4
-"""Settings named in a sentence; more are counted."""
+"""Greatest number of items in a sentence; the last one counts the settings that do not fit."""
 
 
 def unlike(evidence: Evidence) -> str:
@@ -29,5 +29,5 @@ def _said(value: Any) -> str:
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_said, value))}]"
     if isinstance(value, float):
-        return f"{value:g}"
+        return f"{value:.12g}"  # without ".0"
     return value if isinstance(value, str) else json.dumps(value)

@@ -31,10 +31,10 @@ def check_verdict(given: Any) -> None:
     """
     verdict = as_mapping(Plain().read(given, "verdict"), "verdict")
     rule = _rule(verdict)
-    evaluations = {"greedy": verdict.get("greedy"), **verdict["baselines"]}
+    evaluations = [("greedy", verdict.get("greedy")), *verdict["baselines"].items()]
     if verdict.get("sampled") is not None:
-        evaluations["sampled"] = verdict["sampled"]
-    for name, flights in evaluations.items():
+        evaluations.append(("sampled", verdict["sampled"]))
+    for name, flights in evaluations:  # pairs: a baseline may have any name
         _check_flights(verdict, flights, name[:40], rule)
         check_same(flights["episodes"], verdict["greedy"]["episodes"], f"{name[:40]}.episodes")
     found = [
@@ -48,7 +48,7 @@ def check_verdict(given: Any) -> None:
 
 
 def _rule(verdict: Mapping[str, Any]) -> Rule:
-    """The rule of the verdict, for its strata and baselines."""
+    """Return the rule of the verdict, for its strata and baselines."""
     error_rate, good_share = (verdict.get(key) for key in ("error_rate", "good_share"))
     strata = [name for name in _shares(verdict.get("greedy"), "greedy") if name != "all"]
     if set(strata) == set(SIDES):
@@ -139,7 +139,7 @@ def _quantity(
 def _expected(
     verdict: Mapping[str, Any], name: str, rule: Rule
 ) -> tuple[Any, tuple[float, float], int]:
-    """Expected value of a quantity, its range, and the number of values that it averages."""
+    """Return the expected value of a quantity, its range, and its number of values."""
     greedy, baselines, good = verdict["greedy"], verdict["baselines"], rule.good_share
     ours, best = (of["success"]["share"] for of in (greedy, baselines["oracle"]))
     every, most = (of["shares"]["all"]["mean"] for of in (greedy, baselines["oracle"]))

@@ -98,7 +98,7 @@ class Evaluation:
         return table(head, rows, self._notes())
 
     def _notes(self) -> list[str]:
-        """Return notes on the arithmetic, the seed and differences from the training's dynamics."""
+        """Return notes on the arithmetic, the seed and what differs from the training."""
         unlike, seed = self.policy.unlike, self.seed.as_dict()
         evidence = {**seed, "rounding": self.rounding}
         notes = [say(EVALUATION, evidence), unlike_text({"unlike": unlike}) if unlike else ""]

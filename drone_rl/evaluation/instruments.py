@@ -24,7 +24,7 @@ _SPEEDS, _BARS = (172, 30), 140
 """Position of the speeds, and width of their bars, pixels."""
 _MOTORS = (330, 30)
 _STILL = 0.05
-"""Slower motion backward, right or down is labelled forward, left or up, m/s."""
+"""Motion backward, right or down up to this speed, m/s, is labelled forward, left or up."""
 _WORDS = (("forward", "backward"), ("left", "right"), ("climbs", "sinks"))
 _PLACES = {"front left": 2, "front right": 0, "rear left": 1, "rear right": 3}
 """Index of each rotor in `FlightState.rotors`."""
@@ -75,8 +75,8 @@ def horizon(attitude: Attitude) -> Image.Image:
     along = x * math.cos(roll) + y * math.sin(roll)
     colors = np.where(above[..., None] < 0.0, _GROUND, _SKY).astype(np.uint8)
     for degrees in (-20.0, -10.0, 0.0, 10.0, 20.0):
-        is_long = 2.0 if degrees == 0.0 else 0.2
-        is_on = (abs(above - degrees / _DEGREES) < 0.013) & (abs(along) < is_long)
+        reach = 2.0 if degrees == 0.0 else 0.2
+        is_on = (abs(above - degrees / _DEGREES) < 0.013) & (abs(along) < reach)
         colors[is_on] = _TEXT
     colors[x * x + y * y > 1.0] = _BACKGROUND
     return Image.fromarray(colors).resize((2 * _RADIUS, 2 * _RADIUS), Image.Resampling.BOX)

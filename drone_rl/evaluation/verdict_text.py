@@ -131,7 +131,7 @@ def _sides(evidence: Evidence) -> dict[str, str]:
 
 
 def _lost_side(evidence: Evidence) -> str:
-    """Goals on the side that a one-sided policy has lost, else empty."""
+    """Goals on the side where a one-sided policy fails, else empty."""
     lost = {"one-sided (left)": "right", "one-sided (right)": "left"}.get(evidence["kind"])
     terms = terms_of(evidence)
     return f"{terms.goals} {terms.side(lost)}" if lost else ""
@@ -353,14 +353,14 @@ SENTENCES = (
     ),
     Sentence(
         "failures.largest",
-        "an episode failed",
+        "an episode failed in a way that the table names",
         lambda e: e["failures"]["largest"] is not None,
         _largest,
     ),
     Sentence(
         "failures.never",
         "no episode failed",
-        lambda e: e["failures"]["largest"] is None,
+        lambda e: not e["failures"]["bound"]["successes"] and e["failures"]["largest"] is None,
         _never,
     ),
     Sentence(

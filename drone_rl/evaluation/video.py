@@ -1,4 +1,4 @@
-"""`drone-rl play`: videos of the drone, its cameras, the observation and action probabilities."""
+"""`drone-rl play`: videos of the drone, its cameras and its action probabilities."""
 
 import contextlib
 import dataclasses
@@ -50,7 +50,7 @@ _log = logging.getLogger(__name__)
 WIDTH, HEIGHT = 1280, 720
 CHASE_HEIGHT, STRIP_HEIGHT, GAP = 532, 144, 5
 INSET_WIDTH = 320
-"""Pixels of the observation, enlarged."""
+"""Pixels of the image of the policy's camera, enlarged."""
 FRAMES_PER_SECOND = 10
 _STRIP = CHASE_HEIGHT + GAP
 _BOTTOM = _STRIP + STRIP_HEIGHT + 9
@@ -179,7 +179,7 @@ def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
     Raises:
         InputError: A file can't be written.
     """
-    files = [path.with_suffix(".mp4"), path.with_suffix(".gif")]
+    files = [path.with_name(path.name + suffix) for suffix in (".mp4", ".gif")]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         iio.imwrite(files[0], np.stack(frames), fps=FRAMES_PER_SECOND, codec="libx264")
@@ -219,7 +219,7 @@ def render_step(base: DroneEnv) -> StepImages:
 def _compose(
     seen: StepImages, caption: str, acted: TensorDictBase | None = None, actions: Actions = MOVES
 ) -> np.ndarray:
-    """Chase view with the observation as inset; below all five cameras, a caption and bars."""
+    """Chase view with the camera image as inset; below all five cameras, a caption and bars."""
     canvas = Image.new("RGB", (WIDTH, HEIGHT), _BACKGROUND)
     draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(16)
     canvas.paste(Image.fromarray(seen.chase.cpu().numpy()), (0, 0))

@@ -153,7 +153,7 @@ class TcpLink(Link):
         self._listener.settimeout(within)
         try:
             link, _ = self._listener.accept()
-        except TimeoutError:
+        except (TimeoutError, BlockingIOError):  # the latter with a limit of 0
             raise FlightControllerError(
                 f"no autopilot connected to port {self.port} in {within:g} s"
             ) from None
@@ -277,7 +277,7 @@ class MavlinkBridge:
             if kind == "BAD_DATA" or kind.startswith("UNKNOWN_"):  # without a check of the sum
                 continue
             self._heard = time.monotonic()
-            if kind == "HIL_ACTUATOR_CONTROLS" and message.time_usec >= self._controls_time:
+            if kind == "HIL_ACTUATOR_CONTROLS":
                 self._began = True
                 self._controls_time = message.time_usec
                 self.is_armed = bool(message.mode & ARMED)

@@ -16,6 +16,11 @@ def test_settings_are_named_as_they_are_typed():
     assert "with other dynamics and another appearance: " in named and "=true instead of 1" in named
 
 
+def test_numbers_that_differ_are_not_rounded_to_the_same():
+    mass = {"own": 1.0, "flown": 1.00000012}
+    assert "dynamics.mass=1.00000012 instead of 1." in unlike({"unlike": {"mass": mass}})
+
+
 def test_of_many_settings_three_are_named():
     changed = {f"appearance.s{i}": {"own": 0, "flown": 1} for i in range(4)}
     assert "appearance.s3=1 instead of 0." in unlike({"unlike": changed})

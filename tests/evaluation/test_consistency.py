@@ -134,6 +134,31 @@ def test_a_second_evaluation_of_a_name_does_not_divert_the_check(judged):
         check_verdict({**lie, "oracle": verdict["baselines"]["oracle"]})
 
 
+def renamed(value, old, new):
+    """A verdict whose keys have another name of a baseline or side."""
+    if not isinstance(value, dict):
+        return value
+    return {k.replace(old, new): renamed(v, old, new) for k, v in value.items()}
+
+
+def test_names_of_baselines_and_sides_may_have_several_words(judged):
+    verdict = renamed(judged(lambda i, side: side != LEFT), "right", "turn right")
+    assert {"turn right", "oracle"} < verdict["baselines"].keys()
+    check_verdict(verdict)
+    with pytest.raises(InputError, match="unsolved by turn right"):
+        check_verdict(changed(verdict, {"quantities.unsolved by turn right.value": 0.1}))
+
+
+def test_a_baseline_named_as_the_policy_does_not_divert_the_check(judged):
+    verdict = renamed(judged(lambda i, side: side != LEFT), "random", "greedy")
+    check_verdict(verdict)
+    with pytest.raises(InputError, match=r"greedy\.mean_goals"):
+        check_verdict(changed(verdict, {"greedy.mean_goals": 3}))
+    with pytest.raises(InputError, match=r"sampled\.mean_goals"):
+        named = {k.replace("forward", "sampled"): v for k, v in verdict["baselines"].items()}
+        check_verdict(changed({**verdict, "baselines": named}, {"baselines.sampled.mean_goals": 3}))
+
+
 def test_sides_in_another_order_are_the_same_sides(judged):
     verdict = judged(lambda i, side: side != LEFT)
     shares = verdict["greedy"]["shares"]

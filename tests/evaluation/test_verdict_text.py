@@ -50,7 +50,7 @@ def evidence():
             "rows": [largest, *ends],
             "largest": largest,
             "expected_end": "front_boundary",
-            "bound": {"share": 0.06, "upper95": 0.0921, "trials": 400},
+            "bound": {"share": 0.06, "successes": 24, "upper95": 0.0921, "trials": 400},
         },
     }
 
@@ -184,6 +184,8 @@ def test_how_many_episodes_end(evidence):
 
 def test_no_failure_has_a_bound(evidence):
     evidence["failures"]["largest"] = None
+    assert "failures.never" not in speak(evidence)  # 24 failed, of no class in the table
+    evidence["failures"]["bound"]["successes"] = 0
     found = speak(evidence)
     assert found["failures.never"] == (
         "It failed in none of 400 episodes, so it fails in at most 9.2% (95% CI)."

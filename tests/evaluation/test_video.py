@@ -49,8 +49,8 @@ def test_film_and_files(make_pipeline, tmp_path):
     assert 2 <= len(frames) <= 5
     assert frames[0].shape == (720, 1280, 3)
     assert len({f.tobytes() for f in frames}) == len(frames)
-    files = write_video(frames, tmp_path / "sub" / "episode")
-    assert [f.suffix for f in files] == [".mp4", ".gif"]
+    files = write_video(frames, tmp_path / "sub" / "wind_0.5")
+    assert [f.name for f in files] == ["wind_0.5.mp4", "wind_0.5.gif"]
     assert all(f.stat().st_size > 1000 for f in files)
 
 

@@ -12,7 +12,7 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.flight.in_the_loop.control import AT_REST
 from drone_rl.flight.in_the_loop.drone import DroneInTheLoop, FlightControllerError
 from drone_rl.flight.in_the_loop.instruments import Readings
-from drone_rl.flight.mavlink import MavlinkBridge, SerialLink, TcpLink
+from drone_rl.flight.mavlink import Link, MavlinkBridge, SerialLink, TcpLink
 from drone_rl.utils.errors import InputError
 from tests.flight.simple_body import SimpleBody
 
@@ -79,6 +79,24 @@ def test_without_lockstep_no_step_waits(stubs):
     assert (rotors[0] == rotors[-1]).all()
     assert rotors[0][0] > 0.5
     assert bridge.missed == 0
+
+
+def test_controls_after_a_reboot_are_the_newest(stubs):
+    """Its clock starts again at 0."""
+    codec, sent = stubs.common.MAVLink(None, srcSystem=1), []
+
+    class Line(Link):
+        def read(self, within):
+            return sent.pop(0) if sent else b""
+
+        def write(self, data):
+            pass
+
+    bridge = MavlinkBridge(Line("the autopilot", 1.0), lockstep=False)
+    for time_usec, thrust in ((9_000_000, 0.75), (1_000, 0.25)):
+        controls = codec.hil_actuator_controls_encode(time_usec, [thrust] * 16, 128, 1)
+        sent.append(controls.pack(codec))
+        assert bridge.step(readings(0.0)).tolist() == [thrust] * 4
 
 
 def test_an_autopilot_that_falls_silent(stubs):

@@ -64,6 +64,8 @@ def test_tcp_links():
         FlightControllerError, match=r"no autopilot connected to port \d+ in 0.01 s"
     ):
         link.accept(0.01)
+    with pytest.raises(FlightControllerError, match="no autopilot connected"):
+        link.accept(0.0)
     with socket.create_connection(("127.0.0.1", link.port)) as far:
         link.accept(5.0)
         link.write(b"abc")

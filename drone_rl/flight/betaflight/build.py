@@ -46,9 +46,9 @@ def find_firmware(path: str | Path | None = None) -> Path:
 
 
 def build_firmware(path: str | Path | None = None, source: str | Path | None = None) -> Path:
-    """Compile the firmware, in 10 to 30 seconds, and return the program; only that is kept.
+    """Compile the firmware, in 10 to 30 seconds, to a path, and return it; only that is kept.
 
-    By default it is that of `firmware_path`, from the source in the extra's package.
+    By default the path is `firmware_path`, and the source that in the extra's package.
 
     Raises:
         InputError: A compiler or the source is missing, compilation fails, or the program can't be

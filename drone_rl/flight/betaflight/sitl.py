@@ -117,7 +117,7 @@ class Betaflight:
         self.missed = 0
         """States that were not answered in time."""
         self._silence = 0.0
-        """Seconds that were waited in vain since the last answer."""
+        """Seconds of waiting since the last answer."""
         self._open = contextlib.ExitStack()
 
     def __enter__(self) -> Self:

@@ -114,7 +114,10 @@ def path(points: Any) -> Tensor:
 def quadrotor(
     dynamics: DynamicsSettings | Quadrotor | None, changes: Mapping[str, Any]
 ) -> Quadrotor:
-    """Return the dynamics of a drone, AirSim's generic one by default, with settings changed."""
+    """Return the dynamics of a drone, AirSim's generic one by default, with settings changed.
+
+    Changes to a `Quadrotor`, whose settings are fixed, are an `InputError`.
+    """
     if isinstance(dynamics, Quadrotor):
         if changes:
             raise InputError(f"{', '.join(changes)} and a Quadrotor are given; give settings alone")

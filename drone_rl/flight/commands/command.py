@@ -201,7 +201,7 @@ class FlightFuture:
         self._wait = wait
         self._success: bool | None = None
         self.cancelled = False
-        """Whether another command replaced this one."""
+        """Whether the command was cancelled, such as by another one, before it ended."""
 
     @property
     def done(self) -> bool:

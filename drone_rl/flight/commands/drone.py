@@ -5,6 +5,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, Self
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -92,7 +93,7 @@ class Drone:
         self._quadrotor = checks.quadrotor(dynamics, changes)
         self.settings = self._quadrotor.settings
         """Vehicle and wind."""
-        height = [] if self.is_computer_vision and len(start) == 3 else [self.settings.radius]
+        height = [] if self.is_computer_vision and np.size(start) == 3 else [self.settings.radius]
         given = checks.numbers(start, "start", 3 - len(height), -checks.FARTHEST, checks.FARTHEST)
         place = [[*given, *height]]
         degrees = checks.real(yaw, "yaw", unit="degrees")
@@ -212,7 +213,7 @@ class Drone:
         height: int | None = None,
         width: int | None = None,
     ) -> Tensor:
-        """Render one of AirSim's five cameras; level if the cameras hang in a gimbal.
+        """Render one of AirSim's five cameras; with dynamics, level if they hang in a gimbal.
 
         See `Renderer.render` for `modality`. The size, in pixels, is the worlds' by default. A
         drone without worlds raises `PilotError`.
@@ -241,7 +242,7 @@ class Drone:
         if self.worlds is None:
             raise PilotError(f"{name}: there is nothing to render; give worlds=Worlds(1, ...)")
         state, body = copy.copy(self.worlds.state), self.body
-        is_level = self._quadrotor.mount == "gimbal"
+        is_level = self._quadrotor.mount == "gimbal" and not self.is_computer_vision
         state.body = body.moved(body.position, twist_about_z(body.attitude)) if is_level else body
         return self.worlds, state
 

@@ -29,9 +29,9 @@ AUTOMATIC = -1.0
 _TAKEOFF_MARGIN = 0.1
 """A take-off is complete this far below its height, metres. Wind may shift it sideways."""
 _PERIODS_AHEAD = 30.0
-"""Lookahead in control periods if it adapts to the speed."""
+"""Lookahead in control periods if it grows with the distance from the path."""
 _PERIODS_AHEAD_FIXED = 40.0
-"""Lookahead in control periods if it does not adapt."""
+"""Lookahead in control periods if it does not."""
 _SLOWEST = 0.6
 """Braking keeps this speed, m/s, so that wind cannot stop a drone short of the end."""
 _VERTICAL_BRAKING = 0.5
@@ -188,7 +188,7 @@ class TakeoffCommand(PathCommand):
     """Climbs straight up."""
 
     def __init__(self, body: FlightState, limit: float) -> None:
-        """Take the state on the ground and the time limit in seconds."""
+        """Take the state at the start and the time limit in seconds."""
         up = body.position.new_tensor([0.0, 0.0, TAKEOFF_HEIGHT])
         super().__init__(body, (body.position + up)[:, None], TAKEOFF_SPEED, limit)
 
@@ -242,7 +242,7 @@ def lookahead_of(speed: float, lookahead: float = AUTOMATIC, adaptive: float = 1
 def braking_time(settings: DynamicsSettings) -> float:
     """Return the braking time without overshoot, seconds (remaining distance over speed).
 
-    It is twice the time constant of the horizontal velocity loop.
+    It is twice the time constant of the horizontal velocity loop, but at most 20 s.
     """
     pull = GRAVITY * settings.velocity_gain * settings.angle_limit
     return min(2.0 / max(pull, 1e-3), 20.0)

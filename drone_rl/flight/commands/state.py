@@ -47,7 +47,10 @@ class LandedState(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Attitude:
-    """Orientation in degrees, applied in the order yaw, pitch, roll; signs as in `conventions`."""
+    """Orientation in degrees, applied in the order yaw, pitch, roll; signs as in `conventions`.
+
+    With the nose straight up or down, where yaw and roll turn about the same axis, roll is 0.
+    """
 
     roll: float
     """Positive with the right side down."""

@@ -93,10 +93,10 @@ class InTheLoopDynamics:
             FlightControllerError: See `DroneInTheLoop.tick`; or the policy took too long.
         """
         assert isinstance(body, FlightState)
-        seconds = time.monotonic() - self._last
-        if seconds > LONGEST_DECISION:
+        waited = time.monotonic() - self._last
+        if waited > LONGEST_DECISION:
             raise FlightControllerError(
-                f"the policy took {seconds:.2f} s for an action, more than {LONGEST_DECISION:g} s; "
+                f"the policy took {waited:.2f} s for an action, more than {LONGEST_DECISION:g} s; "
                 "fly it on a machine that is less busy"
             )
         drone, goals = self.drone, self._quadrotor.steering.goals(body, action)

@@ -7,6 +7,9 @@ import torch
 from drone_rl.flight.commands import checks
 from drone_rl.utils.errors import InputError
 
+HUGE = pytest.param(10**400, id="huge")
+BOUNDS = r"a finite number of -1e\+06 or more, up to 1e\+06"
+
 
 def test_numbers_of_any_kind_are_taken():
     assert checks.real(np.float32(1.5), "x") == 1.5

@@ -36,6 +36,7 @@ def test_settings_one_by_one():
         ({"wings": 2}, "wings is unknown"),
         ({"start": (0, 0, 5)}, r"start=\(0, 0, 5\) is invalid; give 2 numbers"),
         ({"start": 5}, "start=5 is invalid"),
+        ({"start": 5, "mode": "computer_vision"}, "start=5 is invalid"),
         ({"seed": 0.5}, "seed=0.5"),
         ({"yaw": "north"}, "yaw='north'"),
         ({"start": (0, math.inf)}, r"start\[1\]=inf"),

@@ -1,8 +1,11 @@
 import math
 
+import numpy as np
 import pytest
 import torch
 
+from drone_rl.flight.commands.computer_vision import _attitude
+from drone_rl.flight.commands.conventions import to_simulator
 from drone_rl.flight.commands.state import Attitude, Collision, LandedState, PilotState
 from drone_rl.sim.dynamics.state import DEPTH, GROUND, NORMAL, THING
 
@@ -25,6 +28,16 @@ HALF = math.sqrt(0.5)
 def test_angles(quaternion, angles):
     found = Attitude.of(quaternion)
     assert (found.roll, found.pitch, found.yaw) == pytest.approx(angles, abs=1e-6)
+
+
+@pytest.mark.parametrize("pitch", [-90, 90])
+@pytest.mark.parametrize(("roll", "yaw"), [(0, 30), (0, -120), (20, 50)])
+def test_yaw_is_known_with_the_nose_straight_up_or_down(pitch, roll, yaw):
+    """There yaw and roll turn about one axis, in opposite senses with the nose up."""
+    turn = yaw - roll if pitch > 0 else yaw + roll
+    quaternion = _attitude(*np.radians(to_simulator(roll, pitch, yaw)).tolist())
+    found = Attitude.of(quaternion.tolist())
+    assert (found.roll, found.pitch, found.yaw) == pytest.approx((0, pitch, turn), abs=1e-4)
 
 
 def test_contacts_have_names(hovering):
