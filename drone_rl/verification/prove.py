@@ -15,14 +15,13 @@ from drone_rl.config.commands import ProveSettings
 from drone_rl.config.configuration import as_changes
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.display import aligned, table
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically
 from drone_rl.utils.limits import ARRAYS_BYTES
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import plural
-from drone_rl.verification.checker.certificate import fingerprint
+from drone_rl.verification.checker.certificate import fingerprint, read_certificate
 from drone_rl.verification.prover.policy_spec import PolicySpec, make_policy_spec, one_thread
 from drone_rl.verification.prover.proof_files import certify, load, save
 from drone_rl.verification.prover.prover import Prover
@@ -140,7 +139,8 @@ def _prove(
 ) -> Proof:
     prover = Prover(spec, settings.most_combinations)
     weights = fingerprint(policy.state["policy"])
-    proof_id = json.dumps([weights, policy.description.as_dict(), settings.logit_gap])
+    shown = [settings.logit_gap, settings.renderer]
+    proof_id = json.dumps([weights, policy.description.as_dict(), *shown])
     state = None if folder is None else folder / "state.npz"
     if state is not None and state.exists():
         boxes = settings.most_boxes * policy.description.task.values()["num_cubes"]
@@ -186,16 +186,12 @@ def _advance(
 
 
 def load_proof(path: str | Path) -> Proof:
-    """Load a proof from its certificate.
+    """Load a proof from its certificate, a file or `certificate.json` in a folder.
 
     Raises:
-        InputError: There is none.
+        InputError: There is none, or it is damaged or too large.
     """
     path = Path(path)
     path = path / "certificate.json" if path.is_dir() else path
-    try:
-        return Proof(json.loads(path.read_text()), path.parent)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"certificate={path} can't be read ({error}); give a certificate"
-        ) from None
+    read_certificate(path)  # refuses what is no certificate
+    return Proof(json.loads(path.read_text()), path.parent)

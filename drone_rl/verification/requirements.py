@@ -2,6 +2,7 @@
 
 from drone_rl.config import TaskSettings
 from drone_rl.policies.zoo import PolicyDescription
+from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.utils.errors import InputError
 
 
@@ -27,6 +28,8 @@ def require_cubes(described: PolicyDescription, what: str) -> TaskSettings:
         problem = "policies that observe one frame; this one remembers earlier ones (network=lstm)"
     elif described.faults:
         problem = f"cameras without faults; it simulates faults (transform {described.faults[0]})"
+    elif AppearanceSampler(described.appearance, 1, task=task, camera=described.camera).varies:
+        problem = "appearances without ranges; this policy's differs between episodes"
     else:
         return task
     remedy = "give another policy" if dynamics.is_computer_vision else "leave dynamics out"

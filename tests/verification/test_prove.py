@@ -51,6 +51,13 @@ def test_it_is_loaded_again(proof):
         drone_rl.load_proof(proof.folder / "nothing.json")
 
 
+@pytest.mark.parametrize("content", ["[]", '{"outcomes": []}'])
+def test_what_is_no_certificate_is_not_loaded(content, tmp_path):
+    (tmp_path / "certificate.json").write_text(content)
+    with pytest.raises(InputError, match=r"certificate .*certificate\.json can't be used: "):
+        drone_rl.load_proof(tmp_path)
+
+
 def test_stopped_and_gone_on_with(proof, tmp_path):
     stopped = prove(folder=tmp_path, limit_s=0.0)
     assert not stopped.certificate["finished"]
@@ -71,6 +78,12 @@ def test_a_state_of_another_policy_is_refused(tmp_path):
     prove(folder=tmp_path, limit_s=0.0)
     with pytest.raises(InputError, match="belongs to another proof"):
         prove("good", folder=tmp_path)
+
+
+def test_a_state_of_another_renderer_is_refused(tmp_path):
+    prove(folder=tmp_path, limit_s=0.0)
+    with pytest.raises(InputError, match="belongs to another proof"):
+        prove(folder=tmp_path, limit_s=0.0, renderer="mujoco_warp")
 
 
 def test_progress_is_told():

@@ -218,7 +218,7 @@ def _levels(aside: NDArray, outer: NDArray, leaves: NDArray, half: float) -> lis
     order = np.argsort(height)
     found = []
     for group in np.split(order, np.flatnonzero(np.diff(height[order]) > SAME) + 1):
-        for begin, end in unite(spans[group][spans[group, 0].argsort()], SAME):
+        for begin, end in unite(spans[group], SAME):
             found.append(np.array([[0.0], [height[group[0]]], [begin], [end]]))
     return found
 

@@ -136,7 +136,8 @@ class ActionTable:
         self.num_images += len(blocks)
         if len(blocks) <= ALONE:
             return work(blocks) if len(blocks) else np.zeros(0, np.uint8)
-        parts = np.array_split(blocks, max(-(-len(blocks) // CHUNK), num_cores()))
+        count = max(-(-len(blocks) // CHUNK), num_cores())
+        parts = np.array_split(blocks, min(count, len(blocks)))  # none is empty
         return np.concatenate(list(workers().map(work, parts)))
 
     def _evaluate(self, combinations: NDArray) -> None:

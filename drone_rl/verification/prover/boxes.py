@@ -96,14 +96,13 @@ def _select(boxes: Boxes, space: Boxes, most: int, *, covered: bool) -> Boxes | 
 
 
 def unite(intervals: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
-    """Merge intervals, sorted by their start or middle, that overlap or are at most `gap` apart."""
-    starts, stops = intervals.T
+    """Merge intervals, (N, 2), that overlap or are at most `gap` apart; return them in order."""
+    starts, stops = intervals[intervals[:, 0].argsort()].T
     is_new = starts[1:] > np.maximum.accumulate(stops)[:-1] + gap
     first = np.flatnonzero(np.append(True, is_new)[: len(starts)])
     if not len(first):
         return intervals
-    merged = np.minimum.reduceat(starts, first), np.maximum.reduceat(stops, first)
-    return np.stack(merged, -1)
+    return np.stack([starts[first], np.maximum.reduceat(stops, first)], -1)
 
 
 def blocks(mask: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -143,3 +143,9 @@ def test_intervals_that_touch_are_united():
     assert unite(intervals, 0.0).tolist() == [[0.0, 2.0], [2.5, 4.0]]
     assert unite(intervals, 0.5).tolist() == [[0.0, 4.0]]
     assert unite(intervals[:0], 0.5).shape == (0, 2)
+
+
+def test_intervals_are_united_in_any_order():
+    """By their middles, the widest is the last one, and begins before the first one ends."""
+    intervals = np.array([[-1.0, 1.0], [1.2, 3.2], [0.2, 4.3]])
+    assert unite(intervals, 0.0).tolist() == [[-1.0, 4.3]]
