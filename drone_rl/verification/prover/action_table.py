@@ -180,11 +180,11 @@ def _open(table: NDArray[np.uint8], spans: NDArray) -> NDArray[np.int64]:
     if not len(spans) or (len(spans) == 1 and not table[_slices(spans[0])].any()):
         return spans
     lowest, highest = spans[..., 0].min(0), spans[..., 1].max(0)
-    is_asked = np.zeros([*(highest - lowest + 1)[::-1]], bool)
+    is_wanted = np.zeros([*(highest - lowest + 1)[::-1]], bool)
     for span in spans:
-        is_asked[_slices(span - lowest[:, None])] = True
-    is_asked &= table[_slices(np.stack([lowest, highest], -1))] == 0
-    found = merge(blocks(is_asked)[:, ::-1])
+        is_wanted[_slices(span - lowest[:, None])] = True
+    is_wanted &= table[_slices(np.stack([lowest, highest], -1))] == 0
+    found = merge(blocks(is_wanted)[:, ::-1])
     return found + lowest[:, None] - [0, 1]
 
 
