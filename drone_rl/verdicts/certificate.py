@@ -19,6 +19,9 @@ from drone_rl.verification.checker.certificate import Certificate
 from drone_rl.verification.checker.checker import check_certificate, read_validated
 from drone_rl.verification.checker.sampling import ANYWHERE, find
 
+_ROUNDING = 2.0**-24
+"""Largest relative error of a number that is rounded to float32."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Claim:
@@ -136,10 +139,18 @@ def _can_end_otherwise(stated: Certificate, greedy: Episodes, rounding: Rounding
 
 
 def _outcomes_of(stated: Certificate, episodes: Episodes) -> NDArray[np.int64]:
-    """Index of each episode's outcome; the number of outcomes where none is stated."""
+    """Index of each episode's outcome; the number of outcomes where none is stated.
+
+    Episodes record placements in float32. Where that leaves open which of two outcomes is stated,
+    none counts as stated.
+    """
     groups, places = stated.groups, episodes.goals.world.reshape(len(episodes), -1, 3)  # x, y, z
+    boxes, bound = np.concatenate(groups), stated.task.lateral_bound
     owner = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])
-    return owner[find(np.concatenate(groups), places[..., 1].double().numpy())]
+    y = places[..., 1].double().numpy()
+    ends = (y - _ROUNDING * abs(y), y + _ROUNDING * abs(y))
+    low, high = (owner[find(boxes, end.clip(-bound, bound))] for end in ends)
+    return np.where(low == high, low, len(stated.outcomes))
 
 
 def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:

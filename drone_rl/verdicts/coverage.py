@@ -276,9 +276,9 @@ def _strengths(
     """The ends other than no perturbation, and random strengths between them, each once."""
     low, high = needed_range(numbers["axes"][axis.name], need)
     ends = sorted(axis.position(axis.strength(value, subject)) for value in (low, high))
-    drawn = rng.uniform(ends[0], ends[1], NUM_RANDOM_STRENGTHS) if ends[0] < ends[1] else []
+    sampled = rng.uniform(ends[0], ends[1], NUM_RANDOM_STRENGTHS) if ends[0] < ends[1] else []
     seen: set[float] = set()
-    for position in (*ends, *(float(one) for one in drawn)):
+    for position in (*ends, *(float(one) for one in sampled)):
         strength = axis.at(position)
         strength = float(round(strength)) if axis.whole else strength
         if abs(axis.position(strength)) > 1e-12 and strength not in seen:

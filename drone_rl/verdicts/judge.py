@@ -231,10 +231,10 @@ def judge_one(
         flights = settings.certificate_flights
         claim = find_claim(loaded, certificate, flights=flights, seed=seed, **where)
         worlds = held_out_environments(loaded, settings, seed)
-    draws, rule = settings.sampled and loaded is not None, Rule(good_share=settings.good_share)
+    is_sampled, rule = settings.sampled and loaded is not None, Rule(good_share=settings.good_share)
     known = {"claim": claim, "unlike": loaded and loaded.unlike, "rule": rule, "seed": seed}
     with worlds as (env, actor):
-        verdict = judge_policy(env, actor, settings.episodes, sampled=draws, **known)
+        verdict = judge_policy(env, actor, settings.episodes, sampled=is_sampled, **known)
     progress("judged", 1, 1)
     done = Judgement(name, settings, verdict, claim and claim.path, measured)
     if coverage is None or measured is None:

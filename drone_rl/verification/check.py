@@ -128,11 +128,9 @@ def check(
         )
     policy = stated.name if policy is None else policy
     loaded = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-    weights, asked = (
-        loaded.state["policy"],
-        loaded.in_task(**as_changes(task, "task")).task if task else None,
-    )
-    check_same_policy(stated, loaded.description, weights, asked)
+    weights = loaded.state["policy"]
+    required = loaded.in_task(**as_changes(task, "task")).task if task else None
+    check_same_policy(stated, loaded.description, weights, required)
     policy = dataclasses.replace(loaded, description=stated.description)
     findings = check_certificate(
         stated,

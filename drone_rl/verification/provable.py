@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.commands import ProvableSettings
+from drone_rl.config.commands import ProvableSettings, ProveSettings
 from drone_rl.config.configuration import as_config, check_same_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.evaluation.rollouts import find_failures
@@ -42,6 +43,7 @@ from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import Settings
 from drone_rl.verification.prove import Proof, prove
 from drone_rl.verification.prover.boxes import volumes
+from drone_rl.verification.prover.policy_spec import make_policy_spec, partition_placements
 from drone_rl.verification.requirements import require_cubes
 
 WORLDS = 250  # environments of a search; each search uses other seeds
@@ -102,7 +104,7 @@ class Journal(Callback):
             check_same_config(saved["how"], how.values(), HOW_MAY_CHANGE)
             rounds = [Round.read(row, "rounds") for row in saved["rounds"]]
         journal = cls(folder, settings, how or ProvableSettings(rounds=10), rounds)
-        _ = journal.task  # refused before anything is written
+        _check_support(settings)  # refused before anything is written
         if state is None:  # from here on, the folder has no rounds of an earlier run
             journal.save()
         return journal
@@ -236,6 +238,15 @@ def train_until_proved(
         result["rounds"] = [done.values() for done in journal.rounds]
         done = finish(journal.settings, folder, result)
     return reraise_signal(done)
+
+
+def _check_support(settings: TrainSettings) -> None:
+    """Raise the InputError with which a proof would refuse the trained policy."""
+    described = describe(settings)
+    require_cubes(described, "proofs")
+    network, gap = described.build_network(torch.Generator()), ProveSettings.logit_gap
+    with closing(make_policy_spec(described, network, gap, settings.renderer)) as spec:
+        partition_placements(spec, ProveSettings.most_combinations)
 
 
 def _learn(

@@ -68,6 +68,24 @@ def test_what_is_undecided_is_not_proved_and_no_flight_speaks_against_it(good):
     assert some["agreeing"] == 1
 
 
+def test_a_placement_that_float32_moves_across_a_border_speaks_neither_for_nor_against_it(good):
+    """The cube stands at 3.0000001 m, where nothing is stated; the episode records 3 m."""
+    place = float(torch.tensor(3.0000001, dtype=torch.float32))
+    assert place == 3.0
+    found = claim(good, undecided=True).as_evidence(
+        flown([[place, 0.0], [2.0, 0.0]], [BEHIND, ALL])
+    )
+    assert (found["refused"], found["agreeing"]) == (None, 1)
+
+
+def test_a_placement_that_float32_moves_out_of_bounds(good):
+    place = float(torch.tensor(5.3, dtype=torch.float32))
+    assert place > 5.3
+    narrow = good.in_task(lateral_bound=5.3)
+    found = claim(narrow).as_evidence(flown([[place, 0.0]], [ALL]))
+    assert (found["refused"], found["agreeing"]) == (None, 1)
+
+
 def rounded(count, fragile=(), ends=None, owner=(), is_open=()):
     """What rounding can change: a frame of some episodes, and how they can end."""
     flags, opened = torch.zeros(count, dtype=torch.bool), torch.zeros(count, dtype=torch.bool)

@@ -6,6 +6,7 @@ import pytest
 import torch
 
 import drone_rl
+from drone_rl.config import AppearanceSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verification.prover.markov_chain import SuccessBounds
@@ -93,6 +94,13 @@ def test_held_out_placements_are_those_of_a_verdict(good):
 
 def test_it_says_how_far_it_is(several, reported):
     assert reported == [(0, 2), (2, 2)]
+
+
+def test_an_appearance_that_varies_is_refused(good):
+    """Only the middle of its ranges would be rendered."""
+    varied = good.in_appearance(AppearanceSettings(fog_visibility=(5.0, 1000.0)))
+    with pytest.raises(InputError, match="exact probabilities support only appearances without"):
+        drone_rl.chances(varied, [6.0], task=ONE, progress=silent)
 
 
 def test_the_tables(good, several):

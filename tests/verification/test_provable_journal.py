@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from drone_rl.config import ActionSettings
+from drone_rl.config import ActionSettings, AppearanceSettings, TaskSettings
 from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainerSettings, TrainSettings
@@ -126,4 +126,18 @@ def test_nothing_is_begun_for_who_flies(tmp_path):
     for changes in ({"dynamics": FLIGHT}, {"actions": ActionSettings(kind="velocity")}):
         with pytest.raises(InputError, match="proofs support only"):
             begin(tmp_path / "new", **changes)
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"task": TaskSettings(spacing=2.0)}, "task.spacing=2.0 puts cubes next to each other"),
+        ({"appearance": AppearanceSettings(exposure=2.0)}, "only appearance=minimal"),
+        ({"task": TaskSettings(num_cubes=8)}, "task.num_cubes=8 gives about"),
+    ],
+)
+def test_what_no_proof_supports_is_not_begun(change, message, tmp_path):
+    with pytest.raises(InputError, match=message):
+        begin(tmp_path / "new", **change)
     assert not (tmp_path / "new").exists()

@@ -24,11 +24,20 @@ def test_the_policies_of_the_package_pass():
             "only dynamics=computer_vision, got",
         ),
         ({"actions": ActionSettings(kind="velocity")}, "only actions=moves, got actions.kind=vel"),
+        (
+            {"appearance": AppearanceSettings(fog_visibility=(20.0, 100.0))},
+            "only appearances without ranges; this policy's differs between episodes; give another",
+        ),
     ],
 )
-def test_other_tasks_dynamics_and_actions_are_refused(change, message):
+def test_other_tasks_dynamics_actions_and_appearances_are_refused(change, message):
     with pytest.raises(InputError, match=message):
         require_cubes(describe(TrainSettings().replace(**change)), "proofs")
+
+
+def test_an_appearance_that_is_the_same_in_every_episode_passes():
+    foggy = TrainSettings().replace(appearance=AppearanceSettings(fog_visibility=20.0))
+    assert require_cubes(describe(foggy), "proofs") == foggy.task
 
 
 @pytest.mark.parametrize(

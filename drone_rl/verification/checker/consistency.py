@@ -55,7 +55,7 @@ def _uncancelled(ranks: NDArray[np.intp]) -> NDArray[np.intp] | None:
     ends = np.array(list(product((0, 1), repeat=n)))  # (2^n, n)
     sign = 1 - 2 * (ends.sum(1) % 2)
     key = np.zeros((len(ranks), len(ends)), np.int64)
-    for i in range(n):  # corners by number; numbered anew at each axis, so that none overflows
+    for i in range(n):  # corners by number; renumbered at each axis, so that none overflows
         key = key * (int(ranks[:, i].max()) + 1) + ranks[:, i][:, ends[:, i]]
         key = np.unique(key, return_inverse=True)[1].reshape(key.shape)
     weight = np.repeat(sign[None], len(ranks), 0)

@@ -104,13 +104,13 @@ class ActionMap:
         "points" has the corners of all polygons, shape (P, 2); "ends" the end of each polygon among
         them; "labels" the action of each, or one more than the last action if unseen.
         """
-        ways = self.arrangement.outlines(self.action)
+        outlines = self.arrangement.outlines(self.action)
         unseen = self.arrangement.outlines(self.is_unseen.astype(np.int64))
-        ways += [(len(MOVES), way) for label, way in unseen if label]
+        outlines += [(len(MOVES), polygon) for label, polygon in unseen if label]
         return {
-            "points": np.concatenate([way for _, way in ways]),
-            "ends": np.cumsum([len(way) for _, way in ways]),
-            "labels": np.array([label for label, _ in ways]),
+            "points": np.concatenate([polygon for _, polygon in outlines]),
+            "ends": np.cumsum([len(polygon) for _, polygon in outlines]),
+            "labels": np.array([label for label, _ in outlines]),
         }
 
 

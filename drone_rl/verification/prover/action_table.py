@@ -136,7 +136,8 @@ class ActionTable:
         self.num_images += len(blocks)
         if len(blocks) <= ALONE:
             return work(blocks) if len(blocks) else np.zeros(0, np.uint8)
-        parts = np.array_split(blocks, max(-(-len(blocks) // CHUNK), num_cores()))
+        count = max(-(-len(blocks) // CHUNK), num_cores())
+        parts = np.array_split(blocks, min(count, len(blocks)))  # none is empty
         return np.concatenate(list(workers().map(work, parts)))
 
     def _evaluate(self, combinations: NDArray) -> None:
@@ -179,11 +180,11 @@ def _open(table: NDArray[np.uint8], spans: NDArray) -> NDArray[np.int64]:
     if not len(spans) or (len(spans) == 1 and not table[_slices(spans[0])].any()):
         return spans
     lowest, highest = spans[..., 0].min(0), spans[..., 1].max(0)
-    is_asked = np.zeros([*(highest - lowest + 1)[::-1]], bool)
+    is_wanted = np.zeros([*(highest - lowest + 1)[::-1]], bool)
     for span in spans:
-        is_asked[_slices(span - lowest[:, None])] = True
-    is_asked &= table[_slices(np.stack([lowest, highest], -1))] == 0
-    found = merge(blocks(is_asked)[:, ::-1])
+        is_wanted[_slices(span - lowest[:, None])] = True
+    is_wanted &= table[_slices(np.stack([lowest, highest], -1))] == 0
+    found = merge(blocks(is_wanted)[:, ::-1])
     return found + lowest[:, None] - [0, 1]
 
 

@@ -139,16 +139,16 @@ class Arrangement:
         while (inner := ~is_border[following]).any():
             following[inner] = self.following[twin[following[inner]]]
         after = dict(zip(edges.tolist(), following.tolist(), strict=True))
-        ways = []
+        outlines = []
         while after:
-            edge, way = next(iter(after)), []
+            edge, border = next(iter(after)), []
             while edge in after:
-                way.append(edge)
+                border.append(edge)
                 edge = after.pop(edge)
-            angles = self.angle[way]
+            angles = self.angle[border]
             corner = angles != np.roll(angles, 1)
-            ways.append((int(label[way[0]]), self.points[self.origin[way]][corner]))
-        return ways
+            outlines.append((int(label[border[0]]), self.points[self.origin[border]][corner]))
+        return outlines
 
     def _around(self, cell: int) -> list[int]:
         around = [int(np.flatnonzero(self.cell == cell)[0])]

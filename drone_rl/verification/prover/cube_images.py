@@ -70,13 +70,13 @@ class CameraModel:
         if not shown.any():
             return np.empty(0), np.empty(0)
         slopes = np.unique(np.abs(self.left))
-        ways = [slopes * front + self.half]
+        places = [slopes * front + self.half]
         if ahead > self.half:
-            ways.append(slopes * front - self.half)
-        ways += [slopes * depth + self.half for depth in np.unique(back[shown])]
-        slope, way = np.tile(slopes, len(ways)), np.concatenate(ways)
-        error = 16 * (np.abs(way) + self.half) + 3 * slope * self.farthest + 3 * self.widest
-        both, errors = np.concatenate([way, -way]), np.concatenate([error, error]) * UNIT
+            places.append(slopes * front - self.half)
+        places += [slopes * depth + self.half for depth in np.unique(back[shown])]
+        slope, place = np.tile(slopes, len(places)), np.concatenate(places)
+        error = 16 * (np.abs(place) + self.half) + 3 * slope * self.farthest + 3 * self.widest
+        both, errors = np.concatenate([place, -place]), np.concatenate([error, error]) * UNIT
         order = np.argsort(both)
         return both[order], errors[order]
 
@@ -251,8 +251,9 @@ class CubeImages:
             ahead = random_state.randint(0, farthest + 1, size)
             left = random_state.randint(-widest, widest + 1, size)
             places = np.stack([ahead, left], -1)
-            drawn, (made, is_clear) = self.render(cubes, places), self.closed_form(cubes, places)
-            is_wrong = (drawn != made).flatten(1).any(-1).numpy() & is_clear
+            rendered = self.render(cubes, places)
+            expected, is_clear = self.closed_form(cubes, places)
+            is_wrong = (rendered != expected).flatten(1).any(-1).numpy() & is_clear
             compared += int(is_clear.sum())
             if is_wrong.any():
                 worst = int(np.flatnonzero(is_wrong)[0])

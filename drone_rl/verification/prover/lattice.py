@@ -55,14 +55,17 @@ class Lattice:
     """A task's rules on the lattice."""
 
     def __init__(self, task: TaskSettings) -> None:
-        """Raise InputError if rounding makes positions depend on the path."""
+        """Raise InputError if the simulator or the renderer, in float32, rounds positions."""
         self.task = task
         step, count = task.step_length, task.step_limit + 1
         multiples = np.arange(-count, count + 1) * step
-        if not np.array_equal(multiples[1:], multiples[:-1] + step):
+        aside = multiples[np.abs(multiples) <= task.side_bound]  # see `CameraModel.rounding`
+        is_exact = np.array_equal(multiples[1:], multiples[:-1] + step)
+        if not is_exact or not np.array_equal(aside, aside.astype(np.float32)):
             raise InputError(
                 f"multiples of task.step_length={step} are rounded, so positions depend on the "
-                "path; give a multiple of a power of two, such as 0.5 or 1.25"
+                "path or are rendered elsewhere; give a multiple of a power of two, such as 0.5 or "
+                "1.25"
             )
         self.cubes = task.first_distance + task.spacing * np.arange(task.num_cubes)  # x, metres
         self.everything = (1 << task.num_cubes) - 1

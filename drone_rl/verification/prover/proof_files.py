@@ -21,7 +21,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
 from drone_rl.utils.limits import ARRAYS_BYTES, check_indices
 from drone_rl.verification.prover.boxes import Boxes, volumes
-from drone_rl.verification.prover.lattice import Ending, LatticeState
+from drone_rl.verification.prover.lattice import AHEAD, LEFT, RIGHT, Ending, LatticeState
 from drone_rl.verification.prover.prover import ProofFindings, Prover, combine
 
 FORMAT = "drone_rl certificate"
@@ -186,6 +186,8 @@ def _check(part: Boxes, waiting: Sequence, known: Sequence) -> None:
 
 def _lattice_state(row: _Row) -> tuple[LatticeState, int]:
     ahead, left, collected, steps, came, is_fork, longest = row
+    if came not in (AHEAD, LEFT, RIGHT):
+        raise ValueError(f"a state was reached by action {came}")
     return LatticeState(ahead, left, collected, steps, came, bool(is_fork)), longest
 
 

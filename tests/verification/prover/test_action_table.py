@@ -138,3 +138,12 @@ def test_runs_of_one_cube():
     ((_, ranges, bits),) = runs(table, spans, 100)
     assert (bits[1:] != bits[:-1]).all()
     assert ranges[:, 0].tolist()[0][0] == 0 and ranges[-1, 0, 1] == len(table.cells[0]) - 1
+
+
+def test_more_cores_than_blocks(table, monkeypatch):
+    """There are up to 65 images at a time here, just too many for one thread."""
+    name = "drone_rl.verification.prover.action_table.num_cores"
+    monkeypatch.setattr(name, lambda: 100_000)
+    monkeypatch.setattr("drone_rl.verification.prover.action_table.ALONE", 1)
+    table.fill(all_of(table))
+    assert (table.table[0::2, 0::2] == 1 << looked_at(table)).all()

@@ -87,6 +87,18 @@ def test_a_broken_state_is_refused(spec, tmp_path, content):
         load(Prover(spec), path, "this")
 
 
+def test_a_state_reached_by_no_action_is_refused(spec, tmp_path):
+    path, begun = tmp_path / "state.npz", Prover(spec)
+    begun.advance()
+    save(begun, path, "this")
+    with np.load(path) as arrays:
+        state = {**arrays}
+    state["waiting_rows"][:, 4] = 3
+    np.savez(path, **state)
+    with pytest.raises(InputError, match=r"is not a saved proof state .*by action 3"):
+        load(Prover(spec), path, "this")
+
+
 def test_a_state_with_code_in_it_is_refused(spec, tmp_path):
     path = tmp_path / "state.npz"
     np.savez(path, spec=np.array([print], dtype=object))
