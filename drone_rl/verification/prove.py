@@ -15,13 +15,14 @@ from drone_rl.config.commands import ProveSettings
 from drone_rl.config.configuration import as_changes
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.display import aligned, table
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically
 from drone_rl.utils.limits import ARRAYS_BYTES
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import plural
-from drone_rl.verification.checker.certificate import fingerprint, read_certificate
+from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.prover.policy_spec import PolicySpec, make_policy_spec, one_thread
 from drone_rl.verification.prover.proof_files import FORMAT, certify, load, save
 from drone_rl.verification.prover.prover import Prover

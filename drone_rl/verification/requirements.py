@@ -2,7 +2,6 @@
 
 from drone_rl.config import TaskSettings
 from drone_rl.policies.zoo import PolicyDescription
-from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.utils.errors import InputError
 
 
