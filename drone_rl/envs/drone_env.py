@@ -214,7 +214,8 @@ class DroneEnv(EnvBase):
         """Raise an `InputError` for indices of actions that there are not."""
         if action.is_floating_point() or not len(action):
             return
-        count, low, high = self.action_spec.space.n, int(action.min()), int(action.max())
+        space: Any = self.action_spec.space
+        count, low, high = space.n, int(action.min()), int(action.max())
         if low < 0 or high >= count:
             raise InputError(
                 f"actions from {low} to {high} are not all in 0 to {count - 1}; give indices of "

@@ -40,6 +40,8 @@ _DTYPES = {
     "ComplexFloatStorage": torch.complex64,
     "ComplexDoubleStorage": torch.complex128,
 }
+_DISPATCH: dict[int, Any] = pickle._Unpickler.dispatch
+"""Python's own instructions, by code."""
 _INSTRUCTIONS = {
     name: getattr(pickle, name)[0]
     for name in (
@@ -115,9 +117,7 @@ def _build(storage: Any, offset: Any, size: Any, stride: Any, *_: Any) -> Tensor
 class _Unpickler(pickle._Unpickler):
     """Python's unpickler, restricted to the instructions of checkpoints."""
 
-    dispatch: ClassVar[dict] = {
-        code: pickle._Unpickler.dispatch[code] for code in _INSTRUCTIONS.values()
-    }
+    dispatch: ClassVar[dict] = {code: _DISPATCH[code] for code in _INSTRUCTIONS.values()}
 
     def __init__(self, program: bytes, members: Mapping[str, bytes]) -> None:
         super().__init__(io.BytesIO(program))
@@ -163,11 +163,11 @@ class _Unpickler(pickle._Unpickler):
 
     def _set_item(self) -> None:
         self._check_names(self.stack[-2:-1])  # pyright: ignore[reportAttributeAccessIssue]
-        pickle._Unpickler.dispatch[_INSTRUCTIONS["SETITEM"]](self)
+        _DISPATCH[_INSTRUCTIONS["SETITEM"]](self)
 
     def _set_items(self) -> None:
         self._check_names(self.stack[::2])  # pyright: ignore[reportAttributeAccessIssue]
-        pickle._Unpickler.dispatch[_INSTRUCTIONS["SETITEMS"]](self)
+        _DISPATCH[_INSTRUCTIONS["SETITEMS"]](self)
 
     def _check_names(self, names: Sequence[Any]) -> None:
         """Refuse tuples: Python crashes when it hashes a deeply nested one."""
