@@ -279,7 +279,7 @@ class Policy(BasePolicy):
             The index of each action, or the values of continuous ones. Shape: (N, ...).
 
         Raises:
-            InputError: The images do not fit the camera or the images of the last call.
+            InputError: They are no images, or do not fit the camera or the images of the last call.
         """
         images, camera = _copied(images), self.description.camera
         size = (camera.height, camera.width, 3)
@@ -334,7 +334,14 @@ class Policy(BasePolicy):
 
 def _copied(images: np.ndarray | Tensor) -> Tensor:
     """Return a copy as a tensor: cameras reuse buffers, and torch has no negative strides."""
-    return images.clone() if isinstance(images, Tensor) else torch.as_tensor(np.array(images))
+    if isinstance(images, Tensor):
+        return images.clone()
+    try:
+        return torch.as_tensor(np.array(images))
+    except (TypeError, ValueError):  # None, a path, images of several sizes
+        raise InputError(
+            f"{shown(images)} is no image; give an array of uint8, RGB, as the camera takes it"
+        ) from None
 
 
 def load_policy(which: str | Path, *, outputs: str | Path = "outputs") -> Policy:
@@ -374,6 +381,11 @@ def find_policy(which: str | Path, outputs: str | Path = "outputs") -> Path:
 
     The checkpoint of a folder may be missing.
     """
+    if not str(which):
+        raise InputError(
+            f"policy= has no value; give a file, the folder of a run, latest, or one of "
+            f"{', '.join(policy_names())}"
+        )
     if which == "latest":
         trained = trained_policies(outputs)
         if not trained:

@@ -9,6 +9,7 @@ from torch import Tensor, nn
 from drone_rl.config.networks import Network, SmallCnn
 from drone_rl.policies.networks import PolicyNetwork
 from drone_rl.utils.errors import InputError, extra
+from drone_rl.utils.schema import shown
 
 extra("stable_baselines3", "sb3", "drone_rl.policies.sb3")
 
@@ -27,12 +28,18 @@ class Sb3Logits(nn.Module):
     A policy that was trained on bytes gets frames from 0 to 1, as from the transform `Rgb`.
 
     Raises:
-        InputError: It is no actor-critic with discrete actions, or needs more than one array.
+        InputError: It is no model, or no actor-critic with discrete actions, or needs more than one
+            array.
     """
 
     def __init__(self, model: BaseAlgorithm) -> None:
         """Take the modules between frame and logits, which it shares with the model."""
         super().__init__()
+        if not isinstance(model, BaseAlgorithm):
+            raise InputError(
+                f"model={shown(model)} is no model of Stable-Baselines3; give one, such as "
+                "stable_baselines3.PPO.load(path)"
+            )
         policy, space = model.policy, model.policy.observation_space
         if not isinstance(policy, ActorCriticPolicy) or not hasattr(policy.action_space, "n"):
             raise _refusal(model)

@@ -27,7 +27,7 @@ from drone_rl.robustness.perturbations import (
 )
 from drone_rl.robustness.shifts_text import TABLE
 from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.utils.errors import InputError
+from drone_rl.utils.errors import InputError, did_you_mean
 
 TOGETHER = 3
 """Number of the strength at which all axes are combined."""
@@ -210,7 +210,8 @@ def check_axes(names: Iterable[str]) -> None:
     for name in names:
         if name not in (*GROUPS, *AXES):
             known = ", ".join(dict.fromkeys((*GROUPS, *AXES)))
-            raise InputError(f"axes={name} is unknown; give some of: {known}")
+            meant = did_you_mean(name, (*GROUPS, *AXES))
+            raise InputError(f"axes={name} is unknown; give some of: {known}{meant}")
 
 
 def find_axes(names: Iterable[str] | None, subject: EvaluatedPolicy) -> list[Axis]:

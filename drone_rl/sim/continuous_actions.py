@@ -21,6 +21,7 @@ from torch import Tensor
 from drone_rl.config.dynamics import ActionSettings
 from drone_rl.sim.actions import MOVES, Actions, Entry, listed
 from drone_rl.utils import palette
+from drone_rl.utils.errors import InputError
 
 FORWARD, SIDEWAYS, YAW = range(3)
 """Indices of an action's numbers."""
@@ -47,7 +48,11 @@ class ContinuousActions(Actions):
 
     @classmethod
     def of(cls, settings: ActionSettings) -> Self:
-        """Return the actions for some settings."""
+        """Return the actions for some settings; raise an `InputError` if they are discrete."""
+        if settings.kind != "velocity":
+            raise InputError(
+                f"actions={settings.kind} are discrete; give settings with kind=velocity"
+            )
         count, yaw_rate = 5 if settings.yaw_rate else 3, math.radians(settings.yaw_rate)
         return cls(
             names=("forward", "left", "right", "turn left", "turn right")[:count],

@@ -143,7 +143,13 @@ class Worlds:
     def advance(self, state: State, action: Tensor) -> tuple[State, Tensor]:
         """Return states a step later, and rewards; the environments stay as they are."""
         around = [self.task.obstacles(state)] if self.dynamics.needs_obstacles else []
-        return self.task.step(state, self.dynamics.step(state.body, action, *around))
+        found: Any = self.task.step(state, self.dynamics.step(state.body, action, *around))
+        if not isinstance(found, tuple) or len(found) != 2 or not isinstance(found[1], Tensor):
+            raise InputError(
+                f"{type(self.task).__name__}.step returns no pair; return the states after the "
+                "step and the rewards, a tensor with one number for each environment"
+            )
+        return found
 
     def render(
         self, state: State, view: View | None = None, appearance: Appearance | None = None

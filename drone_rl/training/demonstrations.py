@@ -65,6 +65,7 @@ class FlightConditions:
     @classmethod
     def of(cls, settings: TrainSettings) -> Self:
         """Return the conditions of a training."""
+        Instance(TrainSettings).read(settings, "settings")
         return cls(*(getattr(settings, name) for name in _CONDITIONS))
 
     @classmethod
@@ -141,6 +142,13 @@ class Demonstration:
     def __post_init__(self) -> None:
         """Check the arrays."""
         _PILOT.read(self.pilot, "pilot")
+        if not isinstance(self.conditions, FlightConditions):
+            raise InputError(
+                f"conditions={shown(self.conditions)} are none; give FlightConditions.of(settings)"
+            )
+        for name in _ARRAYS:
+            if not isinstance(value := getattr(self, name), np.ndarray):
+                raise InputError(f"{name}={shown(value)} is no array; give one of numpy")
         steps = len(self.actions) if self.actions.ndim else 0
         if not steps:
             raise InputError("a flight has no steps; record at least one")
@@ -269,8 +277,11 @@ def add_demonstration(folder: str | Path, demonstration: Demonstration) -> Path:
     The files are numbered from flight_00000.npz. Several processes may write to the folder.
 
     Raises:
+        InputError: It is no demonstration.
         OSError: The file can't be written.
     """
+    if not isinstance(demonstration, Demonstration):
+        raise InputError(f"{shown(demonstration)} is no drone_rl.Demonstration; give one")
     folder, content = Path(folder), demonstration.to_bytes()
     folder.mkdir(parents=True, exist_ok=True)
     with folder_lock(folder, patience_s=_PATIENCE_S):
@@ -287,6 +298,7 @@ def record_oracle(
     *,
     flights: int = 30,
     seed: int = 0,
+    **changes: Any,
 ) -> list[Path]:
     """Record flights of the task's oracle, which acts by the true state.
 
@@ -295,15 +307,16 @@ def record_oracle(
         settings: Those of the training that shall learn from them; by default the default ones.
         flights: Number of episodes, which are simulated and rendered together.
         seed: Root of the environments' random streams.
+        changes: Settings of the training by name, as in `record_oracle("outputs/a", task=task)`.
 
     Returns:
         The paths of the new files.
 
     Raises:
-        InputError: The task has no oracle, or none for these actions.
+        InputError: A setting is unusable, or the task has no oracle, or none for these actions.
     """
-    settings = settings or TrainSettings()
-    Instance(TrainSettings).read(settings, "settings")
+    Instance(TrainSettings).read(settings := settings or TrainSettings(), "settings")
+    settings = settings.replace(**changes)
     flights = Whole(1).read(flights, "flights")
     env = DroneEnv(
         flights,

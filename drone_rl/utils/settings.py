@@ -66,6 +66,7 @@ class Settings(_Frozen):
         for name, field in fields.items():
             setattr(cls, name, field)
         _refuse_unknown_names(cls)
+        _refuse_untyped(cls)
         if not cls.__dataclass_fields__.keys().isdisjoint(_FORMER_FIELDS.values()):
             _accept_former_names(cls)
         del cls.__setattr__, cls.__delattr__
@@ -161,6 +162,19 @@ def _current_value(name: str, hint: Any, value: Any) -> Any:
     if "_target_" in value:
         value = {**value, "_target_": _current_value(name, str, value["_target_"])}
     return current_names(hint, value) if issubclass(hint, Settings) else value
+
+
+def _refuse_untyped(cls: type[Settings]) -> None:
+    """Raise an `InputError` for a value without a type, which would be no setting."""
+    for name, value in vars(cls).items():
+        known = {n for c in cls.__mro__[1:-1] for n in (*vars(c), *c.__annotations__)}
+        known -= {field.name for field in dataclasses.fields(cls)}  # whose values would be ignored
+        is_typed = name in {*known, *cls.__annotations__} or name.startswith("_")
+        if not is_typed and isinstance(value, int | float | str):
+            raise InputError(
+                f"{cls.__name__}.{name} has no type, so it would have no effect; write "
+                f"{name}: {type(value).__name__} = {value!r}"
+            )
 
 
 def _refuse_unknown_names(cls: type[Settings]) -> None:

@@ -162,6 +162,12 @@ def test_figures_under_another_appearance(in_process, tmp_path):
     assert any(name.startswith("appearance.sun") for name in kept["unlike"])
 
 
+def test_no_latest_run_is_named_where_there_is_none(in_process, caplog):
+    caplog.set_level("INFO")
+    assert "policy=latest, but there is no run" in error_line(in_process("verdict"))
+    assert "policy=latest is" not in caplog.text
+
+
 def test_latest_is_named_by_its_file(run, in_process, tmp_path, monkeypatch, caplog):
     """Which run `latest` is changes with the next one."""
     monkeypatch.setattr("drone_rl.cli.settings.trained_policies", lambda _: [run / "checkpoints/x"])

@@ -56,6 +56,18 @@ def test_reversed_channels_are_accepted():
     assert policy.act(rgb[0]) == policy.act(rgb[0].copy())
 
 
+@pytest.mark.parametrize("image", [None, "image.png", [[1], [2, 3]]])
+def test_what_is_no_image_is_refused(image):
+    for act in (drone_rl.load_policy("good").act, drone_rl.load_policy("good").act_batch):
+        with pytest.raises(InputError, match="is no image; give an array of uint8, RGB"):
+            act(image)
+
+
+def test_an_empty_name_is_no_policy():
+    with pytest.raises(InputError, match=r"policy= has no value; give a file.*good"):
+        drone_rl.load_policy("")
+
+
 def test_environment_is_closed_at_the_end_or_on_failure():
     policy = drone_rl.load_policy("good")
     with pytest.raises(KeyError), policy.flying(2) as (env, actor):

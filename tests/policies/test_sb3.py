@@ -99,6 +99,11 @@ def test_policy_with_custom_forward_raises():
         Sb3Logits(model)
 
 
+def test_a_path_is_no_model():
+    with pytest.raises(InputError, match=r"model='model.zip' is no model.*PPO\.load\(path\)"):
+        Sb3Logits("model.zip")
+
+
 def test_model_without_action_probabilities_raises():
     model = sb3.DQN("MlpPolicy", StaticEnv(FLOATS), buffer_size=10)
     with pytest.raises(InputError, match=r"^the policy of DQN gives no logits of a single image"):

@@ -47,6 +47,8 @@ def test_axes_are_found_by_name_and_by_group():
 
 
 def test_there_is_no_such_axis():
+    with pytest.raises(InputError, match=r"axes=sunn is unknown.*did you mean sun\?"):
+        check_axes(["sunn"])
     with pytest.raises(InputError, match="axes=wind is unknown; give some of: color"):
         check_axes(["wind"])
     with pytest.raises(InputError, match="axes=wind"):

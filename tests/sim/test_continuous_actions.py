@@ -7,6 +7,7 @@ import torch
 from drone_rl.config import ActionSettings
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions, normal_of
+from drone_rl.utils.errors import InputError
 
 SETTINGS = ActionSettings(kind="velocity", forward_speed=4, sideways_speed=3, yaw_rate=45)
 ALL = ContinuousActions.of(SETTINGS)
@@ -23,6 +24,11 @@ def outputs(forward=0.0, left=0.0, yaw=0.0):
 
 def phi(x):
     return 0.5 * math.erfc(-x / math.sqrt(2))
+
+
+def test_discrete_actions_are_refused():
+    with pytest.raises(InputError, match="actions=moves are discrete; give settings with kind=vel"):
+        ContinuousActions.of(ActionSettings())
 
 
 def test_part_names_are_moves_and_turns():

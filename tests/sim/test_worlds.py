@@ -71,6 +71,15 @@ def test_indexed_and_whole_batches_step_alike():
     assert torch.equal(worlds.state.cubes, turned.state.cubes)
 
 
+def test_a_task_whose_step_returns_no_pair_is_named(monkeypatch):
+    worlds = Worlds(2, TaskSettings(num_cubes=1))
+    worlds.reset(torch.arange(2), [world_random_state(0, i) for i in range(2)])
+    step = worlds.task.step
+    monkeypatch.setattr(worlds.task, "step", lambda *given: step(*given)[1])
+    with pytest.raises(InputError, match=r"CollectCubes\.step returns no pair; return the states"):
+        worlds.step(torch.arange(2), torch.zeros(2, dtype=torch.int64))
+
+
 def test_combined_appearance_is_cached():
     worlds = Worlds(1, TaskSettings(), appearance=Appearance(fog_visibility=50.0))
     dark = Appearance(exposure=0.5)

@@ -376,6 +376,26 @@ def test_the_oracle_is_recorded_as_it_flies(tmp_path, kind):
     assert [len(one) for one in read_demonstrations(tmp_path)] == [*lengths, *lengths[:2]]
 
 
+def test_settings_of_the_oracles_training_may_be_given_by_name(tmp_path):
+    record_oracle(tmp_path, EASY, flights=1, camera=CameraSettings(width=8, height=4))
+    assert read_demonstrations(tmp_path)[0].images.shape[1:] == (4, 8, 3)
+    with pytest.raises(InputError, match="flight is unknown; valid names"):
+        record_oracle(tmp_path, EASY, flight=3)
+
+
+def test_what_is_no_demonstration_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"conditions=.TrainSettings. are none; give FlightCond"):
+        flight(conditions=TrainSettings())
+    for name in ("images", "actions", "rewards", "done"):
+        with pytest.raises(InputError, match=rf"{name}=\(list\) is no array; give one of numpy"):
+            flight(**{name: [1, 0, 0]})
+    with pytest.raises(InputError, match="settings=None is no TrainSettings"):
+        FlightConditions.of(None)
+    with pytest.raises(InputError, match=r"is no drone_rl\.Demonstration"):
+        add_demonstration(tmp_path / "new", np.zeros(3))
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_task_without_an_oracle_is_refused(tmp_path):
     rising = EASY.replace(task=EASY.task.replace(vertical_bound=5.0, altitude=12.0))
     with pytest.raises(InputError, match=r"task.vertical_bound=5.0 puts cubes|oracle of task"):

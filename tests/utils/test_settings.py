@@ -152,3 +152,15 @@ def test_the_configuration_of_the_checkout_or_of_the_installed_package(monkeypat
     package = tmp_path / "drone_rl"
     monkeypatch.setattr(settings_module, "__file__", str(package / "utils" / "settings.py"))
     assert conf_dir() == package / "conf"
+
+
+def test_a_value_without_a_type_is_no_setting():
+    with pytest.raises(InputError, match=r"Half\.cost has no type.*write cost: float = 0\.005"):
+
+        class Half(Inner):
+            cost = 0.005
+
+    with pytest.raises(InputError, match=r"Other\.x has no type.*write x: int = 3"):
+
+        class Other(Inner):  # the base's default would stay
+            x = 3

@@ -316,8 +316,9 @@ def _job(
             with _explained(name, overrides):
                 settings = read_settings(command, config)
             folder = Path(HydraConfig.get().runtime.output_dir)
-            if getattr(settings, "policy", None) == "latest":
-                _log.info("policy=latest is %s", settings.used_policy(folder))
+            used = settings.used_policy(folder)
+            if getattr(settings, "policy", None) == "latest" != used:
+                _log.info("policy=latest is %s", used)
             status, value = settings.run(folder)
             if status < 128 and sys.stdout.isatty():  # pipes get only the results
                 print(next_steps(name.replace("_", "-"), settings.used_policy(folder), folder))

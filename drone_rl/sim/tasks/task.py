@@ -325,16 +325,30 @@ def register_task(
         make: Makes the task from its settings; not for a task without settings.
 
     Raises:
-        InputError: Another task has this name.
+        InputError: Another task has this name, or an argument is of the wrong kind.
     """
     if isinstance(settings, Task):
         as_settings(settings)
         return
+    if not (isinstance(settings, type) and issubclass(settings, BaseTaskSettings)):
+        raise InputError(
+            f"{_name_of(settings)} is no class of settings; give it first, then what makes the "
+            "task: register_task(MySettings, MyTask)"
+        )
     if make is None:
-        raise InputError(f"{settings.__name__}: give register_task what makes the task, too")
+        raise InputError(
+            f"{settings.__name__}: give register_task what makes the task, too: "
+            f"register_task({settings.__name__}, MyTask)"
+        )
+    if not callable(make):
+        raise InputError(f"{shown(make)} makes no task; give a class of tasks or a function")
     if TASKS.get(settings.name, settings) is not settings:
         raise InputError(f"there is a task called {settings.name}; give another name")
     TASKS[settings.name], MAKERS[settings] = settings, make
+
+
+def _name_of(given: Any) -> str:
+    return given.__name__ if isinstance(given, type) else shown(given)
 
 
 def as_settings(task: Any) -> Any:

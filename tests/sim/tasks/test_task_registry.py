@@ -63,4 +63,8 @@ def test_tasks_without_settings_are_registered_as_objects():
             as_settings(Variant())
         with pytest.raises(InputError, match="PostsSettings: give register_task what makes"):
             register_task(PostsSettings)
+        with pytest.raises(InputError, match="Posts is no class of settings; give it first"):
+            register_task(Posts, PostsSettings)
+        with pytest.raises(InputError, match="5 makes no task; give a class of tasks"):
+            register_task(PostsSettings, 5)
     assert "posts" not in TASKS
