@@ -166,7 +166,7 @@ def _current_value(name: str, hint: Any, value: Any) -> Any:
 
 def _refuse_untyped(cls: type[Settings]) -> None:
     """Raise an `InputError` for a value without a type, which would be no setting."""
-    for name, value in vars(cls).items():
+    for name, value in dict(vars(cls)).items():
         known = {n for c in cls.__mro__[1:-1] for n in (*vars(c), *c.__annotations__)}
         known -= {field.name for field in dataclasses.fields(cls)}  # whose values would be ignored
         is_typed = name in {*known, *cls.__annotations__} or name.startswith("_")
