@@ -381,11 +381,6 @@ def find_policy(which: str | Path, outputs: str | Path = "outputs") -> Path:
 
     The checkpoint of a folder may be missing.
     """
-    if not str(which):
-        raise InputError(
-            f"policy= has no value; give a file, the folder of a run, latest, or one of "
-            f"{', '.join(policy_names())}"
-        )
     if which == "latest":
         trained = trained_policies(outputs)
         if not trained:
@@ -397,7 +392,7 @@ def find_policy(which: str | Path, outputs: str | Path = "outputs") -> Path:
     if which in policy_names():
         return policy_path(str(which))
     path = Path(which)
-    if not path.exists():
+    if not str(which) or not path.exists():
         raise InputError(
             f"policy={which} does not exist; give a file, the folder of a run, latest, or one of "
             f"{', '.join(policy_names())}{did_you_mean(which, policy_names())}"

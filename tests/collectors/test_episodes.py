@@ -281,7 +281,7 @@ def test_unbatched_environment_raises(make_pipeline):
     class Unbatched:
         batch_size = torch.Size([])
 
-    with pytest.raises(InputError, match="batch of environments"):
+    with pytest.raises(InputError, match="give one with one batch dimension"):
         EpisodeCollector(Unbatched(), actor)
 
 

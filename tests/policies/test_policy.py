@@ -64,7 +64,7 @@ def test_what_is_no_image_is_refused(image):
 
 
 def test_an_empty_name_is_no_policy():
-    with pytest.raises(InputError, match=r"policy= has no value; give a file.*good"):
+    with pytest.raises(InputError, match=r"policy= does not exist; give a file.*good"):
         drone_rl.load_policy("")
 
 
