@@ -64,7 +64,10 @@ def register_network(name: str) -> Callable[[F], F]:
     Raises:
         InputError: The name is invalid or taken, or a parameter has no default or no plain type.
     """
-    return lambda factory: _register(Network, name, factory, 2, {"generator"})
+    _check_name(name)
+    return lambda factory: _register(
+        Network, name, _derived(factory, "is_recurrent", "PolicyNetwork"), 2, {"generator"}
+    )
 
 
 def register_transform(
@@ -75,6 +78,7 @@ def register_transform(
     `output` maps the input's `Frame` and the settings to the output's `Frame`. By default, the
     shape is that of the transformed zeros. See `register_network` for errors.
     """
+    _check_name(name)
     own = {"output": lambda self, frame: output(frame, self) if output else None}
     return lambda factory: _register(Transform, name, factory, 0, _KEYS, own)
 
@@ -85,7 +89,8 @@ def register_returns(name: str) -> Callable[[F], F]:
     The class accepts `scale`, for example by passing keyword arguments on to `ReturnEstimator`. See
     `register_network` for errors.
     """
-    return lambda factory: _register(Returns, name, factory, 0)
+    _check_name(name)
+    return lambda factory: _register(Returns, name, _derived(factory, "to", "ReturnEstimator"), 0)
 
 
 def register_learner(name: str) -> Callable[[F], F]:
@@ -95,6 +100,7 @@ def register_learner(name: str) -> Callable[[F], F]:
     and the result of `drone_rl.training.components.make_collector`, and returns a
     `drone_rl.training.learners.Learner`. See `register_network` for errors.
     """
+    _check_name(name)
     return lambda factory: _register(Objective, name, factory, 2)
 
 
@@ -105,6 +111,7 @@ def register_collector(name: str) -> Callable[[F], F]:
     the task that replays failures (None for the task of the settings), and returns a
     `drone_rl.training.components.Components`. See `register_network` for errors.
     """
+    _check_name(name)
     return lambda factory: _register(Collector, name, factory, 2)
 
 
@@ -122,6 +129,20 @@ def modules_of(settings: Any) -> set[str]:
     return modules_of(tuple(values)) | ({own} if not own.startswith("drone_rl.") else set())
 
 
+def _check_name(name: Any) -> None:
+    if not isinstance(name, str):
+        raise InputError('give a name in brackets, as in @drone_rl.register_network("mine")')
+    if not _NAME.fullmatch(name):
+        raise InputError(f"name={name!r} is invalid; give lower-case letters, digits and _")
+
+
+def _derived(factory: F, attribute: str, base: str) -> F:
+    """Return a class that has an attribute of the class it has to derive from."""
+    if isinstance(factory, type) and not hasattr(factory, attribute):
+        raise InputError(f"{factory.__name__} does not derive from {base}; derive it from there")
+    return factory
+
+
 def _register(
     part: type[Variant],
     name: str,
@@ -131,8 +152,6 @@ def _register(
     own: dict[str, Any] | None = None,
 ) -> F:
     """Create the settings class of a part and connect it with its factory."""
-    if not _NAME.fullmatch(name):
-        raise InputError(f"name={name!r} is invalid; give lower-case letters, digits and _")
     for variant in part.variants():
         if variant.registered_name() == name:
             if variant.__module__.startswith("drone_rl."):

@@ -195,7 +195,9 @@ class DroneEnv(EnvBase):
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         env_ids = self._indices(tensordict.get("_step", None))
         reward = torch.zeros(*self.batch_size, 1, device=self.device)
-        action = tensordict.get(self.action_key)
+        action = tensordict.get(self.action_key, None)
+        if action is None:
+            raise InputError(f"there is no entry {self.action_key!r}; give one of env.action_spec")
         if action.shape != self.action_spec.shape:
             raise InputError(
                 f"actions have the shape {tuple(action.shape)}; give {self.action_spec.shape}, as "
@@ -212,9 +214,11 @@ class DroneEnv(EnvBase):
 
     def _check_range(self, action: Tensor) -> None:
         """Raise an `InputError` for indices of actions that there are not."""
-        if action.is_floating_point() or not len(action):
-            return
         space: Any = self.action_spec.space
+        if not hasattr(space, "n") or not len(action):
+            return
+        if action.is_floating_point():
+            raise InputError("actions are numbers with a point; give indices of env.action_spec")
         count, low, high = space.n, int(action.min()), int(action.max())
         if low < 0 or high >= count:
             raise InputError(

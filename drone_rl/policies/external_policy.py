@@ -147,6 +147,10 @@ def policy_from(
     Raises:
         InputError: It does not accept such frames, or does not return one logit for each action.
     """
+    if isinstance(logits, str | Path | BasePolicy):
+        raise InputError(
+            f"policy_from takes callables; give {shown(logits)} itself to judge or explain"
+        )
     if not callable(logits):
         raise InputError(
             f"policy={shown(logits)} is no policy; give a callable from images to logits, or the "

@@ -339,22 +339,22 @@ def _copied(images: np.ndarray | Tensor) -> Tensor:
     try:
         return torch.as_tensor(np.array(images))
     except (TypeError, ValueError):  # None, a path, images of several sizes
-        raise InputError(
-            f"{shown(images)} is no image; give an array of uint8, RGB, as the camera takes it"
-        ) from None
+        raise InputError(f"{shown(images)} is no image; give an array of uint8, RGB") from None
 
 
-def load_policy(which: str | Path, *, outputs: str | Path = "outputs") -> Policy:
+def load_policy(which: str | Path | Policy, *, outputs: str | Path = "outputs") -> Policy:
     """Load a trained policy.
 
     Args:
         which: The name of a shipped policy such as "good" or "proved", a .pt or .safetensors file,
-            the folder of a run (its `last.pt`), or "latest" for the newest.
+            the folder of a run (its `last.pt`), or "latest" for the newest. A policy is returned.
         outputs: Folder of the runs.
 
     Raises:
         InputError: There is none, or it is unusable.
     """
+    if isinstance(which, Policy):
+        return which
     if not isinstance(which, str | Path):
         if not isinstance(which, BasePolicy) and not callable(which):
             raise InputError(f"policy={shown(which)} is no name and no path; give one of them")

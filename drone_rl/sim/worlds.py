@@ -144,11 +144,14 @@ class Worlds:
         """Return states a step later, and rewards; the environments stay as they are."""
         around = [self.task.obstacles(state)] if self.dynamics.needs_obstacles else []
         found: Any = self.task.step(state, self.dynamics.step(state.body, action, *around))
-        if not isinstance(found, tuple) or len(found) != 2 or not isinstance(found[1], Tensor):
+        is_pair = isinstance(found, tuple) and len(found) == 2
+        if not is_pair or getattr(found[1], "shape", None) != action.shape[:1]:
             raise InputError(
-                f"{type(self.task).__name__}.step returns no pair; return the states after the "
-                "step and the rewards, a tensor with one number for each environment"
+                f"{type(self.task).__name__}.step must return two things: the states after the "
+                "step, and the rewards, a tensor with one number for each environment"
             )
+        if not bool(torch.isfinite(found[1]).all()):
+            raise InputError(f"{type(self.task).__name__}.step returns rewards that are not finite")
         return found
 
     def render(

@@ -285,11 +285,15 @@ def add_demonstration(folder: str | Path, demonstration: Demonstration) -> Path:
     folder, content = Path(folder), demonstration.to_bytes()
     folder.mkdir(parents=True, exist_ok=True)
     with folder_lock(folder, patience_s=_PATIENCE_S):
-        names = (_NAME.fullmatch(path.name) for path in folder.iterdir())
-        number = max((int(name[1]) for name in names if name), default=-1) + 1
-        path = folder / f"flight_{number:05d}.npz"
+        path = folder / f"flight_{_next_number(folder):05d}.npz"
         write_atomically(path, content)
     return path
+
+
+def _next_number(folder: Path) -> int:
+    """Return the number of the next file in a folder, which may not exist yet."""
+    names = (_NAME.fullmatch(path.name) for path in folder.glob("*"))
+    return max((int(name[1]) for name in names if name), default=-1) + 1
 
 
 def record_oracle(
@@ -305,7 +309,8 @@ def record_oracle(
     Args:
         folder: Folder of the demonstrations; new flights are added to it.
         settings: Those of the training that shall learn from them; by default the default ones.
-        flights: Number of episodes, which are simulated and rendered together.
+        flights: Number of episodes, which are simulated and rendered together. They are others than
+            those of the files that the folder has already, also with the same seed.
         seed: Root of the environments' random streams.
         changes: Settings of the training by name, as in `record_oracle("outputs/a", task=task)`.
 
@@ -323,6 +328,7 @@ def record_oracle(
         settings.task,
         settings.camera,
         seed=seed,
+        first_world=_next_number(Path(folder)),
         device=settings.device,
         dynamics=settings.dynamics,
         actions=settings.actions,

@@ -6,6 +6,7 @@ begins with the name `where`.
 
 import dataclasses
 import math
+import numbers
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
@@ -42,9 +43,9 @@ class Whole:
     def read(self, value: Any, where: str) -> int:
         """See `Kind`."""
         _refuse_text(value, where, self.words)
-        if type(value) is not int or not self.low <= value <= self.high:
+        if not _is_number(value, numbers.Integral) or not self.low <= value <= self.high:
             raise InputError(f"{where}={shown(value)} is out of range; give {self.words}")
-        return value
+        return int(value)
 
     @property
     def words(self) -> str:
@@ -70,7 +71,7 @@ class Real:
     def read(self, value: Any, where: str) -> float:
         """See `Kind`."""
         _refuse_text(value, where, self.words)
-        if type(value) not in (int, float) or not self._holds(value):
+        if not _is_number(value, numbers.Real) or not self._holds(value):
             raise InputError(f"{where}={shown(value)} is out of range; give {self.words}")
         return float(value)
 
@@ -338,6 +339,11 @@ def shown(value: Any) -> str:
         return f"(a number of {value.bit_length()} bits)"
     text = repr(value[:80] if isinstance(value, str) else value)
     return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def _is_number(value: Any, kind: type) -> bool:
+    """Return whether a value is a number of Python or NumPy, and no bool."""
+    return isinstance(value, kind) and not isinstance(value, bool)
 
 
 def _refuse_text(value: Any, where: str, words: str) -> None:

@@ -94,6 +94,7 @@ def test_an_exported_file_has_names_and_values_only(folder):
 def test_mistakes_are_one_line(folder):
     (folder / "needs_more.py").write_text("import not_installed.part")
     (folder / "fails.py").write_text("x = 1\ny = x / 0\n")
+    (folder / "leaves.py").write_text("import sys\nsys.exit(0)\n")
     (folder / "unclosed.py").write_text("x = 1\ny = (\n")
     for given, told in (
         (["plugins=[nowhere]"], "plugins=nowhere can't be imported"),
@@ -102,6 +103,9 @@ def test_mistakes_are_one_line(folder):
         (["plugins=[needs_more]"], "install not_installed"),
         (["plugins=[fails]"], "fails.py (ZeroDivisionError: division by zero); correct it"),
         (["plugins=[fails]"], "plugins=fails failed in line 2 of "),
+        (["plugins=[leaves]"], "plugins=leaves failed in line 2 of "),
+        (["plugins=[./my_parts]"], "is a path; type the module's name, plugins=[my_parts]"),
+        (["plugins=my_parts"], "type a list such as plugins=[my_parts]"),
         (["plugins=[unclosed]"], "plugins=unclosed failed in line 2 of "),
         (["plugins=[my_parts]", "network=cells", "network.row=3"], "network.row"),
         (["plugins=[my_parts]", "network=cells", "network.rows=many"], "network.rows"),

@@ -144,6 +144,22 @@ def test_names_that_cannot_be_registered(name):
         register_network(name)(Wide)
 
 
+@pytest.mark.parametrize(
+    "register",
+    [register_network, register_transform, register_returns, register_learner, register_collector],
+)
+def test_a_decorator_without_a_name_is_refused(register):
+    with pytest.raises(InputError, match="give a name in brackets"):
+        register(Wide)
+
+
+def test_a_class_that_does_not_derive_from_the_base_is_refused():
+    with pytest.raises(InputError, match="Linear does not derive from PolicyNetwork"):
+        register_network("plain")(torch.nn.Linear)
+    with pytest.raises(InputError, match="Frame does not derive from ReturnEstimator"):
+        register_returns("plain")(Frame)
+
+
 def test_a_module_that_is_imported_again_replaces_its_parts(registered):
     first = register_network("wide")(Wide).Settings
     second = registered(register_network("wide")(Wide)).Settings

@@ -236,6 +236,7 @@ def test_invalid_texture_raises_at_construction(tmp_path):
         (torch.tensor([-5, 0]), "actions from -5 to 0 are not all in"),
         (torch.tensor([0, -1]), "actions from -1 to 0 are not all in 0 to 2; give indices of"),
         (torch.tensor([3, 2]), "actions from 2 to 3 are not all in 0 to 2"),
+        (torch.zeros(2), "actions are numbers with a point; give indices of env.action_spec"),
         (torch.zeros(2, 3, dtype=torch.int64), r"shape \(2, 3\); give torch.Size\(\[2\]\)"),
     ],
 )
@@ -243,6 +244,12 @@ def test_invalid_actions_are_named(action, message):
     env = DroneEnv(2, SHORT)
     with pytest.raises(InputError, match=message):
         env.step(env.reset().set("action", action))
+
+
+def test_a_step_needs_an_action():
+    env = DroneEnv(2, SHORT)
+    with pytest.raises(InputError, match=r"there is no entry 'action'"):
+        env.step(env.reset())
 
 
 @pytest.mark.parametrize("num_envs", [0, -1, 2.0])

@@ -63,6 +63,13 @@ def test_what_is_no_image_is_refused(image):
             act(image)
 
 
+def test_a_loaded_policy_is_returned():
+    policy = drone_rl.load_policy("good")
+    assert drone_rl.load_policy(policy) is policy
+    with pytest.raises(InputError, match="policy_from takes callables; give 'good' itself"):
+        policy_from("good")
+
+
 def test_an_empty_name_is_no_policy():
     with pytest.raises(InputError, match=r"policy= does not exist; give a file.*good"):
         drone_rl.load_policy("")

@@ -76,8 +76,19 @@ def test_a_task_whose_step_returns_no_pair_is_named(monkeypatch):
     worlds.reset(torch.arange(2), [world_random_state(0, i) for i in range(2)])
     step = worlds.task.step
     monkeypatch.setattr(worlds.task, "step", lambda *given: step(*given)[1])
-    with pytest.raises(InputError, match=r"CollectCubes\.step returns no pair; return the states"):
-        worlds.step(torch.arange(2), torch.zeros(2, dtype=torch.int64))
+    ahead = (torch.arange(2), torch.zeros(2, dtype=torch.int64))
+    with pytest.raises(InputError, match=r"CollectCubes\.step must return two things: the states"):
+        worlds.step(*ahead)
+    for spoiled in (lambda r: r[:, None], lambda r: r.mean(), lambda r: 0.5):
+        monkeypatch.setattr(
+            worlds.task, "step", lambda *given, of=spoiled: (step(*given)[0], of(step(*given)[1]))
+        )
+        with pytest.raises(InputError, match="a tensor with one number for each environment"):
+            worlds.step(*ahead)
+    unknown = torch.full((2,), torch.nan)
+    monkeypatch.setattr(worlds.task, "step", lambda *given: (step(*given)[0], unknown))
+    with pytest.raises(InputError, match=r"CollectCubes\.step returns rewards that are not finite"):
+        worlds.step(*ahead)
 
 
 def test_combined_appearance_is_cached():

@@ -372,8 +372,14 @@ def test_the_oracle_is_recorded_as_it_flies(tmp_path, kind):
         assert np.array_equal(one.images[0], first[i])
     env.close()
     lengths = [len(one) for one in found]
-    record_oracle(tmp_path, settings, flights=2, seed=5)
-    assert [len(one) for one in read_demonstrations(tmp_path)] == [*lengths, *lengths[:2]]
+    record_oracle(tmp_path, settings, flights=2, seed=5)  # the next episodes of the seed
+    record_oracle(tmp_path / "all", settings, flights=5, seed=5)
+    found, expected = read_demonstrations(tmp_path), read_demonstrations(tmp_path / "all")
+    assert [len(one) for one in found] == [len(one) for one in expected]
+    assert [len(one) for one in found][:3] == lengths
+    for one, other in zip(found, expected, strict=True):
+        assert np.array_equal(one.images, other.images)
+    assert len({one.images.tobytes() for one in found}) == 5
 
 
 def test_settings_of_the_oracles_training_may_be_given_by_name(tmp_path):

@@ -1,5 +1,6 @@
 """Each kind takes what it should, at its very bounds, and refuses the next value by name."""
 
+import numpy as np
 import pytest
 
 from drone_rl.utils.errors import InputError
@@ -172,3 +173,12 @@ def test_missing_settings_and_other_objects_are_named():
         InputError, match=r"^x=3 is no Whole; give drone_rl.utils.schema.Whole\(\.\.\.\)"
     ):
         Instance(Whole).read(3, "x")
+
+
+def test_numbers_of_numpy_are_numbers():
+    found = Whole(0, 9).read(np.int64(3), "x"), Real(0.0, 1.0).read(np.float32(0.5), "x")
+    assert found == (3, 0.5) and [type(f) for f in found] == [int, float]
+    with pytest.raises(InputError, match="x=True is out of range"):
+        Whole(0, 9).read(True, "x")
+    with pytest.raises(InputError, match="is out of range"):
+        Whole(0, 9).read(np.float64(3.0), "x")

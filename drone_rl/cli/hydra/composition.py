@@ -139,6 +139,12 @@ def import_plugins(overrides: Sequence[str]) -> None:
     if names and os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
     for name in names:
+        if "/" in name or name.startswith("."):
+            own = Path(name).name.removesuffix(".py")
+            raise InputError(
+                f"plugins={name} is a path; type the module's name, plugins=[{own}], in its folder "
+                "or with the folder on PYTHONPATH"
+            )
         try:
             importlib.import_module(name)
         except ModuleNotFoundError as error:
@@ -146,15 +152,15 @@ def import_plugins(overrides: Sequence[str]) -> None:
             place = "give a module in this folder or on PYTHONPATH"
             remedy = place if is_own else f"install {error.name}"
             if name.endswith(".py"):
-                remedy = f"type the module's name: plugins=[{name[:-3].replace('/', '.')}]"
+                remedy = f"type the module's name: plugins=[{name[:-3]}]"
             raise InputError(f"plugins={name} can't be imported ({error}); {remedy}") from error
         except InputError:
             raise
-        except Exception as error:  # any that the user's module raises
+        except (Exception, SystemExit) as error:  # any that the user's module raises
             raise InputError(_plugin_error(name, error)) from error
 
 
-def _plugin_error(name: str, error: Exception) -> str:
+def _plugin_error(name: str, error: BaseException) -> str:
     """Return the message about a plugin that raised an error, with the line of its own files."""
     frames = traceback.extract_tb(error.__traceback__)
     own = next((f for f in reversed(frames) if "importlib" not in f.filename), frames[-1])

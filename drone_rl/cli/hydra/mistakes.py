@@ -353,7 +353,7 @@ def _wrong_value(config: DictConfig, key: str, value: Any, text: str, reason: st
     if isinstance(now, DictConfig):
         return InputError(f"{text}: {key} is a group of settings; type {key}.NAME=VALUE")
     if isinstance(now, ListConfig):
-        listed = [value, *now[1:]] if isinstance(value, int | float) else ([*now] or [1, 2])
+        listed = [value, *now[1:]] if isinstance(value, int | float) else ([*now] or [value])
         listed = str(listed).replace(" ", "").replace("'", "")
         return InputError(f"{text} has the wrong type; type a list such as {name}={listed}")
     if now is None:

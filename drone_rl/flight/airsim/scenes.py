@@ -89,6 +89,8 @@ def make_task(scene: str) -> Task[Any]:
     if scene == "blocks":
         return _blocks()
     path = Path(scene)
+    if path.suffix == ".xml" and not path.exists():
+        raise InputError(f"scene={scene} does not exist; give the path of an MJCF file")
     if path.suffix == ".xml" and path.is_file():
         return _Fixed([_File(path)], torch.zeros(1, 3, dtype=torch.float64), None)
     raise InputError(

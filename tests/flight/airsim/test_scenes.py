@@ -34,5 +34,7 @@ def test_crafted_files_are_refused(tmp_path, text, message):
     (tmp_path / "bad.xml").write_text(text)
     with pytest.raises(InputError, match=message):
         Stage(str(tmp_path / "bad.xml"), 0)
+    with pytest.raises(InputError, match=r"scene=no\.xml does not exist; give the path of an MJCF"):
+        Stage("no.xml", 0)
     with pytest.raises(InputError, match=r"scene=blokcs is unknown; give cubes.*blocks"):
         Stage("blokcs", 0)
