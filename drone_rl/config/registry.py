@@ -138,8 +138,9 @@ def _check_name(name: Any) -> None:
 
 def _derived(factory: F, attribute: str, base: str) -> F:
     """Return a class that has an attribute of the class it has to derive from."""
-    if isinstance(factory, type) and not hasattr(factory, attribute):
-        raise InputError(f"{factory.__name__} does not derive from {base}; derive it from there")
+    given: Any = factory
+    if isinstance(given, type) and not hasattr(given, attribute):
+        raise InputError(f"{given.__name__} does not derive from {base}; derive it from there")
     return factory
 
 
