@@ -64,10 +64,8 @@ def register_network(name: str) -> Callable[[F], F]:
     Raises:
         InputError: The name is invalid or taken, or a parameter has no default or no plain type.
     """
-    _check_name(name)
-    return lambda factory: _register(
-        Network, name, _derived(factory, "is_recurrent", "PolicyNetwork"), 2, {"generator"}
-    )
+    base = ("is_recurrent", "PolicyNetwork")
+    return _decorator(Network, name, 2, {"generator"}, base=base)
 
 
 def register_transform(
@@ -78,9 +76,8 @@ def register_transform(
     `output` maps the input's `Frame` and the settings to the output's `Frame`. By default, the
     shape is that of the transformed zeros. See `register_network` for errors.
     """
-    _check_name(name)
     own = {"output": lambda self, frame: output(frame, self) if output else None}
-    return lambda factory: _register(Transform, name, factory, 0, _KEYS, own)
+    return _decorator(Transform, name, 0, _KEYS, own)
 
 
 def register_returns(name: str) -> Callable[[F], F]:
@@ -89,8 +86,7 @@ def register_returns(name: str) -> Callable[[F], F]:
     The class accepts `scale`, for example by passing keyword arguments on to `ReturnEstimator`. See
     `register_network` for errors.
     """
-    _check_name(name)
-    return lambda factory: _register(Returns, name, _derived(factory, "to", "ReturnEstimator"), 0)
+    return _decorator(Returns, name, 0, base=("to", "ReturnEstimator"))
 
 
 def register_learner(name: str) -> Callable[[F], F]:
@@ -100,8 +96,7 @@ def register_learner(name: str) -> Callable[[F], F]:
     and the result of `drone_rl.training.components.make_collector`, and returns a
     `drone_rl.training.learners.Learner`. See `register_network` for errors.
     """
-    _check_name(name)
-    return lambda factory: _register(Objective, name, factory, 2)
+    return _decorator(Objective, name, 2)
 
 
 def register_collector(name: str) -> Callable[[F], F]:
@@ -111,8 +106,7 @@ def register_collector(name: str) -> Callable[[F], F]:
     the task that replays failures (None for the task of the settings), and returns a
     `drone_rl.training.components.Components`. See `register_network` for errors.
     """
-    _check_name(name)
-    return lambda factory: _register(Collector, name, factory, 2)
+    return _decorator(Collector, name, 2)
 
 
 def modules_of(settings: Any) -> set[str]:
@@ -129,19 +123,32 @@ def modules_of(settings: Any) -> set[str]:
     return modules_of(tuple(values)) | ({own} if not own.startswith("drone_rl.") else set())
 
 
-def _check_name(name: Any) -> None:
+def _decorator(
+    part: type[Variant],
+    name: Any,
+    positional: int,
+    skipped: Set[str] = frozenset(),
+    own: dict[str, Any] | None = None,
+    base: tuple[str, str] | None = None,
+) -> Callable[[F], F]:
+    """Return the decorator of a part; `base` is an attribute that only its base class has, and it.
+
+    The other arguments are those of `_register`.
+    """
     if not isinstance(name, str):
         raise InputError('give a name in brackets, as in @drone_rl.register_network("mine")')
     if not _NAME.fullmatch(name):
         raise InputError(f"name={name!r} is invalid; give lower-case letters, digits and _")
 
+    def register(factory: F) -> F:
+        given: Any = factory
+        if base and isinstance(given, type) and not hasattr(given, base[0]):
+            raise InputError(
+                f"{given.__name__} does not derive from {base[1]}; derive it from there"
+            )
+        return _register(part, name, factory, positional, skipped, own)
 
-def _derived(factory: F, attribute: str, base: str) -> F:
-    """Return a class that has an attribute of the class it has to derive from."""
-    given: Any = factory
-    if isinstance(given, type) and not hasattr(given, attribute):
-        raise InputError(f"{given.__name__} does not derive from {base}; derive it from there")
-    return factory
+    return register
 
 
 def _register(

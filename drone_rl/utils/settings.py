@@ -166,10 +166,12 @@ def _current_value(name: str, hint: Any, value: Any) -> Any:
 
 def _refuse_untyped(cls: type[Settings]) -> None:
     """Raise an `InputError` for a value without a type, which would be no setting."""
-    for name, value in dict(vars(cls)).items():
-        known = {n for c in cls.__mro__[1:-1] for n in (*vars(c), *c.__annotations__)}
-        known -= {field.name for field in dataclasses.fields(cls)}  # whose values would be ignored
-        is_typed = name in {*known, *cls.__annotations__} or name.startswith("_")
+    own = dict(vars(cls))
+    known = {name for c in cls.__mro__[1:-1] for name in (*vars(c), *c.__annotations__)}
+    known -= {field.name for field in dataclasses.fields(cls)}  # whose values would be ignored
+    known |= cls.__annotations__.keys()
+    for name, value in own.items():
+        is_typed = name in known or name.startswith("_")
         if not is_typed and isinstance(value, int | float | str):
             raise InputError(
                 f"{cls.__name__}.{name} has no type, so it would have no effect; write "

@@ -322,8 +322,8 @@ def _job(
             with _explained(name, overrides):
                 settings = read_settings(command, config)
             folder = Path(HydraConfig.get().runtime.output_dir)
-            used = settings.used_policy(folder)
-            if getattr(settings, "policy", None) == "latest" != used:
+            is_latest = getattr(settings, "policy", None) == "latest"
+            if is_latest and (used := settings.used_policy(folder)) != "latest":
                 _log.info("policy=latest is %s", used)
             status, value = settings.run(folder)
             if status < 128 and sys.stdout.isatty():  # pipes get only the results
