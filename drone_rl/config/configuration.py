@@ -261,6 +261,11 @@ class Changes:
     def read(self, value: Any, where: str) -> dict[str, Any]:
         """See `drone_rl.utils.schema.Kind`."""
         given = as_mapping(value, where)
+        if "name" in given and "name" not in self.types and hasattr(self.of, "name"):
+            raise InputError(
+                f"{where}.name={shown(given['name'])} would replace the task, which is "
+                f"{self.of.name}; give values of that task's settings"
+            )
         for name in given:
             if name not in self.types:
                 known, meant = ", ".join(self.types), did_you_mean(name, self.types)
@@ -276,7 +281,12 @@ def as_changes(value: Any, where: str) -> Mapping[str, Any]:
     """Return changes of settings by name: those of a mapping, all of a settings object, or none."""
     if value is None:
         return {}
-    return value.values() if isinstance(value, Settings) else as_mapping(value, where)
+    if isinstance(value, Mapping | Settings):
+        return value if isinstance(value, Mapping) else value.values()
+    raise InputError(
+        f"{where}={shown(value)} gives no changes; give values by name, as in "
+        "task={'num_cubes': 5} or dynamics={'wind': [5, 0, 0]}"
+    )
 
 
 TaskChanges = Annotated[Mapping[str, Any], Changes()]

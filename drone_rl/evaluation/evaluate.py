@@ -20,9 +20,8 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.display import aligned, table
-from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.schema import Instance
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import Evidence, Sentence, fixed_seed, interval, percent, say, seed_line
 
@@ -123,9 +122,8 @@ def evaluate(
     Raises:
         InputError: The policy or a setting is unusable.
     """
-    Instance(EvaluateSettings).read(settings := settings or EvaluateSettings(), "settings")
-    settings, seed = with_seed(settings.replace(**changes))
-    progress = progress or Bar()
+    settings, seed = with_seed(EvaluateSettings.from_arguments(settings, changes))
+    progress = as_progress(progress)
     policy = as_policy(policy)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with held_out_environments(policy, settings, seed) as (env, actor):

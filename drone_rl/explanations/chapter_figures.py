@@ -123,7 +123,7 @@ def reproduce(
         InputError: There is no such figure, the episodes have fewer frames than asked for, or in
             Fig. 9 the policy moves to one side only.
     """
-    settings = (settings or FigureSettings()).replace(figure=figure, **changes)
+    settings = FigureSettings.from_arguments(settings, {"figure": figure, **changes})
     if figure not in _MAKERS:
         known = ", ".join(map(str, _MAKERS))
         raise InputError(f"figure={figure} can't be reproduced; give one of {known}")

@@ -154,7 +154,7 @@ def class_models(
     Raises:
         InputError: The policy or a setting is unusable, or the images diverge.
     """
-    settings, seed = with_seed((settings or ClassModelsSettings()).replace(**changes))
+    settings, seed = with_seed(ClassModelsSettings.from_arguments(settings, changes))
     subject = as_policy(policy, outputs=outputs)
     subject = subject.in_task(**as_changes(task, "task")) if task else subject
     network = subject.make_network()

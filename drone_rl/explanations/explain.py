@@ -27,8 +27,8 @@ from drone_rl.policies.policy import BasePolicy
 from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.utils.display import page
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import to_file_name
-from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.files import as_path, to_file_name
+from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import RootSeed, with_seed
@@ -109,10 +109,10 @@ def explain(
     Raises:
         InputError: A policy or a setting is unusable, or the folder can't be written.
     """
-    settings, seed = with_seed((settings or ExplainSettings()).replace(**changes))
+    settings, seed = with_seed(ExplainSettings.from_arguments(settings, changes))
     Whole(1).read(num_envs, "num_envs")
     chosen = _named(policies)
-    folder, progress = Path(folder), progress or Bar()
+    folder, progress = as_path(folder, "folder"), as_progress(progress)
     folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(chosen)}
 
     def explain_one(policy: BasePolicy, folder: Path) -> dict[str, Any]:

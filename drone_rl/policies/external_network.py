@@ -59,8 +59,8 @@ class ExternalNetwork(ImageNetwork):
             what = " ".join(f"{type(error).__name__}: {error}".split())[:200]
             shown = tuple(self._given(image).shape)
             raise InputError(
-                f"the network can't take images of shape {shown} ({what}); give the camera and "
-                "transforms that it was trained with"
+                f"the network can't take images of shape {shown}, {image.dtype} ({what}); give "
+                f"{_remedy(self.parts)}"
             ) from error
         if not torch.allclose(found, self(image), atol=_TOLERANCE):
             raise InputError(
@@ -103,6 +103,14 @@ class ExternalNetwork(ImageNetwork):
         if not self._takes_bytes:
             return flat
         return (flat * 255).round().to(torch.uint8).movedim(-3, -1)
+
+
+def _remedy(module: nn.Module) -> str:
+    """Return what to give in place of a network that does not take the images."""
+    for parameter in module.parameters():
+        if parameter.dtype != torch.float32:
+            return f"network.float(), since its parameters are {parameter.dtype}"
+    return "the camera and transforms that it was trained with"
 
 
 def _copied(module: nn.Module) -> nn.Module:

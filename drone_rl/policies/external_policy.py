@@ -151,6 +151,10 @@ def policy_from(
         raise InputError(
             f"policy_from takes callables; give {shown(logits)} itself to judge or explain"
         )
+    if isinstance(logits, type):
+        raise InputError(
+            f"policy={logits.__name__} is a class; give an instance, such as {logits.__name__}()"
+        )
     if not callable(logits):
         raise InputError(
             f"policy={shown(logits)} is no policy; give a callable from images to logits, or the "

@@ -34,7 +34,7 @@ from drone_rl.robustness.suite import Suite, make_strip, packed
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.display import aligned, picture, table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import say, seed_line
@@ -120,8 +120,8 @@ def shifts(
     Raises:
         InputError: The policy or a setting is unusable, or there is no such axis or strength.
     """
-    settings, seed = with_seed((settings or ShiftSettings()).replace(**changes))
-    progress = progress or Bar()
+    settings, seed = with_seed(ShiftSettings.from_arguments(settings, changes))
+    progress = as_progress(progress)
     check_axes(settings.axes or ())
     loaded = as_policy(policy, outputs).in_task(**as_changes(task, "task"))
     loaded = loaded.in_dynamics(**as_changes(dynamics, "dynamics")) if dynamics else loaded

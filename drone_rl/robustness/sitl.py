@@ -19,7 +19,7 @@ from drone_rl.flight.in_the_loop.dynamics import InTheLoopDynamics
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import RootSeed, root_seed
 from drone_rl.utils.text import LOOPED, interval, say, seed_line
@@ -112,7 +112,7 @@ def evaluate_in_the_loop(
         FlightControllerError: The firmware failed, or the machine was too busy for it.
     """
     Whole(1).read(flights, "flights")
-    progress, loaded = progress or Bar(), as_policy(policy, outputs)
+    progress, loaded = as_progress(progress), as_policy(policy, outputs)
     root = drawn_seed or root_seed(seed)
     program = find_firmware(firmware)
     results: list[tuple[Episodes, SitlEpisode]] = []

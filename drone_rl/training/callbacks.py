@@ -18,8 +18,9 @@ from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import remove_leftovers, write_atomically
 from drone_rl.utils.progress import Progress as Report
+from drone_rl.utils.progress import as_progress
 from drone_rl.utils.readers import NAMES_OF_0_1, read_table
-from drone_rl.utils.schema import shown
+from drone_rl.utils.schema import Instance, Several, shown
 
 
 @dataclasses.dataclass
@@ -50,6 +51,8 @@ class OngoingTraining(Protocol):
 
 
 _log = logging.getLogger(__name__)
+_MANY = 1000
+"""Callbacks of one training run."""
 
 
 class Callback:
@@ -280,6 +283,16 @@ class ProgressCallback(Callback):
         """Close the bar."""
         if self._bar is not None:
             self._bar.close()
+
+
+def with_progress(given: Sequence[Callback], progress: Report | None) -> list[Callback]:
+    """Return given callbacks and one that forwards the progress, by default to a bar.
+
+    Raises:
+        InputError: They are no callbacks, or `progress` is no function.
+    """
+    known = Several(Instance(Callback), 0, _MANY).read(given, "callbacks")
+    return [*known, ForwardProgress(as_progress(progress))]
 
 
 class ForwardProgress(Callback):

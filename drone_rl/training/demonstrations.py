@@ -35,7 +35,7 @@ from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import folder_lock, parse_json, refuse_links, write_atomically
+from drone_rl.utils.files import as_path, folder_lock, parse_json, refuse_links, write_atomically
 from drone_rl.utils.limits import ARRAYS_BYTES, Allowance
 from drone_rl.utils.schema import Instance, Plain, Record, Text, Whole, as_mapping, shown
 
@@ -248,7 +248,7 @@ def read_demonstrations(
         InputError: There are none, one is unusable or was recorded under other conditions, or all
             together are too large.
     """
-    folder = Path(folder)
+    folder = as_path(folder, "folder")
     try:
         refuse_links(folder, depth=1)
     except OSError as error:
@@ -282,7 +282,7 @@ def add_demonstration(folder: str | Path, demonstration: Demonstration) -> Path:
     """
     if not isinstance(demonstration, Demonstration):
         raise InputError(f"{shown(demonstration)} is no drone_rl.Demonstration; give one")
-    folder, content = Path(folder), demonstration.to_bytes()
+    folder, content = as_path(folder, "folder"), demonstration.to_bytes()
     folder.mkdir(parents=True, exist_ok=True)
     with folder_lock(folder, patience_s=_PATIENCE_S):
         path = folder / f"flight_{_next_number(folder):05d}.npz"
@@ -320,15 +320,14 @@ def record_oracle(
     Raises:
         InputError: A setting is unusable, or the task has no oracle, or none for these actions.
     """
-    Instance(TrainSettings).read(settings := settings or TrainSettings(), "settings")
-    settings = settings.replace(**changes)
+    settings = TrainSettings.from_arguments(settings, changes)
     flights = Whole(1).read(flights, "flights")
     env = DroneEnv(
         flights,
         settings.task,
         settings.camera,
         seed=seed,
-        first_world=_next_number(Path(folder)),
+        first_world=_next_number(as_path(folder, "folder")),
         device=settings.device,
         dynamics=settings.dynamics,
         actions=settings.actions,

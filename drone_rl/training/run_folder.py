@@ -107,6 +107,11 @@ class RunFolder:
         if path is not None and not isinstance(path, str | Path):
             raise InputError(f"folder={shown(path)} is no path; give the folder of the run")
         folder = new_folder() if path is None else Path(path)
+        if resume and folder.suffix == ".pt":  # what load_policy takes
+            raise InputError(
+                f"folder={folder} is a checkpoint; give the folder of its run, the one with "
+                "metrics.csv"
+            )
         if resume:
             return cls(folder), read_checkpoint(last_of(folder))
         if (folder / "result.json").exists():

@@ -22,7 +22,7 @@ from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import describe
 from drone_rl.sim.tasks import FailureReplayTask, as_settings, as_task
 from drone_rl.training import components, run_folder
-from drone_rl.training.callbacks import Callback, CollapseCheck, CsvCallback, ForwardProgress
+from drone_rl.training.callbacks import Callback, CollapseCheck, CsvCallback, with_progress
 from drone_rl.training.cloning import clone
 from drone_rl.training.components import Components, Group
 from drone_rl.training.confirmation import Confirmation
@@ -32,7 +32,7 @@ from drone_rl.training.trainer import Trainer
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock
 from drone_rl.utils.memory import bound_kernels
-from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.progress import Progress
 from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.seeding import Stream, torch_generator
 
@@ -66,14 +66,14 @@ def train(
         SystemExit: SIGTERM stopped it (status 143); it has the same attribute. A signal handler
             that the caller has set is called instead, and nothing is raised.
     """
+    hooks = with_progress(callbacks, progress)
     run, state = RunFolder.open(folder, resume)
     if settings is None:
         settings = TrainSettings() if state is None else run_folder.settings_of(state["config"])
     settings = settings.replace(**{name: as_settings(value) for name, value in changes.items()})
     run.make()
     with folder_lock(run.path):
-        result = learn(settings, run.path, state, [*callbacks, ForwardProgress(progress or Bar())])
-        training = run_folder.finish(settings, run.path, result)
+        training = run_folder.finish(settings, run.path, learn(settings, run.path, state, hooks))
     return run_folder.reraise_signal(training)
 
 

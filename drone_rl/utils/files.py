@@ -22,6 +22,7 @@ from drone_rl.utils.limits import (
     check_depth,
     check_json_size,
 )
+from drone_rl.utils.schema import shown
 
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP)
 """Errors of file systems without locks."""
@@ -31,6 +32,13 @@ _FORMER_SUFFIX = re.compile(r"[a-z0-9_]{8}")
 """Random end of such a name in versions until 0.1."""
 _LONGEST_NUMBER = 19
 """Digits of an integer in a JSON file."""
+
+
+def as_path(value: str | Path, where: str) -> Path:
+    """Return the path of an argument named `where`; raise an `InputError` if it is none."""
+    if not isinstance(value, str | os.PathLike):
+        raise InputError(f"{where}={shown(value)} is no path; give the path of a file or folder")
+    return Path(value)
 
 
 def read_bytes(path: Path, most: int) -> bytes:
@@ -78,7 +86,7 @@ def newest(paths: Iterable[Path]) -> Path | None:
 
 def trained_policies(outputs: str | Path) -> list[Path]:
     """Return last.pt of every training under a folder of outputs, the newest first."""
-    found = Path(outputs).glob("train/**/checkpoints/last.pt")
+    found = as_path(outputs, "outputs").glob("train/**/checkpoints/last.pt")
     return sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
 
 

@@ -4,6 +4,9 @@ import logging
 import time
 from typing import TYPE_CHECKING, Protocol
 
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
+
 if TYPE_CHECKING:
     from tqdm.auto import tqdm
 
@@ -25,6 +28,16 @@ def silent(text: str, done: int = 0, total: int = 0) -> None:
 def log(text: str, done: int = 0, total: int = 0) -> None:
     """Write one line to the log."""
     _log.info("%s", f"[{done}/{total}] {text}" if total else text)
+
+
+def as_progress(given: Progress | None) -> Progress:
+    """Return an argument `progress`, a bar by default; raise an `InputError` for other values."""
+    if given is not None and not callable(given):
+        raise InputError(
+            f"progress={shown(given)} is no function; leave it out for a bar, or give "
+            "drone_rl.utils.progress.silent for none"
+        )
+    return given or Bar()
 
 
 class Bar:

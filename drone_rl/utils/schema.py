@@ -7,6 +7,7 @@ begins with the name `where`.
 import dataclasses
 import math
 import numbers
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
@@ -157,7 +158,9 @@ class Text:
     longest: int = LONGEST_TEXT
 
     def read(self, value: Any, where: str) -> str:
-        """See `Kind`."""
+        """See `Kind`; a path or a device of torch is its text."""
+        if isinstance(value, os.PathLike) or type(value).__module__ == "torch":
+            value = str(value)
         if not isinstance(value, str) or len(value) > self.longest or not value.isprintable():
             raise InputError(
                 f"{where}={shown(value)} is no text; give one line of at most {self.longest} "

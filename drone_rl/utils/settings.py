@@ -87,6 +87,16 @@ class Settings(_Frozen):
         return dataclasses.replace(self, **changes)
 
     @classmethod
+    def from_arguments(cls, settings: Self | None, changes: Mapping[str, Any]) -> Self:
+        """Return a function's `settings`, the defaults if None, with its changes to them.
+
+        Raises:
+            InputError: `settings` is no instance of this class, or see `replace`.
+        """
+        given = cls() if settings is None else Instance(cls).read(settings, "settings")
+        return given.replace(**changes)
+
+    @classmethod
     def read(cls, data: Any, where: str) -> Self:
         """Return settings from a mapping that has every field and no other.
 

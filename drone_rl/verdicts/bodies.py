@@ -19,9 +19,8 @@ from drone_rl.sim.vocabulary import terms_of
 from drone_rl.utils.display import aligned, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import BAD, EMPTY, FAINT, GOOD, INK, ONE_SIDED, css, light
-from drone_rl.utils.progress import Bar, Progress, silent
+from drone_rl.utils.progress import Progress, as_progress, silent
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.schema import Instance
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import BODIES, Evidence, interval, percent, rate, say, seed_line
 from drone_rl.verdicts.judge import judge
@@ -93,9 +92,8 @@ def bodies(
     Raises:
         InputError: A policy or a setting is unusable.
     """
-    Instance(BodiesSettings).read(settings := settings or BodiesSettings(), "settings")
-    settings, seed = with_seed(settings.replace(**changes))
-    progress = progress or Bar()
+    settings, seed = with_seed(BodiesSettings.from_arguments(settings, changes))
+    progress = as_progress(progress)
     given = list(settings.policies) if policies is None else policies
     listed = given if isinstance(given, list | tuple) else [given]
     loaded = [as_policy(one, outputs) for one in listed]

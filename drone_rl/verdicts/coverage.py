@@ -21,7 +21,7 @@ from drone_rl.robustness.perturbations import Condition
 from drone_rl.robustness.shifts_file import SavedShifts, read_shifts
 from drone_rl.robustness.shifts_text import contradicted, lacking, needed_range
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.files import as_path, parse_json, read_bytes
 from drone_rl.utils.intervals import mean_bounds
 from drone_rl.utils.limits import YAML_BYTES
 from drone_rl.utils.readers import parse_yaml
@@ -139,7 +139,7 @@ def find_domain(
             return read_shifts(adjacent, *of)
         except InputError as error:
             return SavedShifts(adjacent, None, refused=str(error))
-    folder = Path(outputs) / "shifts"
+    folder = as_path(outputs, "outputs") / "shifts"
     there = [*folder.glob("runs/*/shifts.json"), *folder.glob("multiruns/*/*/shifts.json")]
     found = None
     for path in sorted(there, key=lambda p: p.stat().st_mtime, reverse=True)[:MAX_FILES]:

@@ -27,9 +27,8 @@ from drone_rl.robustness.shifts_text import QUOTED, why_not
 from drone_rl.utils.display import aligned, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import NOT_COVERED, PROOF_MISSING
-from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.schema import Instance
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
 from drone_rl.utils.text import rate, say, seed_line
 from drone_rl.verdicts.certificate import find_claim
@@ -155,7 +154,7 @@ def judge(
         return judge_one(cast("Any", policy), settings, **how)
     if not policy:
         raise InputError("policy=[] is empty; give one or more policies")
-    Instance(JudgeSettings).read(settings := settings or JudgeSettings(), "settings")
+    settings = JudgeSettings.from_arguments(settings, {})
     for one in policy:  # a wrong one is refused before any episode
         if one not in BASELINES:
             as_policy(one, how.get("outputs", "outputs"))
@@ -202,9 +201,8 @@ def judge_one(
     Raises:
         InputError: A policy, setting or file is unusable, or a required domain was not measured.
     """
-    Instance(JudgeSettings).read(settings := settings or JudgeSettings(), "settings")
-    settings, seed = with_seed(settings.replace(**changes), drawn_seed)
-    progress = progress or Bar()
+    settings, seed = with_seed(JudgeSettings.from_arguments(settings, changes), drawn_seed)
+    progress = as_progress(progress)
     progress("policy and baselines", 0, 1)
     loaded = None if policy in BASELINES else as_policy(policy, outputs)
     name = str(policy) if loaded is None or isinstance(policy, str | Path) else loaded.name

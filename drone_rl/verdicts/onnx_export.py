@@ -15,7 +15,7 @@ from drone_rl.envs import worlds_of
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import make_onnx, open_onnx
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import write_atomically
+from drone_rl.utils.files import as_path, write_atomically
 from drone_rl.utils.seeding import root_seed
 from drone_rl.verdicts.export import origin_of
 
@@ -90,6 +90,9 @@ def export_onnx(
     Raises:
         InputError: The policy can't be converted, the model differs, or the file can't be written.
     """
+    target = as_path(target, "target")
+    if target.is_dir():
+        raise InputError(f"target={target} is a folder; give a file in it, such as policy.onnx")
     policy = policy if isinstance(policy, Policy) else load_policy(policy)
     metadata = {"command": command or origin_of(policy.path, policy.state)[0]}
     content = make_onnx(policy.description, policy.make_network(), metadata)
@@ -104,7 +107,7 @@ def export_onnx(
             "with format=safetensors"
         )
     try:
-        write_atomically(Path(target), content)
+        write_atomically(target, content)
     except OSError as error:
         raise InputError(
             f"the ONNX file {target} can't be written ({error.strerror}); free some space or "

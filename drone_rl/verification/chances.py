@@ -19,7 +19,7 @@ from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason
 from drone_rl.utils.display import aligned, table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, Stream, with_seed, world_random_state
 from drone_rl.utils.text import CHANCES, say, seed_line
@@ -183,8 +183,8 @@ def chances(
         InputError: An input is unusable, `require_cubes` refuses the policy, or the task has too
             many nodes.
     """
-    settings, seed = with_seed((settings or ChanceSettings()).replace(**changes))
-    progress = progress or Bar()
+    settings, seed = with_seed(ChanceSettings.from_arguments(settings, changes))
+    progress = as_progress(progress)
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**as_changes(task, "task"))
     task_settings = require_cubes(policy.description, "exact probabilities")

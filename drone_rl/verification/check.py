@@ -14,8 +14,8 @@ from drone_rl.policies.zoo import policy_names
 from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import CERTIFICATE_REFUSED
-from drone_rl.utils.files import newest
-from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.files import as_path, newest
+from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import CHECK, say, seed_line
@@ -118,7 +118,7 @@ def check(
     Raises:
         InputError: The certificate is of another network or task, or an input is unusable.
     """
-    settings, seed = with_seed((settings or CheckSettings()).replace(**changes))
+    settings, seed = with_seed(CheckSettings.from_arguments(settings, changes))
     path = _find(certificate, outputs)
     stated = read_certificate(path)
     if policy is None and stated.name not in policy_names():
@@ -139,15 +139,15 @@ def check(
         seed=seed.value,
         device=settings.device,
         renderer=settings.renderer,
-        report=functools.partial(progress or Bar(), "flown"),
+        report=functools.partial(as_progress(progress), "flown"),
     )
     return Check(path, policy, settings, stated, findings, seed)
 
 
 def _find(certificate: str | Path, outputs: str | Path) -> Path:
     if certificate != "latest":
-        return Path(certificate)
-    path = newest(Path(outputs).glob("prove/**/certificate.json"))
+        return as_path(certificate, "certificate")
+    path = newest(as_path(outputs, "outputs").glob("prove/**/certificate.json"))
     if path is None:
         raise InputError(
             f"certificate=latest, but there is none under {outputs}/prove; run drone-rl prove "

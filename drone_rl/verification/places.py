@@ -19,7 +19,7 @@ from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.utils.display import aligned, picture, table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import say
@@ -107,7 +107,7 @@ def places(
     Raises:
         InputError: The policy, its task or a setting is not supported; the message says why.
     """
-    settings, progress = (settings or PlacesSettings()).replace(**changes), progress or Bar()
+    settings, progress = PlacesSettings.from_arguments(settings, changes), as_progress(progress)
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**as_changes(task, "task"))
     begin = time.perf_counter()

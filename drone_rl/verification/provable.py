@@ -23,7 +23,7 @@ from drone_rl.policies.zoo import describe, read_checkpoint
 from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.sim.tasks.collect_cubes import inflated
 from drone_rl.training import Callback
-from drone_rl.training.callbacks import ForwardProgress, OngoingTraining
+from drone_rl.training.callbacks import OngoingTraining, with_progress
 from drone_rl.training.run_folder import (
     MAY_CHANGE,
     RunFolder,
@@ -37,8 +37,8 @@ from drone_rl.training.train import learn
 from drone_rl.utils.archives import read_array
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, read_json, write_atomically
-from drone_rl.utils.progress import Bar, Progress
-from drone_rl.utils.schema import Plain, Real, Record, Several, Whole
+from drone_rl.utils.progress import Progress, as_progress
+from drone_rl.utils.schema import Instance, Maybe, Plain, Real, Record, Several, Whole
 from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import Settings
 from drone_rl.verification.prove import Proof, prove
@@ -97,7 +97,7 @@ class Journal(Callback):
         saved = _JOURNAL.read(read_json(path), str(path)) if state and path.exists() else None
         if settings is None and state is not None:
             settings = settings_of(saved["settings"] if saved else state["config"])
-        settings = (settings or TrainSettings()).replace(**changes)
+        settings = TrainSettings.from_arguments(settings, changes)
         if saved is not None:
             how = how or ProvableSettings.read(saved["how"], "how")
             check_same_config(saved["settings"], as_config(settings), MAY_CHANGE)
@@ -217,13 +217,15 @@ def train_until_proved(
             repeated on resume.
         SystemExit: SIGTERM stopped it, see `train`.
     """
+    progress = as_progress(progress)
+    how = Maybe(Instance(ProvableSettings)).read(how, "how")
+    hooks = with_progress(callbacks, progress)
     run, state = RunFolder.open(folder, resume)
     run.make()
     folder = run.path
-    progress = progress or Bar()
     with folder_lock(folder):
         journal = Journal.open(folder, settings, how, state, changes)
-        callbacks = [journal, *callbacks, ForwardProgress(progress)]
+        callbacks = [journal, *hooks]
         result = _learn(journal, state, callbacks)
         while not (journal.is_over or result["reason"].startswith("SIG")):
             _search(journal, progress)

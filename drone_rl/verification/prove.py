@@ -16,9 +16,9 @@ from drone_rl.config.configuration import as_changes
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.display import aligned, table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import folder_lock, write_atomically
+from drone_rl.utils.files import as_path, folder_lock, write_atomically
 from drone_rl.utils.limits import ARRAYS_BYTES
-from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import plural
@@ -122,7 +122,7 @@ def prove(
         InputError: The policy, its task or a setting is not supported, or the folder holds an
             unfinished proof of another policy, task, logit_gap or renderer; the message says why.
     """
-    settings = (settings or ProveSettings()).replace(**changes)
+    settings = ProveSettings.from_arguments(settings, changes)
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**as_changes(task, "task"))
     network, gap = policy.make_network(), settings.logit_gap
@@ -130,10 +130,10 @@ def prove(
     with one_thread(), closing(spec), contextlib.ExitStack() as stack:
         spec.images.check(settings.compared, np.random.RandomState(legacy_seed(fresh_seed())))
         if folder is not None:
-            folder = Path(folder)
+            folder = as_path(folder, "folder")
             folder.mkdir(parents=True, exist_ok=True)
             stack.enter_context(folder_lock(folder))
-        return _prove(policy, spec, settings, folder, progress or Bar())
+        return _prove(policy, spec, settings, folder, as_progress(progress))
 
 
 def _prove(
@@ -197,7 +197,7 @@ def load_proof(path: str | Path) -> Proof:
     Raises:
         InputError: There is none, or it is damaged or too large.
     """
-    path = Path(path)
+    path = as_path(path, "path")
     path = path / "certificate.json" if path.is_dir() else path
     try:
         found = json.loads(path.read_text())

@@ -17,6 +17,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvS
 from drone_rl.config.transforms import Fault, Stack, Transform
 from drone_rl.envs.transforms import on_pixels
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
 
 
 class Sb3Worlds(VecEnv):
@@ -36,6 +37,11 @@ class Sb3Worlds(VecEnv):
         Raises:
             InputError: The autoreset mode is different, or a transform is unsuitable.
         """
+        if not isinstance(env, VectorEnv):
+            raise InputError(
+                f"env={shown(env)} is no vector environment; give gymnasium.make_vec(NAME, "
+                "num_envs=64, autoreset_mode='SameStep') of gymnasium"
+            )
         mode = env.metadata.get("autoreset_mode")
         if mode is not AutoresetMode.SAME_STEP:
             name = getattr(mode, "value", mode)

@@ -22,6 +22,7 @@ from drone_rl.config.commands import FlySettings
 from drone_rl.explanations.fly_page.flight import Flight
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.errors import InputError, extra
+from drone_rl.utils.files import as_path
 
 _log = logging.getLogger(__name__)
 
@@ -367,7 +368,7 @@ def fly(
     Raises:
         InputError: A setting is wrong, the port is in use, or the extra `fly` is not installed.
     """
-    settings = (settings or FlySettings()).replace(**changes)
+    settings = FlySettings.from_arguments(settings, changes)
     found = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-    folder = settings.demonstrations or Path(outputs) / "demonstrations"
+    folder = settings.demonstrations or as_path(outputs, "outputs") / "demonstrations"
     return FlyPage(found, settings, Path(folder))

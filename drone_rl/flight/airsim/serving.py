@@ -11,6 +11,7 @@ from drone_rl.flight.airsim.lockstep import PATIENCE
 from drone_rl.flight.airsim.server import AirsimServer
 from drone_rl.flight.airsim.settings_file import AirsimSettings, parse_settings, read_settings
 from drone_rl.flight.airsim.simulation import CLOCKS, Simulation
+from drone_rl.utils.files import as_path
 from drone_rl.utils.schema import OneOf, Real, Whole
 
 _log = logging.getLogger(__name__)
@@ -133,7 +134,7 @@ def make_simulation(
     if settings is None:
         settings = parse_settings("{}")
     elif not isinstance(settings, AirsimSettings):
-        settings = read_settings(Path(settings))
+        settings = read_settings(as_path(settings, "settings"))
     clock = OneOf(CLOCKS).read(clock, "clock")
     seed = Whole(0, 2**31 - 1).read(seed, "seed")
     host = settings.address if address is None else address
@@ -142,7 +143,7 @@ def make_simulation(
         _log.warning(
             "the server listens at %s: everybody in that network can control the vehicles", host
         )
-    folder = None if recordings is None else Path(recordings)
+    folder = None if recordings is None else as_path(recordings, "recordings")
     simulation = Simulation(
         settings, scene, clock=clock, seed=seed, renderer=renderer, recordings=folder
     )

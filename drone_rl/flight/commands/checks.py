@@ -122,6 +122,11 @@ def quadrotor(
         if changes:
             raise InputError(f"{', '.join(changes)} and a Quadrotor are given; give settings alone")
         return dynamics
+    if dynamics is not None and not isinstance(dynamics, DynamicsSettings):
+        raise InputError(
+            f"dynamics={_shown(dynamics)} is no DynamicsSettings; give changes by name, as in "
+            "Pilot(mass=1.3), or worlds=Worlds(1, task) for a scene"
+        )
     return Quadrotor((dynamics or DynamicsSettings()).replace(mode="simple_flight", **changes))
 
 

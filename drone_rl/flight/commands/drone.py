@@ -27,13 +27,13 @@ from drone_rl.flight.commands.state import LandedState, PilotState, Sensors, Tra
 from drone_rl.sim.dynamics import FlightState, Goals, Obstacles, Quadrotor
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.state import twist_about_z
-from drone_rl.sim.entities import FRONT_CENTER
+from drone_rl.sim.entities import FRONT_CENTER, find_camera
 from drone_rl.sim.image_types import ImageRequest, images
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks import State
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import OneOf, Whole
+from drone_rl.utils.schema import Instance, OneOf, Several, Whole
 
 COASTING = 0.06
 """Seconds for which the last goals hold after a command that leaves no position to hold."""
@@ -84,6 +84,7 @@ class Drone:
             changes: Dynamics settings to change, such as wind=[5, 0, 0].
         """
         if worlds is not None:
+            Instance(Worlds).read(worlds, "worlds")
             if worlds.num_envs != 1:
                 raise InputError(f"worlds has {worlds.num_envs} worlds; give Worlds(1, ...)")
             if dynamics is None and isinstance(worlds.dynamics, Quadrotor):
@@ -208,18 +209,19 @@ class Drone:
 
     def picture(
         self,
-        camera: str = FRONT_CENTER.name,
+        camera: str | int = FRONT_CENTER.name,
         modality: Modality = "rgb",
         height: int | None = None,
         width: int | None = None,
     ) -> Tensor:
-        """Render one of AirSim's five cameras; with dynamics, level if they hang in a gimbal.
+        """Render a camera, by AirSim's name or number; with dynamics, level if it has a gimbal.
 
         See `Renderer.render` for `modality`. The size, in pixels, is the worlds' by default. A
         drone without worlds raises `PilotError`.
         """
         worlds, state = self._scene("picture")
-        return worlds.render(state, worlds.view(camera, modality, height, width))[0]
+        name = find_camera(camera).name
+        return worlds.render(state, worlds.view(name, modality, height, width))[0]
 
     def images(
         self,
@@ -235,6 +237,7 @@ class Drone:
         Returns:
             One tensor per request. Shapes: (H, W, 3), uint8; or (H, W), float32, for `as_float`.
         """
+        requests = Several(Instance(ImageRequest), 1, 1000).read(requests, "requests")
         worlds, state = self._scene("images")
         return [found[0] for found in images(worlds, state, requests, height=height, width=width)]
 

@@ -36,7 +36,7 @@ from drone_rl.flight.commands.path_following import (
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
 from drone_rl.sim.dynamics.control import Modes, rotor_goals
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import OneOf
+from drone_rl.utils.schema import Instance, OneOf
 
 MOVING = 0.05
 """Speed in m/s above which a drone can't take off."""
@@ -319,7 +319,7 @@ class Pilot(ComputerVisionDrone):
         cos, sin = self.body.heading.cos(), self.body.heading.sin()
 
         def goals(body: FlightState) -> Goals:
-            sticks = self.sticks
+            sticks = Instance(Sticks).read(self.sticks, "sticks")
             forward, left = sticks.pitch * fastest[0], -sticks.roll * fastest[1]
             x, y = cos * forward - sin * left, sin * forward + cos * left
             heading = control.goal(torch.stack([x, y, torch.zeros_like(x)], -1))

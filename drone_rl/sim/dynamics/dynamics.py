@@ -14,6 +14,7 @@ from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.dynamics.quadrotor import Quadrotor
 from drone_rl.sim.dynamics.state import BodyState, Obstacles, heading_of
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Instance, Maybe, shown
 
 
 class Dynamics(Protocol):
@@ -105,7 +106,13 @@ def make_dynamics(
     without settings. Raises an `InputError` if both dynamics and settings of actions are given, or
     they don't fit each other.
     """
+    Maybe(Instance(ActionSettings)).read(actions, "actions")
     if dynamics is not None and not isinstance(dynamics, DynamicsSettings):
+        if isinstance(dynamics, type) or not hasattr(dynamics, "step"):
+            raise InputError(
+                f"dynamics={shown(dynamics)} is none; give settings such as "
+                "drone_rl.DynamicsSettings(mode='simple_flight')"
+            )
         if actions is not None:
             raise InputError(
                 f"actions={actions.kind}, but dynamics={type(dynamics).__name__} brings its own; "
