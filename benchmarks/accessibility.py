@@ -78,7 +78,7 @@ def build_site(folder: Path) -> list[Path]:
 
 
 def check(browser: Any, page: Path, sizes: Sequence[tuple[int, int]]) -> Iterator[str]:
-    """Yield the violations of a page at each size of the window and in each colour scheme."""
+    """Yield the violations of a page at each size of the window and in each color scheme."""
     extra("axe_core_python", "dev", "bench accessibility")
     program = importlib.resources.files("axe_core_python").joinpath("axe.min.js")
     source = program.read_text(encoding="utf-8")

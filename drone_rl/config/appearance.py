@@ -31,7 +31,7 @@ _Turn = Span(Several(Real(-90.0, 90.0, unit="degrees"), 3, 3))
 
 
 class AppearanceSettings(Settings):
-    """Sun, sky, fog, colours, textures, distractors, and the mounting of the policy's camera.
+    """Sun, sky, fog, colors, textures, distractors, and the mounting of the policy's camera.
 
     The defaults are the tasks' own appearance.
     """
@@ -49,17 +49,17 @@ class AppearanceSettings(Settings):
     shadows: Annotated[float, Real(0.0, 1.0)] = 0.0
     """Probability that the sun casts shadows in an episode."""
     sky_horizon: Annotated[ColorOrRange, _Tint] = (0.62, 0.74, 0.92)
-    """Colour of the sky at the horizon, and of fog."""
+    """Color of the sky at the horizon, and of fog."""
     sky_zenith: Annotated[ColorOrRange, _Tint] | None = None
-    """Colour of the sky overhead; null for that of the horizon."""
+    """Color of the sky overhead; null for that of the horizon."""
     fog_visibility: (
         Annotated[NumberOrRange, Span(Real(0.0, 100_000.0, is_above=True, unit="m"))] | None
     ) = None
     """Distance at which fog reduces contrast to 5%, in metres; null for clear air."""
     ground_color: Annotated[ColorOrRange, _Tint] = (0.5, 0.54, 0.48)
-    """Colour of the ground."""
+    """Color of the ground."""
     object_color: Annotated[ColorOrRange, _Tint] | None = None
-    """Colour of targets and obstacles; null for the task's own."""
+    """Color of targets and obstacles; null for the task's own."""
     ground_texture: Annotated[Names, _Textures] | None = None
     """Texture of the ground: checker, grid, bricks, noise, an image file, or a list of these and
     none (no texture), each equally likely; null for no texture."""
@@ -74,7 +74,7 @@ class AppearanceSettings(Settings):
     distractor_size: Annotated[NumberOrRange, Span(Real(0.1, 50.0, unit="m"))] = (1.0, 4.0)
     """Edge length or diameter of each distractor, in metres."""
     distractor_color: Annotated[ColorOrRange, _Tint] | None = None
-    """Colour of each distractor; null for six colours in turn."""
+    """Color of each distractor; null for six colors in turn."""
     distractor_distance: Annotated[NumberOrRange, Span(Real(0.1, 200.0, unit="m"))] = (2.0, 14.0)
     """Lateral distance of each distractor from the area of targets and obstacles, in metres."""
     camera_offset: Annotated[TripleOrRange, _Place] = (0.0, 0.0, 0.0)
@@ -84,7 +84,7 @@ class AppearanceSettings(Settings):
     camera_widening: Annotated[NumberOrRange, Span(Real(-160.0, 160.0, unit="degrees"))] = 0.0
     """Degrees added to `camera.horizontal_fov`; negative values narrow the field of view."""
     exposure: Annotated[NumberOrRange, Span(Real(0.01, 100.0))] = 1.0
-    """Factor by which the camera multiplies all colours."""
+    """Factor by which the camera multiplies all colors."""
 
     @classmethod
     def from_name(cls, name: str, where: str) -> Self:

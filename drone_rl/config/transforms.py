@@ -49,7 +49,7 @@ class Gray(Transform, target="gray"):
 
 
 class Rgb(Transform, target="rgb"):
-    """RGB bytes to colours from 0 to 1."""
+    """RGB bytes to colors from 0 to 1."""
 
     needs: ClassVar[str] = "bytes"
 

@@ -64,7 +64,7 @@ class FigureSettings(Settings):
     episodes: Annotated[int, Whole(1, 1000, "episodes")] | None = None
     """Episodes that the frames come from; null for the chapter's number."""
     tint: Annotated[str, OneOf(("predicted", "sampled"))] = "predicted"
-    """Action whose colour tints a frame of Figs. 7 and 8: the most probable one, or the one that
+    """Action whose color tints a frame of Figs. 7 and 8: the most probable one, or the one that
     was sampled."""
     kernel: Annotated[str, OneOf(("student", "gaussian"))] = "student"
     """Similarity of points on the maps of Figs. 7 and 8: Student's t, as t-SNE is defined, or the

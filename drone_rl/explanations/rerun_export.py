@@ -47,7 +47,7 @@ CLASS_COLORS: Mapping[SemanticClass, palette.Rgb] = {
     SemanticClass.DRONE: palette.FAINT,
     SemanticClass.DISTRACTOR: palette.MUTED,
 }
-"""Colours of the segmentation image and of the boxes."""
+"""Colors of the segmentation image and of the boxes."""
 
 
 def record(
@@ -299,7 +299,7 @@ class EpisodeLog:
             self._stream.log(path, self._box(kind, centers=[center], half_sizes=[half]))
 
     def _box(self, kind: SemanticClass, **sizes: Any) -> Any:
-        """Return a box in the colour of its class."""
+        """Return a box in the color of its class."""
         style = {"fill_mode": "solid", "show_labels": False}
         return self._rr.Boxes3D(class_ids=[kind.value], **sizes, **style)
 

@@ -165,7 +165,7 @@ class Intervention:
 def intervene(
     scenes: Scenes, network: ImageNetwork, state: State, regions: Tensor, seed: int = 0
 ) -> list[Intervention]:
-    """Remove, move and recolour the next target; as a control, change a patch of ground.
+    """Remove, move and recolor the next target; as a control, change a patch of ground.
 
     `regions` has the `Region` of each pixel (T, H, W).
     """
@@ -173,13 +173,13 @@ def intervene(
     base = probabilities(network, scenes.transform(before))
     visible = regions == Region.NEXT_TARGET
     ground = _patches(regions == Region.GROUND, visible.sum((1, 2)), seed)
-    recoloured = scenes.frames(state, OTHER_TARGETS)
+    recolored = scenes.frames(state, OTHER_TARGETS)
     repainted = scenes.frames(state, DARK_GROUND)
     moved = scenes.frames(to_the_middle(scenes, state))
     changes = {
         "target taken away": (scenes.frames(scenes.task.without_next(state)), visible),
         "target moved": (moved, (moved != before).any(-1)),
-        "target recoloured": (torch.where(visible[..., None], recoloured, before), visible),
+        "target recolored": (torch.where(visible[..., None], recolored, before), visible),
         "ground patch changed": (torch.where(ground[..., None], repainted, before), ground),
     }
     return [
@@ -191,7 +191,7 @@ def intervene(
 def clear_frame(change: Intervention) -> int:
     """Return a frame on which a change has an effect and covers about a twentieth of the pixels.
 
-    Where the target fills the frame, a reader sees no more than one colour.
+    Where the target fills the frame, a reader sees no more than one color.
     """
     effect = np.nan_to_num(change.effect)
     covered = change.area.flatten(1).double().mean(1).cpu().numpy()

@@ -141,7 +141,7 @@ def policy_from(
         actions: The action space.
         transforms: Transform of the image, or several in order; an empty list for the camera's RGB
             bytes (N, H, W, 3). By default `Gray` and `Standardize`, or `Rgb` if `logits` was
-            trained on colour frames.
+            trained on color frames.
         name: Name in reports; that of the callable by default.
 
     Raises:
@@ -190,8 +190,8 @@ def _camera_of(logits: Logits) -> CameraSettings:
 
 def _transforms_of(logits: Logits) -> tuple[Transform, ...]:
     shape = getattr(logits, "observation_shape", None)
-    is_colour = getattr(logits, "observes_bytes", False) or (shape is not None and shape[0] == 3)
-    return (Rgb(),) if is_colour else (Gray(), Standardize())
+    is_color = getattr(logits, "observes_bytes", False) or (shape is not None and shape[0] == 3)
+    return (Rgb(),) if is_color else (Gray(), Standardize())
 
 
 def _is_sb3_model(which: Any) -> bool:

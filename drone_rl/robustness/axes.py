@@ -2,7 +2,7 @@
 
 `axes.toml` has names, units and strengths; the functions that apply a strength are here.
 
-The strengths mirror published ones: colours Distracting Control Suite (Stone et al., 2021) and
+The strengths mirror published ones: colors Distracting Control Suite (Stone et al., 2021) and
 DMControl Generalization Benchmark (Hansen and Wang, 2021), camera angles the former's three levels
 and two below, sizes The Colosseum (Pumacay et al., 2024), correlated noise Nasvytis et al. (2024).
 """

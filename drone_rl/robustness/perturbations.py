@@ -62,7 +62,7 @@ class Condition:
     camera: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """Settings of the camera to replace."""
     appearance_changes: tuple[AppearanceChange, ...] = ()
-    """Changes of colours and light; they need an appearance in which all is given."""
+    """Changes of colors and light; they need an appearance in which all is given."""
     mounts: tuple[AppearanceChange, ...] = ()
     """Changes of the camera's pose."""
     faults: tuple[FaultModel, ...] = ()
@@ -136,7 +136,7 @@ def tint(classes: Sequence[SemanticClass], by: float) -> AppearanceChange:
 
 
 def whiten(classes: Sequence[SemanticClass], fraction: float) -> AppearanceChange:
-    """Mix this fraction of white into the colours of some classes."""
+    """Mix this fraction of white into the colors of some classes."""
     return AppearanceChange(
         lambda look, _: _repaint(look, classes, lambda own: own + fraction * (1.0 - own))
     )
@@ -196,14 +196,14 @@ def elevation(direction: Colors) -> float:
 
 
 def task_region(settings: BaseTaskSettings) -> ObjectRegion:
-    """Return where a task's objects are, their size and colour; an `InputError` without any."""
+    """Return where a task's objects are, their size and color; an `InputError` without any."""
     if settings.object_region is None:
         raise InputError(f"axes=distractors is not for task={settings.name}; leave it out of axes")
     return settings.object_region
 
 
 def as_bright(color: Sequence[float]) -> tuple[float, ...]:
-    """Return a blue of the same luminance as a colour, as far as possible."""
+    """Return a blue of the same luminance as a color, as far as possible."""
     wanted, has = (sum(w * c for w, c in zip(LUMA, rgb, strict=True)) for rgb in (color, _BLUE))
     return tuple(min(1.0, wanted / has * c) for c in _BLUE)
 

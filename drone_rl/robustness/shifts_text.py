@@ -224,7 +224,7 @@ SHIFTS = (
     ),
     fixed_seed("shifts.fixed_seed"),
 )
-_OTHERS = {"color": "colours", "light": "light", "object size": "sizes"}
+_OTHERS = {"color": "colors", "light": "light", "object size": "sizes"}
 """Names in sentences of the groups of axes that a verdict alone does not cover."""
 NEARLY = 1e-9
 """Relative rounding of a limit."""
@@ -253,7 +253,7 @@ def why_not(evidence: Evidence) -> str | None:
 
 
 def not_evaluated(evidence: Evidence) -> list[str]:
-    """Return which of colours, light and sizes were not evaluated."""
+    """Return which of colors, light and sizes were not evaluated."""
     axes = evidence["shifts"]["axes"].values() if is_quoted(evidence) else ()
     tested = {along["group"] for along in axes}
     return [name for group, name in _OTHERS.items() if group not in tested]

@@ -100,7 +100,7 @@ class Suite:
     def _fly_oracle(self, condition: Condition) -> ConditionResult:
         """Run the oracle; if a condition changes nothing that affects it, reuse the first run.
 
-        Light, colours and faults that hide nothing do not affect it.
+        Light, colors and faults that hide nothing do not affect it.
         """
         faults = tuple(fault for fault in condition.faults if fault.hides)
         kept = dataclasses.replace(condition, appearance_changes=(), faults=faults)
@@ -127,7 +127,7 @@ class Suite:
 
 
 class FrameRecorder:
-    """Fly straight on and record the colour image of one step."""
+    """Fly straight on and record the color image of one step."""
 
     needs_only_hiding_faults = False
 

@@ -61,7 +61,7 @@ class Actions(abc.ABC):
         if sorted(self.order) != every:
             raise ValueError(f"order={self.order} must name every action once")
         if not len(self.arrows) == len(self.colors) == len(every):
-            raise ValueError(f"give an arrow and a colour to each of {len(every)} actions")
+            raise ValueError(f"give an arrow and a color to each of {len(every)} actions")
         if self.mirrored[self.left] == self.left:
             raise ValueError(f"left={self.left} is its own mirror image; give one that turns")
 

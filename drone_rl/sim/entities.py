@@ -128,7 +128,7 @@ class Pillar(VisualEntity):
 
 
 class Distractor(VisualEntity):
-    """A box, ball or cylinder of 1 m, which appearances scale and colour; one of `KINDS`."""
+    """A box, ball or cylinder of 1 m, which appearances scale and color; one of `KINDS`."""
 
     semantic_class = SemanticClass.DISTRACTOR
 

@@ -27,7 +27,7 @@ _SEED = 42
 
 @functools.cache
 def palette() -> Tensor:
-    """Return AirSim's colours: red, green, blue of each id. Shape: (256, 3), uint8.
+    """Return AirSim's colors: red, green, blue of each id. Shape: (256, 3), uint8.
 
     Each channel, from blue to red, is a random permutation; then id 0 is black and 255 white.
     """
@@ -68,7 +68,7 @@ class ImageType(enum.IntEnum):
     DISPARITY_NORMALIZED = 4
     """Shift in a second camera 0.25 m to the right, as a fraction of the image's width."""
     SEGMENTATION = 5
-    """Colour of the object's id, see `palette`."""
+    """Color of the object's id, see `palette`."""
     SURFACE_NORMALS = 6
 
     @property

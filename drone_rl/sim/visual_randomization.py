@@ -32,7 +32,7 @@ PALETTE = (
 )
 """Yellow, teal, white, green, blue, violet: neither red (cubes) nor brown (pillars)."""
 WIDTH = 7
-"""Numbers of a distractor: position, size, colour."""
+"""Numbers of a distractor: position, size, color."""
 _TURN = (5**0.5 - 1) / 2
 """The step, as a fraction of the path, that leaves the most even gaps."""
 
@@ -97,7 +97,7 @@ def _color(
 ) -> Tensor:
     given = settings.distractor_color
     if given is None:
-        turn = number + number // len(PALETTE)  # otherwise all of a kind have one colour
+        turn = number + number // len(PALETTE)  # otherwise all of a kind have one color
         return torch.tensor(PALETTE[turn % len(PALETTE)], dtype=torch.float64)
     return torch.stack([_uniform(pair, source, ()) for pair in _pairs(given)])
 

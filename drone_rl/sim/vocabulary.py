@@ -162,7 +162,7 @@ class ShownActions:
     """Greatest speeds of continuous actions: forward and sideways, m/s; yaw rate, degrees/s."""
 
     def css(self, action: int) -> str:
-        """Return the colour of an action for style sheets."""
+        """Return the color of an action for style sheets."""
         return palette.css(self.colors[action])
 
 
@@ -187,7 +187,7 @@ def shown_actions(numbers: Mapping[str, Any]) -> ShownActions:
             "different names, and the index of each once"
         )
     if not len(given["arrows"]) == len(given["colors"]) == count:
-        raise InputError(f"actions have {count} names; give each an arrow and a colour")
+        raise InputError(f"actions have {count} names; give each an arrow and a color")
     speeds = given.get("speeds")
     return ShownActions(names, given["order"], given["arrows"], given["colors"], speeds)
 

@@ -28,7 +28,7 @@ COLORS = {
     FAILED: css(FAINT),
 }
 MARKERS = dict(zip(COLORS, ("o", "D", "s", "v", "P", "X"), strict=True))
-"""Shapes of markers, so that kinds differ in more than colour."""
+"""Shapes of markers, so that kinds differ in more than color."""
 MAX_PANELS = 6
 LOG_FROM = 3.0
 """Ratio of the greatest to the least value from which the axis is logarithmic."""
@@ -135,7 +135,7 @@ def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
         error = np.abs([y - low, high - y])
         axes.errorbar(x, y, yerr=error, markersize=4, capsize=2, **_style(kind))
     axes.set(ylabel="fraction of runs", ylim=(-0.03, 1.03))
-    _explain_colours(axes)
+    _explain_colors(axes)
 
 
 def _sides(axes: Axes, layout: Layout, groups: list[Group]) -> None:
@@ -169,7 +169,7 @@ def _dots(
                 x = _aside(axes, np.array([place]), shift, places)
                 fill = "full" if row.is_certain else "none"
                 axes.plot(x, [y], ls="", markersize=4, fillstyle=fill, **_style(str(row.kind)))
-    _explain_colours(axes)
+    _explain_colors(axes)
 
 
 def _aside(axes: Axes, places: NDArray, shift: float, every: Sequence[float]) -> NDArray:
@@ -184,7 +184,7 @@ def _style(kind: str) -> dict[str, Any]:
     return {"marker": MARKERS[kind], "color": COLORS[kind]}
 
 
-def _explain_colours(axes: Axes) -> None:
+def _explain_colors(axes: Axes) -> None:
     """Add one legend above the image."""
     figure = axes.get_figure()
     if figure is None or figure.legends:

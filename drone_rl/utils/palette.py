@@ -1,6 +1,6 @@
-"""Colours of plots, images and pages, one meaning each, by red, green and blue from 0 to 255.
+"""Colors of plots, images and pages, one meaning each, by red, green and blue from 0 to 255.
 
-Most are Okabe and Ito's, which readers with a colour vision deficiency can tell apart. Red is left
+Most are Okabe and Ito's, which readers with a color vision deficiency can tell apart. Red is left
 to the cubes, which are red in every image.
 """
 
@@ -37,11 +37,11 @@ SKY: Rgb = (158, 202, 233)
 
 
 def css(color: Rgb) -> str:
-    """Return a colour as "#rrggbb", for style sheets and Matplotlib."""
+    """Return a color as "#rrggbb", for style sheets and Matplotlib."""
     return "#{:02x}{:02x}{:02x}".format(*color)
 
 
 def light(color: Rgb, strength: float = 0.35) -> Rgb:
-    """Return a colour mixed with white, for areas behind text."""
+    """Return a color mixed with white, for areas behind text."""
     red, green, blue = (round(255 + strength * (c - 255)) for c in color)
     return red, green, blue

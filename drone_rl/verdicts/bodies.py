@@ -191,7 +191,7 @@ def failure(verdict: Evidence) -> str:
 
 
 def chart(numbers: Mapping[str, Any]) -> Figure:
-    """Draw a coloured table: verdict, success rate with 95% interval, and largest failure.
+    """Draw a colored table: verdict, success rate with 95% interval, and largest failure.
 
     `numbers` are those of `bodies.json`.
     """
@@ -225,7 +225,7 @@ def chart(numbers: Mapping[str, Any]) -> Figure:
 
 
 def _verdict_cell(verdict: Evidence) -> tuple[str, str | None, list[tuple[float, str, float, str]]]:
-    """Colour, hatch, and lines of a cell: height, text, points and colour of each."""
+    """Color, hatch, and lines of a cell: height, text, points and color of each."""
     kind, success = verdict["kind"], verdict["greedy"]["success"]
     color = _COLORS.get(kind) or _COLORS.get(kind.split()[0], _COLORS["none"])
     lines = [

@@ -59,7 +59,7 @@ def test_maps_go_back_to_where_the_pipeline_took_the_picture_from():
     env.close()
 
 
-def test_whether_the_channels_are_colours(scenes):
+def test_whether_the_channels_are_colors(scenes):
     assert scenes.channels == "gray"
     for pipeline, channels in (
         ([RgbPixels()], "rgb"),

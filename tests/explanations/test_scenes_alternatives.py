@@ -36,7 +36,7 @@ def test_what_the_simulator_draws_otherwise(scenes, world):
     assert all(torch.equal(found[name], again[name]) for name in found)
 
 
-def test_other_colours_are_darker_and_brighter_than_the_arenas():
+def test_other_colors_are_darker_and_brighter_than_the_arenas():
     assert DARK_GROUND.colors == {SemanticClass.GROUND: DARK.colors[SemanticClass.GROUND]}
     for thing, color in ((SemanticClass.GROUND, FLOOR_COLOR), (SemanticClass.SKY, SKY_COLOR)):
         for low, middle, high in zip(DARK.colors[thing], color, BRIGHT.colors[thing], strict=True):
@@ -56,7 +56,7 @@ def test_cubes_elsewhere_are_in_view(scenes):
     assert moved.present.all() and state.passed.all()
 
 
-def test_only_the_named_colours_change(scenes):
+def test_only_the_named_colors_change(scenes):
     state = place_target(scenes, torch.tensor([6.0]), torch.tensor([2.0]))
     regions, before = scenes.regions(state), scenes.frames(state)
     after = scenes.frames(state, Appearance(colors={SemanticClass.GROUND: (0.1, 0.1, 0.1)}))

@@ -17,10 +17,10 @@ def test_only_what_was_changed_changes(scenes, world):
     cube = regions == Region.NEXT_TARGET
     away = changes["target taken away"]
     torch.testing.assert_close(away.frames, scenes.frames(empty_scene(scenes)).expand_as(before))
-    for name in ("target recoloured", "ground patch changed"):
+    for name in ("target recolored", "ground patch changed"):
         changed = (changes[name].frames != before).any(-1)
         assert torch.equal(changed, changes[name].area), name
-    assert torch.equal(changes["target recoloured"].area, cube)
+    assert torch.equal(changes["target recolored"].area, cube)
     patch = changes["ground patch changed"].area
     assert patch.any() and (regions[patch] == Region.GROUND).all()
     moved = changes["target moved"]
@@ -75,7 +75,7 @@ def test_a_patch_of_ground_is_a_square_of_about_as_many_pixels():
     assert torch.equal(patches, _patches(ground, torch.full((60,), 49), seed=0))
 
 
-def test_other_colours_are_colours_unlike_the_cubes_and_the_grounds():
+def test_other_colors_are_colors_unlike_the_cubes_and_the_grounds():
     yellow, dark = (
         OTHER_TARGETS.colors[SemanticClass.TARGET],
         DARK_GROUND.colors[SemanticClass.GROUND],

@@ -45,7 +45,7 @@ def test_a_policy_sees_what_its_transforms_make_of_spoilt_pictures():
     assert seen is network.shown[0]
 
 
-def test_colours_are_drawn_for_who_sees_colours():
+def test_colors_are_drawn_for_who_sees_colors():
     worlds, network = make_env(), Looking()
     PolicyAgent(network, [RgbPixels()], 3).act(sight(worlds, torch.arange(3)))
     worlds.close()

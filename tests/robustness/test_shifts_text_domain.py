@@ -42,7 +42,7 @@ def test_what_speaks_against_them_is_said_instead(changes, why):
     evidence = changed(GOOD, changes)
     assert not is_quoted(evidence) and why in why_not(evidence)
     assert list(said(QUOTED, evidence)) == ["domain.refused"]
-    assert not_evaluated(evidence) == ["colours", "light", "sizes"]
+    assert not_evaluated(evidence) == ["colors", "light", "sizes"]
 
 
 def test_an_open_verdict_and_a_policy_that_is_good_nowhere_go_together():
@@ -52,8 +52,8 @@ def test_an_open_verdict_and_a_policy_that_is_good_nowhere_go_together():
 
 
 def test_what_was_not_flown_was_not_evaluated():
-    assert not_evaluated(GOOD) == ["colours", "sizes"]
-    assert not_evaluated({"verdict": VERDICT}) == ["colours", "light", "sizes"]
+    assert not_evaluated(GOOD) == ["colors", "sizes"]
+    assert not_evaluated({"verdict": VERDICT}) == ["colors", "light", "sizes"]
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ def test_an_axis_by_its_strengths(suite):
     drifting = found["axes"]["object_color"]["levels"][1]["modes"]["drifting"]
     assert drifting["success"]["share"] == plain and not drifting["unchanged"]
     assert found["axes"]["object_color"]["areas"]["constant"] == pytest.approx(plain)
-    # a size of 3/4 at the third strength, which this policy minds, and colours, which it does not
+    # a size of 3/4 at the third strength, which this policy minds, and colors, which it does not
     assert found["together"]["modes"]["constant"]["success"]["share"] <= plain
 
 

@@ -104,7 +104,7 @@ def test_as_dict_returns_plain_values():
         ({"mirrored": (0, 1, 3)}, "mirrored"),
         ({"opposite": (1, 2, 0)}, "opposite"),
         ({"order": (0, 1, 1)}, "order"),
-        ({"colors": ((0, 0, 0),)}, "colour"),
+        ({"colors": ((0, 0, 0),)}, "color"),
         ({"left": 0}, "left"),
     ],
 )

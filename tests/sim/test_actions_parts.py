@@ -63,8 +63,8 @@ def test_distance_is_half_the_sum_of_absolute_differences():
 @pytest.mark.parametrize(
     ("field", "value", "message"),
     [
-        ("arrows", FOUR.arrows[:3], "give an arrow and a colour to each of 4"),
-        ("colors", FOUR.colors[:3], "give an arrow and a colour to each of 4"),
+        ("arrows", FOUR.arrows[:3], "give an arrow and a color to each of 4"),
+        ("colors", FOUR.colors[:3], "give an arrow and a color to each of 4"),
         ("order", (0, 1, 2, 2), "must name every action once"),
         ("opposite", (0, 1, 2, 2), "opposite"),
     ],

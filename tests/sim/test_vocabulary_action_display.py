@@ -26,7 +26,7 @@ def test_speeds_are_in_meters_and_degrees_per_second():
         ({"names": ["forward", "left"]}, "give 2 different names, and the index of each once"),
         ({"order": [0, 1, 1]}, "order=.*0, 1, 1.* or a name is invalid"),
         ({"order": [0, 1, 99]}, "out of range"),
-        ({"arrows": [[0, 1]]}, "an arrow and a colour"),
+        ({"arrows": [[0, 1]]}, "an arrow and a color"),
         ({"arrows": [[0, 9]] * 3}, "out of range"),
         ({"colors": [[0, 0, 256]] * 3}, "out of range"),
         ({"colors": "red"}, "does not fit"),

@@ -29,7 +29,7 @@ class Sea(Settings):
     Salty.
     """
 
-    colour: ClassVar[str] = "blue"
+    color: ClassVar[str] = "blue"
     """No setting."""
     depth: Annotated[float, Real(0.0, 11_000.0, is_above=True, unit="m")] = 100.0
     """How deep, |z| below

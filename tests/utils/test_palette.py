@@ -1,4 +1,4 @@
-"""Colours that readers with a colour vision deficiency can tell apart, and text that is legible."""
+"""Colors that readers with a color vision deficiency can tell apart, and text that is legible."""
 
 import itertools
 import re
@@ -51,13 +51,13 @@ def rgb(text):
     "colors",
     [ACTIONS, (*ACTIONS, palette.NEXT_CUBE), (palette.GOOD, palette.BAD, palette.MUTED)],
 )
-def test_colours_of_one_image_differ_for_everybody(seen, colors):
+def test_colors_of_one_image_differ_for_everybody(seen, colors):
     """A difference of 2.3 is just noticeable."""
     for one, other in itertools.combinations(colors, 2):
         assert np.linalg.norm(lab(seen @ linear(one)) - lab(seen @ linear(other))) > 15
 
 
-def test_one_colour_has_one_meaning():
+def test_one_color_has_one_meaning():
     colors = [value for name, value in vars(palette).items() if name.isupper()]
     assert len(set(colors)) == len(colors) >= 15
 

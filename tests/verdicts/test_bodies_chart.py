@@ -1,4 +1,4 @@
-"""The table in colours: a row a policy, a column a body."""
+"""The table in colors: a row a policy, a column a body."""
 
 from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
@@ -12,7 +12,7 @@ def cells(figure):
     return [patch for patch in figure.axes[0].patches if isinstance(patch, Rectangle)]
 
 
-def test_each_cell_has_the_colour_of_its_verdict():
+def test_each_cell_has_the_color_of_its_verdict():
     boxes = cells(chart(NUMBERS))
     assert [box.get_xy() for box in boxes] == [(0, 0), (1, 0)]
     assert [box.get_hatch() for box in boxes] == [None, "//"]  # the second is not certain

@@ -115,7 +115,7 @@ def test_a_card_quotes_conditions_that_then_travel_with_the_policy(tmp_path, nam
     export(policy, tmp_path / "mine.safetensors", settings, shifts=made)
     card = (tmp_path / "mine.md").read_text()
     assert ("with blur of up to 1 pixels and up to 4 dead rows" in card) == is_good
-    assert "nothing is known of other colours, light or sizes" in card
+    assert "nothing is known of other colors, light or sizes" in card
     beside = tmp_path / "mine.shifts.json"
     assert beside.exists() == is_good
     if is_good:

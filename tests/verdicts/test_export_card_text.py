@@ -61,7 +61,7 @@ def test_what_is_always_said():
     )
     assert "400 episodes in environments reserved for reports (seed 5)" in found["card.reported"]
     assert "three cubes of 2.5 m, up to 6 m to either side and 0 m" in found["card.tested"]
-    assert "nothing is known of other colours, light or sizes" in found["card.tested"]
+    assert "nothing is known of other colors, light or sizes" in found["card.tested"]
     assert "not for a real drone" in found["card.use"]
     assert "not recorded" in found["card.not_chosen"]
     assert "95% intervals that count episodes" in found["card.intervals"]

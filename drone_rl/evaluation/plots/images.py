@@ -19,7 +19,7 @@ _CHANNELS = {"gray": 1, "rgb": 3, "chromaticity": 2}
 
 
 def tint(frame: NDArray, color: Rgb, strength: float = 0.4) -> NDArray:
-    """Tint a frame, (H, W, 3), uint8, with its action's colour. Shape and type kept."""
+    """Tint a frame, (H, W, 3), uint8, with its action's color. Shape and type kept."""
     wash = np.array(color, dtype=np.float64)
     return (frame * (1 - strength) + wash * strength).astype(np.uint8)
 
@@ -35,7 +35,7 @@ def heated(frame: NDArray, heat: NDArray) -> NDArray:
 
 
 def thumbnails(frames: NDArray, colors: Sequence[Rgb], cells: NDArray) -> Image.Image:
-    """Place frames, each tinted with its action's colour, on the cells of a grid.
+    """Place frames, each tinted with its action's color, on the cells of a grid.
 
     Shapes: (N, H, W, 3) of the frames; (N, 2), column and row, of the cells.
     """
@@ -115,7 +115,7 @@ def shown_picture(observation: NDArray, low: float, high: float, channels: str) 
     """Convert the newest frame of an observation, shape (C, H, W), to an RGB image, uint8.
 
     `low` is shown as black, `high` as white. The channels are "gray", "rgb", or "chromaticity" of
-    red and blue. Their green is 1 minus the mean of both: the image tells colours apart and does
+    red and blue. Their green is 1 minus the mean of both: the image tells colors apart and does
     not show those of the scene. Shape: (H, W, 3).
     """
     newest = observation[-_CHANNELS.get(channels, 1) :].astype(np.float64)

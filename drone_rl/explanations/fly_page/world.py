@@ -197,7 +197,7 @@ class World:
         self.task.touch(self.worlds.state, body.position)
 
     def set_light(self, light: float) -> None:
-        """Set the factor by which cameras multiply all colours."""
+        """Set the factor by which cameras multiply all colors."""
         self.light = light
         self._change()
 

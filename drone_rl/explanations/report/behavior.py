@@ -63,7 +63,7 @@ def say_advice(evidence: Evidence) -> Claims:
 
 
 def say_scope(evidence: Evidence) -> Claims:
-    """Say with which colours, light or sizes the policy was not evaluated."""
+    """Say with which colors, light or sizes the policy was not evaluated."""
     if not (names := not_evaluated(evidence)):
         return {}
     start = "The verdict holds for" if is_quoted(evidence) else "Tested in"

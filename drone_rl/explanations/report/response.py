@@ -21,7 +21,7 @@ from drone_rl.utils.text import Claims, Evidence, bounds, listed, percent
 from drone_rl.verification.text import rows as place_rows
 from drone_rl.verification.text import say_places
 
-_OUTCOMES = (css(EMPTY), css(GOOD))  # colours of unhandled and of handled targets
+_OUTCOMES = (css(EMPTY), css(GOOD))  # colors of unhandled and of handled targets
 
 
 def say_response(evidence: Evidence) -> Claims:

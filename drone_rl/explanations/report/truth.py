@@ -254,7 +254,7 @@ def _say_outcomes(evidence: Evidence) -> Claims:
             f"reliably follow it ({follows['mean']:.2f} m per metre, {bounds(follows)})."
         )
     claims["truth.ground"] = (
-        "Another ground colour, which should not matter, changes the outcome of "
+        "Another ground color, which should not matter, changes the outcome of "
         f"{percent(ground['mean'])} of the rollouts from these frames (upper 95% limit: "
         f"{percent(ground['upper95'])})."
     )

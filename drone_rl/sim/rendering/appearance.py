@@ -1,4 +1,4 @@
-"""Appearance of a scene: colours, light, textures, fog and camera mounting, per environment."""
+"""Appearance of a scene: colors, light, textures, fog and camera mounting, per environment."""
 
 import dataclasses
 import math
@@ -77,7 +77,7 @@ def rotate(attitude: Tensor, vector: Tensor) -> Tensor:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Texture:
-    """A tiled texture; its colours are multiplied by those of the geoms."""
+    """A tiled texture; its colors are multiplied by those of the geoms."""
 
     images: tuple[str, ...]
     """Names or files that environments choose from, see `textures.load`."""
@@ -125,24 +125,24 @@ class Appearance:
     sun_direction: Colors | None = None
     """Direction in which the sun's light travels, world frame; need not have length 1."""
     zenith: Colors | None = None
-    """Colour of the sky overhead, blended with that of the horizon by the elevation's sine."""
+    """Color of the sky overhead, blended with that of the horizon by the elevation's sine."""
     fog_visibility: Scalars | None = None
     """Metres: the distance at which 95% of the contrast to the horizon is lost
     (meteorological optical range, WMO-No. 8). Infinite for clear air."""
     shadows: Scalars | None = None
     """Whether solids cast shadows in sunlight: 1 or 0."""
     exposure: Scalars | None = None
-    """Factor of all colours before they are clipped at white."""
+    """Factor of all colors before they are clipped at white."""
     textures: Mapping[SemanticClass, Texture] = dataclasses.field(default_factory=dict)
     """Of the geoms of a class; the sky has none."""
     camera: Mounting | None = None
     """How a camera differs from the model's."""
     distractors: Distractors | None = None
-    """Their colours and sizes; the caller appends their positions to `Poses.props`."""
+    """Their colors and sizes; the caller appends their positions to `Poses.props`."""
 
     @property
     def is_plain(self) -> bool:
-        """Whether every face and the whole sky have one colour: no effects."""
+        """Whether every face and the whole sky have one color: no effects."""
         is_shaded = bool(torch.as_tensor(0 if self.shadows is None else self.shadows).any())
         is_foggy, has_zenith = self.fog_visibility is not None, self.zenith is not None
         return not (has_zenith or is_foggy or is_shaded or self.textures)
@@ -170,7 +170,7 @@ class Appearance:
 
 
 def expand_color(value: Colors, num_envs: int) -> Tensor:
-    """Return one colour or direction per environment. Shape: (num_envs, 3), float64."""
+    """Return one color or direction per environment. Shape: (num_envs, 3), float64."""
     return torch.as_tensor(value, dtype=torch.float64).expand(num_envs, 3)
 
 

@@ -65,7 +65,7 @@ class WarpRenderer:
         """See `Renderer.render`; appearances may not have fog, shadows or textures."""
         if appearance is not None and not _is_supported(appearance):
             raise InputError(
-                "fog, shadows, textures, a sky of two colours, an exposure and other fields of "
+                "fog, shadows, textures, a sky of two colors, an exposure and other fields of "
                 "view can't be rendered by WarpRenderer; give renderer=raytrace"
             )
         view.check_modalities(self, SUPPORTED)

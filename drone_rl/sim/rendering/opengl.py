@@ -73,7 +73,7 @@ class OpenGlAppearance:
     def apply(self, physics: mjcf.Physics, appearance: Appearance, upload: bool) -> None:
         """Write the appearance of one environment; `upload` sends new textures to OpenGL.
 
-        It must give ambient light, sun, its direction and the sky's colour. Other colours, camera
+        It must give ambient light, sun, its direction and the sky's color. Other colors, camera
         and distractors stay as written before if it does not give them.
         """
         model: Any = physics.model
@@ -172,9 +172,9 @@ def apply_fog(
 
 
 def sky_sides(side: int, horizon: NDArray, zenith: NDArray) -> NDArray[np.uint8]:
-    """Return a cube map of a sky that blends two colours by the sine of the elevation; +y is up.
+    """Return a cube map of a sky that blends two colors by the sine of the elevation; +y is up.
 
-    Colours are in [0, 1], that of the horizon also below it. Shape: (6, side, side, 3).
+    Colors are in [0, 1], that of the horizon also below it. Shape: (6, side, side, 3).
     """
     points = _points(side)
     up = np.clip(points[..., 1:2] / np.linalg.norm(points, axis=-1, keepdims=True), 0.0, 1.0)

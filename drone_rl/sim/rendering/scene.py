@@ -13,7 +13,7 @@ from drone_rl.utils.errors import InputError
 mujoco: Any = _mujoco
 """MuJoCo's bindings, which are untyped."""
 _UNSET = (0.5, 0.5, 0.5, 1.0)
-"""MuJoCo's colour of a geom that was given none."""
+"""MuJoCo's color of a geom that was given none."""
 
 
 class SemanticClass(enum.IntEnum):
@@ -47,7 +47,7 @@ class Scene:
     props: tuple[int, ...]
     """Index in `Task.make_props()` of the entity that each geom belongs to; -1 for none."""
     sky: tuple[float, float, float]
-    """Background colour: red, green, blue in [0, 1]."""
+    """Background color: red, green, blue in [0, 1]."""
 
     def geoms(self, semantic_class: SemanticClass) -> list[int]:
         """Return the indices of the geoms of a class."""
@@ -60,7 +60,7 @@ class Scene:
 
     @property
     def colors(self) -> NDArray[np.float32]:
-        """Colours and opacity of geoms, or of their materials, in [0, 1]. Shape: (num_geoms, 4)."""
+        """Colors and opacity of geoms, or of their materials, in [0, 1]. Shape: (num_geoms, 4)."""
         model, colors = self.model, self.model.geom_rgba.copy()
         uses_material = (model.geom_matid >= 0) & (colors == _UNSET).all(1)
         colors[uses_material] = model.mat_rgba[model.geom_matid[uses_material]]

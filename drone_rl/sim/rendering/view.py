@@ -10,7 +10,7 @@ from torch import Tensor
 from drone_rl.utils.errors import InputError
 
 Modality = Literal["rgb", "gray", "depth", "distance", "segmentation", "normals"]
-"""What a pixel holds: colour, brightness, depth along the camera's axis, distance along the pixel's
+"""What a pixel holds: color, brightness, depth along the camera's axis, distance along the pixel's
 ray, geom index, surface normal."""
 MODALITIES: tuple[Modality, ...] = get_args(Modality)
 _KINDS: dict[Modality, tuple[torch.dtype, tuple[int, ...]]] = {

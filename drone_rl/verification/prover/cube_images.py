@@ -9,7 +9,7 @@ pixel whose ray goes a metres left and b metres up per metre ahead shows
 - the background elsewhere.
 
 So at a fixed D the image changes only where Y is a T - h, a T + h or a U + h for some pixel. The
-colours of faces, floor and sky come from the renderer; `CubeImages.check` compares the closed form
+colors of faces, floor and sky come from the renderer; `CubeImages.check` compares the closed form
 with its images byte for byte.
 """
 
@@ -138,7 +138,7 @@ class CubeImages:
     """Images of cubes at given positions, rendered and in closed form."""
 
     def __init__(self, worlds: Worlds, lattice: Lattice, camera: CameraModel) -> None:
-        """Read the colours; raise InputError if a face has several or none, or shares one."""
+        """Read the colors; raise InputError if a face has several or none, or shares one."""
         self._worlds, self._lattice, self._camera = worlds, lattice, camera
         task = lattice.task
         self.num_cubes = task.num_cubes
@@ -160,20 +160,20 @@ class CubeImages:
             if not len(shown):
                 raise InputError(
                     f"the camera does not show all faces of cubes {ahead:g} m ahead and up to "
-                    f"{left[1]:g} m to the side, so their colours are unknown; prove a policy with "
+                    f"{left[1]:g} m to the side, so their colors are unknown; prove a policy with "
                     "a larger camera.horizontal_fov"
                 )
             if (shown != shown[0]).any():
                 raise InputError(
-                    "a face of a cube has more than one colour, so its image has no closed form; "
+                    "a face of a cube has more than one color, so its image has no closed form; "
                     "prove the policy in an environment without textures and shadows"
                 )
             self.colors[face] = shown[0]
         behind = self.background.reshape(-1, 3).unique(dim=0)
         if len(torch.cat([behind, self.colors[FRONT:]]).unique(dim=0)) < len(behind) + 3:
             raise InputError(
-                f"task.cube_color={task.cube_color} gives a face the colour of another face, the "
-                "floor or the sky; give another colour"
+                f"task.cube_color={task.cube_color} gives a face the color of another face, the "
+                "floor or the sky; give another color"
             )
 
     def read(self, images: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -185,7 +185,7 @@ class CubeImages:
             faces[packed == _packed(shown.numpy())] = face
         if (faces == ANYTHING).any():
             raise InputError(
-                "a pixel has none of the colours of floor, sky and the cubes' faces, so nothing "
+                "a pixel has none of the colors of floor, sky and the cubes' faces, so nothing "
                 "can be proved; prove the policy in the default environment"
             )
         return faces
@@ -273,7 +273,7 @@ class CubeImages:
 
 
 def _packed(colors: NDArray[np.uint8]) -> NDArray[np.uint32]:
-    """Pack each colour into one number. Shape: (*, 3) to (*)."""
+    """Pack each color into one number. Shape: (*, 3) to (*)."""
     red, green, blue = (colors[..., k].astype(np.uint32) for k in range(3))
     return (red | green << 8 | blue << 16).astype(np.uint32)
 

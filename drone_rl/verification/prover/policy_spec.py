@@ -111,7 +111,7 @@ def check_task(task: TaskSettings) -> None:
 
 
 def make_compositor(description: PolicyDescription, images: CubeImages) -> Compositor:
-    """Return the colours after pixelwise transforms, and the other transforms.
+    """Return the colors after pixelwise transforms, and the other transforms.
 
     Raises:
         InputError: The first transform is not gray, or one is not supported.
@@ -119,7 +119,7 @@ def make_compositor(description: PolicyDescription, images: CubeImages) -> Compo
     chosen = [choice for choice in description.transforms if choice.name not in _BLIND]
     names = [choice.name for choice in chosen]
     if names[:1] != ["gray"]:
-        raise InputError("the policy observes colours; prove one whose first transform is gray")
+        raise InputError("the policy observes colors; prove one whose first transform is gray")
     if strange := [name for name in names if name not in _MONOTONE]:
         raise InputError(
             f"proofs do not support the transform {strange[0]}; prove a policy whose only "

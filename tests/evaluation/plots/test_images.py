@@ -60,7 +60,7 @@ def test_a_gray_picture_shows_the_newest_channel_between_its_bounds():
     assert (gray == gray[..., :1]).all()
 
 
-def test_a_picture_in_colours_shows_the_newest_ones():
+def test_a_picture_in_colors_shows_the_newest_ones():
     older, newer = np.zeros((3, 1, 1)), np.array([-1.0, 0.5, 2.0])[:, None, None]
     for observation in (newer, np.concatenate([older, newer])):
         shown = pictures.shown_picture(observation, low=0.0, high=1.0, channels="rgb")

@@ -18,7 +18,7 @@ FIVE = ShownActions(
 
 
 def bars(picture, color):
-    """Where a colour is, right of the names."""
+    """Where a color is, right of the names."""
     found = (np.asarray(picture) == color).all(-1)
     found[:, : picture.width // 2] = False
     return found

@@ -217,7 +217,7 @@ def test_heat_is_laid_over_the_observation_of_a_trusted_method(make_flight):
     expected = {"on": True, "state": "shown", "method": "saliency", "problem": None}
     assert state["saliency"] == expected
     hot = np.asarray(Image.open(io.BytesIO(images["observation"]))).astype(int)
-    assert (hot[..., 0] - hot[..., 2]).max() > 60  # warm colours, where all was gray
+    assert (hot[..., 0] - hot[..., 2]).max() > 60  # warm colors, where all was gray
 
 
 def test_the_tests_of_heat_maps_begin_when_they_are_wanted(make_flight, monkeypatch):

@@ -22,6 +22,6 @@ def test_one_thing_to_do(verdict, name, part):
 
 def test_nothing_reads_as_if_other_looks_had_been_tested():
     assert (
-        "nothing here tests other colours, light or sizes"
+        "nothing here tests other colors, light or sizes"
         in say_scope(EXPLANATION)["scope.one_look"]
     )

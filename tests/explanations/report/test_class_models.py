@@ -32,7 +32,7 @@ def test_actions_stand_from_left_to_right_and_objectives_below_each_other(explan
 @pytest.mark.parametrize(
     "told", [{"channels": "rgb"}, {"color": True}]
 )  # the latter as once written
-def test_colours_are_shown_as_such(explanation, told):
+def test_colors_are_shown_as_such(explanation, told):
     for name in ("class_model_probability", "class_model_logit"):
         explanation.arrays[name] = np.zeros((3, 3, 4, 30))
         explanation.arrays[name][1, 0] = 1.0  # the picture for left is red

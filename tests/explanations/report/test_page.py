@@ -162,7 +162,7 @@ def test_conditions_are_shown_where_they_were_flown(explanations, tmp_path):
     assert "the sun at 21.1 to 60 degrees" in part and part.count("data:image/svg") == 3 + 1
     assert part.count("data:image/png") == 3 + 3 + 2  # as trained, and each strength
     assert "not measured again here" in part and "<td>elevation of the sun</td>" in part
-    assert "nothing here tests other colours or sizes" in page
+    assert "nothing here tests other colors or sizes" in page
 
 
 def test_what_is_missing_is_left_out(changed, tmp_path):

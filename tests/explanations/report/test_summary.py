@@ -44,12 +44,12 @@ def test_what_was_not_run_is_said_with_the_command_that_adds_it():
     assert "t-SNE" in found["summary.limits"] and "drone-rl explain" in found["summary.limits"]
     assert "shifts" in found["summary.robustness_unknown"]
     assert speak()["summary.limits"] == (
-        "Real cameras and drones, other colours, light or sizes and what was left out (embedding)."
+        "Real cameras and drones, other colors, light or sizes and what was left out (embedding)."
     )
 
 
 def test_sections_that_were_not_run_are_named_also_if_others_were_left_out():
     assert speak(tsne=None, response=None)["summary.limits"] == (
-        "Real cameras and drones, other colours, light or sizes, what was left out (embedding) and "
+        "Real cameras and drones, other colors, light or sizes, what was left out (embedding) and "
         "what was not run (response map; drone-rl explain adds it)."
     )

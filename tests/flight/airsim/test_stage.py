@@ -91,7 +91,7 @@ def test_spawned_objects_are_seen_and_destroyed(empty):
     assert all(map(empty.destroy, names))
 
 
-def test_segmentation_ids_are_colours(cubes):
+def test_segmentation_ids_are_colors(cubes):
     cubes.reset()
     assert cubes.set_id("cube_.*", 7, is_pattern=True)
     assert cubes.get_id("cube_2") == 7

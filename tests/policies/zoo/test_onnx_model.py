@@ -139,7 +139,7 @@ def test_frames_of_another_camera_raise(linear):
         (7, 9, [GRAY, {"name": "resize", "height": 10, "width": 20}], LINEAR),
         (5, 6, [STANDARD], {"name": "mlp", "hidden": [4]}),
     ],
-    ids=["default", "original", "averaged unevenly and blurred", "enlarged", "in colour"],
+    ids=["default", "original", "averaged unevenly and blurred", "enlarged", "in color"],
 )
 def test_model_agrees_with_the_pipeline(height, width, transforms, network):
     description = describe(height, width, transforms, network)

@@ -13,7 +13,7 @@ TINY = CameraModel(
 
 
 class Drawn:
-    """A renderer with an error in each pixel: colours are faces."""
+    """A renderer with an error in each pixel: colors are faces."""
 
     def __init__(self, error=(0.0, 0.0), ahead=4.0):
         self.error, self.ahead, self.appearances = error, ahead, 0

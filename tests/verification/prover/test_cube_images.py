@@ -30,7 +30,7 @@ def tiny():
     )
 
 
-def test_each_colour_is_a_number_of_its_own():
+def test_each_color_is_a_number_of_its_own():
     colors = np.array([[1, 2, 3], [3, 2, 1], [0, 0, 255], [255, 0, 0]], np.uint8)
     assert _packed(colors).tolist() == [0x030201, 0x010203, 0xFF0000, 0x0000FF]
 

@@ -37,7 +37,7 @@ def test_other_worlds_and_cameras():
     assert make(task, camera).check(500, np.random.RandomState(1)) > 450
 
 
-def test_colours_are_the_renderers(images):
+def test_colors_are_the_renderers(images):
     assert images.colors[FRONT].tolist() == [117, 18, 12]
     assert images.background.reshape(-1, 3).unique(dim=0).tolist() == [
         [123, 132, 118],
@@ -73,8 +73,8 @@ def test_one_cube_alone(images):
     assert faces[1, 12, 32] == FRONT and (faces[2] == NOTHING).all()
 
 
-def test_colours_of_nothing_that_is_known_are_refused(images):
-    with pytest.raises(InputError, match="none of the colours"):
+def test_colors_of_nothing_that_is_known_are_refused(images):
+    with pytest.raises(InputError, match="none of the colors"):
         images.read(np.zeros((1, 25, 64, 3), np.uint8))
 
 

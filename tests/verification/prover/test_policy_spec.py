@@ -103,7 +103,7 @@ def test_worlds_without_a_closed_form_are_refused(change, message):
     ("change", "message"),
     [
         ({"step_length": 0.3}, "are rounded"),
-        ({"cube_color": (0.0, 0.0, 0.0)}, "gives a face the colour of another"),
+        ({"cube_color": (0.0, 0.0, 0.0)}, "gives a face the color of another"),
     ],
 )
 def test_what_the_parts_refuse_is_refused(change, message):

@@ -1,4 +1,4 @@
-"""Appearance for the ray tracer's kernels: colours, lights, sky, fog, shadows and textures."""
+"""Appearance for the ray tracer's kernels: colors, lights, sky, fog, shadows and textures."""
 
 import math
 from typing import Any, TypeAlias
@@ -26,7 +26,7 @@ _Encoded: TypeAlias = "tuple[structs.Materials, structs.Effects | None]"
 
 
 class MaterialsEncoder:
-    """Encodes a scene's own colours and lights, and appearances that differ from them.
+    """Encodes a scene's own colors and lights, and appearances that differ from them.
 
     The last appearance is cached by identity; each set of textures is read once.
     """
@@ -86,7 +86,7 @@ class MaterialsEncoder:
         return materials
 
     def encode_effects(self, appearance: Appearance, zenith: Tensor) -> structs.Effects:
-        """Return the effects; `zenith` holds colours in [0, 1], shape (num_envs, 3)."""
+        """Return the effects; `zenith` holds colors in [0, 1], shape (num_envs, 3)."""
         count = len(zenith)
         names = tuple({n: 0 for t in appearance.textures.values() for n in t.images})
         texture = torch.full((count, self._scene.model.ngeom), -1, dtype=torch.int32)

@@ -1,4 +1,4 @@
-"""The ray tracer on a CPU, for flat colours and light: one image at a time, geom by geom.
+"""The ray tracer on a CPU, for flat colors and light: one image at a time, geom by geom.
 
 Rays are cast at each geom, in the geom's own frame, within the rectangle of pixels around its
 projection; the nearest hit owns the pixel. Then pixels are shaded, once for a span of consecutive

@@ -1,6 +1,6 @@
 """The renderer `raytrace`: a ray tracer of simple solids under distant lights, on CPU and GPU.
 
-Kernels by device and appearance: `plain_kernel` (CPU, flat colours), `effects_kernel` (CPU, with
+Kernels by device and appearance: `plain_kernel` (CPU, flat colors), `effects_kernel` (CPU, with
 fog, shadows, textures or a sky gradient) and `gpu_kernel` (both, on a GPU).
 """
 

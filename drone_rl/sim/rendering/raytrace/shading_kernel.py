@@ -1,4 +1,4 @@
-"""Shading: the colour of a surface from light, shadow, texture and fog; writing of pixels."""
+"""Shading: the color of a surface from light, shadow, texture and fog; writing of pixels."""
 
 import warp as wp
 
@@ -63,7 +63,7 @@ def shade_span_with_effects(
 def _find_surface(
     job: structs.Job, first: int, last: int, owner: int, distance: float
 ) -> structs.PixelValue:
-    """Return what a span shows, without its colour; set its distance to 0 if that is the sky."""
+    """Return what a span shows, without its color; set its distance to 0 if that is the sky."""
     shown = structs.PixelValue()
     shown.number = structs.NO_GEOM
     if owner == structs.NO_GEOM:

@@ -72,7 +72,7 @@ def mix_gray(
     green: float,
     blue: float,
 ) -> None:
-    """Write gray of colours by weights; each sum is rounded as by torch on x86."""
+    """Write gray of colors by weights; each sum is rounded as by torch on x86."""
 
 
 @wp.func_native("""
@@ -86,7 +86,7 @@ for (int i = first; i < last; ++i) {
 def shade_sky(
     job: Job, first: int, last: int, up: wp.vec3, horizon: wp.vec3, zenith: wp.vec3
 ) -> None:
-    """Colour the sky; `up` is the world's up axis in the camera's frame."""
+    """Color the sky; `up` is the world's up axis in the camera's frame."""
 
 
 _FADE = """
@@ -98,7 +98,7 @@ _FADE = """
     const float clear = two.number * (1.0f + part * (0.69314718f + part * (0.24022651f + part
         * (0.05550411f + part * (0.00961813f + part * 0.00133336f)))));
 """
-"""Fog: the fraction `clear` of a colour that passes, e^(-extinction distance), by a polynomial."""
+"""Fog: the fraction `clear` of a color that passes, e^(-extinction distance), by a polynomial."""
 _READ = """
 const float *const far = job.nearest.data;
 const int *const dark = job.dark.data;
@@ -127,7 +127,7 @@ for (int i = first; i < last; ++i) {{
     {_WRITE}
 }}""")
 def shade_plain(job: Job, first: int, last: int, light: SurfaceLight) -> None:
-    """Colour a flat face, with shadow and fog."""
+    """Color a flat face, with shadow and fog."""
 
 
 _AT_ONCE = """
@@ -214,7 +214,7 @@ def shade_textured(
     texture: TextureMap,
     texels: wp.array[wp.uint32],
 ) -> None:
-    """Colour a textured face; `light` has the colours of a white texel.
+    """Color a textured face; `light` has the colors of a white texel.
 
     Texels are interpolated bilinearly. The mip level follows from the number of texels that a pixel
     covers: half its base-2 logarithm, rounded.
