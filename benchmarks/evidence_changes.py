@@ -74,7 +74,8 @@ OF_VERDICTS = (
     ("fixed_seed", {"seed": None}),
 )  # fmt: skip
 _OTHER_ACTIONS = {"rounding.differing": 5}
-_EXCESSIVE = {"rounding.excessive": True, "rounding.fragile": 400, "rounding.fragile_rate": 0.2}
+_FRAGILE = {"rounding.fragile": 400, "rounding.fragile_rate": 0.2}
+_FEW_FRAMES = {"rounding.fragile": 40, "rounding.fragile_rate": 0.02}
 OF_EVALUATIONS = (
     ("computed", {"rounding": None}),
     ("computed", {"rounding.arithmetic": "float32 on cuda, PyTorch"}),
@@ -82,8 +83,13 @@ OF_EVALUATIONS = (
     ("computed.same", {"rounding": None}),
     ("computed.other", {"rounding.differing": 0}, _OTHER_ACTIONS),
     ("computed.other", {"rounding.differing": 6}, _OTHER_ACTIONS),
-    ("computed.fragile", {"rounding.excessive": False}, _EXCESSIVE),
-    ("computed.fragile", {"rounding.fragile": 300, "rounding.fragile_rate": 0.15}, _EXCESSIVE),
+    ("computed.fragile", _FEW_FRAMES, _FRAGILE),
+    ("computed.fragile", {"rounding.fragile": 300, "rounding.fragile_rate": 0.15}, _FRAGILE),
+    (
+        "computed.fragile",
+        {"rounding.fragile_episodes_rate": 0.2},
+        {**_FEW_FRAMES, "rounding.fragile_episodes_rate": 0.5},
+    ),
 )
 _CERTAIN_GOOD = {"verdict.kind": "good", "verdict.certain": True, "verdict.exit_code": 0}
 _NOT_CERTAIN = {"verdict.certain": False, "verdict.enough": 1600}

@@ -108,9 +108,9 @@ class FusedCollector:
 
         Batches get an entry "activations", which a `FusedNetwork` with this cache reads.
         """
-        parts = _MAX_ACTIVATIONS // (self._num_rows * self._network.num_outputs)
+        parts = _MAX_ACTIVATIONS // (self._num_rows * self._network.num_activations)
         if self._cache is None and parts:
-            self._cache = ActivationCache(parts * self._num_rows, self._network.num_outputs)
+            self._cache = ActivationCache(parts * self._num_rows, self._network.num_activations)
         return self._cache
 
     def collect(self, num_envs: int) -> TensorDictBase:

@@ -43,9 +43,9 @@ class ActivationCache:
     changes only a few pixels must remove the entry.
     """
 
-    def __init__(self, num_rows: int, num_outputs: int) -> None:
-        """Allocate memory for one batch of observations with `num_outputs` activations each."""
-        self.outputs = torch.empty(num_rows, num_outputs)
+    def __init__(self, num_rows: int, num_activations: int) -> None:
+        """Allocate memory for one batch of observations with `num_activations` each."""
+        self.outputs = torch.empty(num_rows, num_activations)
         """Written by the collector between `clear` and `add`."""
         self.generation = 0
         """Number of calls of `clear`."""

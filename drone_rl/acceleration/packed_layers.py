@@ -298,7 +298,7 @@ class PackedNetwork:
         layers.features_size = packed[layers.num_convolutions].num_inputs
         layers.logits_offset, layers.logits_stride = inputs, packed[-1].num_outs
         offsets = OutputOffsets.of(packed)
-        self.num_outputs = offsets.outputs[-1]
+        self.num_activations = offsets.outputs[-1]
         """Numbers of the outputs of all layers of a frame."""
         layers.output_offsets = as_indices(offsets.outputs)
         layers.kept_offsets = as_indices(offsets.kept)

@@ -21,7 +21,7 @@ class Transform(Variant):
     """Settings of a transform."""
 
     needs: ClassVar[str] = ""
-    """Required input: "bytes" (RGB of the camera), "floats", or "" for both."""
+    """Required input: "bytes" (RGB of the camera), "channels" first, "floats", or "" for any."""
 
     def output(self, frame: Frame) -> Frame | None:
         """Return shape and type of the output; None if only a call of the transform shows them.
@@ -31,6 +31,10 @@ class Transform(Variant):
         """
         if self.needs == "bytes" and (frame.is_float or frame.shape[-1] != 3):
             raise InputError(f"the transform {self.name} needs the camera's bytes; put it first")
+        if self.needs == "channels" and not frame.is_float and frame.shape[-1] == 3:
+            raise InputError(
+                f"the transform {self.name} needs channels first; put gray or rgb before it"
+            )
         if self.needs == "floats" and not frame.is_float:
             raise InputError(f"the transform {self.name} needs floats; put gray before it")
         return self._transformed(frame)
@@ -72,6 +76,7 @@ class Chromaticity(Transform, target="chromaticity"):
 class Standardize(Transform, target="standardize"):
     """Shift and scale: (x - mean) / std."""
 
+    needs: ClassVar[str] = "channels"
     mean: Annotated[float, Real(-1000.0, 1000.0)] = 0.53
     """Gray level that becomes 0."""
     std: Annotated[float, Real(1e-6, 1000.0)] = 0.21
@@ -84,6 +89,7 @@ class Standardize(Transform, target="standardize"):
 class Crop(Transform, target="crop"):
     """Crop to the rows from top (included) to bottom (excluded)."""
 
+    needs: ClassVar[str] = "channels"
     top: Annotated[int, Whole(0, 1023, "pixels")] = 5
     """First row."""
     bottom: Annotated[int, Whole(1, 1024, "pixels")] = 30

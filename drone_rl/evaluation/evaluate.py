@@ -201,7 +201,11 @@ EVALUATION = (
         "computed.fragile",
         "rounding can change the action in more frames or episodes than a verdict allows",
         lambda e: bool(
-            (found := e.get("rounding")) and found.get("excessive") and found["fragile"] > 0
+            (found := e.get("rounding"))
+            and (
+                found["fragile_rate"] > found["threshold"]
+                or found["fragile_episodes_rate"] > found["threshold_episodes"]
+            )
         ),
         _fragile,
     ),

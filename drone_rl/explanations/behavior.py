@@ -160,14 +160,15 @@ def find_loops(
     two, the drone is back where it was, and away again. No move undoes forward.
     """
     moves, episode = flights.tensor("actions"), flights.episode
-    sways = actions.sways({name: flights.tensor(name) for name in actions.fields()}).numpy()
+    kept = {name: flights.tensor(name) for name in actions.fields()}
+    reversible = actions.is_reversible(kept).numpy()
     turns = actions.undoes(moves[1:], moves[:-1])
-    is_new = (np.diff(episode) != 0) | (np.diff(sways.astype(int)) != 0)
+    is_new = (np.diff(episode) != 0) | (np.diff(reversible.astype(int)) != 0)
     starts = np.flatnonzero(np.concatenate([[True], is_new]))
     loops = []
     for start, end in zip(starts, [*starts[1:], len(moves)], strict=True):
         reversals = int(turns[start : end - 1].sum())
-        if reversals >= min_reversals and sways[start]:
+        if reversals >= min_reversals and reversible[start]:
             found = {"first": int(start), "length": int(end - start), "reversals": reversals}
             loops.append(found)
     return loops

@@ -1,7 +1,8 @@
 """Scores of heat maps by the effects of patches, and controls: placebos and shuffled weights.
 
 All patches of a frame have one size, so neither the size of a target nor the sharpness of a map
-matters: an uninformative map has a mean score of 0 with any policy.
+matters. A map of random values has a mean score of 0 with any policy. A map that follows only the
+scene can have a higher one, which the placebos measure.
 """
 
 import copy
@@ -22,7 +23,7 @@ from drone_rl.utils.intervals import episode_means, mean_bounds
 from drone_rl.utils.seeding import plain_generator
 
 PATCHES = 40  # approximate number of patches of a frame
-UNMOVED = 1e-4  # frames on which every patch has a smaller effect are left out of tests of maps
+MIN_EFFECT = 1e-4  # frames on which every patch has a smaller effect are left out of tests of maps
 TOP = 0.1  # fraction of the patches that count as those with the largest effect
 _EQUAL = 1e-6  # smaller differences are ties: of effects, and of heat relative to the map's maximum
 NO_HEAT = 1e-6  # heat up to this fraction of the map's maximum counts as none
@@ -115,9 +116,9 @@ def patch_effects(
     return torch.stack(effects).mean(0).double().cpu().numpy()
 
 
-def moving(effects: NDArray) -> NDArray:
+def has_effect(effects: NDArray) -> NDArray:
     """Return whether some patch of a frame affects the policy. Shape: (T,)."""
-    return effects.max(1) >= UNMOVED
+    return effects.max(1) >= MIN_EFFECT
 
 
 def scores(heat: NDArray, effects: NDArray) -> NDArray:
@@ -126,10 +127,10 @@ def scores(heat: NDArray, effects: NDArray) -> NDArray:
 
 
 def pointing(heat: NDArray, effects: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the fraction of the hottest patches, and of all (chance), with the largest effect.
+    """Return the fractions of the hottest patches, and of all (chance), among the most effective.
 
-    Heat and effects are (T, count), the fractions (T,). Chance is a tenth, more if effects tie,
-    less if other patches have none.
+    These are the tenth with the largest effects. Chance is more than a tenth if effects tie, and
+    less if fewer patches have any effect. Heat and effects are (T, count), the fractions (T,).
     """
     levels, moved = _levels(heat), np.round(effects / _EQUAL)
     number = max(1, round(TOP * effects.shape[1]))

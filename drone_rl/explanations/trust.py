@@ -58,7 +58,7 @@ class Trial:
     placebos: dict[str, Tensor]  # (T, h, w) each
     episode: NDArray  # (T,)
     grid: Grid
-    still: int = 0  # frames left out because no patch affects the policy
+    frames_without_effect: int = 0  # left out, as no patch affects the policy
     seed: int = 0
 
     def __getitem__(self, rows: NDArray) -> "Trial":
@@ -111,7 +111,7 @@ def measure(
     """
     grid = make_grid(*observations.shape[-2:])
     effects = patches.patch_effects(network, observations, others, grid)
-    moved = patches.moving(effects)
+    moved = patches.has_effect(effects)
     trial = Trial(
         network=network,
         observations=observations,
@@ -120,7 +120,7 @@ def measure(
         placebos=placebo_maps(observations, absent, others, seed),
         episode=episode,
         grid=grid,
-        still=int((~moved).sum()),
+        frames_without_effect=int((~moved).sum()),
         seed=seed,
     )
     return trial[moved]
@@ -185,7 +185,7 @@ def check_maps(
             for name, found in trial.placebo_scores.items()
         },
         "frames": len(trial.episode),
-        "frames_unmoved": trial.still,
+        "frames_unmoved": trial.frames_without_effect,
         "episodes": len(np.unique(trial.episode)),
         "level": level,
         "confidence": 1.0 - 2 * level,

@@ -1,7 +1,8 @@
-"""Return estimators, one for each of `objectives.returns`; they write "return_to_go".
+"""Return estimators as TorchRL transforms, applied by the collector to each batch.
 
-All but `TotalReward` and `LinearRamp` have a discount rate `gamma` in [0, 1] and raise `InputError`
-for another; the other arguments are those of `ReturnEstimator`.
+Each `ReturnEstimator` applies one function of `objectives.returns` and writes "return_to_go"; those
+with a discount rate `gamma` raise `InputError` unless it is in [0, 1]. `Advantages` is TorchRL's
+GAE, for learners with a critic.
 """
 
 import abc

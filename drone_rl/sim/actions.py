@@ -184,7 +184,7 @@ class Actions(abc.ABC):
         """Return these entries; "actions" are the parts. (T), then the entry's, to (T, *)."""
 
     @abc.abstractmethod
-    def sways(self, kept: Mapping[str, Tensor]) -> Tensor:
+    def is_reversible(self, kept: Mapping[str, Tensor]) -> Tensor:
         """Return whether actions, as `kept`, are steps of going back and forth. (T,), bool."""
 
 
@@ -238,7 +238,7 @@ class DiscreteActions(Actions):
         """Return the action's number."""
         return {"actions": action}
 
-    def sways(self, kept: Mapping[str, Tensor]) -> Tensor:
+    def is_reversible(self, kept: Mapping[str, Tensor]) -> Tensor:
         """Return whether actions have an opposite."""
         return self.can_be_undone(kept["actions"])
 

@@ -166,7 +166,7 @@ class ComposerTask(composer.Task):
     def after_substep(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         """Record the contacts of a quadrotor."""
         if self._flight is not None:
-            self._flight.moved(physics)
+            self._flight.record_contacts(physics)
 
     def after_step(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         """Apply the task's rules."""

@@ -153,7 +153,7 @@ class ContinuousActions(Actions):
         forward, aside, turning = self.speeds
         return {**super().as_dict(), "speeds": [forward, aside, math.degrees(turning)]}
 
-    def sways(self, kept: Mapping[str, Tensor]) -> Tensor:
+    def is_reversible(self, kept: Mapping[str, Tensor]) -> Tensor:
         """Return whether actions go or turn to a side, forward at most at a third of full speed."""
         is_slow = kept["rates"][..., FORWARD] <= ASIDE * self.speeds[FORWARD]
         return self.can_be_undone(kept["actions"]) & is_slow

@@ -96,7 +96,7 @@ class MujocoFlight:
         physics.data.qpos[self._pose] = numbers[fs.POSITION : fs.VELOCITY]
         physics.data.qvel[self._motion] = numbers[fs.VELOCITY : fs.ROTORS]
         physics.data.xfrc_applied[self._body] = 0.0
-        self._left = physics.data.qpos[self._pose].copy()
+        self._last_pose = physics.data.qpos[self._pose].copy()
         self.level_cameras(physics)
 
     def found(self, physics: mjcf.Physics) -> FlightState:
@@ -105,7 +105,7 @@ class MujocoFlight:
         now[0, fs.POSITION : fs.VELOCITY] = torch.from_numpy(physics.data.qpos[self._pose])
         now[0, fs.VELOCITY : fs.ROTORS] = torch.from_numpy(physics.data.qvel[self._motion])
         state = FlightState(now)
-        is_moved = not np.array_equal(physics.data.qpos[self._pose], self._left)
+        is_moved = not np.array_equal(physics.data.qpos[self._pose], self._last_pose)
         return state.settled() if is_moved else state
 
     def command(self, physics: mjcf.Physics, action: Tensor) -> FlightState:
@@ -117,22 +117,22 @@ class MujocoFlight:
     def set_goals(self, physics: mjcf.Physics, body: FlightState, goals: Goals) -> None:
         """Begin goals for a drone whose motion MuJoCo already has."""
         self._state, self._goals, self._tick = body, goals, 0
-        self._left = physics.data.qpos[self._pose].copy()
+        self._last_pose = physics.data.qpos[self._pose].copy()
 
     def push(self, physics: mjcf.Physics) -> None:
         """Apply a tick's forces, before MuJoCo's step."""
         if self._goals is None:
             return
-        self._left = physics.data.qpos[self._pose].copy()
+        self._last_pose = physics.data.qpos[self._pose].copy()
         body, pushes = forces(self.quadrotor.frame, self.found(physics), self._goals, self._tick)
         physics.data.xfrc_applied[self._body] = pushes[0].numpy()
         if self._is_grounded and pushes[0, 2] < self._settings.mass * GRAVITY:
             physics.data.xfrc_applied[self._body, 3:] -= self._rocking(physics)
         self._state, self._tick = body, self._tick + 1
 
-    def moved(self, physics: mjcf.Physics) -> None:
+    def record_contacts(self, physics: mjcf.Physics) -> None:
         """Record contacts after MuJoCo's step; obstacles count more than the ground."""
-        self._left = physics.data.qpos[self._pose].copy()
+        self._last_pose = physics.data.qpos[self._pose].copy()
         data, row = physics.data, self._state.numbers[0]
         self._is_grounded = False
         for contact in data.contact[: data.ncon]:

@@ -159,7 +159,8 @@ class Text:
 
     def read(self, value: Any, where: str) -> str:
         """See `Kind`; a path or a device of torch is its text."""
-        if isinstance(value, os.PathLike) or type(value).__module__ == "torch":
+        is_device = f"{type(value).__module__}.{type(value).__name__}" == "torch.device"
+        if is_device or isinstance(value, os.PathLike):
             value = str(value)
         if not isinstance(value, str) or len(value) > self.longest or not value.isprintable():
             raise InputError(

@@ -7,7 +7,7 @@ import pytest
 
 from drone_rl.cli.evaluation import PlayCommand
 from drone_rl.config import AppearanceSettings, TaskSettings
-from drone_rl.config.configuration import as_config, from_config, variant_of
+from drone_rl.config.configuration import Changes, as_changes, as_config, from_config, variant_of
 from drone_rl.config.learning import Adam, Optimizer
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import TrainerSettings, TrainSettings
@@ -94,3 +94,14 @@ def test_settings_that_may_be_none_are_made_of_mappings_too():
 def test_an_appearance_without_room_is_refused_with_the_training():
     with pytest.raises(InputError, match="puts the camera into the ground"):
         TrainSettings(appearance=AppearanceSettings(camera_offset=(0.0, 0.0, -3.0)))
+
+
+def test_changes_of_settings_have_names():
+    assert as_changes(None, "task") == {}
+    assert as_changes({"num_cubes": 2}, "task") == {"num_cubes": 2}
+    assert as_changes(TaskSettings(num_cubes=2), "task")["num_cubes"] == 2
+    for wrong in (5, "pillars", [1]):
+        with pytest.raises(InputError, match=r"^task=.* gives no changes; .*'num_cubes': 5"):
+            as_changes(wrong, "task")
+    with pytest.raises(InputError, match=r"^task\.name='pillars' would replace the task, which is"):
+        Changes(TaskSettings).read({"name": "pillars"}, "task")

@@ -7,7 +7,9 @@ FOUND = {
     "frames": 2000,
     "fragile": 400,
     "fragile_rate": 0.2,
-    "excessive": True,
+    "threshold": 0.1,
+    "fragile_episodes_rate": 0.5,
+    "threshold_episodes": 0.6,
     "compared": "fused kernel",
     "compared_episodes": 50,
     "differing": 0,
@@ -27,8 +29,10 @@ def test_an_evaluation_that_depends_on_rounding_says_so_even_if_both_implementat
 
 
 def test_few_frames_and_other_differences_are_not_called_fragile():
-    for changes in ({"excessive": False}, {"fragile": 0, "differing": 9}):
+    few = {"fragile": 20, "fragile_rate": 0.01}
+    for changes in (few, {**few, "differing": 9, "unexplained": 9, "excessive": True}):
         assert "only" not in said(**changes)
+    assert "in 20 of 2,000" in said(**few, fragile_episodes_rate=0.7)
     assert "decisions depend on rounding" in said(fragile=0, differing=9)
 
 

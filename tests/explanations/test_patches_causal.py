@@ -6,7 +6,7 @@ import torch
 
 from drone_rl.explanations.patches import (
     Grid,
-    moving,
+    has_effect,
     patch_effects,
     pointing,
     rank_correlation,
@@ -105,7 +105,7 @@ def test_pointing_where_patches_tie():
 
 def test_pictures_on_which_nothing_moves_the_policy():
     effects = np.array([[0.0, 0.99e-4], [0.0, 1e-4], [0.2, 0.5]])
-    assert moving(effects).tolist() == [False, True, True]
+    assert has_effect(effects).tolist() == [False, True, True]
 
 
 def test_rank_correlation_by_hand():

@@ -196,9 +196,9 @@ def test_nothing_is_trusted_about_a_policy_that_nothing_moves(trial):
 
 
 def test_a_trial_is_a_fact(trial):
-    assert (trial.seed, trial.still) == (0, 0)
+    assert (trial.seed, trial.frames_without_effect) == (0, 0)
     with pytest.raises(dataclasses.FrozenInstanceError):
-        trial.still = 1
+        trial.frames_without_effect = 1
     with pytest.raises(TypeError):  # nine fields, told apart by name alone
         Trial(*vars(trial).values())
 
@@ -230,7 +230,7 @@ def test_a_trial_of_a_policy_in_the_simulator(world, scenes, dataset):
     assert made.seed == 0
     assert made.effects.shape == (len(made.episode), 40) == (len(made.observations), 40)
     rows = patches.sample_frames(dataset.episode, trust.FRAMES_AN_EPISODE)
-    assert len(made.episode) + made.still == len(rows)
+    assert len(made.episode) + made.frames_without_effect == len(rows)
     torch.testing.assert_close(
         made.observations, dataset.tensor("observations")[rows][: len(made.episode)]
     )
@@ -240,6 +240,6 @@ def test_a_trial_of_a_policy_in_the_simulator(world, scenes, dataset):
     blind = trust.make_trial(
         scenes, network, dataset.state(scenes.task), dataset.tensor("actions"), dataset.episode
     )
-    assert len(blind.episode) == 0 and blind.still == len(rows)
+    assert len(blind.episode) == 0 and blind.frames_without_effect == len(rows)
     found = check_maps(blind, method_maps(Explainer(network, torch.zeros(1, 25, 64))))
     assert found["trusted"] is None

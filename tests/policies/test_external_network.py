@@ -83,8 +83,8 @@ def test_module_is_copied_in_eval_mode():
 @pytest.mark.parametrize(
     ("logits", "message"),
     [
-        (nn.Linear(7, 3), r"can't take images of shape \(1, 1, 2, 4\) \(RuntimeError: .*\); give "
-         "the camera and transforms that it was trained with"),
+        (nn.Linear(7, 3), r"can't take images of shape \(1, 1, 2, 4\), torch\.float32 "
+         r"\(RuntimeError: .*\); give the camera and transforms that it was trained with"),
         (lambda x: x.fly(), "can't take images of .*AttributeError: 'Tensor' object has no"),
         (lambda x: left_half(x)[:, :2], r"returned logits of shape \(1, 2\); give one that returns "
          r"\(1, 3\), one for each of forward, left, right"),
@@ -122,3 +122,11 @@ def test_uncopyable_module_raises():
 def test_numpy_float64_is_converted():
     network = make(lambda x: np.asarray(left_half(x).detach(), np.float64))
     assert network(torch.ones(2, *SHAPE)).dtype == torch.float32
+
+
+def test_the_type_of_parameters_is_named():
+    network = nn.Sequential(nn.Flatten(), nn.Linear(8, 3)).double()
+    with pytest.raises(InputError, match=r"give network\.float\(\), since its parameters"):
+        make(network)
+    with pytest.raises(InputError, match="give the camera and transforms"):
+        make(nn.Sequential(nn.Flatten(), nn.Linear(9, 3)))

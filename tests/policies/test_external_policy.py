@@ -140,16 +140,16 @@ def test_stable_baselines3_model_uses_its_training_observations():
 
 
 def test_network_attributes_define_transforms():
-    class Color:
+    class Colour:
         observation_shape = (3, 8, 9)
 
         def __call__(self, images):
             return left(images)
 
-    policy = drone_rl.policy_from(Color())
+    policy = drone_rl.policy_from(Colour())
     assert policy.transforms == (Rgb(),) and policy.make_network().in_shape == (3, 8, 9)
     given = drone_rl.CameraSettings(width=12, height=10)
-    policy = drone_rl.policy_from(Color(), camera=given, transforms=[Gray()])
+    policy = drone_rl.policy_from(Colour(), camera=given, transforms=[Gray()])
     assert policy.make_network().in_shape == (1, 10, 12)
     assert drone_rl.policy_from(left).transforms == (Gray(), Standardize())
 
@@ -228,3 +228,8 @@ def test_dynamics_can_be_replaced(monkeypatch):
         assert isinstance(env.base_env.worlds.dynamics, Turning)
     with pytest.raises(InputError, match=r"^dynamics\.mass=-1\.0"):
         policy.in_dynamics(mass=-1.0)
+
+
+def test_a_class_is_no_policy():
+    with pytest.raises(InputError, match=r"^policy=Flatten is a class; .* such as Flatten\(\)$"):
+        drone_rl.policy_from(nn.Flatten)

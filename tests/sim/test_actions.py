@@ -32,7 +32,7 @@ def test_recorded_actions_are_indices():
     action = torch.tensor([0, 4, 2])
     assert FIVE.part(action) is action and FIVE.kept(action) == {"actions": action}
     assert FIVE.fields() == {"actions": "action taken: 0 up, 1 down, 2 left, 3 right, 4 stay"}
-    assert FIVE.sways(FIVE.kept(action)).tolist() == [True, False, True]
+    assert FIVE.is_reversible(FIVE.kept(action)).tolist() == [True, False, True]
 
 
 def test_probabilities_are_the_softmax_of_outputs():

@@ -156,7 +156,7 @@ def test_recorded_actions_have_rates_and_parts():
 
 def test_lateral_motion_without_progress_is_swaying():
     action = torch.tensor([[-1.0, 0.5, 0], [-0.3, 0.5, 0], [-0.4, 0, -0.5], [-1, 0.2, 0.2]])
-    assert ALL.sways(ALL.kept(action)).tolist() == [True, False, True, False]
+    assert ALL.is_reversible(ALL.kept(action)).tolist() == [True, False, True, False]
 
 
 def test_as_dict_has_names_arrows_and_colors():

@@ -61,7 +61,7 @@ class Both:
         for _ in range(ticks):
             self.flight.push(self.physics)
             self.physics.step()
-            self.flight.moved(self.physics)
+            self.flight.record_contacts(self.physics)
         self.there = self.flight.finished(self.physics)
         return self
 

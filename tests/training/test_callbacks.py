@@ -13,7 +13,7 @@ from drone_rl.training import (
     ProgressCallback,
     callbacks,
 )
-from drone_rl.training.callbacks import CollapseCheck, ForwardProgress
+from drone_rl.training.callbacks import CollapseCheck, ForwardProgress, with_progress
 from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.utils.errors import InputError
 from tests.training_loop import run
@@ -228,3 +228,14 @@ def test_checkpoints_are_saved_at_intervals(make_trainer, monkeypatch, tmp_path)
         clock.now = now
         callback.on_update(trainer, {})
     assert saved == [1060.0, 1100.0]  # the time of each save
+
+
+def test_progress_is_forwarded_after_the_callbacks():
+    mine, seen = CsvCallback("metrics.csv"), []
+    found = with_progress([mine], lambda *given: seen.append(given))
+    assert found[0] is mine and isinstance(found[1], ForwardProgress) and len(found) == 2
+    for wrong in ([print], print, [CsvCallback]):
+        with pytest.raises(InputError, match=r"^callbacks"):
+            with_progress(wrong, None)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(InputError, match=r"^progress=5"):
+        with_progress([mine], 5)  # pyright: ignore[reportArgumentType]

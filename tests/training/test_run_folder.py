@@ -52,3 +52,9 @@ def test_lost_control_is_possible_only_with_dynamics():
     flying = TrainSettings(dynamics=DynamicsSettings(mode="simple_flight"))
     names = [[end.name for end in possible_ends(s)] for s in (TrainSettings(), flying)]
     assert "LOST_CONTROL" not in names[0] and names[1] == [*names[0], "LOST_CONTROL"]
+
+
+def test_a_checkpoint_is_no_folder_to_resume(tmp_path):
+    path = tmp_path / "checkpoints" / "last.pt"
+    with pytest.raises(InputError, match=r"last\.pt is a checkpoint; give the folder of its run"):
+        RunFolder.open(path, resume=True)

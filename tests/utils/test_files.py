@@ -5,11 +5,13 @@ import math
 import multiprocessing
 import os
 import subprocess
+from pathlib import Path
 
 import pytest
 
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import (
+    as_path,
     folder_lock,
     is_locked,
     newest,
@@ -230,3 +232,10 @@ def test_a_folder_of_too_many_files(tmp_path, monkeypatch):
     monkeypatch.setattr("drone_rl.utils.files.FOLDER_ENTRIES", 2)
     with pytest.raises(InputError, match="more than 2 files and folders"):
         refuse_links(tmp_path)
+
+
+def test_paths_are_text_or_paths():
+    assert as_path("a/b", "folder") == as_path(Path("a/b"), "folder") == Path("a/b")
+    for wrong in (5, None, ["a"], b"a"):
+        with pytest.raises(InputError, match=r"^folder=.* is no path; give the path of a"):
+            as_path(wrong, "folder")  # pyright: ignore[reportArgumentType]

@@ -1,6 +1,9 @@
 import logging
 
-from drone_rl.utils.progress import Bar, log, silent
+import pytest
+
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import Bar, as_progress, log, silent
 
 
 def test_a_bar_ends_when_all_is_done(capsys):
@@ -28,3 +31,11 @@ def test_a_line_in_the_log(caplog):
         log("section")
     assert caplog.messages == ["[1/3] flying", "section"]
     silent("nothing")
+
+
+def test_progress_is_a_function_and_a_bar_by_default():
+    assert isinstance(as_progress(None), Bar)
+    assert as_progress(silent) is silent
+    for wrong in (True, False, 5, "bar"):
+        with pytest.raises(InputError, match=rf"^progress={wrong!r} is no function; leave it out"):
+            as_progress(wrong)  # pyright: ignore[reportArgumentType]

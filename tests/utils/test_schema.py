@@ -1,7 +1,10 @@
 """Each kind takes what it should, at its very bounds, and refuses the next value by name."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import torch
 
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import (
@@ -182,3 +185,11 @@ def test_numbers_of_numpy_are_numbers():
         Whole(0, 9).read(True, "x")
     with pytest.raises(InputError, match="is out of range"):
         Whole(0, 9).read(np.float64(3.0), "x")
+
+
+def test_paths_and_devices_are_their_text():
+    assert Text(20).read(Path("a/b.pt"), "x") == "a/b.pt"
+    assert Text(20).read(torch.device("cuda", 1), "x") == "cuda:1"
+    for wrong in (torch.tensor(1), torch.float32):
+        with pytest.raises(InputError, match=r"^x=.* is no text"):
+            Text(20).read(wrong, "x")

@@ -155,3 +155,10 @@ def test_a_place_for_an_onnx_model_that_is_none(tmp_path, monkeypatch):
     monkeypatch.setattr(exporting, "open_onnx", lambda _: lambda f: torch.zeros(len(f), 3))
     with pytest.raises(InputError, match=r"nowhere/m\.onnx can't be written"):
         drone_rl.export_onnx(drone_rl.load_policy("poor"), tmp_path / "nowhere" / "m.onnx")
+
+
+def test_a_folder_is_refused_before_the_conversion(tmp_path):
+    with pytest.raises(InputError, match=r"is a folder; give a file in it, such as policy\.onnx"):
+        drone_rl.export_onnx("good", tmp_path)
+    with pytest.raises(InputError, match=r"^target=5 is no path"):
+        drone_rl.export_onnx("good", 5)  # pyright: ignore[reportArgumentType]

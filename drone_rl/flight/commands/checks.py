@@ -124,7 +124,7 @@ def quadrotor(
         return dynamics
     if dynamics is not None and not isinstance(dynamics, DynamicsSettings):
         raise InputError(
-            f"dynamics={_shown(dynamics)} is no DynamicsSettings; give changes by name, as in "
+            f"dynamics={shown(dynamics)} is no DynamicsSettings; give changes by name, as in "
             "Pilot(mass=1.3), or worlds=Worlds(1, task) for a scene"
         )
     return Quadrotor((dynamics or DynamicsSettings()).replace(mode="simple_flight", **changes))

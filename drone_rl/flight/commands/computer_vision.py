@@ -39,8 +39,8 @@ KEYS: Mapping[str, tuple[tuple[float, float, float], tuple[float, float, float]]
 and yaw."""
 
 
-class ComputerVisionDrone(Drone):
-    """A drone whose pose can be set, and whose scene has named objects."""
+class SceneDrone(Drone):
+    """Base of `Pilot`: poses in computer-vision mode; the scene's objects in any mode."""
 
     def set_pose(
         self, position: Sequence[float], *, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0

@@ -19,7 +19,7 @@ from drone_rl.flight.commands.command import (
     TimedCommand,
     goals_of,
 )
-from drone_rl.flight.commands.computer_vision import ComputerVisionDrone
+from drone_rl.flight.commands.computer_vision import SceneDrone
 from drone_rl.flight.commands.conventions import to_simulator
 from drone_rl.flight.commands.path_following import (
     AUTOMATIC,
@@ -65,7 +65,7 @@ class Sticks:
             object.__setattr__(self, field.name, number)
 
 
-class Pilot(ComputerVisionDrone):
+class Pilot(SceneDrone):
     """Flies one drone by the commands of AirSim (Tables 2 and 3), over simulated time.
 
     World frame: x forward, y left, z up, metres. Angles are in degrees and have AirSim's signs:

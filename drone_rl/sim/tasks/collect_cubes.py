@@ -100,7 +100,7 @@ class CollectCubes(PropTask[WorldState]):
 
     @property
     def entries(self) -> Mapping[str, Entry]:
-        """Algorithm 3's info: the state's fields, and the number of cubes collected."""
+        """Algorithm 3's info: "cubes" is the number collected; see `State` for the others."""
         cubes = self.settings.num_cubes
         return {
             "cubes": Entry((1,), torch.int64, 0, cubes),
@@ -255,8 +255,9 @@ class CollectCubes(PropTask[WorldState]):
 
     def tally(self, info: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
         """Return the number of cubes collected, and of cubes left behind."""
-        collected = info["collected"].sum(-1)
-        return collected, info["next_cube"][:, 0] - collected
+        collected, next_cube = info["collected"], info["next_cube"]
+        is_behind = torch.arange(collected.shape[-1], device=next_cube.device) < next_cube
+        return collected.sum(-1), (is_behind & ~collected).sum(-1)
 
     def recall(self, kept: Mapping[str, Tensor], body: BodyState) -> WorldState:
         """Return states as they were, except side and lateral, which are not kept."""

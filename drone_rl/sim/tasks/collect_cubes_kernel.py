@@ -1,4 +1,7 @@
-"""The rules of cube collection, stated by the Warp function `step` alone."""
+"""The rules of cube collection: the Warp function `step`.
+
+Only `CollectCubes.touch`, for flights without steps, states the rule of contact again.
+"""
 
 import enum
 import functools

@@ -1,10 +1,10 @@
 """Consistency of a certificate: an exact partition, exact fractions, possible outcomes.
 
 Whether boxes partition a cube is decided without tolerance. The mixed derivative of a box's
-indicator function is a sum of deltas at its corners, with sign plus where an even number of edges
-are low ones. Functions that vanish far away are equal if and only if their derivatives are; so
-boxes cover each point of the cube exactly once, and none outside, if and only if their signed
-corners cancel except for those of the cube.
+indicator function is a sum of deltas at its corners, with sign plus where an even number of its
+coordinates are upper ends. Functions that vanish far away are equal if and only if their
+derivatives are; so boxes cover each point of the cube exactly once, and none outside, if and only
+if their signed corners cancel except for those of the cube.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,9 +34,10 @@ def volume(boxes: NDArray[np.float64]) -> Fraction:
 def find_partition_error(
     boxes: NDArray[np.float64], bound: float
 ) -> tuple[list[float], int] | None:
-    """Return a point of [-bound, bound]^n not held by exactly one box, and by how many.
+    """Return a point that refutes a partition of [-bound, bound]^n, and how many boxes hold it.
 
-    None if nonempty boxes, shape (boxes, n, 2), are a partition.
+    The point lies inside and not in exactly one box, or outside and in a box. None if nonempty
+    boxes, shape (boxes, n, 2), are a partition.
     """
     n = boxes.shape[1]
     cube = np.full((1, n, 2), (-bound, bound))
@@ -168,7 +169,8 @@ def find_wrong_step_counts(
 ) -> Iterator[str]:
     """Yield the stated fractions of step counts that random episodes refute, one line each.
 
-    `owner` (flights,) has each episode's outcome; their number where nothing is stated.
+    `owner`, (episodes,), has the index of each episode's outcome, or the number of outcomes if no
+    stated outcome is the episode's.
     """
     for i, outcome in enumerate(outcomes):
         here, missing = steps[owner == i], missing_steps(outcome)

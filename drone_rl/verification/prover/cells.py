@@ -91,7 +91,7 @@ class Cells:
 def _bands(
     camera: CameraModel, ahead: float, lowest: float, highest: float, narrower: float
 ) -> NDArray:
-    """Return the bands that would intersect an interval if none were narrower. Shape: (N, 2)."""
+    """Return the bands, narrowed, of the borders whose full bands intersect an interval. (N, 2)."""
     places, widest = camera.borders(ahead)
     errors = widest / narrower + camera.rounding(places)
     bands = unite(np.stack([places - errors, places + errors], -1), 4 * SLIVER)
@@ -115,9 +115,10 @@ def _middle_faces(camera: CameraModel, ahead: float, limits: NDArray) -> NDArray
 def _within(
     bands: NDArray, camera: CameraModel, ahead: float, renderer: CubeView
 ) -> list[NDArray[np.uint8]] | None:
-    """Return the images inside each band, without the neighbours'; None if it is too narrow.
+    """Return the images inside each band, without those of the neighbouring cells.
 
-    It is if a neighbour's image is not visible as far inside its ends as rounding may move a cube.
+    None if a band is too narrow: a point inside its end, by as much as rounding may move a cube,
+    does not show the neighbouring cell's image.
     """
     if not len(bands):
         return []

@@ -154,3 +154,9 @@ def test_missing_extra_raises_with_install_command(monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3", None)
     with pytest.raises(InputError, match=r"pip install -e '.\[sb3\]' in the checkout$"):
         import drone_rl.envs.sb3.worlds  # noqa: F401
+
+
+@pytest.mark.parametrize("given", [NAME, 4])
+def test_only_vector_environments_are_adapted(given):
+    with pytest.raises(InputError, match=r"^env=.* is no vector environment; give gymnasium\.make"):
+        drone_rl.Sb3Worlds(given)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.config import TaskSettings
 from drone_rl.flight.commands import checks
 from drone_rl.utils.errors import InputError
 
@@ -70,3 +71,9 @@ def test_what_is_no_path(path, told):
     with pytest.raises(InputError, match=told) as error:
         checks.path(path)
     assert "\n" not in str(error.value)
+
+
+def test_dynamics_of_another_type_are_named():
+    for wrong in (TaskSettings(), "good", 5):
+        with pytest.raises(InputError, match=r"^dynamics=.* is no DynamicsSettings; give changes"):
+            checks.quadrotor(wrong, {})  # pyright: ignore[reportArgumentType]

@@ -7,6 +7,7 @@ from drone_rl.flight.commands.command import hold
 from drone_rl.flight.commands.drone import Drone
 from drone_rl.flight.commands.state import LandedState
 from drone_rl.sim.dynamics.control import rotor_goals
+from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 
 
@@ -99,3 +100,16 @@ def test_a_notebook_shows_the_state_as_a_table(drone):
     shown = drone._repr_html_()
     assert "landed, armed" in shown
     assert f"<td>ground, {drone.state.collision.time:.2f} s</td>" in shown
+
+
+def test_wrong_worlds_cameras_and_requests_are_named():
+    with pytest.raises(InputError, match=r"^worlds=1 is no Worlds"):
+        Drone(worlds=1)  # pyright: ignore[reportArgumentType]
+    worlds = Worlds(1)
+    drone = Drone(worlds=worlds)
+    assert torch.equal(drone.picture(0), drone.picture("front_center"))
+    with pytest.raises(InputError, match="front_center"):
+        drone.picture("front")
+    with pytest.raises(InputError, match="requests"):
+        drone.images("front_center")  # pyright: ignore[reportArgumentType]
+    worlds.close()

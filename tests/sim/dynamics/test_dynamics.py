@@ -4,12 +4,13 @@ import pytest
 import torch
 from torchrl.envs.utils import check_env_specs
 
-from drone_rl.config import MOVES_SETTINGS
+from drone_rl.config import MOVES_SETTINGS, DynamicsSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.sim.composer_task import make_environment
-from drone_rl.sim.dynamics import Dynamics
+from drone_rl.sim.dynamics import ComputerVision, Dynamics, make_dynamics
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
 from tests.composer_env import ComposerEnv
 from tests.fake_flight import FLIGHT, Floating, floating
@@ -152,3 +153,11 @@ def test_lost_drone_ends_only_its_own_episode():
     assert state["info", "end_reason"].flatten().tolist() == [5, 0]
     assert state["terminated"].flatten().tolist() == [True, False]
     env.close()
+
+
+def test_values_of_another_type_are_named():
+    for wrong in ("quadrotor", DynamicsSettings, 5):
+        with pytest.raises(InputError, match=r"^dynamics=.* give settings such as drone_rl\.Dyn"):
+            make_dynamics(ComputerVision, wrong)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(InputError, match=r"^actions='moves'"):
+        make_dynamics(ComputerVision, None, "moves")  # pyright: ignore[reportArgumentType]
