@@ -277,7 +277,7 @@ def render_chase(worlds: Worlds, look: Appearance | None, height: int, width: in
     With flight dynamics the chase camera follows the heading only, so that tilt is visible.
 
     Returns:
-        Colours. Shape: (num_envs, height, width, 3), uint8.
+        Colors. Shape: (num_envs, height, width, 3), uint8.
     """
     view = worlds.view(CHASE.name, height=height, width=width, show_drone=True)
     state = worlds.state

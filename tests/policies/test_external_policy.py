@@ -140,16 +140,16 @@ def test_stable_baselines3_model_uses_its_training_observations():
 
 
 def test_network_attributes_define_transforms():
-    class Colour:
+    class Color:
         observation_shape = (3, 8, 9)
 
         def __call__(self, images):
             return left(images)
 
-    policy = drone_rl.policy_from(Colour())
+    policy = drone_rl.policy_from(Color())
     assert policy.transforms == (Rgb(),) and policy.make_network().in_shape == (3, 8, 9)
     given = drone_rl.CameraSettings(width=12, height=10)
-    policy = drone_rl.policy_from(Colour(), camera=given, transforms=[Gray()])
+    policy = drone_rl.policy_from(Color(), camera=given, transforms=[Gray()])
     assert policy.make_network().in_shape == (1, 10, 12)
     assert drone_rl.policy_from(left).transforms == (Gray(), Standardize())
 

@@ -12,7 +12,7 @@ from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 
 
-class OneColour:
+class OneColor:
     """Render all pixels in the color of the sky; only RGB is supported."""
 
     def __init__(self, scene, *, num_envs, num_shards, device):
@@ -37,7 +37,7 @@ class OneColour:
 
 
 def test_worlds_use_a_custom_renderer():
-    worlds = Worlds(2, renderer=OneColour)
+    worlds = Worlds(2, renderer=OneColor)
     pixels = worlds.render(worlds.state)
     assert pixels.shape == (2, 25, 64, 3)
     assert pixels.unique(dim=-2).flatten(0, -2).unique(dim=0).tolist() == [[158, 188, 234]]
@@ -46,15 +46,15 @@ def test_worlds_use_a_custom_renderer():
 
 
 def test_unsupported_view_raises_one_line():
-    worlds = Worlds(2, renderer=OneColour)
+    worlds = Worlds(2, renderer=OneColor)
     with pytest.raises(
-        InputError, match="modality='depth' can't be rendered by OneColour; give one of: rgb"
+        InputError, match="modality='depth' can't be rendered by OneColor; give one of: rgb"
     ):
         worlds.render(worlds.state, worlds.view(modality="depth"))
 
 
 def test_environment_uses_and_closes_the_renderer():
-    env = DroneEnv(3, renderer=OneColour)
+    env = DroneEnv(3, renderer=OneColor)
     check_env_specs(env)
     renderer = env.worlds.renderer
     assert renderer.prepared[0] == env.worlds.policy_view
@@ -63,7 +63,7 @@ def test_environment_uses_and_closes_the_renderer():
 
 
 def test_explanations_use_its_images():
-    env = with_transforms(DroneEnv(2, renderer=OneColour), [GrayPixels(), StandardizePixels()])
+    env = with_transforms(DroneEnv(2, renderer=OneColor), [GrayPixels(), StandardizePixels()])
     scenes = Scenes(env)
     seen = scenes.observe(place_target(scenes, torch.tensor([5.0, 9.0]), torch.zeros(2)))
     assert seen.shape == (2, 1, 25, 64) and len(seen.unique()) == 1

@@ -90,7 +90,7 @@ class Poses:
 
 @struct
 class Materials:
-    """Colours and lights; first dimension: one for all environments or one each."""
+    """Colors and lights; first dimension: one for all environments or one each."""
 
     colors: wp.array2d[wp.vec3]
     ambient: wp.array2d[wp.vec3]
@@ -168,7 +168,7 @@ class PixelValue:
 
 @struct
 class SurfaceLight:
-    """Colours, 0 to 255 or more, of a surface in the sun and in shadow, and its fog."""
+    """Colors, 0 to 255 or more, of a surface in the sun and in shadow, and its fog."""
 
     lit: wp.vec3
     shaded: wp.vec3
@@ -204,7 +204,7 @@ class Scratch:
     dark: wp.array2d[int]
     """Whether that surface is in shadow; used with shadows only."""
     colors: wp.array2d[wp.vec3ub]
-    """Colours, where they differ from pixel to pixel."""
+    """Colors, where they differ from pixel to pixel."""
     geom_views: wp.array2d[GeomView]
 
 
