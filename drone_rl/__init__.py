@@ -1,4 +1,4 @@
-"""Train, evaluate and audit vision policies of a drone, with pip alone.
+"""Train, evaluate and audit vision policies of a drone. Installs with pip alone.
 
 Public names are imported when they are first used, so that `import drone_rl` is fast.
 """
@@ -100,7 +100,7 @@ if TYPE_CHECKING:
     from drone_rl.verification.prove import load_proof as load_proof
     from drone_rl.verification.prove import prove as prove
 
-__version__ = "0.1.0"
+__version__ = "0.2.0.dev0"
 
 # the imports above are for type checkers, and the list of public names
 with open(__file__, encoding="utf-8") as _own_source:  # importing pathlib takes longer
@@ -128,5 +128,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return all public names, imported or not."""
-    return [*globals(), *__all__]
+    """Return the module's names, imported or not."""
+    return sorted({*globals(), *__all__})

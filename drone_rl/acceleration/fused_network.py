@@ -73,7 +73,8 @@ class ActivationCache:
     def find(self, handles: Tensor, weights: Tensor, observations: Tensor) -> Tensor | None:
         """Return the rows of the activations with these handles (k,), or None if one is invalid.
 
-        Handles are invalid once the packed weights or the observations, (k, *), have changed.
+        Handles are invalid once the packed weights or sampled pixels of the observations, (k, *),
+        have changed.
         """
         rows = handles - self.generation * len(self.outputs)
         is_valid = (rows >= 0) & (rows < len(self.outputs))
@@ -92,7 +93,7 @@ def _sample_pixels(observations: Tensor) -> Tensor:
 
 
 class FusedNetwork(ImageNetwork):
-    """Compute a network's logits and gradients faster than torch, up to the rounding of sums.
+    """Compute a network's logits and gradients in fused kernels, as torch does up to rounding.
 
     With a small network, torch spends a third of its time between matrix products. The fused kernel
     passes blocks of observations through all layers, so that the activations stay in cache.

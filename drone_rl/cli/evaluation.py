@@ -170,7 +170,7 @@ class ExportCommand(CommandSettings, HeldOutSettings):
     format: Annotated[str, OneOf(("safetensors", "onnx"))] = "safetensors"
     """safetensors with model card, or onnx: a model from RGB image to action probabilities."""
     command: Annotated[str, COMMAND] | None = None
-    """Training command for the model card; null makes it from the run's settings."""
+    """Training command for the card or the ONNX metadata; null takes that of the policy's run."""
     certificate: str | None = None
     """Certificate file for the card; null takes the one next to the policy, if it matches."""
     shifts: str | None = None
@@ -178,7 +178,7 @@ class ExportCommand(CommandSettings, HeldOutSettings):
     under outputs/shifts of this network and task."""
 
     def check(self) -> None:
-        """Reject settings of the model card for an ONNX model, which has none."""
+        """Reject files for the model card with an ONNX model, which has none."""
         for name in ("certificate", "shifts"):
             if self.format == "onnx" and getattr(self, name) is not None:
                 raise InputError(

@@ -25,8 +25,8 @@ class EpisodeCollector(BatchedCollector):
 
     A batch is in the "cat" format of TorchRL's `Collector(trajs_per_batch=...)`: a flat TensorDict
     of shape (T_total,), episode after episode without padding, numbered by ("collector",
-    "traj_ids"), each ending in ("next", "done"). Next observations are left out: no estimator
-    without a critic needs them.
+    "traj_ids"), each ending in ("next", "done"). Next observations are left out: only
+    estimators with a critic need them.
 
     All environments reset at the start of a batch. An environment whose episode has ended is masked
     until the batch ends and is not rendered. So a batch is on-policy and not biased towards short
@@ -208,7 +208,7 @@ class _ActiveOnly(TensorDictModuleBase):
         self._blank: dict[NestedKey, Tensor] = {}
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write what the actor writes, and 0 for the other environments."""
+        """Evaluate the actor on active environments; write 0 for the others."""
         active = self._env[0].active
         rows = active.nonzero()[:, 0]
         if not len(rows):

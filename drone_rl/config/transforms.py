@@ -76,7 +76,6 @@ class Chromaticity(Transform, target="chromaticity"):
 class Standardize(Transform, target="standardize"):
     """Shift and scale: (x - mean) / std."""
 
-    needs: ClassVar[str] = "channels"
     mean: Annotated[float, Real(-1000.0, 1000.0)] = 0.53
     """Gray level that becomes 0."""
     std: Annotated[float, Real(1e-6, 1000.0)] = 0.21

@@ -55,10 +55,11 @@ def _rule(verdict: Mapping[str, Any]) -> Rule:
         strata = list(SIDES)
     baselines = as_mapping(verdict.get("baselines"), "baselines")
     blind = [name for name in baselines if name != "oracle"]
-    if not 0 < len(strata) <= 8 or not 0 < len(blind) <= 32 or len(blind) == len(baselines):
-        raise InputError(
-            f"verdict has {len(strata)} strata and {len(blind)} baselines; judge again"
-        )
+    if len(blind) == len(baselines):
+        raise InputError("verdict.baselines has no oracle; judge again")
+    for what, count, most in (("strata", len(strata), 8), ("blind baselines", len(blind), 32)):
+        if not 0 < count <= most:
+            raise InputError(f"verdict has {count} {what}, not 1 to {most}; judge again")
     rule = Rule(
         error_rate=Real(0.0, 1.0).read(error_rate, "verdict.error_rate"),
         good_share=Real(0.0, 1.0).read(good_share, "verdict.good_share"),

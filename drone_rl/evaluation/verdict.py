@@ -105,8 +105,9 @@ def judge_for_selection(
     *,
     seed: RootSeed | None = None,
 ) -> tuple[dict[str, Any], dict]:
-    """Judge a checkpoint in environments reserved for selection, of which no report shows figures.
+    """Judge a checkpoint in environments of `Stream.CHOICE`, for selection.
 
+    Figures of a judgement are from `Stream.REPORT`, never from these.
     The root of the random streams is fresh by default. Return the verdict, as in verdict.json, and
     the checkpoint's progress.
 
@@ -139,7 +140,8 @@ def apply_rule(
         rule: Thresholds of the verdict.
         sampled: The policy's episodes with sampled actions, from the same states.
         claim: A certificate of the policy in this task, if there is one.
-        unlike: What differs from the training, by setting: "own", in training, and "flown".
+        unlike: Settings that differ from the training, by name: "own", its value in training, and
+            "flown".
         seed: Root of the environments' random streams; without it the verdict says that a policy
             could have been fitted to these environments.
         rounding: How rounding can change `greedy`; None if that was not checked.

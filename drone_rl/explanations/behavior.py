@@ -14,7 +14,7 @@ from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.actions import Actions
 from drone_rl.utils.intervals import mean_interval, proportion
 
-ALIKE_METRES = 1.0  # next targets that differ by at most this, relative to the drone, are equal
+ALIKE_METRES = 1.0  # next targets that differ by at most this along each axis are at the same place
 MIN_OPPOSITION = 0.2  # pairs with a smaller opposition are ignored
 LISTED = 50  # number of pairs that are listed; all are counted
 
@@ -68,7 +68,7 @@ def dataset_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray
 def flaws_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Return "contradictions" (Fig. 9) of the analysed frames, and "loops" of whole episodes."""
     data, flights, scenes = context.dataset, context.flights, context.scenes
-    alike = one_move(flights)
+    alike = median_frame_change(flights)
     pairs = find_pairs(data, alike, scenes.actions, data.offset(scenes.task))
     numbers = {
         "contradictions": summarise_pairs(pairs, data, alike),
@@ -92,7 +92,7 @@ class Pair:
     kind: Literal["contradiction", "justified", "unknown"]
 
 
-def one_move(flights: RolloutDataset) -> float:
+def median_frame_change(flights: RolloutDataset) -> float:
     """Return the median root mean square difference of successive observations.
 
     Observations that differ by no more count as similar.

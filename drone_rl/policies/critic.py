@@ -22,7 +22,8 @@ VALUE = "state_value"
 class ActorCritic(nn.Module):
     """A policy network, split before its last layer, and a critic.
 
-    Policy and critic share the features. The policy's parameters are the network's own.
+    Policy and critic share the features unless the critic has a network of its own. The policy's
+    parameters are the network's.
     """
 
     def __init__(
@@ -34,7 +35,7 @@ class ActorCritic(nn.Module):
         """Add a critic to a policy.
 
         Args:
-            network: Of the policy; an `InputError` for other networks than a `PolicyNetwork`.
+            network: The policy's; an `InputError` unless it is a `PolicyNetwork`.
             own: Of the critic, with one output; None for a linear layer on the policy's features.
             generator: Source of that layer's initial weights.
         """

@@ -3,7 +3,7 @@
 The search starts without perturbation and moves outwards. It tests every strength of the table and,
 before each, a strength sampled at random between it and the previous one, to which a policy cannot
 have been fitted. It stops at the first strength at which the policy is not certainly good, and then
-tests the gap before that strength in `PARTS` steps. Within a range, the policy is therefore
+tests the gap before that strength, divided into `PARTS`. Within a range, the policy is therefore
 certainly good at every tested strength.
 
 A range is wrong only if the policy passes the test at the first strength of a side at which it is
@@ -34,7 +34,7 @@ from drone_rl.utils.intervals import proportion
 from drone_rl.utils.seeding import Stream, torch_generator
 
 PARTS = 4
-"""Number of steps in which the gap at the end of a range is searched."""
+"""Equal parts of the gap at the end of a range; the strengths between them are tested."""
 WALKING = 1 / 4
 """Fraction of an axis's error probability for the search of each of its two sides."""
 REFINING = 1 / 20
@@ -58,7 +58,7 @@ class End:
 def walk(axis: Axis, sign: int, seed: int, is_good: Callable[[float, float], bool]) -> End:
     """Find one end of a range; the same answers give the same strengths.
 
-    `sign` is the side of no perturbation on the axis's scale, -1 or 1. `is_good` takes a strength
+    `sign` is 1 to search above the neutral strength, -1 below it. `is_good` takes a strength
     and the part of the axis's error that its answer may use; it returns whether the policy is
     certainly good there. The seed is that of the random strengths.
     """
@@ -87,7 +87,7 @@ def walk(axis: Axis, sign: int, seed: int, is_good: Callable[[float, float], boo
 def range_of(
     axis: Axis, ends: Mapping[str, End], failed: Sequence[Mapping[str, Any]], of: Any
 ) -> dict[str, Any]:
-    """Return the range of a policy between two ends, by name, as in `Prober.search`."""
+    """Return the result of `Prober.search` from the two ends by name."""
 
     def value(strength: float) -> float | None:
         return finite(axis.value(strength, of))

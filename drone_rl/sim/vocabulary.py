@@ -61,7 +61,7 @@ class TaskVocabulary:
     def handles(self) -> str:
         """Third person of `handle`."""
         verb, _, rest = self.handle.partition(" ")
-        return f"{_third(verb)} {rest}"
+        return f"{_third(verb)} {rest}".rstrip()
 
     @property
     def targets(self) -> str:
@@ -87,7 +87,8 @@ class TaskVocabulary:
     def failing(self, by: str, value: str) -> str:
         """Return the phrase of failures where a variable has a value."""
         if by == "end":
-            return f"by ending {self.ending(value)}"
+            ending = self.ending(value)
+            return ending if ending.startswith("by ") else f"by ending {ending}"
         if by == "side":
             return f"with {self.goals} {self.side(value)}"
         exact = self.classes.get(f"{by}={value}")
@@ -100,6 +101,8 @@ class TaskVocabulary:
 
 
 def _third(verb: str) -> str:
+    if verb.endswith("y") and verb[-2:-1] not in "aeiou":
+        return f"{verb[:-1]}ies"
     return f"{verb}es" if verb.endswith(("s", "sh", "ch", "x")) else f"{verb}s"
 
 

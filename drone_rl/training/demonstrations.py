@@ -1,7 +1,7 @@
 """Demonstrations: recorded flights that a policy is cloned from, each in a compressed .npz file.
 
-A file contains arrays, see `Demonstration`, and a description in JSON. It may come from a stranger:
-sizes are checked before memory is allocated, and nothing in it is executed.
+A file contains arrays, see `Demonstration`, and a description in JSON. It may come from an
+untrusted source: sizes are checked before memory is allocated, and nothing in it is executed.
 """
 
 import dataclasses
@@ -135,7 +135,7 @@ class Demonstration:
     rewards: NDArray[np.float32]  # (T,)
     """Reward of each action."""
     done: NDArray[np.bool_]  # (T,)
-    """Whether the episode ended after the action; false except for the last one."""
+    """Whether the episode ended after the action; only the last may be true."""
     pilot: str = "person"
     """Name of what flew, such as "person" or "oracle"."""
 
@@ -144,7 +144,8 @@ class Demonstration:
         _PILOT.read(self.pilot, "pilot")
         if not isinstance(self.conditions, FlightConditions):
             raise InputError(
-                f"conditions={shown(self.conditions)} are none; give FlightConditions.of(settings)"
+                f"conditions={shown(self.conditions)} is no FlightConditions; give "
+                "FlightConditions.of(settings)"
             )
         for name in _ARRAYS:
             if not isinstance(value := getattr(self, name), np.ndarray):
@@ -308,9 +309,9 @@ def record_oracle(
 
     Args:
         folder: Folder of the demonstrations; new flights are added to it.
-        settings: Those of the training that shall learn from them; by default the default ones.
-        flights: Number of episodes, which are simulated and rendered together. They are others than
-            those of the files that the folder has already, also with the same seed.
+        settings: Settings of the training that learns from them; the defaults if None.
+        flights: Number of episodes, which are simulated and rendered together. They differ from
+            those already in the folder, even with the same seed.
         seed: Root of the environments' random streams.
         changes: Settings of the training by name, as in `record_oracle("outputs/a", task=task)`.
 

@@ -12,7 +12,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import shown
 
 MAY_DIFFER = ("lr", "initial_lr")
-"""Entries of an optimizer's parameter groups that a scheduler changes."""
+"""Entries of an optimizer's parameter groups that a scheduler changes or adds."""
 
 
 def check_fits(saved: Any, own: Any, where: str) -> None:

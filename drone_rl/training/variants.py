@@ -1,4 +1,4 @@
-"""Variants of the pipeline in `train.py`: a critic (PPO, A2C), workers of a Ray cluster."""
+"""Variants of the pipeline in `train.py`: a critic (PPO, A2C), rollouts, a Ray cluster."""
 
 import functools
 import importlib
@@ -102,7 +102,10 @@ def _remote_collector(
     number: int,
     replay: FailureReplayTask | None,
 ) -> tuple[EpisodeCollector, ImageNetwork, torch.Generator]:
-    """Make a worker's collector, from arguments that can be sent; `modules` register its parts."""
+    """Make a worker's collector, with its network and generator, from arguments that can be sent.
+
+    `modules` register its parts.
+    """
     for module in modules:
         importlib.import_module(module)
     settings = from_config(TrainSettings, config)

@@ -212,7 +212,7 @@ def save_checkpoint(path: str | Path, state: Mapping[str, Any]) -> None:
         before = "the previous checkpoint is intact" if path.is_file() else "there is none yet"
         raise InputError(
             f"checkpoint {path} could not be written ({reason}); free some space or choose "
-            f"another folder with hydra.run.dir=..., {before}"
+            f"another folder with hydra.run.dir=...; {before}"
         ) from error
 
 

@@ -19,7 +19,7 @@ from drone_rl.utils.schema import Flag, Instance, Kind, Maybe, Record, Text, as_
 
 S = TypeVar("S", bound="Settings")
 FORMER_NAMES = {"optimiser": "optimizer", "trainer.minibatch_frames": "trainer.chunk_frames"}
-"""Former names of settings, the latest last. Command lines, arguments and files may have them."""
+"""Former names of settings, the newest last. Command lines, arguments and files may have them."""
 FORMER_CHOICES = {
     "collector=threads": "episodes",
     "scheduler=none": "constant",
@@ -147,7 +147,7 @@ def check_names(cls: type[Settings], given: Mapping[str, Any], prefix: str = "")
 
 
 def _inside(cls: type[Settings], name: str) -> str:
-    """Return the end of a message with the default settings inside which a name is, if any are."""
+    """Return a hint at the field whose settings have a name, or ""."""
     for field in dataclasses.fields(cls):
         if isinstance(field.default, Settings) and name in kinds_of(type(field.default)):
             return f"; did you mean {field.name}={type(field.default).__name__}({name}=...)?"
@@ -175,7 +175,7 @@ def _current_value(name: str, hint: Any, value: Any) -> Any:
 
 
 def _refuse_untyped(cls: type[Settings]) -> None:
-    """Raise an `InputError` for a value without a type, which would be no setting."""
+    """Raise an `InputError` for a class attribute without an annotation, which is no setting."""
     own = dict(vars(cls))
     known = {name for c in cls.__mro__[1:-1] for name in (*vars(c), *c.__annotations__)}
     known -= {field.name for field in dataclasses.fields(cls)}  # whose values would be ignored

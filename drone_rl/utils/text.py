@@ -18,7 +18,7 @@ def bounds(interval: Mapping[str, Any], show: Callable[[float], str] = "{:.2f}".
 
 
 def among(share: Mapping[str, Any]) -> str:
-    """Return a rate as a count of so many."""
+    """Return a rate as "k of n"."""
     return f"{share['successes']} of {share['trials']}"
 
 
@@ -63,7 +63,7 @@ class Sentence:
     """One claim."""
 
     name: str
-    """Section and claim, such as "loops.never"."""
+    """Section and claim, such as "loops.none"."""
     condition: str
     """The condition in English, for readers of the code or the page."""
     may: Callable[[Evidence], bool]
@@ -108,7 +108,8 @@ def interval(figure: Mapping[str, Any]) -> str:
 def rate(figure: Mapping[str, Any], label: str = "95% CI ") -> str:
     """Return a rate in percent with its 95% confidence interval, which the label precedes.
 
-    `figure` has the rate under "share" or, for a mean over episodes, "mean"; None if it has none.
+    `figure` has the rate under "share" or, for a mean over episodes, "mean". A rate of None is
+    "not offered".
     """
     share = figure["share"] if "share" in figure else figure["mean"]
     return "not offered" if share is None else f"{100 * share:.1f}% ({label}{interval(figure)})"

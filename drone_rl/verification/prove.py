@@ -16,8 +16,8 @@ from drone_rl.config.configuration import as_changes
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.display import aligned, table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import as_path, folder_lock, write_atomically
-from drone_rl.utils.limits import ARRAYS_BYTES
+from drone_rl.utils.files import as_path, folder_lock, parse_json, read_bytes, write_atomically
+from drone_rl.utils.limits import ARRAYS_BYTES, CERTIFICATE_BYTES, CERTIFICATE_VALUES
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
@@ -38,7 +38,7 @@ class Proof:
     certificate: dict[str, Any]
     """Plain data, see `drone_rl.verification.prover.proof_files`."""
     folder: Path | None = None
-    """Contains `certificate.json`."""
+    """The folder of the certificate."""
 
     @property
     def success(self) -> float:
@@ -187,7 +187,7 @@ def _advance(
             saved = time.monotonic()
     if state is not None and stopped:
         save(prover, state, proof_id)
-    progress(why_stopped(stopped) if stopped else "proved", last, last)
+    progress(why_stopped(stopped) if stopped else "finished", last, last)
     return stopped
 
 
@@ -200,11 +200,14 @@ def load_proof(path: str | Path) -> Proof:
     path = as_path(path, "path")
     path = path / "certificate.json" if path.is_dir() else path
     try:
-        found = json.loads(path.read_text())
+        content = read_bytes(path, CERTIFICATE_BYTES)
+        found = parse_json(content, "it", most_values=CERTIFICATE_VALUES)
         if not isinstance(found, dict) or found.get("format") != FORMAT:
-            raise ValueError(f"its format is not {FORMAT!r}")
+            raise InputError(f"its format is not {FORMAT!r}")
+        if missing := {"policy", "outcomes", "undecided"} - found.keys():
+            raise InputError(f"it has no {', '.join(sorted(missing))}")
         return Proof(found, path.parent)
-    except (OSError, ValueError) as error:
+    except (OSError, InputError) as error:
         raise InputError(
             f"certificate={path} can't be read ({error}); give a certificate"
         ) from None

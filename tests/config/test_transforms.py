@@ -57,7 +57,6 @@ def test_faults_are_those_by_chance_or_with_memory():
         ("chromaticity", Frame((2, 25, 64), True), "chromaticity needs three colors"),
         ("chromaticity", Frame((3, 25, 64)), "chromaticity needs three colors"),
         ("crop", RGB, "crop needs channels first; put gray or rgb before it"),
-        ("standardize", RGB, "standardize needs channels first; put gray or rgb before it"),
     ],
 )
 def test_images_of_another_kind_are_refused(name, frame, message):

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from drone_rl.explanations.behavior import Pair, find_pairs, one_move, summarise_pairs
+from drone_rl.explanations.behavior import Pair, find_pairs, median_frame_change, summarise_pairs
 from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.actions import MOVES
 
@@ -124,7 +124,7 @@ def test_one_move_is_the_median_change_within_episodes():
     # episodes, 90, does not count
     pictures = [[0, 0], [6, 6], [7, 7], [10, 4], [100, 100], [104, 104], [99, 99]]
     data = fake(pictures, np.zeros((7, 3)), np.zeros((7, 2)), episode=[0, 0, 0, 0, 1, 1, 1])
-    assert one_move(data) == pytest.approx(4.0)
+    assert median_frame_change(data) == pytest.approx(4.0)
     data.arrays["episode"][4:] = [1, 2, 3]
-    assert one_move(data) == pytest.approx(3.0)
-    assert one_move(fake([[0]], np.zeros((1, 3)), np.zeros((1, 2)))) == 0.0
+    assert median_frame_change(data) == pytest.approx(3.0)
+    assert median_frame_change(fake([[0]], np.zeros((1, 3)), np.zeros((1, 2)))) == 0.0

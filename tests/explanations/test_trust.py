@@ -188,7 +188,7 @@ def test_few_episodes_show_nothing():
 
 def test_nothing_is_trusted_about_a_policy_that_nothing_moves(trial):
     blind = trial[np.zeros(0, np.int64)]
-    found = check_maps(dataclasses.replace(blind, still=120), {"true": weights})
+    found = check_maps(dataclasses.replace(blind, frames_without_effect=120), {"true": weights})
     assert found["trusted"] is None and found["frames_unmoved"] == 120
     assert found["methods"]["true"]["failed"] == ["nothing moves the policy"]
     saliency = method_maps(Explainer(trial.network, torch.zeros(1, *SIZE)))["saliency"]

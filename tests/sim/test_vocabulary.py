@@ -26,6 +26,9 @@ def test_phrases():
         "cubes", "cubes", "collects", "collects the cube",
     )  # fmt: skip
     assert dataclasses.replace(CUBES, reach="reach").reaches == "reaches"
+    assert dataclasses.replace(CUBES, reach="fly", handle="dodge").reaches == "flies"
+    assert dataclasses.replace(CUBES, reach="play", handle="dodge").reaches == "plays"
+    assert dataclasses.replace(CUBES, handle="dodge").handles == "dodges"
     assert CUBES.side("left") == "on its left" and CUBES.side("above") == "above"
     assert CUBES.place("right") == "on its right" and CUBES.label("row") == "row"
     assert CUBES.ending("step_limit") == "at the step limit"
@@ -40,6 +43,7 @@ def test_phrases():
         ("sideways", "4 to 6 m", "with cubes 4 to 6 m to its side"),
         ("height", "lower", "with cubes lower than itself"),
         ("end", "side_boundary", "by ending outside the field, left or right"),
+        ("end", "wall_touched", "by wall touched"),
         ("wind", "strong", "where wind is strong"),
     ],
 )

@@ -390,7 +390,7 @@ def test_settings_of_the_oracles_training_may_be_given_by_name(tmp_path):
 
 
 def test_what_is_no_demonstration_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"conditions=.TrainSettings. are none; give FlightCond"):
+    with pytest.raises(InputError, match=r"conditions=.TrainSettings. is no FlightConditions; "):
         flight(conditions=TrainSettings())
     for name in ("images", "actions", "rewards", "done"):
         with pytest.raises(InputError, match=rf"{name}=\(list\) is no array; give one of numpy"):

@@ -68,6 +68,21 @@ def test_a_file_that_is_no_certificate_is_refused(tmp_path, content):
         drone_rl.load_proof(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ('{"format": "drone_rl certificate", "policy": {}}', "it has no outcomes, undecided"),
+        ("[" * 100_000, "nested"),
+        (" " * (2**25 + 1), "large"),
+    ],
+    ids=["incomplete", "nested", "large"],
+)
+def test_a_damaged_certificate_is_refused(tmp_path, content, reason):
+    (tmp_path / "certificate.json").write_text(content)
+    with pytest.raises(InputError, match=rf"can't be read \(.*{reason}.*give a certificate"):
+        drone_rl.load_proof(tmp_path)
+
+
 def test_stopped_and_gone_on_with(proof, tmp_path):
     stopped = prove(folder=tmp_path, limit_s=0.0)
     assert not stopped.certificate["finished"]
@@ -102,7 +117,7 @@ def test_progress_is_told():
     told = []
     drone_rl.prove("good", task=ONE, compared=100, progress=lambda *args: told.append(args))
     texts = [text for text, *_ in told]
-    assert "step 0 of 27" in texts[0] and texts[-1] == "proved"
+    assert "step 0 of 27" in texts[0] and texts[-1] == "finished"
     assert np.diff([done for _, done, _ in told]).min() >= 0
 
 

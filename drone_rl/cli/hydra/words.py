@@ -6,6 +6,8 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
+from omegaconf import OmegaConf
+
 from drone_rl.cli.hydra.mistakes import OTHER_NAMES, Command, choices, in_quotes
 from drone_rl.utils.errors import InputError
 
@@ -56,7 +58,7 @@ def _dashed(command: Command, word: str, following: Sequence[str]) -> InputError
         value = following[0] if is_value else ""
         word = f"{word} {value}" if is_value else word
     if len(name) > 1 and (ours := command.instead(name, value)):
-        if ours.removesuffix("=VALUE") not in command.groups:
+        if isinstance(OmegaConf.select(command.config, ours.removesuffix("=VALUE")), bool):
             ours = ours.replace("=VALUE", "=true")
         return InputError(f"{word}: settings have no dashes; type {ours}")
     return InputError(

@@ -15,7 +15,7 @@ ROW = 18
 SCALE = 5
 """Enlargement of a single frame."""
 _CHANNELS = {"gray": 1, "rgb": 3, "chromaticity": 2}
-"""Channels of each frame."""
+"""Number of channels of a frame, by kind."""
 
 
 def tint(frame: NDArray, color: Rgb, strength: float = 0.4) -> NDArray:
@@ -115,7 +115,7 @@ def shown_picture(observation: NDArray, low: float, high: float, channels: str) 
     """Convert the newest frame of an observation, shape (C, H, W), to an RGB image, uint8.
 
     `low` is shown as black, `high` as white. The channels are "gray", "rgb", or "chromaticity" of
-    red and blue. Their green is 1 minus the mean of both: the image tells colors apart and does
+    red and blue. Their green is 1 minus the mean of both: the image distinguishes colors and does
     not show those of the scene. Shape: (H, W, 3).
     """
     newest = observation[-_CHANNELS.get(channels, 1) :].astype(np.float64)

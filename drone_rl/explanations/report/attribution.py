@@ -85,7 +85,7 @@ def say_untrusted(evidence: Evidence) -> Claims:
 
 
 def key_frames(explanation: Explanation, method: str | None) -> dict[str, Image.Image]:
-    """Return six frames of an episode with heat map and action probabilities, by caption."""
+    """Return up to six frames of an episode with heat map and action probabilities, by caption."""
     steps = explanation.numbers["attribution"]["film"]["key_steps"]
     captions = [f"{i}. {entry['why']}" for i, entry in enumerate(steps, start=1)]
     return {

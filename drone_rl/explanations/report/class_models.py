@@ -50,8 +50,7 @@ def tiles(explanation: Explanation, start: str = "") -> dict[str, Image.Image]:
     shown: dict[str, Image.Image] = {}
     numbers = explanation.numbers["class_model"]
     low, high = numbers["statistics"]["low"], numbers["statistics"]["high"]
-    # version 0.1 wrote "color" instead of "channels"
-    channels = numbers.get("channels", "rgb" if numbers.get("color") else "gray")
+    channels = numbers["channels"]
     for objective in _OBJECTIVES:
         reached = numbers[objective]["probabilities"]
         found = explanation.arrays[f"class_model_{objective}"]

@@ -23,7 +23,10 @@ _BLOCK = (4.0, 4.0)
 
 
 class _Fixed(Task[Any]):
-    """A scene without rules: entities at fixed places."""
+    """A scene without rules: entities at fixed places.
+
+    `solid` has the half sizes, in metres, of the boxes around places that can be touched.
+    """
 
     name = "scene"
 
@@ -58,7 +61,7 @@ class _Fixed(Task[Any]):
 
 
 class _File(VisualEntity):
-    """A model from a file of MuJoCo's."""
+    """A model from an MJCF file."""
 
     semantic_class = SemanticClass.OBSTACLE
 

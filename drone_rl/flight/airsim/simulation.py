@@ -145,18 +145,18 @@ class Simulation:
         self.add(VehicleChoice(name, found, start))
         return True
 
-    def find(self, name: str, *, is_pose: bool = False) -> Vehicle:
+    def find(self, name: str, *, is_sim_api: bool = False) -> Vehicle:
         """Return a vehicle; "" is the first one.
 
         Raises an `InputError` with AirSim's message for an unknown name, for its Sim-API if
-        `is_pose`.
+        `is_sim_api`.
         """
         if name == "":
             return next(iter(self.vehicles.values()))
         if name in self.vehicles:
             return self.vehicles[name]
         meant = did_you_mean(name, self.vehicles)
-        if is_pose:
+        if is_sim_api:
             raise InputError(
                 f"Vehicle Sim-API for '{name}' is not available. This could either because this "
                 f"is not a simulation or this vehicle does not exist{meant}"

@@ -16,7 +16,7 @@ X, Y, HEADING, Z = range(4)
 
 
 class Mode(enum.IntEnum):
-    """Meaning of the number of an axis; inner controllers follow."""
+    """Quantity that an axis's goal sets; the controllers below it in the cascade set the rest."""
 
     THROTTLE = 0
     """Fraction of full thrust, 0 to 1."""
@@ -54,7 +54,7 @@ class Goals:
     """Of x (or roll), y (or pitch), heading and height."""
     values: Tensor  # (num_envs, 4) float64
     drift: Tensor | None = None  # (num_envs, 4) float64
-    """Rate of change of positions and headings, a second; 0 by default."""
+    """Rate of change of positions and headings per second; 0 by default."""
 
     def __post_init__(self) -> None:
         for axis, (mode, allowed) in enumerate(zip(self.modes, ALLOWED, strict=True)):
@@ -86,7 +86,7 @@ class Goals:
         return torch.zeros_like(self.values) if self.drift is None else self.drift
 
     def reference_after(self, seconds: float, body: FlightState) -> Tensor:
-        """Return `FlightState.reference` of drones, `body`, after a command of some seconds."""
+        """Return `FlightState.reference` after `seconds` of a command; `body` has the drones."""
         has_target = [mode is Mode.POSITION for mode in self.modes]
         has_target[HEADING] = self.modes[HEADING] is Mode.ANGLE
         there = self.values + seconds * self.drifts
@@ -99,7 +99,10 @@ def rotor_goals(rotors: Tensor) -> Goals:
 
 
 class Moves:
-    """The chapter's moves: each shifts the target position, never farther away than the lead."""
+    """The chapter's moves: each moves the target position at a constant speed.
+
+    At the start of a move, the target is at most the lead away from the drone, along x and along y.
+    """
 
     MODES = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
     actions = MOVES

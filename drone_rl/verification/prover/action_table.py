@@ -246,8 +246,8 @@ def _slices(span: NDArray) -> tuple[slice, ...]:
 def runs(table: ActionTable, spans: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray, ...]]:
     """Cut filled spans, shape (N, cubes, 2), into runs of the nearest cube with constant actions.
 
-    Yields the span of each run, its first and last cell of each cube, shape (cubes, 2), and its
-    bits, in batches of about `most` rows.
+    Yields, in batches of about `most` rows: the index in `spans` of each run's span, its first and
+    last cell of each cube, shape (cubes, 2), and its bits.
     """
     rows = _counts(spans[:, 1:])
     parts = np.searchsorted(np.cumsum(rows), np.arange(most, rows.sum() + most, most))

@@ -17,6 +17,8 @@ pytestmark = pytest.mark.usefixtures("registered")
         ("train --num-envs=8", "type collector.num_envs=8$"),
         ("train --cuda", "type device=cuda$"),
         ("train --algo", "type objective=VALUE$"),
+        ("train --seed", "type seed=VALUE$"),
+        ("train --lr", "type optimizer.lr=VALUE$"),
         ("train --nope 1", "--nope 1: .* no such option"),
         ("train -s 1", "-s 1: .* no such option"),
         ("verdict --sampled", "type sampled=true$"),

@@ -11,6 +11,7 @@ def explanation(make_explanation):
     numbers = {
         "class_model": {
             "statistics": {"low": 0.0, "high": 1.0},
+            "channels": "gray",
             "probability": reached,
             "logit": reached,
         }
@@ -29,14 +30,11 @@ def test_actions_stand_from_left_to_right_and_objectives_below_each_other(explan
     assert middles == [(255,) * 3, (0,) * 3, (0,) * 3]
 
 
-@pytest.mark.parametrize(
-    "told", [{"channels": "rgb"}, {"color": True}]
-)  # the latter as once written
-def test_colors_are_shown_as_such(explanation, told):
+def test_colors_are_shown_as_such(explanation):
     for name in ("class_model_probability", "class_model_logit"):
         explanation.arrays[name] = np.zeros((3, 3, 4, 30))
         explanation.arrays[name][1, 0] = 1.0  # the picture for left is red
-    explanation.numbers["class_model"] |= told
+    explanation.numbers["class_model"]["channels"] = "rgb"
     assert grid([explanation]).getpixel((75, 30)) == (255, 0, 0)
 
 

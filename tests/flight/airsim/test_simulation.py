@@ -95,7 +95,7 @@ def test_vehicles_are_found_by_name(make):
     with pytest.raises(InputError, match="Vehicle API for 'Tow' is not available"):
         simulation.find("Tow")
     with pytest.raises(InputError, match="Vehicle Sim-API for 'Tow' is not available"):
-        simulation.find("Tow", is_pose=True)
+        simulation.find("Tow", is_sim_api=True)
 
 
 def test_time_stamps_of_vehicles_go_on_after_a_reset_and_from_their_creation(make):

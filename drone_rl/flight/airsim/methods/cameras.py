@@ -8,7 +8,7 @@ from typing import Any
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.cameras import CameraState
 from drone_rl.flight.airsim.messages import Map, number, read_map, read_pose, text, to_world
-from drone_rl.flight.airsim.methods.registry import method, posed_at
+from drone_rl.flight.airsim.methods.registry import method, sim_vehicle_at
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.sim.entities import find_camera
@@ -34,7 +34,7 @@ def camera_in_world(
 @method("simGetCameraInfo", least=1)
 def _camera_info(simulation: Simulation, args: Sequence[Any]) -> Map:
     camera = read_camera(args[0])
-    vehicle = posed_at(simulation, args, 1)
+    vehicle = sim_vehicle_at(simulation, args, 1)
     place, turn = camera_in_world(simulation, vehicle, camera)
     capture = simulation.cameras[vehicle.choice.name][camera].capture(ImageType.SCENE)
     return {
@@ -84,7 +84,7 @@ def _set_camera_fov(simulation: Simulation, args: Sequence[Any]) -> None:
 
 def camera_at(simulation: Simulation, args: Sequence[Any], index: int = 2) -> CameraState:
     """Return the camera of the first argument, of the vehicle that another one names."""
-    vehicle = posed_at(simulation, args, index)
+    vehicle = sim_vehicle_at(simulation, args, index)
     return simulation.cameras[vehicle.choice.name][read_camera(args[0])]
 
 
@@ -92,5 +92,5 @@ def put_camera(
     simulation: Simulation, args: Sequence[Any], camera: CameraState, index: int = 2
 ) -> None:
     """Replace a camera of the vehicle that an argument names."""
-    vehicle = posed_at(simulation, args, index)
+    vehicle = sim_vehicle_at(simulation, args, index)
     simulation.cameras[vehicle.choice.name][camera.name] = camera

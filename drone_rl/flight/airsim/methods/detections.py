@@ -10,7 +10,7 @@ import torch
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.messages import MAX_NAME, Map, number, text, to_world
 from drone_rl.flight.airsim.methods.cameras import camera_at, put_camera
-from drone_rl.flight.airsim.methods.registry import method, posed_at
+from drone_rl.flight.airsim.methods.registry import method, sim_vehicle_at
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.sim.coordinates import body_from_world, geo_from_world
@@ -52,7 +52,7 @@ def _detections(simulation: Simulation, args: Sequence[Any]) -> list[Map]:
 
 
 def _found(simulation: Simulation, args: Sequence[Any]) -> Iterator[Map]:
-    camera, vehicle = camera_at(simulation, args, 2), posed_at(simulation, args, 2)
+    camera, vehicle = camera_at(simulation, args, 2), sim_vehicle_at(simulation, args, 2)
     stage = simulation.stage
     names = [n for n in stage.names if any(fnmatch.fnmatch(n, p) for p in camera.detected)]
     if not names:

@@ -1,4 +1,4 @@
-"""Methods that render images, with the channel orders of the three dialects."""
+"""Methods that render images, with the channel orders of AirSim 1.1, AirSim and Cosys-AirSim."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from torch import Tensor
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.messages import Map, flag, text, whole
 from drone_rl.flight.airsim.methods.cameras import camera_in_world, read_camera
-from drone_rl.flight.airsim.methods.registry import method, posed_at
+from drone_rl.flight.airsim.methods.registry import method, sim_vehicle_at
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.stage import Shot, Stage, png
 from drone_rl.flight.airsim.vehicle import Vehicle
@@ -79,7 +79,7 @@ def _images(simulation: Simulation, args: Sequence[Any]) -> list[Map]:
     if not isinstance(args[0], list | tuple) or len(args[0]) > MAX_IMAGES:
         raise InputError(f"requests are not a list of at most {MAX_IMAGES}; give ImageRequests")
     requests = [_read_request(value) for value in args[0]]
-    vehicle = posed_at(simulation, args, 1)
+    vehicle = sim_vehicle_at(simulation, args, 1)
     cameras = simulation.cameras[vehicle.choice.name]
     found: list[Any] = [None] * len(requests)
     for camera in dict.fromkeys(request.camera for request in requests):
@@ -136,7 +136,7 @@ def _raw(image: Tensor, channels: str) -> bytes:
 @method("simGetImage", least=2)
 def _image(simulation: Simulation, args: Sequence[Any]) -> bytes:
     camera, (kind, is_infrared) = read_camera(args[0]), _image_type(args[1])
-    vehicle = posed_at(simulation, args, 2)
+    vehicle = sim_vehicle_at(simulation, args, 2)
     state = simulation.cameras[vehicle.choice.name][camera]
     (one,) = simulation.stage.render(vehicle.body, state, [kind])
     return png(_pixels(simulation.stage, one, kind, is_infrared, as_float=False))

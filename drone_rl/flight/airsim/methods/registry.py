@@ -77,6 +77,6 @@ def vehicle_at(simulation: Simulation, args: Sequence[Any], index: int) -> Vehic
     return simulation.find(name_at(args, index))
 
 
-def posed_at(simulation: Simulation, args: Sequence[Any], index: int) -> Vehicle:
+def sim_vehicle_at(simulation: Simulation, args: Sequence[Any], index: int) -> Vehicle:
     """Return the vehicle that an argument names; errors name its Sim-API, as in AirSim."""
-    return simulation.find(name_at(args, index), is_pose=True)
+    return simulation.find(name_at(args, index), is_sim_api=True)

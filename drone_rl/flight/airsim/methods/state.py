@@ -5,7 +5,7 @@ from typing import Any
 
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.messages import Map, flag, read_map, read_pose, read_vector
-from drone_rl.flight.airsim.methods.registry import method, posed_at, vehicle_at
+from drone_rl.flight.airsim.methods.registry import method, sim_vehicle_at, vehicle_at
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.sim.coordinates import GeoPoint
@@ -18,12 +18,12 @@ def _state(simulation: Simulation, args: Sequence[Any]) -> Map:
 
 @method("simGetVehiclePose", "simGetPose")
 def _pose(simulation: Simulation, args: Sequence[Any]) -> Map:
-    return messages.pose(posed_at(simulation, args, 0).pose)
+    return messages.pose(sim_vehicle_at(simulation, args, 0).pose)
 
 
 @method("simSetVehiclePose", "simSetPose", least=2)
 def _set_pose(simulation: Simulation, args: Sequence[Any]) -> None:
-    vehicle = posed_at(simulation, args, 2)
+    vehicle = sim_vehicle_at(simulation, args, 2)
     ignore = flag(args[1], "ignore_collision")
     vehicle.set_airsim_pose(read_pose(args[0]), ignore_collision=ignore)
     simulation.stage.touch(vehicle.body.position[0])
@@ -31,7 +31,7 @@ def _set_pose(simulation: Simulation, args: Sequence[Any]) -> None:
 
 @method("simGetGroundTruthKinematics")
 def _kinematics(simulation: Simulation, args: Sequence[Any]) -> Map:
-    return posed_at(simulation, args, 0).kinematics()
+    return sim_vehicle_at(simulation, args, 0).kinematics()
 
 
 @method("simSetKinematics", least=2)
@@ -52,7 +52,7 @@ _STRATOSPHERE = 11_000.0
 
 @method("simGetGroundTruthEnvironment")
 def _environment(simulation: Simulation, args: Sequence[Any]) -> Map:
-    vehicle = posed_at(simulation, args, 0)
+    vehicle = sim_vehicle_at(simulation, args, 0)
     altitude = min(vehicle.geo_point()["altitude"], _STRATOSPHERE)
     kelvin = 288.15 - 0.0065 * altitude
     pressure = 101325.0 * (kelvin / 288.15) ** 5.25588
@@ -68,7 +68,7 @@ def _environment(simulation: Simulation, args: Sequence[Any]) -> Map:
 
 @method("simGetCollisionInfo", "getCollisionInfo")
 def _collision(simulation: Simulation, args: Sequence[Any]) -> Map:
-    return posed_at(simulation, args, 0).collision()
+    return sim_vehicle_at(simulation, args, 0).collision()
 
 
 @method("getRotorStates")
@@ -78,12 +78,12 @@ def _rotors(simulation: Simulation, args: Sequence[Any]) -> Map:
 
 @method("simTestLineOfSightToPoint", least=1)
 def _line_of_sight(simulation: Simulation, args: Sequence[Any]) -> bool:
-    return posed_at(simulation, args, 1).sees(_read_place(args[0]))
+    return sim_vehicle_at(simulation, args, 1).sees(_read_place(args[0]))
 
 
 @method("simTestLineOfSightBetweenPoints", least=2)
 def _line_between(simulation: Simulation, args: Sequence[Any]) -> bool:
-    return simulation.find("", is_pose=True).sees(_read_place(args[0]), _read_place(args[1]))
+    return simulation.find("", is_sim_api=True).sees(_read_place(args[0]), _read_place(args[1]))
 
 
 def _read_place(value: Any) -> GeoPoint:
