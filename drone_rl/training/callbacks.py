@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import remove_leftovers, write_atomically
+from drone_rl.utils.files import make_folder, remove_leftovers, write_atomically
 from drone_rl.utils.progress import Progress as Report
 from drone_rl.utils.progress import as_progress
 from drone_rl.utils.readers import NAMES_OF_0_1, read_table
@@ -95,13 +95,7 @@ class CheckpointCallback(Callback):
 
     def on_start(self, training: OngoingTraining) -> None:
         """Create the folder before the first update; delete half-written checkpoints."""
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(
-                f"checkpoint folder {self.folder} can't be made ({error.strerror}); "
-                "choose another with hydra.run.dir=..."
-            ) from error
+        make_folder(self.folder)
         remove_leftovers(self.folder, self.last_path.name, self.best_path.name)
         if not self.last_path.exists():
             self._save(training)

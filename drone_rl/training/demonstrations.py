@@ -35,7 +35,14 @@ from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import as_path, folder_lock, parse_json, refuse_links, write_atomically
+from drone_rl.utils.files import (
+    as_path,
+    folder_lock,
+    make_folder,
+    parse_json,
+    refuse_links,
+    write_atomically,
+)
 from drone_rl.utils.limits import ARRAYS_BYTES, Allowance
 from drone_rl.utils.schema import Instance, Plain, Record, Text, Whole, as_mapping, shown
 
@@ -284,7 +291,7 @@ def add_demonstration(folder: str | Path, demonstration: Demonstration) -> Path:
     if not isinstance(demonstration, Demonstration):
         raise InputError(f"{shown(demonstration)} is no drone_rl.Demonstration; give one")
     folder, content = as_path(folder, "folder"), demonstration.to_bytes()
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     with folder_lock(folder, patience_s=_PATIENCE_S):
         path = folder / f"flight_{_next_number(folder):05d}.npz"
         write_atomically(path, content)
@@ -321,14 +328,14 @@ def record_oracle(
     Raises:
         InputError: A setting is unusable, or the task has no oracle, or none for these actions.
     """
-    settings = TrainSettings.from_arguments(settings, changes)
+    settings, folder = TrainSettings.from_arguments(settings, changes), as_path(folder, "folder")
     flights = Whole(1).read(flights, "flights")
     env = DroneEnv(
         flights,
         settings.task,
         settings.camera,
         seed=seed,
-        first_world=_next_number(as_path(folder, "folder")),
+        first_world=_next_number(folder),
         device=settings.device,
         dynamics=settings.dynamics,
         actions=settings.actions,

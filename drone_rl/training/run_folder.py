@@ -24,7 +24,7 @@ from drone_rl.training.demonstrations import Demonstration, FlightConditions, re
 from drone_rl.training.trainer import Trainer
 from drone_rl.utils.display import picture, table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import remove_leftovers, write_atomically
+from drone_rl.utils.files import make_folder, remove_leftovers, write_atomically
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import Real, shown
@@ -123,12 +123,7 @@ class RunFolder:
 
     def make(self) -> None:
         """Make the folder, or raise an `InputError` if that is not possible."""
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(
-                f"folder={self.path} can't be made ({error.strerror}); give another folder"
-            ) from error
+        make_folder(self.path)
 
     def prepare(
         self, settings: TrainSettings, state: Mapping[str, Any] | None

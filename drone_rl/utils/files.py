@@ -41,6 +41,16 @@ def as_path(value: str | Path, where: str) -> Path:
     return Path(value)
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder and its parents, or raise an `InputError` if that is not possible."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"folder={folder} can't be made ({error.strerror}); give another folder"
+        ) from error
+
+
 def read_bytes(path: Path, most: int) -> bytes:
     """Return the content of a regular file of at most `most` bytes, opened once, without waiting.
 

@@ -16,7 +16,14 @@ from drone_rl.config.configuration import as_changes
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.display import aligned, table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import as_path, folder_lock, parse_json, read_bytes, write_atomically
+from drone_rl.utils.files import (
+    as_path,
+    folder_lock,
+    make_folder,
+    parse_json,
+    read_bytes,
+    write_atomically,
+)
 from drone_rl.utils.limits import ARRAYS_BYTES, CERTIFICATE_BYTES, CERTIFICATE_VALUES
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
@@ -131,7 +138,7 @@ def prove(
         spec.images.check(settings.compared, np.random.RandomState(legacy_seed(fresh_seed())))
         if folder is not None:
             folder = as_path(folder, "folder")
-            folder.mkdir(parents=True, exist_ok=True)
+            make_folder(folder)
             stack.enter_context(folder_lock(folder))
         return _prove(policy, spec, settings, folder, as_progress(progress))
 

@@ -14,6 +14,7 @@ from drone_rl.utils.files import (
     as_path,
     folder_lock,
     is_locked,
+    make_folder,
     newest,
     parse_json,
     read_bytes,
@@ -239,3 +240,12 @@ def test_paths_are_text_or_paths():
     for wrong in (5, None, ["a"], b"a"):
         with pytest.raises(InputError, match=r"^folder=.* is no path; give the path of a"):
             as_path(wrong, "folder")  # pyright: ignore[reportArgumentType]
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path):
+    make_folder(tmp_path / "a" / "b")
+    make_folder(tmp_path / "a" / "b")
+    assert (tmp_path / "a" / "b").is_dir()
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match=r"^folder=.*b can't be made \(Not a directory\); give"):
+        make_folder(tmp_path / "file" / "b")

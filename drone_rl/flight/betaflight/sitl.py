@@ -42,6 +42,7 @@ from drone_rl.sim.coordinates import enu_from_world, frd_from_body, ned_attitude
 from drone_rl.sim.dynamics import FlightState, Quadrotor
 from drone_rl.sim.dynamics.state import LEVEL
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import make_folder
 
 MEMORY = "eeprom.bin"
 """The file in which the firmware stores its settings."""
@@ -123,12 +124,7 @@ class Betaflight:
     def __enter__(self) -> Self:
         """Start the firmware; set it up first if the folder has no settings."""
         self._rotors, self._next_sticks = np.zeros(4), -np.inf
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(
-                f"folder={self.folder} can't be created: {error.strerror}; give another"
-            ) from error
+        make_folder(self.folder)
         with contextlib.ExitStack() as stack:
             self._process = stack.enter_context(FirmwareProcess(isolated=self.isolated))
             if not (self.folder / MEMORY).exists():

@@ -82,7 +82,7 @@ def test_one_that_does_not_understand_leaves_no_memory(stub, tmp_path):
 
 def test_a_folder_that_is_a_file(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match=r"folder=.*file can't be created: File exists"):
+    with pytest.raises(InputError, match=r"folder=.*file can't be made \(File exists"):
         Betaflight(["sh"], tmp_path / "file").__enter__()
 
 
