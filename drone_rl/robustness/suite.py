@@ -42,7 +42,7 @@ class Suite:
         self.oracle: ConditionResult | None = None
         self.oracle = self._fly_oracle(Condition()) if self._knows else None
 
-    def run(self, axes: Sequence[Axis], numbers: Iterable[int], report: Report) -> dict[str, Any]:
+    def run(self, axes: Sequence[Axis], numbers: Sequence[int], report: Report) -> dict[str, Any]:
         """Measure axes at the strengths with these numbers (from 1), alone and combined.
 
         Returns:
@@ -56,7 +56,7 @@ class Suite:
         plain = {"oracle": _success(self.oracle), **self._figures(self.plain)}
         return {"plain": plain, "axes": found, "together": self.level(together)}
 
-    def along(self, axis: Axis, numbers: Iterable[int], report: Report) -> dict[str, Any]:
+    def along(self, axis: Axis, numbers: Sequence[int], report: Report) -> dict[str, Any]:
         """Measure one axis at some of its strengths."""
         levels, subject = [], self._evaluator.subject
         for number in numbers:

@@ -203,8 +203,8 @@ def judge_one(
     """
     settings, seed = with_seed(JudgeSettings.from_arguments(settings, changes), drawn_seed)
     progress = as_progress(progress)
-    progress("policy and baselines", 0, 1)
     loaded = None if policy in BASELINES else as_policy(policy, outputs)
+    progress("policy and baselines", 0, 1)
     name = str(policy) if loaded is None or isinstance(policy, str | Path) else loaded.name
     if isinstance(loaded, Policy) and policy == "latest":  # which changes with the next run
         name = str(loaded.path)

@@ -191,7 +191,7 @@ class World:
     # What a person does
 
     def move(self, body: BodyState) -> None:
-        """Put the drone somewhere. No time passes; the only rule is that touched cubes vanish."""
+        """Put the drone somewhere. No time passes; contact is the only rule that applies."""
         self._forget()
         self._place(body)
         self.task.touch(self.worlds.state, body.position)

@@ -268,7 +268,7 @@ def write(after: wp.array2d[wp.float64], world: int, flight: Flight, ticks: int)
 
 @wp.func
 def _write_touch(after: wp.array2d[wp.float64], world: int, flight: Flight, tick: float) -> None:
-    """Write the last contact; a tick lasts so many seconds."""
+    """Write the last contact; `tick` is the duration of a tick in seconds."""
     touch = flight.touch
     after[world, fs.THING] = wp.float64(touch.thing)
     for i in range(3):
