@@ -8,7 +8,6 @@ import logging
 import os
 import re
 import sys
-import traceback
 import types
 import typing
 from collections.abc import Callable, Iterator, Sequence
@@ -53,6 +52,7 @@ from drone_rl.config.training import CloningSettings, Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import USER_ERROR
+from drone_rl.utils.plugins import failure
 from drone_rl.utils.schema import Kind
 from drone_rl.utils.settings import Settings, conf_dir, kinds_of, plain, types_of
 
@@ -157,19 +157,7 @@ def import_plugins(overrides: Sequence[str]) -> None:
         except InputError:
             raise
         except (Exception, SystemExit) as error:  # any that the user's module raises
-            raise InputError(_plugin_error(name, error)) from error
-
-
-def _plugin_error(name: str, error: BaseException) -> str:
-    """Return the message about a plugin that raised an error, with the line of its own files."""
-    frames = traceback.extract_tb(error.__traceback__)
-    own = next((f for f in reversed(frames) if "importlib" not in f.filename), frames[-1])
-    file, line = own.filename, own.lineno
-    if isinstance(error, SyntaxError):
-        file, line = error.filename or file, error.lineno
-    reason = " ".join(str(error).split())
-    where = f"line {line} of {file}"
-    return f"plugins={name} failed in {where} ({type(error).__name__}: {reason}); correct it"
+            raise InputError(failure(f"plugins={name}", error)) from error
 
 
 def schema_of(cls: type[Settings], further: Sequence[tuple[str, Any, Any]] = ()) -> type:
