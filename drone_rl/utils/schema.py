@@ -137,10 +137,9 @@ class Instance:
             return self.of.from_name(value, where)
         if not isinstance(value, self.of):
             example = _example_of(self.of)
-            raise InputError(
-                f"{where}={shown(value)} is no {self.of.__name__}; give "
-                f"{example.__module__}.{example.__name__}(...)"
-            )
+            remedy = f"{example.__module__}.{example.__name__}(...)"
+            remedy = f"a {self.of.__name__}" if self.of.__module__ == "builtins" else remedy
+            raise InputError(f"{where}={shown(value)} is no {self.of.__name__}; give {remedy}")
         return value
 
 

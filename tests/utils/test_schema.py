@@ -77,7 +77,7 @@ def test_what_is_taken(kind, value):
         (Flag(), "true", "x='true'"),
         (OneOf(("a", "b")), "c", "x='c' is unknown; give a, b"),
         (OneOf(("1", "b")), 1, "x=1 is unknown"),
-        (Instance(bytes), "x", "x='x' is no bytes"),
+        (Instance(bytes), "x", "x='x' is no bytes; give a bytes$"),
         (Listed("policy"), [], "must name a policy"),
         (Listed("policy"), ["a", "a"], "each once"),
         (Listed("policy", most=1), ["a", "b"], "or a list"),
