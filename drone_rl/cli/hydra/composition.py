@@ -23,6 +23,7 @@ from hydra.errors import HydraException
 from hydra.types import RunMode
 from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
+from yaml import YAMLError
 
 from drone_rl.cli.hydra.help import next_steps, show_help
 from drone_rl.cli.hydra.messages import input_error, is_output_closed, one_line
@@ -30,6 +31,7 @@ from drone_rl.cli.hydra.mistakes import (
     check_choices,
     check_launcher,
     explain,
+    explain_file,
     repeated,
     whole_numbers,
 )
@@ -264,13 +266,14 @@ def _may_be_multirun(name: str, overrides: Sequence[str]) -> bool:
 
 @contextlib.contextmanager
 def _explained(name: str, overrides: Sequence[str]) -> Iterator[None]:
-    """Raise an `InputError` for settings that Hydra or OmegaConf rejects."""
+    """Raise an `InputError` for settings that Hydra, OmegaConf or PyYAML rejects."""
     try:
         yield
-    except (HydraException, OmegaConfBaseException) as error:
+    except (HydraException, OmegaConfBaseException, YAMLError) as error:
         if input_error(error) is not None:
             raise
-        raise explain(error, name, conf_dir(), overrides) from error
+        in_file = explain_file(error, name, conf_dir())
+        raise in_file or explain(error, name, conf_dir(), overrides) from error
 
 
 @contextlib.contextmanager
