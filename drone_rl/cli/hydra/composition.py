@@ -134,19 +134,14 @@ def import_plugins(overrides: Sequence[str]) -> None:
     """Import the modules that `plugins=[MODULE, ...]` names on a command line, and none from files.
 
     Raises:
-        InputError: A module is not found, or fails.
+        InputError: A module is not found, has the name of one of Python's, or fails.
     """
     typed = [o.partition("=")[2] for o in overrides if re.match(r"\+{0,2}plugins=", o)]
     names = re.findall(r"[^\[\]\s,'\"]+", typed[-1]) if typed else []
     if names and os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
     for name in names:
-        if "/" in name or name.startswith("."):
-            own = Path(name).name.removesuffix(".py")
-            raise InputError(
-                f"plugins={name} is a path; type the module's name, plugins=[{own}], in its folder "
-                "or with the folder on PYTHONPATH"
-            )
+        _check_module(name)
         try:
             importlib.import_module(name)
         except ModuleNotFoundError as error:
@@ -160,6 +155,21 @@ def import_plugins(overrides: Sequence[str]) -> None:
             raise
         except (Exception, SystemExit) as error:  # any that the user's module raises
             raise InputError(failure(f"plugins={name}", error)) from error
+
+
+def _check_module(name: str) -> None:
+    """Raise an `InputError` for a path, and for a module of Python itself."""
+    if "/" in name or name.startswith("."):
+        own = Path(name).name.removesuffix(".py")
+        raise InputError(
+            f"plugins={name} is a path; type the module's name, plugins=[{own}], in its folder "
+            "or with the folder on PYTHONPATH"
+        )
+    if name in sys.stdlib_module_names:
+        raise InputError(
+            f"plugins={name} is a module of Python, which has precedence over your {name}.py; "
+            "rename the file"
+        )
 
 
 def schema_of(cls: type[Settings], further: Sequence[tuple[str, Any, Any]] = ()) -> type:
