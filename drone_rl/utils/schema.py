@@ -112,10 +112,12 @@ class OneOf:
     """One of some texts."""
 
     names: tuple[str, ...]
+    also: tuple[str, ...] = ()
+    """Accepted as well, but not offered."""
 
     def read(self, value: Any, where: str) -> str:
         """See `Kind`."""
-        if not isinstance(value, str) or value not in self.names:
+        if not isinstance(value, str) or value not in (*self.names, *self.also):
             meant = did_you_mean(value, self.names)
             raise InputError(
                 f"{where}={shown(value)} is unknown; give {', '.join(self.names)}{meant}"
