@@ -231,8 +231,8 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     `name` is that of its file in conf/. `command.prepare` translates the overrides first.
     """
     is_help = bool({"--help", "-h"} & set(overrides))
-    is_all = is_help and "all" in overrides
-    words = [word for word in overrides if not (is_all and word == "all")]
+    topics = [word for word in overrides if is_help and re.fullmatch(r"[A-Za-z_][\w.]*", word)]
+    words = [word for word in overrides if word not in topics]
     overrides = command.prepare([*map(whole_numbers, words)])
     import_plugins(overrides)
     register_schemas(**{name: command})
@@ -244,7 +244,7 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
             print(f"warning: {counts}", file=sys.stderr)
     if is_help:
         with _explained(name, overrides):
-            show_help(name, conf_dir(), overrides, command, is_all=is_all)
+            show_help(name, conf_dir(), overrides, command, topics)
         return 0
     check_words(name, conf_dir(), overrides)
     statuses: list[int] = []

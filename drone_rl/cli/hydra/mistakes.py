@@ -170,7 +170,7 @@ class Command:
         self.groups = [g for g in chosen if "@" not in g and (conf / g).is_dir() and g != "hydra"]
         own: Any = OmegaConf.to_container(self.config, resolve=False)
         del own["hydra"]
-        self.keys = [*_flatten(own), *self.groups, *_HYDRAS_OWN]
+        self.keys = [*flattened(own), *self.groups, *_HYDRAS_OWN]
         self.list_all = f"drone-rl {self.name} --help all lists the settings"
 
     def instead(self, name: str, value: str) -> str | None:
@@ -212,12 +212,13 @@ class Command:
         return InputError(text + listed)
 
 
-def _flatten(values: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+def flattened(values: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    """Yield the dotted names of groups and settings."""
     for name, value in values.items():
         if not name.startswith("_"):
             yield prefix + name
             if isinstance(value, Mapping):
-                yield from _flatten(value, f"{prefix}{name}.")
+                yield from flattened(value, f"{prefix}{name}.")
 
 
 def explain(error: Exception, name: str, conf: Path, overrides: Sequence[str]) -> InputError:
