@@ -29,6 +29,7 @@ examples
   drone-rl explain policy=good         explain a shipped policy
   drone-rl COMMAND --help              the most used settings of a command, and examples
   drone-rl COMMAND --help all          every setting of a command
+  drone-rl COMMAND --help NAME         one setting, or a group of them such as optimizer
   drone-rl --version                   the version
 """.format(commands="\n".join(f"  {name:<12}  {entry['about']}" for name, entry in TABLE.items()))
 DEMO_USAGE = """\

@@ -13,24 +13,46 @@ classes and functions in higher layers.
 """
 
 import dataclasses
+import functools
 import inspect
 import math
 import re
 import types
 import typing
 from collections.abc import Callable, Set
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar, cast
 
 from drone_rl.config.configuration import Variant
 from drone_rl.config.learning import Collector, Objective, Returns
 from drone_rl.config.networks import Network
 from drone_rl.config.transforms import Frame, Transform
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.plugins import described, errors_of, place_of
 from drone_rl.utils.schema import Flag, Kind, Maybe, OneOf, Real, Several, Text, Whole
 from drone_rl.utils.settings import Settings
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+
+class _Base(NamedTuple):
+    """Base class, or protocol, of one kind of part."""
+
+    name: str
+    own: str
+    """Attribute that only it and classes derived from it have; "" for a protocol."""
+    members: tuple[str, ...]
+    """Attributes of its objects."""
+
+
+_BASES: dict[type[Variant], _Base] = {
+    Network: _Base("PolicyNetwork", "is_recurrent", ("in_shape",)),
+    Transform: _Base("Transform", "set_container", ("_apply_transform", "_parameters")),
+    Returns: _Base("ReturnEstimator", "to", ("estimate", "_parameters")),
+    Objective: _Base(
+        "Learner", "", ("in_keys", "update", "state_dict", "check_state", "load_state_dict")
+    ),
+    Collector: _Base("Components", "", ("collector", "network", "generators")),
+}
 _KEYS = {"in_keys", "out_keys"}
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,60}")
 _KINDS: dict[Any, Kind] = {
@@ -64,8 +86,7 @@ def register_network(name: str) -> Callable[[F], F]:
     Raises:
         InputError: The name is invalid or taken, or a parameter has no default or no plain type.
     """
-    base = ("is_recurrent", "PolicyNetwork")
-    return _decorator(Network, name, 2, {"generator"}, base=base)
+    return _decorator(Network, name, 2, {"generator"})
 
 
 def register_transform(
@@ -74,7 +95,7 @@ def register_transform(
     """Decorate a class derived from TorchRL's `Transform` to register it as an image transform.
 
     `output` maps the input's `Frame` and the settings to the output's `Frame`. By default, the
-    shape is that of the transformed zeros. See `register_network` for errors.
+    shape is that of two transformed images. See `register_network` for errors.
     """
     own = {"output": lambda self, frame: output(frame, self) if output else None}
     return _decorator(Transform, name, 0, _KEYS, own)
@@ -86,7 +107,7 @@ def register_returns(name: str) -> Callable[[F], F]:
     The class accepts `scale`, for example by passing keyword arguments on to `ReturnEstimator`. See
     `register_network` for errors.
     """
-    return _decorator(Returns, name, 0, base=("to", "ReturnEstimator"))
+    return _decorator(Returns, name, 0, {"reward_key", "done_key", "out_key"})
 
 
 def register_learner(name: str) -> Callable[[F], F]:
@@ -109,6 +130,14 @@ def register_collector(name: str) -> Callable[[F], F]:
     return _decorator(Collector, name, 2)
 
 
+def own_place(part: Variant) -> str:
+    """Return the name and file of a part of the user's own, for messages; "" if it is built in."""
+    if type(part).__module__.startswith("drone_rl."):
+        return ""
+    factory: Any = type(part).factory
+    return place_of(inspect.unwrap(factory))
+
+
 def modules_of(settings: Any) -> set[str]:
     """Return the modules that register the user's parts among settings.
 
@@ -129,22 +158,18 @@ def _decorator(
     positional: int,
     skipped: Set[str] = frozenset(),
     own: dict[str, Any] | None = None,
-    base: tuple[str, str] | None = None,
 ) -> Callable[[F], F]:
-    """Return the decorator of a part; `base` is an attribute that only its base class has, and it.
-
-    The other arguments are those of `_register`.
-    """
+    """Return the decorator of a part; the arguments are those of `_register`."""
     if not isinstance(name, str):
         raise InputError('give a name in brackets, as in @drone_rl.register_network("mine")')
     if not _NAME.fullmatch(name):
         raise InputError(f"name={name!r} is invalid; give lower-case letters, digits and _")
 
     def register(factory: F) -> F:
-        given: Any = factory
-        if base and isinstance(given, type) and not hasattr(given, base[0]):
+        given, base = cast(Any, factory), _BASES[part]
+        if base.own and isinstance(given, type) and not hasattr(given, base.own):
             raise InputError(
-                f"{given.__name__} does not derive from {base[1]}; derive it from there"
+                f"{given.__name__} does not derive from {base.name}; derive it from there"
             )
         return _register(part, name, factory, positional, skipped, own)
 
@@ -180,13 +205,33 @@ def _register(
         "__doc__": (inspect.getdoc(factory) or name).split("\n")[0],
         "__module__": factory.__module__,
         "target": name,
-        "factory": staticmethod(factory),
+        "factory": staticmethod(_checked(factory, f"{part.__name__.lower()}={name}", _BASES[part])),
         "arguments": lambda self: {n: v for n, v in self.values().items() if n in names},
     }
     settings = type(name.title().replace("_", ""), (part,), namespace)
     vars_of: Any = factory
     vars_of.Settings = settings
     return factory
+
+
+def _checked(factory: Callable[..., Any], what: str, base: _Base) -> Callable[..., Any]:
+    """Return the factory with its errors, and an object that is no such part, as `InputError`."""
+
+    @functools.wraps(factory, updated=())
+    def make(*args: Any, **kwargs: Any) -> Any:
+        with errors_of(what, place_of(factory)):
+            made = factory(*args, **kwargs)
+        if missing := [name for name in base.members if not hasattr(made, name)]:
+            remedy = f"return a {base.name}"
+            if isinstance(factory, type):
+                remedy = "call super().__init__(...) first, or define what is missing"
+            raise InputError(
+                f"{what}: {place_of(factory)} makes {described(made)} without "
+                f"{', '.join(missing)}; {remedy}"
+            )
+        return made
+
+    return make
 
 
 def _fields(

@@ -20,6 +20,7 @@ from drone_rl.config.learning import Gae, Returns
 from drone_rl.config.registry import implements
 from drone_rl.objectives import returns
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.plugins import described, place_of
 
 _MASK = ("collector", "mask")
 
@@ -88,7 +89,16 @@ class ReturnEstimator(Transform, abc.ABC):
         return tensordict.set(self.out_keys[0], filled).set(_MASK, known[..., 0])
 
     def _estimate(self, reward: Tensor, done: Tensor) -> Tensor:
-        values = self.estimate(reward, done)
+        values: Any = self.estimate(reward, done)
+        is_tensor = isinstance(values, Tensor) and values.shape == reward.shape
+        fault = "" if is_tensor else described(values)
+        if is_tensor and not type(self).__module__.startswith("drone_rl."):
+            fault = "" if values.isfinite().all() else "NaN or infinity"
+        if fault:
+            raise InputError(
+                f"{place_of(type(self))} returns {fault} for rewards of shape "
+                f"{tuple(reward.shape)}; return a tensor of finite numbers of that shape"
+            )
         return returns.scale_to_unit(values) if self.scale else values
 
     def set_container(self, container: Transform | EnvBase) -> None:

@@ -21,7 +21,7 @@ from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.mujoco_flight import MujocoFlight
 from drone_rl.sim.rendering import Appearance, opengl
 from drone_rl.sim.rendering.opengl import OpenGlAppearance
-from drone_rl.sim.rendering.scene import Scene, SemanticClass
+from drone_rl.sim.rendering.scene import Scene, SemanticClass, compiled
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.visual_randomization import AppearanceSampler, object_region_of
 
@@ -121,7 +121,7 @@ class ComposerTask(composer.Task):
 
     def compile(self) -> Scene:
         """Return the model that dm_control simulates, with the semantic classes of its geoms."""
-        physics = mjcf.Physics.from_mjcf_model(self._arena.mjcf_model)
+        physics = compiled(self._arena.mjcf_model, f"the scene of task={self.rules.name}")
         model = physics.model.ptr
         classes, props = [SemanticClass.GROUND] * model.ngeom, [-1] * model.ngeom
         for number, entity in [(-1, self.drone), *enumerate(self._props)]:

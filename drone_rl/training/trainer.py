@@ -20,6 +20,7 @@ from drone_rl.training.learners import Learner, NotANumberError, check_batch
 from drone_rl.training.restore import check_fits
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.memory import return_freed_memory
+from drone_rl.utils.plugins import place_of
 
 
 def episode_rewards(batch: TensorDictBase) -> Tensor:
@@ -170,9 +171,16 @@ class Trainer:
 
         Args:
             batch: The batch.
-            metrics: What the learner's `update` returned.
+            metrics: What the learner's `update` returned; an `InputError` unless numbers by name.
         """
         end = time.perf_counter()
+        try:
+            metrics = {name: float(value) for name, value in metrics.items()}
+        except (AttributeError, TypeError, ValueError, RuntimeError):
+            raise InputError(
+                f"update of {place_of(type(self.learner))} returns {metrics!r:.80}; return numbers "
+                'by name, as in {"loss/mine": 0.5}'
+            ) from None
         rewards, progress = episode_rewards(batch), self.progress
         progress.frames += batch.numel()
         progress.episodes += len(rewards)

@@ -56,6 +56,21 @@ _INSTRUCTIONS = {
 
 
 _ZIP = b"PK"
+_FORMATS = {
+    b"version https://git-lfs": "a Git LFS pointer; replace it by the file with git lfs pull",
+    rb".{8}\{": "a safetensors file; name it NAME.safetensors",
+    _ZIP: "an archive, as checkpoints are; name it NAME.pt",
+    rb"\x08.[\x12\x1a:B]": "an ONNX model; give the policy's .pt or .safetensors file",
+}
+"""What begins so is no file of the name that it has, but this; with a remedy."""
+
+
+def other_format(content: bytes) -> str | None:
+    """Return what a file with this content is, with a remedy; None if that is not known."""
+    found = (text for start, text in _FORMATS.items() if re.match(start, content, re.DOTALL))
+    return next(found, None)
+
+
 """First bytes of a checkpoint."""
 
 
@@ -226,6 +241,16 @@ def _reason(error: BaseException) -> str:
     return (str(error) or type(error).__name__).splitlines()[0]
 
 
+def _refuse(content: bytes, path: Path) -> None:
+    """Raise an `InputError` for a file that is no archive, unless its name is a checkpoint's."""
+    if other := other_format(content):
+        raise InputError(f"{path} is {other}")
+    if path.suffix != ".pt":
+        raise InputError(
+            f"{path} is no policy file; give a .pt or .safetensors file or a run's folder"
+        )
+
+
 def load_checkpoint(path: str | Path) -> dict[str, Any]:
     """Read tensors and plain values from a checkpoint onto the CPU.
 
@@ -236,10 +261,8 @@ def load_checkpoint(path: str | Path) -> dict[str, Any]:
     if not os.path.exists(path):  # `Path.exists` raises an error for a name that is too long
         raise InputError(f"checkpoint {path} does not exist; give a run's folder or a .pt file")
     content = read_bytes(path, CHECKPOINT_BYTES)
-    if path.suffix != ".pt" and not content.startswith(_ZIP):
-        raise InputError(
-            f"{path} is no policy file; give a .pt or .safetensors file or a run's folder"
-        )
+    if not content.startswith(_ZIP):
+        _refuse(content, path)
     try:
         state = unpickle(content, f"checkpoint {path}")
     except InputError:

@@ -112,10 +112,12 @@ class OneOf:
     """One of some texts."""
 
     names: tuple[str, ...]
+    also: tuple[str, ...] = ()
+    """Accepted as well, but not offered."""
 
     def read(self, value: Any, where: str) -> str:
         """See `Kind`."""
-        if not isinstance(value, str) or value not in self.names:
+        if not isinstance(value, str) or value not in (*self.names, *self.also):
             meant = did_you_mean(value, self.names)
             raise InputError(
                 f"{where}={shown(value)} is unknown; give {', '.join(self.names)}{meant}"
@@ -137,10 +139,9 @@ class Instance:
             return self.of.from_name(value, where)
         if not isinstance(value, self.of):
             example = _example_of(self.of)
-            raise InputError(
-                f"{where}={shown(value)} is no {self.of.__name__}; give "
-                f"{example.__module__}.{example.__name__}(...)"
-            )
+            remedy = f"{example.__module__}.{example.__name__}(...)"
+            remedy = f"a {self.of.__name__}" if self.of.__module__ == "builtins" else remedy
+            raise InputError(f"{where}={shown(value)} is no {self.of.__name__}; give {remedy}")
         return value
 
 

@@ -127,7 +127,7 @@ def conf_dir() -> Path:
 def kinds_of(cls: type[Settings]) -> Mapping[str, Kind]:
     """Return the kind of each field, in order."""
     hints = typing.get_type_hints(cls, include_extras=True)
-    return {field.name: _kind(hints[field.name]) for field in dataclasses.fields(cls)}
+    return {field.name: _kind(hints[field.name], field.name) for field in dataclasses.fields(cls)}
 
 
 @functools.cache
@@ -241,13 +241,18 @@ def plain(value: Any) -> Any:
     return [plain(v) for v in value] if isinstance(value, tuple) else value
 
 
-def _kind(hint: Any) -> Kind:
+def _kind(hint: Any, where: str) -> Kind:
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-    if origin is Annotated:
+    if origin is Annotated and hasattr(arguments[1], "read") and not isinstance(arguments[1], type):
         return arguments[1]
-    if origin in (typing.Union, types.UnionType):
-        (inner,) = (argument for argument in arguments if argument is not types.NoneType)
-        return Maybe(_kind(inner))
+    inner = [argument for argument in arguments if argument is not types.NoneType]
+    if origin in (typing.Union, types.UnionType) and len(inner) == 1:
+        return Maybe(_kind(inner[0], where))
     if hint in (bool, str):
         return Flag() if hint is bool else Text()
-    return Instance(hint)
+    if origin is None and isinstance(hint, type):
+        return Instance(hint)
+    raise InputError(
+        f"{where} is of type {hint}; annotate it with a kind of drone_rl.utils.schema, as in "
+        "Annotated[float, Real(0.0, 1.0)]"
+    )

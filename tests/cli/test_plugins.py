@@ -104,6 +104,10 @@ def test_mistakes_are_one_line(folder):
         (["plugins=[fails]"], "fails.py (ZeroDivisionError: division by zero); correct it"),
         (["plugins=[fails]"], "plugins=fails failed in line 2 of "),
         (["plugins=[leaves]"], "plugins=leaves failed in line 2 of "),
+        (
+            ["plugins=[random]"],
+            "module of Python, which has precedence over your random.py; rename",
+        ),
         (["plugins=[./my_parts]"], "is a path; type the module's name, plugins=[my_parts]"),
         (["plugins=my_parts"], "type a list such as plugins=[my_parts]"),
         (["plugins=[unclosed]"], "plugins=unclosed failed in line 2 of "),

@@ -10,6 +10,7 @@ from drone_rl.config.learning import Collector, LeaveOneOut, Objective, Returns
 from drone_rl.config.networks import Network, SmallCnn
 from drone_rl.config.registry import (
     modules_of,
+    own_place,
     register_collector,
     register_learner,
     register_network,
@@ -116,13 +117,17 @@ def test_a_return_estimator(registered):
 
 
 def test_a_learner_and_a_collector_get_the_settings_of_the_training(registered):
+    class Parts(tuple):
+        in_keys = update = state_dict = check_state = load_state_dict = None
+        collector = network = generators = None
+
     @register_learner("mine")
     def learner(settings, parts, *, alpha: float = 0.5):
-        return settings, parts, alpha
+        return Parts((settings, parts, alpha))
 
     @register_collector("theirs")
     def collector(settings, replay, *, patience: int = 3):
-        return settings, replay, patience
+        return Parts((settings, replay, patience))
 
     registered(learner), registered(collector)
     training = TrainSettings(
@@ -158,6 +163,50 @@ def test_a_class_that_does_not_derive_from_the_base_is_refused():
         register_network("plain")(torch.nn.Linear)
     with pytest.raises(InputError, match="Frame does not derive from ReturnEstimator"):
         register_returns("plain")(Frame)
+
+
+@pytest.mark.parametrize(
+    ("register", "missing"),
+    [
+        (register_network, "in_shape; return a PolicyNetwork"),
+        (register_transform, "_apply_transform, _parameters; return a Transform"),
+        (register_returns, "estimate, _parameters; return a ReturnEstimator"),
+        (register_learner, ".*, load_state_dict; return a Learner"),
+        (register_collector, "collector, network, generators; return a Components"),
+    ],
+)
+def test_a_factory_that_returns_none_is_named(registered, register, missing):
+    def build(*args, **kwargs):
+        return None
+
+    settings = registered(register("mine")(build)).Settings
+    with pytest.raises(InputError, match=rf"=mine: .*build of {__file__} makes None .*{missing}$"):
+        settings().make()
+
+
+def test_a_class_that_does_not_initialize_its_base_is_named(registered):
+    class Careless(MLP):
+        def __init__(self, in_shape, num_actions, *, generator=None):
+            self.shape = in_shape
+
+    settings = registered(register_network("mine")(Careless)).Settings
+    with pytest.raises(InputError, match=r"Careless of .* without in_shape; call super\(\)\."):
+        settings().make((1, 2, 2), 3)
+
+
+def test_an_error_of_a_factory_is_reported_with_its_line(registered):
+    @register_learner("mine")
+    def learner(settings, parts):
+        return {}[settings]
+
+    settings = registered(learner).Settings
+    with pytest.raises(InputError, match=rf"^objective=mine failed in line \d+ of {__file__} \(K"):
+        settings().make("key", None)
+
+
+def test_the_place_of_a_part_of_ones_own(registered):
+    assert own_place(SmallCnn()) == ""
+    assert own_place(registered(register_network("wide")(Wide)).Settings()) == f"Wide of {__file__}"
 
 
 def test_a_module_that_is_imported_again_replaces_its_parts(registered):

@@ -4,7 +4,7 @@ from tensordict import TensorDict
 
 from drone_rl import objectives
 from drone_rl.config.learning import Gae, Returns
-from drone_rl.objectives import LeaveOneOut, RewardToGo, TimeBaseline, returns
+from drone_rl.objectives import LeaveOneOut, ReturnEstimator, RewardToGo, TimeBaseline, returns
 from drone_rl.utils.errors import InputError
 
 
@@ -109,6 +109,26 @@ def test_returns_require_no_grad():
     data = batch([0.0, 1.0], [0, 1])
     data["next", "reward"].requires_grad_()
     assert not RewardToGo(0.5)(data)["return_to_go"].requires_grad
+
+
+@pytest.mark.parametrize(
+    ("result", "fault"),
+    [
+        (lambda _: None, "None"),
+        (lambda _: 3.0, "a float"),
+        (lambda reward: reward.numpy(), r"a ndarray of shape \(2, 1\)"),
+        (lambda reward: reward[:, 0], r"a Tensor of shape \(2,\)"),
+        (lambda reward: reward / 0.0, "NaN or infinity"),
+    ],
+)
+def test_wrong_returns_of_an_estimator_of_ones_own_are_named(result, fault):
+    class Own(ReturnEstimator):
+        def estimate(self, reward, done):
+            return result(reward)
+
+    where = rf"Own of {__file__} returns {fault} for rewards of shape \(2, 1\); return a tensor"
+    with pytest.raises(InputError, match=where):
+        Own(scale=False)(batch([0.0, 1.0], [0, 1]))
 
 
 @pytest.mark.parametrize("gamma", [-0.1, 1.0001])

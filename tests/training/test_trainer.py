@@ -9,6 +9,7 @@ from drone_rl.training import Callback, CheckpointCallback, NotANumberError
 from drone_rl.training import trainer as trainer_module
 from drone_rl.training.trainer import episode_rewards, running_mean
 from drone_rl.utils.checkpoint import load_checkpoint
+from drone_rl.utils.errors import InputError
 from tests.training_loop import run
 
 
@@ -148,6 +149,14 @@ def test_nan_stops_and_keeps_the_last_good_checkpoint(make_trainer, tmp_path, wh
         run(trainer)
     assert torch.equal(parameters(trainer), good[0])
     assert load_checkpoint(tmp_path / "last.pt")["progress"]["updates"] == 2
+
+
+@pytest.mark.parametrize("metrics", [None, 0.5, {"loss/x": None}, {"loss/x": torch.zeros(2)}])
+def test_wrong_metrics_of_a_learner_are_named(make_trainer, metrics):
+    trainer = make_trainer()
+    trainer.learner.update = lambda batch: metrics
+    with pytest.raises(InputError, match=r"update of ReinforceLearner of .* returns .*by name"):
+        run(trainer)
 
 
 def test_stops_when_solved(make_trainer):

@@ -1,6 +1,7 @@
 import errno
 import os
 import pickle
+import re
 
 import pytest
 import torch
@@ -22,6 +23,22 @@ def test_round_trip(saved):
     assert state["value"].tolist() == [0, 1, 2]
     assert state["name"] == "first"
     assert [p.name for p in saved.parent.iterdir()] == ["last.pt"]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b'\x08\x01\0\0\0\0\0\0{"__metadata__"', "is a safetensors file; name it NAME.safetensors"),
+        (b"\x08\n\x12\x07pytorch\x1a\x0a2.1", "is an ONNX model; give the policy's .pt or .s"),
+        (b"version https://git-lfs.github.com/spec/v1\noid", "is a Git LFS pointer; replace it by"),
+        (b"anything", "is damaged or cut short"),
+    ],
+)
+def test_files_of_other_formats_are_named(tmp_path, content, message):
+    path = tmp_path / "last.pt"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=re.escape(f"{path} {message}")):
+        load_checkpoint(path)
 
 
 @pytest.mark.parametrize("step", ["fsync", "replace"])

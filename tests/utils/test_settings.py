@@ -126,6 +126,15 @@ def test_kinds_and_types_of_each_field():
     }
 
 
+@pytest.mark.parametrize(
+    "hint", [int | str, list[int], Annotated[int, 3], Annotated[int, Whole], dict[str, int]]
+)
+def test_types_without_a_kind_are_refused(hint):
+    odd = type("Odd", (Settings,), {"__annotations__": {"x": hint}, "x": 1})
+    with pytest.raises(InputError, match=r"^x is of type .*; annotate it with a kind of"):
+        odd()
+
+
 def test_names_of_files_and_plain_values():
     assert [snake_case(c) for c in (Inner, Outer)] == ["inner", "outer"]
     assert snake_case(type("SmallCnn", (), {})) == "small_cnn"

@@ -8,7 +8,6 @@ import logging
 import os
 import re
 import sys
-import traceback
 import types
 import typing
 from collections.abc import Callable, Iterator, Sequence
@@ -24,6 +23,7 @@ from hydra.errors import HydraException
 from hydra.types import RunMode
 from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
+from yaml import YAMLError
 
 from drone_rl.cli.hydra.help import next_steps, show_help
 from drone_rl.cli.hydra.messages import input_error, is_output_closed, one_line
@@ -31,6 +31,7 @@ from drone_rl.cli.hydra.mistakes import (
     check_choices,
     check_launcher,
     explain,
+    explain_file,
     repeated,
     whole_numbers,
 )
@@ -53,6 +54,7 @@ from drone_rl.config.training import CloningSettings, Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import USER_ERROR
+from drone_rl.utils.plugins import failure
 from drone_rl.utils.schema import Kind
 from drone_rl.utils.settings import Settings, conf_dir, kinds_of, plain, types_of
 
@@ -132,19 +134,14 @@ def import_plugins(overrides: Sequence[str]) -> None:
     """Import the modules that `plugins=[MODULE, ...]` names on a command line, and none from files.
 
     Raises:
-        InputError: A module is not found, or fails.
+        InputError: A module is not found, has the name of one of Python's, or fails.
     """
     typed = [o.partition("=")[2] for o in overrides if re.match(r"\+{0,2}plugins=", o)]
     names = re.findall(r"[^\[\]\s,'\"]+", typed[-1]) if typed else []
     if names and os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
     for name in names:
-        if "/" in name or name.startswith("."):
-            own = Path(name).name.removesuffix(".py")
-            raise InputError(
-                f"plugins={name} is a path; type the module's name, plugins=[{own}], in its folder "
-                "or with the folder on PYTHONPATH"
-            )
+        _check_module(name)
         try:
             importlib.import_module(name)
         except ModuleNotFoundError as error:
@@ -157,19 +154,22 @@ def import_plugins(overrides: Sequence[str]) -> None:
         except InputError:
             raise
         except (Exception, SystemExit) as error:  # any that the user's module raises
-            raise InputError(_plugin_error(name, error)) from error
+            raise InputError(failure(f"plugins={name}", error)) from error
 
 
-def _plugin_error(name: str, error: BaseException) -> str:
-    """Return the message about a plugin that raised an error, with the line of its own files."""
-    frames = traceback.extract_tb(error.__traceback__)
-    own = next((f for f in reversed(frames) if "importlib" not in f.filename), frames[-1])
-    file, line = own.filename, own.lineno
-    if isinstance(error, SyntaxError):
-        file, line = error.filename or file, error.lineno
-    reason = " ".join(str(error).split())
-    where = f"line {line} of {file}"
-    return f"plugins={name} failed in {where} ({type(error).__name__}: {reason}); correct it"
+def _check_module(name: str) -> None:
+    """Raise an `InputError` for a path, and for a module of Python itself."""
+    if "/" in name or name.startswith("."):
+        own = Path(name).name.removesuffix(".py")
+        raise InputError(
+            f"plugins={name} is a path; type the module's name, plugins=[{own}], in its folder "
+            "or with the folder on PYTHONPATH"
+        )
+    if name in sys.stdlib_module_names:
+        raise InputError(
+            f"plugins={name} is a module of Python, which has precedence over your {name}.py; "
+            "rename the file"
+        )
 
 
 def schema_of(cls: type[Settings], further: Sequence[tuple[str, Any, Any]] = ()) -> type:
@@ -231,8 +231,8 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     `name` is that of its file in conf/. `command.prepare` translates the overrides first.
     """
     is_help = bool({"--help", "-h"} & set(overrides))
-    is_all = is_help and "all" in overrides
-    words = [word for word in overrides if not (is_all and word == "all")]
+    topics = [word for word in overrides if is_help and re.fullmatch(r"[A-Za-z_][\w.]*", word)]
+    words = [word for word in overrides if word not in topics]
     overrides = command.prepare([*map(whole_numbers, words)])
     import_plugins(overrides)
     register_schemas(**{name: command})
@@ -244,7 +244,7 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
             print(f"warning: {counts}", file=sys.stderr)
     if is_help:
         with _explained(name, overrides):
-            show_help(name, conf_dir(), overrides, command, is_all=is_all)
+            show_help(name, conf_dir(), overrides, command, topics)
         return 0
     check_words(name, conf_dir(), overrides)
     statuses: list[int] = []
@@ -276,13 +276,14 @@ def _may_be_multirun(name: str, overrides: Sequence[str]) -> bool:
 
 @contextlib.contextmanager
 def _explained(name: str, overrides: Sequence[str]) -> Iterator[None]:
-    """Raise an `InputError` for settings that Hydra or OmegaConf rejects."""
+    """Raise an `InputError` for settings that Hydra, OmegaConf or PyYAML rejects."""
     try:
         yield
-    except (HydraException, OmegaConfBaseException) as error:
+    except (HydraException, OmegaConfBaseException, YAMLError) as error:
         if input_error(error) is not None:
             raise
-        raise explain(error, name, conf_dir(), overrides) from error
+        in_file = explain_file(error, name, conf_dir())
+        raise in_file or explain(error, name, conf_dir(), overrides) from error
 
 
 @contextlib.contextmanager

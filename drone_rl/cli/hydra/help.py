@@ -11,7 +11,8 @@ import yaml
 from omegaconf import OmegaConf
 
 from drone_rl.cli.commands import TABLE
-from drone_rl.cli.hydra.mistakes import composed
+from drone_rl.cli.hydra.mistakes import closest, composed, flattened
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import Settings, kinds_of
 
 _SETTING = re.compile(r"(?P<indent> *)(?P<name>[A-Za-z_]\w*):(?= |$)")
@@ -27,12 +28,14 @@ def show_help(
     conf: Path,
     overrides: Sequence[str],
     settings: type[Settings],
-    *,
-    is_all: bool = False,
+    topics: Sequence[str] = (),
 ) -> None:
-    """Print the most used settings of a command, or all, and examples.
+    """Print the most used settings of a command, or those that `topics` names, and examples.
 
-    `command` is the name of its file in `conf`; `settings` is its class.
+    `command` is the name of its file in `conf`; `settings` is its class. "all" is all settings.
+
+    Raises:
+        InputError: There is no setting and no group of settings of a name.
     """
     typed = [o for o in overrides if "=" in o or o.startswith("~")]
     config = composed(command, conf, typed)
@@ -46,7 +49,10 @@ def show_help(
     name = command.replace("_", "-")
     print(f"drone-rl {name} [setting=value ...]\n")
     print((conf / f"{command}.yaml").read_text().split("\ndefaults:")[0], end="\n\n")
-    if is_all:
+    if topics:
+        if "all" not in topics:
+            values = _chosen({g: chosen[g] for g in groups} | values, topics, f"drone-rl {name}")
+            groups = {g: names for g, names in groups.items() if g in values}
         if groups:
             lines = [f"  {g}: {', '.join(names)}" for g, names in groups.items()]
             print("Groups, each chosen by the name of a file:", *lines, "", sep="\n")
@@ -68,6 +74,21 @@ def show_help(
     print("\nexamples")
     for line, purpose in TABLE[name]["examples"]:
         print(f"  {line:<55}  {purpose}")
+
+
+def _chosen(values: Any, topics: Sequence[str], command: str) -> dict[str, Any]:
+    """Return the settings, and groups of them, whose names are most like those of topics."""
+    found: dict[str, Any] = {}
+    for topic in topics:
+        key = closest(topic, [*flattened(values)])
+        if key is None or "=" in key:
+            raise InputError(f"{command} has no setting {topic}; {command} --help all lists all")
+        *groups, last = key.split(".")
+        source, target = values, found
+        for group in groups:
+            source, target = source[group], target.setdefault(group, {})
+        target[last] = source[last]
+    return found
 
 
 def next_steps(name: str, policy: str, folder: Path) -> str:

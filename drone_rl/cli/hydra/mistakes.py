@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import yaml
 from hydra import compose, initialize_config_dir
 from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
@@ -48,6 +49,7 @@ _TEXTS = re.compile(
     r"demonstrations)(?=[=.@/]|$)"
 )
 """Settings whose values are names and paths."""
+_IN_FILE = re.compile(r"In '(\S+/\S+)': \w+ raised while composing config:\n(.*)\n +full_key: (.*)")
 _EXPONENT = re.compile(r"(?<=[=,\[(\s])(\d+(?:\.\d+)?[eE]\+?\d+)(?=[,\])]|$)")
 _LARGEST_WHOLE = 10**15
 
@@ -168,7 +170,7 @@ class Command:
         self.groups = [g for g in chosen if "@" not in g and (conf / g).is_dir() and g != "hydra"]
         own: Any = OmegaConf.to_container(self.config, resolve=False)
         del own["hydra"]
-        self.keys = [*_flatten(own), *self.groups, *_HYDRAS_OWN]
+        self.keys = [*flattened(own), *self.groups, *_HYDRAS_OWN]
         self.list_all = f"drone-rl {self.name} --help all lists the settings"
 
     def instead(self, name: str, value: str) -> str | None:
@@ -196,7 +198,7 @@ class Command:
         longer = [key for key in self.keys if key.startswith(name)] if "." in name else []
         if len(longer) > 1:
             return InputError(f"{text}did you mean one of {', '.join(longer)}? ({self.list_all})")
-        ours = f"{longer[0]}={value}" if longer else self.instead(name, value)
+        ours = f"{longer[0]}={value or 'VALUE'}" if longer else self.instead(name, value)
         if ours == override or ((ours or "").startswith("task=") and "task" not in self.groups):
             return InputError(
                 f"{override}: drone-rl {self.name} runs a policy in its own task; change single "
@@ -210,12 +212,13 @@ class Command:
         return InputError(text + listed)
 
 
-def _flatten(values: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+def flattened(values: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    """Yield the dotted names of groups and settings."""
     for name, value in values.items():
         if not name.startswith("_"):
             yield prefix + name
             if isinstance(value, Mapping):
-                yield from _flatten(value, f"{prefix}{name}.")
+                yield from flattened(value, f"{prefix}{name}.")
 
 
 def explain(error: Exception, name: str, conf: Path, overrides: Sequence[str]) -> InputError:
@@ -240,6 +243,24 @@ def explain(error: Exception, name: str, conf: Path, overrides: Sequence[str]) -
                 return found
         text = command.list_all
     return InputError(f"{' '.join(overrides)}: these settings can't be read; {text}")
+
+
+def explain_file(error: Exception, name: str, conf: Path) -> InputError | None:
+    """Return the error about a file of settings, or None; files of conf/ have none."""
+    if isinstance(error, yaml.MarkedYAMLError) and (mark := error.problem_mark):
+        where, remedy = f"line {mark.line + 1} of {mark.name}", "indent with spaces, not tabs"
+        remedy = remedy if "\\t" in f"{error.problem}" else "correct it"
+        return InputError(f"{where} is no YAML ({error.problem}); {remedy}")
+    if not (found := _IN_FILE.match(str(error))):
+        return None
+    file, reason, key = f"{found[1]}.yaml", found[2], found[3]
+    if key == file.partition("/")[0]:
+        return InputError(f"{file} sets more than {key}; write # @package _global_ as first line")
+    command, value = Command(name, conf), re.match("Value '(.*)' of type", reason)
+    if key and value:
+        wrong = _wrong_value(command.config, key, value[1], f"{key}={value[1]}", reason)
+        return InputError(f"{file}: {wrong}")
+    return command.unknown(file, key) if reason.startswith("Key ") else None
 
 
 def _lacking(name: str, conf: Path, groups: Sequence[Override]) -> InputError | None:
@@ -365,6 +386,8 @@ def _wrong_value(config: DictConfig, key: str, value: Any, text: str, reason: st
     written = re.fullmatch(r"(\d+(?:\.\d+)?)([kKmMgG])", str(value))
     if written and "number" in expected:
         now = f"{float(written[1]) * _MAGNITUDES[written[2].lower()]:.0f}"
+    elif whole := re.fullmatch(r"(-?\d+)\.0", str(value)):
+        now = whole[1]
     expected = expected or "another value"
     example = "" if now is None else f", such as {name}={str(now).lower()}"
     return InputError(f"{text} does not fit; type {expected}{example}")

@@ -13,7 +13,7 @@ from torch import Tensor
 from drone_rl.config import TaskSettings
 from drone_rl.sim.dynamics import BodyState, Obstacles
 from drone_rl.sim.entities import Pillar, VisualEntity
-from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.rendering.scene import SemanticClass, compiled
 from drone_rl.sim.tasks import CollectCubes, Task, as_task
 from drone_rl.utils.errors import InputError, did_you_mean
 
@@ -75,6 +75,10 @@ class _File(VisualEntity):
             ) from error
         if self._mjcf_root.model in ("", "unnamed_model"):
             self._mjcf_root.model = "scene"
+        whole = mjcf.RootElement()
+        whole.attach(self._mjcf_root)
+        compiled(whole, f"scene={path}")
+        self._mjcf_root.detach()
 
 
 def make_task(scene: str) -> Task[Any]:

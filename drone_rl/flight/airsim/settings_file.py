@@ -140,8 +140,8 @@ _CAMERA = _Table(
 _VEHICLE = _Table(
     {
         **_POSE,
-        "VehicleType": OneOf((*_TYPES, "ArduCopter", "PhysXCar", "ArduRover")),
-        "DefaultVehicleState": OneOf((*_STATES, "")),
+        "VehicleType": OneOf(_TYPES, also=("ArduCopter", "PhysXCar", "ArduRover")),
+        "DefaultVehicleState": OneOf(_STATES, also=("",)),
         "AutoCreate": Flag(),
         "AllowAPIAlways": Flag(),
         "Cameras": {"": _CAMERA},
@@ -156,7 +156,7 @@ _VEHICLE = _Table(
 _FILE = _Table(
     {
         "SettingsVersion": _NUMBER,
-        "SimMode": OneOf((*SIM_MODES, "Car", "car", "")),
+        "SimMode": OneOf(SIM_MODES, also=("Car", "car", "")),
         "UsageScenario": Text(),
         "ApiServerPort": Whole(0, 65535),
         "LocalHostIp": Text(),
@@ -172,7 +172,7 @@ _FILE = _Table(
         "CameraDefaults": _CAMERA,
         "Vehicles": {"": _VEHICLE},
         "SegmentationSettings": _Table(
-            {"InitMethod": OneOf(("CommonObjectsRandomIDs", "None", ""))},
+            {"InitMethod": OneOf(("CommonObjectsRandomIDs", "None"), also=("",))},
             frozenset({"MeshNamingMethod", "OverrideExisting"}),
         ),
     },

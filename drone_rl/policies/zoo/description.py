@@ -26,6 +26,7 @@ from drone_rl.config import (
 )
 from drone_rl.config.configuration import Variant
 from drone_rl.config.networks import Lstm, Network
+from drone_rl.config.registry import own_place
 from drone_rl.config.training import MOST_TRANSFORMS, TrainSettings
 from drone_rl.config.transforms import Fault, Frame, Stack, Transform
 from drone_rl.envs import DroneEnv, with_transforms
@@ -34,6 +35,7 @@ from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import Dynamics, make_dynamics
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.plugins import described, errors_of
 from drone_rl.utils.schema import Several, as_mapping, shown
 from drone_rl.utils.settings import Settings
 
@@ -182,17 +184,18 @@ class PolicyDescription:
 
     def build_network(self, generator: torch.Generator | None = None) -> ImageNetwork:
         """Return the network with fresh weights, from torch's global generator by default."""
-        return self._network(self.make_dynamics().actions, generator)
+        actions = self.make_dynamics().actions
+        return self._checked(self._network(actions, generator), actions.num_outputs)
 
     def load_network(self, weights: Mapping[str, torch.Tensor]) -> ImageNetwork:
         """Return the network with given weights, as in `expected_weights`."""
         network = self._without_weights().to_empty(device="cpu")
         network.load_state_dict(weights)
-        return network
+        return self._checked(network, network.actions.num_outputs)
 
     def build_critic(self, generator: torch.Generator | None = None) -> ImageNetwork:
         """Return a network of the same kind with one output, see `build_network`."""
-        return self._layers(1, generator)
+        return self._checked(self._layers(1, generator), 1)
 
     def expected_weights(self) -> dict[str, torch.Tensor]:
         """Return meta tensors with the names, shapes and types of the network's weights."""
@@ -210,6 +213,18 @@ class PolicyDescription:
 
     def _layers(self, outputs: int, generator: torch.Generator | None) -> ImageNetwork:
         return self.network.make(self.input.shape, outputs, generator=generator)
+
+    def _checked(self, network: ImageNetwork, outputs: int) -> ImageNetwork:
+        """Return a network; raise an `InputError` if it is the user's own with other outputs."""
+        if place := own_place(self.network):
+            who, zeros = f"network={self.network.name}: {place}", torch.zeros(2, *self.input.shape)
+            with torch.enable_grad(), errors_of(f"network={self.network.name}", place):
+                given: Any = network.eval()(zeros)  # with gradients, also numbers that overflow
+                network.train()
+            _check_returned(given, who, zeros, (2, outputs))
+            if getattr(network, "num_actions", None) != outputs:
+                raise InputError(f'{who} has no last layer "logits" of {outputs} outputs; add it')
+        return network
 
 
 def describe(settings: TrainSettings) -> PolicyDescription:
@@ -233,13 +248,32 @@ def describe(settings: TrainSettings) -> PolicyDescription:
 
 def output_of(transform: Transform, frame: Frame) -> Frame:
     """Return shape and type of an image after a transform; see `Transform.output` for errors."""
-    stated = transform.output(frame)
-    if stated is not None:
+    stated, place = transform.output(frame), own_place(transform)
+    if stated is not None and not place:
         return stated
-    made: Any = transform.make()
-    zeros = torch.zeros(1, *frame.shape, dtype=torch.float32 if frame.is_float else torch.uint8)
-    after: torch.Tensor = made._apply_transform(zeros)
+    images = (torch.arange(2 * math.prod(frame.shape), device="cpu") % 255 + 1).to(torch.uint8)
+    images = images.reshape(2, *frame.shape)
+    images = images.float() / 255 if frame.is_float else images
+    what = f"transform={transform.name}"
+    with errors_of(what, place), torch.device("cpu"):  # also where weights are meta tensors
+        made: Any = transform.make()
+        after: Any = made._apply_transform(images)
+    shape = stated.shape if stated else getattr(after, "shape", ())[1:]
+    wanted = (2, *shape) if len(shape) == 3 else "(2, C, H, W)"
+    _check_returned(after, f"{what}: {place}", images, wanted)
+    if after.dtype == torch.float64 or not bool(after.isfinite().all()):
+        fault = "float64" if after.dtype == torch.float64 else "values that are not finite"
+        raise InputError(f"{what}: {place} returns {fault}; return finite numbers of type float32")
     return Frame(tuple(after.shape[1:]), after.is_floating_point())
+
+
+def _check_returned(given: Any, who: str, images: torch.Tensor, wanted: Any) -> None:
+    """Raise an `InputError` about `who` if it returned no tensor of the wanted shape."""
+    if not isinstance(given, torch.Tensor) or tuple(given.shape) != wanted:
+        raise InputError(
+            f"{who} returns {described(given)} for input of shape {tuple(images.shape)}; return a "
+            f"tensor of shape {wanted}"
+        )
 
 
 def parse(data: Any) -> PolicyDescription:

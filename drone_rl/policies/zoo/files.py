@@ -10,7 +10,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 
 from drone_rl.policies.zoo.description import FORMAT, MAX_PARAMETERS, parse
-from drone_rl.utils.checkpoint import check_weights, load_checkpoint
+from drone_rl.utils.checkpoint import check_weights, load_checkpoint, other_format
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.overrides import COMMAND
@@ -154,7 +154,8 @@ def load_exported(path: Path) -> dict[str, Any]:
 def _exported(content: bytes) -> dict[str, Any]:
     size = int.from_bytes(content[:8], "little")
     if not 2 <= size <= min(MAX_HEADER, len(content) - 8):
-        raise InputError("it is not in the safetensors format, or damaged")
+        other = None if content[8:9] == b"{" else other_format(content)
+        raise InputError(f"it is {other or 'not in the safetensors format, or damaged'}")
     header = as_mapping(parse_json(content[8 : 8 + size], "its header"), "header")
     metadata = as_mapping(header.get("__metadata__", {}), "metadata")
     if metadata.get("format") != FORMAT:

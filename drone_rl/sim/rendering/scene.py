@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import mujoco as _mujoco
 import numpy as np
+from dm_control import mjcf
 from numpy.typing import NDArray
 
 from drone_rl.utils.errors import InputError
@@ -14,6 +15,16 @@ mujoco: Any = _mujoco
 """MuJoCo's bindings, which are untyped."""
 _UNSET = (0.5, 0.5, 0.5, 1.0)
 """MuJoCo's color of a geom that was given none."""
+
+
+def compiled(model: mjcf.RootElement, name: str) -> mjcf.Physics:
+    """Return a compiled model; raise an `InputError` about `name` with MuJoCo's reason."""
+    try:
+        return mjcf.Physics.from_mjcf_model(model)
+    except ValueError as error:
+        lines = str(error).splitlines()
+        reason = next((line for line in lines if line.startswith("Error: ")), lines[0])
+        raise InputError(f"{name} can't be compiled by MuJoCo ({reason}); correct it") from error
 
 
 class SemanticClass(enum.IntEnum):

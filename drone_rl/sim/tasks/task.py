@@ -23,6 +23,7 @@ from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import shown
+from drone_rl.utils.settings import prefixed_errors
 
 
 @dataclasses.dataclass
@@ -344,6 +345,12 @@ def register_task(
         raise InputError(f"{shown(make)} makes no task; give a class of tasks or a function")
     if TASKS.get(settings.name, settings) is not settings:
         raise InputError(f"there is a task called {settings.name}; give another name")
+    for field in dataclasses.fields(settings):
+        if field.default is field.default_factory is dataclasses.MISSING:
+            where = f"{settings.__name__}.{field.name}"
+            raise InputError(f"{where} has no default; give it one, as in = 1.0 behind its type")
+    with prefixed_errors(settings.__name__):
+        settings()  # its defaults are checked
     TASKS[settings.name], MAKERS[settings] = settings, make
 
 

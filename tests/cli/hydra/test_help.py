@@ -17,6 +17,7 @@ from drone_rl.cli.hydra.help import (
 )
 from drone_rl.cli.hydra.mistakes import composed
 from drone_rl.cli.main import find_command
+from drone_rl.utils.errors import InputError
 from tests.cli.hydra.conftest import FILES
 
 CONF = Path(__file__).parents[3] / "conf"
@@ -53,7 +54,7 @@ def test_values_stand_below_their_comments():
 
 @pytest.mark.parametrize("command", FILES)
 def test_every_knob_of_every_command_is_explained(command, config, capsys):
-    show_help(command, CONF, ["--help"], find_command(command.replace("_", "-")), is_all=True)
+    show_help(command, CONF, ["--help"], find_command(command.replace("_", "-")), ["all"])
     lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
     told = lines[lines.index("Settings, as they would be used now:") :]
     for before, line in itertools.pairwise(told):
@@ -96,6 +97,18 @@ def test_help_shows_units_defaults_and_choices(config, capsys):
     assert "  seed=7\n" in text
     assert "  objective=reinforce\n      One of: a2c, ppo, reinforce.\n" in text
     assert "drone-rl evaluate" not in text
+
+
+def test_help_of_a_group_or_setting_shows_only_that(config, capsys):
+    train = find_command("train")
+    show_help("train", CONF, ["--help"], train, ["optimizer", "experiment", "num_cubes"])
+    text = capsys.readouterr().out
+    assert "  optimizer: adam, sgd\n" in text and "  experiment: default\n" in text
+    assert "  optimizer:\n    # Learning rate.\n    lr: 0.001\n" in text
+    assert "    num_cubes: 3\n" in text
+    assert "spacing" not in text and "trainer" not in text.partition("examples")[0]
+    with pytest.raises(InputError, match=r"^drone-rl train has no setting foo; drone-rl train --h"):
+        show_help("train", CONF, ["--help"], train, ["foo"])
 
 
 @pytest.mark.parametrize("name", TABLE)

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+import yaml
 from hydra.errors import HydraException
 
 from drone_rl.cli.hydra.mistakes import (
@@ -10,7 +11,9 @@ from drone_rl.cli.hydra.mistakes import (
     Command,
     check_launcher,
     closest,
+    composed,
     explain,
+    explain_file,
     repeated,
     whole_numbers,
 )
@@ -178,3 +181,37 @@ def test_lists_are_offered_where_they_are_accepted():
 
 def test_hydras_words_are_kept_if_the_user_has_files_of_settings():
     assert "Hydra's words" in said("seed=x", "--config-dir=my")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "trainer:\n  target: 1",
+            r"^experiment/mine\.yaml sets more .*; write # @package _global_ ",
+        ),
+        (
+            "# @package _global_\ntrainer:\n  total_frame: 1",
+            r"^experiment/mine\.yaml: .* no setting trainer\.total_frame; did you mean "
+            r"trainer\.total_frames=VALUE\?",
+        ),
+        (
+            "# @package _global_\ntrainer:\n  total_frames: 1e3",
+            r"^experiment/mine\.yaml: trainer\.total_frames=1000\.0 does not fit; type a whole "
+            r"number, such as trainer\.total_frames=1000$",
+        ),
+        ("trainer:\n\ttarget: 1", r"^line 2 of .*/mine\.yaml is no YAML .*; indent with spaces"),
+        ("trainer: {target: 1", r"^line 1 of .*/mine\.yaml is no YAML .*; correct it$"),
+    ],
+)
+def test_mistakes_in_a_file_of_the_user_name_the_file(tmp_path, text, message):
+    (tmp_path / "experiment").mkdir()
+    (tmp_path / "experiment" / "mine.yaml").write_text(text)
+    with pytest.raises((HydraException, yaml.YAMLError)) as error:
+        composed("train", conf_dir(), [f"hydra.searchpath=[file://{tmp_path}]", "experiment=mine"])
+    assert re.search(message, str(explain_file(error.value, "train", conf_dir())))
+
+
+def test_mistakes_elsewhere_are_not_those_of_a_file():
+    error = HydraException("In 'train': Could not find 'network/x'")
+    assert explain_file(error, "train", conf_dir()) is None

@@ -28,7 +28,19 @@ def test_blocks_can_be_touched_and_a_file_is_shown(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "message"), [("<mujoco><", "can't be read"), ("", "can't be read")]
+    ("text", "message"),
+    [
+        ("<mujoco><", "can't be read"),
+        ("", "can't be read"),
+        (
+            '<mujoco><worldbody><geom type="mesh" mesh="tree"/></worldbody></mujoco>',
+            r"^scene=.*bad\.xml can't be compiled .*Error: mesh 'scene/tree' not found in geom 0\)",
+        ),
+        (
+            '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>',
+            r"free joint can only be used on top level\); correct it$",
+        ),
+    ],
 )
 def test_crafted_files_are_refused(tmp_path, text, message):
     (tmp_path / "bad.xml").write_text(text)

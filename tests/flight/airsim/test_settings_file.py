@@ -132,7 +132,7 @@ def test_unknown_keys_are_warned_about_and_others_are_not(caplog):
     ("text", "message"),
     [
         ("{'SimMode': 'Car'}", "SimMode=Car is not supported; give Multirotor or ComputerVision"),
-        ("{'SimMode': 'Boat'}", "SimMode='Boat' is unknown"),
+        ("{'SimMode': 'Boat'}", "SimMode='Boat' is unknown; give Multirotor, ComputerVision$"),
         ("{'ApiServerPort': 70000}", "ApiServerPort=70000 is out of range"),
         ("{'ApiServerPort': '1'}", "ApiServerPort='1' is a text"),
         ("{'ClockSpeed': 0}", "ClockSpeed=0 is out of range"),

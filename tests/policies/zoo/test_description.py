@@ -1,11 +1,16 @@
 """Descriptions are strict and complete, and build the described policy."""
 
 import copy
+from collections import OrderedDict
 
 import pytest
 import torch
+from torch import nn
 
 from drone_rl.config import COMPUTER_VISION, MOVES_SETTINGS, ActionSettings, AppearanceSettings
+from drone_rl.config.registry import register_network, register_transform
+from drone_rl.envs.transforms import PixelTransform
+from drone_rl.policies import PolicyNetwork, SmallCNN
 from drone_rl.policies.zoo import parse
 from drone_rl.sim.dynamics import ComputerVision
 from drone_rl.utils.errors import InputError
@@ -60,6 +65,78 @@ def test_critic_is_the_network_with_one_output():
     last = {"layers.logits.weight": (1, 128), "layers.logits.bias": (1,)}
     assert shapes == {name: tuple(value.shape) for name, value in wanted.items()} | last
     assert critic(torch.zeros(5, 1, 25, 64)).shape == (5, 1)
+
+
+class Own(SmallCNN):
+    """The small network with another result."""
+
+    result = staticmethod(lambda logits: logits)
+
+    def __init__(self, in_shape, num_actions, *, generator: torch.Generator | None = None):
+        super().__init__(in_shape, num_actions, generator=generator)
+
+    def forward(self, pixels):
+        return self.result(super().forward(pixels))
+
+
+@pytest.mark.parametrize(
+    ("result", "fault"),
+    [
+        (lambda _: None, r"returns None for input of shape \(2, 1, 25, 64\)"),
+        (lambda x: (x, 1), "returns a tuple for"),
+        (lambda x: x[:, :2], r"returns a Tensor of shape \(2, 2\) .* of shape \(2, 3\)$"),
+        (lambda x: x @ x, r"network=own failed in line \d+ of .*\(RuntimeError: mat1 and mat2"),
+    ],
+)
+def test_wrong_outputs_of_a_registered_network_are_named(registered, monkeypatch, result, fault):
+    registered(register_network("own")(Own))
+    described = parse({**DEFAULT, "network": {"name": "own"}})
+    weights = described.build_network().state_dict()
+    monkeypatch.setattr(Own, "result", staticmethod(result))
+    for build in (described.build_network, lambda: described.load_network(weights)):
+        with pytest.raises(InputError, match=fault) as error:
+            build()
+        assert __file__ in str(error.value)
+
+
+def test_a_registered_network_without_logits_is_named(registered):
+    @register_network("own")
+    class Nameless(PolicyNetwork):
+        def __init__(self, in_shape, num_actions, *, generator=None):
+            layers = {"flatten": nn.Flatten(), "out": nn.Linear(1600, num_actions)}
+            super().__init__(in_shape, OrderedDict(layers), lambda layer, is_last: None)
+
+    registered(Nameless)
+    described = parse({**DEFAULT, "network": {"name": "own"}})
+    for build, outputs in ((described.build_network, 3), (described.build_critic, 1)):
+        with pytest.raises(InputError, match=f'Nameless of .* "logits" of {outputs} outputs'):
+            build()
+
+
+@pytest.mark.parametrize(
+    ("result", "fault"),
+    [
+        (lambda _: None, r"returns None for input .*; return a tensor of shape \(2, C, H, W\)$"),
+        (lambda x: x.mean(-1), r"returns a Tensor of shape \(2, 1, 25\) for input"),
+        (lambda x: x[:1], r"of shape \(1, 1, 25, 64\) .* of shape \(2, 1, 25, 64\)$"),
+        (lambda x: x.numpy(), "returns a ndarray of shape"),
+        (lambda x: x.double(), "returns float64"),
+        (lambda x: x * float("nan"), "returns values that are not finite"),
+        (lambda x: x.nope, r"transform=own failed in line \d+ of .*\(AttributeError: 'Tensor'"),
+    ],
+)
+@pytest.mark.parametrize("output", [None, lambda frame, _: frame])
+def test_wrong_outputs_of_a_registered_transform_are_named(registered, result, fault, output):
+    class Filter(PixelTransform):
+        def _apply_transform(self, obs):
+            return result(obs)
+
+    registered(register_transform("own", output=output)(Filter))
+    if output and "C, H, W" in fault:
+        fault = fault.replace("2, C, H, W", "2, 1, 25, 64")
+    with pytest.raises(InputError, match=fault) as error:
+        parse({**DEFAULT, "transforms": [GRAY, {"name": "own"}]})
+    assert __file__ in str(error.value)
 
 
 def test_description_round_trip():

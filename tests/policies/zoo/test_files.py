@@ -108,6 +108,8 @@ def test_name_of_the_running_reward_in_version_0_1_is_read(tmp_path):
     [
         (b"\x02", "safetensors format"),
         (b"not a policy at all", "safetensors format"),
+        (b"version https://git-lfs.github.com/spec/v1", "it is a Git LFS pointer; replace it by"),
+        (b"PK\x03\x04\0\0\0\0\0\0", r"it is an archive, as checkpoints are; name it NAME\.pt"),
         ((2**40).to_bytes(8, "little") + b"{}", "safetensors format"),
         (exported()[:-1], "weights are damaged"),
         (exported() + b"1", "weights are damaged"),

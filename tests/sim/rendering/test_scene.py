@@ -1,9 +1,10 @@
 import mujoco
 import numpy as np
 import pytest
+from dm_control import mjcf
 
 from drone_rl.sim.rendering import Scene
-from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.rendering.scene import SemanticClass, compiled
 from drone_rl.utils.errors import InputError
 
 
@@ -21,6 +22,17 @@ def test_geoms_are_found_by_semantic_class():
     assert scene.geoms(SemanticClass.OBSTACLE) == []
     assert scene.shown(show_drone=True) == [0, 1, 2, 3]
     assert scene.shown(show_drone=False) == [0, 1, 3]
+
+
+def test_a_model_that_mujoco_rejects_is_named_with_its_reason():
+    model = mjcf.RootElement()
+    model.worldbody.add("geom", type="mesh", mesh="tree")
+    message = (
+        r"^scene=a\.xml can't be compiled .*\(Error: mesh 'tree' not found in geom 0\); correct"
+    )
+    with pytest.raises(InputError, match=message) as error:
+        compiled(model, "scene=a.xml")
+    assert "\n" not in str(error.value)
 
 
 def test_cameras_are_found_by_name():

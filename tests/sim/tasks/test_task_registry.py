@@ -1,4 +1,4 @@
-from typing import ClassVar
+from typing import Annotated, ClassVar
 from unittest.mock import patch
 
 import pytest
@@ -7,6 +7,7 @@ from drone_rl.config import TASKS, BaseTaskSettings, PillarsSettings, TaskSettin
 from drone_rl.sim.tasks import CollectCubes, Pillars
 from drone_rl.sim.tasks.task import MAKERS, as_settings, as_task, register_task
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Real
 from tests.second_task import Posts
 
 
@@ -44,6 +45,35 @@ def test_user_tasks_can_be_registered(monkeypatch):
 
     with pytest.raises(InputError, match="there is a task called posts; give another name"):
         register_task(Other, lambda _: Posts())
+
+
+class WithoutDefault(BaseTaskSettings):
+    name: ClassVar[str] = "mine"
+    cost: Annotated[float, Real(0.0)]
+
+
+class WithText(BaseTaskSettings):
+    name: ClassVar[str] = "mine"
+    cost: float = "0.005"
+
+
+class WithUnion(BaseTaskSettings):
+    name: ClassVar[str] = "mine"
+    cost: int | str = 3
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (WithoutDefault, r"^WithoutDefault\.cost has no default; give it one"),
+        (WithText, r"^WithText\.cost='0\.005' is no float; give a float$"),
+        (WithUnion, r"^WithUnion\.cost is of type int \| str; annotate it with a kind"),
+    ],
+)
+def test_mistakes_in_settings_are_named_when_their_task_is_registered(settings, message):
+    with pytest.raises(InputError, match=message):
+        register_task(settings, lambda _: Posts())
+    assert "mine" not in TASKS
 
 
 def test_tasks_without_settings_are_registered_as_objects():

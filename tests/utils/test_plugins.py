@@ -1,0 +1,57 @@
+"""Errors of a user's own code name its file and line."""
+
+import numpy as np
+import pytest
+
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.plugins import described, errors_of, failure, place_of
+
+
+def raise_it(error):
+    raise error
+
+
+def caught(error):
+    with pytest.raises(type(error)) as info:
+        raise_it(error)
+    return info.value
+
+
+def test_place_has_name_and_file():
+    assert place_of(raise_it) == f"raise_it of {__file__}"
+    assert place_of(type("Typed", (), {"__module__": "gone"})) == "Typed of gone"
+
+
+def test_failure_names_the_last_line_of_the_users_files():
+    line = raise_it.__code__.co_firstlineno + 1
+    error = caught(ValueError("two\n words"))
+    where = f"line {line} of {__file__}"
+    assert failure("x=1", error) == f"x=1 failed in {where} (ValueError: two words); correct it"
+
+
+def test_failure_elsewhere_names_the_place():
+    error = KeyError("x")
+    assert (
+        failure("x=1", error, "A of b.py") == "x=1 failed in A of b.py (KeyError: 'x'); correct it"
+    )
+
+
+def test_failure_of_syntax_names_the_line_of_the_file():
+    error = caught(SyntaxError("invalid", ("mine.py", 7, 1, "x =")))
+    assert "failed in line 7 of mine.py (SyntaxError: invalid" in failure("x=1", error)
+
+
+def test_errors_become_one_line_and_known_ones_stay():
+    failed = r"^x=1 failed in line .*\(OSError: no\); correct it$"
+    with pytest.raises(InputError, match=failed), errors_of("x=1", "A of b.py"):
+        raise_it(OSError("no"))
+    with pytest.raises(InputError, match=r"^known$"), errors_of("x=1", "A of b.py"):
+        raise InputError("known")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(None, "None"), (1.5, "a float"), (np.zeros((2, 3)), "a ndarray of shape (2, 3)")],
+)
+def test_described(value, text):
+    assert described(value) == text
