@@ -58,7 +58,7 @@ class PlacesCommand(PolicyCommandSettings, PlacesSettings):
     """Settings of `drone-rl places`."""
 
     def run(self, folder: Path) -> tuple[int, float]:
-        """Map actions by cube position; return the exit status and the fraction of missed turns."""
+        """Map actions by cube position; return the exit status and the blind fraction of places."""
         chosen = self.as_base(PlacesSettings)
         done = drone_rl.places(self.policy, chosen, **self.shared(), progress=silent)
         finish(done, folder, "places.json, places.png and places.svg")

@@ -95,7 +95,7 @@ class ShiftSettings(DeviceSettings):
     """Settings of robustness tests."""
 
     axes: Annotated[Any, Maybe(Listed("axis"))] = None
-    """Axes or groups of axes, as in axes=[sun,fog]; null for all axes of the task."""
+    """Axes or groups of axes, as in axes=[sun,fog]; null for all that the task has."""
     strengths: Annotated[tuple[int, ...], Several(Whole(1, 5), 1, 5)] = (1, 2, 3, 4, 5)
     """Strengths to test of the five of each axis, in rising order."""
     modes: Annotated[tuple[str, ...], Several(OneOf(MODES), 1, 3)] = MODES

@@ -261,10 +261,11 @@ class Changes:
     def read(self, value: Any, where: str) -> dict[str, Any]:
         """See `drone_rl.utils.schema.Kind`."""
         given = as_mapping(value, where)
-        if "name" in given and "name" not in self.types and hasattr(self.of, "name"):
+        own = getattr(self.of, "name", None)
+        if own and "name" in given and "name" not in self.types:
             raise InputError(
-                f"{where}.name={shown(given['name'])} would replace the task, which is "
-                f"{self.of.name}; give values of that task's settings"
+                f"{where}.name={shown(given['name'])} would replace the task, which is {own}; give "
+                "values of that task's settings"
             )
         for name in given:
             if name not in self.types:

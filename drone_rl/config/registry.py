@@ -47,7 +47,7 @@ class _Base(NamedTuple):
 _BASES: dict[type[Variant], _Base] = {
     Network: _Base("PolicyNetwork", "is_recurrent", ("in_shape",)),
     Transform: _Base("Transform", "set_container", ("_apply_transform", "_parameters")),
-    Returns: _Base("ReturnEstimator", "to", ("estimate", "_parameters")),
+    Returns: _Base("ReturnEstimator", "estimate", ("estimate", "_parameters")),
     Objective: _Base(
         "Learner", "", ("in_keys", "update", "state_dict", "check_state", "load_state_dict")
     ),
@@ -189,6 +189,12 @@ def _register(
         if variant.registered_name() == name:
             if variant.__module__.startswith("drone_rl."):
                 raise InputError(f"{part.__name__.lower()}={name} is built in; give another name")
+            modules = {variant.__module__, factory.__module__}
+            if len(modules) > 1 and "__main__" not in modules:
+                raise InputError(
+                    f"{part.__name__.lower()}={name} is registered by {variant.__module__}, too; "
+                    "give another name"
+                )
             del variant.target  # its module was imported again; the new part replaces the old one
     fields = _fields(name, factory, positional, skipped)
     for field, _, _ in fields:

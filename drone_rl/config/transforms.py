@@ -1,10 +1,11 @@
 """Settings of transforms, from the camera's frame to the network's input."""
 
+from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from drone_rl.config.configuration import Variant
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Real, Several, Whole
+from drone_rl.utils.schema import Real, Several, Whole, shown
 from drone_rl.utils.settings import prefixed_errors
 
 
@@ -41,6 +42,18 @@ class Transform(Variant):
 
     def _transformed(self, frame: Frame) -> Frame:
         return frame
+
+
+def as_transforms(given: Transform | Sequence[Transform]) -> tuple[Transform, ...]:
+    """Return one or several transforms as a tuple; raise an `InputError` for other values."""
+    transforms: Any = given if isinstance(given, list | tuple) else (given,)
+    for i, transform in enumerate(transforms):
+        if not isinstance(transform, Transform):
+            raise InputError(
+                f"transforms[{i}]={shown(transform)} is no transform; give settings such as "
+                "drone_rl.config.transforms.Rgb()"
+            )
+    return tuple(transforms)
 
 
 class Gray(Transform, target="gray"):

@@ -27,7 +27,7 @@ def oracle_policy(
 ) -> TensorDictModule:
     """Return a policy that acts by the true state: an upper bound for one that sees images.
 
-    By default its actions are those of the task's default dynamics.
+    By default its actions are the oracle's own, `OracleRule.actions`.
 
     Raises:
         InputError: The task has no oracle, or none for these actions.

@@ -18,7 +18,7 @@ MAX_FRAGILE_EPISODES = 0.25
 MAX_UNEXPLAINED = 0.04
 """Largest fraction of episodes that may end differently in another implementation if there is no
 bound on rounding, actions are continuous, or drones have flight dynamics. Otherwise an episode may
-take other actions only after a fragile frame."""
+take other actions only in or after a fragile frame."""
 MAX_BRANCHES = 64
 """Largest number of branches of an episode; with more, its outcome is left open."""
 

@@ -72,8 +72,8 @@ def run_compared(
 def require_function(policy: BasePolicy, **how: Any) -> None:
     """Check that a third-party policy depends on the current frame only.
 
-    Policies of this package do so by construction. `how` are the seed, device and renderer of the
-    environments, see `BasePolicy.flying`.
+    Others are not checked: their descriptions state whether they use earlier frames. `how` are the
+    seed, device and renderer of the environments, see `BasePolicy.flying`.
 
     Raises:
         InputError: Its actions depend on the batch, on a frame's row, or on earlier calls.

@@ -55,7 +55,7 @@ KINDS = ("good", "good, but trivial", "one-sided", "poor", "none of these")
 SIDES = ("left", "ahead", "right")
 """Strata of cube collection, as in `sim.tasks.common`, which imports torch."""
 BLIND_BASELINES = ("random", "forward", "left", "right")
-"""Its random and constant baselines."""
+"""Random and constant baselines of cube collection."""
 TOLERANCE = 1e-9
 """Rounding of a mean: a value that exceeds a threshold by less counts as equal to it."""
 
@@ -130,18 +130,18 @@ class Rule:
     def text(self) -> str:
         """The rule as text."""
         return f"""\
-good: the share of episodes in which every cube is collected is more than {self.good_share:.0%} of \
-the oracle's, and more than {self.side_share:.0%} of the cubes to the left, ahead and to the right \
-are collected, wherever more than {self.offered_share:.0%} of episodes offer one. good, but \
-trivial: the same, but random actions or one action always succeed in at least \
-{self.good_share:.0%} of the oracle's episodes, too. one-sided: more \
-than {self.side_share:.0%} of the cubes on one side and no more than {self.other_share:.0%} on \
-the other, both offered. poor: neither, and no farther than {self.poor_margin:.0%} of the way from \
-luck to the oracle, in cubes; luck is the best of random actions and of each action always, flown \
-in the same worlds. none of these: anything else. Every episode counts once: a share is a mean \
-over episodes. The verdict is certain if the kind is the same wherever the quantities lie within \
-intervals that hold all at once with {1 - self.error_rate:.0%} probability, whatever depends on \
-what within an episode."""
+good: the share of episodes in which every cube is collected is more than \
+{100 * self.good_share:g}% of the oracle's, and more than {100 * self.side_share:g}% of the cubes \
+to the left, ahead and to the right are collected, wherever more than \
+{100 * self.offered_share:g}% of episodes offer one. good, but trivial: the same, but random \
+actions or one action always succeed in at least {100 * self.good_share:g}% of the oracle's \
+episodes, too. one-sided: more than {100 * self.side_share:g}% of the cubes on one side and no \
+more than {100 * self.other_share:g}% on the other, both offered. poor: neither, and no farther \
+than {self.poor_margin:.0%} of the way from luck to the oracle, in cubes; luck is the best of \
+random actions and of each action always, flown in the same worlds. none of these: anything else. \
+Every episode counts once: a share is a mean over episodes. The verdict is certain if the kind is \
+the same wherever the quantities lie within intervals that hold all at once with \
+{100 * (1 - self.error_rate):g}% probability, whatever depends on what within an episode."""
 
 
 class Quantity(NamedTuple):

@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 import logging
 import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -87,7 +88,7 @@ def view(policy: Policy, *, greedy: bool = True, seed: int = 0, **how: Any) -> N
         InputError: There is no display, or the policy is recurrent.
     """
     require_memoryless(policy.make_network(), "the viewer", "leave viewer=false to film it")
-    if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    if sys.platform != "darwin" and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
         raise InputError("viewer=true needs a display, and there is none; leave it false to film")
     import dm_env
     from dm_control import viewer

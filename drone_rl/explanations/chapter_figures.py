@@ -62,7 +62,8 @@ class FigureSettings(Settings):
     """Frames of t-SNE (Figs. 7 and 8) or of the search for a pair (Fig. 9); null for the chapter's
     number."""
     episodes: Annotated[int, Whole(1, 1000, "episodes")] | None = None
-    """Episodes that the frames come from; null for the chapter's number."""
+    """Episodes from which the frames of Figs. 7 to 9 and 13 to 15 come; null for the chapter's
+    number, in Figs. 13 to 15 for 20."""
     tint: Annotated[str, OneOf(("predicted", "sampled"))] = "predicted"
     """Action whose color tints a frame of Figs. 7 and 8: the most probable one, or the one that
     was sampled."""

@@ -23,7 +23,7 @@ from drone_rl.utils.seeding import plain_generator
 OBJECTIVES: tuple[Objective, ...] = ("probability", "logit")
 NO_GRADIENTS = (
     "Class models need gradients of the logits with respect to the pixels, and this policy has "
-    "none; give it as a torch function of floats, which the transform rgb makes."
+    "none; give it as a PyTorch function of float images, such as the transform rgb returns."
 )
 AS_PROBABLE = 0.01  # of observations whose probabilities differ by less, the smoothest is the best
 
@@ -54,8 +54,8 @@ class Attempts:
     """Results of one setting from each random start, for each action."""
 
     images: Tensor  # (num_actions, starts, C, H, W); optimized observations
-    probabilities: Tensor  # (num_actions, starts), the policy's of the action
-    roughness: Tensor  # (num_actions, starts), mean difference of neighbours, of the data set's
+    probabilities: Tensor  # (num_actions, starts); the policy's, of the action
+    roughness: Tensor  # (num_actions, starts); relative to the data set's
     settings: ClassModelSettings
 
     def best(self) -> list[int]:

@@ -102,7 +102,7 @@ def explain(
         settings: What to compute.
         folder: Folder of explanations and report.
         num_envs: Environments in a batch; bounds memory.
-        outputs: Folder to search for measured robustness, see `find_domain`.
+        outputs: Folder of all runs, see `load_policy` and `find_domain`.
         progress: Callback for progress; shows a bar by default.
         changes: Settings to change, as in `explain("good", frames=100)`.
 
@@ -111,7 +111,7 @@ def explain(
     """
     settings, seed = with_seed(ExplainSettings.from_arguments(settings, changes))
     Whole(1).read(num_envs, "num_envs")
-    chosen = _named(policies)
+    chosen = _named(policies, outputs)
     folder, progress = as_path(folder, "folder"), as_progress(progress)
     folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(chosen)}
 
@@ -143,11 +143,11 @@ def explain(
     return Explanations(folder, report, numbers, seed)
 
 
-def _named(policies: Given | Sequence[Given]) -> dict[str, BasePolicy]:
+def _named(policies: Given | Sequence[Given], outputs: str | Path) -> dict[str, BasePolicy]:
     """Return the policies by name or, if some share a name, by file."""
     if isinstance(policies, str) or not isinstance(policies, Sequence):
         policies = [policies]
-    loaded = [as_policy(policy) for policy in policies]
+    loaded = [as_policy(policy, outputs) for policy in policies]
     names = [policy.name for policy in loaded]
     if len(set(names)) < len(names):
         names = [policy.origin["policy"] for policy in loaded]

@@ -61,7 +61,7 @@ class Explainer:
     ) -> Tensor:
         """Return Grad-CAM in the observation's size (T, H, W); raise InputError without a layer."""
         if self.layer is None:
-            raise InputError("Grad-CAM needs a convolution, and this policy has none")
+            raise InputError("Grad-CAM needs a convolution with gradients, which this policy lacks")
         method = LayerGradCam(self._forward(objective), find_layer(self.network, self.layer))
 
         def attribute(x: Tensor, a: Tensor) -> Tensor:

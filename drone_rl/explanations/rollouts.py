@@ -134,9 +134,10 @@ def collect(
 
 
 def select_frames(episode: NDArray, num_frames: int) -> NDArray:
-    """Return indices of the same number of frames of each episode, evenly spaced in time.
+    """Return indices of about as many frames of each episode, evenly spaced in time.
 
-    `episode` has the episode of each frame, from 0, in order. At most `num_frames` are selected.
+    `episode` has the episode of each frame, from 0, in order. At most `num_frames` are selected;
+    episodes that are shorter than their part are selected whole.
     """
     lengths = np.bincount(episode)
     quota = np.zeros_like(lengths)

@@ -171,7 +171,7 @@ def check_maps(
     Returns:
         "trusted": name of the best method that passed all tests, None if none did; "methods", by
         name, see `check_method`; "placebos": their scores; "frames", "episodes", "frames_unmoved";
-        "level": error rate of each method; "confidence" of each bound but the scores'.
+        "level": error rate of each method; "confidence" of the intervals "lower" to "upper".
     """
     level = ERROR_RATE / (num_methods or max(1, len(methods)))
     maps = maps or {}

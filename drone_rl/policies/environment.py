@@ -14,7 +14,7 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
 )
-from drone_rl.config.transforms import DEFAULT_TRANSFORMS, Transform
+from drone_rl.config.transforms import DEFAULT_TRANSFORMS, Transform, as_transforms
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, shown
@@ -55,10 +55,7 @@ def make_env(
         _check(dynamics, "dynamics", DynamicsSettings)
     if kwargs.get("appearance") is not None:
         kwargs["appearance"] = Instance(AppearanceSettings).read(kwargs["appearance"], "appearance")
-    several = isinstance(transforms, Sequence) and not isinstance(transforms, str)
-    steps: Any = transforms if several else (transforms,)
-    for transform in steps:
-        _check(transform, "transforms", Transform)
+    steps = as_transforms(transforms)
     for unknown in kwargs.keys() - inspect.signature(envs.DroneEnv.__init__).parameters.keys():
         raise InputError(
             f"{unknown} is no argument of make_env; settings of the task are given as "

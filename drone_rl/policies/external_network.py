@@ -57,9 +57,10 @@ class ExternalNetwork(ImageNetwork):
             raise
         except Exception as error:
             what = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-            shown = tuple(self._given(image).shape)
+            given = self._given(image)
             raise InputError(
-                f"the network can't take images of shape {shown}, {image.dtype} ({what}); give "
+                f"the network can't take images of shape {tuple(given.shape)}, {given.dtype} "
+                f"({what}); give "
                 f"{_remedy(self.parts)}"
             ) from error
         if not torch.allclose(found, self(image), atol=_TOLERANCE):

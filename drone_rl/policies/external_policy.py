@@ -17,9 +17,10 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
     TaskSettings,
+    settings_of,
 )
 from drone_rl.config.configuration import Changes
-from drone_rl.config.transforms import Frame, Gray, Rgb, Standardize, Transform
+from drone_rl.config.transforms import Frame, Gray, Rgb, Standardize, Transform, as_transforms
 from drone_rl.policies import ExternalNetwork
 from drone_rl.policies.environment import make_env
 from drone_rl.policies.external_network import Logits
@@ -119,7 +120,7 @@ class ExternalPolicy(BasePolicy):
 def policy_from(
     logits: Logits,
     *,
-    task: BaseTaskSettings | Task[Any] | None = None,
+    task: BaseTaskSettings | Task[Any] | str | None = None,
     camera: CameraSettings | None = None,
     dynamics: DynamicsSettings = COMPUTER_VISION,
     actions: ActionSettings = MOVES_SETTINGS,
@@ -134,7 +135,7 @@ def policy_from(
     Args:
         logits: Callable from a batch of transformed frames, floats (N, C, H, W), to a logit for
             each action, a tensor or an array (N, number of actions).
-        task: The task.
+        task: The task, its settings, or a name such as "pillars" for the default settings.
         camera: The policy's camera. By default, its images have the size in
             `logits.observation_shape` if there is one, as in `Sb3Logits`.
         dynamics: Vehicle dynamics.
@@ -162,20 +163,15 @@ def policy_from(
         )
     if camera is not None:
         Instance(CameraSettings).read(camera, "camera")
-    if isinstance(transforms, Transform):
-        transforms = (transforms,)
-    for i, transform in enumerate(transforms or ()):
-        if not isinstance(transform, Transform):
-            raise InputError(
-                f"transforms[{i}]={shown(transform)} is no transform; give settings such as "
-                "drone_rl.config.transforms.Rgb()"
-            )
+    Instance(DynamicsSettings).read(dynamics, "dynamics")
+    if isinstance(task, str):
+        task = settings_of(task, "task")()
     policy = ExternalPolicy(
         name=name or getattr(logits, "__name__", type(logits).__name__),
         logits=logits,
         own_task=task or TaskSettings(),
         camera=camera or _camera_of(logits),
-        transforms=_transforms_of(logits) if transforms is None else tuple(transforms),
+        transforms=_transforms_of(logits) if transforms is None else as_transforms(transforms),
         own_dynamics=dynamics,
         actions=actions,
     )

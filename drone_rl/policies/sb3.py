@@ -28,8 +28,8 @@ class Sb3Logits(nn.Module):
     A policy that was trained on bytes gets frames from 0 to 1, as from the transform `Rgb`.
 
     Raises:
-        InputError: It is no model, or no actor-critic with discrete actions, or needs more than one
-            array.
+        InputError: It is no model, or no actor-critic with discrete actions, is recurrent, or needs
+            more than one array.
     """
 
     def __init__(self, model: BaseAlgorithm) -> None:
@@ -104,7 +104,10 @@ class Sb3Trunk(BaseFeaturesExtractor):
             raise InputError(f"Sb3Trunk got observations of shape {shape}; give images (C, H, W)")
         made: Any = (network or SmallCnn()).make(shape, 1)
         if not isinstance(made, PolicyNetwork):
-            raise InputError(f"Sb3Trunk got {type(made).__name__}; give settings of layers")
+            raise InputError(
+                f"Sb3Trunk got {type(made).__name__}, which is recurrent; give the settings of a "
+                "network without memory, such as SmallCnn()"
+            )
         width = made.layers.get_parameter("logits.weight").shape[1]
         super().__init__(observation_space, features_dim=width)
         # Stable-Baselines3's initialization needs contiguous weights, not channels_last

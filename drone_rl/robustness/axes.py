@@ -63,7 +63,7 @@ class Axis:
     strengths: tuple[float, ...]
     """Five, weakest first; on both sides of the neutral one if the axis has two ends."""
     make: Callable[[float, EvaluatedPolicy], Condition]
-    """The condition of a strength; raises InputError if it is not for the task."""
+    """The condition of a strength; raises InputError if it is not for task or renderer."""
     value: Callable[[float, EvaluatedPolicy], float] = lambda strength, _: strength
     """A strength in the axis's unit; differs where strengths are relative to the policy."""
     own: Callable[[EvaluatedPolicy], float] | None = None
@@ -215,10 +215,12 @@ def check_axes(names: Iterable[str]) -> None:
 
 
 def find_axes(names: Iterable[str] | None, subject: EvaluatedPolicy) -> list[Axis]:
-    """Return axes by name or by group, by default all that the task has, in the order of `AXES`.
+    """Return axes by name or by group, in the order of `AXES`.
+
+    By default these are all that the task has and the policy's renderer can render.
 
     Raises:
-        InputError: A name is unknown, or the axis is not for this task.
+        InputError: A name is unknown, or the axis is not for this task or renderer.
     """
     if names is None:
         return [axis.of(subject) for axis in AXES.values() if _is_for(axis, subject)]
@@ -226,7 +228,7 @@ def find_axes(names: Iterable[str] | None, subject: EvaluatedPolicy) -> list[Axi
     check_axes(wanted)
     found = [axis for axis in AXES.values() if {axis.name, axis.group} & {*wanted}]
     for axis in found:
-        axis.make(axis.strengths[0], subject)  # raises if the axis is not for this task
+        axis.make(axis.strengths[0], subject)  # raises if it is not for the task or renderer
     return [axis.of(subject) for axis in found]
 
 

@@ -237,10 +237,9 @@ def clutter(appearance: Appearance | None, region: ObjectRegion, places: Tensor)
 
 
 def frozen_frames(rate: float) -> FaultModel:
-    """The previous image shown again, with this probability at each step.
+    """Repeat the previous image with this probability at each step.
 
-    Unlike the transforms in `drone_rl.envs.camera_faults` it samples the same random numbers at
-    every strength, so that episodes at two strengths are paired.
+    Unlike `fault_models.frozen_frames` it samples a number at the first step, too.
     """
 
     def begin(images: Tensor, sample: Sample) -> Tensor:

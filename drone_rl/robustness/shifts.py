@@ -129,6 +129,8 @@ def shifts(
     require_function(loaded, seed=seed.value, device=settings.device, renderer=settings.renderer)
     subject = make_evaluated_policy(loaded, settings)
     if settings.domain:
+        if (judged := as_task(subject.task)).oracle is None:
+            raise InputError(f"task={judged.name} has no oracle to compare with; give domain=false")
         remedy = "give domain=false for the success rates under perturbations alone"
         require_memoryless(subject.network, "the operating domain", remedy)
     axes = find_axes(settings.axes, subject)
@@ -182,9 +184,6 @@ def _domain(
     report: Callable[[str], None],
 ) -> dict[str, Any]:
     """Return the operating domain: "plain", without perturbation, and "ranges" by axis."""
-    task = as_task(subject.task)
-    if task.oracle is None:
-        raise InputError(f"task={task.name} has no oracle to compare with; give domain=false")
     ranges: dict[str, Any] = {}
     with closing(PairedEvaluator(subject, settings.domain_episodes, seed.value)) as evaluator:
         oracle = evaluator.run(Condition(), agent=OracleAgent(only_visible=False)).episodes

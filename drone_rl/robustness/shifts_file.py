@@ -1,6 +1,7 @@
 """Read `shifts.json` strictly, and check that it is of the given policy.
 
-Counts cannot be checked; axes, units, strengths, values, sums and ranges are.
+Whether the episodes were run cannot be checked. The figures must agree with their counts, and axes,
+units and strengths must be those that `drone-rl shifts` tests.
 """
 
 import dataclasses
@@ -51,7 +52,7 @@ class SavedShifts:
     """A robustness evaluation read from a file, or the reason why it is refused."""
 
     path: Path
-    """Their file."""
+    """The file."""
     numbers: dict[str, Any] | None
     """As in `shifts.json`, without images but with "file" ("path", "dated"); None if refused."""
     pictures: Mapping[str, list[NDArray | None]] = dataclasses.field(default_factory=dict)

@@ -121,7 +121,8 @@ class ComposerTask(composer.Task):
 
     def compile(self) -> Scene:
         """Return the model that dm_control simulates, with the semantic classes of its geoms."""
-        physics = compiled(self._arena.mjcf_model, f"the scene of task={self.rules.name}")
+        arena: Any = self._arena.mjcf_model  # None in dm_control's annotations
+        physics = compiled(arena, f"the scene of task={self.rules.name}")
         model = physics.model.ptr
         classes, props = [SemanticClass.GROUND] * model.ngeom, [-1] * model.ngeom
         for number, entity in [(-1, self.drone), *enumerate(self._props)]:

@@ -97,7 +97,7 @@ def _color(
 ) -> Tensor:
     given = settings.distractor_color
     if given is None:
-        turn = number + number // len(PALETTE)  # otherwise all of a kind have one color
+        turn = number + number // len(PALETTE)  # otherwise each shape would have only two colors
         return torch.tensor(PALETTE[turn % len(PALETTE)], dtype=torch.float64)
     return torch.stack([_uniform(pair, source, ()) for pair in _pairs(given)])
 

@@ -23,10 +23,12 @@ from drone_rl.sim.rendering import (
     View,
     find_renderer,
 )
+from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Instance, Maybe, Whole
 
 _POSE = {"drone": Entry((3,), torch.float32), "attitude": Entry((4,), torch.float32)}
 
@@ -48,7 +50,26 @@ class Worlds:
         appearance: Appearance | None = None,
         distractors: int = 0,
     ) -> None:
-        """Create the environments; arguments and errors are as of `drone_rl.envs.DroneEnv`."""
+        """Create the environments.
+
+        Args:
+            num_envs: Batch size.
+            task: See `drone_rl.envs.DroneEnv`, as for the arguments up to `num_shards`.
+            camera: See there.
+            dynamics: See there.
+            actions: See there.
+            renderer: See there.
+            device: See there.
+            num_shards: See there.
+            appearance: One appearance for all episodes; the task's own by default.
+            distractors: Number of distractors in the model; an appearance places them.
+
+        Raises:
+            InputError: An argument is unusable.
+        """
+        Whole(1).read(num_envs, "num_envs")
+        check_device(device)
+        Maybe(Instance(Appearance)).read(appearance, "appearance")
         self.appearance, self.distractors = appearance, distractors
         self._combined: tuple[Appearance, Appearance | None, Appearance] | None = None
         """The last appearance given, the default one, and both combined."""

@@ -197,8 +197,8 @@ def median_of_runs(values: Sequence[float], used: Sequence[float] | None = None)
     target; what it used until then (`used`) is a lower bound.
 
     Returns:
-        "median" (None of no runs, or if at least half are censored), "more_than" (then a lower
-        bound), "lower95" and "upper95" (None of fewer than six runs; "upper95" also if it is
+        "median" (None for no runs, or if at least half are censored), "more_than" (then a lower
+        bound), "lower95" and "upper95" (None for fewer than six runs; "upper95" also if it is
         unbounded) and "runs".
     """
     least = values if used is None else used
@@ -216,7 +216,7 @@ def median_of_runs(values: Sequence[float], used: Sequence[float] | None = None)
 def median_band(values: Array) -> tuple[Array, Array] | None:
     """Return the pointwise exact interval of the median of values, a row per run.
 
-    Lower and upper bounds have shape (num_points,) each; None of fewer than six runs.
+    Lower and upper bounds have shape (num_points,) each; None for fewer than six runs.
     """
     bounds = [median_bounds(column) for column in np.asarray(values, float).T]
     known = [pair for pair in bounds if pair is not None]

@@ -52,7 +52,7 @@ class OngoingTraining(Protocol):
 
 _log = logging.getLogger(__name__)
 _MANY = 1000
-"""Callbacks of one training run."""
+"""Most callbacks of one training run."""
 
 
 class Callback:
@@ -211,12 +211,16 @@ class LoggerCallback(Callback):
         self.loggers = [] if callable(loggers) else list(loggers)
 
     def on_start(self, training: OngoingTraining) -> None:
-        """Make the loggers."""
+        """Make the loggers, unless cloning has made them."""
+        self._open()
+
+    def _open(self) -> None:
         if self._make is not None:
             self.loggers, self._make = list(self._make()), None
 
     def on_clone(self, epoch: int, epochs: int, metrics: Mapping[str, float]) -> None:
         """Log each metric, by epochs."""
+        self._open()
         for logger in self.loggers:
             for name, value in metrics.items():
                 logger.log_scalar(name, value, step=epoch)

@@ -35,8 +35,8 @@ def episode_rewards(batch: TensorDictBase) -> Tensor:
         return totals[done].double()
     if not bool(done[..., -1, :].all()):
         raise InputError(
-            "a batch ends within an episode, whose reward is not known; collect complete episodes, "
-            "or by collector=rollouts, or put TorchRL's RewardSum behind the environment"
+            "a batch ends within an episode, whose reward is not known; give collector=episodes or "
+            "collector=rollouts, or add TorchRL's RewardSum to the environment's transforms"
         )
     ends = done.flatten().nonzero()[:, 0]
     cumulative = reward.flatten().double().cumsum(0)[ends]

@@ -18,7 +18,6 @@ from drone_rl.utils.limits import (
     FOLDER_ENTRIES,
     JSON_VALUES,
     SMALL_JSON_BYTES,
-    Allowance,
     check_depth,
     check_json_size,
 )
@@ -153,24 +152,31 @@ _NUMBERS: dict[bool, dict[str, Any]] = {
 """Parsers of numbers, by whether NaN and infinity are accepted."""
 
 
-def refuse_links(folder: Path, depth: int = 3, left: Allowance | None = None) -> None:
+def refuse_links(folder: Path, depth: int = 3) -> None:
     """Check that a folder has no links, so that reading and writing below it stays in it.
 
-    `depth` levels of folders are searched; `left` limits the number of files and folders.
+    `depth` levels of folders are searched.
 
     Raises:
         InputError: It contains a link or a device, or too many files.
     """
-    left = left or Allowance(FOLDER_ENTRIES, "files and folders")
-    for entry in os.scandir(folder):
-        left.take(1, str(folder))
+    for number, entry in enumerate(_entries(folder, depth), start=1):
+        if number > FOLDER_ENTRIES:
+            raise InputError(
+                f"{folder} has more than {FOLDER_ENTRIES} files and folders; give a smaller folder"
+            )
         if not (entry.is_file(follow_symlinks=False) or entry.is_dir(follow_symlinks=False)):
             raise InputError(
-                f"{entry.path} is a link or a device; give a folder of regular files, "
-                "replace it by what it points to"
+                f"{entry.path} is a link or a device; give a folder of regular files, or replace "
+                "the link by what it points to"
             )
+
+
+def _entries(folder: Path | str, depth: int) -> Iterator[os.DirEntry[str]]:
+    for entry in os.scandir(folder):
+        yield entry
         if depth > 1 and entry.is_dir(follow_symlinks=False):
-            refuse_links(Path(entry.path), depth - 1, left)
+            yield from _entries(entry.path, depth - 1)
 
 
 def to_file_name(name: str) -> str:

@@ -109,6 +109,7 @@ def standard_error_closed() -> Iterator[None]:
         os.dup2(nowhere, 2)
         yield
     finally:
+        sys.stderr.flush()  # an unfinished line, too
         os.dup2(kept, 2)
         os.close(kept)
         os.close(nowhere)

@@ -60,9 +60,9 @@ class Allowance:
     def take(self, amount: int, where: str) -> None:
         """Take an amount for a file; raise an `InputError` if less is left."""
         if amount > self.left:
-            left = "" if self.left == self._most else f", of which {self.left} are left"
+            left = "" if self.left == self._most else f"the {self.left} left of "
             raise InputError(
-                f"{where} has {amount} {self._unit}, more than {self._most} {self._unit}{left}; "
+                f"{where} has {amount} {self._unit}, more than {left}{self._most} {self._unit}; "
                 "give fewer or smaller files"
             )
         self.left -= amount

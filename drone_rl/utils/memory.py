@@ -47,10 +47,11 @@ def collecting_no_garbage() -> Iterator[None]:
 
 
 def look_for_garbage_rarely() -> None:
-    """Make Python's collector run once in 50,000 new objects instead of 700; for programs.
+    """Make Python's collector run once in 50,000 new objects instead of 700.
 
-    Imports create half a million objects, which the collector would traverse in a third of a second
-    or more. They are excluded from collection when it first runs.
+    Only for programs, as it changes the whole process. Imports create half a million objects, which
+    the collector would traverse in a third of a second or more. These are excluded from collection
+    when it first runs.
     """
     gc.set_threshold(700_000, 50, 100)
     gc.callbacks.append(_from_now_on)

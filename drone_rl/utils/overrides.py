@@ -15,8 +15,8 @@ from drone_rl.utils.schema import Kind, Several, Text, shown
 from drone_rl.utils.settings import FORMER_CHOICES, FORMER_NAMES
 
 _OF_ONE_FOLDER = re.compile(r"\+{0,2}(resume|trial|demonstrations|paths(\.\w+)?)")
-"""Overrides that do not affect how a run continues: its folder, its sweep, and the demonstrations
-that it has cloned. A run can be moved."""
+"""Overrides that do not affect how a run continues: its folder (it may have been moved), its sweep,
+and the demonstrations that it has cloned."""
 MOST_OVERRIDES = 200
 """Largest number of overrides of a run."""
 _LONGEST = 500

@@ -271,7 +271,9 @@ class Listed:
         items = [value] if isinstance(value, str) else value
         is_list = isinstance(items, list | tuple) and 0 < len(items) <= self.most
         if not is_list or len({*map(str, items)}) < len(items):
-            raise InputError(f"{where}={shown(value)} must name {self.words}, each once")
+            raise InputError(
+                f"{where}={shown(value)} must name {self.words}, each once, at most {self.most}"
+            )
         return tuple(Text().read(item, where) for item in items)
 
     @property

@@ -1,7 +1,8 @@
 """Independent random streams from one seed.
 
-Every stream but a `side_stream` is a child of `numpy.random.SeedSequence(seed)` with its own key,
-so the streams of two environments, of two purposes, or of seed and seed + 1 don't overlap.
+A stream is a child of `numpy.random.SeedSequence(seed)` with its own key, so the streams of two
+environments, of two purposes, or of seed and seed + 1 don't overlap. The exceptions are
+`side_stream`, and `plain_generator` and `legacy_seed`, which use the seed itself.
 """
 
 import dataclasses

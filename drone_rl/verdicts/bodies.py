@@ -26,7 +26,7 @@ from drone_rl.utils.text import BODIES, Evidence, interval, percent, rate, say, 
 from drone_rl.verdicts.judge import judge
 
 LOOPED = "software in the loop"
-"""Name of its column, and key in the evidence."""
+"""Name of the column of these episodes, and their key in the evidence."""
 GUSTS = 0.25
 """Standard deviation of the wind along each axis, as a fraction of its mean."""
 _COLORS = {

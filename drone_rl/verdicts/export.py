@@ -104,9 +104,9 @@ def export_policy(
     """Write a checkpoint's policy and its model card, .safetensors and .md, both or neither.
 
     `checkpoint` is from `read_policy`, `verdict` and `shifts` are as in verdict.json and
-    shifts.json, `seed` is the root of the verdict's random streams. `chosen` has "runs" of the
-    policy's sweep, and "episodes" by which it was judged there; None outside a sweep. `carried` are
-    further files that the card quotes, by their paths.
+    shifts.json, `seed` is the root of the verdict's random streams. `chosen` has "runs", the
+    number of runs in the policy's sweep, and "episodes", the number by which it was judged there;
+    None outside a sweep. `carried` are further files that the card quotes, by their paths.
 
     Raises:
         InputError: The files can't be written.

@@ -122,7 +122,8 @@ class Chances:
     def _notes(self) -> list[str]:
         """Return the lines below the table."""
         about = (
-            f"{len(self.cubes)} placements; least probable at cubes={_format_positions(self.worst)}"
+            f"{len(self.cubes)} placements; failure is most probable at "
+            f"cubes={_format_positions(self.worst)}"
         )
         if len(self.cubes) == 1:
             about = f"cubes at {_format_positions(self.cubes[0, :, 1])} metres to the left"

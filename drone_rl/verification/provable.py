@@ -197,8 +197,9 @@ def train_until_proved(
 
     Each round searches for failures: first in episodes, which are fast, and if all succeed by a
     proof, which misses none. Then training continues, with a fraction of its episodes at failures.
-    The result's reason is then "proved", and its "rounds" list what each search found. If the last
-    search was a proof, its certificate is `certificate.json` in the folder.
+    The result's reason is "proved" if the last proof leaves no failure and nothing undecided; its
+    "rounds" list what each search found. If the last search was a proof, its certificate is
+    `certificate.json` in the folder.
 
     Args:
         settings: Settings of the training run, for all rounds together.
@@ -213,8 +214,8 @@ def train_until_proved(
     Raises:
         InputError: A setting is unusable, the folder holds a finished run, proofs do not support
             the policy, or training diverged.
-        KeyboardInterrupt: Ctrl-C stopped it, see `train`; a search for failures ends at once and is
-            repeated on resume.
+        KeyboardInterrupt: Ctrl-C stopped it, see `train`; a search for failures ends at once. On
+            resume its episodes are repeated, and its proof continues from its last saved state.
         SystemExit: SIGTERM stopped it, see `train`.
     """
     progress = as_progress(progress)

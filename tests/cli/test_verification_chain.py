@@ -21,7 +21,7 @@ def test_one_placement(in_process, tmp_path):
 def test_held_out_placements(in_process):
     done = in_process("chain", "policy=good", "placements=2", *ONE)
     assert done.returncode == 0, done.stderr
-    assert "2 placements; least probable at cubes=[" in done.stdout
+    assert "2 placements; failure is most probable at cubes=[" in done.stdout
 
 
 @pytest.mark.parametrize(

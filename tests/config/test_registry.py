@@ -256,3 +256,16 @@ def test_the_modules_of_registered_parts(registered):
     registered(register_transform("mirror")(Mirror))
     mirrored = from_config(TrainSettings, {"transforms": {"gray": {}, "mirror": {}}})
     assert modules_of(mirrored) == {__name__}
+
+
+def test_two_modules_cannot_register_one_name():
+    def make(in_shape, num_actions):
+        return Wide(in_shape, num_actions)
+
+    register_network("twice")(make)
+    register_network("twice")(make)  # as when a module is imported again
+    make.__module__ = "another"
+    with pytest.raises(InputError, match=r"^network=twice is registered by tests.*; give another"):
+        register_network("twice")(make)
+    make.__module__ = "__main__"  # as in a script that is also a plugin
+    register_network("twice")(make)

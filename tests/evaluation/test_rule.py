@@ -145,6 +145,7 @@ def test_the_text_says_every_number():
     for share in ("81% of the oracle's", "than 62% of", "23% on", "14% of episodes", "35% of the"):
         assert share in text
     assert "94% probability" in text
+    assert "more than 92.5% of the oracle's" in Rule(good_share=0.925).text
 
 
 @pytest.mark.parametrize(

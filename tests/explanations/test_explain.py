@@ -18,15 +18,20 @@ SEED = RootSeed(6, is_fixed=False)
 def test_policies_of_the_same_name_go_by_their_files():
     good = drone_rl.load_policy("good")
     other = dataclasses.replace(good, path=Path("elsewhere.safetensors"))
-    assert list(_named([good, "poor"])) == ["good", "poor"]
-    assert list(_named(good)) == ["good"]
-    assert list(_named([good, other])) == [str(good.path), "elsewhere.safetensors"]
+    assert list(_named([good, "poor"], "outputs")) == ["good", "poor"]
+    assert list(_named(good, "outputs")) == ["good"]
+    assert list(_named([good, other], "outputs")) == [str(good.path), "elsewhere.safetensors"]
+
+
+def test_trained_policies_are_found_in_the_folder_of_outputs(tmp_path):
+    with pytest.raises(InputError, match=f"{tmp_path}"):
+        _named("latest", tmp_path)
 
 
 @pytest.mark.parametrize("policies", [[], ["good", "good"]])
 def test_each_policy_is_explained_once(policies):
     with pytest.raises(InputError, match="each once"):
-        _named(policies)
+        _named(policies, "outputs")
 
 
 @pytest.mark.parametrize(

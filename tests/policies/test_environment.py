@@ -66,8 +66,9 @@ def test_task_is_selected_by_name():
         ({"actions": "velocity"}, "actions='velocity' is not of type ActionSettings"),
         ({"appearance": "smog"}, "appearance='smog' is unknown; give one of: .*fog"),
         ({"appearance": 5}, "appearance=5 is no AppearanceSettings"),
-        ({"transforms": "gray"}, "transforms='gray' is not of type Transform"),
-        ({"transforms": [Gray(), 3]}, "transforms=3 is not of type Transform"),
+        ({"transforms": "gray"}, r"transforms\[0\]='gray' is no transform"),
+        ({"transforms": None}, r"transforms\[0\]=None is no transform"),
+        ({"transforms": [Gray(), 3]}, r"transforms\[1\]=3 is no transform"),
     ],
 )
 def test_values_of_wrong_type_raise_with_the_name(given, message):

@@ -130,3 +130,9 @@ def test_the_type_of_parameters_is_named():
         make(network)
     with pytest.raises(InputError, match="give the camera and transforms"):
         make(nn.Sequential(nn.Flatten(), nn.Linear(9, 3)))
+
+
+def test_the_type_of_the_images_it_was_given_is_named():
+    network = nn.Sequential(nn.Flatten(), nn.Linear(24, 3))
+    with pytest.raises(InputError, match=r"of shape \(1, 2, 4, 3\), torch\.uint8"):
+        make(network, (3, 2, 4), takes_bytes=True)

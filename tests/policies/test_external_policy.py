@@ -230,6 +230,14 @@ def test_dynamics_can_be_replaced(monkeypatch):
         policy.in_dynamics(mass=-1.0)
 
 
+def test_tasks_by_name_and_values_of_wrong_type():
+    found = drone_rl.policy_from(left, task="pillars")
+    assert found.task == drone_rl.PillarsSettings()
+    for given in ({"dynamics": None}, {"dynamics": "quadrotor"}, {"transforms": 3}, {"task": "x"}):
+        with pytest.raises(InputError, match=f"^{next(iter(given))}"):
+            drone_rl.policy_from(left, **given)
+
+
 def test_a_class_is_no_policy():
     with pytest.raises(InputError, match=r"^policy=Flatten is a class; .* such as Flatten\(\)$"):
         drone_rl.policy_from(nn.Flatten)

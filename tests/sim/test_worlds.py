@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.config import TaskSettings
+from drone_rl.config import AppearanceSettings, TaskSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.rendering import Appearance
@@ -109,3 +109,18 @@ def test_combined_appearance_is_cached():
 def test_images_without_pixels_are_refused(size):
     with pytest.raises(InputError, match="give 1 to 4096 each way"):
         Worlds(1).view(**size)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"num_envs": 0}, "^num_envs=0 is out of range"),
+        ({"num_envs": 2.5}, "^num_envs=2.5"),
+        ({"device": "gpu"}, "^device=gpu is unknown"),
+        ({"appearance": AppearanceSettings()}, "^appearance=.* is no Appearance; give "),
+        ({"renderer": 42}, "^renderer=42 is no renderer; give one of: raytrace"),
+    ],
+)
+def test_invalid_arguments_raise(given, message):
+    with pytest.raises(InputError, match=message):
+        Worlds(**{"num_envs": 1, **given})

@@ -140,6 +140,10 @@ def test_passes_are_logged_by_torchrl_and_forwarded(tmp_path):
     LoggerCallback([logger]).on_clone(3, 9, METRICS)
     (path,) = tmp_path.glob("run/scalars/**/*loss*.csv")
     assert path.read_text().strip() == "3,0.25"
+    late = LoggerCallback(lambda: [CSVLogger("late", log_dir=str(tmp_path))])
+    late.on_clone(3, 9, METRICS)
+    (path,) = tmp_path.glob("late/scalars/**/*loss*.csv")
+    assert path.read_text().strip() == "3,0.25"
     ForwardProgress(lambda *message: messages.append(message)).on_clone(
         3, 9, {"cloning/accuracy": 0.5}
     )

@@ -17,7 +17,7 @@ def test_files_share_an_allowance():
     allowance = Allowance(10)
     allowance.take(4, "a")
     allowance.take(6, "b")
-    with pytest.raises(InputError, match=r"c has 1 bytes, more than 10 bytes, of which 0 are left"):
+    with pytest.raises(InputError, match="c has 1 bytes, more than the 0 left of 10 bytes"):
         allowance.take(1, "c")
 
 

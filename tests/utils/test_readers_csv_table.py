@@ -29,7 +29,7 @@ def test_rows_without_the_empty_ones(table):
 def test_sizes_are_bounded(table, monkeypatch):
     path, allowance = table(b"a,b\n1,2\n3,4\n"), TablesAllowance(20)
     assert len([*read_table(path, allowance)]) == 3
-    with pytest.raises(InputError, match="8 are left"):
+    with pytest.raises(InputError, match="the 8 left of"):
         [*read_table(path, allowance)]
     monkeypatch.setattr(readers, "METRICS_ROWS", 1)
     with pytest.raises(InputError, match="more than 1 rows"):
@@ -43,8 +43,8 @@ def test_sizes_are_bounded(table, monkeypatch):
 @pytest.mark.parametrize(
     ("allowance", "message"),
     [
-        (TablesAllowance(rows=5), "3 rows, more than 5 rows, of which 2 are left"),
-        (TablesAllowance(cells=5), "3 cells, more than 5 cells, of which 2 are left"),
+        (TablesAllowance(rows=5), "3 rows, more than the 2 left of 5 rows"),
+        (TablesAllowance(cells=5), "3 cells, more than the 2 left of 5 cells"),
     ],
 )
 def test_rows_and_cells_of_several_tables_are_bounded(table, allowance, message):

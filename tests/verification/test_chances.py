@@ -107,7 +107,7 @@ def test_the_tables(good, several):
     rows = [row.split("  ")[0] for row in str(several).splitlines()]
     assert rows[1:5] == ["all cubes", "not all cubes", "mean cubes", "cube 1 collected"]
     assert str(several).splitlines()[0].split() == ["mean", "least", "most"]
-    assert rows[-1] == f"2 placements; least probable at cubes=[{several.worst[0]:g}]"
+    assert rows[-1] == f"2 placements; failure is most probable at cubes=[{several.worst[0]:g}]"
     assert "<td>ended: front boundary</td>" in several._repr_html_()
     one = drone_rl.chances(good, [6.0], task=ONE, progress=silent)
     assert str(one).splitlines()[0].split() == ["chance"]

@@ -292,11 +292,19 @@ class OptunaSweeper(Sweeper):
 def check_params(params: Mapping[str, Any], space: Mapping[str, Any]) -> None:
     """Raise an `InputError` for parameters of a journal outside this search's space."""
     for name, value in params.items():
-        if name not in space or not space[name]._contains(space[name].to_internal_repr(value)):
+        if name not in space or not _contains(space[name], value):
             raise InputError(
                 f"optuna.journal sets {shown(name)} to {shown(value)}, which is outside "
                 "this search's space; choose another folder"
             )
+
+
+def _contains(searched: Any, value: object) -> bool:
+    """Return whether a distribution of Optuna contains a value."""
+    try:
+        return searched._contains(searched.to_internal_repr(value))
+    except ValueError:  # from Optuna, for none of the choices or no number
+        return False
 
 
 def distribution(override: Override) -> Any:

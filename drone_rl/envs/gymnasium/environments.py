@@ -155,8 +155,8 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
     def _read_seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
         if seed is None:
             return [None] * self.num_envs
-        if isinstance(seed, int):
-            return [seed + i for i in range(self.num_envs)]
+        if isinstance(seed, int | np.integer):
+            return [int(seed) + i for i in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise InputError(f"seed has {len(seed)} values; give one, or {self.num_envs}")
         return seed

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
-from drone_rl.config.transforms import Fault, Stack, Transform
+from drone_rl.config.transforms import Fault, Stack, Transform, as_transforms
 from drone_rl.envs.transforms import on_pixels
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import shown
@@ -26,13 +26,13 @@ class Sb3Worlds(VecEnv):
     A step returns infos only for environments whose episode has just ended.
     """
 
-    def __init__(self, env: VectorEnv, transforms: Sequence[Transform] = ()) -> None:
+    def __init__(self, env: VectorEnv, transforms: Transform | Sequence[Transform] = ()) -> None:
         """Wrap a vector environment.
 
         Args:
             env: An environment with autoreset mode "SameStep".
-            transforms: Transforms of its images, RGB bytes (H, W, 3), in order; without any,
-                Stable-Baselines3 moves the channels first and scales to 0 to 1.
+            transforms: Transform of its images, RGB bytes (H, W, 3), or several in order; without
+                any, Stable-Baselines3 moves the channels first and scales to 0 to 1.
 
         Raises:
             InputError: The autoreset mode is different, or a transform is unsuitable.
@@ -49,6 +49,7 @@ class Sb3Worlds(VecEnv):
                 f"autoreset_mode={name}, but Stable-Baselines3 needs SameStep; give "
                 "gymnasium.make_vec(..., autoreset_mode='SameStep')"
             )
+        transforms = as_transforms(transforms)
         if any(isinstance(transform, Stack) for transform in transforms):
             raise InputError("transforms stack frames; use Stable-Baselines3's VecFrameStack")
         if strange := [t.name for t in transforms if isinstance(t, Fault)]:

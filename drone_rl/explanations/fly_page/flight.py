@@ -82,7 +82,7 @@ class Flight:
         """Why the last recorded flight could not be written."""
         self.time = 0.0
         """Seconds flown since the start."""
-        self._waits_for_saliency, self._shows_saliency = settings.saliency, settings.saliency
+        self._wants_saliency, self._shows_saliency = settings.saliency, settings.saliency
         self._over = 0.0
         self._seen, self._seen_at, self._looks = self.world.see(), 0.0, 0
         levels = [
@@ -162,7 +162,7 @@ class Flight:
 
     def _set_saliency(self, on: bool) -> None:
         self._shows_saliency = on
-        self._waits_for_saliency |= on
+        self._wants_saliency |= on
 
     def _set(self, name: str, value: float) -> None:
         low, high = LIMITS[name]
@@ -191,6 +191,8 @@ class Flight:
         return "policy" if self.pilot == "policy" else self.mode
 
     def _change_flyer(self) -> None:
+        if self._kind not in ("actions", "policy"):  # only these pilots take steps to record
+            self.recorder.is_on = False
         self.controls.release()
         self._flyer = make_pilot(self._kind, self.world, self._note_step)
 
@@ -220,7 +222,7 @@ class Flight:
             self._over += seconds
             if self._over >= _PAUSE:
                 self.reset()
-        if self._waits_for_saliency:
+        if self._wants_saliency:
             self.saliency.start()
         self.saliency.poll()
 

@@ -69,8 +69,8 @@ def say_scope(evidence: Evidence) -> Claims:
     start = "The verdict holds for" if is_quoted(evidence) else "Tested in"
     return {
         "scope.one_look": (
-            f"{start} one appearance and one light only, those of its task: nothing here tests "
-            f"other {listed(names, 'or')}."
+            f"{start} the appearance and light of these episodes only: nothing here tests other "
+            f"{listed(names, 'or')}."
         )
     }
 
@@ -194,8 +194,8 @@ def say_contradictions(evidence: Evidence) -> Claims:
         )
     if found["contradictions"] > 0:
         claims["contradictions.worst"] = (
-            "In the worst contradiction, the probability of a turn changes sides by "
-            f"{found['worst_opposition']:.2f}."
+            "In the worst contradiction, from one frame to the other, left loses and right gains "
+            f"at least {found['worst_opposition']:.2f} of probability."
         )
     return claims
 

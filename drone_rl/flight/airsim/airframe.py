@@ -285,13 +285,14 @@ class Airframe(Pilot):
             name = self.names[thing] if thing < len(self.names) else f"obstacle_{thing}"
             number = thing + 1
         nothing = (0.0, 0.0, 0.0)
+        place = contact.point + self.settings.radius * contact.normal - self.home  # at the contact
         return {
             "has_collided": is_new,
             "penetration_depth": float(contact.depth[0]) if touched else 0.0,
             "time_stamp": self._stamp(time) if touched else 0,
             "normal": messages.vector(ned(contact.normal) if touched else nothing),
             "impact_point": messages.vector(ned(contact.point - self.home) if touched else nothing),
-            "position": messages.vector(self._relative(self.body) if touched else nothing),
+            "position": messages.vector(ned(place) if touched else nothing),
             "object_name": name,
             "object_id": number,
         }

@@ -21,7 +21,7 @@ MAX_NAME = 50
 """Most letters of a new name."""
 MAX_PATTERN = 200
 """Most letters of a regular expression."""
-_FARTHEST = 3.5e38
+_LARGEST = 3.5e38
 """Above all finite float32, such as AirSim's default timeout of 3e38."""
 
 
@@ -102,7 +102,7 @@ def attitude_to_world(values: Sequence[float]) -> Tensor:
 # What clients send
 
 
-def number(value: Any, name: str, low: float = -_FARTHEST, high: float = _FARTHEST) -> float:
+def number(value: Any, name: str, low: float = -_LARGEST, high: float = _LARGEST) -> float:
     """Return a finite number from `low` to `high`, else raise an `InputError`."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"{name}={shown(value)} is not a number; give one")
@@ -132,7 +132,7 @@ def text(value: Any, name: str, most: int = 10_000) -> str:
         value = value.decode("utf-8", "replace")
     if not isinstance(value, str) or len(value) > most:
         raise InputError(
-            f"{name}={shown(value)} is not a text; give one of at most {most:,} letters"
+            f"{name}={shown(value)} is not a text of at most {most:,} letters; give one"
         )
     return value
 
@@ -143,7 +143,7 @@ def read_map(
     keys: Sequence[str],
     *,
     can_be_nan: bool = False,
-    most: float = _FARTHEST,
+    most: float = _LARGEST,
 ) -> list[float]:
     """Return the numbers of a map, in the order of `keys`; other keys are ignored.
 
@@ -163,7 +163,7 @@ def read_map(
 
 
 def read_vector(
-    value: Any, name: str, *, can_be_nan: bool = False, most: float = _FARTHEST
+    value: Any, name: str, *, can_be_nan: bool = False, most: float = _LARGEST
 ) -> tuple[float, float, float]:
     """Return the numbers of a Vector3r; errors as of `read_map`."""
     x, y, z = read_map(value, name, ("x_val", "y_val", "z_val"), can_be_nan=can_be_nan, most=most)

@@ -52,7 +52,7 @@ class Wait:
 class Simulation:
     """Vehicles in one scene. Time advances for all of them together.
 
-    With the clock "wall", `follow` makes it follow the time of day, times `clock_speed`; with
+    With the clock "wall", `follow` makes it follow real time, times `clock_speed`; with
     "lockstep", `advance` advances it as fast as possible, while a call waits.
     """
 
@@ -98,10 +98,10 @@ class Simulation:
         self._until: float | None = None
         """Time at which `simContinueForTime` pauses."""
         self._anchor = (time.monotonic(), 0.0)
-        """Time of day, and simulated seconds then."""
+        """A time of `time.monotonic`, and the simulated seconds then."""
 
     @property
-    def tick(self) -> float:
+    def period_s(self) -> float:
         """Seconds of one control period."""
         first = next(iter(self.vehicles.values()))
         return first.period * first.settings.tick
@@ -109,7 +109,7 @@ class Simulation:
     @property
     def time(self) -> float:
         """Simulated seconds since the start; `reset` does not change it."""
-        return self._periods * self.tick
+        return self._periods * self.period_s
 
     def add(self, choice: VehicleChoice) -> Vehicle:
         """Create a vehicle; an `InputError` if its name is taken, or there are too many."""
@@ -230,7 +230,7 @@ class Simulation:
         return Wait(lambda: self.is_paused or self.time >= end - 1e-9, lambda: None, blocks=True)
 
     def follow(self, budget: float) -> float:
-        """Follow the time of day, for at most `budget` seconds of real time.
+        """Catch up with real time, in at most `budget` seconds of it.
 
         Returns:
             Seconds after which there is more to do; infinite if only a call can change that.
@@ -266,7 +266,7 @@ class Simulation:
     def _left(self) -> float:
         """Seconds of real time until the next control period is due."""
         then, simulated = self._anchor
-        due = then + (self.time + self.tick - simulated) / self.settings.clock_speed
+        due = then + (self.time + self.period_s - simulated) / self.settings.clock_speed
         return due - time.monotonic()
 
     def _hold_anchor(self) -> None:

@@ -19,8 +19,9 @@ _DEGREES = 180.0 / math.pi
 
 
 class Vehicle(Airframe):
-    """One vehicle and its commands. Values are in NED, relative to the start pose; radians.
+    """One vehicle and its commands. Values are in NED, relative to the start position.
 
+    Angles are in radians, except where a method says degrees.
     Movements return a `FlightFuture`, or None if API control is off: the movement is refused.
     """
 

@@ -203,7 +203,7 @@ class PolicyDescription:
 
     def _without_weights(self) -> ImageNetwork:
         actions = self.make_dynamics().actions
-        with torch.device("meta"):  # nothing is computed here: that would load a compiler's algebra
+        with torch.device("meta"):  # names, shapes and types only
             return self._network(actions)
 
     def _network(self, actions: Actions, generator: torch.Generator | None = None) -> ImageNetwork:
@@ -283,17 +283,18 @@ def parse(data: Any) -> PolicyDescription:
         InputError: A key is missing or unknown, a value has another type or is out of bounds.
     """
     data = as_mapping(data, "the policy's description")
-    if data.get("format") != FORMAT or type(data.get("format_version")) is not int:
+    if data.get("format") != FORMAT:
         raise InputError(f"format={shown(data.get('format'))} is not that of a policy: {FORMAT}")
-    if data["format_version"] != FORMAT_VERSION:
+    version = data.get("format_version")
+    if type(version) is not int or version != FORMAT_VERSION:
         raise InputError(
-            f"format_version={shown(data['format_version'])}: this program reads "
+            f"format_version={shown(version)}: this program reads "
             f"{FORMAT_VERSION}; use the version of drone_rl that wrote it"
         )
     if (keys := set(data) - set(_OPTIONAL)) != set(_KEYS):
         names = ", ".join(shown(key) for key in sorted(keys ^ set(_KEYS)))
         raise InputError(
-            f"the policy's description has exactly {', '.join(_KEYS)}; not so: {names}"
+            f"the policy's description needs {', '.join(_KEYS)}; missing or unknown: {names}"
         )
     special: dict[str, Any] = {
         name: of.read(data[name], name) for name, (of, _) in _OPTIONAL.items() if name in data

@@ -81,7 +81,8 @@ def rate_control(frame: Airframe, missing: wp.vec3) -> wp.vec3:
 def mix(throttle: float, torque: wp.vec3) -> wp.vec4:
     """Return fractions of full thrust: front right, rear left, front left, rear right.
 
-    `throttle` is a fraction of all thrust, 0 to 1; torques, see `rate_control`, take precedence.
+    `throttle` is a fraction of all thrust, 0 to 1; torques, see `rate_control`. Below 0, all four
+    are raised equally, which keeps the torques; above 1, all four are scaled down.
     """
     front_right = throttle - torque[0] - torque[1] - torque[2]
     rear_left = throttle + torque[0] + torque[1] - torque[2]

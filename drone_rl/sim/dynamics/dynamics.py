@@ -110,7 +110,7 @@ def make_dynamics(
     if dynamics is not None and not isinstance(dynamics, DynamicsSettings):
         if isinstance(dynamics, type) or not hasattr(dynamics, "step"):
             raise InputError(
-                f"dynamics={shown(dynamics)} is none; give settings such as "
+                f"dynamics={shown(dynamics)} is no Dynamics object; give settings such as "
                 "drone_rl.DynamicsSettings(mode='simple_flight')"
             )
         if actions is not None:

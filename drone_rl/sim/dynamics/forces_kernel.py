@@ -50,10 +50,11 @@ def push(
 def forces(
     frame: Airframe, body: FlightState, goals: Goals, tick: int
 ) -> tuple[FlightState, Tensor]:
-    """Return what moves drones in tick number `tick` of a command with some goals, on the CPU.
+    """Compute controllers, rotors and air in tick number `tick` of a command, on the CPU.
 
-    These are the drones, with rotors, air and controllers a tick later, neither moved nor touched;
-    and force without weight and torque, world frame, shape (num_envs, 6), float64.
+    Returns the states with rotors, air and controllers a tick later, but unchanged motion and
+    contacts. Also returns the force on each drone, without its weight, then the torque, world
+    frame, shape (num_envs, 6), float64.
     """
     start_warp("cpu")
     after = FlightState(torch.empty_like(body.numbers))

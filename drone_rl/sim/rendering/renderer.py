@@ -16,6 +16,7 @@ from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import Modality, View
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
 
 
 @dataclasses.dataclass
@@ -79,6 +80,10 @@ _CLASSES = {
 def find_renderer(which: str | RendererFactory) -> RendererFactory:
     """Return the factory of a name in `RENDERERS`; a factory is returned as it is."""
     if not isinstance(which, str):
+        if not callable(which):
+            raise InputError(
+                f"renderer={shown(which)} is no renderer; give one of: {', '.join(RENDERERS)}"
+            )
         return which
     if which not in RENDERERS:
         raise InputError(f"renderer={which!r} is unknown; give one of: {', '.join(RENDERERS)}")

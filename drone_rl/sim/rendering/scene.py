@@ -56,7 +56,8 @@ class Scene:
     """A `mujoco.MjModel`, whose bindings are untyped."""
     semantic_classes: tuple[SemanticClass, ...]
     props: tuple[int, ...]
-    """Index in `Task.make_props()` of the entity that each geom belongs to; -1 for none."""
+    """Index of the prop that each geom belongs to, in the order of `Task.make_props()`, then of the
+    distractors; -1 for none."""
     sky: tuple[float, float, float]
     """Background color: red, green, blue in [0, 1]."""
 

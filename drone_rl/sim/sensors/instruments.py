@@ -310,7 +310,10 @@ class Barometer(Sensor[BarometerState, BarometerReading]):
 
 
 def pressure_ratio(altitude: Tensor) -> Tensor:
-    """Return the pressure at some metres over that at sea level; constant from 11 km on."""
+    """Return the ratio of the pressure at an altitude in metres to that at sea level.
+
+    It is constant from 11 km on.
+    """
     height = (_ATMOSPHERE_RADIUS * altitude / (_ATMOSPHERE_RADIUS + altitude)).clamp(max=_TOP)
     return (1 - _LAPSE * height / SEA_LEVEL_TEMPERATURE) ** _EXPONENT
 

@@ -77,7 +77,7 @@ class SensorSuite:
         return SensorSuiteState(time=time, **states, collision=collision)
 
     def update(self, state: SensorSuiteState, body: BodyState, seconds: float) -> SensorSuiteState:
-        """Return the sensors some seconds after the last update; call it once a tick."""
+        """Return the sensors some seconds after the last update; each takes at most one reading."""
         time = state.time + seconds
         states = {
             name: getattr(self, name).update(getattr(state, name), body, time, stream)

@@ -231,7 +231,7 @@ class Pillars(common.PropTask[FieldState]):
         return {"rows": info["rows"], "passed": info["passed"], "next_target": pillar}
 
     def tally(self, info: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
-        """Return the numbers of rows passed and missed; a running episode misses none."""
+        """Return the numbers of rows passed and missed; no row can be missed."""
         passed = info["passed"].sum(-1)
         return passed, torch.zeros_like(passed)
 

@@ -326,7 +326,8 @@ def register_task(
         make: Makes the task from its settings; not for a task without settings.
 
     Raises:
-        InputError: Another task has this name, or an argument is of the wrong kind.
+        InputError: Another task has this name, unless both are without settings, or an argument is
+            of the wrong kind.
     """
     if isinstance(settings, Task):
         as_settings(settings)
@@ -361,7 +362,8 @@ def _name_of(given: Any) -> str:
 def as_settings(task: Any) -> Any:
     """Return settings that make a task; a task without registered settings is registered.
 
-    Anything else is returned. Raises `InputError` if another task has its name.
+    Anything else is returned. A task without settings replaces an earlier one of its name; raises
+    an `InputError` if a task with settings has its name.
     """
     if not isinstance(task, Task):
         return task

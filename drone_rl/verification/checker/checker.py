@@ -95,7 +95,7 @@ class Rollouts:
     end: NDArray[np.int64]  # (k,); `EndReason`
     collected: NDArray[np.bool_]  # (k, cubes); whether each cube was collected
     steps: NDArray[np.int64]  # (k,); number of steps
-    repeats: NDArray[np.int64]  # (k,); final steps after which the state was that of two before
+    repeats: NDArray[np.int64]  # (k,); final steps whose state equals that of two steps before
 
 
 class Simulator:

@@ -118,7 +118,7 @@ class Placements:
 
 
 def sample_placements(certificate: Certificate, count: int, rng: np.random.Generator) -> Placements:
-    """Sample placements: half in boxes of each outcome, a quarter at borders, the rest anywhere."""
+    """Sample placements: half in the outcomes' boxes, a quarter at borders, the rest anywhere."""
     groups = certificate.groups
     boxes = np.concatenate(groups)
     group = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])

@@ -69,7 +69,10 @@ def merge(boxes: NDArray[_Number]) -> NDArray[_Number]:
 
 
 def union(boxes: Boxes, most: int = MAX_GRIDS) -> Boxes:
-    """Return the union of boxes as disjoint boxes; unchanged if it takes more than `most` grids."""
+    """Return the union of boxes as disjoint boxes.
+
+    If it takes more than `most` grids, the boxes are only merged and may still overlap.
+    """
     if len(boxes) < 2:
         return boxes
     boxes = np.unique(boxes, axis=0)
@@ -81,7 +84,7 @@ def union(boxes: Boxes, most: int = MAX_GRIDS) -> Boxes:
 def complement(boxes: Boxes, space: Boxes, most: int = MAX_GRIDS) -> Boxes | None:
     """Return the part of a space, shape (1, n, 2), outside all boxes, as disjoint boxes.
 
-    None if it takes more than `most` grids.
+    The boxes must lie within the space. None if it takes more than `most` grids.
     """
     return _select(boxes, space, most, covered=False)
 

@@ -64,8 +64,8 @@ class Lattice:
         if not is_exact or not np.array_equal(aside, aside.astype(np.float32)):
             raise InputError(
                 f"multiples of task.step_length={step} are rounded, so positions depend on the "
-                "path or are rendered elsewhere; give a multiple of a power of two, such as 0.5 or "
-                "1.25"
+                "path, or differ between simulator (float64) and renderer (float32); give a sum of "
+                "few powers of two, such as 0.5 or 1.25"
             )
         self.cubes = task.first_distance + task.spacing * np.arange(task.num_cubes)  # x, metres
         self.everything = (1 << task.num_cubes) - 1

@@ -56,6 +56,6 @@ def test_numbers_below_one_are_refused():
 def test_a_journal_sets_only_what_is_searched():
     space = {"a": FloatDistribution(0.0, 1.0), "b": CategoricalDistribution(["x", "y"])}
     check_params({"a": 0.5, "b": "x"}, space)
-    for params in ({"policy._target_": "os.system"}, {"a": 2.0}):
+    for params in ({"policy._target_": "os.system"}, {"a": 2.0}, {"a": "x"}, {"b": "z"}):
         with pytest.raises(InputError, match="outside this search's space"):
             check_params(params, space)

@@ -94,6 +94,7 @@ def test_first_environments_do_not_depend_on_batch_size(make):
     assert np.array_equal(one.reset(seed=4)[0][0], many.reset(seed=4)[0][0])
     alone = gymnasium.make(NAME)
     assert np.array_equal(many.reset(seed=4)[0][2], alone.reset(seed=6)[0])
+    assert np.array_equal(many.reset(seed=np.int64(4))[0][2], alone.reset(seed=6)[0])
     alone.close()
 
 

@@ -68,9 +68,16 @@ def test_adapter_equals_stable_baselines3s_vec_env(make, observations):
     theirs.close()
 
 
+@pytest.mark.parametrize("given", ["gray", 3, [Gray], [None]])
+def test_what_is_no_transform_is_named(make, given):
+    with pytest.raises(InputError, match=r"^transforms\[0\]=.* is no transform; give settings"):
+        make(given)
+
+
 def test_transforms_are_applied(make):
     raw, seen = make(**SHORT), make([Gray(), Standardize(), Crop(top=2, bottom=9)], **SHORT)
     assert seen.observation_space.shape == (1, 7, 64)
+    assert make(Gray(), **SHORT).observation_space.shape == (1, 25, 64)
     for env in (raw, seen):
         env.seed(0)
     frames, images = raw.reset(), seen.reset()

@@ -102,6 +102,15 @@ def test_a_demonstration_has_one_flyer_one_episode_and_one_wind(make_flight, wri
     assert flight.recorder.is_on
 
 
+def test_free_flight_is_not_recorded_nor_said_to_be(make_flight, written):
+    flight = make_flight()
+    flight.handle({"type": "record", "on": True})
+    press(flight, "forward")
+    flight.handle({"type": "mode", "mode": "simple_flight"})
+    assert not flight.recorder.is_on
+    assert len(written) == 1
+
+
 def test_closing_writes_what_was_recorded(make_flight, written):
     flight = make_flight()
     flight.handle({"type": "record", "on": True})

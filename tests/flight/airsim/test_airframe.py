@@ -47,9 +47,13 @@ def test_collisions_latch_until_they_are_read():
     assert read["has_collided"] and read["object_id"] == 1
     assert read["normal"]["x_val"] == pytest.approx(-1.0)
     assert read["impact_point"]["x_val"] == pytest.approx(4.0, abs=0.1)
+    radius = vehicle.settings.radius
+    assert read["position"]["x_val"] == pytest.approx(read["impact_point"]["x_val"] - radius)
     vehicle.set_airsim_pose(Pose((0.0, 0.0, -1.0), SAME), ignore_collision=True)
     vehicle.run(vehicle.period)
-    assert not vehicle.collision()["has_collided"]
+    later = vehicle.collision()
+    assert not later["has_collided"]
+    assert later["position"] == read["position"]  # at the contact, not now
 
 
 def test_a_long_way_is_refused_before_it_takes_memory():

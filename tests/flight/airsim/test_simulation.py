@@ -29,10 +29,10 @@ def test_lockstep_runs_while_a_call_waits_and_no_longer(make):
     assert simulation.advance(1.0, math.inf) and simulation.time == 0.0
     simulation.wait_for(Wait(lambda: simulation.time >= 1.0, lambda: "done"), answers.append)
     assert not simulation.advance(60.0, 0.5)
-    assert 0.5 <= simulation.time < 0.5 + simulation.tick and answers == []
+    assert 0.5 <= simulation.time < 0.5 + simulation.period_s and answers == []
     assert simulation.advance(60.0, math.inf)
     assert answers == ["done"]
-    assert 1.0 <= simulation.time < 1.0 + simulation.tick
+    assert 1.0 <= simulation.time < 1.0 + simulation.period_s
     assert not simulation.is_due
 
 
@@ -61,7 +61,7 @@ def test_time_stands_at_the_end_of_each_call(make):
     simulation.wait_for(Wait(lambda: simulation.time >= 0.2, lambda: "b"), answers.append)
     simulation.wait_for(Wait(lambda: simulation.time >= 0.1, lambda: "a"), answers.append)
     assert simulation.advance(60.0, math.inf) and answers == ["a"]
-    assert simulation.time < 0.2 - simulation.tick
+    assert simulation.time < 0.2 - simulation.period_s
     assert simulation.advance(60.0, math.inf) and answers == ["a", "b"]
 
 
@@ -72,7 +72,7 @@ def test_continue_for_a_time_pauses_afterwards(make):
     assert simulation.is_blocked
     assert simulation.advance(60.0, math.inf)
     assert answers == [None] and simulation.is_paused
-    assert simulation.time == pytest.approx(0.5, abs=simulation.tick)
+    assert simulation.time == pytest.approx(0.5, abs=simulation.period_s)
 
 
 def test_continue_for_no_time_pauses_at_once(make):
@@ -86,7 +86,7 @@ def test_paused_wall_time_stands_still(make):
     simulation.pause(True)
     assert simulation.follow(0.1) == math.inf and simulation.time == 0.0
     simulation.pause(False)
-    assert 0.0 < simulation.follow(0.0) <= simulation.tick
+    assert 0.0 < simulation.follow(0.0) <= simulation.period_s
 
 
 def test_vehicles_are_found_by_name(make):

@@ -125,6 +125,6 @@ def test_no_place_comes_before_one_that_leads_to_it():
 def test_steps_that_round_are_refused():
     with pytest.raises(InputError, match=r"step_length=0.1 are rounded"):
         Lattice(dataclasses.replace(TASK, step_length=0.1, step_limit=900))
-    with pytest.raises(InputError, match=r"are rounded, so .* or are rendered elsewhere"):
+    with pytest.raises(InputError, match=r"are rounded, so .* or differ between simulator"):
         Lattice(dataclasses.replace(TASK, step_length=1 + 2**-30))  # no float32
     Lattice(dataclasses.replace(TASK, step_length=0.75))

@@ -94,7 +94,7 @@ def _continue(simulation: Simulation, args: Sequence[Any]) -> Wait:
 
 @method("simContinueForFrames", least=1)
 def _continue_frames(simulation: Simulation, args: Sequence[Any]) -> Wait:
-    return simulation.continue_for(whole(args[0], "frames", 0, 10**6) * simulation.tick)
+    return simulation.continue_for(whole(args[0], "frames", 0, 10**6) * simulation.period_s)
 
 
 @method("startRecording")

@@ -124,7 +124,7 @@ class CpuLauncher:
         self._scratch: dict[tuple[int, int], structs.Scratch] = {}
 
     def launch(self, launch: Launch) -> None:
-        """Render images; kernels are loaded first, so that fused training need not load them."""
+        """Render images. The first call loads the kernels, which fused training does not need."""
         view, geoms = launch.view, launch.geoms
         size = (view.height * view.width, len(geoms.kind))
         if size not in self._scratch:

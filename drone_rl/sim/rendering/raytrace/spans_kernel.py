@@ -50,9 +50,9 @@ def intersect_level_plane(
 ) -> None:
     """Intersect rays with a plane that all of them meet; `mark` the pixels in which it is nearest.
 
-    `down` is the plane's normal in the camera's frame, `height` minus the eye's height above the
-    plane: only their quotient counts. `same` is the relative distance within which the plane is in
-    front of what was nearest.
+    `down` is the plane's normal in the camera's frame, and `height` the eye's height above the
+    plane, negated: only their quotient counts. `same` is the relative distance within which the
+    plane is in front of what was nearest.
     """
 
 
