@@ -115,9 +115,11 @@ class ShiftSettings(DeviceSettings):
     """A strength is impossible if the oracle's success rate is certainly below this."""
 
     def check(self) -> None:
-        """Refuse duplicate strengths and modes without the constant one."""
+        """Refuse strengths that don't rise, duplicate modes, and modes without the constant one."""
         if [*self.strengths] != sorted({*self.strengths}):
             raise InputError(f"strengths={[*self.strengths]} don't rise; give each once, in order")
+        if len({*self.modes}) < len(self.modes):
+            raise InputError(f"modes={[*self.modes]} has one twice; give each once")
         if MODES[0] not in self.modes:
             raise InputError(
                 f"modes={[*self.modes]} leaves out constant, with which all others are compared; "

@@ -247,7 +247,7 @@ def _unregistered(part: type[Variant], target: str, given: Mapping[str, Any]) ->
 
 @dataclasses.dataclass(frozen=True)
 class Changes:
-    """The kind of a mapping with some settings of a class; the others keep their values."""
+    """The kind of a mapping with some settings of a class; others, and those of None, are kept."""
 
     of: type[Settings] | None = None
     """The class; None for the settings of all tasks, whose values are checked by the task later."""

@@ -129,6 +129,7 @@ def _copied(module: nn.Module) -> nn.Module:
     return own
 
 
+@torch.enable_grad()
 def _has_gradients(network: nn.Module, image: Tensor) -> bool:
     """Return whether the logits of an image have gradients by its pixels."""
     image = image.clone().requires_grad_()

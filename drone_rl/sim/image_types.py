@@ -1,4 +1,4 @@
-"""AirSim's seven image types, computed from rendered modalities, and its segmentation ids."""
+"""Seven of AirSim's image types, computed from rendered modalities, and its segmentation ids."""
 
 import dataclasses
 import enum

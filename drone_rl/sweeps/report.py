@@ -96,7 +96,7 @@ def terminal_lines(summary: dict[str, Any]) -> str:
 def judge_sweep(sweep: Sweep, episodes: int, device: str) -> None:
     """Judge the last policies of all finished runs again; log those that can't be judged.
 
-    Each verdict takes so many episodes, in selection environments.
+    Each verdict takes `episodes` episodes in selection environments.
     """
     from drone_rl.utils.seeding import root_seed  # imports torch
 

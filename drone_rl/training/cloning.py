@@ -105,8 +105,8 @@ def hold_out(
 ) -> tuple[list[T], list[T]]:
     """Split items at random into those to learn from and those held out.
 
-    At least one is held out if there are two and `share`, a fraction, is above 0; one is always
-    left to learn from.
+    At least one is held out if there are two or more and `share`, a fraction, is above 0; one
+    is always left to learn from.
     """
     count = len(items)
     held = min(count - 1, max(1, round(share * count))) if share > 0 else 0

@@ -17,6 +17,7 @@ def test_modes_are_those_that_are_flown():
         ({"strengths": (2, 1)}, r"strengths=\[2, 1\] don't rise"),
         ({"strengths": (2, 2)}, "don't rise"),
         ({"strengths": ()}, "strengths"),
+        ({"modes": ("constant", "constant")}, "modes=.* has one twice; give each once"),
         ({"modes": ("drifting",)}, r"modes=\['drifting'\] leaves out constant"),
         ({"modes": ("sudden",)}, "sudden.* is unknown; give constant, drifting, onset"),
         ({"episodes": 0}, "episodes=0"),

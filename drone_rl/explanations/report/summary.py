@@ -25,6 +25,7 @@ _SECTIONS = {
     "embedding": ("tsne", "t-SNE"),
     "class_models": ("class_model", "class models"),
     "attribution": ("attribution", "heat maps"),
+    "flaws": ("contradictions", "contradictions and loops"),
     "response": ("response", "response map"),
     "asymmetry": ("asymmetry", "asymmetry"),
 }

@@ -50,7 +50,7 @@ class Host(Protocol):
         ...
 
     def must_wait(self, client: "Connection") -> bool:
-        """Return whether requests have to wait; the client is then released when they need not."""
+        """Return whether requests have to wait; if so, call `client.release` once they need not."""
         ...
 
     def note(self, client: "Connection") -> None:

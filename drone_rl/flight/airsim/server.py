@@ -16,7 +16,7 @@ _POLL = 0.05
 
 
 class AirsimServer:
-    """Serves one simulation to any number of clients, and advances its time."""
+    """Serves one simulation to up to `MAX_CLIENTS` clients, and advances its time."""
 
     def __init__(self, simulation: Simulation, patience: float = PATIENCE) -> None:
         """Create a server that does not listen yet; for `patience` see `lockstep`."""

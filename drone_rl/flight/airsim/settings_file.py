@@ -289,6 +289,8 @@ def _read_as(kind: Any, value: Any, where: str, name: str) -> Any:
 
     None stands for null and NaN, which mean the default.
     """
+    if value is None:
+        return None
     if isinstance(kind, _Table):
         return _read(kind, value, where, name)
     if isinstance(kind, list):

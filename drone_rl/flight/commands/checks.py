@@ -120,7 +120,7 @@ def quadrotor(
     """
     if isinstance(dynamics, Quadrotor):
         if changes:
-            raise InputError(f"{', '.join(changes)} and a Quadrotor are given; give settings alone")
+            raise InputError(f"{', '.join(changes)} and a Quadrotor are given; give one of them")
         return dynamics
     if dynamics is not None and not isinstance(dynamics, DynamicsSettings):
         raise InputError(

@@ -63,7 +63,7 @@ def make_onnx(
     output, and `about`.
 
     Raises:
-        InputError: The policy needs several frames, ONNX does not support it, or lacks a package.
+        InputError: The policy needs several frames, a package is missing, or ONNX lacks a part.
     """
     extra("onnxscript", "onnx", _SETTING)  # which torch's exporter needs
     passes = extra("onnx_ir.passes.common", "onnx", _SETTING)

@@ -253,7 +253,7 @@ class Task(abc.ABC, Generic[S]):
         self._lacks("next_target")
 
     def next_offset(self, state: S) -> Tensor:
-        """Return where it stands, metres from the drone; NaN if there is none. (N, 3)."""
+        """Return the next target's offset from the drone, metres; NaN if there is none. (N, 3)."""
         target, places = self.next_target(state), self.places(state)
         last, env = places.shape[1] - 1, torch.arange(len(state), device=places.device)
         away = places[env, target.clamp(max=last)] - state.body.position

@@ -116,6 +116,8 @@ def test_null_and_nan_mean_the_default():
     text = json.dumps({**given, "Wind": {"X": math.nan, "Y": 2}})
     plain = parse_settings('{"Wind": {"Y": 2}}')
     assert dataclasses.replace(parse_settings(text), text=plain.text) == plain
+    nothing = dataclasses.replace(parse_settings('{"Wind": null, "Vehicles": null}'), text="{}")
+    assert nothing == parse_settings("{}")
     (vehicle,) = parse_settings('{"Vehicles": {"A": {"AutoCreate": null}}}').vehicles
     assert vehicle.name == "A"
 

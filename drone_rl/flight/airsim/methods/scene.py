@@ -53,7 +53,7 @@ def _set_object_scale(simulation: Simulation, args: Sequence[Any]) -> bool:
 def _read_scale(value: Any) -> float:
     scale = read_vector(value, "scale")
     if len({*scale}) > 1 or not 0.0 < scale[0] <= 100.0:
-        raise InputError(f"scale={list(scale)} is not supported; give one factor up to 100")
+        raise InputError(f"scale={list(scale)} is not supported; give one above 0, up to 100")
     return scale[0]
 
 
