@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import importlib
+import inspect
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
@@ -17,7 +18,7 @@ from drone_rl.config import (
     named_settings,
 )
 from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.schema import as_mapping, shown
+from drone_rl.utils.schema import Instance, as_mapping, shown
 from drone_rl.utils.settings import (
     Settings,
     check_names,
@@ -288,6 +289,32 @@ def as_changes(value: Any, where: str) -> Mapping[str, Any]:
         f"{where}={shown(value)} gives no changes; give values by name, as in "
         "task={'num_cubes': 5} or dynamics={'wind': [5, 0, 0]}"
     )
+
+
+def from_arguments(
+    of: type[S], settings: S | None, changes: Mapping[str, Any], function: Callable[..., Any]
+) -> S:
+    """Return a function's settings, the defaults if None, with its changes to them.
+
+    `function` is the one that has these arguments; messages name its further ones.
+
+    Raises:
+        InputError: `settings` is of another class, or a change is no setting.
+    """
+    given = of() if settings is None else Instance(of).read(settings, "settings")
+    parameters = inspect.signature(function).parameters.values()
+    others = [p.name for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY]
+    groups = {"task": Changes(), "dynamics": Changes(DynamicsSettings)}
+    for name in changes.keys() - kinds_of(of).keys():
+        group = next((group for group, its in groups.items() if name in its.types), "")
+        if group in others:
+            text = f"{group}={{{name!r}: {shown(changes[name])}}}"
+            raise InputError(f"{name} is a setting of {group}; give {text}")
+        if group and any(p.name == "policy" for p in parameters):
+            text = f"load_policy(...).in_{group}({name}={shown(changes[name])})"
+            raise InputError(f"{name} is a setting of {group}; give {text}")
+    check_names(of, changes, others=others)
+    return given.replace(**changes)
 
 
 TaskChanges = Annotated[Mapping[str, Any], Changes()]

@@ -42,16 +42,24 @@ class _Base(NamedTuple):
     """Attribute that only it and classes derived from it have; "" for a protocol."""
     members: tuple[str, ...]
     """Attributes of its objects."""
+    decorator: str
 
 
 _BASES: dict[type[Variant], _Base] = {
-    Network: _Base("PolicyNetwork", "is_recurrent", ("in_shape",)),
-    Transform: _Base("Transform", "set_container", ("_apply_transform", "_parameters")),
-    Returns: _Base("ReturnEstimator", "estimate", ("estimate", "_parameters")),
-    Objective: _Base(
-        "Learner", "", ("in_keys", "update", "state_dict", "check_state", "load_state_dict")
+    Network: _Base("PolicyNetwork", "is_recurrent", ("in_shape",), "register_network"),
+    Transform: _Base(
+        "Transform", "set_container", ("_apply_transform", "_parameters"), "register_transform"
     ),
-    Collector: _Base("Components", "", ("collector", "network", "generators")),
+    Returns: _Base("ReturnEstimator", "estimate", ("estimate", "_parameters"), "register_returns"),
+    Objective: _Base(
+        "Learner",
+        "",
+        ("in_keys", "update", "state_dict", "check_state", "load_state_dict"),
+        "register_learner",
+    ),
+    Collector: _Base(
+        "Components", "", ("collector", "network", "generators"), "register_collector"
+    ),
 }
 _KEYS = {"in_keys", "out_keys"}
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,60}")
@@ -161,7 +169,8 @@ def _decorator(
 ) -> Callable[[F], F]:
     """Return the decorator of a part; the arguments are those of `_register`."""
     if not isinstance(name, str):
-        raise InputError('give a name in brackets, as in @drone_rl.register_network("mine")')
+        example = f'@drone_rl.{_BASES[part].decorator}("mine")'
+        raise InputError(f"give a name in brackets, as in {example}")
     if not _NAME.fullmatch(name):
         raise InputError(f"name={name!r} is invalid; give lower-case letters, digits and _")
 

@@ -9,6 +9,7 @@ from typing import Any
 from tensordict.nn import TensorDictModuleBase
 
 from drone_rl.config.commands import EvaluateSettings, HeldOutSettings
+from drone_rl.config.configuration import from_arguments
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.baselines import run_baselines
 from drone_rl.evaluation.conditions_text import unlike as unlike_text
@@ -122,7 +123,7 @@ def evaluate(
     Raises:
         InputError: The policy or a setting is unusable.
     """
-    settings, seed = with_seed(EvaluateSettings.from_arguments(settings, changes))
+    settings, seed = with_seed(from_arguments(EvaluateSettings, settings, changes, evaluate))
     progress = as_progress(progress)
     policy = as_policy(policy)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2

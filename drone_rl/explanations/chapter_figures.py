@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial.distance import cdist
 
+from drone_rl.config.configuration import from_arguments
 from drone_rl.envs.three_state import SUCCESS_PROBABILITY, exact_gradient
 from drone_rl.evaluation.plots import images
 from drone_rl.evaluation.plots.saving import to_png
@@ -124,7 +125,7 @@ def reproduce(
         InputError: There is no such figure, the episodes have fewer frames than asked for, or in
             Fig. 9 the policy moves to one side only.
     """
-    settings = FigureSettings.from_arguments(settings, {"figure": figure, **changes})
+    settings = from_arguments(FigureSettings, settings, {"figure": figure, **changes}, reproduce)
     if figure not in _MAKERS:
         known = ", ".join(map(str, _MAKERS))
         raise InputError(f"figure={figure} can't be reproduced; give one of {known}")

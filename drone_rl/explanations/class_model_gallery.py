@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from drone_rl.config.configuration import as_changes
+from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.evaluation.plots import images
 from drone_rl.explanations.class_models import (
     NO_GRADIENTS,
@@ -154,7 +154,7 @@ def class_models(
     Raises:
         InputError: The policy or a setting is unusable, or the images diverge.
     """
-    settings, seed = with_seed(ClassModelsSettings.from_arguments(settings, changes))
+    settings, seed = with_seed(from_arguments(ClassModelsSettings, settings, changes, class_models))
     subject = as_policy(policy, outputs=outputs)
     subject = subject.in_task(**as_changes(task, "task")) if task else subject
     network = subject.make_network()

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torchrl.envs import TransformedEnv
 
+from drone_rl.config.configuration import from_arguments
 from drone_rl.evaluation.rounding_sensitivity import require_function
 from drone_rl.explanations import attribution, behavior, class_models, embedding, response, truth
 from drone_rl.explanations.context import Context, LeftOutError
@@ -109,7 +110,7 @@ def explain(
     Raises:
         InputError: A policy or a setting is unusable, or the folder can't be written.
     """
-    settings, seed = with_seed(ExplainSettings.from_arguments(settings, changes))
+    settings, seed = with_seed(from_arguments(ExplainSettings, settings, changes, explain))
     Whole(1).read(num_envs, "num_envs")
     chosen = _named(policies, outputs)
     folder, progress = as_path(folder, "folder"), as_progress(progress)

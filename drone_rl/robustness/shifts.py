@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from drone_rl.config import MINIMAL, BaseTaskSettings
 from drone_rl.config.commands import ShiftSettings
-from drone_rl.config.configuration import as_changes
+from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.rounding_sensitivity import require_function
 from drone_rl.evaluation.verdict_text import unlike as say_unlike
@@ -120,7 +120,7 @@ def shifts(
     Raises:
         InputError: The policy or a setting is unusable, or there is no such axis or strength.
     """
-    settings, seed = with_seed(ShiftSettings.from_arguments(settings, changes))
+    settings, seed = with_seed(from_arguments(ShiftSettings, settings, changes, shifts))
     progress = as_progress(progress)
     check_axes(settings.axes or ())
     loaded = as_policy(policy, outputs).in_task(**as_changes(task, "task"))

@@ -27,6 +27,7 @@ from drone_rl.config import (
     DynamicsSettings,
     read_task,
 )
+from drone_rl.config.configuration import from_arguments
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import oracle_policy
@@ -328,7 +329,8 @@ def record_oracle(
     Raises:
         InputError: A setting is unusable, or the task has no oracle, or none for these actions.
     """
-    settings, folder = TrainSettings.from_arguments(settings, changes), as_path(folder, "folder")
+    settings = from_arguments(TrainSettings, settings, changes, record_oracle)
+    folder = as_path(folder, "folder")
     flights = Whole(1).read(flights, "flights")
     env = DroneEnv(
         flights,

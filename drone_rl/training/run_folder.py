@@ -5,18 +5,23 @@ import enum
 import json
 import signal
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Self
 
 import yaml
 
-from drone_rl.config.configuration import as_config, check_same_config, from_config
+from drone_rl.config.configuration import (
+    as_config,
+    check_same_config,
+    from_arguments,
+    from_config,
+)
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.recurrent import refusal
 from drone_rl.policies.zoo import describe, read_checkpoint
-from drone_rl.sim.tasks import as_task
+from drone_rl.sim.tasks import as_settings, as_task
 from drone_rl.training.callbacks import CheckpointCallback
 from drone_rl.training.cloning import Cloning
 from drone_rl.training.confirmation import Confirmation
@@ -24,7 +29,7 @@ from drone_rl.training.demonstrations import Demonstration, FlightConditions, re
 from drone_rl.training.trainer import Trainer
 from drone_rl.utils.display import picture, table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import make_folder, remove_leftovers, write_atomically
+from drone_rl.utils.files import as_path, make_folder, remove_leftovers, write_atomically
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import Real, shown
@@ -104,9 +109,7 @@ class RunFolder:
             raise InputError(
                 f"resume={shown(resume)} is neither true nor false; give folder=RUN, resume=True"
             )
-        if path is not None and not isinstance(path, str | Path):
-            raise InputError(f"folder={shown(path)} is no path; give the folder of the run")
-        folder = new_folder() if path is None else Path(path)
+        folder = new_folder() if path is None else as_path(path, "folder")
         if resume and folder.suffix == ".pt":  # what load_policy takes
             raise InputError(
                 f"folder={folder} is a checkpoint; give the folder of its run, the one with "
@@ -236,6 +239,22 @@ def _own(config: Mapping[str, Any]) -> dict[str, Any]:
     """Return the training settings of a checkpoint."""
     given = current_names(TrainSettings, config)
     return {k: v for k, v in given.items() if k in kinds_of(TrainSettings)}
+
+
+def settings_for(
+    settings: TrainSettings | None,
+    state: Mapping[str, Any] | None,
+    changes: Mapping[str, Any],
+    function: Callable[..., Any],
+) -> TrainSettings:
+    """Return a run's settings with changes: those given, of the checkpoint, or the defaults.
+
+    A `Task` among the changes is registered. See `from_arguments` for `function` and errors.
+    """
+    if settings is None and state is not None:
+        settings = settings_of(state["config"])
+    changes = {name: as_settings(value) for name, value in changes.items()}
+    return from_arguments(TrainSettings, settings, changes, function)
 
 
 def settings_of(config: Mapping[str, Any]) -> TrainSettings:

@@ -20,7 +20,7 @@ from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.objectives import ReinforceLoss
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import describe
-from drone_rl.sim.tasks import FailureReplayTask, as_settings, as_task
+from drone_rl.sim.tasks import FailureReplayTask, as_task
 from drone_rl.training import components, run_folder
 from drone_rl.training.callbacks import Callback, CollapseCheck, CsvCallback, with_progress
 from drone_rl.training.cloning import clone
@@ -68,9 +68,7 @@ def train(
     """
     hooks = with_progress(callbacks, progress)
     run, state = RunFolder.open(folder, resume)
-    if settings is None:
-        settings = TrainSettings() if state is None else run_folder.settings_of(state["config"])
-    settings = settings.replace(**{name: as_settings(value) for name, value in changes.items()})
+    settings = run_folder.settings_for(settings, state, changes, train)
     run.make()
     with folder_lock(run.path):
         training = run_folder.finish(settings, run.path, learn(settings, run.path, state, hooks))

@@ -35,7 +35,7 @@ _LONGEST_NUMBER = 19
 
 def as_path(value: str | Path, where: str) -> Path:
     """Return the path of an argument named `where`; raise an `InputError` if it is none."""
-    if not isinstance(value, str | os.PathLike):
+    if not isinstance(value, str | os.PathLike) or value == "":
         raise InputError(f"{where}={shown(value)} is no path; give the path of a file or folder")
     return Path(value)
 

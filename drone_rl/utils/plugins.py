@@ -20,18 +20,23 @@ def place_of(code: Callable[..., Any]) -> str:
     return f"{code.__qualname__} of {file}"
 
 
+def line_of(error: BaseException) -> str:
+    """Return the user's line that raised an error, with its file; "" if none did."""
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"line {error.lineno} of {error.filename}"
+    frames = traceback.extract_tb(error.__traceback__)
+    own = (f for f in reversed(frames) if not f.filename.startswith(("<frozen", *_OTHERS)))
+    return next((f"line {frame.lineno} of {frame.filename}" for frame in own), "")
+
+
 def failure(what: str, error: BaseException, place: str = "") -> str:
     """Return the message about user's code that raised an error, with the line of its own files.
 
     `what` is the setting that selects the code. `place` is named if no line of its own is known.
     """
-    frames = traceback.extract_tb(error.__traceback__)
-    own = (f for f in reversed(frames) if not f.filename.startswith(("<frozen", *_OTHERS)))
-    frame = next(own, None if place else frames[-1])
-    where = place if frame is None else f"line {frame.lineno} of {frame.filename}"
-    if isinstance(error, SyntaxError) and error.filename:
-        where = f"line {error.lineno} of {error.filename}"
-    reason = " ".join(str(error).split())
+    where, reason = line_of(error) or place, " ".join(str(error).split())
+    if isinstance(error, InputError):
+        return f"{where}: {reason}"
     return f"{what} failed in {where} ({type(error).__name__}: {reason}); correct it"
 
 

@@ -57,9 +57,19 @@ def parse_yaml(content: bytes | str, where: str) -> Any:
         return yaml.load(content, _PlainLoader)  # a safe loader
     except InputError as error:
         raise InputError(f"{where} is damaged: no plain YAML ({error})") from None
+    except yaml.MarkedYAMLError as error:
+        raise InputError(yaml_mistake(error, where)) from None
     except _DAMAGE as error:
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise InputError(f"{where} is damaged: no plain YAML ({reason})") from None
+
+
+def yaml_mistake(error: yaml.MarkedYAMLError, where: str) -> str:
+    """Return the message about a line that is no YAML; `where` is the file's name."""
+    remedy = "indent with spaces, not tabs" if "\\t" in f"{error.problem}" else "correct it"
+    line = f"line {error.problem_mark.line + 1} of " if error.problem_mark else ""
+    context = f"{error.context}: " if error.context else ""
+    return f"{line}{where} is no YAML ({context}{error.problem}); {remedy}"
 
 
 class _PlainLoader(yaml.SafeLoader):

@@ -10,7 +10,7 @@ import operator
 import re
 import types
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
@@ -87,16 +87,6 @@ class Settings(_Frozen):
         return dataclasses.replace(self, **changes)
 
     @classmethod
-    def from_arguments(cls, settings: Self | None, changes: Mapping[str, Any]) -> Self:
-        """Return a function's `settings`, the defaults if None, with its changes to them.
-
-        Raises:
-            InputError: `settings` is no instance of this class, or see `replace`.
-        """
-        given = cls() if settings is None else Instance(cls).read(settings, "settings")
-        return given.replace(**changes)
-
-    @classmethod
     def read(cls, data: Any, where: str) -> Self:
         """Return settings from a mapping that has every field and no other.
 
@@ -137,13 +127,16 @@ def types_of(cls: type[Settings]) -> Mapping[str, Any]:
     return {field.name: hints[field.name] for field in dataclasses.fields(cls)}
 
 
-def check_names(cls: type[Settings], given: Mapping[str, Any], prefix: str = "") -> None:
-    """Raise an `InputError` with the valid names if a name is not one of them."""
+def check_names(
+    cls: type[Settings], given: Mapping[str, Any], prefix: str = "", others: Sequence[str] = ()
+) -> None:
+    """Raise an `InputError` with the valid names, and others, if a name is not one of the valid."""
     known = kinds_of(cls)
     for name in given:
         if name not in known:
-            meant = did_you_mean(name, known) or _inside(cls, name)
-            raise InputError(f"{prefix}{name} is unknown; valid names: {', '.join(known)}{meant}")
+            names = [*known, *others]
+            meant = _inside(cls, name) or did_you_mean(name, names)
+            raise InputError(f"{prefix}{name} is unknown; valid names: {', '.join(names)}{meant}")
 
 
 def _inside(cls: type[Settings], name: str) -> str:

@@ -12,6 +12,7 @@ from matplotlib.patches import Rectangle
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.commands import BodiesSettings, JudgeSettings
+from drone_rl.config.configuration import from_arguments
 from drone_rl.flight.in_the_loop.drone import FlightControllerError
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
@@ -92,7 +93,7 @@ def bodies(
     Raises:
         InputError: A policy or a setting is unusable.
     """
-    settings, seed = with_seed(BodiesSettings.from_arguments(settings, changes))
+    settings, seed = with_seed(from_arguments(BodiesSettings, settings, changes, bodies))
     progress = as_progress(progress)
     given = list(settings.policies) if policies is None else policies
     listed = given if isinstance(given, list | tuple) else [given]

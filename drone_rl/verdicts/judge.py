@@ -12,7 +12,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
 from drone_rl.config.commands import HeldOutSettings, JudgeSettings
-from drone_rl.config.configuration import Changes, as_changes
+from drone_rl.config.configuration import Changes, as_changes, from_arguments
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, make_baseline
 from drone_rl.evaluation.evaluate import held_out_environments
@@ -148,13 +148,22 @@ def judge(
 ) -> Judgement | Judgements:
     """Judge one policy, or a list or tuple of policies in the same environments.
 
-    Arguments and errors are those of `judge_one`; an empty list is an `InputError`, too.
+    Args:
+        policy: The policy, what `load_policy` takes, a callable, see `policy_from`, a model of
+            Stable-Baselines3, or a baseline: "random", "forward", "left", "right" or "oracle".
+        settings: Number of episodes, seed, device and so on.
+        how: See `drone_rl.verdicts.judge.judge_one`: task, dynamics, appearance, certificate,
+            shifts, require_domain, outputs, progress, and settings to change, as in
+            `judge("good", episodes=1000, appearance="fog")`.
+
+    Raises:
+        InputError: A policy, setting or file is unusable, or the list is empty.
     """
     if not isinstance(policy, list | tuple):
         return judge_one(cast("Any", policy), settings, **how)
     if not policy:
         raise InputError("policy=[] is empty; give one or more policies")
-    settings = JudgeSettings.from_arguments(settings, {})
+    settings = from_arguments(JudgeSettings, settings, {}, judge_one)
     for one in policy:  # a wrong one is refused before any episode
         if one not in BASELINES:
             as_policy(one, how.get("outputs", "outputs"))
@@ -201,7 +210,8 @@ def judge_one(
     Raises:
         InputError: A policy, setting or file is unusable, or a required domain was not measured.
     """
-    settings, seed = with_seed(JudgeSettings.from_arguments(settings, changes), drawn_seed)
+    settings = from_arguments(JudgeSettings, settings, changes, judge_one)
+    settings, seed = with_seed(settings, drawn_seed)
     progress = as_progress(progress)
     loaded = None if policy in BASELINES else as_policy(policy, outputs)
     progress("policy and baselines", 0, 1)

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ChanceSettings, ProveSettings
-from drone_rl.config.configuration import as_changes
+from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason
 from drone_rl.utils.display import aligned, table
@@ -184,7 +184,7 @@ def chances(
         InputError: An input is unusable, `require_cubes` refuses the policy, or the task has too
             many nodes.
     """
-    settings, seed = with_seed(ChanceSettings.from_arguments(settings, changes))
+    settings, seed = with_seed(from_arguments(ChanceSettings, settings, changes, chances))
     progress = as_progress(progress)
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**as_changes(task, "task"))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.config.commands import CheckSettings
-from drone_rl.config.configuration import as_changes
+from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import policy_names
 from drone_rl.utils.display import table
@@ -118,7 +118,7 @@ def check(
     Raises:
         InputError: The certificate is of another network or task, or an input is unusable.
     """
-    settings, seed = with_seed(CheckSettings.from_arguments(settings, changes))
+    settings, seed = with_seed(from_arguments(CheckSettings, settings, changes, check))
     path = _find(certificate, outputs)
     stated = read_certificate(path)
     if policy is None and stated.name not in policy_names():

@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 
 from drone_rl.config.commands import PlacesSettings
-from drone_rl.config.configuration import as_changes
+from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.evaluation.plots import regions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
@@ -107,7 +107,8 @@ def places(
     Raises:
         InputError: The policy, its task or a setting is not supported; the message says why.
     """
-    settings, progress = PlacesSettings.from_arguments(settings, changes), as_progress(progress)
+    settings = from_arguments(PlacesSettings, settings, changes, places)
+    progress = as_progress(progress)
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**as_changes(task, "task"))
     begin = time.perf_counter()

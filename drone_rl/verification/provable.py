@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings, ProveSettings
-from drone_rl.config.configuration import as_config, check_same_config
+from drone_rl.config.configuration import as_config, check_same_config, from_arguments
 from drone_rl.config.training import TrainSettings
 from drone_rl.evaluation.rollouts import find_failures
 from drone_rl.policies.policy import Policy, load_policy
@@ -97,7 +97,7 @@ class Journal(Callback):
         saved = _JOURNAL.read(read_json(path), str(path)) if state and path.exists() else None
         if settings is None and state is not None:
             settings = settings_of(saved["settings"] if saved else state["config"])
-        settings = TrainSettings.from_arguments(settings, changes)
+        settings = from_arguments(TrainSettings, settings, changes, train_until_proved)
         if saved is not None:
             how = how or ProvableSettings.read(saved["how"], "how")
             check_same_config(saved["settings"], as_config(settings), MAY_CHANGE)

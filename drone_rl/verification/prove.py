@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from drone_rl.config.commands import ProveSettings
-from drone_rl.config.configuration import as_changes
+from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.display import aligned, table
 from drone_rl.utils.errors import InputError
@@ -129,7 +129,7 @@ def prove(
         InputError: The policy, its task or a setting is not supported, or the folder holds an
             unfinished proof of another policy, task, logit_gap or renderer; the message says why.
     """
-    settings = ProveSettings.from_arguments(settings, changes)
+    settings = from_arguments(ProveSettings, settings, changes, prove)
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**as_changes(task, "task"))
     network, gap = policy.make_network(), settings.logit_gap

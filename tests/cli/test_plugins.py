@@ -94,6 +94,7 @@ def test_an_exported_file_has_names_and_values_only(folder):
 def test_mistakes_are_one_line(folder):
     (folder / "needs_more.py").write_text("import not_installed.part")
     (folder / "fails.py").write_text("x = 1\ny = x / 0\n")
+    (folder / "nameless.py").write_text("import drone_rl\n@drone_rl.register_returns\nclass A: 0\n")
     (folder / "leaves.py").write_text("import sys\nsys.exit(0)\n")
     (folder / "unclosed.py").write_text("x = 1\ny = (\n")
     for given, told in (
@@ -103,6 +104,10 @@ def test_mistakes_are_one_line(folder):
         (["plugins=[needs_more]"], "install not_installed"),
         (["plugins=[fails]"], "fails.py (ZeroDivisionError: division by zero); correct it"),
         (["plugins=[fails]"], "plugins=fails failed in line 2 of "),
+        (
+            ["plugins=[nameless]"],
+            "nameless.py: give a name in brackets, as in @drone_rl.register_r",
+        ),
         (["plugins=[leaves]"], "plugins=leaves failed in line 2 of "),
         (
             ["plugins=[random]"],
@@ -121,3 +126,23 @@ def test_mistakes_are_one_line(folder):
 def test_a_run_is_resumed_only_with_the_plug_in_typed(folder):
     line = error_line(drone_rl("train", "resume=run", "trainer.total_frames=500", cwd=folder))
     assert "plugins=[my_parts]" in line and "repeat it on the command line" in line
+
+
+BROKEN = """
+import drone_rl
+from drone_rl.objectives import ReturnEstimator
+
+@drone_rl.register_returns("broken")
+class Broken(ReturnEstimator):
+    def estimate(self, reward, done):
+        return reward * self.factor
+"""
+
+
+def test_an_error_of_a_part_is_one_line_with_the_users_line(tmp_path):
+    (tmp_path / "own_broken.py").write_text(BROKEN)
+    plugins = "plugins=[own_broken]"
+    done = drone_rl("train", *TINY, plugins, "returns=broken", cwd=tmp_path)
+    assert done.returncode == 2
+    assert error_line(done).startswith(f"error: {plugins} failed in line 8 of ")
+    assert "'Broken' object has no attribute 'factor'); correct it" in error_line(done)

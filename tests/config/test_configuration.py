@@ -7,7 +7,14 @@ import pytest
 
 from drone_rl.cli.evaluation import PlayCommand
 from drone_rl.config import AppearanceSettings, TaskSettings
-from drone_rl.config.configuration import Changes, as_changes, as_config, from_config, variant_of
+from drone_rl.config.configuration import (
+    Changes,
+    as_changes,
+    as_config,
+    from_arguments,
+    from_config,
+    variant_of,
+)
 from drone_rl.config.learning import Adam, Optimizer
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import TrainerSettings, TrainSettings
@@ -105,3 +112,43 @@ def test_changes_of_settings_have_names():
             as_changes(wrong, "task")
     with pytest.raises(InputError, match=r"^task\.name='pillars' would replace the task, which is"):
         Changes(TaskSettings).read({"name": "pillars"}, "task")
+
+
+def judged(policy, settings=None, *, task=None, appearance=None, **changes):
+    """A function with settings, its further arguments, and changes."""
+
+
+def evaluated(policy, settings=None, **changes):
+    """A function of a policy without further arguments."""
+
+
+def test_settings_of_a_function_and_its_changes_to_them():
+    assert from_arguments(Adam, None, {}, judged) == Adam()
+    assert from_arguments(Adam, Adam(lr=0.5), {}, judged) == Adam(lr=0.5)
+    assert from_arguments(Adam, Adam(lr=0.5), {"lr": 0.25}, judged) == Adam(lr=0.25)
+    for wrong in (Adam, {"lr": 0.5}, TaskSettings(), 5):
+        with pytest.raises(InputError, match=r"^settings=.* is no Adam; give "):
+            from_arguments(Adam, wrong, {}, judged)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize(
+    ("function", "change", "message"),
+    [
+        (
+            judged,
+            {"apperance": 1},
+            r"^apperance is unknown; valid names: lr, task, .* mean appearance\?",
+        ),
+        (
+            judged,
+            {"num_cubes": 2},
+            r"^num_cubes is a setting of task; give task=\{'num_cubes': 2\}$",
+        ),
+        (evaluated, {"num_cubes": 2}, r"give load_policy\(\.\.\.\)\.in_task\(num_cubes=2\)$"),
+        (evaluated, {"mass": 2.0}, r"give load_policy\(\.\.\.\)\.in_dynamics\(mass=2\.0\)$"),
+        (judged, {"lrr": 2.0}, "lrr is unknown; .*did you mean lr"),
+    ],
+)
+def test_changes_that_are_no_settings(function, change, message):
+    with pytest.raises(InputError, match=message):
+        from_arguments(Adam, None, change, function)

@@ -154,7 +154,8 @@ def test_names_that_cannot_be_registered(name):
     [register_network, register_transform, register_returns, register_learner, register_collector],
 )
 def test_a_decorator_without_a_name_is_refused(register):
-    with pytest.raises(InputError, match="give a name in brackets"):
+    example = rf'give a name in brackets, as in @drone_rl\.{register.__name__}\("mine"\)$'
+    with pytest.raises(InputError, match=example):
         register(Wide)
 
 

@@ -298,9 +298,16 @@ def test_a_finished_run_is_not_replaced(tmp_path):
     [
         ({"resume": "RUN"}, "resume='RUN' is neither true nor false; give folder=RUN, resume=True"),
         ({"folder": 5}, "folder=5 is no path"),
+        ({"folder": ""}, "folder='' is no path"),
         ({"folder": "/dev/null/x"}, "folder=/dev/null/x can't be made .*give another folder"),
     ],
 )
 def test_folders_that_do_not_work_are_named(given, message):
     with pytest.raises(InputError, match=message):
         drone_rl.train(TINY, progress=silent, **given)
+
+
+def test_settings_of_another_kind_are_named():
+    for wrong in ({"seed": 1}, "latest", drone_rl.TaskSettings()):
+        with pytest.raises(InputError, match=r"^settings=.* is no TrainSettings"):
+            drone_rl.train(wrong, progress=silent)  # pyright: ignore[reportArgumentType]

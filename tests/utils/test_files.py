@@ -237,7 +237,7 @@ def test_a_folder_of_too_many_files(tmp_path, monkeypatch):
 
 def test_paths_are_text_or_paths():
     assert as_path("a/b", "folder") == as_path(Path("a/b"), "folder") == Path("a/b")
-    for wrong in (5, None, ["a"], b"a"):
+    for wrong in (5, None, ["a"], b"a", ""):
         with pytest.raises(InputError, match=r"^folder=.* is no path; give the path of a"):
             as_path(wrong, "folder")  # pyright: ignore[reportArgumentType]
 

@@ -24,17 +24,32 @@ def test_a_merge_sign_is_a_name_like_any_other():
         ("!!python/object/apply:os.system [x]", "tags are not accepted"),
         ('!!int ""', "tags are not accepted"),
         ("a: 1\na: 2", "twice"),
-        ("a: [1", "expected"),
         ("[" * 17 + "]" * 17, "nested more than 16"),
         ("[" + "1," * 2001 + "]", "more than 2000 values"),
         ("2001-99-99", "month must be"),
-        ("? [a]\n: 1", "unhashable"),
-        ("--- a\n--- b", "single document"),
         ("a: \x00", "not allowed"),
     ],
 )
 def test_what_is_refused_in_one_line(text, message):
     with pytest.raises(InputError, match=rf"x is damaged: no plain YAML .*{message}") as error:
+        parse_yaml(text, "x")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "b: 1\na: [1",
+            "line 2 of x is no YAML .while parsing a flow sequence: expected .*; correct",
+        ),
+        ("? [a]\n: 1", "line 1 of x is no YAML .*unhashable key.; correct it"),
+        ("--- a\n--- b", "line 2 of x is no YAML .*single document"),
+        ("a:\n\tb: 1", "line 2 of x is no YAML .*; indent with spaces, not tabs"),
+    ],
+)
+def test_a_line_that_is_no_yaml_is_named(text, message):
+    with pytest.raises(InputError, match=message) as error:
         parse_yaml(text, "x")
     assert "\n" not in str(error.value)
 

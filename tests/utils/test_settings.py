@@ -173,12 +173,3 @@ def test_a_value_without_a_type_is_no_setting():
 
         class Other(Inner):  # the base's default would stay
             x = 3
-
-
-def test_settings_of_a_function_and_its_changes_to_them():
-    assert Inner.from_arguments(None, {}) == Inner()
-    assert Inner.from_arguments(Inner(x=4), {}) == Inner(x=4)
-    assert Outer.from_arguments(Outer(count=3), {"name": "b"}) == Outer(count=3, name="b")
-    for wrong in (Inner, {"x": 4}, Outer(), 5):
-        with pytest.raises(InputError, match=r"^settings=.* is no Inner; give "):
-            Inner.from_arguments(wrong, {})  # pyright: ignore[reportArgumentType]

@@ -111,7 +111,7 @@ def test_a_verdict_on_luck_in_another_task():
         ({"episodes": "many"}, "episodes='many'"),
         ({"good_share": 1.0}, "good_share=1.0 is out of range; give a number above 0 and below 1"),
         ({"task": {"num_cubes": 0}}, "task.num_cubes=0"),
-        ({"wind": 1}, "wind is unknown; valid names: .*episodes"),
+        ({"wind": 1}, r"^wind is a setting of dynamics; give dynamics=\{'wind': 1\}$"),
     ],
 )
 def test_mistakes_name_the_argument(change, message):

@@ -54,7 +54,7 @@ from drone_rl.config.training import CloningSettings, Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import USER_ERROR
-from drone_rl.utils.plugins import failure
+from drone_rl.utils.plugins import failure, line_of
 from drone_rl.utils.schema import Kind
 from drone_rl.utils.settings import Settings, conf_dir, kinds_of, plain, types_of
 
@@ -151,10 +151,8 @@ def import_plugins(overrides: Sequence[str]) -> None:
             if name.endswith(".py"):
                 remedy = f"type the module's name: plugins=[{name[:-3]}]"
             raise InputError(f"plugins={name} can't be imported ({error}); {remedy}") from error
-        except InputError:
-            raise
         except (Exception, SystemExit) as error:  # any that the user's module raises
-            raise InputError(failure(f"plugins={name}", error)) from error
+            raise InputError(failure(f"plugins={name}", error, name)) from error
 
 
 def _check_module(name: str) -> None:
@@ -313,6 +311,14 @@ def read_settings(cls: type[Settings], config: DictConfig) -> Any:
     return from_config(cls, values)
 
 
+def _mistake(error: Exception, overrides: Sequence[str]) -> str | None:
+    """Return the message about a user's mistake, also in a plugin; None for any other error."""
+    if isinstance(error, InputError | OSError):
+        return one_line(error)
+    plugins = next((o for o in overrides if o.lstrip("+").startswith("plugins=")), "")
+    return failure(plugins, error) if plugins and line_of(error) else None
+
+
 def _job(
     name: str, command: type[CommandSettings], statuses: list[int], overrides: Sequence[str] = ()
 ) -> Callable[[DictConfig], object]:
@@ -329,10 +335,11 @@ def _job(
             status, value = settings.run(folder)
             if status < 128 and sys.stdout.isatty():  # pipes get only the results
                 print(next_steps(name.replace("_", "-"), settings.used_policy(folder), folder))
-        except (InputError, OSError) as error:  # a failed run of a sweep does not stop the others
-            if isinstance(error, BrokenPipeError) and is_output_closed():
+        except Exception as error:  # a failed run of a sweep does not stop the others
+            is_closed = isinstance(error, BrokenPipeError) and is_output_closed()
+            if is_closed or (text := _mistake(error, overrides)) is None:
                 raise
-            print(f"error: {one_line(error)}", file=sys.stderr)
+            print(f"error: {text}", file=sys.stderr)
             status, value = USER_ERROR, None
         statuses.append(status)
         if status > 128:  # a signal ends a whole sweep, not one run of it

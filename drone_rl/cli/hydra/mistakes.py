@@ -24,6 +24,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from drone_rl.sweeps.manifest import is_sweep, quoted
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.readers import yaml_mistake
 
 OTHER_NAMES = tomllib.loads(Path(__file__).parent.with_name("names.toml").read_text("utf-8"))
 """Names of other projects' settings and commands, with ours."""
@@ -187,13 +188,16 @@ class Command:
         text = f"{override}: drone-rl {self.name} has no setting {name}; "
         group, first = name.rpartition(".")[0], name.partition(".")[0]
         if is_group(self.conf, first) and first not in ("hydra", *self.groups, *self.keys):
-            cannot = f"drone-rl {self.name} can't change {first}"
-            return InputError(f"{override}: {cannot}; {self.list_all}")
+            return InputError(
+                f"{override}: drone-rl {self.name} can't change {first}; {self.list_all}"
+            )
         if group in self.groups and self.config[group] is None:
             offered = ", ".join(choices(self.conf, group))
+            why = f"{group} is null, which has no settings; type {group}=NAME {override}"
+            return InputError(f"{override}: {why} with one of the names {offered}")
+        if first in self.groups and (others := self._choices_with(first, name)):
             return InputError(
-                f"{override}: {group} is null, which has no settings; type {group}=NAME {override} "
-                f"with one of the names {offered}"
+                f"{override} needs {' or '.join(others)}; type {others[0]} {override}"
             )
         longer = [key for key in self.keys if key.startswith(name)] if "." in name else []
         if len(longer) > 1:
@@ -206,10 +210,15 @@ class Command:
             )
         if ours:
             return InputError(f"{text}did you mean {ours}? ({self.list_all})")
-        prefix = f"{name.rpartition('.')[0]}."
-        inside = [k.removeprefix(prefix) for k in self.keys if k.startswith(prefix)]
-        listed = f"{prefix[:-1]} has: {', '.join(inside[:40])}" if inside else self.list_all
+        inside = [k.removeprefix(f"{group}.") for k in self.keys if k.startswith(f"{group}.")]
+        listed = f"{group} has: {', '.join(inside[:40])}" if inside else self.list_all
         return InputError(text + listed)
+
+    def _choices_with(self, group: str, name: str) -> list[str]:
+        """Return the choices of a group, as overrides, whose files have a setting."""
+        texts = {p.stem: p.read_text() for p in sorted((self.conf / group).glob("*.yaml"))}
+        found = (n for n, t in texts.items() if name in flattened({group: yaml.safe_load(t) or {}}))
+        return [f"{group}={n}" for n in found]
 
 
 def flattened(values: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
@@ -247,10 +256,8 @@ def explain(error: Exception, name: str, conf: Path, overrides: Sequence[str]) -
 
 def explain_file(error: Exception, name: str, conf: Path) -> InputError | None:
     """Return the error about a file of settings, or None; files of conf/ have none."""
-    if isinstance(error, yaml.MarkedYAMLError) and (mark := error.problem_mark):
-        where, remedy = f"line {mark.line + 1} of {mark.name}", "indent with spaces, not tabs"
-        remedy = remedy if "\\t" in f"{error.problem}" else "correct it"
-        return InputError(f"{where} is no YAML ({error.problem}); {remedy}")
+    if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark:
+        return InputError(yaml_mistake(error, error.problem_mark.name))
     if not (found := _IN_FILE.match(str(error))):
         return None
     file, reason, key = f"{found[1]}.yaml", found[2], found[3]

@@ -23,6 +23,7 @@ _SPACED = re.compile(r"(?:^|\s)([\w.]+)(?: =|= | = )([^\s=]\S*)")
 """A setting with spaces around its equals sign."""
 _DASHES = "-\N{EN DASH}\N{EM DASH}\N{MINUS SIGN}"
 _PAIRS = {"[": "]", "(": ")", "{": "}"}
+_EMPTY_FOLDER = re.compile(r"\+{0,2}(hydra\.(run|sweep)\.dir|paths\.\w+)=")
 _MAIN = ("policy", "certificate", "explanations", "policies", "folder")
 """Settings that a word without a name may be meant for, in this order."""
 _CHOICES = ("experiment", "objective", "network", "appearance", "dynamics", "task", "logger")
@@ -44,6 +45,8 @@ def check_words(name: str, conf: Path, words: Sequence[str]) -> None:
             position += 1
         elif not is_flag and word.startswith(tuple(_DASHES)):
             raise _dashed(Command(name, conf), word, words[position + 1 :])
+        elif _EMPTY_FOLDER.fullmatch(word):
+            raise InputError(f"{word} has no value; type a folder, such as {word}outputs")
         elif not is_flag and "=" in word[1:]:
             _check_brackets(word, words[position + 1 :])
         elif not is_flag and not (word.startswith("~") and len(word) > 1):

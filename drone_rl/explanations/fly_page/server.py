@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from drone_rl.config.commands import FlySettings
+from drone_rl.config.configuration import from_arguments
 from drone_rl.explanations.fly_page.flight import Flight
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.errors import InputError, extra
@@ -368,7 +369,7 @@ def fly(
     Raises:
         InputError: A setting is wrong, the port is in use, or the extra `fly` is not installed.
     """
-    settings = FlySettings.from_arguments(settings, changes)
+    settings = from_arguments(FlySettings, settings, changes, fly)
     found = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     folder = settings.demonstrations or as_path(outputs, "outputs") / "demonstrations"
     return FlyPage(found, settings, Path(folder))

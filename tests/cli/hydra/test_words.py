@@ -18,6 +18,8 @@ pytestmark = pytest.mark.usefixtures("registered")
         ("train --cuda", "type device=cuda$"),
         ("train --algo", "type objective=VALUE$"),
         ("train --seed", "type seed=VALUE$"),
+        ("train paths.outputs=", "^paths.outputs= has no value; type a folder, such as paths"),
+        ("train hydra.run.dir=", "^hydra.run.dir= has no value; type a folder"),
         ("train --lr", "type optimizer.lr=VALUE$"),
         ("train --nope 1", "--nope 1: .* no such option"),
         ("train -s 1", "-s 1: .* no such option"),
