@@ -259,7 +259,7 @@ def test_the_modules_of_registered_parts(registered):
     assert modules_of(mirrored) == {__name__}
 
 
-def test_two_modules_cannot_register_one_name():
+def test_two_modules_cannot_register_one_name(registered):
     def make(in_shape, num_actions):
         return Wide(in_shape, num_actions)
 
@@ -269,4 +269,4 @@ def test_two_modules_cannot_register_one_name():
     with pytest.raises(InputError, match=r"^network=twice is registered by tests.*; give another"):
         register_network("twice")(make)
     make.__module__ = "__main__"  # as in a script that is also a plugin
-    register_network("twice")(make)
+    registered(register_network("twice")(make))

@@ -37,5 +37,5 @@ def test_both_objectives_are_sought_in_the_range_of_the_pictures(monkeypatch):
 
 def test_without_gradients_they_are_left_out():
     network = SimpleNamespace(is_differentiable=False)
-    with pytest.raises(LeftOutError, match="this policy has none; give it as a torch function"):
+    with pytest.raises(LeftOutError, match="this policy has none; give it as a PyTorch function"):
         section(SimpleNamespace(network=network))

@@ -72,7 +72,7 @@ def test_who_ignores_the_picture_is_called_good_nowhere():
         ({"strengths": [6]}, r"strengths\[0\]=6 is out of range"),
         ({"modes": ["drifting"]}, "leaves out constant"),
         ({"task": {"cube_size": -1.0}}, r"task\.cube_size=-1"),
-        ({"wind": 1}, "wind is unknown"),
+        ({"wind": 1}, "wind is a setting of dynamics; give dynamics="),
     ],
 )
 def test_mistakes_are_told_in_a_line_before_anything_is_drawn(change, message, monkeypatch):

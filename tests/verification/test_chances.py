@@ -124,7 +124,7 @@ def test_the_tables(good, several):
         ([0.0, float("nan"), 0.0], {}, "give metres to the left from -6 to 6"),
         (None, {"placements": 0}, "placements=0 is out of range"),
         (None, {"task": {"num_cubes": 20}}, "num_cubes=20"),
-        (None, {"wind": 1}, "wind is unknown; valid names: .*placements"),
+        (None, {"count": 1}, "count is unknown; valid names: .*placements"),
     ],
 )
 def test_mistakes_are_told_in_a_line(good, cubes, change, message):

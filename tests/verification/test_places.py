@@ -90,7 +90,7 @@ def test_it_is_saved_and_shows_itself(done, tmp_path):
         ({"sideways": 0.0}, r"sideways=0.0 is out of range"),
         ({"most_cells": 5}, r"more than 5 cells"),
         ({"task": {"vertical_bound": 1.0}}, r"task.vertical_bound=1.0"),
-        ({"wind": 1}, "wind is unknown"),
+        ({"wind": 1}, "wind is a setting of dynamics"),
     ],
 )
 def test_mistakes_are_told_in_a_line(small, change, message):
