@@ -305,7 +305,7 @@ def from_arguments(
     parameters = inspect.signature(function).parameters.values()
     others = [p.name for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY]
     groups = {"task": Changes(), "dynamics": Changes(DynamicsSettings)}
-    for name in changes.keys() - kinds_of(of).keys():
+    for name in (name for name in changes if name not in kinds_of(of)):
         group = next((group for group, its in groups.items() if name in its.types), "")
         if group in others:
             text = f"{group}={{{name!r}: {shown(changes[name])}}}"
