@@ -264,6 +264,7 @@ OF_CARDS = (
     ("card.verdict", {"verdict.kind": "good"}),
     ("card.reported", {"worlds": "choice"}),
     ("card.reported", {"verdict.proof": PROOF}),
+    ("card.reported", {"shifts": None}, _MEASURED),
     ("card.chosen", {"chosen": None}),
     ("card.chosen", {"chosen.episodes": None}),
     ("card.not_chosen", {"chosen": {"runs": 3, "episodes": 200}}, {"chosen": None}),

@@ -129,8 +129,9 @@ def scores(heat: NDArray, effects: NDArray) -> NDArray:
 def pointing(heat: NDArray, effects: NDArray) -> tuple[NDArray, NDArray]:
     """Return the fractions of the hottest patches, and of all (chance), among the most effective.
 
-    These are the tenth with the largest effects. Chance is more than a tenth if effects tie, and
-    less if fewer patches have any effect. Heat and effects are (T, count), the fractions (T,).
+    The most effective are the tenth with the largest effects. Chance is more than a tenth if
+    effects tie, and less if fewer patches have any effect. Heat and effects are (T, count), the
+    fractions (T,).
     """
     levels, moved = _levels(heat), np.round(effects / _EQUAL)
     number = max(1, round(TOP * effects.shape[1]))

@@ -62,7 +62,7 @@ class Condition:
     camera: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """Settings of the camera to replace."""
     appearance_changes: tuple[AppearanceChange, ...] = ()
-    """Changes of colors and light; they need an appearance in which all is given."""
+    """Changes of colors and light; they need those of `scene_appearance`."""
     mounts: tuple[AppearanceChange, ...] = ()
     """Changes of the camera's pose."""
     faults: tuple[FaultModel, ...] = ()
@@ -114,9 +114,13 @@ def reflect(variation: Tensor) -> Tensor:
 
 
 def scene_appearance(scene: Scene) -> Appearance:
-    """Return a scene's appearance with all of it given but for distractors."""
-    known = [m for m in scene.semantic_classes if m is not SemanticClass.DISTRACTOR]
-    colors = {m: tuple(scene.colors[scene.geoms(m)[0], :3].tolist()) for m in known}
+    """Return lights, sky and colors of a scene, without distractors.
+
+    A class whose geoms differ in color is left out, so that it stays as in the model.
+    """
+    known = {*scene.semantic_classes} - {SemanticClass.DISTRACTOR}
+    found = {m: {*map(tuple, scene.colors[scene.geoms(m), :3].tolist())} for m in known}
+    colors = {m: next(iter(own)) for m, own in found.items() if len(own) == 1}
     model = scene.model
     lights = (model.light_ambient[0], model.light_diffuse[0], model.light_dir[0])
     ambient, sun, direction = (tuple(light.tolist()) for light in lights)
@@ -297,6 +301,11 @@ def _repaint(
     appearance: Appearance, classes: Sequence[SemanticClass], paint: Callable[[Tensor], Tensor]
 ) -> Appearance:
     painted = {m: paint(_tensor(c)) for m, c in appearance.colors.items() if m in classes}
+    if not painted:
+        raise InputError(
+            "these objects have several colors, which can't be changed together; leave "
+            "object_color and object_white out of axes"
+        )
     return dataclasses.replace(appearance, colors={**appearance.colors, **painted})
 
 

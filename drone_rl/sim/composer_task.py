@@ -23,6 +23,7 @@ from drone_rl.sim.rendering import Appearance, opengl
 from drone_rl.sim.rendering.opengl import OpenGlAppearance
 from drone_rl.sim.rendering.scene import Scene, SemanticClass, compiled
 from drone_rl.sim.tasks import State, Task, as_task
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.visual_randomization import AppearanceSampler, object_region_of
 
 _SKY = 0.69 * entities.DRAW_DISTANCE
@@ -61,7 +62,7 @@ class ComposerTask(composer.Task):
             dynamics: Vehicle dynamics; the task's default if None.
             actions: Action space, if `dynamics` are settings; the moves by default.
             pixels: Whether to observe the front-center camera, which needs OpenGL.
-            distractors: Their number, if no appearance is given.
+            distractors: Number of distractors in the model; only an appearance places them.
             appearance: Visual appearance, see `OpenGlAppearance`; the task's by default.
 
         Raises:
@@ -215,8 +216,10 @@ class ComposerTask(composer.Task):
         if self._flight is None:
             self.drone.set_pose(physics, body.position[0].numpy(), self._shown(body)[0].numpy())
         places = self.rules.places(self.state)[0]
-        if self.appearance is not None and self.appearance.distractors is not None:
-            places = torch.cat([places, self.appearance.distractors.expand(1).places[0]])
+        shown = None if self.appearance is None else self.appearance.distractors
+        if count := len(self._frames) - len(places):  # without an appearance out of sight
+            hidden = places.new_tensor([0.0, 0.0, -HIDDEN_DEPTH]).expand(count, 3)
+            places = torch.cat([places, hidden if shown is None else shown.expand(1).places[0]])
         for frame, place in zip(self._frames, places, strict=True):
             physics.bind(frame).mocap_pos = place.numpy()
 

@@ -1,8 +1,9 @@
 """Consistency of rates, means and intervals in files.
 
 A reader can't know whether the figures of a file were measured. But a rate and its exact interval
-follow from its counts, and the interval of a mean has a least width for a number of values. So no
-file can claim more than its own counts allow. `where` names the checked part in messages.
+follow from its counts, and the interval of a mean has a least width for a number of values. So a
+rate or mean that passes its check claims no more than its own counts allow. `where` names the
+checked part in messages.
 """
 
 import math
@@ -25,9 +26,11 @@ _COUNTS = ("episodes", "frames", "steps", "trials", "successes", "count", "goals
 def check_intervals(given: Any, where: str) -> None:
     """Check all rates, means and counts in plain data.
 
+    The width of a mean's interval depends on the values' bounds; see `check_mean`.
+
     Raises:
-        InputError: A rate does not follow from its counts, a value is outside its interval, an
-            interval is narrower than its counts allow, or a count is negative.
+        InputError: A rate does not follow from its counts, a value is outside its interval, the
+            interval of a rate is narrower than its counts allow, or a count is negative.
     """
     waiting = [(given, where)]
     while waiting:

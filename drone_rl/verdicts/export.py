@@ -221,7 +221,9 @@ def _verdict(card: Evidence) -> str:
 
 
 def _reported(card: Evidence) -> str:
-    but = " except those of the certificate" if is_quoted(card["verdict"]) else ""
+    others = ["the certificate"] if is_quoted(card["verdict"]) else []
+    others += ["the robustness evaluation"] if has_domain(card) else []
+    but = f" except those of {listed(others)}" if others else ""
     return (
         f"All figures{but} are from {card['verdict']['greedy']['episodes']:,} episodes in "
         f"environments reserved for reports (seed {card['seed']}), which neither training nor the "

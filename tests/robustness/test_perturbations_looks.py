@@ -16,6 +16,7 @@ from drone_rl.robustness.perturbations import (
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
 
 PLAIN = Appearance(
     colors={SemanticClass.TARGET: (0.8, 0.1, 0.0), SemanticClass.SKY: (0.6, 0.7, 0.9)},
@@ -59,4 +60,16 @@ def test_the_look_of_a_scene_is_all_given_and_draws_the_same():
     assert elevation(look.sun_direction) == pytest.approx(MINIMAL.sun_elevation, abs=0.05)
     drawn = worlds.render(worlds.state).clone()
     assert torch.equal(worlds.render(worlds.state, appearance=look), drawn)
+    worlds.close()
+
+
+def test_classes_of_several_colors_stay_as_they_are():
+    worlds = Worlds(1, task="pillars", num_shards=1)
+    geoms = worlds.scene.geoms(SemanticClass.OBSTACLE)
+    assert SemanticClass.OBSTACLE in scene_appearance(worlds.scene).colors
+    worlds.scene.model.geom_rgba[geoms[0], :3] = (0.1, 0.2, 0.3)
+    look = scene_appearance(worlds.scene)
+    assert SemanticClass.OBSTACLE not in look.colors and SemanticClass.SKY in look.colors
+    with pytest.raises(InputError, match="these objects have several colors"):
+        whiten([SemanticClass.OBSTACLE], 0.5).change(look, NONE)
     worlds.close()

@@ -139,3 +139,13 @@ def test_a_turned_drone_has_the_new_attitude(env):
     turned = [math.cos(half), 0.0, 0.0, math.sin(half)]
     env.task.drone.set_pose(env.physics, body.position[0].numpy(), turned)
     assert env.task._found(env.physics).attitude[0].tolist() == pytest.approx(turned)
+
+
+def test_distractors_without_an_appearance_are_out_of_sight():
+    env = make_environment(pixels=False, distractors=2, random_state=0)
+    env.reset()
+    env.step(0)
+    *_, first, second = env.task._frames
+    heights = [float(env.physics.bind(frame).mocap_pos[2]) for frame in (first, second)]
+    assert heights == [-HIDDEN_DEPTH] * 2
+    env.close()

@@ -19,7 +19,7 @@ from drone_rl.sim.rendering.appearance import product
 from drone_rl.utils.errors import InputError
 
 MAX_PATTERNS = 20
-"""Patterns of one camera."""
+"""Most patterns of one camera."""
 
 
 @method("simAddDetectionFilterMeshName", least=3)
@@ -60,25 +60,28 @@ def _found(simulation: Simulation, args: Sequence[Any]) -> Iterator[Map]:
     (shot,) = stage.render(vehicle.body, camera, [ImageType.SEGMENTATION])
     attitude = product(vehicle.body.attitude[0].double(), camera.attitude)
     for name in names:
-        box = stage.box(shot, name)
-        place = torch.tensor(to_world(stage.object_pose(name).position), dtype=torch.float64)
+        box, pose = stage.box(shot, name), stage.object_pose(name)
+        place = torch.tensor(to_world(pose.position), dtype=torch.float64)
         from_camera = body_from_world(attitude, place - vehicle.place_of(camera))
         if box is not None and float(from_camera.norm()) <= camera.detection_radius:
-            yield _detection(vehicle, name, place, from_camera, box, stage.radius(name))
+            inverse = attitude * attitude.new_tensor((1.0, -1.0, -1.0, -1.0))
+            turn = product(inverse, messages.attitude_to_world(pose.attitude)[0])
+            w, i, j, k = messages.ned_attitude(turn[None])
+            x, y, z = messages.ned(from_camera[None])
+            relative = messages.Pose((x, y, z), (w, i, j, k))
+            yield _detection(vehicle, name, place, relative, box, stage.radius(name))
 
 
 def _detection(
     vehicle: Vehicle,
     name: str,
     place: torch.Tensor,
-    from_camera: torch.Tensor,
+    relative: messages.Pose,
     box: Sequence[int],
     radius: float,
 ) -> Map:
     left, top, right, bottom = box
-    x, y, z = messages.ned(from_camera[None])
-    ends = [[value + side for value in (x, y, z)] for side in (-radius, radius)]
-    level = (1.0, 0.0, 0.0, 0.0)
+    ends = [[value + side for value in relative.position] for side in (-radius, radius)]
     return {
         "name": name,
         "geo_point": messages.geo_point(geo_from_world(place, vehicle.geo_home).tolist()),
@@ -87,5 +90,5 @@ def _detection(
             "max": {"x_val": float(right), "y_val": float(bottom)},
         },
         "box3D": {"min": messages.vector(ends[0]), "max": messages.vector(ends[1])},
-        "relative_pose": messages.pose(messages.Pose((x, y, z), level)),
+        "relative_pose": messages.pose(relative),
     }

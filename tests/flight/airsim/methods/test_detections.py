@@ -1,5 +1,7 @@
 """Detections by hand: boxes in the image, distances, names and radius."""
 
+import math
+
 import pytest
 
 from tests.flight.airsim.conftest import SMALL, pose
@@ -31,6 +33,8 @@ def test_a_box_ahead_by_hand(client):
     assert (box["min"]["y_val"], box["max"]["y_val"]) == (3.0, 4.0)
     there = found["relative_pose"]["position"]
     assert [*there.values()] == pytest.approx([10.0, 0.0, 0.0], abs=1e-6)
+    turn = found["relative_pose"]["orientation"]
+    assert [turn[f"{axis}_val"] for axis in "wxyz"] == pytest.approx([1.0, 0.0, 0.0, 0.0])
     assert found["box3D"]["max"]["x_val"] == pytest.approx(10.0 + 3**0.5, abs=1e-3)
     home = client.call("getHomeGeoPoint")
     assert found["geo_point"]["latitude"] == pytest.approx(
@@ -63,3 +67,13 @@ def test_names_of_a_camera_are_limited(client):
         client.call("simAddDetectionFilterMeshName", "0", 0, f"box{i}", "")
     with pytest.raises(RuntimeError, match="a camera can have 20 mesh names"):
         client.call("simAddDetectionFilterMeshName", "0", 0, "box", "")
+
+
+def test_orientations_are_relative_to_the_camera(client):
+    half = math.sqrt(0.5)
+    left = {"w_val": half, "x_val": 0.0, "y_val": 0.0, "z_val": -half}  # 90 degrees, NED
+    client.call("simSetVehiclePose", pose(10.0, 10.0, 0.0, left), True, "")
+    client.call("simAddDetectionFilterMeshName", "0", 0, "box", "")
+    (found,) = client.call("simGetDetections", "0", 0, "")
+    turn = found["relative_pose"]["orientation"]
+    assert [turn[f"{axis}_val"] for axis in "wxyz"] == pytest.approx([half, 0.0, 0.0, half])
