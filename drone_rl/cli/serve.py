@@ -19,7 +19,7 @@ class ServeCommand(CommandSettings):
     settings: str | None = None
     """AirSim's settings.json; null for one multirotor."""
     scene: str = "cubes"
-    """What stands in the world: cubes, which vanish when touched; blocks; pillars; empty; or the
+    """Objects in the scene: cubes, which vanish when touched; blocks; pillars; empty; or the
     path of an MJCF file, *.xml."""
     clock: Annotated[str, OneOf(("wall", "lockstep"))] = "wall"
     """wall: real time, multiplied by ClockSpeed. lockstep: time advances only while a call waits

@@ -80,7 +80,7 @@ def judge_policy(
     the arguments "rule", "claim", "unlike" and "seed" of `apply_rule`.
 
     Raises:
-        InputError: The task has no oracle, or see `check_rounding`.
+        InputError: The task has no oracle; also what `check_rounding` raises.
     """
     base, worlds = base_env(env), worlds_of(env)
     state = base.state_dict()
@@ -107,7 +107,7 @@ def judge_for_selection(
 ) -> tuple[dict[str, Any], dict]:
     """Judge a checkpoint in environments of `Stream.CHOICE`, for selection.
 
-    Figures of a judgement are from `Stream.REPORT`, never from these.
+    Reported figures come from environments of `Stream.REPORT`, never from these.
     The root of the random streams is fresh by default. Return the verdict, as in verdict.json, and
     the checkpoint's progress.
 

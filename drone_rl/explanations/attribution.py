@@ -83,8 +83,9 @@ def _normalized(maps: Tensor) -> NDArray:
 def key_frames(dataset: RolloutDataset, episode: int, task: Task[Any]) -> list[tuple[int, str]]:
     """Select six frames of an episode, fewer only if it is shorter: number and reason, in order.
 
-    They are: the first; that half way to the first goal (or to the end); those before each goal is
-    reached or one is missed; the last one of an episode that failed; then those furthest from all.
+    In this order, until there are six: the first; those before a goal is reached; those before one
+    is missed; the last one of an episode that failed; that half way to the first goal (or to the
+    end); then those furthest from all.
     """
     frames = np.flatnonzero(dataset.episode == episode)
     chosen: dict[int, str] = {int(frames[0]): "start"}

@@ -108,7 +108,7 @@ class ClassModels:
         return images.gridded(shown, len(order))
 
     def save(self, folder: Path) -> None:
-        """Write `class_models.png`, `class_models.json` and, with every image, `.npz`."""
+        """Write `class_models.png`, `class_models.json`, and all images as `class_models.npz`."""
         self.image().save(folder / "class_models.png")
         written = {
             **{"policy": self.policy.origin["policy"], **self.seed.as_dict()},

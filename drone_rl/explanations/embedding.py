@@ -19,7 +19,7 @@ NEIGHBOURS = 10  # neighbours by which faithfulness is measured
 QUERIES = 1000  # most points whose neighbourhoods are compared
 GAUSSIAN_DOF = 1e4
 """Degrees of freedom at which openTSNE's kernel (1 + d² / dof)^(-dof) is exp(-d²) within 1e-4."""
-FEW = 2000  # up to so many points, exact methods on one thread are the fastest
+FEW = 2000  # up to so many points, exact neighbours and Barnes-Hut on one thread are fastest
 
 
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:

@@ -52,7 +52,7 @@ def find_layer(network: ImageNetwork, name: str) -> nn.Module:
 def spatial_layers(network: ImageNetwork) -> list[str]:
     """Return layers with a feature map, in order; none in an MLP.
 
-    Each is the layer after a convolution if it keeps the shape and is none, else the convolution.
+    For each convolution: the next layer if that keeps the shape and is no convolution, else itself.
     """
     every, found = [*layers(network).items()], []
     for i, (name, (layer, shape)) in enumerate(every):

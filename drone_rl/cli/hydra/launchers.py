@@ -327,7 +327,10 @@ def distribution(override: Override) -> Any:
                 )
         elif isinstance(value, IntervalSweep):
             low, high = cast(float, value.start), cast(float, value.end)  # Hydra wants both
-            return d.FloatDistribution(float(low), float(high), log="log" in value.tags)
+            is_log = "log" in value.tags
+            if isinstance(low, int) and isinstance(high, int):  # int(interval(LOW,HIGH))
+                return d.IntDistribution(low, high, log=is_log)
+            return d.FloatDistribution(float(low), float(high), log=is_log)
     except ValueError:  # from Optuna, for an empty or a negative logarithmic range
         pass
     raise InputError(

@@ -318,7 +318,7 @@ class FlyPage:
                 _call_soon(self._loop, page.tell, str(error))
 
     def _offer(self, frame: bytes) -> None:
-        """Hand a frame to the server's thread, unless the last one is still to be taken."""
+        """Hand a frame to the server's thread; it replaces one that is still to be taken."""
         with self._handing:
             is_waiting, self._frame = self._frame is not None, frame
         if not is_waiting:

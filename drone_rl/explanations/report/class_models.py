@@ -34,15 +34,13 @@ def say_class_models(evidence: Evidence) -> Claims:
 
 
 def grid(explanations: Sequence[Explanation]) -> Image.Image:
-    """Return images by action (columns), policy and objective (rows), with the probabilities."""
-    shown = [
-        image
-        for explanation in explanations
-        for image in tiles(
-            explanation, f"{explanation.name[:18]}: " if len(explanations) > 1 else ""
-        ).values()
-    ]
-    return images.gridded(shown, len(explanations[0].actions.names))
+    """Return images by policy and objective (rows) and action (columns), with probabilities."""
+    grids = []
+    for explanation in explanations:
+        start = f"{explanation.name[:18]}: " if len(explanations) > 1 else ""
+        shown = [*tiles(explanation, start).values()]
+        grids.append(images.gridded(shown, len(explanation.actions.names)))
+    return images.stacked(grids, gap=12)
 
 
 def tiles(explanation: Explanation, start: str = "") -> dict[str, Image.Image]:

@@ -71,7 +71,8 @@ def report(folders: Sequence[Path], target: Path) -> Path:
 def find_explanations(which: Sequence[str], outputs: str | Path = "outputs") -> list[Path]:
     """Return folders of explanations, or raise InputError if there is none.
 
-    `which` has such folders, folders that contain some, or only "latest": the newest in `outputs`.
+    `which` has such folders, folders that contain some, or only "latest": the newest run of
+    `outputs`.
     """
     folders = [Path(path) for path in which]
     if tuple(which) == ("latest",):
@@ -79,7 +80,7 @@ def find_explanations(which: Sequence[str], outputs: str | Path = "outputs") -> 
         run = newest({path.parents[1] for path in made})
         if run is None:
             raise InputError(
-                f"explanations=latest, but there is none under {outputs}/explain; "
+                f"explanations=latest, but there is none under {outputs}/explain/runs; "
                 "run drone-rl explain first or give folders"
             )
         folders = [run]
@@ -99,7 +100,7 @@ def find_explanations(which: Sequence[str], outputs: str | Path = "outputs") -> 
 def write_report(folders: Sequence[Path], target: Path) -> Path:
     """Write report.html, and figures with their numbers in figures/; return the page's path.
 
-    The folders hold one explanation each; several are shown side by side.
+    The folders hold one explanation each; one page shows all.
 
     Raises:
         InputError: An explanation can't be read or the report can't be written.

@@ -45,9 +45,10 @@ def say_response(evidence: Evidence) -> Claims:
     if blind and None not in blind.values():
         parts = [f"{percent(of)} of the places {terms.place(side)}" for side, of in blind.items()]
         claims["response.blind"] = (
-            f"It is blind at {listed(parts)}: a turn is needed, it makes none, and its "
-            f"probabilities differ by less than {evidence['response']['blind_below']:g} from those "
-            f"without a {terms.target}. It may still detect the {terms.target} farther on."
+            f"It is blind at {listed(parts)}: a turn is needed, its action is not to this side, "
+            f"and its probabilities differ by less than {evidence['response']['blind_below']:g} "
+            f"from those without a {terms.target}. It may still detect the {terms.target} farther "
+            "on."
         )
     return claims
 

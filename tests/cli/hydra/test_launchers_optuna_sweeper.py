@@ -20,6 +20,9 @@ from drone_rl.utils.errors import InputError  # noqa: E402
     [
         ("a=interval(0.9,1)", FloatDistribution(0.9, 1.0)),
         ("a=tag(log,interval(1e-4,1e-1))", FloatDistribution(1e-4, 1e-1, log=True)),
+        ("a=int(interval(1,5))", IntDistribution(1, 5)),
+        ("a=tag(log,int(interval(1,100)))", IntDistribution(1, 100, log=True)),
+        ("a=interval(1,5)", FloatDistribution(1.0, 5.0)),
         ("a=range(1,6)", IntDistribution(1, 5)),
         ("a=range(0,10,4)", IntDistribution(0, 8, step=4)),
         ("a=choice(x,y)", CategoricalDistribution(["x", "y"])),
