@@ -143,7 +143,8 @@ def _inside(cls: type[Settings], name: str) -> str:
     """Return a hint at the field whose settings have a name, or ""."""
     for field in dataclasses.fields(cls):
         if isinstance(field.default, Settings) and name in kinds_of(type(field.default)):
-            return f"; did you mean {field.name}={type(field.default).__name__}({name}=...)?"
+            of = type(field.default)
+            return f"; did you mean {field.name}={of.__module__}.{of.__name__}({name}=...)?"
     return ""
 
 

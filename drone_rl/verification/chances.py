@@ -242,7 +242,9 @@ def _given(task: TaskSettings, cubes: Any) -> Tensor:
     try:
         aside = torch.atleast_2d(torch.as_tensor(cubes, dtype=torch.float64))
     except (TypeError, ValueError, RuntimeError):
-        raise InputError(f"cubes={cubes} are not numbers; give metres to the left") from None
+        raise InputError(
+            f"cubes={cubes} are not numbers, as many for each placement; give metres to the left"
+        ) from None
     if aside.ndim != 2 or not len(aside) or aside.shape[1] != task.num_cubes:
         raise InputError(
             f"cubes={cubes} must have {task.num_cubes} positions; give metres to the left, nearest "

@@ -146,7 +146,8 @@ def check(
 
 def _find(certificate: str | Path, outputs: str | Path) -> Path:
     if certificate != "latest":
-        return as_path(certificate, "certificate")
+        path = as_path(certificate, "certificate")
+        return path / "certificate.json" if path.is_dir() else path
     path = newest(as_path(outputs, "outputs").glob("prove/**/certificate.json"))
     if path is None:
         raise InputError(

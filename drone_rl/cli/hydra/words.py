@@ -32,6 +32,7 @@ _CHOICES = ("experiment", "objective", "network", "appearance", "dynamics", "tas
 
 def check_words(name: str, conf: Path, words: Sequence[str]) -> None:
     """Raise an `InputError` for the first word that is not a setting."""
+    _check_resume(words)
     position = 0
     while position < len(words):
         word = words[position]
@@ -52,6 +53,13 @@ def check_words(name: str, conf: Path, words: Sequence[str]) -> None:
         elif not is_flag and not (word.startswith("~") and len(word) > 1):
             raise _bare(Command(name, conf), words, position)
         position += 1
+
+
+def _check_resume(words: Sequence[str]) -> None:
+    if {"-m", "--multirun"} & {*words} and any(word.startswith("resume=") for word in words):
+        raise InputError(
+            "resume= continues one run, not with -m; to continue a sweep, repeat its command"
+        )
 
 
 def _dashed(command: Command, word: str, following: Sequence[str]) -> InputError:
@@ -112,6 +120,7 @@ def _bare(command: Command, words: Sequence[str], position: int) -> InputError:
         return InputError(f"{word} has no =; type {ours or 'NAME=VALUE'}")
     named = [g for g in _CHOICES if g in command.groups and word in choices(command.conf, g)]
     is_policy = Path(word).suffix in ("", ".pt", ".safetensors")
+    is_policy &= not (Path(word) / "certificate.json").is_file()
     main = _MAIN if is_policy else ("certificate", *_MAIN)
     named += [key for key in main if key in command.keys]
     if named:

@@ -94,6 +94,8 @@ def parse_certificate(data: Any) -> Certificate:
     Raises:
         InputError: A key is missing or unknown, or a value has another type or is out of bounds.
     """
+    if isinstance(data, Mapping) and data.get("format") != FORMAT:
+        raise InputError(f"its format is not {FORMAT!r}; give certificate.json of drone-rl prove")
     read = _WHOLE.read(data, "certificate")
     described = parse(read["policy"]["description"])
     task = require_cubes(described, "certificates")

@@ -18,6 +18,7 @@ pytestmark = pytest.mark.usefixtures("registered")
         ("train --cuda", "type device=cuda$"),
         ("train --algo", "type objective=VALUE$"),
         ("train --seed", "type seed=VALUE$"),
+        ("train -m seed=0,1 resume=latest", "^resume= continues one run, .* repeat its command$"),
         ("train paths.outputs=", "^paths.outputs= has no value; type a folder, such as paths"),
         ("train hydra.run.dir=", "^hydra.run.dir= has no value; type a folder"),
         ("train --lr", "type optimizer.lr=VALUE$"),
@@ -69,3 +70,11 @@ def test_settings_and_options_of_hydra_are_accepted():
 )
 def test_no_command(words, message):
     assert message in no_command(words[0], words[1:], [*COMMANDS])
+
+
+def test_a_folder_of_a_proof_is_meant_as_its_certificate(tmp_path):
+    with pytest.raises(InputError, match="type policy="):
+        check_words("check", conf_dir(), [f"{tmp_path}"])
+    (tmp_path / "certificate.json").touch()
+    with pytest.raises(InputError, match=f"type certificate={tmp_path}$"):
+        check_words("check", conf_dir(), [f"{tmp_path}"])
