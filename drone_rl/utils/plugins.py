@@ -66,7 +66,7 @@ def with_methods_of(base: type, made: T) -> T:
 @functools.cache
 def _check_methods(own: type, base: type) -> None:
     for name, method in vars(own).items():
-        theirs = getattr(base, name, None)
+        theirs: Any = getattr(base, name, None)
         both = inspect.isfunction(method) and inspect.isfunction(theirs)
         if own.__module__.startswith("drone_rl.") or not both:
             continue
