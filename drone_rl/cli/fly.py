@@ -2,8 +2,6 @@
 
 import contextlib
 import logging
-import os
-import sys
 import threading
 import webbrowser
 from pathlib import Path
@@ -26,6 +24,8 @@ class FlyCommand(AppearanceCommandSettings, FlySettings):
 
     def run(self, folder: Path) -> tuple[int, None]:
         """Serve the page until Ctrl-C; return the exit status."""
+        from drone_rl.evaluation.video import has_display  # imports torch
+
         policy = self.load_policy()
         given = self.as_base(FlySettings)
         with (
@@ -34,13 +34,7 @@ class FlyCommand(AppearanceCommandSettings, FlySettings):
         ):
             print(f"open {page.url}", flush=True)
             _log.info("policy %s; end with Ctrl-C", policy.name)
-            if self.browser and _has_display():
+            if self.browser and has_display():  # text browsers would take the terminal
                 threading.Thread(target=webbrowser.open, args=(page.url,), daemon=True).start()
             page.wait()
         return 0, None
-
-
-def _has_display() -> bool:
-    """Return whether a browser would open a window; text browsers would take the terminal."""
-    names = ("DISPLAY", "WAYLAND_DISPLAY")
-    return sys.platform in ("darwin", "win32") or any(os.environ.get(name) for name in names)

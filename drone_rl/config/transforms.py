@@ -22,7 +22,7 @@ class Transform(Variant):
     """Settings of a transform."""
 
     needs: ClassVar[str] = ""
-    """Required input: "bytes" (RGB of the camera), "channels" first, "floats", or "" for any."""
+    """Required input: "bytes" (RGB of the camera), "floats", or "" for both."""
 
     def output(self, frame: Frame) -> Frame | None:
         """Return shape and type of the output; None if only a call of the transform shows them.
@@ -32,10 +32,6 @@ class Transform(Variant):
         """
         if self.needs == "bytes" and (frame.is_float or frame.shape[-1] != 3):
             raise InputError(f"the transform {self.name} needs the camera's bytes; put it first")
-        if self.needs == "channels" and not frame.is_float and frame.shape[-1] == 3:
-            raise InputError(
-                f"the transform {self.name} needs channels first; put gray or rgb before it"
-            )
         if self.needs == "floats" and not frame.is_float:
             raise InputError(f"the transform {self.name} needs floats; put gray before it")
         return self._transformed(frame)
@@ -101,13 +97,14 @@ class Standardize(Transform, target="standardize"):
 class Crop(Transform, target="crop"):
     """Crop to the rows from top (included) to bottom (excluded)."""
 
-    needs: ClassVar[str] = "channels"
     top: Annotated[int, Whole(0, 1023, "pixels")] = 5
     """First row."""
     bottom: Annotated[int, Whole(1, 1024, "pixels")] = 30
     """First row that is not kept."""
 
     def _transformed(self, frame: Frame) -> Frame:
+        if not frame.is_float and frame.shape[-1] == 3:
+            raise InputError("the transform crop needs channels first; put gray or rgb before it")
         rows = frame.shape[-2]
         if not self.top < self.bottom <= rows:
             raise InputError(

@@ -27,6 +27,7 @@ from drone_rl.policies.policy import Policy
 from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.sim.composer_task import make_environment
+from drone_rl.sim.coordinates import inverse
 from drone_rl.sim.dynamics import FlightState, Quadrotor
 from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.entities import (
@@ -45,7 +46,6 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import MUTED, PAPER
 from drone_rl.utils.seeding import legacy_seed
 
-_CONJUGATE = (1.0, -1.0, -1.0, -1.0)
 """Signs of a quaternion's inverse."""
 _log = logging.getLogger(__name__)
 WIDTH, HEIGHT = 1280, 720
@@ -79,6 +79,12 @@ def film(
     return files
 
 
+def has_display() -> bool:
+    """Return whether this process can open windows."""
+    names = ("DISPLAY", "WAYLAND_DISPLAY")
+    return sys.platform in ("darwin", "win32") or any(os.environ.get(name) for name in names)
+
+
 def view(policy: Policy, *, greedy: bool = True, seed: int = 0, **how: Any) -> None:
     """Open dm_control's viewer on the composer task, controlled by a policy; see `film`.
 
@@ -88,7 +94,7 @@ def view(policy: Policy, *, greedy: bool = True, seed: int = 0, **how: Any) -> N
         InputError: There is no display, or the policy is recurrent.
     """
     require_memoryless(policy.make_network(), "the viewer", "leave viewer=false to film it")
-    if sys.platform != "darwin" and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
+    if not has_display():
         raise InputError("viewer=true needs a display, and there is none; leave it false to film")
     import dm_env
     from dm_control import viewer
@@ -296,6 +302,6 @@ def level(attitude: Tensor, camera: str) -> Mounting:
 
     Attitudes are quaternions (w, x, y, z), (num_envs, 4); the camera is its name in the model.
     """
-    back = product(attitude * attitude.new_tensor(_CONJUGATE), twist_about_z(attitude))
+    back = product(inverse(attitude), twist_about_z(attitude))
     place = torch.tensor(CHASE.pos, dtype=attitude.dtype, device=attitude.device)
     return Mounting(camera=camera, offset=rotate(back, place) - place, turn=back)

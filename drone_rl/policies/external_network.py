@@ -60,8 +60,7 @@ class ExternalNetwork(ImageNetwork):
             given = self._given(image)
             raise InputError(
                 f"the network can't take images of shape {tuple(given.shape)}, {given.dtype} "
-                f"({what}); give "
-                f"{_remedy(self.parts)}"
+                f"({what}); give {_remedy(self.parts)}"
             ) from error
         if not torch.allclose(found, self(image), atol=_TOLERANCE):
             raise InputError(

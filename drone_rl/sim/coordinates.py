@@ -40,9 +40,14 @@ def enu_from_world(vector: Values) -> Values:
     return _signed(vector[..., [1, 0, 2]], (-1.0, 1.0, 1.0))
 
 
+def inverse(attitude: Tensor) -> Tensor:
+    """Return the attitudes that undo given ones. Shape: (*, 4)."""
+    return _signed(attitude, (1.0, -1.0, -1.0, -1.0))
+
+
 def body_from_world(attitude: Tensor, vector: Tensor) -> Tensor:
     """Return vectors of our world's frame along the axes of bodies. Shapes: (*, 4) and (*, 3)."""
-    return rotate(_signed(attitude, (1.0, -1.0, -1.0, -1.0)), vector)
+    return rotate(inverse(attitude), vector)
 
 
 def _signed(values: Values, signs: tuple[float, ...]) -> Values:

@@ -13,7 +13,7 @@ from drone_rl.flight.airsim.methods.cameras import camera_at, put_camera
 from drone_rl.flight.airsim.methods.registry import method, sim_vehicle_at
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.flight.airsim.vehicle import Vehicle
-from drone_rl.sim.coordinates import body_from_world, geo_from_world
+from drone_rl.sim.coordinates import body_from_world, geo_from_world, inverse
 from drone_rl.sim.image_types import ImageType
 from drone_rl.sim.rendering.appearance import product
 from drone_rl.utils.errors import InputError
@@ -64,8 +64,7 @@ def _found(simulation: Simulation, args: Sequence[Any]) -> Iterator[Map]:
         place = torch.tensor(to_world(pose.position), dtype=torch.float64)
         from_camera = body_from_world(attitude, place - vehicle.place_of(camera))
         if box is not None and float(from_camera.norm()) <= camera.detection_radius:
-            inverse = attitude * attitude.new_tensor((1.0, -1.0, -1.0, -1.0))
-            turn = product(inverse, messages.attitude_to_world(pose.attitude)[0])
+            turn = product(inverse(attitude), messages.attitude_to_world(pose.attitude)[0])
             w, i, j, k = messages.ned_attitude(turn[None])
             x, y, z = messages.ned(from_camera[None])
             relative = messages.Pose((x, y, z), (w, i, j, k))
