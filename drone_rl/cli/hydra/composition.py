@@ -33,8 +33,8 @@ from drone_rl.cli.hydra.mistakes import (
     explain,
     explain_file,
     repeated,
-    whole_numbers,
 )
+from drone_rl.cli.hydra.values import whole_numbers
 from drone_rl.cli.hydra.words import check_words
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config import (

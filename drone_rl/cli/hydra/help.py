@@ -11,7 +11,7 @@ import yaml
 from omegaconf import OmegaConf
 
 from drone_rl.cli.commands import TABLE
-from drone_rl.cli.hydra.mistakes import closest, composed, flattened
+from drone_rl.cli.hydra.names import closest, composed, flattened
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import Settings, kinds_of
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from omegaconf import OmegaConf
 
-from drone_rl.cli.hydra.mistakes import OTHER_NAMES, Command, choices, in_quotes
+from drone_rl.cli.hydra.names import OTHER_NAMES, Command, choices
+from drone_rl.cli.hydra.values import in_quotes
 from drone_rl.utils.errors import InputError
 
 _FLAGS = {"-m", "--multirun", "-h", "--help", "-r", "--run", "--hydra-help", "--resolve"}

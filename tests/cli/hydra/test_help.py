@@ -15,7 +15,7 @@ from drone_rl.cli.hydra.help import (
     read_comments,
     show_help,
 )
-from drone_rl.cli.hydra.mistakes import composed
+from drone_rl.cli.hydra.names import composed
 from drone_rl.cli.main import find_command
 from drone_rl.utils.errors import InputError
 from tests.cli.hydra.conftest import FILES

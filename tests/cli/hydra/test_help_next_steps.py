@@ -8,7 +8,7 @@ import pytest
 from drone_rl.cli.commands import TABLE
 from drone_rl.cli.hydra.composition import register_schemas
 from drone_rl.cli.hydra.help import next_steps
-from drone_rl.cli.hydra.mistakes import composed
+from drone_rl.cli.hydra.names import composed
 from drone_rl.cli.main import find_command
 from drone_rl.utils.settings import conf_dir
 

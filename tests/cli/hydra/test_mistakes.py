@@ -1,4 +1,4 @@
-"""Names that were most likely meant, and values that Hydra and OmegaConf reject."""
+"""Settings that Hydra and OmegaConf reject, choices that do not exist, files of the user."""
 
 import re
 
@@ -7,84 +7,21 @@ import yaml
 from hydra.errors import HydraException
 
 from drone_rl.cli.hydra.mistakes import (
-    OTHER_NAMES,
-    Command,
+    check_choices,
     check_launcher,
-    closest,
-    composed,
     explain,
     explain_file,
     repeated,
-    whole_numbers,
 )
-from drone_rl.cli.main import COMMANDS
+from drone_rl.cli.hydra.names import composed
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import conf_dir
-
-KNOWN = ("seed", "optimizer", "optimizer.lr", "task", "task.num_cubes", "hydra.run.dir", "device")
-
 
 pytestmark = pytest.mark.usefixtures("registered")
 
 
 def said(*overrides, command="train"):
     return str(explain(HydraException("Hydra's words"), command, conf_dir(), overrides))
-
-
-@pytest.mark.parametrize(
-    ("name", "meant"),
-    [
-        ("sed", "seed"),
-        ("SEED", "seed"),
-        ("lr", "optimizer.lr"),
-        ("--learning-rate", "optimizer.lr"),
-        ("optimizer.learning_rate", "optimizer.lr"),
-        ("trainer.lr", "optimizer.lr"),
-        ("optimzer.lr", "optimizer.lr"),
-        ("+num_cubes", "task.num_cubes"),
-        ("num_cubs", "task.num_cubes"),
-        ("env", "task"),
-        ("use_cuda", "device=cuda"),
-        ("learningrat", "optimizer.lr"),
-        ("log-dir", "hydra.run.dir"),
-        ("xyz", None),
-        ("policy", None),
-    ],
-)
-def test_the_name_that_was_meant(name, meant):
-    assert closest(name, KNOWN) == meant
-
-
-def test_names_of_other_projects_lead_to_settings_that_exist():
-    names = {"train": ["objective=ppo"], "evaluate": [], "verdict": [], "explain": []}
-    keys = {k for name, groups in names.items() for k in Command(name, conf_dir(), groups).keys}
-    for candidates in OTHER_NAMES["settings"].values():
-        assert {c.partition("=")[0] for c in candidates} <= keys | {"certificate"}, candidates
-    for meant in OTHER_NAMES["commands"].values():
-        assert meant.split()[0] in COMMANDS
-
-
-@pytest.mark.parametrize(
-    ("override", "number"),
-    [
-        ("trainer.total_frames=1e5", "trainer.total_frames=100000"),
-        ("trainer.total_frames=1.5E+3", "trainer.total_frames=1500"),
-        ("collector.num_envs=1e1,2e1", "collector.num_envs=10,20"),
-        ("network.hidden=[1e2,64]", "network.hidden=[100,64]"),
-        ("network.channels=[1e1, 2e1]", "network.channels=[10, 20]"),
-        ("certificate_flights=1e3", "certificate_flights=1000"),
-        ("certificate=1e3", "certificate=1e3"),
-        ("+policies=[1e3]", "+policies=[1e3]"),
-        ("optimizer.lr=1e-3", "optimizer.lr=1e-3"),
-        ("optimizer.lr=1.5e0", "optimizer.lr=1.5e0"),
-        ("optimizer.lr=1e30", "optimizer.lr=1e30"),
-        ("hydra.run.dir=1e5", "hydra.run.dir=1e5"),
-        ("policy=1e5", "policy=1e5"),
-        ("task=x1e5", "task=x1e5"),
-    ],
-)
-def test_whole_numbers_may_have_an_exponent(override, number):
-    assert whole_numbers(override) == number
 
 
 @pytest.mark.parametrize(
@@ -220,3 +157,32 @@ def test_mistakes_in_a_file_of_the_user_name_the_file(tmp_path, text, message):
 def test_mistakes_elsewhere_are_not_those_of_a_file():
     error = HydraException("In 'train': Could not find 'network/x'")
     assert explain_file(error, "train", conf_dir()) is None
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("task=base_task", r"^task=base_task is unknown; .*: collect_cubes, collect_one, pillars$"),
+        ("task=pillar", r"^task=pillar is unknown; did you mean task=pillars\? give one of: "),
+        ("+task@task=base_pillars", "^task=base_pillars is unknown"),
+        ("task=collect_one,base_task", "task=base_task"),
+        ("task='pillarz'", "task=pillarz"),
+        ("logger=[csv,aim]", "logger=aim is unknown; give one of: csv, mlflow, tensorboard, wandb"),
+        ("sweep=nope", "sweep=nope is unknown; give one of: cubes, high_rate"),
+        ("hydra/launcher=pbs", "hydra/launcher=pbs .*local, ray, slurm"),
+        ("dynamics=null", "^dynamics=null: leave it out, or give one of: computer_vision, "),
+    ],
+)
+def test_schemas_and_unknown_choices_are_refused(override, message):
+    with pytest.raises(InputError, match=message):
+        check_choices(["seed=1", override], conf_dir())
+
+
+def test_all_else_is_accepted():
+    plain = ["task=pillars", "network=mlp,small_cnn", "sweep=seeds", "-m", "seed=1,2"]
+    check_choices(
+        [*plain, "resume=base_x", "task.name=base_x", "--help", "=x", "../x=base_y", "/tmp=x"],
+        conf_dir(),
+    )
+    check_choices(["logger=[csv,tensorboard]", "task='pillars'", "task=choice(a,b)"], conf_dir())
+    check_choices(["sweep=mine", "task=mine", "--config-dir=my"], conf_dir())
