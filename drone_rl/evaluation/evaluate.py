@@ -8,6 +8,7 @@ from typing import Any
 
 from tensordict.nn import TensorDictModuleBase
 
+from drone_rl.config import AppearanceSettings
 from drone_rl.config.commands import EvaluateSettings, HeldOutSettings
 from drone_rl.config.configuration import from_arguments
 from drone_rl.envs import worlds_of
@@ -109,6 +110,10 @@ def evaluate(
     policy: str | Path | BasePolicy | Logits,
     settings: EvaluateSettings | None = None,
     *,
+    task: Mapping[str, Any] | None = None,
+    dynamics: Mapping[str, Any] | None = None,
+    appearance: AppearanceSettings | str | None = None,
+    outputs: str | Path = "outputs",
     progress: Progress | None = None,
     **changes: Any,
 ) -> Evaluation:
@@ -117,6 +122,11 @@ def evaluate(
     Args:
         policy: The policy, an argument of `load_policy`, or a callable, see `policy_from`.
         settings: Number of episodes, seed, device and so on.
+        task: Settings to change of the policy's task.
+        dynamics: Settings to change of its vehicle dynamics.
+        appearance: Appearance of the scenes, or the name of one such as "fog"; by default that of
+            the policy's training.
+        outputs: See `load_policy`.
         progress: Called with the name of each step; a progress bar by default.
         changes: Changed settings, as in `evaluate("good", episodes=200)`.
 
@@ -125,7 +135,7 @@ def evaluate(
     """
     settings, seed = with_seed(from_arguments(EvaluateSettings, settings, changes, evaluate))
     progress = as_progress(progress)
-    policy = as_policy(policy)
+    policy = as_policy(policy, outputs, task=task, dynamics=dynamics, appearance=appearance)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with held_out_environments(policy, settings, seed) as (env, actor):
         state, dynamics = env.base_env.state_dict(), worlds_of(env).dynamics

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from drone_rl.config.configuration import as_changes, from_arguments
+from drone_rl.config.configuration import from_arguments
 from drone_rl.evaluation.plots import images
 from drone_rl.explanations.class_models import (
     NO_GRADIENTS,
@@ -155,8 +155,7 @@ def class_models(
         InputError: The policy or a setting is unusable, or the images diverge.
     """
     settings, seed = with_seed(from_arguments(ClassModelsSettings, settings, changes, class_models))
-    subject = as_policy(policy, outputs=outputs)
-    subject = subject.in_task(**as_changes(task, "task")) if task else subject
+    subject = as_policy(policy, outputs, task=task)
     network = subject.make_network()
     require_memoryless(network, "a class model")
     if not network.is_differentiable:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +13,14 @@ from drone_rl.config import (
     COMPUTER_VISION,
     MOVES_SETTINGS,
     ActionSettings,
+    AppearanceSettings,
     BaseTaskSettings,
     CameraSettings,
     DynamicsSettings,
     TaskSettings,
     settings_of,
 )
-from drone_rl.config.configuration import Changes
+from drone_rl.config.configuration import Changes, as_changes
 from drone_rl.config.transforms import Frame, Gray, Rgb, Standardize, Transform, as_transforms
 from drone_rl.policies import ExternalNetwork
 from drone_rl.policies.environment import make_env
@@ -197,15 +198,28 @@ def _is_sb3_model(which: Any) -> bool:
 
 
 def as_policy(
-    which: str | Path | BasePolicy | Logits, outputs: str | Path = "outputs"
+    which: str | Path | BasePolicy | Logits,
+    outputs: str | Path = "outputs",
+    *,
+    task: Mapping[str, Any] | None = None,
+    dynamics: Mapping[str, Any] | None = None,
+    appearance: AppearanceSettings | str | None = None,
 ) -> BasePolicy:
     """Convert a callable, see `policy_from`, a Stable-Baselines3 model or a file to a policy.
 
-    `outputs` is the folder of the runs, see `load_policy`. A `BasePolicy` is returned unchanged.
+    `outputs` is the folder of the runs, see `load_policy`. `task` and `dynamics` are settings to
+    change of the policy's own, `appearance` replaces that of its scenes.
 
     Raises:
-        InputError: There is no such policy, or it is unusable.
+        InputError: There is no such policy, or it or a setting is unusable.
     """
+    policy = _converted(which, outputs)
+    policy = policy.in_task(**as_changes(task, "task")) if task else policy
+    policy = policy.in_dynamics(**as_changes(dynamics, "dynamics")) if dynamics else policy
+    return policy if appearance is None else policy.in_appearance(appearance)
+
+
+def _converted(which: str | Path | BasePolicy | Logits, outputs: str | Path) -> BasePolicy:
     if isinstance(which, BasePolicy):
         return which
     if _is_sb3_model(which):

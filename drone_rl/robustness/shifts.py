@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from drone_rl.config import MINIMAL, BaseTaskSettings
 from drone_rl.config.commands import ShiftSettings
-from drone_rl.config.configuration import as_changes, from_arguments
+from drone_rl.config.configuration import from_arguments
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.rounding_sensitivity import require_function
 from drone_rl.evaluation.verdict_text import unlike as say_unlike
@@ -123,8 +123,7 @@ def shifts(
     settings, seed = with_seed(from_arguments(ShiftSettings, settings, changes, shifts))
     progress = as_progress(progress)
     check_axes(settings.axes or ())
-    loaded = as_policy(policy, outputs).in_task(**as_changes(task, "task"))
-    loaded = loaded.in_dynamics(**as_changes(dynamics, "dynamics")) if dynamics else loaded
+    loaded = as_policy(policy, outputs, task=task, dynamics=dynamics)
     begin = time.perf_counter()
     require_function(loaded, seed=seed.value, device=settings.device, renderer=settings.renderer)
     subject = make_evaluated_policy(loaded, settings)

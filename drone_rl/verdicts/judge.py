@@ -12,7 +12,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
 from drone_rl.config.commands import HeldOutSettings, JudgeSettings
-from drone_rl.config.configuration import Changes, as_changes, from_arguments
+from drone_rl.config.configuration import Changes, from_arguments
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, make_baseline
 from drone_rl.evaluation.evaluate import held_out_environments
@@ -213,7 +213,8 @@ def judge_one(
     settings = from_arguments(JudgeSettings, settings, changes, judge_one)
     settings, seed = with_seed(settings, drawn_seed)
     progress = as_progress(progress)
-    loaded = None if policy in BASELINES else as_policy(policy, outputs)
+    changed = {"task": task, "dynamics": dynamics, "appearance": appearance}
+    loaded = None if policy in BASELINES else as_policy(policy, outputs, **changed)
     progress("policy and baselines", 0, 1)
     name = str(policy) if loaded is None or isinstance(policy, str | Path) else loaded.name
     if isinstance(loaded, Policy) and policy == "latest":  # which changes with the next run
@@ -223,14 +224,11 @@ def judge_one(
         _refuse_files(name, certificate=certificate, shifts=shifts, require_domain=require_domain)
         if appearance is not None:
             raise InputError(f"policy={name} sees no images; leave appearance out")
-        changed = Changes(TaskSettings).read(task or {}, "task")
+        own = Changes(TaskSettings).read(task or {}, "task")
         moved = DynamicsSettings(**Changes(DynamicsSettings).read(dynamics or {}, "dynamics"))
         moved.check_air()
-        worlds = _baseline(name, TaskSettings(**changed), moved, settings, seed)
+        worlds = _baseline(name, TaskSettings(**own), moved, settings, seed)
     else:
-        loaded = loaded.in_task(**as_changes(task, "task"))
-        loaded = loaded.in_dynamics(**as_changes(dynamics, "dynamics")) if dynamics else loaded
-        loaded = loaded if appearance is None else loaded.in_appearance(appearance)
         measured = find_domain(loaded, shifts, outputs)
         needs = require_domain
         coverage = None if needs is None else compare_with_required(loaded, needs, measured)

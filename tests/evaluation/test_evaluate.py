@@ -7,7 +7,6 @@ import pytest
 import drone_rl
 from drone_rl.config import AppearanceSettings
 from drone_rl.evaluation.evaluate import Evaluation
-from drone_rl.evaluation.verdict_text import unlike
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.progress import silent
@@ -26,7 +25,7 @@ def test_an_evaluation_in_python(good):
     def note(text, done=0, total=0):
         said.append((text, done, total))
 
-    done = drone_rl.evaluate(good.in_task(num_cubes=2), episodes=6, num_envs=4, progress=note)
+    done = drone_rl.evaluate(good, task={"num_cubes": 2}, episodes=6, num_envs=4, progress=note)
     assert set(done.figures) == {
         "greedy",
         "sampled",
@@ -89,10 +88,10 @@ def test_in_another_appearance_it_is_said_so(good):
     assert said in str(done) and said in done.as_dict()["sentence"]
     assert done.as_dict()["unlike"] == {"appearance.shadows": {"own": 0.0, "flown": 1.0}}
     two = {"episodes": 2, "num_envs": 2, "baselines": False, "progress": silent}
-    found = drone_rl.evaluate(good.in_appearance(fog), **two)
+    found = drone_rl.evaluate(good, appearance=fog, **two)
     assert said in str(found) and "appearance.shadows" in found.as_dict()["unlike"]
-    both = good.in_appearance(fog).in_dynamics(mode="simple_flight")
-    assert "with other dynamics and another appearance: " in unlike({"unlike": both.unlike})
+    found = drone_rl.evaluate(good, appearance=fog, dynamics={"mode": "simple_flight"}, **two)
+    assert "with other dynamics and another appearance: " in str(found)
     with pytest.raises(InputError, match="policy=forward sees no images"):
         drone_rl.judge("forward", appearance=fog, **few)
 
