@@ -196,12 +196,14 @@ class ExportCommand(CommandSettings, HeldOutSettings):
         target = folder / f"{self.name}.{self.format}"
         if self.format == "onnx":
             seed = root_seed(self.seed)
+            _log.info("compares the model with PyTorch in the policy's episodes")
             found = export_onnx(policy, target, command=self.command, seed=seed.value)
             difference = f"{found.difference:.1e} in {found.frames:,} images"
             _log.info("written: %s, which differs from PyTorch by at most %s", target, difference)
         else:
             names = ("command", "certificate", "shifts")
             given = {name: getattr(self, name) for name in names}
+            _log.info("judges the policy in %s episodes for the model card", f"{self.episodes:,}")
             seed = export(policy, target, self, **given, outputs=self.paths.outputs)
             _log.info("written: %s and %s", target, target.with_suffix(".md").name)
         _log.info("%s", seed_line(seed.as_dict()))

@@ -24,7 +24,7 @@ _SPEEDS, _BARS = (172, 30), 140
 """Position of the speeds, and width of their bars, pixels."""
 _MOTORS = (330, 30)
 _STILL = 0.05
-"""Motion backward, right or down up to this speed, m/s, is labelled forward, left or up."""
+"""Motion backward, right or down up to this speed, m/s, is labelled forward, left or climbs."""
 _WORDS = (("forward", "backward"), ("left", "right"), ("climbs", "sinks"))
 _PLACES = {"front left": 2, "front right": 0, "rear left": 1, "rear right": 3}
 """Index of each rotor in `FlightState.rotors`."""

@@ -46,7 +46,6 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import MUTED, PAPER
 from drone_rl.utils.seeding import legacy_seed
 
-"""Signs of a quaternion's inverse."""
 _log = logging.getLogger(__name__)
 WIDTH, HEIGHT = 1280, 720
 CHASE_HEIGHT, STRIP_HEIGHT, GAP = 532, 144, 5

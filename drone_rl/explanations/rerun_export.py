@@ -304,7 +304,7 @@ class EpisodeLog:
         return self._rr.Boxes3D(class_ids=[kind.value], **sizes, **style)
 
     def _log_camera(self, position: Tensor, attitude: Tensor, mounting: Mounting | None) -> None:
-        """Log the pose of the policy's camera, and how it projects. Of the drone: (3,), (4,)."""
+        """Log pose and projection of the policy's camera, from the drone's pose: (3,), (4,)."""
         view, model = self._worlds.policy_view, self._worlds.scene.model
         number = self._worlds.scene.camera(view.cameras[0])
         place, turn = (torch.tensor(values[number]) for values in (model.cam_pos, model.cam_quat))

@@ -252,7 +252,7 @@ class Regrouped(ImageNetwork):
 
     @property
     def parts(self) -> nn.Module:
-        """Those of the network."""
+        """Parts of the wrapped network."""
         return self.network.parts
 
     def forward(self, pixels: Tensor) -> Tensor:

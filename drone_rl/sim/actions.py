@@ -36,7 +36,8 @@ class Actions(abc.ABC):
     """A set of actions and its numbered parts; probabilities are a tensor or a NumPy array.
 
     An *action* is what dynamics take, shaped as `entry` says; a *part* is a number, int64. Raises a
-    `ValueError` if a mirror image or opposite is not among the parts, or not mutual.
+    `ValueError` if mirror images or opposites are not mutual, or `order`, `arrows`, `colors` or
+    `left` do not fit.
     """
 
     names: tuple[str, ...]

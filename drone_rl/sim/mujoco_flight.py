@@ -36,7 +36,7 @@ _CALM = 0.5
 
 
 class MujocoFlight:
-    """Flies one drone of a dm_control model, whose geoms and timestep it prepares."""
+    """Flies one drone of a dm_control model, whose geoms it prepares; see also `timesteps`."""
 
     def __init__(
         self,

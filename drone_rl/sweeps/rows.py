@@ -42,8 +42,8 @@ class Row:
     result: dict[str, Any] = dataclasses.field(default_factory=dict)
     """`result.json`."""
     curve: tuple[Array, Array] = (np.empty(0), np.empty(0))
-    """Learning curve: frames, and running mean as a fraction of the greatest reward; empty if the
-    run failed, which counts as having learned nothing. Shape: (num_updates,) each."""
+    """Learning curve: frames, and running mean as a fraction of the greatest reward; empty unless
+    the run finished. A failed run counts as having learned nothing. Shape: (num_updates,) each."""
     frames: float = 0.0
     """Frames until it ended or failed."""
     seconds: float = 0.0
@@ -92,9 +92,11 @@ class Row:
     def share(self, of: str) -> float | None:
         """Return the fraction of goals that the greedy policy reaches: cubes, or rows of pillars.
 
-        `of` is "all", "left", "ahead" or "right". None without a verdict, or without such goals.
+        `of` is "all", "left", "ahead" or "right". None without a verdict, or without such goals, as
+        in a task with other strata.
         """
-        return None if self.verdict is None else self.verdict["greedy"]["shares"][of]["mean"]
+        shares = {} if self.verdict is None else self.verdict["greedy"]["shares"]
+        return shares[of]["mean"] if of in shares else None
 
     def plain(self) -> dict[str, Any]:
         """Return the row as plain values."""

@@ -117,10 +117,10 @@ SENTENCES = (
     ),
     _if_any(
         "runs.few",
-        f"a setting has some ended runs, but fewer than {MIN_RUNS}",
+        f"a setting has some readable ended runs, but fewer than {MIN_RUNS}",
         "few",
-        f"{{n}} of {{settings}} settings with fewer than {MIN_RUNS} ended runs: their medians have "
-        "no valid interval, so that none is shown.",
+        f"{{n}} of {{settings}} settings with fewer than {MIN_RUNS} readable ended runs: their "
+        "medians have no valid interval, so that none is shown.",
     ),
     _if_any(
         "runs.censored",
@@ -205,16 +205,16 @@ SENTENCES = (
     ),
     _if_any(
         "curves.band",
-        f"a setting with {MIN_RUNS} ended runs or more",
+        f"a setting with {MIN_RUNS} readable ended runs or more",
         lambda e: any(readable(group) >= MIN_RUNS for group in e["groups"]),
         "Thick line: the median over runs; band: its exact pointwise 95% interval by order "
         "statistics.",
     ),
     _if_any(
         "curves.runs",
-        f"a setting with fewer than {MIN_RUNS} ended runs",
+        f"a setting with fewer than {MIN_RUNS} readable ended runs",
         "few",
-        f"Thin lines: single runs, where fewer than {MIN_RUNS} have ended.",
+        f"Thin lines: single runs, where fewer than {MIN_RUNS} have ended with readable files.",
     ),
     _if_any(
         "curves.ends",

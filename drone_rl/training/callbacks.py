@@ -94,7 +94,7 @@ class CheckpointCallback(Callback):
         self._saved_at = time.monotonic()
 
     def on_start(self, training: OngoingTraining) -> None:
-        """Create the folder before the first update; delete half-written checkpoints."""
+        """Create the folder, delete half-written checkpoints, and save if there is no last one."""
         make_folder(self.folder)
         remove_leftovers(self.folder, self.last_path.name, self.best_path.name)
         if not self.last_path.exists():

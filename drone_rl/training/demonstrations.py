@@ -286,7 +286,7 @@ def add_demonstration(folder: str | Path, demonstration: Demonstration) -> Path:
     The files are numbered from flight_00000.npz. Several processes may write to the folder.
 
     Raises:
-        InputError: It is no demonstration.
+        InputError: It is no demonstration, or the folder can't be made or stays locked.
         OSError: The file can't be written.
     """
     if not isinstance(demonstration, Demonstration):
@@ -328,6 +328,7 @@ def record_oracle(
 
     Raises:
         InputError: A setting is unusable, or the task has no oracle, or none for these actions.
+        OSError: A file can't be written.
     """
     settings = from_arguments(TrainSettings, settings, changes, record_oracle)
     folder = as_path(folder, "folder")

@@ -102,8 +102,8 @@ class RunFolder:
         """Return the folder and, to resume, the state of its newest checkpoint.
 
         Raises:
-            InputError: The folder holds a finished run that would be lost, or has no checkpoint to
-                resume from, or an argument has the wrong type.
+            InputError: The folder holds a run that would be lost, or has no checkpoint to resume
+                from, or an argument has the wrong type.
         """
         if not isinstance(resume, bool):
             raise InputError(
@@ -117,9 +117,11 @@ class RunFolder:
             )
         if resume:
             return cls(folder), read_checkpoint(last_of(folder))
-        if (folder / "result.json").exists():
+        is_finished = (folder / "result.json").exists()
+        if is_finished or last_of(folder).exists():
+            kind = "a finished" if is_finished else "an unfinished"
             raise InputError(
-                f"folder={folder} holds a finished run, which a new one would replace; resume it "
+                f"folder={folder} holds {kind} run, which a new one would replace; resume it "
                 "(in Python resume=True, else resume=FOLDER), delete it or give another folder"
             )
         return cls(folder), None

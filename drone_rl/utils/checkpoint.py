@@ -56,22 +56,20 @@ _INSTRUCTIONS = {
 
 
 _ZIP = b"PK"
+"""First bytes of a checkpoint, which is a ZIP archive."""
 _FORMATS = {
     b"version https://git-lfs": "a Git LFS pointer; replace it by the file with git lfs pull",
     rb".{8}\{": "a safetensors file; name it NAME.safetensors",
     _ZIP: "an archive, as checkpoints are; name it NAME.pt",
     rb"\x08.[\x12\x1a:B]": "an ONNX model; give the policy's .pt or .safetensors file",
 }
-"""What begins so is no file of the name that it has, but this; with a remedy."""
+"""What a misnamed file is, with a remedy, by a pattern of its first bytes."""
 
 
 def other_format(content: bytes) -> str | None:
     """Return what a file with this content is, with a remedy; None if that is not known."""
     found = (text for start, text in _FORMATS.items() if re.match(start, content, re.DOTALL))
     return next(found, None)
-
-
-"""First bytes of a checkpoint."""
 
 
 class DamagedError(ValueError):
@@ -226,8 +224,8 @@ def save_checkpoint(path: str | Path, state: Mapping[str, Any]) -> None:
         reason = _reason(error)
         before = "the previous checkpoint is intact" if path.is_file() else "there is none yet"
         raise InputError(
-            f"checkpoint {path} could not be written ({reason}); free some space or choose "
-            f"another folder with hydra.run.dir=...; {before}"
+            f"checkpoint {path} could not be written ({reason}); free some space or choose another "
+            f"folder (in Python folder=..., else hydra.run.dir=...); {before}"
         ) from error
 
 
@@ -242,7 +240,7 @@ def _reason(error: BaseException) -> str:
 
 
 def _refuse(content: bytes, path: Path) -> None:
-    """Raise an `InputError` for a file that is no archive, unless its name is a checkpoint's."""
+    """Raise an `InputError` for a file of another known format, or whose suffix is not .pt."""
     if other := other_format(content):
         raise InputError(f"{path} is {other}")
     if path.suffix != ".pt":

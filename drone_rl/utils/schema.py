@@ -102,6 +102,7 @@ class Flag:
 
     def read(self, value: Any, where: str) -> bool:
         """See `Kind`."""
+        value = _unboxed(value)
         if type(value) is not bool:
             raise InputError(f"{where}={shown(value)} is neither true nor false; give one of them")
         return value
@@ -340,12 +341,19 @@ def as_mapping(value: Any, where: str) -> Mapping[str, Any]:
 
 def shown(value: Any) -> str:
     """Return a value for a message: short, on one line."""
+    value = _unboxed(value)
     if value is not None and not isinstance(value, str | int | float):
         return f"({type(value).__name__})"
     if isinstance(value, int) and value.bit_length() > _MOST_BITS:  # Python refuses to write it
         return f"(a number of {value.bit_length()} bits)"
     text = repr(value[:80] if isinstance(value, str) else value)
     return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def _unboxed(value: Any) -> Any:
+    """Return the Python value of a number or truth value of NumPy, and anything else unchanged."""
+    is_scalar = type(value).__module__ == "numpy" and getattr(value, "shape", None) == ()
+    return value.item() if is_scalar else value
 
 
 def _is_number(value: Any, kind: type) -> bool:

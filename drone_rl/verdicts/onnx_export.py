@@ -15,7 +15,7 @@ from drone_rl.envs import worlds_of
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import make_onnx, open_onnx
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import as_path, write_atomically
+from drone_rl.utils.files import as_path, make_folder, write_atomically
 from drone_rl.utils.seeding import root_seed
 from drone_rl.verdicts.export import origin_of
 
@@ -93,6 +93,7 @@ def export_onnx(
     target = as_path(target, "target")
     if target.is_dir():
         raise InputError(f"target={target} is a folder; give a file in it, such as policy.onnx")
+    make_folder(target.parent)
     policy = policy if isinstance(policy, Policy) else load_policy(policy)
     metadata = {"command": command or origin_of(policy.path, policy.state)[0]}
     content = make_onnx(policy.description, policy.make_network(), metadata)

@@ -212,7 +212,7 @@ def train_until_proved(
         changes: Changes to the settings of the training run.
 
     Raises:
-        InputError: A setting is unusable, the folder holds a finished run, proofs do not support
+        InputError: A setting is unusable, the folder holds another run, proofs do not support
             the policy, or training diverged.
         KeyboardInterrupt: Ctrl-C stopped it, see `train`; a search for failures ends at once. On
             resume its episodes are repeated, and its proof continues from its last saved state.

@@ -206,15 +206,13 @@ def load_proof(path: str | Path) -> Proof:
     """
     path = as_path(path, "path")
     path = path / "certificate.json" if path.is_dir() else path
+    content = read_bytes(path, CERTIFICATE_BYTES)
     try:
-        content = read_bytes(path, CERTIFICATE_BYTES)
         found = parse_json(content, "it", most_values=CERTIFICATE_VALUES)
         if not isinstance(found, dict) or found.get("format") != FORMAT:
             raise InputError(f"its format is not {FORMAT!r}")
         if missing := {"policy", "outcomes", "undecided"} - found.keys():
             raise InputError(f"it has no {', '.join(sorted(missing))}")
         return Proof(found, path.parent)
-    except (OSError, InputError) as error:
-        raise InputError(
-            f"certificate={path} can't be read ({error}); give a certificate"
-        ) from None
+    except InputError as error:
+        raise InputError(f"{path} is no certificate ({error}); give another file") from None

@@ -52,8 +52,11 @@ def make_verdict():
     return _verdict
 
 
-def _verdict(kind="good", left=1.0, ahead=1.0, right=1.0, *, whole=1.0, certain=True, **others):
-    shares = {"all": whole, "left": left, "ahead": ahead, "right": right}
+def _verdict(
+    kind="good", left=1.0, ahead=1.0, right=1.0, *, whole=1.0, certain=True, strata=None, **others
+):
+    shares = {"left": left, "ahead": ahead, "right": right}
+    shares = {"all": whole, **(dict.fromkeys(strata, 1.0) if strata else shares)}
     greedy = _flights(shares, success=round(EPISODES * (whole or 0)))
     blind = {name: _flights(dict.fromkeys(shares, 0.0), success=0) for name in BLIND_BASELINES}
     if kind == "poor":  # nearly as many cubes as blind, which gets as many as the policy
@@ -93,7 +96,8 @@ def _constant_bounds(count, value, *others):
 
 def _quantities(evidence):
     """The rule's quantities of evaluations whose episodes are all alike."""
-    rule, found = Rule(), {}
+    strata = tuple(name for name in evidence["greedy"]["shares"] if name != "all")
+    rule, found = Rule(strata=strata), {}
     for name, thresholds in zip(rule.quantities, rule.thresholds, strict=True):
         value, (low, high), count = _expected(evidence, name, rule)
         if name.startswith("offered "):

@@ -45,6 +45,15 @@ def test_no_cubes_on_a_side_is_no_share_of_zero(sweep, make_verdict):
     assert read_rows(sweep)[3].plain()["left"] is None  # not judged at all
 
 
+@pytest.mark.parametrize("strata", [("anywhere",), ("left", "right")])
+def test_runs_of_a_task_with_other_strata_are_not_damaged(sweep, make_verdict, strata):
+    rewrite(sweep, 0, verdict=make_verdict(strata=strata))
+    row = read_rows(sweep)[0]
+    assert (row.state, row.share("all"), row.share("ahead")) == ("finished", 1.0, None)
+    assert row.lean == (0.0 if "left" in strata else None)
+    assert row.plain()["ahead"] == "not offered"
+
+
 @pytest.mark.parametrize(
     "older",
     [{"verdict": None, "evaluation": {"mean_cubes": 3.0}}, {"verdict": {"rule": "of yore"}}],

@@ -42,6 +42,16 @@ def test_new_run_writes_its_description(tmp_path):
     assert new_folder().parent.name == "runs"
 
 
+@pytest.mark.parametrize(
+    ("file", "kind"), [("result.json", "a finished"), ("checkpoints/last.pt", "an unfinished")]
+)
+def test_a_run_is_not_replaced(tmp_path, file, kind):
+    (tmp_path / "checkpoints").mkdir()
+    (tmp_path / file).touch()
+    with pytest.raises(InputError, match=f"holds {kind} run, which a new one would replace; res"):
+        RunFolder.open(tmp_path, resume=False)
+
+
 def test_changed_settings_prevent_resuming(tmp_path):
     state = {"config": as_config(TrainSettings(seed=1))}
     with pytest.raises(InputError, match="seed=0: the run was started with seed=1"):

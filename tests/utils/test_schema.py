@@ -185,8 +185,16 @@ def test_numbers_of_numpy_are_numbers():
     assert found == (3, 0.5) and [type(f) for f in found] == [int, float]
     with pytest.raises(InputError, match="x=True is out of range"):
         Whole(0, 9).read(True, "x")
-    with pytest.raises(InputError, match="is out of range"):
+    with pytest.raises(InputError, match=r"x=3\.0 is out of range"):
         Whole(0, 9).read(np.float64(3.0), "x")
+    with pytest.raises(InputError, match="x=10 is out of range"):
+        Whole(0, 9).read(np.int64(10), "x")
+
+
+def test_truth_values_of_numpy_are_truth_values():
+    assert Flag().read(np.bool_(True), "x") is True
+    with pytest.raises(InputError, match="x=1 is neither true nor false"):
+        Flag().read(np.int64(1), "x")
 
 
 def test_paths_and_devices_are_their_text():

@@ -79,7 +79,7 @@ def test_a_file_that_is_no_certificate_is_refused(tmp_path, content):
 )
 def test_a_damaged_certificate_is_refused(tmp_path, content, reason):
     (tmp_path / "certificate.json").write_text(content)
-    with pytest.raises(InputError, match=rf"can't be read \(.*{reason}.*give a certificate"):
+    with pytest.raises(InputError, match=reason):
         drone_rl.load_proof(tmp_path)
 
 

@@ -22,7 +22,7 @@ _SHIPPED = Path(drone_rl.__file__).parent / "policies" / "zoo"
 
 
 def translate_former(overrides: Sequence[str]) -> list[str]:
-    """Translate former setting names: `policy=mlp` to `network=mlp`, and `FORMER_NAMES`."""
+    """Translate former names: `policy=mlp` to `network=mlp`, `FORMER_NAMES`, `FORMER_CHOICES`."""
     named = [*map(with_current_name, overrides)]
     shipped = {path.stem for path in _SHIPPED.glob("*.safetensors")}
     for value in (o.removeprefix("policy=") for o in named if o.startswith("policy=")):
@@ -56,7 +56,8 @@ def complete(overrides: Sequence[str]) -> list[str]:
     """Add the folder of a sweep, or the folder and settings of a resumed run, to a command line.
 
     Raises:
-        InputError: `resume=FOLDER` has no checkpoint, or a setting that may not come from a file.
+        InputError: There is no run to resume, `policy=` names a policy, or the run has a setting
+            that may not come from a file.
     """
     typed = translate_former(overrides)
     if is_sweep(typed):

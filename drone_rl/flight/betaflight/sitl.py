@@ -105,7 +105,7 @@ class Betaflight:
 
         The folder of its settings and log is created if missing; a firmware without settings is set
         up. After `patience` seconds of silence it counts as dead; while it starts it is started
-        again after half of that, up to `STARTS` times. After `answer_within` seconds without an
+        again after half of that, `STARTS` starts in all. After `answer_within` seconds without an
         answer to one state the rotors keep their commands. See `FirmwareProcess` for `isolated`.
         """
         self.program = list(program)

@@ -41,7 +41,8 @@ _MODES = ("simple_flight", "computer_vision")
 _IDLE = 0.1
 """Thrust of idle rotors as a fraction of the hover thrust."""
 _LEAST_THRUST = 0.1
-"""Mean thrust fraction above which a drone that moves vertically is flying."""
+"""Mean thrust fraction above which a drone that moves vertically is flying; half the hover thrust
+if that is less, as with strong rotors."""
 _CLIMBS = 0.01
 """Vertical speed that counts as moving, m/s."""
 _AT_REST = 0.08
@@ -263,10 +264,6 @@ class Drone:
     def _is_lost(self) -> bool:
         return bool(self.body.numbers.numpy()[0, fs.LOST])  # faster than an index of a tensor
 
-    @property
-    def _speed(self) -> float:
-        return float(self.body.velocity.norm())
-
     def _require_dynamics(self, name: str) -> None:
         if not self.has_api_control:
             raise PilotError(f"{name}: API control is off; call enable_api_control() first")
@@ -354,13 +351,14 @@ class Drone:
     def _update_landed(self) -> None:
         """Detect take-off and landing."""
         row = self.body.numbers.numpy()[0].tolist()
-        pushes = sum(row[fs.ROTORS : fs.ROTORS + 4]) / 4 > _LEAST_THRUST
+        least = min(_LEAST_THRUST, 0.5 * self.settings.hover_throttle)
+        pushes = sum(row[fs.ROTORS : fs.ROTORS + 4]) / 4 > least
         if not self._is_flying:
             if pushes and abs(row[fs.VELOCITY + 2]) > _CLIMBS:
                 self._landed = LandedState.FLYING
             return
-        is_recent = row[fs.TIME] > self.time - 2.5 * self.settings.tick
-        if pushes or row[fs.THING] == fs.NOTHING or not is_recent:
+        last = self.time - 2.5 * self.settings.tick
+        if pushes or row[fs.THING] == fs.NOTHING or row[fs.TIME] <= last:
             return
         turns = math.hypot(*row[fs.RATES : fs.ROTORS])
         if max(math.hypot(*row[fs.VELOCITY : fs.RATES]), turns) < _AT_REST:

@@ -98,10 +98,10 @@ class Pilot(SceneDrone):
     def take_off(self, timeout: float | None = None, *, wait: bool = True) -> bool | FlightFuture:
         """Climb 2 m at 0.5 m/s."""
         self._require_armed("take_off")
-        if self._speed > MOVING:
+        speed = float(self.body.velocity.norm())
+        if speed > MOVING:
             raise PilotError(
-                f"can't take off while moving at {self._speed:.2g} m/s; wait until the drone "
-                "stands still"
+                f"can't take off while moving at {speed:.2g} m/s; wait until the drone stands still"
             )
         limit = checks.time_limit(timeout, TAKEOFF_HEIGHT, TAKEOFF_SPEED)
         return self._start("take_off", TakeoffCommand(self.body, limit), wait)

@@ -97,8 +97,8 @@ def sticks_for(
 ) -> tuple[RcSticks, float]:
     """Velocity and heading loops: return the sticks that track a setpoint, armed.
 
-    Also return the new integral of the climb controller, a fraction of half the thrust, from the
-    one some seconds before.
+    Also return the new integral of the climb controller, a fraction of half the thrust; `integral`
+    is the one `seconds` before.
     """
     missing = np.array(setpoint.velocity) - readings.velocity
     cosine, sine = math.cos(readings.heading), math.sin(readings.heading)

@@ -46,7 +46,7 @@ class Readings:
 
     @property
     def altitude(self) -> float:
-        """Metres above the sea."""
+        """Metres above the ellipsoid, which counts as sea level."""
         return self.home.altitude + float(self.position[2])
 
     @property
@@ -64,8 +64,8 @@ class Readings:
 def measure(before: BodyState, after: BodyState, seconds: float, time: float) -> Readings:
     """Measure the motion of the first drone between two states, at its end.
 
-    Rates and forces are averages over the interval of so many seconds, from attitudes and
-    velocities, so that they include collisions. `time` is that of the end.
+    Rates and forces are averages over the interval of `seconds`, from attitudes and velocities, so
+    that they include collisions. `time` is that of the end.
     """
     position, velocity, attitude = map(first_row, (after.position, after.velocity, after.attitude))
     acceleration = (velocity - first_row(before.velocity)) / seconds

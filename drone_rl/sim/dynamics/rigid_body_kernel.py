@@ -173,8 +173,8 @@ def _turned_by(attitude: wp.vec4, angle: wp.vec3) -> wp.vec4:
     new_x = w * a + x * c + y * d - z * b
     new_y = w * b - x * d + y * c + z * a
     new_z = w * d + x * b - y * a + z * c
-    length = new_w * new_w + new_x * new_x + new_y * new_y + new_z * new_z
-    norm = 1.5 - 0.5 * length
+    square_length = new_w * new_w + new_x * new_x + new_y * new_y + new_z * new_z
+    norm = 1.5 - 0.5 * square_length
     return wp.vec4(norm * new_w, norm * new_x, norm * new_y, norm * new_z)
 
 
@@ -262,7 +262,7 @@ def _bounced(frame: Airframe, velocity: wp.vec3, normal: wp.vec3) -> wp.vec3:
 
 @wp.func
 def pushed_out(frame: Airframe, motion: Motion, overlap: Overlap) -> Motion:
-    """Return the motion of a drone that no longer overlaps a thing."""
+    """Return the motion of a drone that no longer overlaps an object."""
     after = motion
     after.position = motion.position + overlap.depth * overlap.normal
     after.velocity = _bounced(frame, motion.velocity, overlap.normal)

@@ -15,8 +15,8 @@ from drone_rl.sim.dynamics.state import NUMBERS, FlightState, Obstacles
 class SingleQuadrotor(Quadrotor):
     """A `Quadrotor` for one drone on the CPU, with the same states, bit for bit.
 
-    To prepare a launch takes several times as long as the few ticks of a control period. Only one
-    thread may use it at a time.
+    A launch is prepared once: to prepare it takes several times as long as the few ticks of a
+    control period. Only one thread may use it at a time.
     """
 
     def __init__(self, settings: DynamicsSettings, actions: ActionSettings | None = None) -> None:

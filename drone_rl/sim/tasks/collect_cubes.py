@@ -79,7 +79,7 @@ class CollectCubes(PropTask[WorldState]):
     expected_end = EndReason.FRONT_BOUNDARY
     observed = ("cubes", "collected", "side", "end_reason")
     props = "cubes"
-    scored = ("collected", "side", "lateral", "cube_positions", "drone")
+    scored = ("collected", "side", "lateral", "cube_positions")
     remembered = types.MappingProxyType(
         {
             "cubes": "positions of the cubes, metres, in order of x (T, C, 3)",
@@ -100,7 +100,7 @@ class CollectCubes(PropTask[WorldState]):
 
     @property
     def entries(self) -> Mapping[str, Entry]:
-        """Algorithm 3's info: "cubes" is the number collected; see `State` for the others."""
+        """Algorithm 3's info: "cubes" is the number collected; see `WorldState` for the others."""
         cubes = self.settings.num_cubes
         return {
             "cubes": Entry((1,), torch.int64, 0, cubes),

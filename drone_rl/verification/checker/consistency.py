@@ -147,7 +147,7 @@ def _impossible(outcome: Outcome, step_limit: int) -> Iterator[str]:
     if (outcome.end == EndReason.ALL_CUBES) != all(outcome.collected):
         yield "can't be: a flight ends with all_cubes if and only if all are collected"
     if outcome.loops and outcome.end != EndReason.STEP_LIMIT:
-        yield "can't be: going to and fro ends at the step limit"
+        yield "can't be: an oscillation ends at the step limit"
     if any(steps > step_limit for steps in outcome.steps):
         yield f"has more steps than step_limit={step_limit}"
     if outcome.end == EndReason.STEP_LIMIT and {*outcome.steps} - {step_limit}:

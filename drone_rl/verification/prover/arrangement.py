@@ -163,7 +163,7 @@ def arrange(pieces: Pieces, window: Window, most_cells: int) -> Arrangement:
     Collinear segments must not overlap; each must connect, perhaps indirectly, to a window side.
 
     Raises:
-        InputError: There are more cells than `most_cells`.
+        InputError: Segments meet more than 2 * `most_cells` times, which bounds the cells.
     """
     pieces = pieces.framed(window)
     points, piece = _meetings(pieces, most_cells)
@@ -220,7 +220,7 @@ def _meetings(pieces: Pieces, most: int) -> tuple[NDArray, NDArray]:
     if total > 2 * most:
         raise InputError(
             f"the images of one cube have more than {most} cells (most_cells); give a smaller "
-            "window (farthest, sideways) or raise it"
+            "window (farthest, sideways) or raise most_cells"
         )
     return np.stack([np.concatenate(xs), np.concatenate(ys)], -1), np.concatenate(ons)
 

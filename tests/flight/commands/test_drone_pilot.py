@@ -47,6 +47,15 @@ def test_what_can_be_no_drone(given, told):
         Pilot(**given)
 
 
+def test_a_drone_with_strong_rotors_counts_as_flying():
+    pilot = Pilot(mass=0.1)  # hovers at 6% of the thrust
+    pilot.arm()
+    assert pilot.take_off()
+    assert pilot.state.landed == "flying"
+    assert pilot.move_to(2, 0, 3, speed=2)
+    assert pilot.land() and pilot.state.landed == "landed"
+
+
 def test_what_does_not_go_together(quadrotor):
     with pytest.raises(InputError, match="mass and a Quadrotor are given"):
         Pilot(quadrotor, mass=1.1)

@@ -57,7 +57,7 @@ def test_what_is_missing_of_the_steps(parsed, two_halves):
         ({"share": 0.6}, "has a share of 0.6, but boxes of 0.637"),
         ({"end": "side_boundary"}, "if and only if all are collected"),
         ({"collected": [False]}, "if and only if all are collected"),
-        ({"loops": True}, "going to and fro ends at the step limit"),
+        ({"loops": True}, "an oscillation ends at the step limit"),
         ({"steps": {"301": 0.1}}, "has more steps than step_limit=300"),
         ({"steps": {"14": 0.5, "15": 0.5}}, "has a share of 0.637"),
         (

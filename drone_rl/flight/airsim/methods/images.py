@@ -64,6 +64,7 @@ def _image_type(value: Any) -> tuple[ImageType, bool]:
         return ImageType.SEGMENTATION, True
     if found > ImageType.SURFACE_NORMALS:
         names = ", ".join(f"{kind.value} ({kind.name.lower()})" for kind in ImageType)
+        names = f"{names}, {_INFRARED} (infrared)"
         raise InputError(f"image_type={found} is not supported; give one of: {names}")
     return ImageType(found), False
 

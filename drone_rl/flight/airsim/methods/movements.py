@@ -60,7 +60,7 @@ def _move_velocity(
     third = "z" if has_height else "vz"
     vx, vy, vz, seconds = _numbers(args, "vx", "vy", third, "duration")
     if seconds <= 0.0:
-        return not has_height
+        return not has_height  # as AirSim answers
     drivetrain, yaw = read_yaw_mode(argument(args, 5, _HELD), argument(args, 4, 0))
     vehicle = vehicle_at(simulation, args, 6)
     future = vehicle.move_velocity(
