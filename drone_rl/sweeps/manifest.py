@@ -81,7 +81,8 @@ class Run:
     def repeat_command(self) -> str:
         """Return the shell command that repeats this training run."""
         settings = [o for o in self.overrides if not o.startswith("trial=")]
-        return shlex.join(["drone-rl", "train", *settings, "hydra.mode=RUN"])
+        alone = ["hydra.mode=RUN"] if is_sweep(settings) else []  # a file of conf/sweep is chosen
+        return shlex.join(["drone-rl", "train", *settings, *alone])
 
 
 def read_result(folder: Path) -> dict[str, Any] | None:

@@ -37,9 +37,7 @@ def test_it_names_the_commands_to_report_and_to_judge(sweep, monkeypatch):
     name = sweep.folder.name
     assert found["best"]["report_command"] == f"drone-rl verdict policy={name}/0"
     assert found["judge_command"] == f"drone-rl sweep-report folder={name} judge=true"
-    assert found["best"]["command"] == (
-        "drone-rl train optimizer.lr=1e-3 seed=0 logger=csv hydra.mode=RUN"
-    )
+    assert found["best"]["command"] == "drone-rl train optimizer.lr=1e-3 seed=0 logger=csv"
 
 
 def test_all_is_counted(sweep):
