@@ -145,7 +145,8 @@ class ShiftsCommand(RolloutCommandSettings, ShiftSettings):
         """Measure robustness; return the exit status and the mean area under the success curves."""
         chosen, given = self.as_base(ShiftSettings), self.shared()
         done = drone_rl.shifts(self.policy, chosen, dynamics=self.dynamics, **given, progress=log)
-        finish(done, folder, "shifts.json, shifts.png and strips.png")
+        ranges = "" if done.numbers["domain"] is None else "domain.yaml, "
+        finish(done, folder, f"shifts.json, {ranges}shifts.png and strips.png")
         return 0, done.area
 
 

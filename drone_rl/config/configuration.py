@@ -264,10 +264,12 @@ class Changes:
         given = as_mapping(value, where)
         own = getattr(self.of, "name", None)
         if own and "name" in given and "name" not in self.types:
-            raise InputError(
-                f"{where}.name={shown(given['name'])} would replace the task, which is {own}; give "
-                "values of that task's settings"
-            )
+            if given["name"] != own:
+                raise InputError(
+                    f"{where}.name={shown(given['name'])} would replace the task, which is {own}; "
+                    "give values of that task's settings"
+                )
+            given = {name: v for name, v in given.items() if name != "name"}
         for name in given:
             if name not in self.types:
                 known, meant = ", ".join(self.types), did_you_mean(name, self.types)

@@ -41,7 +41,7 @@ class SuccessScaled(_Discounted, target="success_scaled"):
     """Discounted return scaled by exp(reward - max_reward) (variant 3)."""
 
     max_reward: Annotated[float, Real(0.0, 1e6)] = 3.0
-    """Reward of a perfect episode: the task's `largest_reward`."""
+    """Reward of a perfect episode; give the task's `largest_reward`, such as 1 for pillars."""
 
 
 class TimeBaseline(_Discounted, target="time_baseline"):
@@ -51,7 +51,7 @@ class TimeBaseline(_Discounted, target="time_baseline"):
     decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.9
     """Weight of the old mean at each batch, 0 to below 1."""
     max_steps: Annotated[int, Whole(1, 100_000, "steps")] = 300
-    """Time steps that have a mean of their own: the task's limit."""
+    """Time steps that have a mean of their own; later ones have 0. Give the task's step limit."""
 
 
 class LeaveOneOut(_Discounted, target="leave_one_out"):

@@ -147,7 +147,7 @@ def own_place(part: Variant) -> str:
 
 
 def modules_of(settings: Any) -> set[str]:
-    """Return the modules that register the user's parts among settings.
+    """Return the modules that define the user's parts and tasks among settings.
 
     Other processes must import them before they read the settings' configuration.
     """

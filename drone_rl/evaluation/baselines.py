@@ -80,7 +80,7 @@ def make_baseline(
     """Build a baseline of a task: "oracle" or one of its random and constant baselines.
 
     By default its actions are those of the task's default dynamics; `generator` samples random
-    ones. A task without an oracle raises `InputError`.
+    ones. Raises an `InputError` if the task has no oracle, or the drones have no such action.
     """
     task = as_task(task)
     actions = actions or task.make_dynamics().actions
@@ -88,6 +88,11 @@ def make_baseline(
         return oracle_policy(task, actions)
     if name == "random":
         return random_policy(actions, generator)
+    if name not in actions.names:
+        raise InputError(
+            f"baseline={name} of task={task.name} is no action of these drones, which have "
+            f"{', '.join(actions.names)}; name some of these in Task.blind_baselines"
+        )
     return constant_policy(actions.always(name))
 
 

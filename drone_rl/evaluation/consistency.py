@@ -100,10 +100,10 @@ def _check_flights(verdict: Mapping[str, Any], flights: Any, of: str, rule: Rule
 def _check_goals(
     verdict: Mapping[str, Any], flights: Mapping[str, Any], success: float, of: str
 ) -> None:
-    """Check success rates: a success reaches all goals, a failure at least one less."""
+    """Check success rates: a success reaches all goals."""
     goals = read_entry(verdict, "num_cubes", Whole(1, 10_000), "verdict")
     every = float(flights["shares"]["all"]["mean"])
-    if not success - _ROUNDING <= every <= 1 - (1 - success) / goals + _ROUNDING:
+    if not success - _ROUNDING <= every:
         raise InputError(f"{of}: {success:.3f} succeed, but {every:.3f} of all goals are reached")
     if "mean_goals" in flights:
         check_same(flights["mean_goals"], goals * every, f"{of}.mean_goals")
@@ -197,9 +197,8 @@ def _check_failures(verdict: Mapping[str, Any]) -> None:
     failures = as_mapping(verdict["failures"], "failures")
     episodes = verdict["greedy"]["episodes"]
     failed = check_proportion(failures.get("bound"), "failures.bound", episodes)
-    check_same(
-        failed, episodes - verdict["greedy"]["success"]["successes"], "failures.bound.successes"
-    )
+    if failed > episodes - verdict["greedy"]["success"]["successes"]:
+        raise InputError(f"failures.bound: {failed} failures and the successes exceed {episodes}")
     rows = failures.get("rows")
     if not isinstance(rows, list) or not 0 < len(rows) <= 1000:
         raise InputError("failures.rows is not a list of at most 1000 rows; judge again")

@@ -22,6 +22,7 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.display import aligned, table
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
@@ -131,11 +132,13 @@ def evaluate(
         changes: Changed settings, as in `evaluate("good", episodes=200)`.
 
     Raises:
-        InputError: The policy or a setting is unusable.
+        InputError: The policy or a setting is unusable, or the baselines lack an oracle.
     """
     settings, seed = with_seed(from_arguments(EvaluateSettings, settings, changes, evaluate))
     progress = as_progress(progress)
     policy = as_policy(policy, outputs, task=task, dynamics=dynamics, appearance=appearance)
+    if settings.baselines and (own := as_task(policy.task)).oracle is None:
+        raise InputError(f"task={own.name} has no oracle to compare with; give baselines=false")
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with held_out_environments(policy, settings, seed) as (env, actor):
         state, dynamics = env.base_env.state_dict(), worlds_of(env).dynamics

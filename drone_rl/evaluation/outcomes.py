@@ -54,7 +54,7 @@ class Rounding:
     """Implementation that ran the episodes again."""
     compared_episodes: int
     differing: int
-    """Episodes in which it took other actions or, of continuous actions and with flight dynamics,
+    """Episodes in which it took other actions; with continuous actions or flight dynamics, episodes
     that ended differently."""
     unexplained: int
     """Differing episodes without a fragile frame up to the first other action, or at all if
@@ -148,5 +148,6 @@ def _columns(tensors: dict[str, Any], count: int) -> list[Tensor]:
         if isinstance(value, dict):
             found += _columns(value, count)
         else:
-            found.append(value.reshape(count, -1).double())
+            numbers = value.reshape(count, -1).double()
+            found.append(numbers.nan_to_num(nan=torch.inf))  # `unique` never merges rows with NaN
     return found

@@ -41,7 +41,7 @@ class ExternalNetwork(ImageNetwork):
             logits: The callable.
             in_shape: Shape (C, H, W) of one frame.
             actions: The action space; it has one action for each logit.
-            takes_bytes: Whether it takes RGB bytes (N, H, W, 3) instead of floats from 0 to 1.
+            takes_bytes: Whether it takes RGB bytes (N, H, W, 3) instead of transformed floats.
             device: Device of a torch module.
         """
         super().__init__()

@@ -74,7 +74,10 @@ class ExternalPolicy(BasePolicy):
         """Return the same policy in a changed task, such as `policy.in_task(num_cubes=5)`."""
         if not isinstance(self.task, Settings):
             if changes:
-                raise InputError(f"task.{min(changes)} is unknown; the task has no settings")
+                raise InputError(
+                    f"task.{min(changes)} can't be changed in a task object; give policy_from the "
+                    "task's settings"
+                )
             return self
         changed = Changes(type(self.task)).read(changes, "task")
         with prefixed_errors("task"):

@@ -225,7 +225,7 @@ class Policy(BasePolicy):
         return dataclasses.replace(self, description=parse(described))
 
     def in_dynamics(self, **changes: Any) -> "Policy":
-        """Return the same policy with other dynamics, such as `in_dynamics(wind=(5, 0, 0))`."""
+        """Return the same policy with other dynamics, as in `in_dynamics(mode="simple_flight")`."""
         changed = Changes(DynamicsSettings).read(changes, "dynamics")
         described = self.description.as_dict()
         described["dynamics"] = {**self.dynamics.values(), **changed}
@@ -360,8 +360,8 @@ def load_policy(which: str | Path | Policy, *, outputs: str | Path = "outputs") 
             raise InputError(f"policy={shown(which)} is no name and no path; give one of them")
         name = getattr(which, "name", type(which).__name__)
         raise InputError(
-            f"policy={name} is not stored in a file of drone_rl's, and a network from elsewhere "
-            "can only be judged, evaluated and explained; give a policy that drone-rl trained"
+            f"policy={name} is in no file of drone_rl's, which this function needs (judge, "
+            "evaluate, explain and shifts do not); give a policy that drone-rl trained"
         )
     path = find_policy(which, outputs)
     state = read_policy(path)

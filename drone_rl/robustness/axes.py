@@ -116,7 +116,7 @@ _SIZES = {"collect_cubes": "cube_size", "pillars": "width"}
 def _size(subject: EvaluatedPolicy) -> str:
     name = subject.task.name
     if name not in _SIZES:
-        raise InputError(f"axis=object_size is not for task={name}; leave it out of axes")
+        raise InputError(f"axes=object_size is not for task={name}; leave it out of axes")
     return _SIZES[name]
 
 
@@ -144,6 +144,9 @@ def _field_of_view(change: float, subject: EvaluatedPolicy) -> float:
 
 
 def _times(setting: str, factor: float, subject: EvaluatedPolicy) -> float:
+    if not hasattr(subject.task, setting):
+        name = subject.task.name
+        raise InputError(f"axes={setting} is not for task={name}; leave it out of axes")
     return factor * getattr(subject.task, setting)
 
 
@@ -217,7 +220,8 @@ def check_axes(names: Iterable[str]) -> None:
 def find_axes(names: Iterable[str] | None, subject: EvaluatedPolicy) -> list[Axis]:
     """Return axes by name or by group, in the order of `AXES`.
 
-    By default these are all that the task has and the policy's renderer can render.
+    By default these are all that the task has and the policy's renderer can render; whether objects
+    have one color to change is known only when they are rendered.
 
     Raises:
         InputError: A name is unknown, or the axis is not for this task or renderer.

@@ -102,6 +102,8 @@ def _wrong_level(
         return None if is_empty else " is refused, and has figures"
     if not {*level["modes"]} <= {*settings["modes"]} or "constant" not in level["modes"]:
         return ".modes are not those of settings.modes"
+    if (oracle is None) != (numbers["plain"]["oracle"] is None):
+        return " has an oracle only with or only without perturbation"
     impossible = None if oracle is None else oracle["upper95"] < settings["possible_share"]
     if level["impossible"] != impossible:
         return ".impossible does not follow from its oracle"

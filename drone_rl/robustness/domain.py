@@ -150,7 +150,7 @@ class Prober:
         subject, count = self._evaluator.subject, self._evaluator.episodes
         agent = PolicyAgent(subject.network, subject.transforms, count, examines_rounding=True)
         greedy = self._evaluator.run(condition, agent=agent).episodes
-        if key not in self._baselines:  # appearance does not affect these baselines
+        if key not in self._baselines:  # of task and camera, nearly
             self._baselines[key] = self._evaluator.run_baselines(condition)
         rule = self.rule_at(part)
         baselines = {**self._baselines[key], "oracle": self._oracle}

@@ -84,15 +84,20 @@ class PairedEvaluator:
         self.appearances.reset(torch.arange(episodes), streams)
         self._drawn = torch.stack([task.sample(stream) for stream in streams])
         dynamics = make_dynamics(task.make_dynamics, subject.dynamics, subject.actions)
+        self._actions = dynamics.actions
         self._seeds = draw_seeds(streams) if dynamics.is_random else None
         self._built: dict[tuple[Any, ...], Worlds] = {}
 
     def settings(self, condition: Condition) -> tuple[BaseTaskSettings, CameraSettings]:
-        """Return task and camera under a condition; a setting out of range is an `InputError`."""
+        """Return task and camera under a condition.
+
+        A setting out of range, or a task that the policy's actions can't do, is an `InputError`.
+        """
         with prefixed_errors("task"):
             task = self.subject.task.replace(**condition.task)
         with prefixed_errors("camera"):
             camera = self.subject.camera.replace(**condition.camera)
+        as_task(task).check_actions(self._actions)
         return task, camera
 
     def worlds(self, condition: Condition) -> Worlds:

@@ -303,8 +303,8 @@ def _repaint(
     painted = {m: paint(_tensor(c)) for m, c in appearance.colors.items() if m in classes}
     if not painted:
         raise InputError(
-            "these objects have several colors, which can't be changed together; leave "
-            "object_color and object_white out of axes"
+            "the task has no objects of one color to change; leave object_color and object_white "
+            "out of axes"
         )
     return dataclasses.replace(appearance, colors={**appearance.colors, **painted})
 

@@ -20,6 +20,7 @@ from drone_rl.utils.errors import InputError, extra
 from drone_rl.utils.files import is_locked, read_tail, write_atomically
 from drone_rl.utils.limits import LOG_BYTES
 from drone_rl.utils.provenance import num_cores
+from drone_rl.utils.schema import OneOf
 
 PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")
 """The program of a run."""
@@ -154,8 +155,9 @@ class SlurmExecutor:
         arguments of submitit's `update_parameters`.
 
         Raises:
-            InputError: submitit isn't installed, or this machine has no Slurm.
+            InputError: The cluster is unknown, submitit isn't installed, or there is no Slurm here.
         """
+        OneOf(("slurm", "local")).read(cluster, "hydra.launcher.cluster")
         submitit = extra("submitit", "slurm", "hydra/launcher=slurm")
         try:
             self._executor = submitit.AutoExecutor(folder=folder, cluster=cluster)

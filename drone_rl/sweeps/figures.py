@@ -35,7 +35,7 @@ LOG_FROM = 3.0
 MAX_LABELS = 7
 """Greatest number of tick labels."""
 UNIFORM = float(np.log(len(SHOWN_MOVES.names)))
-"""Entropy of the uniform distribution over the moves, nats."""
+"""Entropy of the uniform distribution over the chapter's three moves, nats."""
 _ROUNDING = 1e-4
 
 
@@ -118,7 +118,9 @@ def _curves(axes: Axes, layout: Layout, groups: list[Group]) -> None:
         else:
             axes.plot(grid, np.median(values, axis=0), color=color, label=label)
             axes.fill_between(grid, *band, color=color, alpha=0.2, linewidth=0)
-    axes.set(xlabel="frames", ylabel="running reward / largest reward", ylim=(0, 1))
+    every = [group for panel in layout.panels.values() for group in panel]  # they share the axis
+    least = min((row.curve[1].min(initial=0.0) for g in every for row in g.known), default=0.0)
+    axes.set(xlabel="frames", ylabel="running reward / largest reward", ylim=(1.05 * least, 1))
     if axes.get_legend_handles_labels()[0]:
         axes.legend(title=_literal(layout.axis or ""), fontsize=7, title_fontsize=7)
 
@@ -148,7 +150,8 @@ def _entropies(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     _dots(axes, layout, groups, lambda row: row.entropy)
     axes.set(ylabel="entropy at the end, nats")
     known = [row.entropy for group in groups for row in group.rows if row.entropy is not None]
-    if all(0.0 <= entropy <= UNIFORM + _ROUNDING for entropy in known):  # not of continuous actions
+    # values beyond are of other actions than the three moves
+    if all(0.0 <= entropy <= UNIFORM + _ROUNDING for entropy in known):
         axes.axhline(UNIFORM, color="0.5", linewidth=0.8, zorder=0)
         axes.set(ylim=(-0.06, 1.06 * UNIFORM))
 

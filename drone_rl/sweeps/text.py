@@ -260,7 +260,7 @@ SENTENCES = (
         "sides.not_offered",
         "a policy was offered no goal on a side",
         "sides_not_offered",
-        "{runs} without a dot: one side had no goals.",
+        "{runs} without a dot: a side had no goals, or the task does not count goals by side.",
     ),
     _if_any(
         "entropies.dots",

@@ -18,6 +18,7 @@ from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.training.components import Components, episode_options, group_sizes, joined
 from drone_rl.training.learners import ActorCriticLearner
 from drone_rl.training.train import make_groups
+from drone_rl.utils.plugins import IMPORTED
 from drone_rl.utils.seeding import Stream, torch_generator
 
 _log = logging.getLogger(__name__)
@@ -80,7 +81,7 @@ def ray_collector(settings: TrainSettings, replay: FailureReplayTask | None = No
     sizes = group_sizes(settings)
     (local,) = make_groups(settings, [1])  # only its actor and network are needed
     local.env.close()
-    sent = (as_config(settings), sorted(modules_of(settings)), sizes)
+    sent = (as_config(settings), sorted(modules_of(settings) | {*IMPORTED}), sizes)
     makers = [functools.partial(_remote_collector, *sent, i, replay) for i in range(len(sizes))]
     collector = RayEpisodeCollector(
         makers,

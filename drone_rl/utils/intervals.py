@@ -11,8 +11,8 @@ def proportion(successes: int, trials: int, confidence: float = 0.95) -> dict[st
     """Return a rate with its exact (Clopper-Pearson) interval.
 
     Returns:
-        "share" (None without trials), "lower95" and "upper95" (0 and 1 without trials; whatever
-        the coverage, `confidence`, is), "successes" and "trials".
+        "share" (None without trials), "lower95" and "upper95" (so named for any `confidence`; 0
+        and 1 without trials), "successes" and "trials".
     """
     from scipy.special import betaincinv  # slow to import, and trainings report no interval
 
@@ -46,7 +46,7 @@ def mean_bounds(
         confidence: Coverage of the interval.
 
     Returns:
-        "mean" (None of no values), "lower95", "upper95" (the whole range of no values), "count".
+        "mean" (None without values), "lower95", "upper95" (then the whole range), "count".
 
     Raises:
         ValueError: A value is not finite or out of range.

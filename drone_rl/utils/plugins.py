@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import inspect
+import os
 import sys
 import sysconfig
 import traceback
@@ -13,7 +14,10 @@ from typing import Any, TypeVar
 from drone_rl.utils.errors import InputError
 
 T = TypeVar("T")
-_OTHERS = (str(Path(__file__).parents[1]), *map(sysconfig.get_path, ("stdlib", "purelib")))
+IMPORTED: list[str] = []
+"""Modules that `plugins=` named; other processes must import them, too."""
+_FOLDERS = (Path(__file__).parents[1], *map(sysconfig.get_path, ("stdlib", "purelib")))
+_OTHERS = tuple(f"{folder}{os.sep}" for folder in _FOLDERS)
 """Folders of code that is not the user's."""
 
 

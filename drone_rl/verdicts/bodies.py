@@ -128,9 +128,9 @@ def _looped(policy: BasePolicy, settings: BodiesSettings, seed: RootSeed) -> dic
     """Episodes with software in the loop, in still air, or the reason why there are none."""
     from drone_rl.robustness.sitl import evaluate_in_the_loop
 
-    still = policy.in_dynamics(**changes_of("simple flight", policy.dynamics))
     count = settings.loop_flights
     try:
+        still = policy.in_dynamics(**changes_of("simple flight", policy.dynamics))
         return evaluate_in_the_loop(still, count, drawn_seed=seed, progress=silent).as_dict()
     except (InputError, FlightControllerError) as error:
         return {"left_out": str(error)}

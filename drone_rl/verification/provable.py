@@ -198,8 +198,8 @@ def train_until_proved(
     Each round searches for failures: first in episodes, which are fast, and if all succeed by a
     proof, which misses none. Then training continues, with a fraction of its episodes at failures.
     The result's reason is "proved" if the last proof leaves no failure and nothing undecided; its
-    "rounds" list what each search found. If the last search was a proof, its certificate is
-    `certificate.json` in the folder.
+    "rounds" list what each search found, up to one more than `how.rounds`. If the last search was a
+    proof, its certificate is `certificate.json` in the folder.
 
     Args:
         settings: Settings of the training run, for all rounds together.

@@ -16,7 +16,7 @@ def require_cubes(described: PolicyDescription, what: str) -> TaskSettings:
     """
     task, dynamics, actions = described.task, described.dynamics, described.actions
     remedy = "give another policy"
-    if not isinstance(task, TaskSettings):
+    if type(task) is not TaskSettings:  # a task of a derived class may have other rules
         problem = f"task={TaskSettings.name}, got task={task.name}"
     elif not dynamics.is_computer_vision:
         problem = f"dynamics=computer_vision, got dynamics.mode={dynamics.mode}"

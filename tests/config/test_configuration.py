@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from drone_rl.cli.evaluation import PlayCommand
-from drone_rl.config import AppearanceSettings, TaskSettings
+from drone_rl.config import AppearanceSettings, PillarsSettings, TaskSettings
 from drone_rl.config.configuration import (
     Changes,
     as_changes,
@@ -112,6 +112,9 @@ def test_changes_of_settings_have_names():
             as_changes(wrong, "task")
     with pytest.raises(InputError, match=r"^task\.name='pillars' would replace the task, which is"):
         Changes(TaskSettings).read({"name": "pillars"}, "task")
+    settings = PillarsSettings(num_rows=2)
+    read = Changes(PillarsSettings).read(as_changes(settings, "task"), "task")
+    assert PillarsSettings(**read) == settings
 
 
 def judged(policy, settings=None, *, task=None, appearance=None, **changes):

@@ -8,6 +8,7 @@ from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import (
     BASELINES,
     constant_policy,
+    make_baseline,
     oracle_policy,
     random_policy,
     run_baselines,
@@ -92,6 +93,12 @@ def test_a_task_without_an_oracle_says_so_in_one_line():
     env = DroneEnv(2, Blind(), pixels=False)
     with pytest.raises(InputError, match="task=fog has no oracle; choose a task that has one"):
         run_baselines(2, Blind(), env.state_dict(), 2)
+
+
+def test_a_baseline_that_is_no_action_of_the_drones_is_refused():
+    actions = SimpleNamespace(names=("throttle", "pitch"))
+    with pytest.raises(InputError, match=r"baseline=forward of task=.* which have throttle, pitch"):
+        make_baseline("forward", TASK, torch.Generator(), actions)
 
 
 def test_an_oracle_flies_no_dynamics_that_it_does_not_know():

@@ -9,7 +9,7 @@ from benchmarks.evidence import changed
 from drone_rl.evaluation.consistency import check_verdict
 from drone_rl.evaluation.verdict import apply_rule
 from drone_rl.sim.tasks import CollectCubes
-from drone_rl.sim.tasks.collect_cubes import Side
+from drone_rl.sim.tasks.collect_cubes import EndReason, Side
 from drone_rl.utils.errors import InputError
 
 LEFT, AHEAD, RIGHT = Side
@@ -43,6 +43,16 @@ def judged(make_episodes, make_baselines):
 )
 def test_verdicts_that_were_judged_are_accepted(judged, hits, number):
     check_verdict(judged(hits, number))
+
+
+def test_all_goals_may_be_reached_without_success(make_episodes, make_baselines):
+    """As if the drone had crossed the finish line and the side boundary in one step."""
+    episodes = make_episodes([[LEFT, RIGHT]] * 40, [[True, True]] * 40)
+    episodes.end_reason[0] = EndReason.SIDE_BOUNDARY
+    verdict = apply_rule(episodes, make_baselines(episodes), sampled=episodes).as_dict()
+    assert verdict["greedy"]["success"]["successes"] == 39
+    assert verdict["failures"]["bound"]["successes"] == 0
+    check_verdict(json.loads(json.dumps(verdict)))
 
 
 ONE = {"share": 1.0, "successes": 400}
@@ -94,6 +104,7 @@ LIES = [
     {"skill.oracle.mean": 1.0},
     {"drawing.mean": 0.5},
     {"failures.bound.successes": 0},
+    {"failures.bound": {**ONE, "trials": 400, "lower95": 0.99, "upper95": 1.0}},
     {"failures.rows.0.failed": 1000},
     {"failures.rows.0.share": 0.0},
     {"failures.rows": []},

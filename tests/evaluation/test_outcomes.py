@@ -45,6 +45,20 @@ def test_two_possible_first_actions_give_all_ends_of_both():
     assert len(set(found.episodes.length.tolist())) == 2
 
 
+def test_ways_to_one_state_are_one_branch():
+    """Forward and left in either order lead to one state, though cubes ahead have no distance."""
+    calls = 0
+
+    def possible(pixels):
+        nonlocal calls
+        calls += 1
+        made = torch.zeros(len(pixels), 3, dtype=torch.bool)
+        made[:, [Move.FORWARD, Move.LEFT] if calls <= 2 else [Move.LEFT]] = True
+        return made
+
+    assert sorted(ends(possible).owner.tolist()) == [0, 0, 0, 1, 1, 1]
+
+
 def test_too_many_branches_are_left_open():
     found = ends(lambda x: torch.ones(len(x), 3, dtype=torch.bool))
     assert found.is_open.all()

@@ -75,7 +75,7 @@ def test_in_task_changes_or_replaces_the_task():
     with posts.flying(2) as (env, actor):
         assert actor(env.reset())["action"].tolist() == [1, 1]
     assert posts.in_task() is posts
-    with pytest.raises(InputError, match=r"^task\.num_cubes is unknown; the task has no settings"):
+    with pytest.raises(InputError, match=r"^task\.num_cubes can't be changed in a task obj"):
         posts.in_task(num_cubes=2)
 
 

@@ -3,7 +3,7 @@ import itertools
 import pytest
 import torch
 
-from drone_rl.config import PillarsSettings
+from drone_rl.config import BaseTaskSettings, PillarsSettings
 from drone_rl.robustness.axes import AXES, GROUPS, check_axes, find_axes
 from drone_rl.robustness.shifts_text import NAMES
 from drone_rl.sim.rendering.appearance import Appearance
@@ -60,9 +60,19 @@ def test_a_task_of_which_no_size_is_known():
         name = "other"
 
     other = subject(task=Other())
-    with pytest.raises(InputError, match="axis=object_size is not for task=other"):
+    with pytest.raises(InputError, match="axes=object_size is not for task=other"):
         find_axes(["object_size"], other)
     assert "object_size" not in [a.name for a in find_axes(None, other)]
+
+
+def test_a_task_without_steps_of_its_own():
+    class Plain(BaseTaskSettings):
+        name = "plain"
+
+    plain = subject(task=Plain())
+    with pytest.raises(InputError, match="axes=step_length is not for task=plain; leave it out"):
+        find_axes(["step_length"], plain)
+    assert {"object_size", "step_length"}.isdisjoint(a.name for a in find_axes(None, plain))
 
 
 @pytest.mark.parametrize(

@@ -105,6 +105,9 @@ def test_a_size_that_cannot_be_is_refused(make_bed):
         evaluator.settings(Condition(task={"cube_size": 9.0}))
     with pytest.raises(InputError, match=r"camera\.horizontal_fov=175"):
         evaluator.settings(Condition(camera={"horizontal_fov": 175.0}))
+    high = make_bed(subject(task=TASK.replace(vertical_bound=1.2)), 1)
+    with pytest.raises(InputError, match=r"task\.vertical_bound=1\.2 puts cubes where"):
+        high.settings(Condition(task={"cube_size": 1.25}))
 
 
 @pytest.mark.parametrize("axis", AXES.values(), ids=AXES)

@@ -113,6 +113,11 @@ def test_clusters_of_this_machine(make_runs, tmp_path, cluster):
     assert "output.log" in read_failure(lost)
 
 
+def test_an_unknown_cluster_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"hydra\.launcher\.cluster='Slurm' is unknown; give slurm, local"):
+        SlurmExecutor(tmp_path, cluster="Slurm", num_jobs=2)
+
+
 def test_at_least_one_job():
     with pytest.raises(InputError, match="num_jobs=0"):
         LocalExecutor(0)

@@ -1,5 +1,6 @@
 """What is drawn: lines, bands and dots, as matplotlib holds them."""
 
+import dataclasses
 import struct
 
 import numpy as np
@@ -24,6 +25,15 @@ def test_few_runs_are_lines_and_many_are_a_band(begin_sweep, runs, lines, bands)
     axes = drawn(figures._curves, begin_sweep({f"seed={i}": {} for i in range(runs)}))
     assert (len(axes.lines), len(axes.collections)) == (lines, bands)
     assert axes.lines[0].get_ydata()[-1] == pytest.approx(0.5)  # 1.5 of 3 cubes
+
+
+def test_curves_below_0_are_shown(begin_sweep, monkeypatch):
+    rows = read_rows(begin_sweep({"seed=0": {}}))
+    frames, rewards = rows[0].curve
+    groups = make_groups([dataclasses.replace(rows[0], curve=(frames, rewards - 2.0))])
+    axes = Figure().subplots()
+    figures._curves(axes, figures.lay_out(groups), groups)
+    assert axes.get_ylim()[0] == pytest.approx(1.05 * (rewards.min() - 2.0))
 
 
 def test_failed_runs_pull_the_median_down(begin_sweep):

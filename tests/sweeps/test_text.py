@@ -100,7 +100,7 @@ def test_nothing_else_is_said_of_a_sweep_where_all_went_well():
         ("curves.failed", changed(failed=1), "learned nothing"),
         ("sides.lost_left", with_run(verdict="one-sided (right)"), "1 run one-sided to the right"),
         ("sides.lost_right", with_run(verdict="one-sided (left)"), "1 run one-sided to the left"),
-        ("sides.not_offered", changed(sides_not_offered=1), "one side had no goals"),
+        ("sides.not_offered", changed(sides_not_offered=1), "a side had no goals"),
         ("entropies.still", with_run(entropy=0.009), "1 run ended below 0.01 nats"),
     ],
 )

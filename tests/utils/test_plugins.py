@@ -1,10 +1,20 @@
 """Errors of a user's own code name its file and line."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import drone_rl
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.plugins import described, errors_of, failure, place_of, with_methods_of
+from drone_rl.utils.plugins import (
+    described,
+    errors_of,
+    failure,
+    line_of,
+    place_of,
+    with_methods_of,
+)
 
 
 def raise_it(error):
@@ -27,6 +37,13 @@ def test_failure_names_the_last_line_of_the_users_files():
     error = caught(ValueError("two\n words"))
     where = f"line {line} of {__file__}"
     assert failure("x=1", error) == f"x=1 failed in {where} (ValueError: two words); correct it"
+
+
+def test_a_file_whose_name_begins_like_the_package_is_the_users(tmp_path):
+    file = f"{Path(drone_rl.__file__).parent}_tasks.py"
+    with pytest.raises(ValueError) as info:
+        exec(compile("raise ValueError('here')", file, "exec"))
+    assert line_of(info.value) == f"line 1 of {file}"
 
 
 def test_failure_elsewhere_names_the_place():

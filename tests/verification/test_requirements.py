@@ -1,11 +1,20 @@
+import dataclasses
 import re
 
 import pytest
 
 import drone_rl
-from drone_rl.config import ActionSettings, AppearanceSettings, DynamicsSettings, PillarsSettings
+from drone_rl.config import (
+    ActionSettings,
+    AppearanceSettings,
+    DynamicsSettings,
+    PillarsSettings,
+    TaskSettings,
+)
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.zoo import describe, parse
+from drone_rl.sim.tasks import CollectCubes
+from drone_rl.sim.tasks.task import MAKERS
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.requirements import require_cubes
 
@@ -33,6 +42,16 @@ def test_the_policies_of_the_package_pass():
 def test_other_tasks_dynamics_actions_and_appearances_are_refused(change, message):
     with pytest.raises(InputError, match=message):
         require_cubes(describe(TrainSettings().replace(**change)), "proofs")
+
+
+def test_a_task_derived_from_cube_collection_is_refused(monkeypatch):
+    class OtherRules(TaskSettings):
+        name = "other_rules"
+
+    monkeypatch.setitem(MAKERS, OtherRules, CollectCubes)
+    described = dataclasses.replace(describe(TrainSettings()), task=OtherRules())
+    with pytest.raises(InputError, match="only task=collect_cubes, got task=other_rules"):
+        require_cubes(described, "proofs")
 
 
 def test_an_appearance_that_is_the_same_in_every_episode_passes():

@@ -54,7 +54,7 @@ from drone_rl.config.training import CloningSettings, Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import USER_ERROR
-from drone_rl.utils.plugins import failure, line_of
+from drone_rl.utils.plugins import IMPORTED, failure, line_of
 from drone_rl.utils.schema import Kind
 from drone_rl.utils.settings import Settings, conf_dir, kinds_of, plain, types_of
 
@@ -144,6 +144,7 @@ def import_plugins(overrides: Sequence[str]) -> None:
         _check_module(name)
         try:
             importlib.import_module(name)
+            IMPORTED.append(name)
         except ModuleNotFoundError as error:
             is_own = f"{name}.".startswith(f"{error.name}.")  # or its package
             place = "give a module in this folder or on PYTHONPATH"

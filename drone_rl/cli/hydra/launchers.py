@@ -32,7 +32,7 @@ from drone_rl.sweeps.manifest import Run, Sweep, open_sweep, read_failure, read_
 from drone_rl.sweeps.search import import_optuna, next_trials, note_outcome, open_study
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, refuse_links
-from drone_rl.utils.schema import shown
+from drone_rl.utils.schema import Whole, shown
 
 NAMESPACE = "hydra_plugins.drone_rl"
 """Module of the plugins, as in the files of conf/."""
@@ -229,6 +229,7 @@ class OptunaSweeper(Sweeper):
                 f"hydra.sweeper.num_trials={num_trials}, batch={batch} and report_frames={frames} "
                 "must be 1 or more"
             )
+        seed = Whole(0, 2**31).read(seed, "hydra.sweeper.seed")
         self.num_trials, self.batch, self.seed = num_trials, batch, seed
         self.params, self.shared = dict(params), shared
 

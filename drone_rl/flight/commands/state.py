@@ -205,7 +205,7 @@ class Sensors:
         return self._suite.magnetometer.read(self._state.magnetometer, self._state.time)
 
     def gps(self) -> GpsReading:
-        """Return place on Earth and velocity; invalid until the receiver has a fix."""
+        """Return place on Earth and velocity; `is_valid` from the first reading on, see `fix`."""
         return self._suite.gps.read(self._state.gps, self._state.time)
 
     def collision(self) -> CollisionState:

@@ -32,8 +32,8 @@ def check_device(device: str) -> None:
         raise InputError(f"device={device}, but no CUDA GPU is usable here; give device=cpu")
     if int(device.partition(":")[2] or 0) >= count:
         raise InputError(
-            f"device={device}, but only {count} CUDA GPUs are usable here; give cuda:0 to "
-            f"cuda:{count - 1}"
+            f"device={device}, but the number of usable CUDA GPUs is {count}; give cuda:N with N "
+            f"of at most {count - 1}"
         )
 
 

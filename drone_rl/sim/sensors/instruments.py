@@ -212,7 +212,7 @@ class GpsReading(Batch):
     error: Tensor  # (num_envs,) float64
     """Stated horizontal and vertical error (eph and epv), metres."""
     fix: Tensor  # (num_envs,) int64
-    """One of `Fix`; none before the first reading."""
+    """One of `Fix`, by the stated error; `Fix.NONE` before the first reading."""
     is_valid: Tensor  # (num_envs,) bool
     """Whether there is a reading yet."""
 

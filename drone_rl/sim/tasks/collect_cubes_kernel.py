@@ -1,6 +1,7 @@
 """The rules of cube collection: the Warp function `step`.
 
-Only `CollectCubes.touch`, for flights without steps, states the rule of contact again.
+`CollectCubes.touch`, for flights without steps, and the prover (`lattice.py`, `cube_images.py`)
+state the rule of contact again: change them together.
 """
 
 import enum

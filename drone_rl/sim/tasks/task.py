@@ -123,7 +123,7 @@ class Task(abc.ABC, Generic[S]):
     """Something to do. A subclass defines `name`, `sample` and `step`; all else has a default.
 
     With the defaults a task has one goal, which is reached where the episode ends by `success_end`.
-    Explanations need the methods from `remember` on, which have no default.
+    Explanations need the methods from `remember` on, most of which have no default.
     """
 
     name: str
@@ -133,7 +133,7 @@ class Task(abc.ABC, Generic[S]):
     truncation: int = EndReason.STEP_LIMIT
     """The member of `ends` that truncates an episode; all others terminate it."""
     success_end: int = EndReason.SUCCESS
-    """The member of `ends` of an episode that reached all goals."""
+    """The member of `ends` of success, for which all goals must be reached."""
     expected_end: int = EndReason.FAILURE
     """How an episode ends in which a goal was missed and nothing else went wrong."""
     observed: tuple[str, ...] = ("end_reason",)
@@ -224,7 +224,8 @@ class Task(abc.ABC, Generic[S]):
     def score(self, info: Mapping[str, Tensor]) -> Goals:
         """Return the goals from the entries `scored` at the ends of episodes. Shapes: (n, *)."""
         is_reached = info["end_reason"] == self.success_end
-        return Goals(is_reached, is_reached.long() * 0, info["sampled"].flatten(1).double())
+        world = info["sampled"][:, None].flatten(1).double()  # (n, k), also of a single number
+        return Goals(is_reached, is_reached.long() * 0, world)
 
     def classes(self, goals: Any) -> Iterator[tuple[str, str, Tensor]]:
         """Yield the classes of goals, from `score`, that failure tables count: by stratum.
@@ -334,17 +335,15 @@ def register_task(
         as_settings(settings)
         return
     if not (isinstance(settings, type) and issubclass(settings, BaseTaskSettings)):
+        name = getattr(settings, "__name__", shown(settings))
         raise InputError(
-            f"{_name_of(settings)} is no class of settings; give it first, then what makes the "
-            "task: register_task(MySettings, MyTask)"
+            f"{name} is no class of settings; give it first, then what makes the task: "
+            "register_task(MySettings, MyTask)"
         )
-    if make is None:
-        raise InputError(
-            f"{settings.__name__}: give register_task what makes the task, too: "
-            f"register_task({settings.__name__}, MyTask)"
-        )
+    _require_name(settings)
     if not callable(make):
-        raise InputError(f"{shown(make)} makes no task; give a class of tasks or a function")
+        what = f"give what makes the task, as in register_task({settings.__name__}, MyTask)"
+        raise InputError(f"{shown(make)} makes no task; {what}")
     if TASKS.get(settings.name, settings) is not settings:
         raise InputError(f"there is a task called {settings.name}; give another name")
     for field in dataclasses.fields(settings):
@@ -356,8 +355,9 @@ def register_task(
     TASKS[settings.name], MAKERS[settings] = settings, make
 
 
-def _name_of(given: Any) -> str:
-    return given.__name__ if isinstance(given, type) else shown(given)
+def _require_name(of: type) -> None:
+    if not hasattr(of, "name"):
+        raise InputError(f'{of.__name__} has no name; add name = "my_task" to the class')
 
 
 def as_settings(task: Any) -> Any:
@@ -368,6 +368,7 @@ def as_settings(task: Any) -> Any:
     """
     if not isinstance(task, Task):
         return task
+    _require_name(type(task))
     own: Any = getattr(task, "settings", None)
     if type(own) in MAKERS and type(as_task(own)) is type(task):
         return own

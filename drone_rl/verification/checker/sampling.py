@@ -137,7 +137,7 @@ def sample_placements(certificate: Certificate, count: int, rng: np.random.Gener
 def _inside(
     groups: list[Boxes], count: int, rng: np.random.Generator
 ) -> Iterator[tuple[int, Points]]:
-    """Yield as many points for each outcome; outcomes of few boxes leave some to others."""
+    """Yield equally many points for each outcome; outcomes of few boxes leave some to others."""
     order = sorted((len(boxes), i) for i, boxes in enumerate(groups) if len(boxes))
     for done, (num_boxes, i) in enumerate(order):
         enough = _ROUNDS * num_boxes * (2 ** groups[i].shape[1] + 2)

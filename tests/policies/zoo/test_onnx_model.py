@@ -74,13 +74,21 @@ def test_model_documents_inputs_and_outputs(linear):
 
 
 def test_continuous_actions_are_outputs():
-    description = describe(1, 2, [GRAY], LINEAR)
+    slow = SETTINGS.replace(forward_speed=2.0).values()
+    description = parse({**describe(1, 2, [GRAY], LINEAR).as_dict(), "actions": slow})
     network = MLP((1, 1, 2), 6, hidden=(), generator=torch.Generator().manual_seed(0))
     network.actions = ContinuousActions.of(SETTINGS)
     content = make_onnx(description, network, {})
     session = onnxruntime.InferenceSession(content)
-    actions = json.loads(session.get_modelmeta().custom_metadata_map["actions"])
-    assert actions == ["forward", "left", "right", "turn left", "turn right"]
+    metadata = session.get_modelmeta().custom_metadata_map
+    assert slow.items() <= json.loads(metadata["action_settings"]).items()
+    assert json.loads(metadata["actions"]) == [
+        "forward",
+        "left",
+        "right",
+        "turn left",
+        "turn right",
+    ]
     frames = torch.tensor([[[[255, 0, 0], [9, 99, 255]]]], dtype=torch.uint8)
     found = dict(
         zip(

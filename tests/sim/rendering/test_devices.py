@@ -88,7 +88,10 @@ def test_warp_reports_only_errors_on_cpu():
 
 @pytest.mark.parametrize(
     ("device", "message"),
-    [("cuda:2", "only 2 CUDA GPUs are usable here; give cuda:0 to cuda:1"), ("cuda:x", "unknown")],
+    [
+        ("cuda:2", "of usable CUDA GPUs is 2; give cuda:N with N of at most 1"),
+        ("cuda:x", "unknown"),
+    ],
 )
 def test_gpus_that_do_not_exist_are_refused(device, message, monkeypatch):
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)

@@ -100,6 +100,8 @@ def test_base_class_has_defaults():
     assert (reasons.low, reasons.high) == (0, EndReason.STEP_LIMIT)
     goals = task.score({name: info[name][:, 0] for name in task.scored})
     assert goals.reached.all() and goals.world.shape == (3, 2)
+    one = {**{name: info[name][:, 0] for name in task.scored}, "sampled": torch.zeros(3)}
+    assert task.score(one).world.shape == (3, 1)  # of a single number
     (by, value, of) = next(iter(task.classes(goals)))
     assert (by, value) == ("side", "anywhere") and of.all()
     assert task.vocabulary.goals == "goals" and task.fused_rules(task.make_dynamics(), 3) is None

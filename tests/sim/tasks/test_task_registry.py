@@ -91,10 +91,22 @@ def test_tasks_without_settings_are_registered_as_objects():
 
         with pytest.raises(InputError, match="there is a task called collect_cubes; give another"):
             as_settings(Variant())
-        with pytest.raises(InputError, match="PostsSettings: give register_task what makes"):
+        with pytest.raises(InputError, match=r"None makes no task; .* as in register_task\(PostsS"):
             register_task(PostsSettings)
         with pytest.raises(InputError, match="Posts is no class of settings; give it first"):
             register_task(Posts, PostsSettings)
-        with pytest.raises(InputError, match="5 makes no task; give a class of tasks"):
+        with pytest.raises(InputError, match="5 makes no task; give what makes the task"):
             register_task(PostsSettings, 5)
     assert "posts" not in TASKS
+
+
+def test_tasks_and_settings_need_a_name():
+    class Unnamed(BaseTaskSettings):
+        pass
+
+    with pytest.raises(InputError, match='Unnamed has no name; add name = "my_task" to the class'):
+        register_task(Unnamed, lambda _: Posts())
+    nameless = type("Nameless", (Posts,), {})()
+    with patch.object(Posts, "name", create=True), pytest.raises(InputError, match="Nameless has"):
+        del Posts.name
+        register_task(nameless)

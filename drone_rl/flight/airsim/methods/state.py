@@ -41,7 +41,7 @@ def _set_kinematics(simulation: Simulation, args: Sequence[Any]) -> None:
         read_vector(args[0].get(name), f"state.{name}")
         for name in ("linear_velocity", "angular_velocity")
     )
-    vehicle = vehicle_at(simulation, args, 2)
+    vehicle = sim_vehicle_at(simulation, args, 2)
     vehicle.set_kinematics(pose, velocity, rates)
     simulation.stage.touch(vehicle.body.position[0])
 
