@@ -276,7 +276,7 @@ def _other_ends(evidence: Evidence) -> str:
 
 def _never(evidence: Evidence) -> str:
     bound = evidence["failures"]["bound"]
-    upper = f"{100 * bound['upper95']:.1f}% (95% CI)"
+    upper = f"{100 * bound['upper95']:.2g}% (95% CI)"
     return f"It failed in none of {bound['trials']:,} episodes, so it fails in at most {upper}."
 
 

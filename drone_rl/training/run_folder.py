@@ -187,9 +187,24 @@ def possible_ends(settings: TrainSettings) -> list[enum.IntEnum]:
     return [end for end in ends if not (is_calm and end.name == "LOST_CONTROL")]
 
 
+def target_of(settings: TrainSettings) -> float | None:
+    """Return the running reward at which a run is solved, if any.
+
+    Raises:
+        InputError: It is a fraction of a largest reward that is not above 0.
+    """
+    share, largest = settings.trainer.target_share, as_task(settings.task).largest_reward
+    if share and not largest > 0:
+        raise InputError(
+            f"task={settings.task.name} has largest_reward={largest:g}, of which no fraction is a "
+            "target; give trainer.target_share=null, or shift the reward above 0"
+        )
+    return share and share * largest
+
+
 def result_of(
     trainer: Trainer,
-    largest_reward: float,
+    settings: TrainSettings,
     confirmation: Confirmation | None,
     checkpoints: CheckpointCallback,
 ) -> dict[str, Any]:
@@ -197,7 +212,11 @@ def result_of(
     confirmed = {} if confirmation is None else confirmation.result
     cloned = {k: v for k, v in checkpoints.extra.items() if k == "cloning"}
     progress = dataclasses.asdict(trainer.progress)
-    own = {"reason": trainer.reason, **progress, "largest_reward": largest_reward}
+    own = {
+        "reason": trainer.reason,
+        **progress,
+        "largest_reward": as_task(settings.task).largest_reward,
+    }
     return {**own, **confirmed, **cloned}
 
 

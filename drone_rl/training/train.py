@@ -20,7 +20,7 @@ from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.objectives import ReinforceLoss
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import describe
-from drone_rl.sim.tasks import FailureReplayTask, as_task
+from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.training import components, run_folder
 from drone_rl.training.callbacks import Callback, CollapseCheck, CsvCallback, with_progress
 from drone_rl.training.cloning import clone
@@ -98,7 +98,7 @@ def learn(
         InputError: The checkpoint is of another training run, or learning broke down.
     """
     run, limits = RunFolder(folder), settings.trainer
-    largest_reward = as_task(settings.task).largest_reward
+    target = run_folder.target_of(settings)
     demonstrations = run.prepare(settings, state)
     torch.set_num_threads(limits.num_threads)  # sums depend on it: equal on every machine
     bound_kernels()
@@ -111,7 +111,7 @@ def learn(
         learner=learner,
         callbacks=[CsvCallback(folder / "metrics.csv"), checkpoints, CollapseCheck(), *callbacks],
         generators=parts.generators,
-        target=limits.target_share and limits.target_share * largest_reward,
+        target=target,
         confirm=confirmation,
         total_frames=limits.total_frames,
         total_episodes=limits.total_episodes,
@@ -131,7 +131,7 @@ def learn(
         parts.collector.shutdown()
         if confirmation is not None:
             confirmation.close()
-    return run_folder.result_of(trainer, largest_reward, confirmation, checkpoints)
+    return run_folder.result_of(trainer, settings, confirmation, checkpoints)
 
 
 @implements(Episodes)

@@ -29,8 +29,8 @@ _PROCESS = re.compile(r"[1-9][0-9]{0,6}")
 """Process id at the end of a temporary file's name."""
 _FORMER_SUFFIX = re.compile(r"[a-z0-9_]{8}")
 """Random end of such a name in versions until 0.1."""
-_LONGEST_NUMBER = 19
-"""Digits of an integer in a JSON file."""
+_LONGEST_NUMBER = 40
+"""Digits of an integer in a JSON file; seeds of 128 bits have up to 39."""
 
 
 def as_path(value: str | Path, where: str) -> Path:

@@ -102,7 +102,17 @@ def percent(share: float, digits: int = 1) -> str:
 
 def interval(figure: Mapping[str, Any]) -> str:
     """Return the 95% confidence interval of a rate, in percent."""
-    return " to ".join(f"{100 * figure[end]:.1f}" for end in ("lower95", "upper95"))
+    return " to ".join(_hundredfold(figure[end]) for end in ("lower95", "upper95"))
+
+
+def _hundredfold(share: float) -> str:
+    """Return a rate times 100 with one decimal; 0.0 and 100.0 only if it is exactly 0 or 1."""
+    text = f"{100 * share:.1f}"
+    if text == "0.0" and share > 0:
+        return f"{100 * share:.2g}"
+    if text == "100.0" and share < 1:
+        return f"{100 - float(f'{100 * (1 - share):.2g}'):.12g}"
+    return text
 
 
 def rate(figure: Mapping[str, Any], label: str = "95% CI ") -> str:
@@ -112,7 +122,7 @@ def rate(figure: Mapping[str, Any], label: str = "95% CI ") -> str:
     "not offered".
     """
     share = figure["share"] if "share" in figure else figure["mean"]
-    return "not offered" if share is None else f"{100 * share:.1f}% ({label}{interval(figure)})"
+    return "not offered" if share is None else f"{_hundredfold(share)}% ({label}{interval(figure)})"
 
 
 SEED_KEYS = ("seed", "seed_is_fixed")

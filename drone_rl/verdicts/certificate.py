@@ -14,6 +14,7 @@ from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import as_path
 from drone_rl.utils.seeding import RootSeed, root_seed
 from drone_rl.verification.checker.certificate import Certificate
 from drone_rl.verification.checker.checker import check_certificate, read_validated
@@ -119,7 +120,7 @@ def find_claim(
         return None
     seed = seed or root_seed(None)
     if given is not None:
-        path = Path(given)
+        path = as_path(given, "certificate")
         path = path / "certificate.json" if path.is_dir() else path
         return _read_and_check(policy, path, flights, seed, **options)
     path = certificate_path(policy.path)

@@ -131,7 +131,7 @@ def find_domain(
         return None
     of = policy.description, policy.state["policy"]
     if given is not None:
-        path = Path(given)
+        path = as_path(given, "shifts")
         return read_shifts(path / "shifts.json" if path.is_dir() else path, *of)
     adjacent = shifts_path(policy.path)
     if adjacent.is_file():
@@ -208,9 +208,13 @@ def compare_with_required(
     Raises:
         InputError: The file is unusable, or no operating domain was measured, or it is refused.
     """
-    needs = read_requirements(Path(needed))
-    given = policy.path if isinstance(policy, Policy) else policy.name
-    remedy = f"run drone-rl shifts policy={given} first, in the same task"
+    needs = read_requirements(as_path(needed, "require_domain"))
+    if not isinstance(policy, Policy):
+        raise InputError(
+            f"policy={policy.name} is not a drone_rl policy file, so no shifts.json can be matched "
+            f"to its weights; leave require_domain={needed} out"
+        )
+    remedy = f"run drone-rl shifts policy={policy.path} first, in the same task"
     if measured is None:
         raise InputError(f"require_domain={needed}, but the policy has no shifts.json; {remedy}")
     if measured.numbers is None:

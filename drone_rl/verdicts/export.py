@@ -24,6 +24,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes, write_all_atomically
 from drone_rl.utils.limits import CERTIFICATE_BYTES, SHIFTS_BYTES
 from drone_rl.utils.overrides import COMMAND, read_overrides
+from drone_rl.utils.schema import Maybe
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import Evidence, Sentence, listed, rate, said, say
 from drone_rl.verdicts.certificate import find_claim
@@ -77,8 +78,11 @@ def export(
     return seed
 
 
-def origin_of(path: Path, state: dict[str, Any]) -> tuple[str, dict[str, Any] | None]:
-    """Return the command that repeats the training run, and the selection in a sweep, if any."""
+def origin_of(path: Path, state: dict[str, Any]) -> tuple[str | None, dict[str, Any] | None]:
+    """Return the command that repeats the training run, and the selection in a sweep, if any.
+
+    The command is None if it is unknown, as of a run that was trained from Python.
+    """
     folder = path.absolute().parent.parent
     if path.suffix == ".pt" and (folder.parent / "sweep.json").is_file():
         rows = read_rows(read_sweep(folder.parent))
@@ -86,7 +90,9 @@ def origin_of(path: Path, state: dict[str, Any]) -> tuple[str, dict[str, Any] | 
         if row is not None:
             episodes = None if row.verdict is None else row.verdict["greedy"]["episodes"]
             return row.run.repeat_command(), {"runs": len(rows), "episodes": episodes}
-    noted = state.get("command") or shlex.join(["drone-rl", "train", *read_overrides(folder)])
+    noted = state.get("command")
+    if noted is None and (folder / ".hydra" / "overrides.yaml").is_file():
+        noted = shlex.join(["drone-rl", "train", *read_overrides(folder)])
     return noted, state.get("chosen")
 
 
@@ -94,7 +100,7 @@ def export_policy(
     path: Path,
     checkpoint: Mapping[str, Any],
     *,
-    command: str,
+    command: str | None,
     verdict: Mapping[str, Any],
     seed: int,
     chosen: Mapping[str, Any] | None,
@@ -115,7 +121,7 @@ def export_policy(
     about = {
         "progress": checkpoint["progress"],
         "provenance": {k: origin[k] for k in ("versions", "git_revision")},
-        "command": COMMAND.read(command, "command"),
+        "command": Maybe(COMMAND).read(command, "command"),
         "verdict": verdict,
         "worlds": "report",
         "seed": seed,
@@ -155,6 +161,7 @@ def write_card(name: str, digest: str, about: Evidence) -> str:
     packages = {name: known.get(name, "unknown") for name in ("torch", "torchrl", "mujoco-warp")}
     revision = about["provenance"]["git_revision"] or "unknown"
     points = "\n".join(f"- {text}" for text in sentences.values())
+    by = "" if about["command"] is None else f"by `{about['command']}` "
     return f"""# {name}
 
 {verdict}
@@ -164,7 +171,7 @@ def write_card(name: str, digest: str, about: Evidence) -> str:
 {_failures(about["verdict"]["failures"])}
 
 {points}
-- Trained by `{about["command"]}` for {about["progress"]["frames"]:,} frames; the file's metadata \
+- Trained {by}for {about["progress"]["frames"]:,} frames; the file's metadata \
 contains its description.
 - SHA-256 of `{name}.safetensors`: `{digest}`
 - revision {revision}; torch {packages["torch"]}, torchrl {packages["torchrl"]}, mujoco-warp \
@@ -195,7 +202,7 @@ def _failures(failures: Evidence) -> str:
     """Return the rows of the failure table that have failures, largest first."""
     largest = failures["largest"]
     if largest is None:
-        upper = f"{100 * failures['bound']['upper95']:.1f}% of episodes"
+        upper = f"{100 * failures['bound']['upper95']:.2g}% of episodes"
         return _table([["fails", "never"], ["upper bound", upper]])
     failed = [row for row in failures["rows"] if row["failed"] and row != largest]
     rows = [
@@ -233,6 +240,8 @@ def _reported(card: Evidence) -> str:
 
 def _chosen(card: Evidence) -> str:
     chosen = card["chosen"]
+    if chosen["runs"] == 1:
+        return "It is the only run of a sweep, so it was not chosen among several."
     text = f"It is one of the {chosen['runs']} runs of a sweep"
     if chosen["episodes"] is None:
         return f"{text}, in which it was not judged."
@@ -243,7 +252,8 @@ def _chosen(card: Evidence) -> str:
 
 
 def _tested(card: Evidence) -> str:
-    tested = terms_of(card["verdict"]).tested or some_cubes(card["task"])
+    task, tested = card["task"], terms_of(card["verdict"]).tested
+    tested = tested or (f"task {task['name']}" if "name" in task else some_cubes(task))
     unknown = listed(not_evaluated(card), "or")
     but = f": nothing is known of other {unknown}" if unknown else ", except as stated here"
     what = "The verdict is for" if has_domain(card) else "Tested with"

@@ -95,7 +95,7 @@ def export_onnx(
         raise InputError(f"target={target} is a folder; give a file in it, such as policy.onnx")
     make_folder(target.parent)
     policy = policy if isinstance(policy, Policy) else load_policy(policy)
-    metadata = {"command": command or origin_of(policy.path, policy.state)[0]}
+    metadata = {"command": command or origin_of(policy.path, policy.state)[0] or "unknown"}
     content = make_onnx(policy.description, policy.make_network(), metadata)
     model = open_onnx(content)
     without_faults = dataclasses.replace(policy, description=policy.description.without_faults())

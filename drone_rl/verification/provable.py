@@ -75,6 +75,8 @@ class Journal(Callback):
     settings: TrainSettings
     how: ProvableSettings
     rounds: list[Round]
+    is_new: bool = dataclasses.field(default=False, compare=False)
+    """Whether searches in the folder, even an unfinished one, are of an earlier run."""
 
     @classmethod
     def open(
@@ -103,7 +105,8 @@ class Journal(Callback):
             check_same_config(saved["settings"], as_config(settings), MAY_CHANGE)
             check_same_config(saved["how"], how.values(), HOW_MAY_CHANGE)
             rounds = [Round.read(row, "rounds") for row in saved["rounds"]]
-        journal = cls(folder, settings, how or ProvableSettings(rounds=10), rounds)
+        how = how or ProvableSettings(rounds=10)
+        journal = cls(folder, settings, how, rounds, is_new=saved is None)
         _check_support(settings)  # refused before anything is written
         if state is None:  # from here on, the folder has no rounds of an earlier run
             journal.save()
@@ -112,6 +115,10 @@ class Journal(Callback):
     def on_start(self, training: OngoingTraining) -> None:
         """Write the file."""
         self.save()
+
+    def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
+        """Delete the state of an unfinished proof, which is of the policy before this update."""
+        (self.next_folder / "state.npz").unlink(missing_ok=True)
 
     @property
     def task(self) -> TaskSettings:
@@ -172,8 +179,8 @@ class Journal(Callback):
         return boxes
 
     def save(self) -> None:
-        """Write the file; without rounds, delete those of an earlier run."""
-        if not self.rounds:
+        """Write the file; a new run deletes the searches of an earlier one at first."""
+        if self.is_new and not self.rounds:
             shutil.rmtree(self.folder / "rounds", ignore_errors=True)
         noted = {
             "settings": as_config(self.settings),
@@ -228,7 +235,7 @@ def train_until_proved(
         journal = Journal.open(folder, settings, how, state, changes)
         callbacks = [journal, *hooks]
         result = _learn(journal, state, callbacks)
-        while not (journal.is_over or result["reason"].startswith("SIG")):
+        while not (journal.is_over or _is_stopped(journal, result)):
             _search(journal, progress)
             if not journal.is_over:
                 state = read_checkpoint(last_of(folder))
@@ -241,6 +248,13 @@ def train_until_proved(
         result["rounds"] = [done.values() for done in journal.rounds]
         done = finish(journal.settings, folder, result)
     return reraise_signal(done)
+
+
+def _is_stopped(journal: Journal, result: Mapping[str, Any]) -> bool:
+    """Whether a signal or callback ended training, or no episodes are left since a search."""
+    if result["reason"] == "episodes":
+        return bool(journal.rounds) and journal.rounds[-1].frames == result["frames"]
+    return result["reason"] not in ("solved", "frames")
 
 
 def _check_support(settings: TrainSettings) -> None:

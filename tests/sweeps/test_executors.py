@@ -114,7 +114,9 @@ def test_clusters_of_this_machine(make_runs, tmp_path, cluster):
 
 
 def test_an_unknown_cluster_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"hydra\.launcher\.cluster='Slurm' is unknown; give slurm, local"):
+    with pytest.raises(
+        InputError, match=r"hydra\.launcher\.cluster='Slurm' is unknown; give slurm, local"
+    ):
         SlurmExecutor(tmp_path, cluster="Slurm", num_jobs=2)
 
 

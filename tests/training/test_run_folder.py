@@ -1,11 +1,14 @@
 """Files that a training reads from and writes to its folder."""
 
+from unittest.mock import patch
+
 import pytest
 import yaml
 
-from drone_rl.config import DynamicsSettings
+from drone_rl.config import TASKS, DynamicsSettings
 from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
+from drone_rl.sim.tasks.task import MAKERS, as_settings
 from drone_rl.training.run_folder import (
     RunFolder,
     _read_best,
@@ -13,8 +16,10 @@ from drone_rl.training.run_folder import (
     new_folder,
     possible_ends,
     settings_of,
+    target_of,
 )
 from drone_rl.utils.errors import InputError
+from tests.second_task import Posts
 
 
 @pytest.mark.parametrize("best", [float("nan"), float("inf"), 1e9, "high", None])
@@ -68,3 +73,16 @@ def test_a_checkpoint_is_no_folder_to_resume(tmp_path):
     path = tmp_path / "checkpoints" / "last.pt"
     with pytest.raises(InputError, match=r"last\.pt is a checkpoint; give the folder of its run"):
         RunFolder.open(path, resume=True)
+
+
+def test_a_task_of_costs_has_no_target():
+    class Costs(Posts):
+        name, largest_reward = "costs", 0.0
+
+    with patch.dict(TASKS), patch.dict(MAKERS):
+        settings = TrainSettings(task=as_settings(Costs()))
+        with pytest.raises(InputError, match="task=costs has largest_reward=0, of which no fract"):
+            target_of(settings)
+        endless = settings.trainer.replace(target_share=None)
+        assert target_of(settings.replace(trainer=endless)) is None
+    assert target_of(TrainSettings()) == pytest.approx(2.97)  # 0.99 of three cubes

@@ -249,3 +249,7 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match=r"^folder=.*b can't be made \(Not a directory\); give"):
         make_folder(tmp_path / "file" / "b")
+
+
+def test_seeds_of_128_bits_are_read():
+    assert parse_json(str(2**128 - 1), "x") == 2**128 - 1

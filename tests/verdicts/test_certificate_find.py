@@ -102,3 +102,8 @@ def test_no_tampered_file_makes_a_poor_policy_proved(poor, truth, tmp_path):
             believed.append(name)
     assert count >= 20
     assert believed == []
+
+
+def test_a_certificate_that_is_no_path_is_refused(poor):
+    with pytest.raises(InputError, match=r"certificate=3 is no path"):
+        find_claim(poor, 3)

@@ -123,3 +123,9 @@ def test_a_card_quotes_conditions_that_then_travel_with_the_policy(tmp_path, nam
         again = drone_rl.load_policy(tmp_path / "mine.safetensors")
         assert find_domain(again).path == beside
         assert "Read from mine.shifts.json, dated" in card  # and no path of this machine
+
+
+def test_a_run_from_python_names_no_command(checkpoint):
+    (checkpoint.parents[2] / "sweep.json").unlink()
+    (checkpoint.parents[1] / ".hydra" / "overrides.yaml").unlink()
+    assert origin_of(checkpoint, {}) == (None, None)

@@ -55,3 +55,15 @@ def test_a_policy_that_never_failed_has_a_bound():
 def test_a_package_that_is_not_noted_is_unknown():
     found = lines(provenance={"versions": {"torch": "1"}, "git_revision": None})
     assert "- revision unknown; torch 1, torchrl unknown, mujoco-warp unknown" in found
+
+
+def test_a_small_bound_is_not_zero():
+    bound = {"share": 0.0, "lower95": 0.0, "upper95": 0.000369, "trials": 10_000}
+    failures = {"rows": [], "largest": None, "bound": bound}
+    found = "\n".join(lines(verdict={**VERDICT, "failures": failures}))
+    assert "| upper bound | 0.037% of episodes |" in found
+
+
+def test_an_unknown_command_is_not_named():
+    found = "\n".join(lines(command=None))
+    assert "- Trained for 12,345 frames; the file's metadata" in found

@@ -2,6 +2,7 @@
 
 import pytest
 
+from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.text import said
 from drone_rl.verdicts.export import SENTENCES
 
@@ -112,3 +113,14 @@ def test_a_body_is_told_with_its_air():
 )
 def test_without_its_evidence_a_sentence_goes(name, evidence):
     assert name not in said(SENTENCES, {**CARD, **evidence})
+
+
+def test_a_task_of_the_users_own_is_named():
+    verdict = {**VERDICT, "terms": TaskVocabulary(goal="post").as_dict()}
+    found = said(SENTENCES, {**CARD, "verdict": verdict, "task": {"name": "pass_post"}})
+    assert found["card.tested"].startswith("Tested with task pass_post,")
+
+
+def test_the_only_run_of_a_sweep_was_not_chosen_among_several():
+    found = said(SENTENCES, {**CARD, "chosen": {"runs": 1, "episodes": 200}})
+    assert found["card.chosen"].startswith("It is the only run of a sweep")

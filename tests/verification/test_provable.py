@@ -242,3 +242,20 @@ def test_other_rounds_are_refused(whole):
         train(whole.folder, HOW.replace(share=0.1), resume=True)
     with pytest.raises(InputError, match="can't resume with seed=3"):
         train(whole.folder, resume=True, seed=3)
+
+
+class Stop(Callback):
+    def on_update(self, training, metrics):
+        training.stop_request = "enough"
+
+
+def test_a_callback_stops_it(tmp_path):
+    done = train(tmp_path, callbacks=[Stop()])
+    assert done.reason == "enough" and done.result["rounds"] == []
+
+
+def test_spent_episodes_end_it(tmp_path):
+    limits = TINY.trainer.replace(total_episodes=1, target_share=None)
+    settings = TINY.replace(trainer=limits)
+    done = drone_rl.train_until_proved(settings, HOW, folder=tmp_path, progress=silent)
+    assert done.reason == "episodes" and len(done.result["rounds"]) == 1

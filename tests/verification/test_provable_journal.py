@@ -141,3 +141,15 @@ def test_what_no_proof_supports_is_not_begun(change, message, tmp_path):
     with pytest.raises(InputError, match=message):
         begin(tmp_path / "new", **change)
     assert not (tmp_path / "new").exists()
+
+
+def test_the_first_proof_goes_on_after_a_kill(tmp_path):
+    begin(tmp_path)
+    state = tmp_path / "rounds" / "0" / "state.npz"
+    state.parent.mkdir(parents=True)
+    state.write_bytes(b"a state")
+    again = begin(tmp_path, None, STATE, None)
+    again.on_start(None)
+    assert state.exists()
+    again.on_update(None, {})  # of another policy
+    assert not state.exists()

@@ -54,10 +54,10 @@ _PROVENANCE = Record(
 _ABOUT: dict[str, Kind] = {
     "progress": _PROGRESS,
     "provenance": _PROVENANCE,
-    "command": COMMAND,
+    "command": Maybe(COMMAND),
     "verdict": Plain(),
     "worlds": Text(20),
-    "seed": _COUNT,
+    "seed": Whole(0),
     "chosen": Maybe(Record({"runs": _COUNT, "episodes": Maybe(_COUNT)})),
     "evaluation": Plain(),
 }
@@ -135,7 +135,8 @@ def exported_bytes(
     weights: Mapping[str, torch.Tensor], description: Mapping[str, Any], about: Mapping[str, Any]
 ) -> bytes:
     """Return the content of a file with weights, description and provenance."""
-    contiguous = {name: value.contiguous() for name, value in weights.items()}
+    layout = torch.contiguous_format
+    contiguous = {name: value.clone(memory_format=layout) for name, value in weights.items()}
     metadata = {"description": json.dumps(description), "about": json.dumps(about)}
     return save(contiguous, {"format": FORMAT, **metadata})
 

@@ -18,6 +18,7 @@ from drone_rl.policies.zoo import (
     read_policy,
     shifts_path,
 )
+from drone_rl.policies.zoo.files import exported_bytes
 from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.export import export_policy
@@ -215,3 +216,15 @@ def test_failed_export_writes_nothing(tmp_path, where):
     with pytest.raises(KeyError):
         export_policy(path, CHECKPOINT, verdict={**VERDICT, "failures": {}}, **origin)
     assert [found.name for found in tmp_path.iterdir()] == [where]
+
+
+def test_a_long_seed_and_no_command_are_read_again(tmp_path):
+    path, origin = tmp_path / "mine.safetensors", {"command": None, "chosen": None}
+    export_policy(path, CHECKPOINT, verdict=VERDICT, seed=2**64, **origin)
+    read = load_exported(path)
+    assert (read["seed"], read["command"]) == (2**64, None)
+
+
+def test_tied_weights_are_written_twice():
+    tied = torch.ones(2)
+    assert len(exported_bytes({"a": tied, "b": tied}, {}, {})) > 16
