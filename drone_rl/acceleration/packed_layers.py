@@ -11,7 +11,7 @@ import warp as wp
 from torch import Tensor, nn
 
 from drone_rl.acceleration.layers_kernel import WIDTH, LayerGeometry, Layers
-from drone_rl.policies.networks import PolicyNetwork, Weighted
+from drone_rl.policies.networks import PolicyNetwork, Weighted, has_own_weights
 
 
 class PackedLayer(NamedTuple):
@@ -202,8 +202,7 @@ def unsupported(network: nn.Module) -> list[str]:
     layers with ReLU, in float32 on a CPU.
     """
     name = type(network).__name__
-    is_plain = getattr(type(network), "forward", None) is PolicyNetwork.forward
-    if not isinstance(network, PolicyNetwork) or not is_plain:
+    if not isinstance(network, PolicyNetwork) or not network.is_sequential:
         return [f"network {name} is not fused"]
     if network.in_shape[0] != 1:
         return [f"a network of {network.in_shape[0]} channels is not fused"]
@@ -248,19 +247,20 @@ def _pool_sizes(network: PolicyNetwork) -> dict[nn.Module, int]:
 
 
 def _letter(layer: nn.Module) -> str:
-    if isinstance(layer, nn.Conv2d):
+    """Return a layer's kind; "?" also for derived classes, which may compute something else."""
+    if type(layer) is nn.Conv2d:
         is_square = layer.stride[0] == layer.stride[1]
         plain = (layer.padding, layer.dilation, layer.groups) == ((0, 0), (1, 1), 1)
-        return "c" if is_square and plain and layer.bias is not None else "?"
-    if isinstance(layer, nn.Linear):
-        return "l" if layer.bias is not None else "?"
-    if isinstance(layer, nn.MaxPool2d):
+        return "c" if is_square and plain and has_own_weights(layer) else "?"
+    if type(layer) is nn.Linear:
+        return "l" if has_own_weights(layer) else "?"
+    if type(layer) is nn.MaxPool2d:
         is_square = isinstance(layer.kernel_size, int) and layer.stride == layer.kernel_size
         plain = (layer.padding, layer.dilation, layer.ceil_mode) == (0, 1, False)
         return "p" if is_square and plain and not layer.return_indices else "?"
-    if isinstance(layer, nn.Flatten):
+    if type(layer) is nn.Flatten:
         return "f" if (layer.start_dim, layer.end_dim) == (1, -1) else "?"
-    return "r" if isinstance(layer, nn.ReLU) else "?"
+    return "r" if type(layer) is nn.ReLU else "?"
 
 
 class PackedNetwork:

@@ -35,15 +35,16 @@ class ActorCritic(nn.Module):
         """Add a critic to a policy.
 
         Args:
-            network: The policy's; an `InputError` unless it is a `PolicyNetwork`.
+            network: The policy's; an `InputError` unless it is a `PolicyNetwork` of layers in turn.
             own: Of the critic, with one output; None for a linear layer on the policy's features.
             generator: Source of that layer's initial weights.
         """
         super().__init__()
-        if not isinstance(network, PolicyNetwork):
+        if not isinstance(network, PolicyNetwork) or not network.is_sequential:
             raise InputError(
                 f"a critic needs a policy of layers, which {type(network).__name__} is not; give "
-                "objective=reinforce, or derive the network from drone_rl.policies.PolicyNetwork"
+                "objective=reinforce, or derive it from drone_rl.policies.PolicyNetwork and "
+                "keep its forward"
             )
         *_, last = network.layers
         self.trunk = TensorDictModule(Trunk(network), in_keys=[PIXELS], out_keys=[FEATURES])

@@ -105,6 +105,11 @@ class PolicyNetwork(ImageNetwork):
         """The layers."""
         return self.layers
 
+    @property
+    def is_sequential(self) -> bool:
+        """Whether the outputs are those of `layers` in turn: no class overrides `forward`."""
+        return type(self).forward is PolicyNetwork.forward
+
     @torch.no_grad()
     def rescale(self, factor: Tensor, shift: Tensor) -> None:
         """See `ImageNetwork`; the last layer changes."""
@@ -127,6 +132,11 @@ class PolicyNetwork(ImageNetwork):
         if not (torch.is_grad_enabled() or torch.compiler.is_compiling()):
             require_finite(logits, self.owner)
         return logits.reshape(*pixels.shape[:-3], logits.shape[-1])
+
+
+def has_own_weights(layer: nn.Module) -> bool:
+    """Return whether weight and bias are a layer's parameters, not computed from others."""
+    return {name for name, _ in layer.named_parameters(recurse=False)} == {"weight", "bias"}
 
 
 class Trunk(nn.Module):

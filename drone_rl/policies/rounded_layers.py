@@ -10,6 +10,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from drone_rl.policies.networks import has_own_weights
+
 UNIT = 2.0**-24
 """Unit roundoff of float32: the largest relative error of one operation."""
 TINY = 2.0**-126
@@ -184,16 +186,16 @@ class _Maximum(Layer):
 
 def layer_of(layer: nn.Module) -> Layer | None:
     """Return the rounding errors of a network's layer, or None if it is not supported."""
-    if isinstance(layer, nn.Conv2d):
+    if type(layer) is nn.Conv2d:
         is_plain = (layer.padding, layer.dilation, layer.groups) == ((0, 0), (1, 1), 1)
-        return _Affine(layer) if is_plain and layer.bias is not None else None
-    if isinstance(layer, nn.Linear):
-        return _Affine(layer) if layer.bias is not None else None
-    if isinstance(layer, nn.MaxPool2d):
+        return _Affine(layer) if is_plain and has_own_weights(layer) else None
+    if type(layer) is nn.Linear:
+        return _Affine(layer) if has_own_weights(layer) else None
+    if type(layer) is nn.MaxPool2d:
         side = layer.kernel_size
         is_plain = (layer.padding, layer.dilation, layer.ceil_mode) == (0, 1, False)
         is_plain = is_plain and isinstance(side, int) and layer.stride == side
         return _Maximum(side) if is_plain and isinstance(side, int) else None
-    if isinstance(layer, nn.Flatten):
+    if type(layer) is nn.Flatten:
         return _Flat() if (layer.start_dim, layer.end_dim) == (1, -1) else None
-    return _Rectified() if isinstance(layer, nn.ReLU) else None
+    return _Rectified() if type(layer) is nn.ReLU else None

@@ -67,7 +67,7 @@ class RoundingBound:
         Supported are convolutions without padding and linear layers, all with biases, ReLU,
         pooling without overlap and Flatten, of a `PolicyNetwork`; see `layer_of`.
         """
-        if not isinstance(network, PolicyNetwork):
+        if not isinstance(network, PolicyNetwork) or not network.is_sequential:
             return None
         layers = [layer_of(layer) for layer in network.layers]
         known = [layer for layer in layers if layer is not None]

@@ -94,7 +94,8 @@ class Sb3Trunk(BaseFeaturesExtractor):
     """A features extractor: `policy_kwargs={"features_extractor_class": Sb3Trunk, "net_arch": []}`.
 
     Raises:
-        InputError: The observations do not have three dimensions, or the network is recurrent.
+        InputError: The observations do not have three dimensions, or the network is recurrent or
+            has a forward of its own.
     """
 
     def __init__(self, observation_space: spaces.Box, network: Network | None = None) -> None:
@@ -103,10 +104,10 @@ class Sb3Trunk(BaseFeaturesExtractor):
         if len(shape) != 3:
             raise InputError(f"Sb3Trunk got observations of shape {shape}; give images (C, H, W)")
         made: Any = (network or SmallCnn()).make(shape, 1)
-        if not isinstance(made, PolicyNetwork):
+        if not isinstance(made, PolicyNetwork) or not made.is_sequential:
             raise InputError(
-                f"Sb3Trunk got {type(made).__name__}, which is recurrent; give the settings of a "
-                "network without memory, such as SmallCnn()"
+                f"Sb3Trunk got {type(made).__name__}, which is recurrent or has its own forward; "
+                "give the settings of a network without them, such as SmallCnn()"
             )
         width = made.layers.get_parameter("logits.weight").shape[1]
         super().__init__(observation_space, features_dim=width)

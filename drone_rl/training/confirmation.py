@@ -27,7 +27,7 @@ class Confirmation:
         self._settings, self._network = settings, network
         self._description = describe(settings)
         self.episodes = 0
-        """Episodes so far."""
+        """Episodes since the run began or was last resumed."""
         self.succeeded = 0
         """Successes in the last confirmation."""
 
@@ -39,10 +39,14 @@ class Confirmation:
         worlds.first_world = update * _NUM_ENVS
         env.set_seed(settings.seed)
         actor = make_actor(self._network, env.action_spec)
-        greedy = run_episodes(env, actor, episodes, is_compiled=True)
+        self._network.eval()  # as the policy acts once it is loaded
+        try:
+            greedy = run_episodes(env, actor, episodes, is_compiled=True)
+        finally:
+            self._network.train()
         self.episodes += episodes
         self.succeeded = int(greedy.success.sum())
-        return self.succeeded >= settings.trainer.confirm_share * episodes
+        return self.succeeded >= settings.trainer.confirm_share * episodes - 1e-9
 
     @functools.cached_property
     def _env(self) -> TransformedEnv:

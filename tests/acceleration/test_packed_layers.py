@@ -12,6 +12,7 @@ from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
 from drone_rl.policies.networks import PolicyNetwork
 from drone_rl.sim.rendering.devices import start_warp
+from tests.own_networks import Doubled
 
 start_warp("cpu")
 
@@ -157,3 +158,11 @@ def test_a_network_that_overrides_the_forward_pass_is_unsupported():
             return super().forward(pixels) / 2
 
     assert unsupported(Cold((1, 25, 64), 3)) == ["network Cold is not fused"]
+
+
+@pytest.mark.parametrize(
+    "first", [Doubled(1, 2, 3), nn.utils.parametrizations.spectral_norm(nn.Conv2d(1, 2, 3))]
+)
+def test_layers_that_compute_something_else_are_not_packed(first):
+    layers = OrderedDict(conv=first, relu=nn.ReLU(), flatten=nn.Flatten(), logits=nn.Linear(72, 3))
+    assert unsupported(PolicyNetwork((1, 8, 8), layers, lambda *_: None))

@@ -10,6 +10,7 @@ from torch import nn
 from drone_rl.policies import MLP, ActorCritic, SmallCNN
 from drone_rl.policies.critic import LOG_PROB
 from drone_rl.utils.errors import InputError
+from tests.own_networks import Mirrored
 
 SHAPE = (1, 16, 16)
 
@@ -100,3 +101,8 @@ def test_network_without_layers_raises():
         match=r"of layers, which Linear is not; give objective=",
     ):
         ActorCritic(nn.Linear(4, 2))
+
+
+def test_a_forward_pass_of_its_own_has_no_critic():
+    with pytest.raises(InputError, match="which Mirrored is not; .* keep its forward"):
+        ActorCritic(Mirrored((1, 25, 64), 3))

@@ -176,7 +176,7 @@ def test_mismatched_camera_raises(network):
 
 def test_external_policies_cannot_be_proved(tmp_path):
     policy = drone_rl.policy_from(left)
-    words = r"^policy=left is not stored in a file of drone_rl's"
+    words = r"^policy=left is in no file of drone_rl's"
     for ask in (drone_rl.prove, drone_rl.chances, drone_rl.places, drone_rl.load_policy):
         with pytest.raises(InputError, match=words) as caught:
             ask(policy)

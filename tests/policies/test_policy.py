@@ -248,3 +248,7 @@ def test_images_that_do_not_fit_the_camera_raise():
         policy.act_batch(three)
     policy.reset()
     assert policy.act_batch(three).shape == (3,)
+
+
+def test_a_loaded_network_is_in_evaluation_mode():
+    assert not drone_rl.load_policy("good").make_network().training

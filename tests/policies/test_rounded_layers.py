@@ -3,6 +3,7 @@ import torch
 from torch import nn
 
 from drone_rl.policies.rounded_layers import layer_of
+from tests.own_networks import Doubled
 
 
 def test_bound_covers_inputs_of_other_evaluations():
@@ -43,3 +44,10 @@ def test_convolutions_with_padding_are_not_supported():
     assert layer_of(nn.Conv2d(1, 1, 2)) is not None
     for padding in (1, "valid"):
         assert layer_of(nn.Conv2d(1, 1, 2, padding=padding)) is None
+
+
+@pytest.mark.parametrize(
+    "layer", [Doubled(1, 2, 3), nn.utils.parametrizations.spectral_norm(nn.Conv2d(1, 2, 3))]
+)
+def test_layers_that_compute_something_else_are_not_supported(layer):
+    assert layer_of(layer) is None

@@ -9,6 +9,7 @@ from drone_rl.policies import MLP, OriginalCNN, SmallCNN
 from drone_rl.policies.external_network import ExternalNetwork
 from drone_rl.policies.rounding import TOLERANCE, RoundingBound, arithmetic_on, decider
 from drone_rl.sim.actions import MOVES
+from tests.own_networks import Mirrored
 
 BIG = 2.0**24
 
@@ -154,3 +155,7 @@ def test_tf32_convolutions_are_reported(monkeypatch):
         name = "float32 (convolutions in TF32) on cuda" if allowed else "float32 on cuda"
         assert arithmetic_on(torch.device("cuda")) == (name, False)
         assert arithmetic_on(torch.device("cpu")) == ("float32 on cpu", True)
+
+
+def test_a_forward_pass_of_its_own_has_no_known_bound():
+    assert RoundingBound.find(Mirrored((1, 25, 64), 3)) is None

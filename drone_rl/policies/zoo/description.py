@@ -188,10 +188,14 @@ class PolicyDescription:
         return self._checked(self._network(actions, generator), actions.num_outputs)
 
     def load_network(self, weights: Mapping[str, torch.Tensor]) -> ImageNetwork:
-        """Return the network with given weights, as in `expected_weights`."""
-        network = self._without_weights().to_empty(device="cpu")
+        """Return the network, in evaluation mode, with given weights, as in `expected_weights`."""
+        if own_place(self.network):  # may hold tensors that are no weights, and so not on meta
+            with torch.random.fork_rng(devices=()):
+                network = self._network(self.make_dynamics().actions, torch.Generator())
+        else:
+            network = self._without_weights().to_empty(device="cpu")
         network.load_state_dict(weights)
-        return self._checked(network, network.actions.num_outputs)
+        return self._checked(network, network.actions.num_outputs).eval()
 
     def build_critic(self, generator: torch.Generator | None = None) -> ImageNetwork:
         """Return a network of the same kind with one output, see `build_network`."""

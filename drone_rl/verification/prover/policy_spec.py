@@ -73,6 +73,11 @@ def make_policy_spec(
     task = require_cubes(description, "proofs")
     if not isinstance(network, PolicyNetwork):
         raise InputError(f"proofs need layers, which {type(network).__name__} has not")
+    if not network.is_sequential:
+        raise InputError(
+            f"proofs support only networks of layers in turn; {type(network).__name__} has a "
+            "forward of its own; prove another policy"
+        )
     check_task(task)
     if not description.appearance.is_minimal:
         raise InputError(

@@ -370,3 +370,34 @@ def test_environment_uses_described_or_given_dynamics(monkeypatch):
     turning = Turning()
     assert flown(dynamics=turning) is turning
     assert type(flown(dynamics=COMPUTER_VISION)) is ComputerVision
+
+
+def test_a_loaded_network_has_no_dropout(registered):
+    @register_network("own")
+    class Dropping(PolicyNetwork):
+        def __init__(self, in_shape, num_actions, *, generator=None):
+            layers = OrderedDict(flatten=nn.Flatten(), drop=nn.Dropout(0.5))
+            layers["logits"] = nn.Linear(1600, num_actions)
+            super().__init__(in_shape, layers, lambda *_: None)
+
+    registered(Dropping)
+    described = parse({**DEFAULT, "network": {"name": "own"}})
+    network = described.load_network(described.build_network().state_dict())
+    pixels = torch.ones(1, 1, 25, 64)
+    assert torch.equal(network(pixels), network(pixels))
+
+
+def test_values_that_are_no_weights_survive_loading(registered):
+    @register_network("own")
+    class Tilted(SmallCNN):
+        def __init__(self, in_shape, num_actions, *, generator=None):
+            super().__init__(in_shape, num_actions, generator=generator)
+            self.register_buffer("tilt", torch.linspace(1, 2, in_shape[-1]), persistent=False)
+
+        def forward(self, pixels):
+            return super().forward(pixels + self.tilt)
+
+    registered(Tilted)
+    described = parse({**DEFAULT, "network": {"name": "own"}})
+    built = described.build_network(torch.Generator().manual_seed(0))
+    assert torch.equal(described.load_network(built.state_dict()).tilt, built.tilt)

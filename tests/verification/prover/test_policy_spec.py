@@ -13,6 +13,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.cube_images import CubeView
 from drone_rl.verification.prover.policy_spec import check_task, make_compositor, make_policy_spec
+from tests.own_networks import Mirrored
 
 
 @pytest.fixture(scope="module")
@@ -127,3 +128,9 @@ def test_the_networks_actions_must_be_moves():
     network.actions = dataclasses.replace(network.actions)
     with pytest.raises(InputError, match="support only the actions"):
         make_policy_spec(policy.description, network, 1e-4)
+
+
+def test_a_forward_pass_of_its_own_is_refused():
+    description = drone_rl.load_policy("good").description
+    with pytest.raises(InputError, match="Mirrored has a forward of its own"):
+        make_policy_spec(description, Mirrored(description.input.shape, 3), 1e-4)
