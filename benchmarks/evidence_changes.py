@@ -358,6 +358,8 @@ OF_SHIFTS = (
     ("shifts.together", {"together.refused": "task.cube_size=99"}),
     ("shifts.together", {"together.modes.constant.success.share": 0.5}),
     ("shifts.scope", _NOT_GOOD),
+    ("shifts.own_faults", {"network": None},
+     {"network": {"description": {"transforms": [{"name": "noise"}]}}}),
     ("shifts.fixed_seed", FRESH_SEED),
     ("shifts.fixed_seed", OTHER_SEED),
 )  # fmt: skip

@@ -151,7 +151,7 @@ class FusedNetwork(ImageNetwork):
             layers = packed_layers(self.network)
             self._engine = _Engine(layers, self._num_threads, self._cache, self._differentiates)
         self.network.check(pixels)
-        flat = pixels.reshape(-1, math.prod(self.in_shape))
+        flat = pixels.reshape(-1, math.prod(self.in_shape)).contiguous()
         handles = None if activations is None else activations.reshape(-1)
         parameters = self._engine.parameters if self._differentiates == "weights" else ()
         logits = _Logits.apply(self._engine, flat, handles, *parameters)

@@ -59,6 +59,10 @@ def main() -> None:
     sys.exit(status)
 
 
+_DEMO = ("evaluate", "explain")
+"""What a demo runs after its training."""
+
+
 def _discard_output() -> None:
     """Discard buffered output, which the interpreter would write at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -87,8 +91,16 @@ def _main(args: list[str]) -> int:
     from drone_rl.cli.hydra.messages import guarded  # slow: imports Hydra
 
     leave_compiler_unloaded()
-    steps = [("train", overrides), ("evaluate", []), ("explain", [])]
+    steps = [("train", overrides), *((step, _same_policy(overrides)) for step in _DEMO)]
     return guarded(lambda: _run_all(steps if name == "demo" else [(name, overrides)]))
+
+
+def _same_policy(overrides: list[str]) -> list[str]:
+    """Return the settings by which other commands find the policy that a training makes."""
+    shared = [o for o in overrides if o.lstrip("+").startswith(("paths.", "plugins="))]
+    runs = [o for o in overrides if o.startswith(("hydra.run.dir=", "resume="))]
+    folders = [run.partition("=")[2] for run in runs if run not in ("resume=latest", "resume=null")]
+    return [*shared, *(f"policy={folder}" for folder in folders[-1:])]
 
 
 def _run_all(steps: list[tuple[str, list[str]]]) -> int:

@@ -81,5 +81,5 @@ def _figures(verdict: Any) -> Iterator[str]:
         kind, success = verdict["kind"], as_mapping(verdict["greedy"]["success"], "success")
         figures = [f"{kind}{'' if verdict['certain'] else ' (uncertain)'}"]
         yield from (*figures, rate(success, label=""))
-    except (InputError, KeyError, TypeError):
+    except (KeyError, TypeError, ValueError):
         yield from ("not judged", "")

@@ -188,7 +188,9 @@ def _plain(value: Any, is_several: bool) -> Any:
         return plain(value)
     named: dict[str, Any] = {}
     for variant in value:
-        name = variant.name if variant.name not in named else f"{variant.name}_{len(named)}"
+        name, number = variant.name, len(named)
+        while name in named:
+            name, number = f"{variant.name}_{number}", number + 1
         named[name] = as_config(variant)
     return named
 

@@ -134,7 +134,10 @@ class DynamicsSettings(Settings):
 
 def _rounded(bound: float, *, up: bool = True) -> float:
     """Round a positive bound to three digits, to the side that satisfies it."""
-    scale = 10.0 ** (2 - math.floor(math.log10(bound)))
+    digits = 2 - math.floor(math.log10(bound))
+    if digits > 300:  # 10 to that power may be no float
+        return bound
+    scale = 10.0**digits
     return (math.ceil if up else math.floor)(bound * scale) / scale
 
 

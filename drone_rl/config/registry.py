@@ -255,7 +255,9 @@ def _fields(
     """Return name, annotation and default of each setting, from a signature."""
     source: Any = factory.__init__ if isinstance(factory, type) else factory
     hints = typing.get_type_hints(source, include_extras=True)
-    parameters = list(inspect.signature(factory).parameters.values())[positional:]
+    every = list(inspect.signature(factory).parameters.values())
+    plain = [p for p in every if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
+    parameters = [p for p in every if p not in plain[:positional]]
     found = []
     for parameter in parameters:
         is_star = parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)

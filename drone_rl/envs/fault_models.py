@@ -126,7 +126,8 @@ def gaussian(width: float) -> list[float]:
     Below a deviation of 0.6 pixels the samples have a smaller one than the Gaussian.
     """
     radius = math.ceil(4 * width)
-    samples = [math.exp(-0.5 * (x / width) ** 2) for x in range(-radius, radius + 1)]
+    places = [x / width for x in range(-radius, radius + 1)]
+    samples = [math.exp(-0.5 * x * x) for x in places]
     return [sample / math.fsum(samples) for sample in samples]
 
 

@@ -209,16 +209,16 @@ def without_identities(transforms: Iterable[Transform], images: Tensor) -> list[
 
 def memory_of(transforms: Iterable[Transform]) -> int:
     """Return the number of previous frames in an observation (frame stacking), else 0."""
-    return max((t.N for t in transforms if isinstance(t, CatFrames)), default=1) - 1
+    return sum(t.N - 1 for t in transforms if isinstance(t, CatFrames))
 
 
 def apply_to_frames(transforms: Iterable[Transform], frames: Sequence[Tensor]) -> Tensor:
     """Apply transforms to the last of consecutive images; stacks repeat the first if needed."""
     for transform in transforms:
         if isinstance(transform, CatFrames):
-            shown = frames[-transform.N :]
-            shown = [*shown[:1]] * (transform.N - len(shown)) + [*shown]
-            frames = [torch.cat(shown, dim=transform.dim)]
+            padded = [*frames[:1]] * (transform.N - 1) + [*frames]
+            windows = (padded[i : i + transform.N] for i in range(len(frames)))
+            frames = [torch.cat(window, dim=transform.dim) for window in windows]
         else:
             frames = [transform._apply_transform(pixels) for pixels in frames]
     return frames[-1]

@@ -91,6 +91,11 @@ class Rule:
         for field in dataclasses.fields(self):
             if field.type is float:
                 _FRACTION.read(getattr(self, field.name), field.name)
+        for name in ("strata", "blind_baselines"):
+            if not getattr(self, name):
+                raise InputError(f"a task without {name} can't be judged; name some in the task")
+        if "all" in self.strata:
+            raise InputError('a stratum can\'t be called "all"; give it another name in the task')
         if self.other_share > self.side_share:
             raise InputError(
                 f"other_share={self.other_share} must not exceed side_share={self.side_share}"
@@ -207,5 +212,12 @@ def kinds_within(box: tuple[tuple[int, int], ...], num_strata: int = len(SIDES))
     least = [
         (min(low for low, _ in half), min(high for _, high in half)) for half in halves if half
     ]
-    pieces = [range(low, high + 1) for low, high in (*box[: 1 + 2 * num_strata], *least)]
-    return frozenset(decide(cell, num_strata) for cell in itertools.product(*pieces))
+    offered, shares = [*box[1 : 1 + num_strata]], [*box[1 + num_strata : 1 + 2 * num_strata]]
+    if num_strata > 3:  # between the ends `decide` uses only whether all are good where offered
+        inner = slice(1, -1)
+        pairs = [*zip(offered[inner], shares[inner], strict=True)]
+        may_fail = any(there[1] and share[0] < 2 for there, share in pairs)
+        may_hold = all(not there[0] or share[1] == 2 for there, share in pairs)
+        offered[inner], shares[inner] = [(1, 1)], [(0 if may_fail else 2, 2 if may_hold else 0)]
+    pieces = [range(low, high + 1) for low, high in (box[0], *offered, *shares, *least)]
+    return frozenset(decide(cell, len(offered)) for cell in itertools.product(*pieces))

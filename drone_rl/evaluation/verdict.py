@@ -20,6 +20,7 @@ from drone_rl.evaluation.rounding_sensitivity import check_rounding
 from drone_rl.evaluation.rule import Kind, Quantity, Rule, decide, kinds_within
 from drone_rl.evaluation.verdict_text import SENTENCES, is_proved
 from drone_rl.policies.policy import load_policy
+from drone_rl.sim.tasks import Task
 from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed
@@ -80,9 +81,10 @@ def judge_policy(
     the arguments "rule", "claim", "unlike" and "seed" of `apply_rule`.
 
     Raises:
-        InputError: The task has no oracle; also what `check_rounding` raises.
+        InputError: The task has no oracle, baselines or strata; also what `check_rounding` raises.
     """
     base, worlds = base_env(env), worlds_of(env)
+    _rule_of(known.get("rule"), worlds.task)  # refuses a task before its episodes
     state = base.state_dict()
     baselines = run_baselines(
         env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
@@ -121,6 +123,12 @@ def judge_for_selection(
         return verdict.as_dict(), policy.state["progress"]
 
 
+def _rule_of(rule: Rule | None, task: Task[Any]) -> Rule:
+    """Return the rule for a task's strata and baselines; an `InputError` if it has none."""
+    own = {"strata": task.strata, "blind_baselines": task.blind_baselines}
+    return dataclasses.replace(rule or Rule(), **own)
+
+
 def apply_rule(
     greedy: Episodes,
     baselines: Mapping[str, Episodes],
@@ -150,9 +158,7 @@ def apply_rule(
         ValueError: The initial states differ.
     """
     task = greedy.task
-    rule = dataclasses.replace(
-        rule or Rule(), strata=task.strata, blind_baselines=task.blind_baselines
-    )
+    rule = _rule_of(rule, task)
     for other in (*baselines.values(), greedy if sampled is None else sampled):
         if not torch.equal(other.goals.world, greedy.goals.world):
             raise ValueError("policy and baselines have different initial states; use the same")

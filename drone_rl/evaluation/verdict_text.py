@@ -5,7 +5,16 @@ from typing import Any
 
 from drone_rl.evaluation.conditions_text import unlike
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.text import Evidence, Sentence, all_cubes, exact, fixed_seed, listed, percent
+from drone_rl.utils.text import (
+    Evidence,
+    Sentence,
+    all_cubes,
+    exact,
+    fixed_seed,
+    hundredfold,
+    listed,
+    percent,
+)
 
 MAX_WRONG = 0.01
 """Largest fraction of placements with a wrong statement, with 95% confidence."""
@@ -132,9 +141,12 @@ def _sides(evidence: Evidence) -> dict[str, str]:
 
 def _lost_side(evidence: Evidence) -> str:
     """Goals on the side where a one-sided policy fails, else empty."""
-    lost = {"one-sided (left)": "right", "one-sided (right)": "left"}.get(evidence["kind"])
+    ends = {"one-sided (left)": ("right", -1), "one-sided (right)": ("left", 0)}
+    if evidence["kind"] not in ends:
+        return ""
+    (name, place), names = ends[evidence["kind"]], [*_sides(evidence)]
     terms = terms_of(evidence)
-    return f"{terms.goals} {terms.side(lost)}" if lost else ""
+    return f"{terms.goals} {terms.side(name if name in names else names[place])}"
 
 
 def _looks(evidence: Evidence) -> str:
@@ -276,7 +288,7 @@ def _other_ends(evidence: Evidence) -> str:
 
 def _never(evidence: Evidence) -> str:
     bound = evidence["failures"]["bound"]
-    upper = f"{100 * bound['upper95']:.2g}% (95% CI)"
+    upper = f"{hundredfold(bound['upper95'])}% (95% CI)"
     return f"It failed in none of {bound['trials']:,} episodes, so it fails in at most {upper}."
 
 

@@ -39,7 +39,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
         "film_probabilities": film.probabilities,
         "film_actions": film.actions,
     }
-    frames = key_frames(flights, FILMED, context.scenes.task)
+    frames = key_frames(flights, FILMED, context.scenes.task, len(film))
     numbers = {
         "layer": explainer.layer,
         "methods": list(context.maps),
@@ -80,14 +80,18 @@ def _normalized(maps: Tensor) -> NDArray:
     return (maps / peak).numpy().astype(np.float16)
 
 
-def key_frames(dataset: RolloutDataset, episode: int, task: Task[Any]) -> list[tuple[int, str]]:
-    """Select six frames of an episode, fewer only if it is shorter: number and reason, in order.
+def key_frames(
+    dataset: RolloutDataset, episode: int, task: Task[Any], most: int | None = None
+) -> list[tuple[int, str]]:
+    """Select six of the first `most` frames of an episode, fewer only if it is shorter, in order.
+
+    Returns their numbers and reasons.
 
     In this order, until there are six: the first; those before a goal is reached; those before one
     is missed; the last one of an episode that failed; that half way to the first goal (or to the
     end); then those furthest from all.
     """
-    frames = np.flatnonzero(dataset.episode == episode)
+    frames = np.flatnonzero(dataset.episode == episode)[:most]
     chosen: dict[int, str] = {int(frames[0]): "start"}
     reached, missed = (frames[dataset.event[frames] == event] for event in (1, -1))
     half = frames[len(frames) // 2] if not len(reached) else (frames[0] + reached[0]) // 2

@@ -226,11 +226,14 @@ def _pair(settings: FigureSettings, subjects: list[Policy]) -> _Made:
         images.frame_with_probabilities(data.arrays, frame, f"frame {frame}") for frame in pair
     ]
     apart = float(np.abs(np.diff(data.offset(scenes.task)[list(pair)], axis=0)).max())
+    where = f"the next cube is {apart:.1f} m from its place in the other one"
+    where = "one of them has no next cube" if np.isnan(apart) else where
     caption = (
         f"The two most similar frames on which policy {subject.name} most probably moves to "
-        f"opposite sides; the next cube is {apart:.1f} m from its place in the other one."
+        f"opposite sides; {where}."
     )
-    numbers = {"frames": list(pair), "distance": float(distance.min()), "metres_apart": apart}
+    known = None if np.isnan(apart) else apart
+    numbers = {"frames": list(pair), "distance": float(distance.min()), "metres_apart": known}
     return images.gridded(shown, 2), caption, numbers
 
 

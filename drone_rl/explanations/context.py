@@ -24,6 +24,8 @@ from drone_rl.verdicts.certificate import Claim
 
 T = TypeVar("T")
 FILMED = 0  # the episode shown as a film: always the first
+FILM_STEPS, FILM_BYTES = 2000, 2**23
+"""Most steps and bytes of a film in a report, see `report.validation`."""
 
 
 class LeftOutError(Exception):
@@ -108,8 +110,10 @@ class Context:
 
     @functools.cached_property
     def film(self) -> RolloutDataset:
-        """Every step of the episode shown as a film."""
-        rows = np.flatnonzero(self.flights.episode == FILMED)
+        """The steps of the episode shown as a film, as many as a report shows."""
+        camera = self.scenes.worlds.camera
+        most = min(FILM_STEPS, FILM_BYTES // (3 * camera.height * camera.width))
+        rows = np.flatnonzero(self.flights.episode == FILMED)[:most]
         return render_frames(self.flights, rows, self.scenes, self.network)
 
     @property

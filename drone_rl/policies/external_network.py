@@ -134,9 +134,9 @@ def _has_gradients(network: nn.Module, image: Tensor) -> bool:
     image = image.clone().requires_grad_()
     try:
         logits = network(image)
-    except RuntimeError:  # NumPy takes no tensor that requires gradients
+        if not logits.requires_grad:
+            return False
+        (gradient,) = torch.autograd.grad(logits.sum(), image, allow_unused=True)
+    except (RuntimeError, BufferError):  # NumPy and DLPack take no tensor that requires gradients
         return False
-    if not logits.requires_grad:
-        return False
-    (gradient,) = torch.autograd.grad(logits.sum(), image, allow_unused=True)
     return gradient is not None

@@ -168,6 +168,8 @@ def policy_from(
     if camera is not None:
         Instance(CameraSettings).read(camera, "camera")
     Instance(DynamicsSettings).read(dynamics, "dynamics")
+    dynamics.check_air()
+    Instance(ActionSettings).read(actions, "actions")
     if isinstance(task, str):
         task = settings_of(task, "task")()
     policy = ExternalPolicy(

@@ -335,7 +335,7 @@ class Policy(BasePolicy):
 def _copied(images: np.ndarray | Tensor) -> Tensor:
     """Return a copy as a tensor: cameras reuse buffers, and torch has no negative strides."""
     if isinstance(images, Tensor):
-        return images.clone()
+        return images.detach().cpu().clone()
     try:
         return torch.as_tensor(np.array(images))
     except (TypeError, ValueError):  # None, a path, images of several sizes

@@ -8,8 +8,8 @@ import torch
 from torch import Tensor
 from torchrl.envs import Transform
 
-from drone_rl.envs import GrayPixels
-from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
+from drone_rl.envs import GrayPixels, RgbPixels
+from drone_rl.envs.transforms import PixelTransform, apply_to_frames, memory_of, pixel_transforms
 from drone_rl.policies import ImageNetwork, RecurrentNetwork
 from drone_rl.policies.recurrent import Memory
 from drone_rl.policies.rounding import decider
@@ -55,6 +55,13 @@ class Agent(Protocol):
         ...
 
 
+class _RgbBytes(PixelTransform):
+    """Floats (*, 3, H, W) from 0 to 1 back to the camera's bytes (*, H, W, 3)."""
+
+    def _apply_transform(self, obs: Tensor) -> Tensor:
+        return (obs * 255).round().to(torch.uint8).movedim(-3, -1)
+
+
 class PolicyAgent:
     """A policy that takes the most probable action."""
 
@@ -73,17 +80,20 @@ class PolicyAgent:
         """Episodes with a frame in which rounding can change the action. Shape: (num_envs,)."""
         self._decide = decider(network)[0] if examines_rounding else None
         self._network = network
-        self._first, *self._rest = pixel_transforms(transforms)
+        first, *rest = pixel_transforms(transforms)
+        self._is_gray = type(first) is GrayPixels
+        is_own = type(first) not in (GrayPixels, RgbPixels)  # faults need images from 0 to 1
+        self._rest = [_RgbBytes(), first, *rest] if is_own else rest
         self._memory, self._num_envs = memory_of(self._rest), num_envs
         self._earlier_frames: list[Tensor] = []
         self._state = network.start(num_envs) if isinstance(network, RecurrentNetwork) else None
 
     def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
         """See `Agent`."""
-        if type(self._first) is GrayPixels:
+        if self._is_gray:
             images = context.render("gray")[:, None]
         else:
-            images = self._first._apply_transform(context.render("rgb"))
+            images = RgbPixels()._apply_transform(context.render("rgb"))
         images = context.apply_faults(images, context.active)
         frames = [*(earlier[context.active] for earlier in self._earlier_frames), images]
         observation = apply_to_frames(self._rest, frames)

@@ -135,7 +135,8 @@ def conditions(
     if pictures[0] is not None:
         shown[f"as trained: {_success(numbers['plain'])}"] = enlarge(pictures[0], _SCALE)
     for level in numbers["axes"][name]["levels"]:
-        if (picture := pictures[level["number"]]) is not None:
+        picture = pictures[level["number"]]
+        if picture is not None and level["refused"] is None:
             caption = f"{level['value']:.3g}: {_success(level['modes']['constant'])}"
             shown[caption] = enlarge(picture, _SCALE)
     return shown

@@ -64,6 +64,19 @@ def check_range(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[
                 f"counts {level['modes']['constant']['success']['share']:.0%} there; {_REMEDY}"
             )
 
+    possible = numbers["settings"]["possible_share"]
+    for failure in found["failed"]:
+        if failure["impossible"] != _is_impossible(failure["oracle"], possible):
+            raise InputError(
+                f"domain.ranges.{axis.name}.failed: impossible does not follow from its oracle; "
+                f"{_REMEDY}"
+            )
+
+
+def _is_impossible(oracle: Mapping[str, Any] | None, possible: float) -> bool:
+    """Return whether the oracle certainly fails too often."""
+    return oracle is not None and oracle["upper95"] < possible
+
 
 def check_probe(found: Mapping[str, Any], episodes: int, where: str) -> None:
     """Check the result of a search with so many episodes at one strength.
@@ -104,7 +117,7 @@ def _wrong_level(
         return ".modes are not those of settings.modes"
     if (oracle is None) != (numbers["plain"]["oracle"] is None):
         return " has an oracle only with or only without perturbation"
-    impossible = None if oracle is None else oracle["upper95"] < settings["possible_share"]
+    impossible = None if oracle is None else _is_impossible(oracle, settings["possible_share"])
     if level["impossible"] != impossible:
         return ".impossible does not follow from its oracle"
     episodes = settings["episodes"]

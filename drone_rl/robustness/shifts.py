@@ -197,11 +197,12 @@ def make_evaluated_policy(policy: BasePolicy, settings: ShiftSettings) -> Evalua
     """Return the policy with its task, camera and transforms.
 
     Raises:
-        InputError: The task has no settings to perturb.
+        InputError: The task has no settings to perturb, or its settings make another task.
     """
-    task: Any = policy.task
-    task = task if isinstance(task, BaseTaskSettings) else getattr(task, "settings", None)
-    if not isinstance(task, BaseTaskSettings):
+    own: Any = policy.task
+    task: Any = own if isinstance(own, BaseTaskSettings) else getattr(own, "settings", None)
+    is_settings = isinstance(task, BaseTaskSettings)
+    if not is_settings or not (task is own or type(as_task(task)) is type(own)):
         raise InputError(
             f"the task of policy={policy.name} has no settings to perturb; give another policy"
         )

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from drone_rl.config.transforms import Fault
 from drone_rl.sim.vocabulary import terms_of
 from drone_rl.utils.text import Evidence, Sentence, fixed_seed, listed, percent, plural, say
 
@@ -166,6 +167,14 @@ def _every_axis(e: Evidence) -> str:
     return listed(names) if len(names) <= MAX_NAMED else f"all {len(names)} axes of the table"
 
 
+_FAULTS = frozenset(fault.registered_name() for fault in Fault.__subclasses__())
+
+
+def _own_faults(e: Evidence) -> list[str]:
+    described = (e.get("network") or {}).get("description", {})
+    return [t["name"] for t in described.get("transforms", ()) if t["name"] in _FAULTS]
+
+
 SHIFTS = (
     Sentence(
         "shifts.good",
@@ -221,6 +230,12 @@ SHIFTS = (
             "the table and a random one between each two; not tested: other strengths, and "
             "combinations of axes except those named here."
         ),
+    ),
+    Sentence(
+        "shifts.own_faults",
+        "the policy's transforms simulate camera faults, which these episodes leave out",
+        lambda e: bool(_own_faults(e)),
+        lambda e: f"Without the camera faults of its training ({listed(_own_faults(e))}).",
     ),
     fixed_seed("shifts.fixed_seed"),
 )

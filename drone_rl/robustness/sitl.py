@@ -37,7 +37,7 @@ class SitlEpisode:
     goals: int
     """Number of goals reached."""
     success: bool
-    """Whether all goals were reached."""
+    """Whether it ended with success."""
     end: str
     """Name of one of the task's ends."""
     steps: int
@@ -168,7 +168,7 @@ def _fly(
         return ended, SitlEpisode(
             world=world,
             goals=int(reached.sum()),
-            success=bool(reached.all()),
+            success=bool(ended.success[0]),
             end=worlds.task.ends(int(ended.end_reason[0])).name.lower(),
             steps=steps,
             simulated_s=drone.time - start,

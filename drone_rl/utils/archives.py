@@ -62,12 +62,17 @@ def read_members(
 
 
 def read_arrays(
-    path: Path, *, most: int = ARRAYS_BYTES, allowance: Allowance | None = None
+    path: Path,
+    *,
+    most: int = ARRAYS_BYTES,
+    allowance: Allowance | None = None,
+    wanted: Callable[[str], bool] = lambda _: True,
 ) -> dict[str, NDArray]:
     """Return the arrays of numbers and texts in an .npz file.
 
     `most` is the largest size of all arrays together, in bytes; `allowance`, shared with further
-    files, replaces it. The file may have as many bytes, or 256 MiB if that is more.
+    files, replaces it. The file may have as many bytes, or 256 MiB if that is more. `wanted` says
+    by name which arrays to read.
 
     Raises:
         InputError: The file is unusable, or an array holds objects.
@@ -77,7 +82,7 @@ def read_arrays(
     methods = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
     return {
         name.removesuffix(".npy"): array
-        for name, array in _members(content, str(path), allowance, methods, _array)
+        for name, array in _members(content, str(path), allowance, methods, _array, wanted)
     }
 
 
@@ -93,6 +98,7 @@ def _members(
     allowance: Allowance,
     methods: Collection[int],
     read: Callable[[Any, int, str], T],
+    wanted: Callable[[str], bool] = lambda _: True,
 ) -> Iterator[tuple[str, T]]:
     """Yield the name of each file and the result of `read(file, size, where)`."""
     if content.count(_ENTRY) > MEMBERS:
@@ -100,9 +106,10 @@ def _members(
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = archive.infolist()
-            allowance.take(sum(member.file_size for member in members), f"{where}, unpacked,")
             if len({member.filename for member in members}) < len(members):
                 raise InputError(f"{where} holds two files of one name")
+            members = [m for m in members if wanted(m.filename.removesuffix(".npy"))]
+            allowance.take(sum(member.file_size for member in members), f"{where}, unpacked,")
             for member in members:
                 if member.compress_type not in methods:
                     raise InputError(

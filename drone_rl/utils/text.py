@@ -102,10 +102,10 @@ def percent(share: float, digits: int = 1) -> str:
 
 def interval(figure: Mapping[str, Any]) -> str:
     """Return the 95% confidence interval of a rate, in percent."""
-    return " to ".join(_hundredfold(figure[end]) for end in ("lower95", "upper95"))
+    return " to ".join(hundredfold(figure[end]) for end in ("lower95", "upper95"))
 
 
-def _hundredfold(share: float) -> str:
+def hundredfold(share: float) -> str:
     """Return a rate times 100 with one decimal; 0.0 and 100.0 only if it is exactly 0 or 1."""
     text = f"{100 * share:.1f}"
     if text == "0.0" and share > 0:
@@ -122,7 +122,7 @@ def rate(figure: Mapping[str, Any], label: str = "95% CI ") -> str:
     "not offered".
     """
     share = figure["share"] if "share" in figure else figure["mean"]
-    return "not offered" if share is None else f"{_hundredfold(share)}% ({label}{interval(figure)})"
+    return "not offered" if share is None else f"{hundredfold(share)}% ({label}{interval(figure)})"
 
 
 SEED_KEYS = ("seed", "seed_is_fixed")

@@ -26,7 +26,7 @@ from drone_rl.utils.limits import CERTIFICATE_BYTES, SHIFTS_BYTES
 from drone_rl.utils.overrides import COMMAND, read_overrides
 from drone_rl.utils.schema import Maybe
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import Evidence, Sentence, listed, rate, said, say
+from drone_rl.utils.text import Evidence, Sentence, hundredfold, listed, rate, said, say
 from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import find_domain
 
@@ -202,7 +202,7 @@ def _failures(failures: Evidence) -> str:
     """Return the rows of the failure table that have failures, largest first."""
     largest = failures["largest"]
     if largest is None:
-        upper = f"{100 * failures['bound']['upper95']:.2g}% of episodes"
+        upper = f"{hundredfold(failures['bound']['upper95'])}% of episodes"
         return _table([["fails", "never"], ["upper bound", upper]])
     failed = [row for row in failures["rows"] if row["failed"] and row != largest]
     rows = [

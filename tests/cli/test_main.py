@@ -134,3 +134,19 @@ def test_a_setting_that_is_given_twice_is_pointed_out(in_process):
     done = in_process("train", "seed=1", "seed=2", "task.num_cubes=2", "--help")
     assert done.stderr == "warning: seed is given several times; seed=2 counts\n"
     assert in_process("train", "seed=1", "--help").stderr == ""
+
+
+def test_a_demo_goes_on_with_the_policy_that_it_trained(monkeypatch):
+    ran = []
+
+    def note(name, command, overrides):
+        ran.append((name, overrides))
+        return 0
+
+    monkeypatch.setattr("drone_rl.cli.hydra.composition.run_command", note)
+    line = ["drone-rl", "demo", "seed=1", "paths.outputs=o", "hydra.run.dir=r"]
+    monkeypatch.setattr(sys, "argv", line)
+    with pytest.raises(SystemExit):
+        main()
+    same = ["paths.outputs=o", "policy=r"]
+    assert ran == [("train", line[2:]), ("evaluate", same), ("explain", same)]

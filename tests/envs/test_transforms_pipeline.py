@@ -1,3 +1,4 @@
+import pytest
 import torch
 from torchrl.envs import CatFrames, RewardSum
 
@@ -43,3 +44,16 @@ def test_film_is_transformed_per_frame_and_stacked():
     assert seen[0, :, 0, 0].tolist() == [0.0, 0.0, 1.0]  # the first frame fills missing ones
     assert apply_to_frames([standard], film)[0, 0, 0, 0] == 1.0
     assert (memory_of([standard, stack]), memory_of([standard])) == (2, 0)
+
+
+@pytest.mark.parametrize("sizes", [(3,), (2, 2), (2, 3)])
+def test_stacks_of_stacks_are_those_of_the_environment(sizes):
+    stacks = [CatFrames(N=n, dim=-3, in_keys=["pixels"]) for n in sizes]
+    env, film = with_transforms(DroneEnv(2), [GrayPixels(), *stacks]), []
+    transforms, state = [*env.transform], env.reset()
+    for _ in range(6):
+        film.append(env.base_env.last_pixels.clone())
+        seen = apply_to_frames(transforms, film[-1 - memory_of(transforms) :])
+        torch.testing.assert_close(seen, state["pixels"])
+        state = env.step(state.set("action", torch.zeros(2, dtype=torch.int64)))["next"]
+    env.close()

@@ -11,6 +11,7 @@ from drone_rl.evaluation.verdict import apply_rule
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import EndReason, Side
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.intervals import proportion
 
 LEFT, AHEAD, RIGHT = Side
 LAYOUTS = [[LEFT, RIGHT], [RIGHT, LEFT], [AHEAD, LEFT], [RIGHT, AHEAD]]
@@ -198,3 +199,15 @@ def test_names_of_several_words_are_read_whole(make_episodes, make_baselines):
     for of in named.values():
         of.task = flown.task
     check_verdict(json.loads(json.dumps(apply_rule(flown, named).as_dict())))
+
+
+def test_failures_can_not_be_left_out(judged):
+    verdict = judged(lambda i, side: i % 40 != 0)
+    table, keys = verdict["failures"], ("share", "lower95", "upper95")
+    rows = [
+        {**r, "failed": 0, **{k: proportion(0, r["episodes"])[k] for k in keys}}
+        for r in table["rows"]
+    ]
+    none = {**table, "rows": rows, "bound": proportion(0, 400), "largest": None}
+    with pytest.raises(InputError, match="contradict the goals"):
+        check_verdict({**verdict, "failures": none})

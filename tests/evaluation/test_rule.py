@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drone_rl.evaluation import rule
 from drone_rl.evaluation.rule import (
     BLIND_BASELINES,
     SIDES,
@@ -182,3 +183,34 @@ def test_a_task_may_have_two_strata_and_one_luck(levels, kind):
         "above random", "unsolved by random",
     )  # fmt: skip
     assert len(rule.thresholds) == 7 and rule.confidence == 1 - 0.05 / 7
+
+
+def test_many_strata_are_not_multiplied(monkeypatch):
+    calls = []
+
+    def count(*of):
+        calls.append(of)
+        return decide(*of)
+
+    monkeypatch.setattr(rule, "decide", count)
+    box = ((0, 1), *[(0, 1)] * 7, *[(0, 2)] * 7, (0, 1), (0, 1))
+    assert kinds_within(box, 7) == set(Kind)
+    assert len(calls) < 2000
+
+
+def test_inner_strata_are_reduced_exactly():
+    """All boxes of four strata with some levels, against every single cell."""
+    ends = ((0, 1), (1, 1))
+    for offered in itertools.product(ends, repeat=2):
+        for shares in itertools.product(((0, 0), (0, 2), (2, 2)), repeat=4):
+            box = ((1, 1), (1, 1), *offered, (1, 1), *shares, (1, 1), (1, 1))
+            cells = itertools.product(*(range(low, high + 1) for low, high in box))
+            assert kinds_within(box, 4) == {decide(cell, 4) for cell in cells}
+
+
+@pytest.mark.parametrize("name", ["strata", "blind_baselines"])
+def test_a_task_has_strata_and_baselines(name):
+    with pytest.raises(InputError, match=f"a task without {name} can't be judged"):
+        Rule(**{name: ()})
+    with pytest.raises(InputError, match="can't be called"):
+        Rule(strata=("all", "left"))

@@ -104,5 +104,5 @@ def test_network_without_layers_raises():
 
 
 def test_a_forward_pass_of_its_own_has_no_critic():
-    with pytest.raises(InputError, match="which Mirrored is not; .* keep its forward"):
+    with pytest.raises(InputError, match=r"which Mirrored is not; .* keep its forward"):
         ActorCritic(Mirrored((1, 25, 64), 3))

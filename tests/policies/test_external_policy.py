@@ -1,5 +1,6 @@
 """External policies are evaluated, judged and explained like our own."""
 
+import numpy as np
 import pytest
 import torch
 from torch import nn
@@ -233,9 +234,25 @@ def test_dynamics_can_be_replaced(monkeypatch):
 def test_tasks_by_name_and_values_of_wrong_type():
     found = drone_rl.policy_from(left, task="pillars")
     assert found.task == drone_rl.PillarsSettings()
-    for given in ({"dynamics": None}, {"dynamics": "quadrotor"}, {"transforms": 3}, {"task": "x"}):
+    for given in (
+        {"dynamics": None},
+        {"dynamics": "quadrotor"},
+        {"transforms": 3},
+        {"task": "x"},
+        {"actions": None},
+    ):
         with pytest.raises(InputError, match=f"^{next(iter(given))}"):
             drone_rl.policy_from(left, **given)
+
+
+def test_wind_that_moves_nothing_is_refused():
+    with pytest.raises(InputError, match=r"dynamics\.wind=.* moves nothing"):
+        drone_rl.policy_from(left, dynamics=drone_rl.DynamicsSettings(wind=(5.0, 0.0, 0.0)))
+
+
+def test_functions_of_dlpack_have_no_gradients():
+    policy = drone_rl.policy_from(lambda x: np.from_dlpack(x).reshape(len(x), -1)[:, :3])
+    assert not policy.make_network().is_differentiable
 
 
 def test_a_class_is_no_policy():

@@ -3,6 +3,7 @@ from torchrl.envs import CatFrames
 
 from drone_rl.config import CameraSettings
 from drone_rl.envs import GrayPixels, RgbPixels
+from drone_rl.envs.transforms import PixelTransform
 from drone_rl.policies import ImageNetwork
 from drone_rl.robustness.agents import BaselineAgent, PolicyAgent, StepContext
 from drone_rl.sim.actions import MOVES
@@ -107,3 +108,19 @@ def test_who_looks_at_nothing_may_have_speeds_to_choose():
     assert action.tolist() == [[1, 0, 0]] * 2
     assert BaselineAgent("random", actions, generator).act(where)[0].shape == (2, 3)
     worlds.close()
+
+
+class Signed(PixelTransform):
+    """Gray levels from -1 to 1."""
+
+    def _apply_transform(self, obs):
+        return 2 * GrayPixels()._apply_transform(obs) - 1
+
+
+def test_faults_come_before_a_first_transform_of_the_users_own():
+    worlds, network = make_env(), Looking()
+    agent = PolicyAgent(network, [Signed()], 3)
+    agent.act(sight(worlds, torch.arange(3), lambda p, f, nothing=0.0: p.clamp(0, 1)))
+    wanted = Signed()._apply_transform(worlds.render(worlds.state))
+    worlds.close()
+    torch.testing.assert_close(network.shown[0], wanted)

@@ -70,6 +70,6 @@ def test_classes_of_several_colors_stay_as_they_are():
     worlds.scene.model.geom_rgba[geoms[0], :3] = (0.1, 0.2, 0.3)
     look = scene_appearance(worlds.scene)
     assert SemanticClass.OBSTACLE not in look.colors and SemanticClass.SKY in look.colors
-    with pytest.raises(InputError, match="these objects have several colors"):
+    with pytest.raises(InputError, match="the task has no objects of one color"):
         whiten([SemanticClass.OBSTACLE], 0.5).change(look, NONE)
     worlds.close()

@@ -105,3 +105,15 @@ def test_in_another_body_it_is_said_so():
     )
     assert "dynamics.mode=simple_flight instead of computer_vision" in str(found)
     assert found.numbers["network"]["description"]["dynamics"]["mode"] == "simple_flight"
+
+
+def test_a_task_of_a_derived_class_is_not_replaced():
+    class Strict(CollectCubes):
+        name = "strict"
+
+    policy = drone_rl.policy_from(
+        lambda x: torch.tensor([9.0, 0.0, 0.0]).expand(len(x), 3),
+        task=Strict(TaskSettings(num_cubes=1)),
+    )
+    with pytest.raises(InputError, match="no settings to perturb"):
+        drone_rl.shifts(policy, axes=["noise"], domain=False, **FEW)

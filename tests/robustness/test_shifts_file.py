@@ -104,6 +104,11 @@ _ALL_GOOD = {f"{_BLUR}.flown.3.good": True, **_WIDE}
         ({"domain.plain.bad": True}, "is good, but also bad or refused"),
         ({f"{_BLUR}.failed.0.good": True}, "is good, but also bad or refused"),
         ({f"{_BLUR}.failed.0.oracle": share(200)}, "oracle is of 200 episodes, not of 400"),
+        ({f"{_BLUR}.failed.0.impossible": True}, "impossible does not follow from its oracle"),
+        (
+            {f"{_BLUR}.failed.0.impossible": True, f"{_BLUR}.failed.0.oracle": None},
+            "impossible does not follow",
+        ),
         ({f"{_BLUR}.failed.0.value": 1.49}, "domain.ranges.blur contradicts"),
         (
             {f"{_LEVEL}.modes.constant": figures(150), "axes.blur.areas.constant": None},

@@ -109,3 +109,9 @@ def test_what_nobody_can_is_not_the_policys_failure():
     end = {**failed, "end": "high", "value": 2.0}
     text = said(SHIFTS, changed(EVIDENCE, {"domain.ranges.blur.failed": [end]}))
     assert "blur of up to 1.5 pixels (no more is possible)" in text["shifts.good"]
+
+
+def test_camera_faults_of_the_training_are_named():
+    seen = {"transforms": [{"name": "gray"}, {"name": "late_frames", "frames": 2}]}
+    text = said(SHIFTS, {**EVIDENCE, "network": {"description": seen}})
+    assert text["shifts.own_faults"] == "Without the camera faults of its training (late_frames)."

@@ -330,9 +330,12 @@ def _job(
             with _explained(name, overrides):
                 settings = read_settings(command, config)
             folder = Path(HydraConfig.get().runtime.output_dir)
-            is_latest = getattr(settings, "policy", None) == "latest"
+            which = getattr(settings, "policy", None)
+            is_latest = which in ("latest", ("latest",))
             if is_latest and (used := settings.used_policy(folder)) != "latest":
                 _log.info("policy=latest is %s", used)
+                one = used if which == "latest" else (used,)
+                settings = settings.replace(policy=one)  # another may be the newest soon
             status, value = settings.run(folder)
             if status < 128 and sys.stdout.isatty():  # pipes get only the results
                 print(next_steps(name.replace("_", "-"), settings.used_policy(folder), folder))

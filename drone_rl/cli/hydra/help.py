@@ -94,8 +94,11 @@ def _chosen(values: Any, topics: Sequence[str], command: str) -> dict[str, Any]:
 def next_steps(name: str, policy: str, folder: Path) -> str:
     """Return the lines about the policy that a command used, and what a user may do next."""
     quoted = {"policy": shlex.quote(policy), "folder": shlex.quote(str(folder))}
-    steps = [f"  {line.format(**quoted)}" for line in TABLE[name]["next"]]
-    is_used = any("{policy}" in line for line in TABLE[name]["next"])
+    files = re.compile(r"\{folder\}/([\w.]+)")
+    every = TABLE[name]["next"]
+    known = [line for line in every if all((folder / f).exists() for f in files.findall(line))]
+    steps = [f"  {line.format(**quoted)}" for line in known]
+    is_used = any("{policy}" in line for line in known)
     lines = [f"policy: {policy}"] if is_used else []
     return "\n".join([*lines, *(["next:", *steps] if steps else [])])
 

@@ -332,7 +332,7 @@ def distribution(override: Override) -> Any:
             if isinstance(low, int) and isinstance(high, int):  # int(interval(LOW,HIGH))
                 return d.IntDistribution(low, high, log=is_log)
             return d.FloatDistribution(float(low), float(high), log=is_log)
-    except ValueError:  # from Optuna, for an empty or a negative logarithmic range
+    except (ValueError, OverflowError):  # an empty, negative logarithmic or infinite range
         pass
     raise InputError(
         f"{override.input_line} can't be searched; give a choice, interval(LOW,HIGH), or an "

@@ -66,7 +66,7 @@ def read_action(given: Any, actions: Actions, batch: tuple[int, ...] = ()) -> Te
     is_whole = entry.dtype == torch.int64
     try:
         array = np.asarray(given)
-    except ValueError:  # a ragged list
+    except (ValueError, TypeError, RuntimeError):  # a ragged list, a tensor elsewhere
         array = np.empty(0, object)
     shape = (*batch, *entry.shape)
     fits = array.shape == shape and array.dtype.kind in ("iu" if is_whole else "iuf")

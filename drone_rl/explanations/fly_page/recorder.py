@@ -56,16 +56,19 @@ class Recorder:
         frames, actions, rewards = zip(*steps, strict=True)
         done = np.zeros(len(steps), np.bool_)
         done[-1] = self._world.is_over
-        demonstration = Demonstration(
-            FlightConditions(*self._world.conditions),
-            images=np.concatenate([frame.numpy() for frame in frames]),
-            actions=np.concatenate([action.numpy() for action in actions]),
-            rewards=np.array(rewards, np.float32),
-            done=done,
-            pilot=pilot,
-        )
         try:
+            demonstration = Demonstration(
+                FlightConditions(*self._world.conditions),
+                images=np.concatenate([frame.numpy() for frame in frames]),
+                actions=np.concatenate([action.numpy() for action in actions]),
+                rewards=np.array(rewards, np.float32),
+                done=done,
+                pilot=pilot,
+            )
             add_demonstration(self.folder, demonstration)
+        except InputError:
+            self.is_on = False
+            raise
         except OSError as error:
             self.is_on = False
             raise InputError(

@@ -3,9 +3,12 @@
 The tests take up to a minute. They run in another process, so that the flight goes on meanwhile.
 """
 
+import importlib
 import logging
 import multiprocessing
 import os
+import pickle
+from collections.abc import Sequence
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -20,6 +23,7 @@ from drone_rl.explanations.scenes import empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies.policy import Policy
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.plugins import IMPORTED
 from drone_rl.utils.seeding import root_seed
 
 _log = logging.getLogger(__name__)
@@ -47,9 +51,11 @@ def find_trusted(policy: Policy) -> str | None:
     return trust.check_maps(trial, trust.method_maps(context.explainer))["trusted"]
 
 
-def _work(connection: Connection, policy: Policy) -> None:
+def _work(connection: Connection, policy: Policy, plugins: Sequence[str]) -> None:
     os.nice(_NICE)
     torch.set_num_threads(1)
+    for module in plugins:  # which may register the policy's task
+        importlib.import_module(module)
     try:
         connection.send((find_trusted(policy), None))
     except InputError as error:
@@ -79,10 +85,20 @@ class LiveSaliency:
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe(duplex=False)
         policy = self._world.policy
-        self._process = context.Process(target=_work, args=(theirs, policy), daemon=True)
-        self._process.start()
+        process = context.Process(target=_work, args=(theirs, policy, [*IMPORTED]), daemon=True)
+        try:
+            process.start()
+        except (pickle.PicklingError, AttributeError, TypeError):  # as of a task object
+            self._fail("its task, or another part, can't be sent to another process")
+        else:
+            self._process, self.state = process, "testing"
         theirs.close()
-        self.state = "testing"
+
+    def _fail(self, problem: str) -> None:
+        self.state, self.problem = "failed", problem
+        name = self._world.policy.name
+        _log.warning("the heat maps of policy %s can't be tested: %s", name, problem)
+        self.close()
 
     def poll(self) -> None:
         """Take the result of the tests, if they have ended."""
@@ -94,10 +110,7 @@ class LiveSaliency:
             method, problem = None, "the process ended early"
         self.trust(method)
         if problem is not None:
-            self.state, self.problem = "failed", problem
-            _log.warning(
-                "the heat maps of policy %s can't be tested: %s", self._world.policy.name, problem
-            )
+            self._fail(problem)
         self.close()
 
     def trust(self, method: str | None) -> None:

@@ -11,7 +11,7 @@ from PIL import Image
 
 from drone_rl.evaluation.consistency import check_verdict
 from drone_rl.evaluation.plots.saving import Rows
-from drone_rl.explanations.report.validation import check_files
+from drone_rl.explanations.report.validation import check_files, may_be_shown
 from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary, shown_actions, terms_of
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.consistency import check_intervals
@@ -76,8 +76,10 @@ class Explanation:
             version = numbers.get("format"), numbers.get("format_version")
             if version != (FORMAT, FORMAT_VERSION):
                 raise InputError(f"it has no format version {FORMAT_VERSION}")
-            arrays = read_arrays(folder / "arrays.npz", allowance=allowance)
-            data = read_arrays(folder / "dataset.npz", allowance=allowance)
+            arrays, data = (
+                read_arrays(folder / f"{name}.npz", allowance=allowance, wanted=may_be_shown)
+                for name in ("arrays", "dataset")
+            )
             data.pop("meta", None)
             check_files(numbers, arrays, data, shown_actions(numbers))
             terms_of(numbers)

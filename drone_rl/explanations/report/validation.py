@@ -71,6 +71,8 @@ _DATA: Mapping[str, _Described] = {
     "flights/episode": (_INTEGER, (10 * _MANY,), 2**23),
 }
 """Arrays of `arrays.npz` and of `dataset.npz`, by patterns of their names."""
+_UNSHOWN = re.compile("map_[a-z_]+|observations|regions|depth|features/.+")
+"""Large arrays for other readers, which no part of the report shows."""
 _LENGTHS: Mapping[tuple[str, ...], int] = {
     ("attribution", "film", "key_steps"): 12,
     ("truth", "methods"): 16,
@@ -104,6 +106,11 @@ _WINDOW: Mapping[str, Kind] = {
     "sideways": Real(0.0, 1e3, is_above=True),
 }
 _FARTHEST_RATIO = 20  # largest ratio of the sides of the exact map
+
+
+def may_be_shown(name: str) -> bool:
+    """Return whether a report may show the array of this name."""
+    return _UNSHOWN.fullmatch(name) is None
 
 
 def check_files(

@@ -165,7 +165,7 @@ def _exported(content: bytes) -> dict[str, Any]:
         entry = as_mapping(header[name], name)
         if entry.keys() != _ENTRY:
             raise InputError(f"the weights {shown(name)} do not state {', '.join(sorted(_ENTRY))}")
-        if entry["dtype"] != "F32":
+        if entry["dtype"] not in ("F32", "I64"):  # I64: counters of normalizations
             raise InputError(f"the weights {shown(name)} are not float32")
     about = dict(as_mapping(_inner(metadata, "about"), "about"))
     if "progress" in about:

@@ -1,5 +1,7 @@
 """Commands end with what a user may do next, in a terminal."""
 
+import re
+import shutil
 import sys
 from pathlib import Path
 
@@ -25,9 +27,13 @@ def test_the_policy_and_the_next_commands():
 
 
 @pytest.mark.parametrize("name", TABLE)
-def test_next_commands_exist_with_these_settings(name):
+def test_next_commands_exist_with_these_settings(name, tmp_path):
     assert len(TABLE[name]["next"]) <= 3
-    for line in next_steps(name, "good", Path("x")).splitlines():
+    for file in re.findall(r"\{folder\}/([\w.]+)", " ".join(TABLE[name]["next"])):
+        (tmp_path / file).touch()
+    lines = next_steps(name, "good", tmp_path).splitlines()
+    assert sum(line.startswith("  drone-rl") for line in lines) == len(TABLE[name]["next"])
+    for line in lines:
         if line.startswith("  drone-rl"):
             command, *words = line.split()[1:]
             register_schemas(**{command: find_command(command)})
@@ -40,3 +46,24 @@ def test_they_are_for_terminals_alone(run, in_process, monkeypatch, tmp_path):
     monkeypatch.setattr(type(sys.stdout), "isatty", lambda self: True)
     printed = in_process(*command).stdout
     assert f"policy: {run}\nnext:\n  drone-rl explain policy={run}" in printed
+
+
+def test_files_that_were_not_written_are_not_suggested(tmp_path):
+    assert "domain.yaml" not in next_steps("shifts", "good", tmp_path)
+    assert "next:" not in next_steps("export", "good", tmp_path)
+    (tmp_path / "policy.safetensors").touch()
+    assert "policy.safetensors" in next_steps("export", "good", tmp_path)
+
+
+def test_the_policy_that_was_used_is_named(run, in_process, monkeypatch, tmp_path):
+    runs = tmp_path / "outputs" / "train" / "runs"
+    shutil.copytree(run, runs / "a")
+
+    def judge(self, folder):
+        shutil.copytree(run, runs / "b")  # by another process, meanwhile
+        (runs / "b" / "checkpoints" / "last.pt").touch()
+        return 0, "good"
+
+    monkeypatch.setattr("drone_rl.cli.evaluation.VerdictCommand.run", judge)
+    monkeypatch.setattr(type(sys.stdout), "isatty", lambda self: True)
+    assert "policy: outputs/train/runs/a\n" in in_process("verdict").stdout

@@ -50,3 +50,9 @@ def test_links_are_not_followed(folder, tmp_path):
     (here / "arrays.npz").symlink_to(here / "b.npz")
     with pytest.raises(InputError, match="is a link"):
         Explanation.load(here)
+
+
+def test_arrays_that_no_report_shows_take_no_room(explanations):
+    shown = Explanation.load(explanations[0])
+    assert not any(name.startswith("map_") for name in shown.arrays)
+    assert shown.data.keys().isdisjoint({"observations", "regions", "depth"})
