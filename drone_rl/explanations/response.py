@@ -177,13 +177,14 @@ def outcome_map(
     seed: int | None = None,
 ) -> OutcomeMap:
     """Run greedy rollouts from each place of a coarser grid; see `response_map`."""
-    only = torch.zeros(num_forward * num_lateral, dtype=torch.int64, device=scenes.worlds.device)
-    fields, collected = _over_grid(
-        scenes,
-        (num_forward, num_lateral),
-        (seed, _OUTCOME),
-        lambda state: scenes.task.is_reached(run_to_end(scenes, network, state), only),
-    )
+    task = scenes.task
+
+    def reached(state: State) -> Tensor:
+        target = task.next_target(state)
+        return task.is_reached(run_to_end(scenes, network, state), target)
+
+    shape = (num_forward, num_lateral)
+    fields, collected = _over_grid(scenes, shape, (seed, _OUTCOME), reached)
     return OutcomeMap(**fields, collected=collected.cpu().numpy())
 
 
@@ -191,9 +192,10 @@ def summarise(response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str])
     """Return counts by height and stratum, such as "left", "ahead" and "right".
 
     "rows" has for each height and side the fraction of places at which the policy is "blind" (None
-    if the grid has none on that side), and the number of "places" and of those "collected".
+    if the grid has none on that side, or the needed action is unknown), and the number of "places"
+    and of those "collected".
     """
-    rows = []
+    rows, is_known = [], bool((response.oracle >= 0).all())
     for layer, height in enumerate(response.height.tolist()):
         for number, side in enumerate(strata):
             blind = response.blind[layer][:, response.stratum == number]
@@ -202,7 +204,7 @@ def summarise(response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str])
                 {
                     "height": height,
                     "side": side,
-                    "blind": float(blind.mean()) if blind.size else None,
+                    "blind": float(blind.mean()) if blind.size and is_known else None,
                     "collected": int(collected.sum()),
                     "places": int(collected.size),
                 }
@@ -280,6 +282,10 @@ def _exact_map(context: Context, settings: PlacesSettings) -> ActionMap:
     check_task(task)
     if not network.has_weights:
         raise InputError("it is not a torch module, so its rounding error has no bound")
+    if scenes.is_ambiguous:
+        raise InputError(
+            "its camera has faults or its appearance has ranges, so one place has several images"
+        )
     camera = CameraModel.of(task, scenes.worlds.camera)
     images = CubeImages(scenes.worlds, Lattice(task), camera)
     images.check(_COMPARED, np.random.RandomState(legacy_seed(context.seed.value)))

@@ -32,7 +32,8 @@ from drone_rl.sim.tasks import State, Task
 RENDERED = {
     "observations": "input of the policy's network, float32 (T, C, h, w)",
     "probabilities": "the policy's probability of each action, float32 (T, number of actions)",
-    "frames": "RGB images before the action, uint8 (T, H, W, 3)",
+    "frames": "RGB images before the action, in the middle of the appearance's ranges and without "
+    "camera faults, as regions and depth: uint8 (T, H, W, 3)",
     "regions": "what each pixel shows: " + ", ".join(f"{r.value} {r.name.lower()}" for r in Region),
     "depth": "metres along the optical axis, 0 for the sky, float16 (T, H, W)",
 }

@@ -8,7 +8,7 @@ from torch import Tensor
 from torch.nn import functional
 from torchrl.envs import CatFrames, Transform, TransformedEnv
 
-from drone_rl.envs import ChromaticityPixels, CropRows, RgbPixels, worlds_of
+from drone_rl.envs import CameraFault, ChromaticityPixels, CropRows, RgbPixels, base_env, worlds_of
 from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -50,6 +50,9 @@ class Scenes:
         self.channels: str = next((name for kind, name in colors.items() if kind in kinds), "gray")
         """Channels of an observation: "gray", "rgb", or "chromaticity" (of red and blue)."""
         self.memory: int = memory_of(self._transforms)  # number of earlier frames in observations
+        is_faulty = any(isinstance(one, CameraFault) for one in self._transforms)
+        self.is_ambiguous: bool = is_faulty or base_env(env).appearances.varies
+        """Whether a state has several observations: camera faults, appearances with ranges."""
 
     def frames(self, state: State, appearance: Appearance | None = None) -> Tensor:
         """Render RGB frames. Shape: (T, H, W, 3), uint8."""
@@ -106,14 +109,18 @@ class Scenes:
     def regions(self, state: State) -> Tensor:
         """Return the `Region` of each pixel. Shape: (T, H, W), uint8.
 
-        The horizon is the lowest row of sky and the highest of ground, where they meet.
+        The horizon is the lowest row of sky and the highest of ground, where they meet. Distractors
+        count as ground.
         """
         geoms = self.worlds.render(state, self.worlds.view(modality="segmentation")).long()
-        props = torch.tensor([*self.worlds.scene.props, -1], device=geoms.device)
-        target = props[geoms]  # geom -1 (the sky) reads the last entry
+        scene = self.worlds.scene
+        props = torch.tensor([*scene.props, -1], device=geoms.device)
+        clutter = [kind is SemanticClass.DISTRACTOR for kind in scene.semantic_classes]
+        is_clutter = torch.tensor([*clutter, False], device=geoms.device)[geoms]
+        target = torch.where(is_clutter, -1, props[geoms])  # geom -1 (the sky) reads the last entry
         next_target = self.task.next_target(state)[:, None, None]
         sky, is_target = geoms < 0, target >= 0
-        meets = sky[:, :-1] & ~(sky | is_target)[:, 1:]
+        meets = sky[:, :-1] & ~(sky | is_target | is_clutter)[:, 1:]
         border = functional.pad(meets, (0, 0, 0, 1)) | functional.pad(meets, (0, 0, 1, 0))
         regions = torch.full_like(target, Region.GROUND)
         regions[sky] = Region.SKY

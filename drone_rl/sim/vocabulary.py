@@ -55,7 +55,8 @@ class TaskVocabulary:
     @property
     def reaches(self) -> str:
         """Third person of `reach`."""
-        return _third(self.reach)
+        verb, _, rest = self.reach.partition(" ")
+        return f"{_third(verb)} {rest}".rstrip()
 
     @property
     def handles(self) -> str:

@@ -175,7 +175,7 @@ _RESULT = {
     "episodes": Whole(0, 10**12),
     "seconds": Real(0.0, 1e10),
     "largest_reward": Real(0.0, 1e6, is_above=True),
-    "running_reward": Real(-1e6, 1e6),
+    "running_reward": Real(-_MAX_VALUE, _MAX_VALUE),
 }
 """Schema of the figures in `result.json`."""
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from drone_rl.evaluation.rule import KINDS
-from drone_rl.sweeps.manifest import Sweep, quoted
+from drone_rl.sweeps.manifest import Run, Sweep, quoted
 from drone_rl.sweeps.rows import Array, Row
 from drone_rl.sweeps.text import GROUP_SENTENCES, SENTENCES
 from drone_rl.utils.intervals import median_bounds, proportion
@@ -32,7 +32,8 @@ def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> dict[str, Any]:
     older = sum(row.has_older_verdict for row in rows)
     keys = ("reason", "frames", "episodes", "seconds", "running_reward")
     figures = [tuple(row.result[key] for key in keys) for row in rows if row.state == "finished"]
-    judge_arguments = (f"folder={_path_argument(sweep.folder)}", "judge=true")
+    folder = f"folder={_path_argument(sweep.folder)}"
+    judge_arguments = (folder, "judge=true", *_plugins(sweep.runs))
     summary = {
         "command": sweep.command,
         "judge_command": shlex.join(["drone-rl", "sweep-report", *judge_arguments]),
@@ -52,6 +53,12 @@ def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> dict[str, Any]:
     return {**summary, "sentences": said(SENTENCES, summary)}
 
 
+def _plugins(runs: Sequence[Run]) -> list[str]:
+    """Return the override that imports the modules of a sweep's runs, if they have any."""
+    found = (o for run in runs for o in run.overrides if o.lstrip("+").startswith("plugins="))
+    return list(dict.fromkeys(found))[:1]
+
+
 def _best(rows: Sequence[Row]) -> dict[str, Any] | None:
     ranked = best_rows(rows)
     if not ranked:
@@ -63,7 +70,7 @@ def _best(rows: Sequence[Row]) -> dict[str, Any] | None:
         "episodes": verdict["greedy"]["episodes"],
         "equals": sum(row.share("all") == best.share("all") for row in ranked) - 1,
         "command": best.run.repeat_command(),
-        "report_command": shlex.join(["drone-rl", "verdict", policy]),
+        "report_command": shlex.join(["drone-rl", "verdict", policy, *_plugins([best.run])]),
     }
 
 

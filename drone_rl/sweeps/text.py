@@ -8,6 +8,7 @@ MIN_RUNS = 6
 """Fewest runs whose median has an exact 95% interval."""
 DETERMINISTIC = 0.01
 """Entropy in nats below which a policy is practically deterministic."""
+_ROUNDING = 1e-4
 
 
 def from_to(values: list) -> str:
@@ -31,6 +32,9 @@ def counts(summary: Evidence) -> dict[str, int]:
     runs, groups = summary["runs"], summary["groups"]
     kinds = [run["verdict"] for run in runs]
     known = [run for run in runs if run["entropy"] is not None]
+    # continuous actions have densities, whose entropy is below 0 also where actions vary
+    is_density = any(run["entropy"] < -_ROUNDING for run in known)
+    still = [r for r in known if r["state"] == "finished" and r["entropy"] < DETERMINISTIC]
     solved = sum(group["solved"]["successes"] for group in groups)
     return {
         "ended": len(runs) - summary["unfinished"],
@@ -40,7 +44,7 @@ def counts(summary: Evidence) -> dict[str, int]:
         "censored": sum(group["frames_to_solve"]["more_than"] is not None for group in groups),
         "left": kinds.count("one-sided (left)"),
         "right": kinds.count("one-sided (right)"),
-        "still": sum(r["state"] == "finished" and r["entropy"] < DETERMINISTIC for r in known),
+        "still": 0 if is_density else len(still),
         "entropies": sum(run["certain"] is not None for run in known),
     }
 
@@ -271,7 +275,7 @@ SENTENCES = (
     ),
     _if_any(
         "entropies.still",
-        f"a finished run ended below {DETERMINISTIC} nats",
+        f"a finished run ended below {DETERMINISTIC} nats, and none below 0, as densities may",
         "still",
         f"{{runs}} ended below {DETERMINISTIC} nats: these policies are practically deterministic.",
     ),

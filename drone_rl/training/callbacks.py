@@ -191,7 +191,7 @@ class CollapseCheck(Callback):
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """Count the consecutive updates without a gradient."""
-        values = [metrics.get(f"loss/{name}", 1.0) for name in ("entropy", "grad_norm")]
+        values = [abs(metrics.get(f"loss/{name}", 1.0)) for name in ("entropy", "grad_norm")]
         self._count = self._count + 1 if max(values) < self.SMALLEST else 0
         if self._count == self.UPDATES:
             _log.warning(

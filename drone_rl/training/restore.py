@@ -19,8 +19,8 @@ def check_fits(saved: Any, own: Any, where: str) -> None:
     """Check that a saved state has the structure of `own`, whose None fits anything.
 
     Raises:
-        InputError: A key, type, shape, length, text or flag differs; a number is infinite, or NaN
-            where `own` has no NaN.
+        InputError: A key, type, shape, length, text or flag differs; a number is infinite or
+            NaN where `own` has no such number.
     """
     if isinstance(own, Tensor):
         _check_tensor(saved, own, where)
@@ -81,9 +81,10 @@ def _check_value(saved: Any, own: Any, where: str) -> None:
 def _check_tensor(saved: Any, own: Tensor, where: str) -> None:
     if not isinstance(saved, Tensor) or (saved.shape, saved.dtype) != (own.shape, own.dtype):
         raise _misfit(where, f"is not of shape {tuple(own.shape)} and {own.dtype}")
-    if saved.is_floating_point():
-        unknown = torch.isnan(saved) & torch.isnan(own).any()  # environments store unknowns as NaN
-        if not bool((torch.isfinite(saved) | unknown).all()):
+    if saved.is_floating_point():  # environments store unknowns as NaN or infinity
+        nan = torch.isnan(saved) & bool(torch.isnan(own).any())  # `own` may be on a GPU
+        infinite = torch.isinf(saved) & bool(torch.isinf(own).any())
+        if not bool((torch.isfinite(saved) | nan | infinite).all()):
             raise _misfit(where, "holds NaN or infinity")
 
 

@@ -191,13 +191,13 @@ def target_of(settings: TrainSettings) -> float | None:
     """Return the running reward at which a run is solved, if any.
 
     Raises:
-        InputError: It is a fraction of a largest reward that is not above 0.
+        InputError: It is a fraction of a largest reward that is not above 0, as are all figures.
     """
     share, largest = settings.trainer.target_share, as_task(settings.task).largest_reward
-    if share and not largest > 0:
+    if not largest > 0:
         raise InputError(
             f"task={settings.task.name} has largest_reward={largest:g}, of which no fraction is a "
-            "target; give trainer.target_share=null, or shift the reward above 0"
+            "target; let a perfect episode return more than 0, as by a reward for success"
         )
     return share and share * largest
 
@@ -294,7 +294,7 @@ def settings_of(config: Mapping[str, Any]) -> TrainSettings:
 def _read_best(value: Any) -> float:
     if type(value) is float and value == _NONE_YET:
         return value
-    return Real(-1e6, 1e6).read(value, "the checkpoint's best")
+    return Real(-1e15, 1e15).read(value, "the checkpoint's best")
 
 
 def last_of(folder: Path) -> Path:

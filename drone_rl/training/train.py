@@ -71,6 +71,8 @@ def train(
     settings = run_folder.settings_for(settings, state, changes, train)
     run.make()
     with folder_lock(run.path):
+        if state is None:
+            RunFolder.open(run.path, resume=False)  # another process may have ended a run here
         training = run_folder.finish(settings, run.path, learn(settings, run.path, state, hooks))
     return run_folder.reraise_signal(training)
 

@@ -5,6 +5,7 @@ import torch
 from torch import nn
 
 from drone_rl.config import TaskSettings
+from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.response import (
     OutcomeMap,
@@ -19,6 +20,7 @@ from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions
 from tests.continuous import SETTINGS
+from tests.second_task import Posts
 
 IDLE, LEFT = [1.0, 0.0, 0.0], [0.1, 0.9, 0.0]
 
@@ -135,3 +137,23 @@ def test_who_turns_to_the_side_where_he_is_to_go_is_not_blind():
 def test_who_flies_straight_on_by_nature_is_blind_only_beyond_its_reach(scenes):
     found = response_map(scenes, Forward(), num_lateral=17, num_forward=2)
     assert found.blind[0, 0].tolist() == [True] * 7 + [False] * 3 + [True] * 7
+
+
+def test_an_outcome_is_that_of_the_placed_target_whatever_its_number():
+    env = with_transforms(DroneEnv(1, Posts()), [GrayPixels()])
+    found = outcome_map(Scenes(env), Forward(), num_lateral=7, num_forward=2)
+    env.close()
+    past = [True, True, False, False, False, True, True]  # 3 to -3 m; touched within 1 m
+    assert found.collected.tolist() == [[past, past]]
+
+
+def test_who_is_blind_is_unknown_where_the_needed_action_is():
+    axes = {"height": np.zeros(1), "forward": np.ones(1), "lateral": np.array([3.0, -3.0])}
+    where = {"oracle": np.array([-1, -1]), "stratum": np.array([0, 1])}
+    probs = np.full((1, 1, 2, 3), 1 / 3)
+    never = np.zeros((1, 1, 2), bool)
+    response = ResponseMap(
+        **axes, **where, probabilities=probs, without_target=probs[0, 0, 0], blind=never
+    )
+    rows = summarise(response, OutcomeMap(**axes, **where, collected=never), ("left", "right"))
+    assert [row["blind"] for row in rows["rows"]] == [None, None]

@@ -2,11 +2,16 @@ import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 import torch
 
+from drone_rl.config import AppearanceSettings
+from drone_rl.envs import DroneEnv, GrayPixels, Noise, with_transforms
 from drone_rl.explanations import response
+from drone_rl.explanations.context import Context
 from drone_rl.explanations.scenes import place_target
-from drone_rl.policies import ExternalNetwork
+from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.policies import ExternalNetwork, SmallCNN
 from drone_rl.sim.actions import MOVES
 from drone_rl.verification.prover.cube_images import camera_ahead
 from tests.five_actions import FIVE
@@ -47,3 +52,21 @@ def test_why_there_is_none(context):
     function = ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 25, 64), MOVES)
     assert "not a torch module" in refused(network=function)
     assert "vertical_bound=1.0" in refused(task=type(scenes.task)(tall))
+
+
+@pytest.mark.parametrize(
+    ("look", "faults"),
+    [
+        (AppearanceSettings(), [Noise(0.1)]),
+        (AppearanceSettings(ground_color=((0.4,) * 3, (0.6,) * 3)), []),
+    ],
+)
+def test_there_is_none_where_a_place_has_several_images(look, faults, monkeypatch):
+    small = response.PlacesSettings(farthest=3.5, sideways=3.0)
+    monkeypatch.setattr(response, "PlacesSettings", lambda: small)
+    env = with_transforms(DroneEnv(1, appearance=look), [GrayPixels(), *faults])
+    network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,))
+    settings = ExplainSettings(frames=40, episodes=6, perplexity=5, seed=3)
+    numbers, _ = response.places_section(Context(env, network, settings))
+    env.close()
+    assert "several images" in numbers["places"]["refused"]

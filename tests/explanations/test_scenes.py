@@ -1,6 +1,6 @@
 import torch
 
-from drone_rl.config import CameraSettings
+from drone_rl.config import AppearanceSettings, CameraSettings
 from drone_rl.envs import (
     ChromaticityPixels,
     CropRows,
@@ -82,3 +82,12 @@ def test_what_is_needed_is_the_part_of_the_same_name():
     env, places = make_env(1), torch.tensor([[6.0, y, 0.0] for y in (4.0, 0.0, -4.0)])
     assert Scenes(env).needed(places).tolist() == [1, 0, 2]
     env.close()
+
+
+def test_distractors_are_no_targets():
+    look = AppearanceSettings(distractors=2, distractor_size=8.0, distractor_distance=2.0)
+    env = with_transforms(DroneEnv(1, appearance=look), [GrayPixels()])
+    scenes = Scenes(env)
+    regions = scenes.regions(empty_scene(scenes))
+    env.close()
+    assert not ((regions == Region.NEXT_TARGET) | (regions == Region.OTHER_TARGET)).any()

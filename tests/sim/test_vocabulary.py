@@ -28,6 +28,7 @@ def test_phrases():
     assert dataclasses.replace(CUBES, reach="reach").reaches == "reaches"
     assert dataclasses.replace(CUBES, reach="fly", handle="dodge").reaches == "flies"
     assert dataclasses.replace(CUBES, reach="play", handle="dodge").reaches == "plays"
+    assert dataclasses.replace(CUBES, reach="fly through").reaches == "flies through"
     assert dataclasses.replace(CUBES, handle="dodge").handles == "dodges"
     assert CUBES.side("left") == "on its left" and CUBES.side("above") == "above"
     assert CUBES.place("right") == "on its right" and CUBES.label("row") == "row"

@@ -51,3 +51,8 @@ def test_readable_runs_of_a_setting():
 def test_numbers_in_words():
     assert sweep_counts.from_to([200]) == "200"
     assert sweep_counts.from_to([100, 150, 200]) == "100 to 200"
+
+
+def test_entropies_of_densities_do_not_mean_deterministic():
+    runs = [{**r, "entropy": r["entropy"] and r["entropy"] - 3.0} for r in SUMMARY["runs"]]
+    assert sweep_counts.counts({**SUMMARY, "runs": runs})["still"] == 0

@@ -170,6 +170,7 @@ def test_passes_are_logged_as_lines_now_and_then_and_the_last_one(monkeypatch, c
         ([(0.0, 0.0)] * 19 + [(0.1, 0.1)] + [(0.0, 0.0)] * 19, 0),
         ([(1.0, 0.0)] * 40, 0),  # equal rewards of a policy that still explores
         ([(0.0, 1e-3)] * 40, 0),
+        ([(-0.5, 0.0)] * 40, 0),  # a density: continuous actions that still vary
     ],
 )
 def test_a_deterministic_policy_is_warned_about_once(caplog, updates, warnings):

@@ -111,3 +111,16 @@ def test_foreign_optimizer_states_raise(change, message):
         check_optimizer(state, optimizer)
     with pytest.raises(InputError):
         check_optimizer(5, optimizer)
+
+
+def test_infinity_is_accepted_where_the_own_state_has_it():
+    own = {"closest": torch.tensor([0.5, float("inf")])}
+    check_fits({"closest": torch.tensor([float("inf"), 1.0])}, own, "state")
+    with pytest.raises(InputError, match="holds NaN or infinity"):
+        check_fits({"closest": torch.tensor([float("nan"), 1.0])}, own, "state")
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA GPU")
+def test_a_state_on_the_cpu_fits_one_on_a_gpu():
+    check_fits({"a": torch.zeros(2)}, {"a": torch.zeros(2, device="cuda")}, "state")

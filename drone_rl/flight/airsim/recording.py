@@ -3,6 +3,7 @@
 import datetime
 import io
 import re
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from drone_rl.flight.airsim.messages import Pose, nanoseconds
 from drone_rl.utils.errors import InputError
 
 INTERVAL = 0.05
-"""Simulated seconds between two rows."""
+"""Least simulated seconds between two rows, which are whole control periods apart."""
 _COLUMNS = (
     "VehicleName TimeStamp POS_X POS_Y POS_Z Q_W Q_X Q_Y Q_Z ImageFile".replace(" ", "\t") + "\n"
 )
@@ -54,7 +55,10 @@ class Recording:
     def write(self, time: float, name: str, pose: Pose, image: Tensor) -> None:
         """Write the row of a vehicle at a simulated time, with its image (H, W, 3), uint8."""
         stamp = nanoseconds(time)
-        file = f"img_{to_letters(name)}_0_{stamp}.png"
+        letters = to_letters(name)
+        if letters != name:  # other names may have the same letters
+            letters += f"_{zlib.crc32(name.encode('utf-8', 'replace')):08x}"
+        file = f"img_{letters}_0_{stamp}.png"
         values = (*pose.position, *pose.attitude)
         word = re.sub(r"[\s#]", "_", name) or "Vehicle"  # a column of numpy has no spaces
         row: list[Any] = [word, stamp, *(f"{v:.6g}" for v in values), file]

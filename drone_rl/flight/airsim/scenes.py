@@ -1,6 +1,7 @@
 """Scenes of the server as tasks: cubes, blocks, pillars, an empty field, and MJCF files."""
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from torch import Tensor
 
 from drone_rl.config import TaskSettings
 from drone_rl.sim.dynamics import BodyState, Obstacles
-from drone_rl.sim.entities import Pillar, VisualEntity
+from drone_rl.sim.entities import Field, Pillar, VisualEntity
 from drone_rl.sim.rendering.scene import SemanticClass, compiled
 from drone_rl.sim.tasks import CollectCubes, Task, as_task
 from drone_rl.utils.errors import InputError, did_you_mean
@@ -75,10 +76,35 @@ class _File(VisualEntity):
             ) from error
         if self._mjcf_root.model in ("", "unnamed_model"):
             self._mjcf_root.model = "scene"
+        _use_radians(self._mjcf_root)
+        for section in ("option", "statistic", "visual"):  # those of the field apply
+            getattr(self._mjcf_root, section).remove()
         whole = mjcf.RootElement()
         whole.attach(self._mjcf_root)
         compiled(whole, f"scene={path}")
         self._mjcf_root.detach()
+        field = Field()
+        try:
+            field.mjcf_model.attach(self._mjcf_root)
+        except ValueError as error:
+            raise InputError(f"scene={path}: {error}; remove this attribute") from error
+        self._mjcf_root.detach()
+
+
+def _use_radians(root: Any) -> None:
+    """Convert angles from degrees, MuJoCo's default, to radians, the field's unit."""
+    if root.compiler.angle == "radian":
+        return
+    root.compiler.angle = "radian"
+    elements = [root]
+    while elements:
+        element = elements.pop()
+        elements += element.all_children()
+        if getattr(element, "euler", None) is not None:
+            element.euler = np.radians(element.euler)
+        if getattr(element, "axisangle", None) is not None:
+            *axis, angle = element.axisangle
+            element.axisangle = [*axis, math.radians(angle)]
 
 
 def make_task(scene: str) -> Task[Any]:

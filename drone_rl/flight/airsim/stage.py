@@ -88,7 +88,7 @@ class Stage:
         """Segmentation ids of all geoms, and those without the clients' own."""
         self._own_ids: dict[str, int] = {}
         self._of_file = self._read_file()
-        """Poses in NED of the named geoms of a file, which stay where they are."""
+        """Poses in NED of the named geoms of a file, relative to its model."""
         self.reset()
 
     @staticmethod
@@ -143,7 +143,9 @@ class Stage:
         if name == "Ground":
             return Pose((0.0, 0.0, 0.0), level)
         if name in self._of_file:
-            return self._of_file[name]
+            own, by = self._of_file[name], ned(self.task.places(self.worlds.state)[:, 0])
+            x, y, z = (a + b for a, b in zip(own.position, by, strict=True))
+            return Pose((x, y, z), own.attitude)
         if name in self._spawned:
             x, y, z = to_world(self._spawned[name].place)
             return Pose((x, y, z), level)
@@ -157,12 +159,9 @@ class Stage:
 
     def move_object(self, name: str, place: Sequence[float]) -> bool:
         """Move an object, NaN coordinates excepted; return whether that is possible."""
-        if any(map(math.isnan, self.object_pose(name).position)) or name in (
-            "Ground",
-            *self._of_file,
-        ):
-            return False
         now = to_world(self.object_pose(name).position)
+        if any(map(math.isnan, now)) or name in ("Ground", *self._of_file):
+            return False
         x, y, z = (n if math.isnan(v) else v for v, n in zip(place, now, strict=True))
         if name in self._spawned:
             self._spawned[name] = dataclasses.replace(self._spawned[name], place=(x, y, z))
@@ -259,8 +258,8 @@ class Stage:
         A negative id counts as 0.
         """
         found = self.find(name) if is_pattern else [n for n in self.names if n == name]
-        for one in found:
-            self._own_ids[one] = number
+        kept = {one: own for one, own in self._own_ids.items() if one not in found}
+        self._own_ids = kept | dict.fromkeys(found, number)  # the last one wins
         self._ids = self._segmentation()
         return bool(found)
 

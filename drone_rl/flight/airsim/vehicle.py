@@ -75,10 +75,11 @@ class Vehicle(Airframe):
     def takeoff(self, timeout: float) -> FlightFuture | None:
         """Climb 2 m; a `PilotError` if it moves."""
         self._require_flight("takeoff")
-        if self._speed > MOVING:
+        speed = float(self.body.velocity.norm())
+        if speed > MOVING:
             raise PilotError(
                 "Cannot perform takeoff because vehicle is already moving with velocity "
-                f"{self._speed:f} m/s"
+                f"{speed:f} m/s"
             )
         return self._moved("take_off", limit(timeout))
 
@@ -246,7 +247,9 @@ class Vehicle(Airframe):
     def set_sticks(self, of: Mapping[str, Any]) -> None:
         """Take the sticks of RCData, each from -1 to 1."""
         names = ("pitch", "roll", "throttle", "yaw")
-        values = (messages.number(of.get(name, 0.0), f"rcdata.{name}", -1.0, 1.0) for name in names)
+        keyed = {key.decode() if isinstance(key, bytes) else key: v for key, v in of.items()}
+        given = ((name, keyed.get(name, 0.0)) for name in names)
+        values = (messages.number(value, f"rcdata.{name}", -1.0, 1.0) for name, value in given)
         self.sticks = Sticks(*values)
 
     def _turned(self, forward: float, left: float) -> tuple[float, float]:

@@ -31,6 +31,7 @@ class FirmwareProcess:
 
         Raises:
             InputError: Without a namespace, a port that the firmware needs is in use.
+            FlightControllerError: The supervisor doesn't answer.
         """
         ours, theirs = socket.socketpair()
         self._link = ours

@@ -33,7 +33,7 @@ def real(
     """
     try:
         number = float(value)
-    except (TypeError, ValueError, OverflowError):
+    except (TypeError, ValueError, OverflowError, RuntimeError):
         number = math.nan
     if not low <= number <= high or (is_above and number == low):
         least = f"above {low:g}" if is_above else f"of {low:g} or more"
@@ -98,7 +98,7 @@ def path(points: Any) -> Tensor:
     """
     try:
         places = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
+    except (TypeError, ValueError, OverflowError, RuntimeError) as error:
         raise InputError(f"path={_shown(points)} is invalid; give points (x, y, z)") from error
     if places.size == 0:
         raise InputError("path has no points; give at least one (x, y, z)")

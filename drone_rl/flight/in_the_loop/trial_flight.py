@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
+from drone_rl.flight.commands import checks
 from drone_rl.flight.commands.path_following import (
     Paths,
     direction_at,
@@ -40,6 +41,11 @@ class Course:
     """Speed along the square, metres per second."""
     hover: float = 6.0
     """Seconds of hovering; the first three are not measured, unless there are no more."""
+
+    def __post_init__(self) -> None:
+        """Check the numbers; an `InputError` names the first that is out of range."""
+        for field in dataclasses.fields(self):
+            checks.real(getattr(self, field.name), field.name, 0.1, 1000.0)
 
 
 @dataclasses.dataclass(frozen=True)

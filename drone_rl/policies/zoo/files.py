@@ -29,7 +29,7 @@ _PROGRESS = Record(
         "episodes": _COUNT,
         "updates": _COUNT,
         "seconds": Real(0.0, 1e12),
-        "running_reward": Real(-1e6, 1e6),
+        "running_reward": Real(-1e15, 1e15),
     }
 )
 

@@ -14,7 +14,7 @@ from drone_rl.sim.actions import MOVES, Entry, Move
 from drone_rl.sim.dynamics import BodyState, Obstacles
 from drone_rl.sim.entities import Pillar
 from drone_rl.sim.tasks import common
-from drone_rl.sim.tasks.pillars_lanes import Lanes, meets, nearest_pillar
+from drone_rl.sim.tasks.pillars_lanes import EDGE, Lanes, meets, nearest_pillar
 from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State, register_task
 from drone_rl.sim.vocabulary import PILLARS
 from drone_rl.utils.text import plural
@@ -187,7 +187,7 @@ class Pillars(common.PropTask[FieldState]):
             torch.zeros_like(state.steps)
             .masked_fill(state.steps >= s.step_limit, EndReason.STEP_LIMIT)
             .masked_fill(x >= s.finish, EndReason.FINISH_LINE)
-            .masked_fill(y.abs() > s.spread, EndReason.SIDE_BOUNDARY)
+            .masked_fill(y.abs() > s.spread + EDGE, EndReason.SIDE_BOUNDARY)
             .masked_fill(state.touched.any(-1), EndReason.PILLAR_TOUCHED)
             .masked_fill(state.body.is_lost, EndReason.LOST_CONTROL)
         )

@@ -12,6 +12,8 @@ from torch import Tensor
 from drone_rl.config import PillarsSettings
 from drone_rl.sim.actions import Move
 
+EDGE = 1e-6
+"""Metres by which rounding may move a lane at the field's edge, also in float32."""
 MOST_TRIES = 10_000
 """Largest number of samples of a row until one leaves a lane open."""
 
@@ -50,7 +52,7 @@ class Lanes:
         The y of pillars, (N, R, K), and of drones, (N,), to metres to the left of the drone,
         (N, L), and whether open, (N, R, L).
         """
-        step, edge = self.settings.step_length, self.settings.spread + 1e-9
+        step, edge = self.settings.step_length, self.settings.spread + EDGE
         count = int(2.0 * edge / step) + 1
         first = step * torch.ceil((-edge - y) / step)
         offsets = first[:, None] + step * torch.arange(count, dtype=y.dtype, device=y.device)
@@ -63,7 +65,13 @@ class Lanes:
 
         From y of pillars, (n, K), and drones, (n,): metres to the left and width of the gap, (n,).
         """
+        step = self.settings.step_length
         offsets, is_open = self.lanes_from(rows[:, None], y)
+        is_shut = ~is_open[:, 0].any(-1)
+        if bool(is_shut.any()):  # in flight, between lanes: take those of the field
+            at = torch.where(is_shut, step * torch.round(y / step), y)
+            offsets, is_open = self.lanes_from(rows[:, None], at)
+            offsets = offsets + (at - y)[:, None]
         left, right = self._gap(rows, y[:, None] + offsets)
         off_centre = (0.5 * (left + right) - y[:, None]).abs()
         cost = offsets.abs() + 1e-3 * off_centre / self.settings.spread

@@ -36,3 +36,11 @@ def test_numpy_reads_rows_of_any_name(start, tmp_path):
 
 def test_names_of_files_hold_letters_alone():
     assert to_letters("../a b/ü") == "___a_b__"
+
+
+def test_vehicles_whose_names_have_the_same_letters_have_their_own_images(start, tmp_path):
+    text = """{"SimMode": "ComputerVision", "Vehicles": {"A-1": {}, "A_1": {"X": 4}}}"""
+    _server, client = start(text, recordings=tmp_path)
+    client.call("startRecording")
+    client.call("stopRecording")
+    assert len([*tmp_path.glob("*/images/*.png")]) == 2

@@ -1,5 +1,7 @@
 """Scenes by name, and MJCF files."""
 
+import math
+
 import pytest
 
 from drone_rl.flight.airsim.stage import Stage
@@ -24,6 +26,11 @@ def test_blocks_can_be_touched_and_a_file_is_shown(tmp_path):
     assert house.object_pose("wall").attitude == pytest.approx((1.0, 0.0, 0.0, 0.0))
     assert not house.move_object("wall", (0.0, 0.0, 0.0))
     assert float(look(house, kind=ImageType.DEPTH_PLANAR)[9, 16]) == pytest.approx(10.0, abs=0.05)
+    for name, number, is_pattern in (("wall", 7, False), (".*", 0, True), ("wall", 9, False)):
+        assert house.set_id(name, number, is_pattern=is_pattern)
+    assert house.get_id("wall") == 9
+    assert house.move_object("house", (10.0, math.nan, math.nan))
+    assert house.object_pose("wall").position == pytest.approx((21.4, 0.0, -4.0))
     house.close()
 
 
@@ -50,3 +57,24 @@ def test_crafted_files_are_refused(tmp_path, text, message):
         Stage("no.xml", 0)
     with pytest.raises(InputError, match=r"scene=blokcs is unknown; give cubes.*blocks"):
         Stage("blokcs", 0)
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "",
+        '<compiler angle="degree"/>',
+        '<option gravity="0 0 -9.81"/>',
+        '<statistic extent="20"/>',
+        '<visual><rgba haze="0.1 0.2 0.3 1"/></visual>',
+    ],
+)
+def test_a_files_angles_are_degrees_and_its_settings_do_not_matter(tmp_path, setting):
+    path = tmp_path / "house.xml"
+    path.write_text(
+        f'<mujoco model="house">{setting}<worldbody><geom name="wall" type="box" size="1 4 4" '
+        'pos="11 0 4" euler="0 0 45"/></worldbody></mujoco>'
+    )
+    house = Stage(str(path), 0)
+    assert house.object_pose("wall").attitude == pytest.approx((0.92388, 0, 0, -0.38268), abs=1e-4)
+    house.close()

@@ -29,7 +29,7 @@ def test_armed_rotors_idle(drone, quadrotor):
     drone._fly(None, 100)
     assert drone.body.rotors.mean().item() == pytest.approx(0.1 * quadrotor.settings.hover_throttle)
     assert drone._landed == LandedState.LANDED
-    assert drone._speed < 0.01
+    assert float(drone.body.velocity.norm()) < 0.01
 
 
 def test_it_flies_when_it_climbs_and_has_landed_when_it_lies_still(drone):
@@ -65,7 +65,7 @@ def test_seeds_have_31_bits(quadrotor):
 def test_a_still_drone_in_the_air_has_not_landed(drone, hovering):
     drone.body, drone._landed = hovering((0, 0, 9)), LandedState.FLYING
     drone._fly(None, 1)  # not armed: its rotors stop, and it hardly moves yet
-    assert drone._speed < 0.08
+    assert float(drone.body.velocity.norm()) < 0.08
     assert drone._is_flying
 
 

@@ -122,3 +122,10 @@ def test_field_without_open_lanes_raises(monkeypatch):
     monkeypatch.setattr(pillars_lanes, "MOST_TRIES", 5)
     with pytest.raises(RuntimeError, match="5 samples; lower the density"):
         NARROW_LANES.sample_field(np.random.RandomState(0))
+
+
+def test_the_nearest_lane_of_a_drone_between_lanes_is_one_of_the_field():
+    """No lane a whole number of steps from y = 0.5 m is open; that at 0 m is."""
+    rows, y = torch.tensor([[-1.5, 1.5]]).double(), torch.tensor([0.5]).double()
+    offset, _ = NARROW_LANES.nearest(rows, y)
+    assert offset.tolist() == [-0.5]

@@ -75,6 +75,8 @@ def _spawn(simulation: Simulation, args: Sequence[Any]) -> str:
     place = to_world(read_pose(pose).position)
     if any(map(math.isnan, place)):
         raise InputError("pose has NaN; give the position of a new object")
+    if name in simulation.vehicles:
+        raise InputError(f"object_name={name!r} is a vehicle's; give another name")
     size = _read_scale(argument(args, 3, messages.vector((1.0, 1.0, 1.0))))
     return simulation.stage.spawn(name or "object", asset, place, size)
 

@@ -57,20 +57,20 @@ class MaterialsEncoder:
     def _encode(self, appearance: Appearance, num_envs: int) -> _Encoded:
         values = {name: v.repeat(num_envs, *[1] * (v.dim() - 1)) for name, v in self._plain.items()}
         for semantic_class, color in appearance.colors.items():
-            colored = expand_color(color, num_envs)
+            colored = expand_color(color, num_envs).cpu()
             if semantic_class is SemanticClass.SKY:
                 values["sky"][:] = colored
             else:
                 values["colors"][:, self._scene.geoms(semantic_class)] = colored[:, None]
         if appearance.distractors is not None:
-            colors = appearance.distractors.expand(num_envs).colors.double()
+            colors = appearance.distractors.expand(num_envs).colors.double().cpu()
             values["colors"][:, self._scene.geoms(SemanticClass.DISTRACTOR)] = colors
         for name, value in appearance.lights(num_envs).items():
             values[_LIGHTS[name]][:] = value[:, None]
         zenith = appearance.zenith
-        zenith = values["sky"] if zenith is None else expand_color(zenith, num_envs)
+        zenith = values["sky"] if zenith is None else expand_color(zenith, num_envs).cpu()
         if appearance.exposure is not None:
-            exposure = expand_scalar(appearance.exposure, num_envs)
+            exposure = expand_scalar(appearance.exposure, num_envs).cpu()
             for name in ("ambient", "diffuse"):
                 values[name] *= exposure[:, None, None]
             values["sky"] = (values["sky"] * exposure[:, None]).clamp(max=1.0)
@@ -94,9 +94,9 @@ class MaterialsEncoder:
         for semantic_class, cover in appearance.textures.items():
             geoms = self._scene.geoms(semantic_class)
             number = torch.tensor([names.index(name) for name in cover.images] + [-1])
-            chosen = expand_scalar(cover.choice, count).long()
+            chosen = expand_scalar(cover.choice, count).long().cpu()
             texture[:, geoms] = number[chosen][:, None].int()
-            tiles[:, geoms] = (1.0 / expand_scalar(cover.size, count))[:, None].float()
+            tiles[:, geoms] = (1.0 / expand_scalar(cover.size, count).cpu())[:, None].float()
         visibility = appearance.fog_visibility
         visibility = math.inf if visibility is None else visibility
         shadows = 0 if appearance.shadows is None else appearance.shadows
