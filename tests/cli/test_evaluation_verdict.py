@@ -175,4 +175,4 @@ def test_latest_is_named_by_its_file(run, in_process, tmp_path, monkeypatch, cap
     caplog.set_level("INFO")
     in_process("verdict", "policy=latest", "episodes=4", "hydra.run.dir=v")
     assert f"policy=latest is {run}" in caplog.text
-    assert json.loads((tmp_path / "v" / "verdict.json").read_text())["policy"] == str(run / LAST)
+    assert json.loads((tmp_path / "v" / "verdict.json").read_text())["policy"] == str(run)
