@@ -322,6 +322,7 @@ OF_SWEEPS = (
 )
 OF_SETTINGS = (
     ("group.none", {"ended": 1}, {"ended": 0}),
+    ("group.damaged", {"damaged": 0}, {"damaged": 1}),
     ("group.solved", {"solved.successes": 6}),
     ("group.verdicts", {"judged": 0}),
     ("group.verdicts", {"verdicts.good.certain": 5}),

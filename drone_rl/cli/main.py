@@ -7,7 +7,7 @@ from typing import Any
 
 import drone_rl
 from drone_rl.cli.commands import COMMANDS, TABLE
-from drone_rl.utils.exit_codes import OUTPUT_CLOSED, USER_ERROR
+from drone_rl.utils.exit_codes import INTERRUPTED, OUTPUT_CLOSED, USER_ERROR
 from drone_rl.utils.imports import leave_compiler_unloaded
 from drone_rl.utils.memory import look_for_garbage_rarely
 
@@ -46,9 +46,13 @@ The settings are those of drone-rl train; drone-rl train --help lists them.
 
 def main() -> None:
     """Entry point of `drone-rl`."""
+    _replace_closed_streams()
     try:
         status = _main(sys.argv[1:])
         sys.stdout.flush()
+    except KeyboardInterrupt:  # while libraries are imported; `guarded` answers later ones
+        status = INTERRUPTED
+        print("error: interrupted", file=sys.stderr)
     except BrokenPipeError:
         status = OUTPUT_CLOSED
         _discard_output()
@@ -57,6 +61,13 @@ def main() -> None:
         print(f"error: standard output can't be written ({error.strerror})", file=sys.stderr)
         _discard_output()
     sys.exit(status)
+
+
+def _replace_closed_streams() -> None:
+    """Discard output to streams that were closed before the start, as by `>&-`."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
 
 
 _DEMO = ("evaluate", "explain")

@@ -11,7 +11,7 @@ from drone_rl.sweeps.manifest import read_result
 from drone_rl.utils.display import aligned
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import trained_policies
-from drone_rl.utils.schema import Whole, as_mapping
+from drone_rl.utils.schema import Text, Whole, as_mapping
 from drone_rl.utils.text import plural, rate
 
 _LONGEST_NAME = 18
@@ -68,7 +68,9 @@ def _row(path: Path, name: str) -> list[str]:
         return [name, "", "needs plugins=[MODULE]" if is_plugin else "can't be read", "", ""]
     verdict, run = policy.state.get("verdict"), path.parents[1]
     if path.suffix == ".pt":
-        verdict = (read_result(run) or {}).get("verdict")
+        result = read_result(run) or {}
+        is_of_this = result.get("frames") == policy.state["progress"]["frames"]
+        verdict = result.get("verdict") if is_of_this else None
         origin = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
     else:
         origin = f"revision {str(policy.state['provenance']['git_revision'])[:7]}"
@@ -78,7 +80,8 @@ def _row(path: Path, name: str) -> list[str]:
 def _figures(verdict: Any) -> Iterator[str]:
     """Yield the kind and the success rate of a recorded verdict."""
     try:
-        kind, success = verdict["kind"], as_mapping(verdict["greedy"]["success"], "success")
+        kind = Text(40).read(verdict["kind"], "kind")
+        success = as_mapping(verdict["greedy"]["success"], "success")
         figures = [f"{kind}{'' if verdict['certain'] else ' (uncertain)'}"]
         yield from (*figures, rate(success, label=""))
     except (KeyError, TypeError, ValueError):

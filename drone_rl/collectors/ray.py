@@ -20,6 +20,7 @@ from torchrl.collectors import BaseCollector
 
 from drone_rl.collectors.episodes import EpisodeCollector
 from drone_rl.utils.errors import InputError, extra
+from drone_rl.utils.imports import kept_sigterm
 
 WorkerComponents = tuple[EpisodeCollector, nn.Module, torch.Generator]
 """A worker's collector, the network inside it and the stream of its actions."""
@@ -194,7 +195,8 @@ def _start(
     try:
         is_own = not ray.is_initialized()
         if is_own:
-            ray.init(address=address, **own)
+            with kept_sigterm():
+                ray.init(address=address, **own)
     except (ConnectionError, ValueError) as error:
         raise InputError(
             f"collector.address={address} can't be reached; start a cluster with "

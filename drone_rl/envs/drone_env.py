@@ -25,7 +25,7 @@ from drone_rl.sim.tasks import Task, as_task
 from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Whole
+from drone_rl.utils.schema import Text, Whole
 from drone_rl.utils.seeding import Stream, get_state, set_state, side_stream, world_random_state
 
 
@@ -79,6 +79,7 @@ class DroneEnv(EnvBase):
                 the camera or for distractors, or `actions` are given with dynamics that have some.
         """
         Whole(1).read(num_envs, "num_envs")
+        device = Text().read(device, "device")  # torch's, too
         check_device(device)
         super().__init__(device=torch.device(device), batch_size=torch.Size([num_envs]))
         task = as_task(task)

@@ -96,6 +96,12 @@ def make_baseline(
     return constant_policy(actions.always(name))
 
 
+def check_baselines(task: Task[Any], actions: Actions) -> None:
+    """Raise an `InputError` if these actions lack what a baseline or the oracle of a task needs."""
+    for name in (*task.blind_baselines, "oracle"):
+        make_baseline(name, task, torch.Generator(), actions)
+
+
 def run_baselines(
     num_envs: int,
     task: BaseTaskSettings | Task[Any],

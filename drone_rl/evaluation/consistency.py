@@ -5,6 +5,7 @@ from typing import Any
 
 from drone_rl.evaluation.rule import SIDES, Kind, Quantity, Rule, decide, kinds_within
 from drone_rl.utils.consistency import (
+    COUNT,
     MOST_VALUES,
     check_mean,
     check_mean_width,
@@ -43,6 +44,8 @@ def check_verdict(given: Any) -> None:
     ]
     _check_kind(verdict, found, rule)
     _check_differences(verdict)
+    _check_proof(verdict)
+    _check_rounding(verdict)
     if "failures" in verdict:
         _check_failures(verdict)
 
@@ -192,14 +195,49 @@ def _check_differences(verdict: Mapping[str, Any]) -> None:
         check_same(mean, sampled["success"]["share"] - greedy["success"]["share"], "drawing.mean")
 
 
+def _check_proof(verdict: Mapping[str, Any]) -> None:
+    """Check what is quoted of a certificate against itself and the greedy episodes."""
+    proof = verdict.get("proof")
+    if proof is None or as_mapping(proof, "proof").get("refused") is not None:
+        return
+    episodes = verdict["greedy"]["episodes"]
+    parts = [read_entry(proof, k, Real(0.0), "proof") for k in ("share", "lost", "undecided")]
+    check_same(sum(parts), 1.0, "the sum of proof.share, lost and undecided")
+    agreeing = read_entry(proof, "agreeing", Whole(0, episodes), "proof")
+    won = verdict["greedy"]["success"]["successes"]
+    is_whole = not (parts[1] or parts[2]) and agreeing == won == episodes
+    if read_entry(proof, "every", Flag(), "proof") and not is_whole:
+        raise InputError("proof.every=true, but other figures exclude that; judge again")
+    if proof.get("wrong_at_most") is not None:
+        bound = read_entry(proof, "wrong_at_most", Real(0.0, 1.0), "proof")
+        checked = read_entry(proof, "checked", Whole(1, MOST_VALUES), "proof")
+        if bound < 1.0 - 0.05 ** (1.0 / checked) - _ROUNDING**2:
+            raise InputError(f"proof.wrong_at_most={bound:g} is less than {checked} rollouts show")
+
+
+def _check_rounding(verdict: Mapping[str, Any]) -> None:
+    """Check what is stated of rounding, and the number of episodes that would be enough."""
+    if verdict.get("enough") is not None:
+        read_entry(verdict, "enough", Whole(verdict["greedy"]["episodes"]), "verdict")
+    if verdict.get("rounding") is None:
+        return
+    found = as_mapping(verdict["rounding"], "rounding")
+    for some, of in (("fragile", "frames"), ("fragile_episodes", "episodes")):
+        if {some, of, f"{some}_rate"} <= found.keys():
+            part, whole = (read_entry(found, key, COUNT, "rounding") for key in (some, of))
+            check_same(found[f"{some}_rate"], part / max(1, whole), f"rounding.{some}_rate")
+    if verdict["certain"] and (found.get("excessive") or found.get("decides")):
+        raise InputError("verdict.certain=true, but rounding can change its kind; judge again")
+
+
 def _check_failures(verdict: Mapping[str, Any]) -> None:
     """Check the table of failures."""
     failures = as_mapping(verdict["failures"], "failures")
     episodes = verdict["greedy"]["episodes"]
     failed = check_proportion(failures.get("bound"), "failures.bound", episodes)
-    greedy, goals = verdict["greedy"], verdict["num_cubes"]
+    greedy = verdict["greedy"]
     least = (1.0 - greedy["shares"]["all"]["mean"]) * episodes  # if each missed every goal
-    most = min(goals * least, episodes - greedy["success"]["successes"])
+    most = episodes - greedy["success"]["successes"]
     if not least - 1e-3 <= failed <= most + 1e-3:
         raise InputError(f"failures.bound: {failed} failures contradict the goals that were missed")
     rows = failures.get("rows")

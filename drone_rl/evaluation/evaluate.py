@@ -12,7 +12,7 @@ from drone_rl.config import AppearanceSettings
 from drone_rl.config.commands import EvaluateSettings, HeldOutSettings
 from drone_rl.config.configuration import from_arguments
 from drone_rl.envs import worlds_of
-from drone_rl.evaluation.baselines import run_baselines
+from drone_rl.evaluation.baselines import check_baselines, run_baselines
 from drone_rl.evaluation.conditions_text import unlike as unlike_text
 from drone_rl.evaluation.metrics import summarise
 from drone_rl.evaluation.rollouts import run_episodes
@@ -142,6 +142,8 @@ def evaluate(
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with held_out_environments(policy, settings, seed) as (env, actor):
         state, dynamics = env.base_env.state_dict(), worlds_of(env).dynamics
+        if settings.baselines:
+            check_baselines(as_task(policy.task), dynamics.actions)
         progress("most probable actions", 0, steps)
         greedy, rounding = run_compared(env, actor, episodes)
         env.base_env.load_state_dict(state)

@@ -106,7 +106,8 @@ def summarise(episodes: Episodes) -> dict[str, Any]:
 def failure_table(episodes: Episodes, confidence: float = 0.95) -> dict[str, Any]:
     """Count first failures by class of goal and by how the episode ended.
 
-    An episode fails once, at the first goal that it misses. So each row is a binomial count, and
+    An episode fails once: at the first goal that it misses, or by its end if it reached all goals
+    and did not succeed. So each row is a binomial count, and
     its interval is exact. With this confidence the intervals of all rows hold at once (Bonferroni).
 
     Returns:
@@ -114,7 +115,8 @@ def failure_table(episodes: Episodes, confidence: float = 0.95) -> dict[str, Any
         first failure), "failed" (whose first failure it was), "share" and its interval; "largest":
         the row with the greatest product of failures and lower bound, None if nothing failed; the
         end to which every missed goal leads only if no other row has failures; "expected_end": that
-        end; "bound": the fraction of episodes that failed, with its exact interval.
+        end, None if the task has none; "bound": the fraction of episodes that failed, with its
+        exact interval.
     """
     reached, task = episodes.goals.reached, episodes.task
     first = reached.long().cumprod(-1).sum(-1)  # number of goals where none failed
@@ -125,14 +127,14 @@ def failure_table(episodes: Episodes, confidence: float = 0.95) -> dict[str, Any
         (by, value, int((of & until).any(-1).sum()), int((of & failing).any(-1).sum()))
         for by, value, of in task.classes(episodes.goals)
     ]
-    failed = first < num_goals
+    failed = (first < num_goals) | (episodes.success == 0)  # all goals may not be enough
     for reason in task.ends:
         if reason not in (0, task.success_end):
             ended = int((failed & (episodes.end_reason == reason)).sum())
             counts.append(("end", reason.name.lower(), len(episodes), ended))
     each = 1.0 - (1.0 - confidence) / len(counts)
     rows = [_row(*count, confidence=each) for count in counts]
-    expected = task.ends(task.expected_end).name.lower()
+    expected = next((e.name.lower() for e in task.ends if e == task.expected_end), None)
     hit = [row for row in rows if row["failed"]]
     telling = [row for row in hit if (row["by"], row["value"]) != ("end", expected)]
     largest = max(telling or hit, key=lambda row: row["failed"] * row["lower95"], default=None)

@@ -12,9 +12,9 @@ from drone_rl.policies.rounding import Decide
 from drone_rl.sim.tasks import State
 
 MAX_FRAGILE = 0.02
-"""Largest fraction of fragile frames for a certain verdict; honest policies have at most 0.002."""
+"""Largest fraction of fragile frames for a certain verdict; honest policies have at most 0.003."""
 MAX_FRAGILE_EPISODES = 0.25
-"""Largest fraction of episodes with a fragile frame. Honest policies have at most 0.06."""
+"""Largest fraction of episodes with a fragile frame. Honest policies have at most 0.15."""
 MAX_UNEXPLAINED = 0.04
 """Largest fraction of episodes that may end differently in another implementation if there is no
 bound on rounding, actions are continuous, or drones have flight dynamics. Otherwise an episode may

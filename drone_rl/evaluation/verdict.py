@@ -12,7 +12,7 @@ from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
 from drone_rl.envs import base_env, worlds_of
-from drone_rl.evaluation.baselines import run_baselines
+from drone_rl.evaluation.baselines import check_baselines, run_baselines
 from drone_rl.evaluation.metrics import Episodes, failure_table, summarise
 from drone_rl.evaluation.outcomes import OutcomeSet, Rounding
 from drone_rl.evaluation.rollouts import StepLog, run_episodes
@@ -20,7 +20,9 @@ from drone_rl.evaluation.rounding_sensitivity import check_rounding
 from drone_rl.evaluation.rule import Kind, Quantity, Rule, decide, kinds_within
 from drone_rl.evaluation.verdict_text import SENTENCES, is_proved
 from drone_rl.policies.policy import load_policy
+from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Task
+from drone_rl.sim.vocabulary import terms_of
 from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed
@@ -84,7 +86,7 @@ def judge_policy(
         InputError: The task has no oracle, baselines or strata; also what `check_rounding` raises.
     """
     base, worlds = base_env(env), worlds_of(env)
-    _rule_of(known.get("rule"), worlds.task)  # refuses a task before its episodes
+    check_judged(worlds.task, worlds.dynamics.actions)  # before its episodes
     state = base.state_dict()
     baselines = run_baselines(
         env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
@@ -121,6 +123,13 @@ def judge_for_selection(
     with policy.flying(min(episodes, 250), seed=seed.value, **how) as (env, actor):
         verdict = judge_policy(env, actor, episodes, seed=seed)
         return verdict.as_dict(), policy.state["progress"]
+
+
+def check_judged(task: Task[Any], actions: Actions) -> None:
+    """Raise the `InputError` with which a verdict on a task would end after its episodes."""
+    _rule_of(None, task)
+    check_baselines(task, actions)
+    terms_of({"terms": task.vocabulary.as_dict()})
 
 
 def _rule_of(rule: Rule | None, task: Task[Any]) -> Rule:
@@ -192,7 +201,7 @@ def apply_rule(
         else mean_bounds(sampled.success - greedy.success, -1.0, 1.0),
         "failures": failure_table(greedy),
         "quantities": {name: q._asdict() for name, q in zip(rule.quantities, found, strict=True)},
-        "enough": len(greedy) if is_enough else _enough(greedy, baselines, rule),
+        "enough": len(greedy) if is_enough else _enough(greedy, baselines, rule, rounding),
         **({"unlike": dict(unlike)} if unlike else {}),
     }
     return Verdict(kind, certain, evidence)
@@ -215,11 +224,12 @@ def widen(
     baselines: Mapping[str, Episodes],
     rule: Rule,
     outcomes: OutcomeSet,
+    times: int = 1,
 ) -> tuple[Quantity, ...]:
     """Widen the intervals of `measure` to include all outcomes that rounding makes possible.
 
     Lower bounds hold even if every episode has the worst of its possible outcomes for a quantity,
-    upper bounds even if each has the best one.
+    upper bounds even if each has the best one. Every episode counts `times` times, as in `measure`.
     """
     observed = _observe_each(greedy, baselines, rule)
     others = [values[:0] for values in observed]
@@ -237,7 +247,7 @@ def widen(
         np.fmin.at(lower, owner[is_known], ends[is_known])
         np.fmax.at(upper, owner[is_known], ends[is_known])
         lower[is_open], upper[is_open] = low, high
-        least, most = (estimate(i, v[~np.isnan(v)], rule) for v in (lower, upper))
+        least, most = (estimate(i, np.tile(v[~np.isnan(v)], times), rule) for v in (lower, upper))
         low, high = min(quantity.lower, least.lower), max(quantity.upper, most.upper)
         widened.append(quantity._replace(lower=low, upper=high))
     return tuple(widened)
@@ -285,9 +295,19 @@ def _is_certain(found: tuple[Quantity, ...], rule: Rule) -> bool:
     return len(kinds_within(box, len(rule.strata))) == 1
 
 
-def _enough(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> int | None:
-    """Return about how many episodes certainty needs; None if more than `MANY` covers."""
+def _enough(
+    greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule, rounding: Rounding | None
+) -> int | None:
+    """Return about how many episodes certainty needs; None if more than `MANY` covers.
+
+    None also if rounding leaves it open however many they are.
+    """
+    if rounding is not None and rounding.is_excessive:
+        return None
     for times in MANY:
-        if _is_certain(measure(greedy, baselines, rule, times), rule):
+        found = measure(greedy, baselines, rule, times)
+        if rounding is not None:
+            found = widen(found, greedy, baselines, rule, rounding.outcomes, times)
+        if _is_certain(found, rule):
             return times * len(greedy)
     return None

@@ -152,11 +152,10 @@ def _lost_side(evidence: Evidence) -> str:
 def _looks(evidence: Evidence) -> str:
     if lost := _lost_side(evidence):
         return f"blind to {lost}"
-    kind = str(evidence["kind"])
     return {
         "none of these": "neither good nor poor nor one-sided",
         "good, but trivial": "good in a trivial task",
-    }.get(kind, kind)
+    }.get(evidence["kind"], str(evidence["kind"]))
 
 
 def _kind(evidence: Evidence) -> str:
@@ -173,8 +172,11 @@ def _kind(evidence: Evidence) -> str:
 
 def _trivial(evidence: Evidence) -> str:
     baseline, figures = _most_successful(evidence), evidence["baselines"]
+    ours, theirs = (f["success"]["share"] for f in (evidence["greedy"], figures[baseline]))
+    is_as_good = theirs >= evidence["good_share"] * ours
+    does = "does as well" if is_as_good else "is good by this rule, too"
     return (
-        f"{_acting(baseline).capitalize()} does as well: it {_every(evidence)} in "
+        f"{_acting(baseline).capitalize()} {does}: it {_every(evidence)} in "
         f"{_success(figures[baseline])} of episodes, this policy in {_success(evidence['greedy'])}."
     )
 

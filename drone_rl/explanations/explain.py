@@ -119,7 +119,6 @@ def explain(
     def explain_one(policy: BasePolicy, folder: Path) -> dict[str, Any]:
         require_function(policy, seed=seed.value, renderer=settings.renderer)
         network = policy.make_network()
-        require_memoryless(network, "explain")
         env = policy.make_env(num_envs, seed=seed.value, renderer=settings.renderer)
         with closing(env):
             return explain_policy(
@@ -136,6 +135,8 @@ def explain(
                 seed=seed,
             )
 
+    for one in chosen.values():  # refused before any analysis
+        require_memoryless(one.make_network(), "explain")
     with one_thread():  # same results for any number of cores; threads would gain nothing
         numbers = {name: explain_one(one, folders[name]) for name, one in chosen.items()}
     progress("report")

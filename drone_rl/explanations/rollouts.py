@@ -26,6 +26,7 @@ from drone_rl.explanations.scenes import Region, Scenes
 from drone_rl.policies import ImageNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, Dynamics
+from drone_rl.sim.dynamics.state import heading_of
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State, Task
 
@@ -83,7 +84,11 @@ class RolloutDataset:
 
         Metres; NaN if there is none.
         """
-        return task.next_offset(self.state(task))[:, :2].numpy()
+        state = self.state(task)
+        x, y, _ = task.next_offset(state).unbind(-1)
+        heading = heading_of(state.body.attitude)
+        cos, sin = heading.cos(), heading.sin()
+        return torch.stack([cos * x + sin * y, cos * y - sin * x], -1).numpy()
 
     def state(self, task: Task[Any], dynamics: Dynamics | None = None) -> State:
         """Return the environments' states, drones at rest and rotors as at an episode's start."""

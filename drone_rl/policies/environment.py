@@ -53,6 +53,8 @@ def make_env(
     _check(actions, "actions", ActionSettings)
     if isinstance(dynamics, str | Mapping):
         _check(dynamics, "dynamics", DynamicsSettings)
+    if isinstance(dynamics, DynamicsSettings):
+        dynamics.check_air()
     if kwargs.get("appearance") is not None:
         kwargs["appearance"] = Instance(AppearanceSettings).read(kwargs["appearance"], "appearance")
     steps = as_transforms(transforms)

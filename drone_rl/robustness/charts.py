@@ -94,7 +94,7 @@ def _curve(
     axis.set(ylim=(-0.03, 1.05), yticks=[0, 0.5, 1], yticklabels=["0%", "50%", "100%"])
     axis.set_title(NAMES[name], fontsize=11)
     axis.set_xlabel(along["unit"], fontsize=9)
-    axis.axvline(0.0, color=css(MUTED), lw=0.8, ls=":", label="as it was trained", zorder=0)
+    axis.axvline(0.0, color=css(MUTED), lw=0.8, ls=":", label="unperturbed", zorder=0)
     axis.spines[["top", "right"]].set_visible(False)
 
 
@@ -133,7 +133,7 @@ def conditions(
     """Return camera images of one axis by caption, which has the strength and the success rate."""
     shown: dict[str, Image.Image] = {}
     if pictures[0] is not None:
-        shown[f"as trained: {_success(numbers['plain'])}"] = enlarge(pictures[0], _SCALE)
+        shown[f"unperturbed: {_success(numbers['plain'])}"] = enlarge(pictures[0], _SCALE)
     for level in numbers["axes"][name]["levels"]:
         picture = pictures[level["number"]]
         if picture is not None and level["refused"] is None:
@@ -154,6 +154,6 @@ def _strip(
     canvas = Image.new("RGB", (_TILES * (tiles[0].width + _GAP), grid.height + _HEADING + 6), PAPER)
     canvas.paste(grid, (0, _HEADING))
     along = numbers["axes"][name]
-    heading = f"{NAMES[name]} ({along['unit']}; {_value(along['neutral'])} in training)"
+    heading = f"{NAMES[name]} ({along['unit']}; {_value(along['neutral'])} unperturbed)"
     ImageDraw.Draw(canvas).text((2, 4), heading, INK, ImageFont.load_default(16))
     return canvas

@@ -58,10 +58,11 @@ def check_range(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[
     levels = numbers["axes"][axis.name]["levels"]
     for level, at in ((v, at) for v in levels for at in found["flown"]):
         is_there = _is_same(at["position"], level["position"]) and level["refused"] is None
-        if is_there and at["good"] and _is_surely_bad(level, numbers):
+        success = level["modes"]["constant"]["success"] if is_there else None
+        if success and at["good"] and _is_surely_bad(success, numbers):
             raise InputError(
                 f"domain.ranges.{axis.name} says good at {level['value']:g}, and axes.{axis.name} "
-                f"counts {level['modes']['constant']['success']['share']:.0%} there; {_REMEDY}"
+                f"counts {success['share']:.0%} there; {_REMEDY}"
             )
 
     possible = numbers["settings"]["possible_share"]
@@ -76,6 +77,22 @@ def check_range(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[
 def _is_impossible(oracle: Mapping[str, Any] | None, possible: float) -> bool:
     """Return whether the oracle certainly fails too often."""
     return oracle is not None and oracle["upper95"] < possible
+
+
+def check_plain(numbers: Mapping[str, Any]) -> None:
+    """Check the answer of `domain` without perturbation against the counts there.
+
+    Raises:
+        InputError: It is good, and too few of its own episodes or of those of `plain` succeed.
+    """
+    found, episodes = numbers["domain"]["plain"], numbers["settings"]["domain_episodes"]
+    if not found["good"]:
+        return
+    own = {"successes": round(found["success"] * episodes), "trials": episodes}
+    for where, success in (("domain.plain", own), ("plain", numbers["plain"]["success"])):
+        if _is_surely_bad(success, numbers):
+            share = success["successes"] / success["trials"]
+            raise InputError(f"domain.plain says good, and {where} counts {share:.0%}; {_REMEDY}")
 
 
 def check_probe(found: Mapping[str, Any], episodes: int, where: str) -> None:
@@ -146,8 +163,16 @@ def _problems(
     lost, gained = figures["paired"]["lost"], figures["paired"]["gained"]
     if gained - lost != count - before or lost > before or gained > episodes - before:
         yield ".paired: gained - lost is not the difference to the unperturbed successes"
-    elif not _is_same(figures["paired"]["p"], mcnemar_p(lost, gained)):
+    yield from _pair_problems(figures, lost, gained, episodes)
+
+
+def _pair_problems(
+    figures: Mapping[str, Any], lost: int, gained: int, episodes: int
+) -> Iterator[str]:
+    if not _is_same(figures["paired"]["p"], mcnemar_p(lost, gained)):
         yield ".paired.p is not that of its counts"
+    if figures["unchanged"] and (lost or gained):
+        yield ".unchanged, although episodes were lost or gained"
     difference = figures["difference"]
     low, mean, high = (difference[key] for key in ("lower95", "mean", "upper95"))
     if not low - CLOSE <= mean <= high + CLOSE or not _is_same(mean, (gained - lost) / episodes):
@@ -164,9 +189,9 @@ def _is_mean(share: Mapping[str, Any], episodes: int) -> bool:
     return share["count"] > 0 and low - CLOSE <= mean <= high + CLOSE
 
 
-def _is_surely_bad(level: Mapping[str, Any], numbers: Mapping[str, Any]) -> bool:
+def _is_surely_bad(success: Mapping[str, Any], numbers: Mapping[str, Any]) -> bool:
     """Whether the counts at a strength leave no doubt that the policy is not good there."""
-    success, oracle = level["modes"]["constant"]["success"], numbers["plain"]["oracle"]
+    oracle = numbers["plain"]["oracle"]
     least = 0.0 if oracle is None else oracle["lower95"]
     found = proportion(success["successes"], success["trials"], 1 - UNLIKELY)
     return found["upper95"] < numbers["settings"]["good_share"] * least

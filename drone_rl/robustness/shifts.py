@@ -16,6 +16,7 @@ from drone_rl.config import MINIMAL, BaseTaskSettings
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.config.configuration import from_arguments
 from drone_rl.envs import worlds_of
+from drone_rl.evaluation.baselines import check_baselines
 from drone_rl.evaluation.rounding_sensitivity import require_function
 from drone_rl.evaluation.verdict_text import unlike as say_unlike
 from drone_rl.policies.external_network import Logits
@@ -31,6 +32,7 @@ from drone_rl.robustness.perturbations import Condition, Mode
 from drone_rl.robustness.shifts_file import FORMAT, FORMAT_VERSION
 from drone_rl.robustness.shifts_text import SHIFTS, is_tested, rows
 from drone_rl.robustness.suite import Suite, make_strip, packed
+from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.display import aligned, picture, table
 from drone_rl.utils.errors import InputError
@@ -130,6 +132,8 @@ def shifts(
     if settings.domain:
         if (judged := as_task(subject.task)).oracle is None:
             raise InputError(f"task={judged.name} has no oracle to compare with; give domain=false")
+        flown = make_dynamics(judged.make_dynamics, subject.dynamics, subject.actions)
+        check_baselines(judged, flown.actions)
         remedy = "give domain=false for the success rates under perturbations alone"
         require_memoryless(subject.network, "the operating domain", remedy)
     axes = find_axes(settings.axes, subject)

@@ -17,7 +17,13 @@ from numpy.typing import NDArray
 from drone_rl.config.commands import MODES, ShiftSettings
 from drone_rl.policies.zoo import PolicyDescription, parse
 from drone_rl.robustness.axes import AXES, GROUPS, Axis
-from drone_rl.robustness.consistency import CLOSE, check_counts, check_probe, check_range
+from drone_rl.robustness.consistency import (
+    CLOSE,
+    check_counts,
+    check_plain,
+    check_probe,
+    check_range,
+)
 from drone_rl.robustness.suite import finite, unpacked
 from drone_rl.sim.tasks import as_task
 from drone_rl.sim.vocabulary import terms_of
@@ -88,9 +94,11 @@ def read_shifts(
         numbers = data
         _refuse_another(numbers, described, weights)
         terms_of(numbers)
+        task = as_task(described.task)
+        numbers["terms"] = task.vocabulary.as_dict()  # the file's own could say anything
         for name, along in numbers["axes"].items():
             _check_axis(AXES[name].of(policy), along, policy, f"axes.{name}")
-        check_counts(numbers, as_task(described.task))
+        check_counts(numbers, task)
         _check_domain(numbers, policy)
         shape = (described.camera.height, described.camera.width, 3)
         shown = {name: _read_strip(pictures.get(name), shape, name) for name in numbers["axes"]}
@@ -259,7 +267,9 @@ def _check_domain(numbers: Mapping[str, Any], of: Any) -> None:
     domain, episodes = numbers["domain"], numbers["settings"]["domain_episodes"]
     if domain is None:
         return
+    sides = OneOf(as_task(of.task).strata)
     check_probe(domain["plain"], episodes, "domain.plain")
+    check_plain(numbers)
     for name, found in domain["ranges"].items():
         if name not in numbers["axes"]:
             raise InputError(
@@ -269,6 +279,8 @@ def _check_domain(numbers: Mapping[str, Any], of: Any) -> None:
         check_range(AXES[name].of(of), found, of, numbers)
         for failure in found["failed"]:
             check_probe(failure, episodes, f"domain.ranges.{name}.failed")
+            if failure.get("worst") is not None:
+                sides.read(failure["worst"]["side"], f"domain.ranges.{name}.failed.worst.side")
 
 
 def _read_strip(value: Any, shape: tuple[int, int, int], name: str) -> list[NDArray | None]:

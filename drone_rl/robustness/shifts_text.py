@@ -149,7 +149,19 @@ def _impossible(e: Evidence) -> list[str]:
 
 
 def _without_effect(e: Evidence) -> list[str]:
-    return [NAMES[name] for name in e["axes"] if not is_tested(e, name)]
+    return [NAMES[n] for n in e["axes"] if not is_tested(e, n) and not _is_refused(e, n)]
+
+
+def _is_refused(e: Evidence, name: str) -> bool:
+    """Return whether the task or the camera allows none of the strengths of an axis."""
+    return all(level["refused"] is not None for level in e["axes"][name]["levels"])
+
+
+def _untested(e: Evidence) -> str:
+    barred, same = [NAMES[n] for n in e["axes"] if _is_refused(e, n)], _without_effect(e)
+    parts = [f"because without effect: {listed(same)}"] if same else []
+    parts += [f"because no strength is allowed: {listed(barred)}"] if barred else []
+    return f"Not tested, {'; '.join(parts)}." if parts else ""
 
 
 def _together(e: Evidence) -> str:
@@ -205,9 +217,9 @@ SHIFTS = (
     ),
     Sentence(
         "shifts.untested",
-        "an axis changed neither images nor episodes",
-        lambda e: bool(_without_effect(e)),
-        lambda e: f"Not tested, because without effect: {listed(_without_effect(e))}.",
+        "an axis changed neither images nor episodes, or allows no strength",
+        lambda e: bool(_untested(e)),
+        _untested,
     ),
     Sentence(
         "shifts.impossible",
@@ -355,7 +367,8 @@ def lacking(shifts: Evidence, name: str, need: Mapping[str, float | None]) -> st
     if found["positions"] is None:
         return f"{needed}; it is not certainly good even without perturbation"
     if not is_tested(shifts, name):
-        return f"{needed}; not tested, because it had no effect"
+        why = "no strength is allowed" if _is_refused(shifts, name) else "it had no effect"
+        return f"{needed}; not tested, because {why}"
     good = _number(found["low"]), _number(found["high"])
     short = {
         "low": good[0] > low + NEARLY * abs(low),

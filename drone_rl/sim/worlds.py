@@ -28,7 +28,7 @@ from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Instance, Maybe, Whole
+from drone_rl.utils.schema import Instance, Maybe, Text, Whole
 
 _POSE = {"drone": Entry((3,), torch.float32), "attitude": Entry((4,), torch.float32)}
 
@@ -68,6 +68,7 @@ class Worlds:
             InputError: An argument is unusable.
         """
         Whole(1).read(num_envs, "num_envs")
+        device = Text().read(device, "device")  # torch's, too
         check_device(device)
         Maybe(Instance(Appearance)).read(appearance, "appearance")
         self.appearance, self.distractors = appearance, distractors

@@ -18,6 +18,7 @@ from typing import Any, Protocol
 from drone_rl.sweeps.manifest import THREADS, Run, read_result
 from drone_rl.utils.errors import InputError, extra
 from drone_rl.utils.files import is_locked, read_tail, write_atomically
+from drone_rl.utils.imports import kept_sigterm
 from drone_rl.utils.limits import LOG_BYTES
 from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.schema import OneOf
@@ -38,6 +39,8 @@ class RunProcess:
         """Take a run; the first `poll` starts it."""
         self.run, self._log = run, run.folder / "output.log"
         self._process: subprocess.Popen | None = None
+        self._begin = 0
+        """Bytes of the log before the process: those of earlier attempts."""
 
     def poll(self) -> int | None:
         """Return the exit status, or None while the run is unfinished."""
@@ -53,7 +56,9 @@ class RunProcess:
         if is_locked(self.run.folder) or read_result(self.run.folder) is not None:
             self._process = None  # a process of an earlier sweep finished it
             return None
-        tail = read_tail(self._log, LOG_BYTES).decode(errors="replace").splitlines()
+        written = max(0, self._log.stat().st_size - self._begin)
+        last = read_tail(self._log, min(LOG_BYTES, written))
+        tail = last.decode(errors="replace").splitlines()
         note_failure(self.run, _error(tail, status))
         return status
 
@@ -77,6 +82,7 @@ class RunProcess:
         self.run.folder.mkdir(parents=True, exist_ok=True)
         self.run.failure.unlink(missing_ok=True)
         with self._log.open("ab") as log:
+            self._begin = log.tell()
             return subprocess.Popen(
                 [*PROGRAM, *self.run.arguments()],
                 stdin=subprocess.DEVNULL,
@@ -198,7 +204,8 @@ class RayExecutor:
         self._started = not self._ray.is_initialized()
         try:
             options = {"include_dashboard": False, "log_to_driver": False}
-            self._ray.init(address=address, ignore_reinit_error=True, **options)
+            with kept_sigterm():
+                self._ray.init(address=address, ignore_reinit_error=True, **options)
         except (ConnectionError, ValueError) as error:
             raise InputError(
                 f"hydra.launcher.address={address} can't be reached; start a cluster with "

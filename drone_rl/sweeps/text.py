@@ -117,7 +117,7 @@ SENTENCES = (
         "runs.solved_none",
         "runs ended and none was solved",
         lambda e: counts(e)["ended"] > 0 and counts(e)["solved"] == 0,
-        "No run was stopped by reaching its target.",
+        "No run with readable files was stopped by reaching its target.",
     ),
     _if_any(
         "runs.few",
@@ -335,6 +335,12 @@ GROUP_SENTENCES = (
         "some that ended have no verdict",
         lambda g: g["ended"] - g["judged"] - g["failed"],
         "without verdict {n}",
+    ),
+    _if_any(
+        "group.damaged",
+        "the files of some can't be read",
+        "damaged",
+        "not readable {n}",
     ),
     _if_any(
         "group.unfinished",

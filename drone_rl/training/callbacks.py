@@ -75,7 +75,10 @@ class Callback:
 
 
 class CheckpointCallback(Callback):
-    """Write the newest state (`last.pt`) and the one with the best running mean (`best.pt`)."""
+    """Write the newest state (`last.pt`) and the one with the best running mean (`best.pt`).
+
+    The mean starts at 0: where returns are negative, an early state may be the best by it.
+    """
 
     def __init__(
         self,
@@ -161,7 +164,8 @@ class CsvCallback(Callback):
         return int(row[0])
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
-        """Append a row."""
+        """Append a row; delete result.json, which is of the training before this update."""
+        self.path.with_name("result.json").unlink(missing_ok=True)
         done = training.progress
         counters = {"update": done.updates, "frames": done.frames, "episodes": done.episodes}
         counters = {**counters, "seconds": round(done.seconds, 3)}

@@ -1,6 +1,6 @@
 """Components of a training run, which its collectors and learners share."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import torch
@@ -12,6 +12,7 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.tasks import FailureReplayTask
+from drone_rl.utils.errors import InputError
 
 
 class Group(NamedTuple):
@@ -64,6 +65,18 @@ def make_collector(settings: TrainSettings, replay: FailureReplayTask | None = N
     """
     check_device(settings.device)
     return settings.collector.make(settings, replay)  # by default `train.threaded_collector`
+
+
+def make_learner(settings: TrainSettings, components: Components) -> Any:
+    """Make the learner; raise an `InputError` if no policy could be read from its state."""
+    learner = settings.objective.make(settings, components)
+    saved = learner.state_dict().get("policy")
+    if not isinstance(saved, Mapping) or saved.keys() != components.network.state_dict().keys():
+        raise InputError(
+            f"objective={settings.objective.name}: state_dict of {type(learner).__name__} lacks "
+            'the policy\'s weights; add "policy": components.network.state_dict()'
+        )
+    return learner
 
 
 def learning_actor(settings: TrainSettings, components: Components) -> Any:

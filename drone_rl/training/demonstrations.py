@@ -96,7 +96,7 @@ class FlightConditions:
         `where` is the name of the demonstration for messages.
         """
         own, theirs = self._effective, other._effective
-        for name in {**own, **theirs}:
+        for name in dict.fromkeys(("dynamics.mode", "actions.kind", *own, *theirs)):
             recorded, needed = own.get(name), theirs.get(name)
             if recorded != needed:
                 raise InputError(

@@ -140,6 +140,7 @@ class RunFolder:
                 demonstrations for a recurrent policy or for resuming a run that began without any.
         """
         folder, found = settings.demonstrations, []
+        _check_judged(settings)
         if state is not None:
             check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
             if folder is not None and "cloning" not in state:
@@ -178,6 +179,19 @@ class RunFolder:
         noted = {"config": extra["config"], "description": extra["description"]}
         text = yaml.safe_dump({**noted, **extra["provenance"]}, sort_keys=False)
         write_atomically(self.path / "run.yaml", text)
+
+
+def _check_judged(settings: TrainSettings) -> None:
+    """Refuse, before the training, a task that the verdict after it would refuse."""
+    if not settings.evaluate_after:
+        return
+    from drone_rl.evaluation.verdict import check_judged  # slow to import
+
+    try:
+        check_judged(as_task(settings.task), describe(settings).make_dynamics().actions)
+    except InputError as error:
+        given = f"evaluate_after={settings.evaluate_after}"
+        raise InputError(f"{given}: {error}; or give evaluate_after=0") from None
 
 
 def possible_ends(settings: TrainSettings) -> list[enum.IntEnum]:
@@ -232,8 +246,10 @@ def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Tra
     return Training(folder, result["reason"], result)
 
 
-def reraise_signal(training: Training) -> Training:
+def reraise_signal(training: Training, function: str = "train") -> Training:
     """Re-raise the signal that stopped a training run, now that its state is saved.
+
+    `function` of `drone_rl` resumes it.
 
     Returns `training` if there was no signal, or if the caller's own handler returns. Ctrl-C raises
     a KeyboardInterrupt and no subclass: Python exits by SIGINT, as shells expect, for it alone.
@@ -246,7 +262,7 @@ def reraise_signal(training: Training) -> Training:
     if callable(handler) and handler is not signal.default_int_handler:
         signal.raise_signal(number)
         return training
-    remedy = f"drone_rl.train(folder={str(training.folder)!r}, resume=True)"
+    remedy = f"drone_rl.{function}(folder={str(training.folder)!r}, resume=True)"
     stop = (
         KeyboardInterrupt(f"training stopped, its state is saved; resume with {remedy}")
         if number == signal.SIGINT

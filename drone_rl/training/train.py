@@ -107,7 +107,7 @@ def learn(
     parts = components.make_collector(settings, replay)
     confirmation = Confirmation(settings, parts.network) if limits.confirm_episodes else None
     checkpoints = run.checkpoints(settings)
-    learner = settings.objective.make(settings, parts)  # by default `reinforce_learner`, below
+    learner = components.make_learner(settings, parts)  # by default `reinforce_learner`, below
     trainer = Trainer(
         collector=parts.collector,
         learner=learner,

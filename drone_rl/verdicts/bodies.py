@@ -1,6 +1,7 @@
 """`drone-rl bodies`: judge policies under several vehicle dynamics, also in the loop."""
 
 import dataclasses
+import itertools
 import json
 import textwrap
 from collections.abc import Mapping
@@ -104,6 +105,8 @@ def bodies(
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise InputError(f"two policies are called {twice}; give each once, or rename a file")
     shared = settings.as_base(JudgeSettings)
+    for policy, body in itertools.product(loaded, settings.bodies):  # before any episode
+        policy.in_dynamics(**changes_of(body, policy.dynamics))
     found: dict[str, dict[str, Any]] = {}
     steps = len(loaded) * (len(settings.bodies) + bool(settings.loop_flights))
     for policy in loaded:
@@ -205,7 +208,7 @@ def chart(numbers: Mapping[str, Any]) -> Figure:
     axes.axis("off")
     heading = "Verdict, success rate with 95% CI, and where most failures occur"
     axes.set_title(heading, loc="left", fontsize=11, color=_INK)
-    note = "hatched, ?: too few episodes to be certain"
+    note = "hatched, ?: not certain"
     figure.supxlabel(note, fontsize=9, color=_FAINT)
     for x, body in enumerate(bodies):
         text = textwrap.fill(body, 16)

@@ -59,12 +59,13 @@ def export(
         InputError: The policy can't be written, or a given file is unusable.
     """
     settings, seed = with_seed(settings)
+    noted, chosen = origin_of(policy.path, policy.state)
+    command = Maybe(COMMAND).read(command or noted, "command")
     claim = find_claim(policy, certificate, seed=seed)
     claim = None if claim is None or claim.refused else claim  # cards quote no refused certificate
     measured = find_domain(policy, shifts, outputs)
     with held_out_environments(policy, settings, seed) as (env, actor):
         verdict = judge_policy(env, actor, settings.episodes, claim=claim, seed=seed).as_dict()
-    noted, chosen = origin_of(policy.path, policy.state)
     carried, numbers = {}, measured and measured.numbers
     if numbers is not None:  # the card names the copied file, without its folder
         numbers = {**numbers, "file": {**numbers["file"], "path": shifts_path(target).name}}
@@ -73,7 +74,7 @@ def export(
     if claim is not None and is_quoted(verdict):
         carried[certificate_path(target)] = read_bytes(claim.path, CERTIFICATE_BYTES)
     about: dict[str, Any] = {"verdict": verdict, "seed": seed.value, "chosen": chosen}
-    about |= {"command": command or noted, "shifts": numbers, "carried": carried}
+    about |= {"command": command, "shifts": numbers, "carried": carried}
     export_policy(target, policy.state, **about)
     return seed
 
@@ -90,10 +91,12 @@ def origin_of(path: Path, state: dict[str, Any]) -> tuple[str | None, dict[str, 
         if row is not None:
             episodes = None if row.verdict is None else row.verdict["greedy"]["episodes"]
             return row.run.repeat_command(), {"runs": len(rows), "episodes": episodes}
-    noted = state.get("command")
+    own = state if path.suffix == ".safetensors" else {}  # nobody checked that of a checkpoint
+    noted = own.get("command")
     if noted is None and (folder / ".hydra" / "overrides.yaml").is_file():
-        noted = shlex.join(["drone-rl", "train", *read_overrides(folder)])
-    return noted, state.get("chosen")
+        typed = [o for o in read_overrides(folder) if not o.startswith(("resume=", "trial="))]
+        noted = shlex.join(["drone-rl", "train", *typed])
+    return noted, own.get("chosen")
 
 
 def export_policy(
@@ -132,7 +135,8 @@ def export_policy(
         content = exported_bytes(checkpoint["policy"], described, about)
     except SafetensorError as error:
         raise InputError(f"policy {path} can't be written ({error})") from error
-    origin = {"task": described["task"], "dynamics": described.get("dynamics"), "shifts": shifts}
+    names = ("task", "appearance", "dynamics")
+    origin = {**{name: described.get(name) for name in names}, "shifts": shifts}
     digest = hashlib.sha256(content).hexdigest()
     card = write_card(path.stem, digest, {**about, **origin})
     try:
@@ -257,7 +261,9 @@ def _tested(card: Evidence) -> str:
     unknown = listed(not_evaluated(card), "or")
     but = f": nothing is known of other {unknown}" if unknown else ", except as stated here"
     what = "The verdict is for" if has_domain(card) else "Tested with"
-    return f"{what} {tested}, with this task's appearance only{but}."
+    is_own = card.get("appearance") is None
+    look = "this task's appearance" if is_own else "the appearance of its training"
+    return f"{what} {tested}, with {look} only{but}."
 
 
 def _flies(card: Evidence) -> bool:

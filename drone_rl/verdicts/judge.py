@@ -12,7 +12,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
 from drone_rl.config.commands import HeldOutSettings, JudgeSettings
-from drone_rl.config.configuration import Changes, from_arguments
+from drone_rl.config.configuration import Changes, as_changes, from_arguments
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, make_baseline
 from drone_rl.evaluation.evaluate import held_out_environments
@@ -164,9 +164,9 @@ def judge(
     if not policy:
         raise InputError("policy=[] is empty; give one or more policies")
     settings = from_arguments(JudgeSettings, settings, {}, judge_one)
+    changed = {name: how.get(name) for name in ("task", "dynamics", "appearance")}
     for one in policy:  # a wrong one is refused before any episode
-        if one not in BASELINES:
-            as_policy(one, how.get("outputs", "outputs"))
+        _loaded(one, how.get("outputs", "outputs"), changed)
     given = how.pop("seed", settings.seed)
     seed = how.pop("drawn_seed", None) or root_seed(given)  # all in the same environments
     done = (judge_one(one, settings, drawn_seed=seed, **how) for one in policy)
@@ -214,7 +214,7 @@ def judge_one(
     settings, seed = with_seed(settings, drawn_seed)
     progress = as_progress(progress)
     changed = {"task": task, "dynamics": dynamics, "appearance": appearance}
-    loaded = None if policy in BASELINES else as_policy(policy, outputs, **changed)
+    loaded = _loaded(policy, outputs, changed)
     progress("policy and baselines", 0, 1)
     name = str(policy) if loaded is None or isinstance(policy, str | Path) else loaded.name
     if isinstance(loaded, Policy) and policy == "latest":  # which changes with the next run
@@ -222,10 +222,9 @@ def judge_one(
     claim = measured = coverage = None
     if loaded is None:
         _refuse_files(name, certificate=certificate, shifts=shifts, require_domain=require_domain)
-        if appearance is not None:
-            raise InputError(f"policy={name} sees no images; leave appearance out")
-        own = Changes(TaskSettings).read(task or {}, "task")
-        moved = DynamicsSettings(**Changes(DynamicsSettings).read(dynamics or {}, "dynamics"))
+        own = Changes(TaskSettings).read(as_changes(task, "task"), "task")
+        air = Changes(DynamicsSettings).read(as_changes(dynamics, "dynamics"), "dynamics")
+        moved = DynamicsSettings(**air)
         moved.check_air()
         worlds = _baseline(name, TaskSettings(**own), moved, settings, seed)
     else:
@@ -247,6 +246,15 @@ def judge_one(
         return done
     against = why_not(_quoted(measured, verdict))
     return dataclasses.replace(done, coverage=dataclasses.replace(coverage, against=against))
+
+
+def _loaded(policy: Any, outputs: str | Path, changed: Mapping[str, Any]) -> BasePolicy | None:
+    """Return a policy with its changes; None for a baseline, which sees no images."""
+    if not (isinstance(policy, str) and policy in BASELINES):
+        return as_policy(policy, outputs, **changed)
+    if changed["appearance"] is not None:
+        raise InputError(f"policy={policy} sees no images; leave appearance out")
+    return None
 
 
 def _reflown(

@@ -121,10 +121,10 @@ class Chances:
 
     def _notes(self) -> list[str]:
         """Return the lines below the table."""
-        about = (
-            f"{len(self.cubes)} placements; failure is most probable at "
-            f"cubes={_format_positions(self.worst)}"
-        )
+        most = f"failure is most probable at cubes={_format_positions(self.worst)}"
+        if not self.outcomes.failure.any():
+            most = "no failure was found at any of them"
+        about = f"{len(self.cubes)} placements; {most}"
         if len(self.cubes) == 1:
             about = f"cubes at {_format_positions(self.cubes[0, :, 1])} metres to the left"
         if self.seed is None:
@@ -189,6 +189,9 @@ def chances(
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**as_changes(task, "task"))
     task_settings = require_cubes(policy.description, "exact probabilities")
+    if settings.within:  # bounds that there can't be are refused before anything is computed
+        how = (policy.make_network(), ProveSettings.logit_gap, settings.renderer)
+        make_policy_spec(policy.description, *how).close()
     placed = (
         _sampled(task_settings, settings.placements, seed)
         if cubes is None

@@ -151,6 +151,10 @@ class Journal(Callback):
         """Folder of the next search."""
         return self.folder / "rounds" / str(len(self.rounds))
 
+    def forget_after(self, frames: int) -> None:
+        """Forget searches of later policies than that of a checkpoint with so many frames."""
+        self.rounds = [done for done in self.rounds if done.frames <= frames]
+
     def add(self, done: Round, failures: NDArray[np.float64]) -> None:
         """Record a search and the boxes to train on, metres, shape (boxes, num_cubes, 2)."""
         buffer = io.BytesIO()
@@ -232,7 +236,11 @@ def train_until_proved(
     run.make()
     folder = run.path
     with folder_lock(folder):
+        if state is None:
+            RunFolder.open(folder, resume=False)  # another process may have ended a run here
         journal = Journal.open(folder, settings, how, state, changes)
+        if state is not None:
+            journal.forget_after(state["progress"]["frames"])
         callbacks = [journal, *hooks]
         result = _learn(journal, state, callbacks)
         while not (journal.is_over or _is_stopped(journal, result)):
@@ -243,11 +251,12 @@ def train_until_proved(
         certificate = journal.certificate
         if certificate is not None:
             write_atomically(folder / "certificate.json", certificate.read_bytes())
-        if journal.is_proved and not result["reason"].startswith("SIG"):
+        is_same = journal.is_proved and journal.rounds[-1].frames == result["frames"]
+        if is_same and not result["reason"].startswith("SIG"):
             result["reason"] = "proved"
         result["rounds"] = [done.values() for done in journal.rounds]
         done = finish(journal.settings, folder, result)
-    return reraise_signal(done)
+    return reraise_signal(done, "train_until_proved")
 
 
 def _is_stopped(journal: Journal, result: Mapping[str, Any]) -> bool:

@@ -22,6 +22,7 @@ from drone_rl.utils.files import (
     make_folder,
     parse_json,
     read_bytes,
+    remove_leftovers,
     write_atomically,
 )
 from drone_rl.utils.limits import ARRAYS_BYTES, CERTIFICATE_BYTES, CERTIFICATE_VALUES
@@ -140,6 +141,7 @@ def prove(
             folder = as_path(folder, "folder")
             make_folder(folder)
             stack.enter_context(folder_lock(folder))
+            remove_leftovers(folder, "state.npz", "certificate.json")
         return _prove(policy, spec, settings, folder, as_progress(progress))
 
 

@@ -1,6 +1,11 @@
 """Refuse policies that verification does not support."""
 
+import math
+
+import torch
+
 from drone_rl.config import TaskSettings
+from drone_rl.envs import CameraFault, on_pixels
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.utils.errors import InputError
 
@@ -38,4 +43,10 @@ def _ambiguity(described: PolicyDescription) -> str:
         return f"cameras without faults; it simulates faults (transform {described.faults[0]})"
     if described.appearance.varies:
         return "appearances without ranges; this policy's differs between episodes"
+    made, camera = described.make_transforms(), described.camera  # also the user's own
+    shape = (2, camera.height, camera.width, 3)
+    images = (torch.arange(math.prod(shape)) % 255).to(torch.uint8).reshape(shape)
+    first, second = (on_pixels(made)(images) for _ in range(2))
+    if any(isinstance(one, CameraFault) for one in made) or not torch.equal(first, second):
+        return "transforms without chance; those of this policy may change an image at random"
     return ""

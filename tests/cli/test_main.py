@@ -150,3 +150,24 @@ def test_a_demo_goes_on_with_the_policy_that_it_trained(monkeypatch):
         main()
     same = ["paths.outputs=o", "policy=r"]
     assert ran == [("train", line[2:]), ("evaluate", same), ("explain", same)]
+
+
+@pytest.mark.parametrize("name", ["stdout", "stderr"])
+def test_a_stream_that_was_closed_before_the_start_is_no_error(monkeypatch, name):
+    monkeypatch.setattr(sys, name, None)
+    monkeypatch.setattr(sys, "argv", ["drone-rl", "--version"])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 0
+    assert not getattr(sys, name).isatty()
+
+
+def test_ctrl_c_before_a_command_begins_is_one_line(monkeypatch, capsys):
+    def interrupted(args):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("drone_rl.cli.main._main", interrupted)
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 130
+    assert capsys.readouterr().err == "error: interrupted\n"

@@ -333,3 +333,17 @@ def test_rounds_of_practice_by_the_command_line(tmp_path):
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     frames = [row["frames"] for row in result["rounds"]]
     assert len(frames) == 3 and frames == sorted(set(frames))
+
+
+@pytest.mark.parametrize("command", ["train", "evaluate"])
+def test_a_run_keeps_its_settings_when_another_command_names_its_folder(
+    run, in_process, tmp_path, command
+):
+    folder = shutil.copytree(run, tmp_path / "copy")
+    before = read_overrides(folder)
+    told = {"train": [*TINY, "seed=9"]}.get(
+        command, [f"policy={folder}", "episodes=2", "baselines=false", "videos=0"]
+    )
+    done = in_process(command, *told, f"hydra.run.dir={folder}")
+    assert (done.returncode == 0) == (command == "evaluate"), done.stderr
+    assert read_overrides(folder) == before

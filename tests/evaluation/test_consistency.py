@@ -52,7 +52,7 @@ def test_all_goals_may_be_reached_without_success(make_episodes, make_baselines)
     episodes.end_reason[0] = EndReason.SIDE_BOUNDARY
     verdict = apply_rule(episodes, make_baselines(episodes), sampled=episodes).as_dict()
     assert verdict["greedy"]["success"]["successes"] == 39
-    assert verdict["failures"]["bound"]["successes"] == 0
+    assert verdict["failures"]["bound"]["successes"] == 1
     check_verdict(json.loads(json.dumps(verdict)))
 
 
@@ -211,3 +211,45 @@ def test_failures_can_not_be_left_out(judged):
     none = {**table, "rows": rows, "bound": proportion(0, 400), "largest": None}
     with pytest.raises(InputError, match="contradict the goals"):
         check_verdict({**verdict, "failures": none})
+
+
+PROOF = {"refused": None, "every": True, "share": 1.0, "lost": 0.0, "undecided": 0.0}
+PROOF |= {"finished": True, "checked": 1000, "wrong_at_most": 0.003, "agreeing": 400}
+
+
+@pytest.mark.parametrize(
+    "lie",
+    [
+        {"lost": 0.5},
+        {"share": 0.5},
+        {"agreeing": 9},
+        {"agreeing": 401},
+        {"checked": 1},
+        {"checked": 0},
+        {"wrong_at_most": 1e-9},
+    ],
+)
+def test_a_proof_that_contradicts_itself_is_refused(judged, lie):
+    verdict = judged(lambda i, side: True)
+    check_verdict({**verdict, "proof": PROOF})
+    with pytest.raises(InputError):
+        check_verdict({**verdict, "proof": {**PROOF, **lie}})
+
+
+def test_a_proof_of_every_placement_has_no_failures_beside_it(judged):
+    with pytest.raises(InputError, match=r"proof\.every"):
+        check_verdict({**judged(lambda i, side: side != LEFT), "proof": PROOF})
+
+
+@pytest.mark.parametrize(
+    "lie",
+    [
+        {"rounding": {"fragile": 9, "frames": 10, "fragile_rate": 0.0}},
+        {"rounding": {"excessive": True}},
+        {"rounding": {"decides": True}},
+        {"enough": 3},
+    ],
+)
+def test_rounding_and_certainty_go_together(judged, lie):
+    with pytest.raises(InputError):
+        check_verdict({**judged(lambda i, side: True), **lie})

@@ -7,6 +7,8 @@ import pytest
 import drone_rl
 from drone_rl.config import AppearanceSettings
 from drone_rl.evaluation.evaluate import Evaluation
+from drone_rl.sim.actions import MOVES_3D
+from drone_rl.sim.tasks import CollectCubes, OracleRule
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.progress import silent
@@ -132,3 +134,11 @@ def test_an_evaluation_says_what_its_seed_is(good):
 def test_settings_of_another_class_are_refused(good):
     with pytest.raises(InputError, match=r"^settings=\(dict\) is no EvaluateSettings"):
         drone_rl.evaluate(good, {"episodes": 2}, progress=silent)
+
+
+def test_an_oracle_of_other_actions_is_refused_before_any_episode(good, monkeypatch):
+    rule = OracleRule(("drone",), lambda drone: drone[..., 0].long(), MOVES_3D)
+    monkeypatch.setattr(CollectCubes, "oracle", property(lambda _: rule, lambda _, value: None))
+    monkeypatch.setattr("drone_rl.evaluation.evaluate.run_compared", None)
+    with pytest.raises(InputError, match="acts by forward, left, right, up, down, these drones"):
+        drone_rl.evaluate(good, episodes=2, progress=silent)

@@ -1,3 +1,5 @@
+import enum
+
 import pytest
 import torch
 
@@ -146,3 +148,29 @@ def test_a_class_with_the_name_of_the_expected_end_can_be_the_largest(make_episo
 
     table = failure_table(make_episodes([[LEFT]] * 4, [[0]] * 4, task=Named()))
     assert table["largest"]["by"] == "side"
+
+
+def test_all_goals_without_success_are_a_failure_by_the_end():
+    goals = Goals(
+        reached=torch.ones(2, 2, dtype=torch.bool),
+        stratum=torch.tensor([[0, 1], [0, 1]]),
+        world=torch.zeros(2, 1),
+    )
+    ends = torch.tensor([End.THROUGH, End.TOUCHED])
+    table = failure_table(Episodes(Posts(), goals, ends, torch.tensor([7, 7])))
+    assert table["bound"] == proportion(1, 2)
+    assert row(table, "end", "touched") == (2, 1)
+    assert (table["largest"]["by"], table["largest"]["value"]) == ("end", "touched")
+
+
+def test_a_task_may_lack_the_expected_end():
+    class Only(enum.IntEnum):
+        RUNNING = 0
+        TIME = 1
+
+    class Hover(Posts):
+        ends, success_end, truncation, expected_end = Only, Only.TIME, Only.TIME, 2
+
+    goals = Goals(torch.ones(2, 2).bool(), torch.zeros(2, 2).long(), torch.zeros(2, 1))
+    table = failure_table(Episodes(Hover(), goals, torch.ones(2).long(), torch.tensor([9, 9])))
+    assert table["expected_end"] is None and table["largest"] is None

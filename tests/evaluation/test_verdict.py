@@ -16,6 +16,7 @@ from drone_rl.evaluation.rule import Kind, Rule
 from drone_rl.evaluation.verdict import apply_rule, judge_policy, measure, observe, widen
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import Side
+from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
 from tests.fake_flight import floating
@@ -338,3 +339,38 @@ def test_an_episode_that_may_offer_nothing_on_a_side_may_have_any_share_there(
     left = rule.quantities.index("collected left")
     assert found[left].lower > 0.95
     assert wider[left].lower < 0.9 < wider[left].upper  # 40 of the 400 may have collected none
+
+
+def test_more_episodes_do_not_help_where_rounding_decides(make_episodes, make_baselines):
+    flown = make_episodes([LAYOUTS[i % 4] for i in range(8)], [[True, True]] * 8)
+    is_open = torch.arange(8) < 2
+    rounding = Rounding(
+        arithmetic="float32 on cpu, PyTorch",
+        is_bound=True,
+        frames=320,
+        fragile=2,
+        is_fragile=is_open,
+        outcomes=OutcomeSet(None, torch.arange(0), is_open),
+        compared="fused kernel",
+        compared_episodes=8,
+        differing=0,
+        unexplained=0,
+    )
+    for one in (rounding, dataclasses.replace(rounding, fragile=320)):
+        verdict = apply_rule(flown, make_baselines(flown), rounding=one)
+        assert not verdict.certain and verdict.evidence["enough"] is None
+        assert "would do" not in verdict.sentence
+
+
+def test_phrases_that_no_file_may_hold_are_refused_before_any_episode(monkeypatch):
+    class Wordy(Posts):
+        name, vocabulary = "wordy", TaskVocabulary(tested="two posts\nin a row")
+
+    def refused(*_, **__):
+        raise AssertionError("episodes were flown")
+
+    for module in ("verdict", "baselines"):
+        monkeypatch.setattr(f"drone_rl.evaluation.{module}.run_episodes", refused)
+    env = DroneEnv(2, Wordy(), pixels=False)
+    with pytest.raises(InputError, match=r"terms\.tested="):
+        judge_policy(env, constant_policy(Move.LEFT), 2)

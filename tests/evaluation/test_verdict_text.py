@@ -79,7 +79,7 @@ def test_what_is_said_of_a_good_policy(evidence):
         ("one-sided (right)", "can't be trusted with cubes on its left: it collects every cube"),
         ("one-sided (left)", "can't be trusted with cubes on its right"),
         ("none of these", "is neither good nor poor nor one-sided: it collects"),
-        ("good, but trivial", " does as well: it collects every cube in "),
+        ("good, but trivial", " is good by this rule, too: it collects every cube in "),
     ],
 )
 def test_kinds(evidence, kind, part):
@@ -157,7 +157,7 @@ def test_a_task_that_nobody_can_do(evidence):
         (row("cube", "third", 9, 90), "third cube: in 9 of 90 episodes that got so far (10.0%)."),
         (row("cube", "third", 400), "at the third cube: in all 400 episodes."),
         (row("sideways", "4 to 6 m", 9, 90), "with cubes 4 to 6 m to its side: in 9 of 90"),
-        (row("height", "higher", 9, 90), "with cubes higher than itself: in 9 of 90 episodes"),
+        (row("height", "higher", 9, 90), "with cubes higher than its start: in 9 of 90 episodes"),
         (row("side", "ahead", 90, 90), "with cubes ahead: in all 90 episodes that offered one."),
         (row("end", "step_limit", 40), "at the step limit: in 40 of 400 episodes (10.0%)."),
     ],
@@ -264,3 +264,10 @@ def test_without_a_bound_unexplained_differences_may_be_of_outcomes_only(evidenc
     for bound, what in ((True, "took other actions"), (False, "gave other results")):
         text = speak({**evidence, "rounding": {**found, "bound": bound}})["rounding"]
         assert text.endswith(f"fused kernel {what} in 3 of 50 episodes for no such reason.")
+
+
+def test_a_baseline_that_only_a_weak_oracle_makes_good_does_not_do_as_well(evidence):
+    evidence["kind"] = "good, but trivial"
+    evidence["baselines"]["forward"] = flights(0.6, None, 1.0, None, 0.8)
+    evidence["baselines"]["oracle"] = flights(0.4, 0.5, 0.5, 0.5, 0.5)
+    assert speak(evidence)["kind"].startswith("Flying straight on is good by this rule, too: ")

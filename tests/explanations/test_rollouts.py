@@ -74,3 +74,10 @@ def test_a_recalled_drone_can_go_on_by_the_dynamics_that_it_has(dataset):
     for name in ("position", "attitude", "velocity"):
         torch.testing.assert_close(getattr(body, name), getattr(plain, name))
     assert flight.step(body, torch.zeros(len(body), dtype=torch.int64)).velocity.any()
+
+
+def test_offset_follows_the_heading_of_a_turned_drone(dataset):
+    t = int(np.flatnonzero(dataset.next_target == 0)[0])
+    x, y = (dataset.cubes[t, 0] - dataset.drone[t])[:2]
+    dataset.arrays["attitude"][t] = [0.5**0.5, 0.0, 0.0, 0.5**0.5]  # it looks to the left
+    np.testing.assert_allclose(dataset.offset(CollectCubes())[t], (y, -x), atol=1e-5)

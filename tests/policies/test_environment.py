@@ -151,3 +151,16 @@ def test_settings_of_dynamics_and_actions(monkeypatch):
     env.close()
     with pytest.raises(InputError, match=r"^actions=moves, but dynamics=Turning brings its own"):
         drone_rl.make_env(1, dynamics=Turning(), actions=slow)
+
+
+def test_a_device_may_be_torchs():
+    env = drone_rl.make_env(1, device=torch.device("cpu"))
+    assert env.reset()["pixels"].shape == (1, 1, 25, 64)
+    env.close()
+    with pytest.raises(InputError, match=r"^device=3 is no text"):
+        drone_rl.make_env(1, device=3)
+
+
+def test_wind_that_moves_nothing_is_refused():
+    with pytest.raises(InputError, match=r"^dynamics\.wind=\[5\.0, 0\.0, 0\.0\] moves nothing"):
+        drone_rl.make_env(1, dynamics=drone_rl.DynamicsSettings(wind=(5, 0, 0)))

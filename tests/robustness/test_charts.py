@@ -78,5 +78,5 @@ def test_a_chart_of_each_axis_and_their_legend():
 
 def test_images_are_captioned_with_strength_and_success():
     shown = conditions(SHIFTS, "sun", PICTURES)
-    assert [*shown] == ["as trained: 100% succeed", "60: 99.5% succeed", "0: 10.0% succeed"]
+    assert [*shown] == ["unperturbed: 100% succeed", "60: 99.5% succeed", "0: 10.0% succeed"]
     assert all(picture.size == (3 * 64, 3 * 25) for picture in shown.values())

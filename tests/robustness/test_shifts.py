@@ -7,7 +7,8 @@ import torch
 
 import drone_rl
 from drone_rl.config import TaskSettings
-from drone_rl.sim.tasks import CollectCubes
+from drone_rl.sim.actions import MOVES_3D
+from drone_rl.sim.tasks import CollectCubes, OracleRule
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 
@@ -117,3 +118,10 @@ def test_a_task_of_a_derived_class_is_not_replaced():
     )
     with pytest.raises(InputError, match="no settings to perturb"):
         drone_rl.shifts(policy, axes=["noise"], domain=False, **FEW)
+
+
+def test_an_oracle_of_other_actions_is_refused_before_any_flight(monkeypatch):
+    rule = OracleRule(("drone",), lambda drone: drone[..., 0].long(), MOVES_3D)
+    monkeypatch.setattr(CollectCubes, "oracle", property(lambda _: rule, lambda _, value: None))
+    with pytest.raises(InputError, match="acts by forward, left, right, up, down, these drones"):
+        drone_rl.shifts("good", axes=["noise"], modes=["constant"], **FEW)

@@ -109,6 +109,11 @@ _ALL_GOOD = {f"{_BLUR}.flown.3.good": True, **_WIDE}
             {f"{_BLUR}.failed.0.impossible": True, f"{_BLUR}.failed.0.oracle": None},
             "impossible does not follow",
         ),
+        ({"domain.plain.success": 0.0}, "domain.plain says good, and domain.plain counts 0%"),
+        (
+            {"axes.blur.levels.4.modes.constant.unchanged": True},
+            "unchanged, although episodes were lost or gained",
+        ),
         ({f"{_BLUR}.failed.0.value": 1.49}, "domain.ranges.blur contradicts"),
         (
             {f"{_LEVEL}.modes.constant": figures(150), "axes.blur.areas.constant": None},
@@ -230,3 +235,10 @@ def test_a_file_of_version_0_1_has_a_fixed_seed(good, tmp_path):
     path.write_text(json.dumps(made))
     measured = read_shifts(path, good.description, good.state["policy"])
     assert said(SHIFTS, measured.evidence)["shifts.fixed_seed"].startswith("Fixed seed 0: ")
+
+
+def test_no_text_of_the_file_is_quoted(read, good):
+    lie = {f"{_BLUR}.failed.0.worst": {"side": "nowhere at all", "share": 0.5}}
+    with pytest.raises(InputError, match=r"worst\.side='nowhere at all' is unknown"):
+        read(lie)
+    assert read({"terms.goal": "certified cube"}).numbers["terms"]["goal"] == "cube"

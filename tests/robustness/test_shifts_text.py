@@ -115,3 +115,10 @@ def test_camera_faults_of_the_training_are_named():
     seen = {"transforms": [{"name": "gray"}, {"name": "late_frames", "frames": 2}]}
     text = said(SHIFTS, {**EVIDENCE, "network": {"description": seen}})
     assert text["shifts.own_faults"] == "Without the camera faults of its training (late_frames)."
+
+
+def test_an_axis_of_which_all_strengths_are_refused_is_not_called_without_effect():
+    count = len(EVIDENCE["axes"]["blur"]["levels"])
+    refused = {f"axes.blur.levels.{i}.refused": "camera.horizontal_fov=180" for i in range(count)}
+    text = said(SHIFTS, changed(EVIDENCE, refused))["shifts.untested"]
+    assert text == "Not tested, because no strength is allowed: blur."

@@ -99,3 +99,15 @@ def test_a_reason_is_kept_where_no_folder_was(make_runs):
     (run,) = make_runs("seed=0")
     note_failure(run, "lost")
     assert json.loads(run.failure.read_text()) == {"error": "lost"}
+
+
+def test_an_earlier_failure_is_not_the_reason_of_a_later_one(make_runs, monkeypatch):
+    (run,) = make_runs("seed=0")
+    for program, error in (
+        ("sys.exit('error: disk full')", "disk full"),
+        ("sys.exit(3)", "ended with status 3"),
+    ):
+        code = f"import sys; {program}"
+        monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", code))
+        assert finish_run(run) != 0
+        assert read_failure(run) == error

@@ -157,3 +157,10 @@ def test_names_are_unique_and_licences_are_told():
     names = [sentence.name for sentence in (*SENTENCES, *GROUP_SENTENCES)]
     assert len(set(names)) == len(names)
     assert all(sentence.condition for sentence in SENTENCES)
+
+
+def test_runs_that_can_not_be_read_are_not_called_unsolved():
+    group = {**GROUP, "ended": 3, "damaged": 2, "judged": 0, "solved": {"successes": 0}}
+    found = said(SENTENCES, changed(damaged=2, groups=[group]))["runs.solved_none"]
+    assert found == "No run with readable files was stopped by reaching its target."
+    assert said(GROUP_SENTENCES, group)["group.damaged"] == "not readable 2"

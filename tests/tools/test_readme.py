@@ -303,3 +303,9 @@ def test_plots_of_benchmarks_that_have_run_are_kept(tmp_path):
     assert keep_plots(measured, docs) == ["peers.png"]
     assert (docs / "peers.png").read_bytes() == b"new"
     assert (docs / "scaling.png").read_bytes() == b"old"
+
+
+def test_the_number_of_simulated_policies_is_that_of_the_results():
+    rows = [{"policy": name} for name in ("near", "near", "far")]
+    text = make_table(TRUTH, {"false_certain_rate": 0.005, "certain": rows})
+    assert "| 0.50%; 2 |" in text

@@ -88,3 +88,13 @@ def test_a_task_of_costs_has_no_target():
 
 def test_a_large_negative_mean_is_read():
     assert _read_best(-3e6) == -3e6
+
+
+def test_a_task_that_no_verdict_accepts_is_refused_before_the_training(tmp_path):
+    class Unknown(Posts):
+        name, oracle = "unknown", None
+
+    with patch.dict(TASKS), patch.dict(MAKERS):
+        settings = TrainSettings(task=as_settings(Unknown()), evaluate_after=10)
+        with pytest.raises(InputError, match="evaluate_after=10: task=unknown has no oracle"):
+            RunFolder(tmp_path).prepare(settings, None)

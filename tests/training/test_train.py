@@ -311,3 +311,20 @@ def test_settings_of_another_kind_are_named():
     for wrong in ({"seed": 1}, "latest", drone_rl.TaskSettings()):
         with pytest.raises(InputError, match=r"^settings=.* is no TrainSettings"):
             drone_rl.train(wrong, progress=silent)  # pyright: ignore[reportArgumentType]
+
+
+def test_a_result_is_forgotten_once_the_run_goes_on(trained, tmp_path):
+    class Killed(BaseException):
+        pass
+
+    class Kill(Callback):
+        def on_update(self, training, metrics):
+            raise Killed
+
+    folder = shutil.copytree(trained[0].folder, tmp_path / "run")
+    longer = TINY.trainer.replace(total_frames=900)
+    with pytest.raises(Killed):
+        drone_rl.train(
+            folder=folder, resume=True, trainer=longer, callbacks=[Kill()], progress=silent
+        )
+    assert not (folder / "result.json").exists()

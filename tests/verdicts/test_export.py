@@ -129,3 +129,26 @@ def test_a_run_from_python_names_no_command(checkpoint):
     (checkpoint.parents[2] / "sweep.json").unlink()
     (checkpoint.parents[1] / ".hydra" / "overrides.yaml").unlink()
     assert origin_of(checkpoint, {}) == (None, None)
+
+
+def test_a_checkpoint_is_not_believed_about_its_origin(checkpoint):
+    (checkpoint.parents[2] / "sweep.json").unlink()
+    lie = {"command": "drone-rl train seed=9", "chosen": {"runs": 1, "episodes": None}}
+    assert origin_of(checkpoint, lie) == ("drone-rl train seed=1", None)
+
+
+def test_the_command_of_a_resumed_run_repeats_all_of_it(checkpoint):
+    (checkpoint.parents[2] / "sweep.json").unlink()
+    noted = checkpoint.parents[1] / ".hydra" / "overrides.yaml"
+    noted.write_text("[seed=1, resume=outputs/a, trainer.total_frames=9]")
+    command, _ = origin_of(checkpoint, {})
+    assert command == "drone-rl train seed=1 trainer.total_frames=9"
+
+
+def test_a_wrong_command_is_refused_before_any_episode(tmp_path, monkeypatch):
+    monkeypatch.setattr("drone_rl.verdicts.export.judge_policy", lambda *_, **__: 1 / 0)
+    settings = HeldOutSettings(episodes=2)
+    with pytest.raises(InputError, match="command="):
+        export(
+            drone_rl.load_policy("good"), tmp_path / "a.safetensors", settings, command="rm -rf /"
+        )

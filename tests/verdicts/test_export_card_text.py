@@ -124,3 +124,9 @@ def test_a_task_of_the_users_own_is_named():
 def test_the_only_run_of_a_sweep_was_not_chosen_among_several():
     found = said(SENTENCES, {**CARD, "chosen": {"runs": 1, "episodes": 200}})
     assert found["card.chosen"].startswith("It is the only run of a sweep")
+
+
+def test_another_appearance_is_not_called_the_tasks():
+    told = said(SENTENCES, {**CARD, "appearance": {"fog_visibility": 40.0}})["card.tested"]
+    assert "with the appearance of its training only: nothing is known" in told
+    assert "this task's appearance" in said(SENTENCES, CARD)["card.tested"]

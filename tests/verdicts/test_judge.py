@@ -3,6 +3,7 @@
 import json
 import re
 
+import numpy as np
 import pytest
 
 import drone_rl
@@ -136,3 +137,18 @@ def test_a_baseline_is_judged_from_a_fresh_seed_too():
     how = {"episodes": 2, "progress": silent}
     seeds = {drone_rl.judge("oracle", **how).verdict.evidence["seed"] for _ in range(2)}
     assert len(seeds) == 2
+
+
+def test_changes_that_one_of_several_can_not_have_are_refused_before_any_episode(good):
+    with pytest.raises(InputError, match=r"^task\.num_cubes is unknown"):
+        drone_rl.judge([good, "pillars_good"], task={"num_cubes": 2}, progress=refused)
+    with pytest.raises(InputError, match=r"^policy=oracle sees no images"):
+        drone_rl.judge([good, "oracle"], appearance="fog", progress=refused)
+
+
+def test_a_baseline_takes_settings_as_a_policy_does_and_an_array_is_no_policy():
+    task = drone_rl.TaskSettings(num_cubes=1)
+    done = drone_rl.judge("oracle", task=task, episodes=2, progress=silent)
+    assert done.as_dict()["num_cubes"] == 1
+    with pytest.raises(InputError, match=r"^policy=\(ndarray\) is no policy"):
+        drone_rl.judge(np.zeros(3), progress=refused)

@@ -1,5 +1,6 @@
 """Exact chances in Python, and how they show themselves."""
 
+import dataclasses
 import json
 
 import pytest
@@ -7,6 +8,7 @@ import torch
 
 import drone_rl
 from drone_rl.config import AppearanceSettings
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verification.prover.markov_chain import SuccessBounds
@@ -107,7 +109,7 @@ def test_the_tables(good, several):
     rows = [row.split("  ")[0] for row in str(several).splitlines()]
     assert rows[1:5] == ["all cubes", "not all cubes", "mean cubes", "cube 1 collected"]
     assert str(several).splitlines()[0].split() == ["mean", "least", "most"]
-    assert rows[-1] == f"2 placements; failure is most probable at cubes=[{several.worst[0]:g}]"
+    assert rows[-1] == "2 placements; no failure was found at any of them"
     assert "<td>ended: front boundary</td>" in several._repr_html_()
     one = drone_rl.chances(good, [6.0], task=ONE, progress=silent)
     assert str(one).splitlines()[0].split() == ["chance"]
@@ -135,3 +137,19 @@ def test_mistakes_are_told_in_a_line(good, cubes, change, message):
 def test_flights_have_no_places_that_could_be_counted(good):
     with pytest.raises(InputError, match="exact probabilities support only dynamics"):
         drone_rl.chances(good.in_dynamics(mode="simple_flight"), progress=silent)
+
+
+def test_no_placement_is_called_the_worst_if_none_fails(several):
+    ends = several.outcomes.ends.clone()
+    ends[:, [end for end in EndReason if end != EndReason.ALL_CUBES]] = 0.0
+    sure = dataclasses.replace(several, outcomes=dataclasses.replace(several.outcomes, ends=ends))
+    assert "most probable" not in str(sure)
+    ends[1, EndReason.SIDE_BOUNDARY] = 0.5
+    worst = f"cubes=[{several.cubes[1, 0, 1]:g}]"
+    assert f"2 placements; failure is most probable at {worst}" in str(sure)
+
+
+def test_bounds_that_there_cannot_be_are_refused_first(good, monkeypatch):
+    monkeypatch.setattr("drone_rl.verification.chances.explore", lambda *_: pytest.fail("computed"))
+    with pytest.raises(InputError, match="support only appearance=minimal"):
+        drone_rl.chances(good.in_appearance("fog"), [6.0], task=ONE, within=0.05, progress=silent)

@@ -1,5 +1,6 @@
 """Training until proved: its rounds, what they practise, and that it goes on bit for bit."""
 
+import contextlib
 import json
 import shutil
 import signal
@@ -259,3 +260,26 @@ def test_spent_episodes_end_it(tmp_path):
     settings = TINY.replace(trainer=limits)
     done = drone_rl.train_until_proved(settings, HOW, folder=tmp_path, progress=silent)
     assert done.reason == "episodes" and len(done.result["rounds"]) == 1
+
+
+def test_a_search_of_a_later_policy_proves_nothing_of_an_older_checkpoint(whole, tmp_path, prover):
+    """As if last.pt had been replaced by a checkpoint from before the last search."""
+    folder = tmp_path / "run"
+    shutil.copytree(whole.folder, folder)
+    noted = json.loads((folder / "provable.json").read_text())
+    for done in noted["rounds"]:
+        done["frames"] += 50
+    (folder / "provable.json").write_text(json.dumps(noted))
+    train(folder, resume=True)
+    assert prover.weights  # it was searched again
+
+
+def test_a_run_that_ended_while_this_one_waited_is_not_replaced(tmp_path, monkeypatch):
+    @contextlib.contextmanager
+    def lock(folder):
+        (folder / "result.json").write_text("{}")
+        yield
+
+    monkeypatch.setattr("drone_rl.verification.provable.folder_lock", lock)
+    with pytest.raises(InputError, match="holds a finished run"):
+        train(tmp_path)

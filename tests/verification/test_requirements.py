@@ -2,6 +2,7 @@ import dataclasses
 import re
 
 import pytest
+import torch
 
 import drone_rl
 from drone_rl.config import (
@@ -11,7 +12,9 @@ from drone_rl.config import (
     PillarsSettings,
     TaskSettings,
 )
+from drone_rl.config.registry import register_transform
 from drone_rl.config.training import TrainSettings
+from drone_rl.envs.transforms import PixelTransform
 from drone_rl.policies.zoo import describe, parse
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.task import MAKERS
@@ -91,3 +94,15 @@ def test_the_remedy_is_that_of_the_problem():
     message = re.escape("task=collect_cubes, got task=pillars; give another policy") + "$"
     with pytest.raises(InputError, match=message):
         require_cubes(describe(TrainSettings().replace(**other)), "proofs")
+
+
+def test_a_random_transform_of_the_users_own_is_refused(registered):
+    class Grain(PixelTransform):
+        def _apply_transform(self, obs):
+            return obs + 0.05 * torch.randn_like(obs)
+
+    registered(register_transform("grain")(Grain))
+    described = drone_rl.load_policy("good").description.as_dict()
+    described["transforms"].append({"name": "grain"})
+    with pytest.raises(InputError, match="exact probabilities support only transforms without ch"):
+        require_cubes(parse(described), "exact probabilities")

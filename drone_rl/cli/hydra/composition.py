@@ -34,6 +34,7 @@ from drone_rl.cli.hydra.mistakes import (
     explain_file,
     repeated,
 )
+from drone_rl.cli.hydra.resuming import spare_run
 from drone_rl.cli.hydra.values import whole_numbers
 from drone_rl.cli.hydra.words import check_words
 from drone_rl.cli.settings import CommandSettings
@@ -232,7 +233,7 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     is_help = bool({"--help", "-h"} & set(overrides))
     topics = [word for word in overrides if is_help and re.fullmatch(r"[A-Za-z_][\w.]*", word)]
     words = [word for word in overrides if word not in topics]
-    overrides = command.prepare([*map(whole_numbers, words)])
+    overrides = spare_run(command.prepare([*map(whole_numbers, words)]))
     import_plugins(overrides)
     register_schemas(**{name: command})
     check_choices(overrides, conf_dir())
@@ -338,7 +339,8 @@ def _job(
                 settings = settings.replace(policy=one)  # another may be the newest soon
             status, value = settings.run(folder)
             if status < 128 and sys.stdout.isatty():  # pipes get only the results
-                print(next_steps(name.replace("_", "-"), settings.used_policy(folder), folder))
+                used = settings.used_policy(folder)
+                print(next_steps(name.replace("_", "-"), used, folder, IMPORTED))
         except Exception as error:  # a failed run of a sweep does not stop the others
             is_closed = isinstance(error, BrokenPipeError) and is_output_closed()
             if is_closed or (text := _mistake(error, overrides)) is None:

@@ -91,13 +91,15 @@ def _chosen(values: Any, topics: Sequence[str], command: str) -> dict[str, Any]:
     return found
 
 
-def next_steps(name: str, policy: str, folder: Path) -> str:
+def next_steps(name: str, policy: str, folder: Path, plugins: Sequence[str] = ()) -> str:
     """Return the lines about the policy that a command used, and what a user may do next."""
     quoted = {"policy": shlex.quote(policy), "folder": shlex.quote(str(folder))}
     files = re.compile(r"\{folder\}/([\w.]+)")
     every = TABLE[name]["next"]
     known = [line for line in every if all((folder / f).exists() for f in files.findall(line))]
-    steps = [f"  {line.format(**quoted)}" for line in known]
+    named = shlex.quote(f"plugins=[{','.join(dict.fromkeys(plugins))}]") if plugins else ""
+    more = [f" {named}" if named and "{policy}" in line else "" for line in known]
+    steps = [f"  {line.format(**quoted)}{end}" for line, end in zip(known, more, strict=True)]
     is_used = any("{policy}" in line for line in known)
     lines = [f"policy: {policy}"] if is_used else []
     return "\n".join([*lines, *(["next:", *steps] if steps else [])])

@@ -200,14 +200,20 @@ def _number(value: object) -> float | None:
 
 @contextmanager
 def _sigterm_as_interrupt() -> Iterator[None]:
-    """Make SIGTERM stop a sweep as Ctrl-C does, so that its runs save their state."""
+    """Make SIGTERM stop a sweep as Ctrl-C does, with status 143; its runs save their state."""
+    came: list[object] = []
 
-    def interrupt(*_: object) -> None:
+    def interrupt(number: int, _: object) -> None:
+        came.append(number)
         raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGTERM, interrupt)
     try:
         yield
+    except KeyboardInterrupt:
+        if came:
+            raise SystemExit(128 + signal.SIGTERM) from None
+        raise
     finally:
         signal.signal(signal.SIGTERM, before)
 

@@ -81,6 +81,17 @@ def complete(overrides: Sequence[str]) -> list[str]:
     return [*kept, *plain, *own]
 
 
+def spare_run(overrides: Sequence[str]) -> list[str]:
+    """Keep Hydra from replacing the settings in a run's folder, if `hydra.run.dir=` names one.
+
+    `resume=` and model cards read them; those of another command, or a refused one, are not its.
+    """
+    given = [o.partition("=")[2] for o in overrides if o.startswith("hydra.run.dir=")]
+    is_run = bool(given) and (Path(_unquoted(given[-1])) / "checkpoints" / "last.pt").exists()
+    is_kept = not is_run or _NO_EARLY_FILES[0] in overrides
+    return [*overrides] if is_kept else [*overrides, _NO_EARLY_FILES[0]]
+
+
 def _sweep_folder(typed: Sequence[str]) -> str:
     """Return the folder's name, or that of the same sweep begun under former names of settings."""
     older, names = [*typed], [sweep_name(typed)]

@@ -162,7 +162,7 @@ class WorldBatch:
         if self.has_images:
             return self.worlds.render(state).cpu().numpy()
         info = self.worlds.info(state)
-        flat = [info[name].flatten(1).float().nan_to_num() for name in self.names]
+        flat = [info[name][:, None].flatten(1).float().nan_to_num() for name in self.names]
         return torch.cat(flat, 1).cpu().numpy()
 
     def flags(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

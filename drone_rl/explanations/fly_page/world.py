@@ -216,10 +216,12 @@ class World:
     def flight_dynamics(self) -> DynamicsSettings:
         """Dynamics, with the present wind, of the policy's drone, else of AirSim's."""
         speed, direction = self.wind
-        angle, upward = math.radians(direction), self.policy.dynamics.wind[2]
-        wind = (0.0 - speed * math.cos(angle), speed * math.sin(angle), upward)
         base = self.policy.dynamics if self.has_dynamics else DynamicsSettings(mode="simple_flight")
-        return base.replace(wind=wind)
+        if self.wind == _to_polar(base.wind):  # unchanged: its exact numbers, for demonstrations
+            return base
+        angle, upward = math.radians(direction), self.policy.dynamics.wind[2]
+        level = (-speed * math.cos(angle), speed * math.sin(angle))
+        return base.replace(wind=(*(round(along, 9) + 0.0 for along in level), upward))
 
     @property
     def conditions(self) -> tuple[Any, Any, DynamicsSettings, ActionSettings]:

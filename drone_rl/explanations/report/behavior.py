@@ -4,7 +4,7 @@ from PIL import Image
 
 from drone_rl.evaluation.plots import images
 from drone_rl.evaluation.plots.saving import Rows
-from drone_rl.evaluation.verdict_text import depends_on_rounding
+from drone_rl.evaluation.verdict_text import SENTENCES, depends_on_rounding
 from drone_rl.explanations.report.explanation import Explanation, Figures, Part
 from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.robustness import charts
@@ -20,6 +20,7 @@ from drone_rl.utils.text import (
     listed,
     percent,
     plural,
+    said,
     seed_line,
     seed_of,
 )
@@ -35,6 +36,11 @@ def say_source(evidence: Evidence) -> Claims:
             "The figures were read from this file and not measured again."
         )
     }
+
+
+def say_verdict(evidence: Evidence) -> Claims:
+    """Say the verdict by its figures; the sentence in the file may say anything."""
+    return said(SENTENCES, evidence["verdict"])
 
 
 def say_advice(evidence: Evidence) -> Claims:
@@ -103,7 +109,7 @@ EVALUATION_PART = Part(
     title="Verdict",
     label="Verdict",
     needs=("verdict",),
-    text={"advice": say_advice, "scope": say_scope, "seed": say_seed},
+    text={"verdict": say_verdict, "advice": say_advice, "scope": say_scope, "seed": say_seed},
     extras=_evaluation_extras,
 )
 

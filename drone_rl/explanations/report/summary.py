@@ -81,6 +81,8 @@ def _say_robustness(evidence: Evidence) -> Claims:
     count = plural(len(shifts["axes"]), "perturbation")
     if shifts["domain"] is None:
         return {"summary.robustness_table": f"Success rates under {count}."}
+    tested = [name for name in shifts["axes"] if shifts_text.is_tested(shifts, name)]
+    count = plural(len(tested), "perturbation")
     wide = [shifts_text.NAMES[name] for name in shifts_text.wide(shifts)]
     names = f": {listed(wide)}" if wide else ""
     return {

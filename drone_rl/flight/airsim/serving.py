@@ -12,7 +12,7 @@ from drone_rl.flight.airsim.server import AirsimServer
 from drone_rl.flight.airsim.settings_file import AirsimSettings, parse_settings, read_settings
 from drone_rl.flight.airsim.simulation import CLOCKS, Simulation
 from drone_rl.utils.files import as_path
-from drone_rl.utils.schema import OneOf, Real, Whole
+from drone_rl.utils.schema import OneOf, Real, Text, Whole
 
 _log = logging.getLogger(__name__)
 
@@ -76,7 +76,7 @@ class RunningServer:
 def serve(
     settings: str | Path | AirsimSettings | None = None,
     *,
-    scene: str = "cubes",
+    scene: str | Path = "cubes",
     clock: str = "wall",
     patience_s: float = PATIENCE,
     address: str | None = None,
@@ -122,7 +122,7 @@ def serve(
 def make_simulation(
     settings: str | Path | AirsimSettings | None,
     *,
-    scene: str,
+    scene: str | Path,
     clock: str,
     address: str | None,
     port: int | None,
@@ -135,9 +135,10 @@ def make_simulation(
         settings = parse_settings("{}")
     elif not isinstance(settings, AirsimSettings):
         settings = read_settings(as_path(settings, "settings"))
+    scene = Text().read(scene, "scene")
     clock = OneOf(CLOCKS).read(clock, "clock")
     seed = Whole(0, 2**31 - 1).read(seed, "seed")
-    host = settings.address if address is None else address
+    host = settings.address if address is None else Text().read(address, "address")
     number = settings.port if port is None else Whole(0, 65535).read(port, "port")
     if host not in ("127.0.0.1", "localhost", "::1"):
         _log.warning(

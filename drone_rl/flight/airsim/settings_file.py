@@ -17,6 +17,7 @@ from drone_rl.sim.coordinates import HOME, GeoPoint
 from drone_rl.sim.entities import find_camera
 from drone_rl.sim.image_types import ImageType
 from drone_rl.utils.errors import InputError, did_you_mean
+from drone_rl.utils.files import read_bytes
 from drone_rl.utils.schema import Flag, Kind, Maybe, OneOf, Real, Text, Whole
 
 _log = logging.getLogger(__name__)
@@ -28,10 +29,11 @@ FLYING, POSING, PX4 = "SimpleFlight", "ComputerVision", "PX4Multirotor"
 MAX_BYTES = 2**20
 _TYPES = (FLYING, POSING, PX4)
 _STATES = ("Armed", "Disarmed")
-_COMMENT = r"//[^\n]*(?![^\n])|/\*(?:(?!\*/).)*\*/"
-"""Matches one comment in one way only, so that a failing search does not take forever."""
+_COMMENT = r"//[^\n]*(?![^\n])|/\*(?:(?!\*/).)*(?:\*/|\Z)"
+"""Matches one comment in one way only, an open one to the end, so that no search is repeated."""
 _TOKEN = re.compile(
-    rf"""(?P<comment>{_COMMENT})|(?P<text>"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')"""
+    rf"""(?P<comment>{_COMMENT})"""
+    r"""|(?P<text>"(?:\\.|[^"\\])*(?:"|\\?\Z)|'(?:\\.|[^'\\])*(?:'|\\?\Z))"""
     rf"""|(?P<comma>,(?=(?:\s|{_COMMENT})*[}}\]]))|(?P<other>.)""",
     re.DOTALL,
 )
@@ -168,7 +170,7 @@ _FILE = _Table(
                 "Altitude": Real(-1000.0, 10_000.0),
             }
         ),
-        "Wind": _Table(dict.fromkeys(("X", "Y", "Z"), Real(-100.0, 100.0))),
+        "Wind": _Table(dict.fromkeys(("X", "Y", "Z"), Real(-50.0, 50.0))),
         "CameraDefaults": _CAMERA,
         "Vehicles": {"": _VEHICLE},
         "SegmentationSettings": _Table(
@@ -192,14 +194,7 @@ def read_settings(path: Path) -> AirsimSettings:
         InputError: It can't be read, or a value is wrong; the message has the key's path.
     """
     try:
-        content = path.read_bytes()
-        if len(content) > MAX_BYTES:
-            raise InputError(f"{path} has {len(content)} bytes; give a file of at most {MAX_BYTES}")
-        text = content.decode("utf-8-sig")
-    except OSError as error:
-        raise InputError(
-            f"settings={path} can't be read ({error.strerror}); give the path of a settings.json"
-        ) from error
+        text = read_bytes(path, MAX_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"settings={path} is not text in UTF-8; save it as UTF-8") from error
     return parse_settings(text, str(path))
@@ -229,7 +224,7 @@ def parse_settings(text: str, name: str = "settings.json") -> AirsimSettings:
         for vehicle, given in found.get("Vehicles", {}).items()
         if given.get("AutoCreate", True)
     ]
-    default = VehicleChoice("SimpleFlight" if mode == SIM_MODES[0] else "", _kind(mode))
+    default = VehicleChoice(_kind(mode), _kind(mode))
     origin, wind = found.get("OriginGeopoint", {}), found.get("Wind", {})
     return AirsimSettings(
         sim_mode=mode,
@@ -257,10 +252,14 @@ def _as_json(text: str) -> Iterator[str]:
         if match.lastgroup == "text" and token[0] == "'":
             inner = token[1:-1].replace("\\'", "'")
             yield '"' + re.sub(r'(?<!\\)"', r"\"", inner) + '"'
-        elif match.lastgroup == "comment":
+        elif match.lastgroup == "comment" and _is_closed(token):
             yield "\n" * token.count("\n")  # errors name lines of the file
         elif match.lastgroup != "comma":
             yield token
+
+
+def _is_closed(comment: str) -> bool:
+    return comment.startswith("//") or (len(comment) > 3 and comment.endswith("*/"))
 
 
 def _read(table: _Table, data: Any, path: str, name: str) -> dict[str, Any]:
@@ -321,6 +320,11 @@ def _vehicle(vehicle: str, given: Mapping[str, Any], mode: str, name: str) -> Ve
         raise InputError(
             f"{name}: Vehicles.{vehicle}.VehicleType={kind} is not supported; give one of "
             f"{', '.join(_TYPES)}"
+        )
+    if kind == PX4:
+        _log.warning(
+            "%s: Vehicles.%s.VehicleType=%s: there is no PX4; SimpleFlight's controller flies it",
+            *(name, vehicle, kind),
         )
     cameras: dict[str, CameraChoice] = {}
     for camera, own in given.get("Cameras", {}).items():

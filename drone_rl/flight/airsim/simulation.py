@@ -195,14 +195,14 @@ class Simulation:
         for vehicle in self.vehicles.values():
             vehicle.reset()
             vehicle.epoch = self.time
-        self._settle()
+        self.settle()
 
     # Time
 
     def wait_for(self, wait: Wait, reply: Callable[[Any], None]) -> None:
         """Call `reply` with the result once a call is done, perhaps at once."""
         self._waits.append((wait, reply))
-        self._settle()
+        self.settle()
 
     def forget(self, reply: Callable[[Any], None]) -> None:
         """Drop the call with this reply."""
@@ -281,9 +281,9 @@ class Simulation:
         self._record()
         if self._until is not None and self.time >= self._until - 1e-9:
             self.is_paused, self._until = True, None
-        return self._settle()
+        return self.settle()
 
-    def _settle(self) -> bool:
+    def settle(self) -> bool:
         """Answer the calls that are done, in the order in which they came."""
         if not self._waits:
             return False

@@ -19,6 +19,8 @@ from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole,
 
 MAX_HEADER = 2**20
 """Bytes of the header of an exported file."""
+_TYPES = ("F32", "F64", "I64", "I32", "U8", "BOOL")
+"""Types of weights, and of counters, indices and masks; the network's own decide which is right."""
 _ENTRY = {"dtype", "shape", "data_offsets"}
 """Keys of each tensor in a safetensors header."""
 _FOLDER = Path(__file__).resolve().parent
@@ -165,8 +167,8 @@ def _exported(content: bytes) -> dict[str, Any]:
         entry = as_mapping(header[name], name)
         if entry.keys() != _ENTRY:
             raise InputError(f"the weights {shown(name)} do not state {', '.join(sorted(_ENTRY))}")
-        if entry["dtype"] not in ("F32", "I64"):  # I64: counters of normalizations
-            raise InputError(f"the weights {shown(name)} are not float32")
+        if entry["dtype"] not in _TYPES:
+            raise InputError(f"the weights {shown(name)} are of type {shown(entry['dtype'])}")
     about = dict(as_mapping(_inner(metadata, "about"), "about"))
     if "progress" in about:
         about["progress"] = _progress_of(about["progress"])

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from drone_rl.config import CameraSettings, PillarsSettings
 from drone_rl.sim.actions import MOVES, Entry, Move
-from drone_rl.sim.dynamics import BodyState, Obstacles
+from drone_rl.sim.dynamics import BodyState, FlightState, Obstacles
 from drone_rl.sim.entities import Pillar
 from drone_rl.sim.tasks import common
 from drone_rl.sim.tasks.pillars_lanes import EDGE, Lanes, meets, nearest_pillar
@@ -155,6 +155,9 @@ class Pillars(common.PropTask[FieldState]):
         """
         s, before, now = self.settings, state.drone, body.position
         hit = meets(s.touch_distance, before, now, state.pillars)
+        if isinstance(body, FlightState):  # it may have bounced off between the two positions
+            number = torch.arange(s.num_pillars, device=now.device)
+            hit = hit | (body.contact.thing[:, None] == number)
         touched = state.touched | (state.present & hit)
         new = dataclasses.replace(state, body=body, touched=touched, steps=state.steps + 1)
         passing = s.first_distance + s.spacing * torch.arange(s.num_rows, device=now.device)

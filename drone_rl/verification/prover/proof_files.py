@@ -141,7 +141,7 @@ def load(prover: Prover, path: Path, proof_id: str, most: int = ARRAYS_BYTES) ->
     """
     try:
         state = read_arrays(path, most=most)
-        saved = bytes(state["subject"]).decode()
+        saved = state["subject"].tobytes().decode()
         counts = {
             name: type(getattr(prover, name))(count)
             for name, count in zip(_COUNTS, state["counts"].tolist(), strict=True)

@@ -67,3 +67,8 @@ def test_the_policy_that_was_used_is_named(run, in_process, monkeypatch, tmp_pat
     monkeypatch.setattr("drone_rl.cli.evaluation.VerdictCommand.run", judge)
     monkeypatch.setattr(type(sys.stdout), "isatty", lambda self: True)
     assert "policy: outputs/train/runs/a\n" in in_process("verdict").stdout
+
+
+def test_the_modules_of_the_users_parts_are_part_of_the_next_commands():
+    lines = next_steps("verdict", "run", Path("x"), ["cells", "more"]).splitlines()
+    assert lines[2] == "  drone-rl explain policy=run 'plugins=[cells,more]'"

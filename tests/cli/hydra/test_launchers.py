@@ -63,11 +63,16 @@ def test_hydra_finds_the_launchers():
         assert known[f"{NAMESPACE}.{launcher.__name__}"] is launcher
 
 
-def test_sigterm_stops_a_sweep_as_ctrl_c_does():
-    before = signal.getsignal(signal.SIGTERM)
-    with pytest.raises(KeyboardInterrupt), _sigterm_as_interrupt():
-        os.kill(os.getpid(), signal.SIGTERM)
-        signal.sigtimedwait([], 1)
+def test_sigterm_stops_a_sweep_as_ctrl_c_does_with_its_own_status():
+    before, seen = signal.getsignal(signal.SIGTERM), []
+    with pytest.raises(SystemExit) as stop, _sigterm_as_interrupt():
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            signal.sigtimedwait([], 1)
+        except KeyboardInterrupt:
+            seen.append("interrupt")
+            raise
+    assert (stop.value.code, seen) == (143, ["interrupt"])
     assert signal.getsignal(signal.SIGTERM) is before
 
 

@@ -1,12 +1,16 @@
 """A single environment complies with the checkers of Gymnasium and Stable-Baselines3."""
 
+import dataclasses
 import pickle
 import warnings
 
 import numpy as np
 import pytest
+import torch
 
 import drone_rl
+from drone_rl.sim.tasks import Task
+from drone_rl.sim.tasks.task import EndReason
 from drone_rl.utils.errors import InputError
 from tests.second_task import Posts
 
@@ -186,3 +190,21 @@ def test_second_close_is_allowed_and_spec_recreates_the_environment(make):
 def test_class_accepts_settings():
     env = drone_rl.DroneWorld(drone_rl.TaskSettings(num_cubes=2), num_cubes=4)
     assert env.reset(seed=0)[1]["collected"].shape == (4,)
+
+
+class Far(Task):
+    name = "far"
+
+    def sample(self, random_state):
+        return torch.tensor(random_state.uniform(2.0, 4.0), dtype=torch.float64)
+
+    def step(self, state, body):
+        end = (body.position[:, 0] > state.sampled).long() * EndReason.SUCCESS
+        new = dataclasses.replace(state, body=body, steps=state.steps + 1, end_reason=end)
+        return new, end.double()
+
+
+def test_a_task_that_samples_one_number_is_observed():
+    env = drone_rl.DroneWorld(task=Far(), observations="state")
+    assert env.reset(seed=0)[0].shape == env.observation_space.shape
+    env.close()

@@ -236,3 +236,15 @@ class Unexplained:
     def tally(self, info):
         """Refuse, as the base class does."""
         raise drone_rl.InputError("task=x cannot be explained; define tally in its class")
+
+
+@pytest.mark.parametrize("wind", [(0.0, 5.0, 0.0), (3.0, 1.0, 0.5), (0.1, -0.7, 0.0)])
+def test_demonstrations_note_the_exact_wind_of_the_policy(make_world, wind):
+    policy = drone_rl.load_policy("flight").in_dynamics(wind=wind)
+    assert make_world(policy).conditions[2] == policy.dynamics
+
+
+def test_a_slider_sets_a_wind_that_a_training_can_have(make_world):
+    world = make_world("flight")
+    world.set_wind(4.0, 90.0)
+    assert world.conditions[2].wind == (0.0, 4.0, 0.0)

@@ -8,6 +8,7 @@ import pytest
 from drone_rl.explanations.report import page
 from drone_rl.explanations.report.page import find_explanations, report
 from drone_rl.utils.errors import InputError
+from tests.explanations.quick import quick_figures
 
 
 def explained(folder, *names):
@@ -55,3 +56,14 @@ def test_an_explanation_without_heat_of_any_method_is_refused(explanations, tmp_
     (tmp_path / "explanation.json").write_text(json.dumps(numbers))
     with pytest.raises(InputError, match="lack entries that a report needs"):
         report([tmp_path], tmp_path / "report")
+
+
+def test_the_verdict_is_said_by_its_figures_and_not_by_the_file(explanations, tmp_path):
+    numbers = json.loads((explanations[0] / "explanation.json").read_text())
+    numbers["verdict"]["sentence"] = "It never fails anywhere."
+    for name in ("arrays.npz", "dataset.npz"):
+        (tmp_path / name).write_bytes((explanations[0] / name).read_bytes())
+    (tmp_path / "explanation.json").write_text(json.dumps(numbers))
+    with quick_figures():
+        page = report([tmp_path], tmp_path / "report")
+    assert "It never fails anywhere." not in page.read_text()

@@ -53,3 +53,9 @@ def test_sections_that_were_not_run_are_named_also_if_others_were_left_out():
         "Real cameras and drones, other colors, light or sizes, what was left out (embedding) and "
         "what was not run (response map; drone-rl explain adds it)."
     )
+
+
+def test_an_axis_without_effect_is_not_counted_as_tested():
+    same = changed(SHIFTS, {"axes.blur.levels.1.modes.constant.unchanged": True})
+    found = speak(shifts=same, verdict__kind="good")["summary.robustness"]
+    assert "a range of 1 of 2 perturbations tested: elevation of the sun." in found

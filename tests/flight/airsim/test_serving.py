@@ -72,3 +72,10 @@ def test_calls_that_wait_when_the_server_stops_are_answered_with_an_error(start)
 def test_an_open_address_is_warned_about(caplog):
     with serve(scene="empty", port=0, address="0.0.0.0"):
         assert "everybody in that network can control the vehicles" in caplog.text
+
+
+def test_a_scene_may_be_a_path(tmp_path):
+    file = tmp_path / "box.xml"
+    file.write_text('<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>')
+    with serve(scene=file, port=0) as server:
+        assert server.simulation.stage.scene_name == str(file)

@@ -4,6 +4,8 @@ import dataclasses
 import json
 import logging
 import math
+import os
+import time
 
 import pytest
 
@@ -176,3 +178,23 @@ def test_files_that_can_not_be_read(tmp_path):
         read_settings(tmp_path / "large.json")
     (tmp_path / "bom.json").write_text("\ufeff" + LISTING_1, "utf-8")
     assert read_settings(tmp_path / "bom.json").port == 41451
+
+
+@pytest.mark.parametrize("text", ["/* " * 30_000, '"' + '\\"' * 30_000, "'" + "\\'" * 30_000])
+def test_what_is_never_closed_is_refused_in_linear_time(text):
+    begin = time.perf_counter()
+    with pytest.raises(InputError, match="not JSON"):
+        parse_settings(text)
+    assert time.perf_counter() - begin < 2.0
+
+
+def test_a_file_is_not_read_beyond_its_limit(tmp_path):
+    (tmp_path / "huge.json").touch()
+    os.truncate(tmp_path / "huge.json", 2**40)
+    with pytest.raises(InputError, match="at most"):
+        read_settings(tmp_path / "huge.json")
+
+
+def test_px4_is_warned_about(caplog):
+    parse_settings('{"Vehicles": {"A": {"VehicleType": "PX4Multirotor"}}}')
+    assert "there is no PX4" in caplog.text

@@ -38,6 +38,7 @@ def test_settings_one_by_one():
         ({"start": 5}, "start=5 is invalid"),
         ({"start": 5, "mode": "computer_vision"}, "start=5 is invalid"),
         ({"seed": 0.5}, "seed=0.5"),
+        ({"sensors": True}, "sensors=True is no SensorSettings"),
         ({"yaw": "north"}, "yaw='north'"),
         ({"start": (0, math.inf)}, r"start\[1\]=inf"),
     ],

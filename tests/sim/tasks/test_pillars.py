@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from drone_rl.config import CameraSettings, PillarsSettings
+from drone_rl.config import CameraSettings, DynamicsSettings, PillarsSettings
 from drone_rl.sim.actions import Move
-from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.dynamics import BodyState, Quadrotor
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import Pillars, as_task
 from drone_rl.sim.tasks.common import Side, side_of
@@ -406,3 +406,17 @@ def test_settings_create_the_task():
     task = as_task(PillarsSettings(num_rows=2))
     assert isinstance(task, Pillars) and task.settings.num_rows == 2
     assert Pillars().settings == PillarsSettings()
+
+
+def test_a_pillar_that_a_drone_bounces_off_within_a_step_is_touched():
+    """It hits at x = 8.2 (0.5 m + 0.3 m from the middle) and is before x = 8.1 at both ends."""
+    task, quadrotor = Pillars(), Quadrotor(DynamicsSettings(mode="simple_flight"))
+    flying = quadrotor.start(torch.tensor([[8.09, 0.0, 2.5]]).double())
+    flying.velocity[0, 0] = 4.0
+    rows = torch.tensor([[[0.0, 4.0, 6.0, -6.0]] * 4]).double()
+    state = task.start(rows, flying)
+    after = quadrotor.step(flying, torch.tensor([0]), task.obstacles(state))
+    assert float(after.position[0, 0]) < 8.1 and float(after.velocity[0, 0]) < 0
+    state, reward = task.step(state, after)
+    assert state.end_reason == EndReason.PILLAR_TOUCHED
+    assert state.touched[0].nonzero().tolist() == [[0]] and float(reward) < -0.49

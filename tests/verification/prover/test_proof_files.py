@@ -146,3 +146,13 @@ def test_a_state_that_makes_no_sense_is_refused_and_nothing_taken_over(spec, tmp
     assert not fresh.waiting and not fresh.ended and not fresh.fork_ends and not fresh.forked
     assert not len(fresh.part) and not fresh.done.endings and not fresh.done.steps
     assert fresh.num_states == 0 and fresh.parts.tolist() == [[[-6.0, 6.0]]]
+
+
+def test_a_number_as_subject_is_of_another_proof(spec, tmp_path):
+    path = tmp_path / "state.npz"
+    save(Prover(spec), path, "this")
+    with np.load(path) as arrays:
+        state = {**arrays, "subject": np.array(2**62)}
+    np.savez(path, **state)
+    with pytest.raises(InputError, match="belongs to another proof"):
+        load(Prover(spec), path, "this")

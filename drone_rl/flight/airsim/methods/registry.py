@@ -54,7 +54,9 @@ def call(simulation: Simulation, name: str, args: Sequence[Any]) -> Any:
         raise InputError(
             f"{name} was called with {len(args)} arguments; give {found.least} or more"
         )
-    return found.compute(simulation, args)
+    result = found.compute(simulation, args)
+    simulation.settle()  # it may have ended other calls, as cancelLastTask and simPause do
+    return result
 
 
 def suggestion(name: str) -> str:

@@ -2,6 +2,8 @@
 
 import pytest
 
+from tests.flight.airsim.conftest import Client
+
 
 def test_handshakes_of_both_clients(start):
     _, client = start()
@@ -18,3 +20,25 @@ def test_without_a_folder_nothing_is_recorded(start):
     with pytest.raises(RuntimeError, match="no folder for recordings"):
         client.call("startRecording")
     assert client.call("isRecording") is False
+
+
+@pytest.mark.parametrize("end", [("cancelLastTask",), ("enableApiControl", False)])
+def test_a_movement_that_is_cancelled_while_time_is_paused_is_answered(start, end):
+    _, client = start()
+    client.call("enableApiControl", True)
+    client.call("simPause", True)
+    movement = client.send("takeoff", 20.0)
+    client.call(*end)
+    client.socket.settimeout(5)
+    assert client.receive(movement) == (None, False)
+
+
+def test_a_pause_ends_the_wait_of_continuing(start):
+    server, client = start(clock="wall")
+    waiting, other = client.send("simContinueForTime", 600.0), Client(server.address[1])
+    while other.call("getMultirotorState")["timestamp"] == 0:
+        pass
+    other.call("simPause", True)
+    client.socket.settimeout(5)
+    assert client.receive(waiting) == (None, None)
+    other.close()
