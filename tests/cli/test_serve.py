@@ -38,7 +38,7 @@ def test_it_says_when_clients_can_connect_and_ends_by_ctrl_c(tmp_path):
     ("args", "message"),
     [
         (("scene=moon",), "scene=moon is unknown"),
-        (("settings=none.json",), "settings=none.json can't be read"),
+        (("settings=none.json",), "none.json can't be read"),
         (("clock=fast",), "clock='fast' is unknown"),
     ],
 )

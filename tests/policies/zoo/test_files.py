@@ -135,7 +135,7 @@ def test_name_of_the_running_reward_in_version_0_1_is_read(tmp_path):
         (exported(about={"seed": 0.5}), r"seed=0\.5"),
         (exported(about={"chosen": {"runs": 3}}), r"chosen\.episodes is missing"),
         (exported({**WEIGHTS, "x": torch.zeros(1)}), "x' is .* absent by"),
-        (exported({k: v.double() for k, v in WEIGHTS.items()}), "not float32"),
+        (exported({k: v.double() for k, v in WEIGHTS.items()}), "of float64"),
         (exported({k: v * float("nan") for k, v in WEIGHTS.items()}), "NaN"),
         (exported({}), "absent in the file"),
         (DAMAGED_DESCRIPTION, "its description is damaged"),

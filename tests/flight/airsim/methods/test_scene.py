@@ -10,7 +10,7 @@ from tests.flight.airsim.conftest import NAN, SMALL, YAW, pose
 def test_objects_and_vehicles_by_name(start):
     _, client = start(SMALL, scene="cubes")
     names = client.call("simListSceneObjects", ".*")
-    assert names == ["Ground", "cube_0", "cube_1", "cube_2"]
+    assert names == ["Ground", "cube_0", "cube_1", "cube_2", "ComputerVision"]
     before = client.call("simGetObjectPose", "cube_0")
     assert before["position"]["x_val"] == 15.0
     assert client.call("simSetObjectPose", "cube_0", pose(18.0, NAN, NAN), True) is True
