@@ -141,9 +141,9 @@ def evaluate(
         raise InputError(f"task={own.name} has no oracle to compare with; give baselines=false")
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with held_out_environments(policy, settings, seed) as (env, actor):
-        state, dynamics = env.base_env.state_dict(), worlds_of(env).dynamics
+        state, flown = env.base_env.state_dict(), worlds_of(env).dynamics
         if settings.baselines:
-            check_baselines(as_task(policy.task), dynamics.actions)
+            check_baselines(as_task(policy.task), flown.actions)
         progress("most probable actions", 0, steps)
         greedy, rounding = run_compared(env, actor, episodes)
         env.base_env.load_state_dict(state)
@@ -152,7 +152,7 @@ def evaluate(
     if settings.baselines:
         progress("baselines", 2, steps)
         num_envs, device = settings.batch_size, settings.device
-        rollouts |= run_baselines(num_envs, policy.task, state, episodes, device, dynamics)
+        rollouts |= run_baselines(num_envs, policy.task, state, episodes, device, flown)
     progress("evaluated", steps, steps)
     figures = {name: summarise(e) for name, e in rollouts.items()}
     return Evaluation(policy, settings, figures, seed, rounding and rounding.as_dict())

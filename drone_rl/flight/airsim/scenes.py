@@ -83,7 +83,7 @@ class _File(VisualEntity):
         whole.attach(self._mjcf_root)
         compiled(whole, f"scene={path}")
         self._mjcf_root.detach()
-        field = Field()
+        field: Any = Field()
         try:
             field.mjcf_model.attach(self._mjcf_root)
         except ValueError as error:
