@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from typing import Any, Self
 
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.config.dynamics import ActionSettings
@@ -86,11 +87,12 @@ class ContinuousActions(Actions):
         numbers = ("forward", "left", "turn left")
         return (*(f"{n} mean" for n in numbers), *(f"{n} deviation" for n in numbers))
 
-    def to_rates(self, action: Tensor) -> Tensor:
+    def to_rates(self, action: Tensor | NDArray) -> Tensor:
         """Return m/s forward, m/s to the left and rad/s to the left, in the drone's frame.
 
         Actions are clipped to [-1, 1]. Shapes: (*, 3), the result's type is float64.
         """
+        action = torch.as_tensor(action)
         forward, *aside = action.double().clamp(-1, 1).unbind(-1)
         return torch.stack([(forward + 1) / 2, *aside], -1) * action.new_tensor(
             self.speeds, dtype=torch.float64

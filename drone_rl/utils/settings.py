@@ -35,10 +35,12 @@ class _Frozen:
     """Values that can't be assigned or deleted."""
 
     def __setattr__(self, name: str, value: object) -> None:
-        raise dataclasses.FrozenInstanceError(f"cannot assign to field {name!r}")
+        raise dataclasses.FrozenInstanceError(
+            f"{name} can't be assigned; make new ones, as in settings.replace({name}={value!r})"
+        )
 
     def __delattr__(self, name: str) -> None:
-        raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
+        raise dataclasses.FrozenInstanceError(f"{name} can't be deleted")
 
 
 @typing.dataclass_transform(kw_only_default=True, frozen_default=True)

@@ -169,3 +169,9 @@ def test_as_dict_has_names_arrows_and_colors():
         description["colors"][:3] == MOVES.as_dict()["colors"]
         and len(set(map(tuple, description["colors"]))) == 5
     )
+
+
+def test_rates_of_an_array_are_those_of_a_tensor():
+    actions, action = ContinuousActions.of(SETTINGS), [1.0, 0.0, -1.0]
+    found = actions.to_rates(np.array(action))
+    assert torch.equal(found, actions.to_rates(torch.tensor(action)))

@@ -152,3 +152,8 @@ def test_torch_has_its_threads_again():
         assert torch.get_num_threads() == 2
     finally:
         torch.set_num_threads(before)
+
+
+def test_what_takes_days_is_refused_before_images_are_compared():
+    with pytest.raises(InputError, match=r"task\.num_cubes=30 gives about .* which takes days"):
+        drone_rl.prove("good", task={"num_cubes": 30}, progress=silent)

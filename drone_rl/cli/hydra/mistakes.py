@@ -127,7 +127,7 @@ def _syntax(word: str) -> InputError:
         return InputError(f"{word!r} holds two settings in one pair of quotes; type: {word}")
     if not re.fullmatch(r"(\+{0,2}|~)[A-Za-z_][\w./@-]*", key) or key.endswith("."):
         fixed = re.sub(r"[^\w./@]", "_", key.strip()).strip("._")
-        return InputError(f"{word}: {key!r} is not a valid name; type {fixed}={value}")
+        return InputError(f"{word}: {key!r} is not a valid name; type {fixed}={value.strip()}")
     if value.startswith("~"):
         return InputError(f"{word}: the shell left ~ as it is; type {key}=$HOME{value[1:]}")
     if found := re.fullmatch(r"\((.*)\)", value):

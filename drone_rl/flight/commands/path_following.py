@@ -18,7 +18,7 @@ from drone_rl.flight.commands.command import ACCURACY, PERIOD, Command, Land
 from drone_rl.flight.commands.conventions import to_simulator
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import OneOf
+from drone_rl.utils.schema import Flag, OneOf
 
 TAKEOFF_HEIGHT = 2.0
 """Climb of a take-off, metres."""
@@ -58,7 +58,8 @@ class YawMode:
     `Drivetrain.FORWARD_ONLY`."""
 
     def __post_init__(self) -> None:
-        """Check the number."""
+        """Check both values."""
+        Flag().read(self.is_rate, "is_rate")
         number = real(self.yaw_or_rate, "yaw_or_rate", -3600.0, 3600.0, unit="degrees")
         object.__setattr__(self, "yaw_or_rate", number)
 

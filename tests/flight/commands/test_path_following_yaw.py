@@ -48,3 +48,8 @@ def test_what_does_not_go_together(body):
         YawControl(body, "forward_only", (False, 9))
     with pytest.raises(InputError, match="yaw_or_rate=nan"):
         YawMode(False, math.nan)
+
+
+def test_whether_it_is_a_rate_is_true_or_false():
+    with pytest.raises(InputError, match="is_rate='no' is neither true nor false"):
+        YawMode(is_rate="no", yaw_or_rate=45)
