@@ -40,7 +40,7 @@ class _Frozen:
         )
 
     def __delattr__(self, name: str) -> None:
-        raise dataclasses.FrozenInstanceError(f"{name} can't be deleted")
+        raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
 
 
 @typing.dataclass_transform(kw_only_default=True, frozen_default=True)
