@@ -19,13 +19,12 @@ from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import ImageNetwork, make_actor
 from drone_rl.robustness.shifts_file import SavedShifts
+from drone_rl.utils.limits import FILM_BYTES, FILM_STEPS
 from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
 from drone_rl.verdicts.certificate import Claim
 
 T = TypeVar("T")
 FILMED = 0  # the episode shown as a film: always the first
-FILM_STEPS, FILM_BYTES = 2000, 2**23
-"""Most steps and bytes of a film in a report, see `report.validation`."""
 
 
 class LeftOutError(Exception):

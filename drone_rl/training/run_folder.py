@@ -1,11 +1,12 @@
 """The folder of a training run: its files and its result."""
 
+import contextlib
 import dataclasses
 import enum
 import json
 import signal
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Self
 
@@ -29,7 +30,13 @@ from drone_rl.training.demonstrations import Demonstration, FlightConditions, re
 from drone_rl.training.trainer import Trainer
 from drone_rl.utils.display import picture, table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import as_path, make_folder, remove_leftovers, write_atomically
+from drone_rl.utils.files import (
+    as_path,
+    folder_lock,
+    make_folder,
+    remove_leftovers,
+    write_atomically,
+)
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import Real, shown
@@ -126,9 +133,19 @@ class RunFolder:
             )
         return cls(folder), None
 
-    def make(self) -> None:
-        """Make the folder, or raise an `InputError` if that is not possible."""
+    @contextlib.contextmanager
+    def locked(self, *, is_new: bool) -> Iterator[None]:
+        """Make the folder and keep other processes out of it.
+
+        Raises:
+            InputError: It can't be made, another process uses it, or one has meanwhile left a run
+                there that a new run would replace.
+        """
         make_folder(self.path)
+        with folder_lock(self.path):
+            if is_new:
+                self.open(self.path, resume=False)
+            yield
 
     def prepare(
         self, settings: TrainSettings, state: Mapping[str, Any] | None

@@ -30,7 +30,6 @@ from drone_rl.training.learners import NotANumberError, ReinforceLearner
 from drone_rl.training.run_folder import RunFolder, Training
 from drone_rl.training.trainer import Trainer
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import folder_lock
 from drone_rl.utils.memory import bound_kernels
 from drone_rl.utils.progress import Progress
 from drone_rl.utils.provenance import num_cores
@@ -69,10 +68,7 @@ def train(
     hooks = with_progress(callbacks, progress)
     run, state = RunFolder.open(folder, resume)
     settings = run_folder.settings_for(settings, state, changes, train)
-    run.make()
-    with folder_lock(run.path):
-        if state is None:
-            RunFolder.open(run.path, resume=False)  # another process may have ended a run here
+    with run.locked(is_new=state is None):
         training = run_folder.finish(settings, run.path, learn(settings, run.path, state, hooks))
     return run_folder.reraise_signal(training)
 

@@ -30,11 +30,13 @@ JOURNAL_BYTES = 2**23  # journal of a search by Optuna
 CHECKPOINT_BYTES = 2**28  # a checkpoint; also unpacked
 ARCHIVE_BYTES = 2**28  # an .npz file, compressed
 ARRAYS_BYTES = 5 * 2**26  # the .npz files of one command together, unpacked
+FILM_BYTES = 2**23  # the film of a report
 
 # Counts
 JSON_VALUES = 2**18  # values in a JSON file, without names
 EXPLANATION_VALUES = 2**16  # those in explanation.json
 CERTIFICATE_VALUES = 3 * 2**19  # those in a certificate, nearly all of them borders of boxes
+FILM_STEPS = 2000  # steps of the film of a report
 JSON_DEPTH = 64  # levels of lists and mappings in a JSON file
 YAML_DEPTH = 16  # those in a YAML file
 YAML_VALUES = 2000  # values and names in a YAML file

@@ -36,7 +36,7 @@ from drone_rl.training.run_folder import (
 from drone_rl.training.train import learn
 from drone_rl.utils.archives import read_array
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import folder_lock, read_json, write_atomically
+from drone_rl.utils.files import read_json, write_atomically
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.schema import Instance, Maybe, Plain, Real, Record, Several, Whole
 from drone_rl.utils.seeding import Stream
@@ -233,11 +233,8 @@ def train_until_proved(
     how = Maybe(Instance(ProvableSettings)).read(how, "how")
     hooks = with_progress(callbacks, progress)
     run, state = RunFolder.open(folder, resume)
-    run.make()
     folder = run.path
-    with folder_lock(folder):
-        if state is None:
-            RunFolder.open(folder, resume=False)  # another process may have ended a run here
+    with run.locked(is_new=state is None):
         journal = Journal.open(folder, settings, how, state, changes)
         if state is not None:
             journal.forget_after(state["progress"]["frames"])

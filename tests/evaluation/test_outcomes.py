@@ -26,20 +26,20 @@ def test_one_possible_action_gives_one_end():
     assert not found.is_open.any()
 
 
-def test_two_possible_first_actions_give_all_ends_of_both():
-    calls = 0
+def then_left(*first):
+    """What is possible: these actions at the first steps, then every branch goes on to the left."""
+    steps = iter(first)
 
     def possible(pixels):
-        nonlocal calls
-        calls += 1
         made = torch.zeros(len(pixels), 3, dtype=torch.bool)
-        if calls == 1:
-            made[:, [Move.LEFT, Move.RIGHT]] = True
-        else:  # every branch goes on to the left
-            made[:, Move.LEFT] = True
+        made[:, next(steps, [Move.LEFT])] = True
         return made
 
-    found = ends(possible)
+    return possible
+
+
+def test_two_possible_first_actions_give_all_ends_of_both():
+    found = ends(then_left([Move.LEFT, Move.RIGHT]))
     assert sorted(found.owner.tolist()) == [0, 0, 1, 1]
     assert (found.episodes.end_reason == EndReason.SIDE_BOUNDARY).all()
     assert len(set(found.episodes.length.tolist())) == 2
@@ -47,16 +47,8 @@ def test_two_possible_first_actions_give_all_ends_of_both():
 
 def test_ways_to_one_state_are_one_branch():
     """Forward and left in either order lead to one state, though cubes ahead have no distance."""
-    calls = 0
-
-    def possible(pixels):
-        nonlocal calls
-        calls += 1
-        made = torch.zeros(len(pixels), 3, dtype=torch.bool)
-        made[:, [Move.FORWARD, Move.LEFT] if calls <= 2 else [Move.LEFT]] = True
-        return made
-
-    assert sorted(ends(possible).owner.tolist()) == [0, 0, 0, 1, 1, 1]
+    found = ends(then_left(*[[Move.FORWARD, Move.LEFT]] * 2))
+    assert sorted(found.owner.tolist()) == [0, 0, 0, 1, 1, 1]
 
 
 def test_too_many_branches_are_left_open():

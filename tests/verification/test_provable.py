@@ -280,6 +280,6 @@ def test_a_run_that_ended_while_this_one_waited_is_not_replaced(tmp_path, monkey
         (folder / "result.json").write_text("{}")
         yield
 
-    monkeypatch.setattr("drone_rl.verification.provable.folder_lock", lock)
+    monkeypatch.setattr("drone_rl.training.run_folder.folder_lock", lock)
     with pytest.raises(InputError, match="holds a finished run"):
         train(tmp_path)

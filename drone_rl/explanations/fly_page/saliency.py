@@ -111,7 +111,8 @@ class LiveSaliency:
         self.trust(method)
         if problem is not None:
             self._fail(problem)
-        self.close()
+        else:
+            self.close()
 
     def trust(self, method: str | None) -> None:
         """Show the maps of a method, None for none."""

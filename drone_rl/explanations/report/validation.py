@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from drone_rl.sim.vocabulary import ShownActions
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.limits import check_indices
+from drone_rl.utils.limits import FILM_BYTES, FILM_STEPS, check_indices
 from drone_rl.utils.schema import Kind, Maybe, OneOf, Real, Several, Whole, as_mapping
 from drone_rl.verification.text import WHERE
 
@@ -26,7 +26,7 @@ _ACTIONS = 16
 _MANY = 100_000
 _INTEGER, _FLOAT, _BOOL, _PIXEL = "iu", "f", "b", "u"
 _SIZES = {
-    "steps of the film": 2000,
+    "steps of the film": FILM_STEPS,
     "frames": _MANY,
     "actions": _ACTIONS,
     "outlines": 2**13,
@@ -37,7 +37,7 @@ _SIZES = {
 """Largest sizes of dimensions; dimensions of the same name must have the same size."""
 _Described = tuple[str, tuple[str | int, ...], int]  # kind of dtype, (largest) sizes, most bytes
 _ARRAYS: Mapping[str, _Described] = {
-    "film_frames": (_PIXEL, ("steps of the film", _SIDE, _SIDE, 3), 2**23),
+    "film_frames": (_PIXEL, ("steps of the film", _SIDE, _SIDE, 3), FILM_BYTES),
     "film_heat(_[a-z_]+)?": (_FLOAT, ("steps of the film", _SIDE, _SIDE), 2**23),
     "film_probabilities": (_FLOAT, ("steps of the film", "actions"), 2**20),
     "film_actions": (_INTEGER, ("steps of the film",), 2**20),

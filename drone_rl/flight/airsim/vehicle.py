@@ -9,7 +9,7 @@ from drone_rl.flight.airsim.airframe import Airframe
 from drone_rl.flight.airsim.messages import ned, to_world
 from drone_rl.flight.commands.command import Command, FlightFuture, PilotError
 from drone_rl.flight.commands.path_following import Drivetrain, YawMode
-from drone_rl.flight.commands.pilot import MOVING, Sticks
+from drone_rl.flight.commands.pilot import MOVING, Sticks, speed_of
 from drone_rl.sim.coordinates import GeoPoint
 from drone_rl.utils.errors import InputError
 
@@ -75,7 +75,7 @@ class Vehicle(Airframe):
     def takeoff(self, timeout: float) -> FlightFuture | None:
         """Climb 2 m; a `PilotError` if it moves."""
         self._require_flight("takeoff")
-        speed = float(self.body.velocity.norm())
+        speed = speed_of(self.body)
         if speed > MOVING:
             raise PilotError(
                 "Cannot perform takeoff because vehicle is already moving with velocity "

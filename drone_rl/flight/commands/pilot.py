@@ -45,6 +45,11 @@ YAW_AT_FULL_STICK = 100.0
 _FREE = Drivetrain.MAX_DEGREE_OF_FREEDOM
 
 
+def speed_of(body: FlightState) -> float:
+    """Return the speed of a single drone, m/s."""
+    return float(body.velocity.norm())
+
+
 @dataclasses.dataclass(frozen=True)
 class Sticks:
     """Positions of a remote control's sticks, each from -1 to 1."""
@@ -98,7 +103,7 @@ class Pilot(SceneDrone):
     def take_off(self, timeout: float | None = None, *, wait: bool = True) -> bool | FlightFuture:
         """Climb 2 m at 0.5 m/s."""
         self._require_armed("take_off")
-        speed = float(self.body.velocity.norm())
+        speed = speed_of(self.body)
         if speed > MOVING:
             raise PilotError(
                 f"can't take off while moving at {speed:.2g} m/s; wait until the drone stands still"
