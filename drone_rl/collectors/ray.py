@@ -38,6 +38,10 @@ class RemoteEpisodes(BaseCollector):
         torch.set_num_threads(1)
         self._episodes, self._network, self._actions = create_env_fn[0]()
 
+    def __bool__(self) -> bool:
+        """Return True; else Ray would ask for a length before it reports an error of `__init__`."""
+        return True
+
     def collect(
         self, weights: dict[str, torch.Tensor], state: dict | None
     ) -> tuple[dict[str, Any], dict]:
@@ -189,8 +193,6 @@ def _start(
 ) -> tuple[Any, Any]:
     """Return the module ray and TorchRL's collector, whose workers are ready."""
     ray = extra("ray", "ray", "collector=ray")
-    from torchrl.collectors.distributed import RayCollector
-
     own = {"include_dashboard": False, "log_to_driver": False, "logging_level": "warning"}
     try:
         is_own = not ray.is_initialized()
@@ -202,10 +204,22 @@ def _start(
             f"collector.address={address} can't be reached; start a cluster with "
             "ray start --head or leave it null"
         ) from error
-    cores = ray.cluster_resources().get("CPU", 0)
-    if len(makers) * num_cpus > cores:
+    try:
+        return ray, _start_workers(ray, makers, num_cpus)
+    except InputError:
         if is_own:
             ray.shutdown()
+        raise
+
+
+def _start_workers(
+    ray: Any, makers: Sequence[Callable[[], WorkerComponents]], num_cpus: float
+) -> Any:
+    """Return TorchRL's collector, whose workers are ready."""
+    from torchrl.collectors.distributed import RayCollector
+
+    cores = ray.cluster_resources().get("CPU", 0)
+    if len(makers) * num_cpus > cores:
         raise InputError(
             f"collector.num_threads={len(makers)} workers of collector.num_cpus={num_cpus} need "
             f"more than the cluster's {cores:g} cores; lower one of them"
@@ -220,7 +234,15 @@ def _start(
             weight_sync_schemes={},
             remote_configs={"num_cpus": num_cpus},
         )
-    return ray, pool
+    try:
+        ray.get([worker.__ray_ready__.remote() for worker in pool.remote_collectors])
+    except ray.exceptions.RayActorError as error:
+        reason = str(error).strip().splitlines()[-1]
+        raise InputError(
+            f"a Ray worker did not start ({reason}); its machine needs the packages and the "
+            "plugins= of this one"
+        ) from error
+    return pool
 
 
 def _to_tensordict(arrays: dict[Any, Any]) -> TensorDictBase:

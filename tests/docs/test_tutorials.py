@@ -89,6 +89,7 @@ def workplace(tmp_path, monkeypatch):
     for package in (drone_rl.explanations, report):
         folder = inside.joinpath(*package.__name__.split(".")[1:])
         monkeypatch.setattr(package, "__path__", [*package.__path__, str(folder)])
+    monkeypatch.setattr(composition, "IMPORTED", [])  # other tests of this process don't find them
     few = {name: explain.SECTIONS[name] for name in ("dataset", "evaluation")}
     monkeypatch.setattr(explain, "SECTIONS", few)  # all of them take a minute
     monkeypatch.setattr(report_page, "PARTS", dict(report_page.PARTS))
