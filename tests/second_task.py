@@ -123,9 +123,9 @@ class Posts(Task[PostsState]):
     def info(self, state):
         """Return the values of `entries`."""
         return {
-            "passed": state.passed.clone(),
+            "passed": state.passed,
             "sides": (state.posts[..., 1] < 0).long(),
-            "end_reason": state.end_reason[:, None].clone(),
+            "end_reason": state.end_reason[:, None],
             "posts": state.posts.float(),
         }
 

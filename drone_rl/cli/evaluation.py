@@ -72,7 +72,7 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
     """Settings of `drone-rl play`."""
 
     episodes: Annotated[int, Whole(1, unit="episodes")] = 3
-    """Episodes to record, one file each."""
+    """Episodes to record, each in files of its own."""
     format: Annotated[str, OneOf(("video", "rerun"))] = "video"
     """video: an MP4 and a GIF file; or rerun: a recording of cameras, poses, action probabilities
     and heat maps on one timeline, for the viewer of Rerun."""

@@ -103,7 +103,7 @@ class RayEpisodeCollector:
             makers: One function for each worker, sent to it; makes its collector.
             actor: The policy that learns, in this process.
             network: Its network.
-            address: Address of the cluster; None starts one on this machine.
+            address: Address of the cluster; None joins the one known here or starts one.
             num_cpus: Cores of a worker.
             max_lost_workers: Number of workers that may be replaced before training stops.
             device: Device of the batches.
@@ -202,7 +202,7 @@ def _start(
     except (ConnectionError, ValueError) as error:
         raise InputError(
             f"collector.address={address} can't be reached; start a cluster with "
-            "ray start --head or leave it null"
+            "ray start --head, or set it to local for one on this machine"
         ) from error
     try:
         return ray, _start_workers(ray, makers, num_cpus)
@@ -224,25 +224,23 @@ def _start_workers(
             f"collector.num_threads={len(makers)} workers of collector.num_cpus={num_cpus} need "
             f"more than the cluster's {cores:g} cores; lower one of them"
         )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # about a policy to send, which is not needed
-        pool = RayCollector(
-            list(makers),
-            collector_class=RemoteEpisodes,  # pyright: ignore[reportArgumentType]
-            frames_per_batch=len(makers),
-            sync=True,
-            weight_sync_schemes={},
-            remote_configs={"num_cpus": num_cpus},
-        )
     try:
-        ray.get([worker.__ray_ready__.remote() for worker in pool.remote_collectors])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # about a policy, which need not be sent
+            return RayCollector(
+                list(makers),
+                collector_class=RemoteEpisodes,  # pyright: ignore[reportArgumentType]
+                frames_per_batch=len(makers),
+                sync=True,
+                weight_sync_schemes={},
+                remote_configs={"num_cpus": num_cpus},
+            )
     except ray.exceptions.RayActorError as error:
         reason = str(error).strip().splitlines()[-1]
         raise InputError(
             f"a Ray worker did not start ({reason}); its machine needs the packages and the "
             "plugins= of this one"
         ) from error
-    return pool
 
 
 def _to_tensordict(arrays: dict[Any, Any]) -> TensorDictBase:

@@ -108,7 +108,8 @@ class Ray(CompleteEpisodes, target="ray"):
     num_threads: Annotated[int, Whole(1, unit="workers")] = 2
     """Workers with own environments and action streams; results depend on their number."""
     address: str | None = None
-    """Address of the cluster, such as auto or ray://host:10001; null starts one on this machine."""
+    """Address of the cluster, such as auto or ray://host:10001; local starts one on
+    this machine; null joins that of RAY_ADDRESS or ray start, else starts one."""
     num_cpus: Annotated[float, Real(0.0, is_above=True, unit="cores")] = 1.0
     """Cores that a worker takes of the cluster."""
     max_lost_workers: Annotated[int, Whole(0, unit="workers")] = 10

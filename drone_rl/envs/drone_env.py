@@ -1,7 +1,7 @@
 """The batched TorchRL environment."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -156,6 +156,16 @@ class DroneEnv(EnvBase):
             self.worlds.close()
         super().close(raise_if_closed=raise_if_closed)
 
+    def to(self, device: torch.device | str) -> Self:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Return the environment itself; raise an `InputError` for another device."""
+        wanted, own = torch.device(device), self.device or torch.device("cpu")
+        if wanted.type != own.type or len({wanted.index, own.index} - {None}) > 1:
+            raise InputError(
+                f"a DroneEnv on {own} can't move to {wanted}; make it with "
+                f"device={str(wanted)!r} or give TorchRL's collector env_device={str(own)!r}"
+            )
+        return self
+
     def _make_specs(self) -> None:
         n = self.batch_size[0]
         entries = {name: _spec(entry, n) for name, entry in self.worlds.entries.items()}
@@ -179,6 +189,8 @@ class DroneEnv(EnvBase):
         self._random_states = [world_random_state(seed, first + i, self.stream) for i in range(n)]
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
+        if "seed" in kwargs:
+            raise InputError("reset can't take a seed; call env.set_seed(seed) before it")
         mask = None if tensordict is None else tensordict.get("_reset", None)
         env_ids = self._indices(mask)
         self.start(env_ids)

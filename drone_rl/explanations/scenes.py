@@ -98,7 +98,7 @@ class Scenes:
         """Return the action that a target calls for at an offset (N, 3) from the drone, in metres.
 
         The task knows it for the actions of its default dynamics; for other actions it is the one
-        with the same name, or -1 if there is none.
+        with the same name. It is always -1 if any of those names is missing.
         """
         names, known = self.actions.names, self.task.make_dynamics().actions.names
         if not set(known) <= set(names):

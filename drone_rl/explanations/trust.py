@@ -202,7 +202,8 @@ def check_method(
         interval; "placebos": by name, how much more it scores; "pointing": how much more often than
         "chance" it hits, and the mean "hit"; "likeness" to maps of shuffled weights;
         "random_weights"; "maps_without_heat". With bounds: "median", "lower" and "upper", each of
-        which holds with probability 1 - level; None for too few episodes.
+        which holds with probability 1 - level; None for too few episodes. Without frames only
+        "trusted", "failed", which says why, and "score".
     """
     episode = trial.episode
     if not len(episode):

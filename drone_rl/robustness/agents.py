@@ -143,7 +143,7 @@ class OracleAgent:
     It reads the segmentation image of the policy's camera, with the same faults. It uses the exact
     position of each cube that is visible in at least one pixel, and nothing about the others. It
     compensates for delayed actions. A strength at which it certainly fails too often counts as
-    impossible, see `possible_share`.
+    impossible, see `possible_share` of `ShiftSettings`.
     """
 
     needs_only_hiding_faults = True

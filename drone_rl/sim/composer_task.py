@@ -257,7 +257,7 @@ class ComposerTask(composer.Task):
         return opengl.apply_fog(image, depth, self.appearance, fovy, _SKY)
 
     def _read(self, name: str) -> np.ndarray:
-        return self.rules.info(self.state)[name][0].numpy()
+        return self.rules.info(self.state)[name][0].numpy().copy()
 
 
 def make_environment(

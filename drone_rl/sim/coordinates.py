@@ -79,7 +79,7 @@ def geo_from_world(position: Values, home: GeoPoint = HOME) -> Values:
     Positions are metres from home: north, west, up. The world is flat and level, as AirSim's is;
     north and east are measured along the meridian and the parallel of WGS84's ellipsoid. Within 1
     km of home, horizontal positions are within 0.1 m of those of the tangent plane; heights differ
-    by 0.08 m, because Earth is curved.
+    by up to 0.08 m, because Earth is curved.
     """
     library: Any = torch if isinstance(position, Tensor) else np
     across, meridian = _curvature_radii(home)

@@ -92,10 +92,11 @@ class Worlds:
         return {**self.task.entries, **_POSE}
 
     def info(self, state: State | None = None) -> dict[str, Tensor]:
-        """Return the true state, by default of these environments; see `entries`. (N, *)."""
+        """Return copies of the true state, by default of these worlds; see `entries`. (N, *)."""
         state = self.state if state is None else state
         pose = {"drone": state.body.position.float(), "attitude": state.body.attitude.float()}
-        return {**self.task.info(state), **pose}
+        info = {**self.task.info(state), **pose}
+        return {name: value.clone() for name, value in info.items()}
 
     def ends(self, end_reason: Tensor | None = None) -> tuple[Tensor, Tensor]:
         """Return which episodes terminated and which were truncated. Shapes: (N,)."""

@@ -5,13 +5,14 @@ Each run is a process of its own.
 
 import collections
 import json
+import logging
 import os
 import re
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -27,6 +28,7 @@ PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")
 """The program of a run."""
 POLL_S = 0.1
 """Seconds between polls of a process."""
+_log = logging.getLogger(__name__)
 
 
 class RunProcess:
@@ -35,9 +37,9 @@ class RunProcess:
     If a process of an interrupted sweep still works on the run, this waits for it.
     """
 
-    def __init__(self, run: Run) -> None:
-        """Take a run; the first `poll` starts it."""
-        self.run, self._log = run, run.folder / "output.log"
+    def __init__(self, run: Run, cwd: Path | None = None) -> None:
+        """Take a run and its working directory, by default this one; the first `poll` starts it."""
+        self.run, self._log, self._cwd = run, run.folder / "output.log", cwd
         self._process: subprocess.Popen | None = None
         self._begin = 0
         """Bytes of the log before the process: those of earlier attempts."""
@@ -88,6 +90,7 @@ class RunProcess:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
+                cwd=self._cwd,
                 env={**os.environ, **THREADS},
                 start_new_session=True,  # Ctrl-C goes to the sweep, which stops its runs
             )
@@ -99,9 +102,9 @@ def note_failure(run: Run, error: str) -> None:
     write_atomically(run.failure, json.dumps({"error": error}, indent=2))
 
 
-def finish_run(run: Run) -> int:
-    """Run to the end and return the exit status."""
-    return RunProcess(run).wait()
+def finish_run(run: Run, cwd: Path | None = None) -> int:
+    """Run to the end, in a working directory, and return the exit status."""
+    return RunProcess(run, cwd).wait()
 
 
 def _error(lines: list[str], status: int) -> str:
@@ -161,7 +164,8 @@ class SlurmExecutor:
         arguments of submitit's `update_parameters`.
 
         Raises:
-            InputError: The cluster is unknown, submitit isn't installed, or there is no Slurm here.
+            InputError: The cluster or a resource is unknown, submitit isn't installed, or there is
+                no Slurm here.
         """
         OneOf(("slurm", "local")).read(cluster, "hydra.launcher.cluster")
         submitit = extra("submitit", "slurm", "hydra/launcher=slurm")
@@ -172,12 +176,28 @@ class SlurmExecutor:
                 f"hydra.launcher.cluster={cluster} is not available here ({error}); "
                 "start the sweep on a node with sbatch"
             ) from error
-        self._executor.update_parameters(slurm_array_parallelism=num_jobs, **resources)
+        try:
+            self._executor.update_parameters(slurm_array_parallelism=num_jobs, **resources)
+        except (NameError, AssertionError) as error:
+            raise InputError(
+                f"submitit refuses a setting of hydra.launcher ({str(error).splitlines()[0]}); "
+                "Slurm's own begin with slurm_, as in +hydra.launcher.slurm_partition=NAME"
+            ) from error
 
     def finish(self, runs: Sequence[Run]) -> Iterator[tuple[Run, int]]:
-        """See `Executor`. Submitted jobs continue when the sweep is stopped."""
-        with self._executor.batch():
-            jobs = [self._executor.submit(finish_run, run) for run in runs]
+        """See `Executor`. Submitted jobs continue when the sweep is stopped.
+
+        Raises:
+            InputError: Slurm refuses the jobs.
+        """
+        try:
+            with self._executor.batch():
+                jobs = [self._executor.submit(finish_run, run) for run in runs]
+        except RuntimeError as error:
+            reason = " ".join(str(error).split())[-300:]
+            raise InputError(
+                f"Slurm refuses the jobs ({reason}); change the settings of hydra.launcher"
+            ) from error
         left = dict(zip(runs, jobs, strict=True))
         while left:
             ended = [run for run, job in left.items() if job.done()]
@@ -193,7 +213,7 @@ class RayExecutor:
     """Executes runs as Ray tasks; Ray restarts the tasks of a lost node."""
 
     def __init__(self, *, address: str | None, num_cpus: float, num_gpus: float) -> None:
-        """Connect to the cluster at an address; None starts one on this machine.
+        """Connect to the cluster at an address; None joins the one known here or starts one.
 
         A run takes so many cores and GPUs, possibly a fraction.
 
@@ -209,14 +229,28 @@ class RayExecutor:
         except (ConnectionError, ValueError) as error:
             raise InputError(
                 f"hydra.launcher.address={address} can't be reached; start a cluster with "
-                "ray start --head or leave it null"
+                "ray start --head, or set it to local for one on this machine"
             ) from error
         remote = self._ray.remote(num_cpus=num_cpus, num_gpus=num_gpus, max_retries=3)
         self._finish_run = remote(finish_run)
+        self._check_room({"cpus": num_cpus, "gpus": num_gpus})
+
+    def _check_room(self, wanted: Mapping[str, float]) -> None:
+        """Warn of runs that fit on no machine; a cluster may grow."""
+        machines = [node["Resources"] for node in self._ray.nodes() if node["Alive"]]
+        for name, count in wanted.items():
+            most = max((machine.get(name[:-1].upper(), 0.0) for machine in machines), default=0.0)
+            if count > most:
+                _log.warning(
+                    "hydra.launcher.num_%s=%g, but no machine has more than %g; runs wait until "
+                    "one joins the cluster",
+                    *(name, count, most),
+                )
 
     def finish(self, runs: Sequence[Run]) -> Iterator[tuple[Run, int]]:
         """See `Executor`."""
-        left = {self._finish_run.remote(run): run for run in runs}
+        here = Path.cwd()  # a worker is in the folder where the cluster was started
+        left = {self._finish_run.remote(run, here): run for run in runs}
         try:
             while left:
                 ended, _ = self._ray.wait(list(left))

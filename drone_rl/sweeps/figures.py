@@ -81,7 +81,7 @@ def draw_outcome(layout: Layout) -> bytes:
 def _render(
     layout: Layout, plots: Sequence["Plot"], height: float, transparent: bool = False
 ) -> bytes:
-    """Stack a block of panels per plot, with up to three panels a row, else two."""
+    """Stack a block of panels per plot: up to three panels in one row, more in rows of two."""
     panels = list(layout.panels.items())
     columns = len(panels) if 0 < len(panels) <= 3 else min(2, len(panels) or 1)
     rows = max(1, -(-len(panels) // columns))
@@ -227,7 +227,7 @@ PLOTS: dict[str, tuple[str, Plot, float]] = {
     "entropies": ("Entropy at the end", _entropies, 3.2),
     "costs": ("Frames to solve", _costs, 3.2),
 }
-"""Title, function and height in inches of each plot; its sentences have the same prefix."""
+"""Title, function and height in inches of each plot, by the prefix of its `SENTENCES`."""
 
 
 def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:

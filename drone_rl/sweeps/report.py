@@ -119,7 +119,7 @@ def judge_run(
     All runs that are compared need the same root of the environments' streams; default: fresh.
 
     Raises:
-        InputError: The run has no result, or its last checkpoint is unusable or of another run.
+        InputError: The run has no result, or its last checkpoint is unusable or of another frame.
     """
     from drone_rl.evaluation.verdict import judge_for_selection  # imports torch
 

@@ -30,14 +30,18 @@ def open_study(folder: Path, **settings: Any) -> Any:
     The settings are further arguments of `optuna.create_study`.
 
     Raises:
-        InputError: Optuna isn't installed, or the study's file is damaged or too large.
+        InputError: Optuna isn't installed, or the study's file is missing, damaged or too large.
     """
     optuna = import_optuna()
     path = folder / "optuna.journal"
+    if "direction" not in settings and not path.exists():
+        raise InputError(f"{folder} has no search (optuna.journal); leave out trial=")
     _check_journal(path)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     try:
-        backend = optuna.storages.journal.JournalFileBackend(str(path))
+        journal = optuna.storages.journal
+        lock = journal.JournalFileOpenLock(str(path))  # the default is a link, refused in sweeps
+        backend = journal.JournalFileBackend(str(path), lock)
         storage = optuna.storages.JournalStorage(backend)
         named = {"study_name": NAME, "storage": storage, **settings}
         if "direction" not in settings:

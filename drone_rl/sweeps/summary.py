@@ -31,7 +31,8 @@ def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> dict[str, Any]:
     judged = [row.verdict for row in rows if row.verdict is not None]
     older = sum(row.has_older_verdict for row in rows)
     keys = ("reason", "frames", "episodes", "seconds", "running_reward")
-    figures = [tuple(row.result[key] for key in keys) for row in rows if row.state == "finished"]
+    finished = (row.result for row in rows if row.state == "finished")
+    figures = [tuple(r[key] for key in keys) for r in finished if r["frames"]]  # clones have none
     folder = f"folder={_path_argument(sweep.folder)}"
     judge_arguments = (folder, "judge=true", *_plugins(sweep.runs))
     summary = {

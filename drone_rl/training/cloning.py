@@ -222,7 +222,7 @@ def clone(
 
 
 def _named(terms: Any) -> dict[str, float]:
-    """Return the loss and the accuracy; rounding of means must not raise it above 1."""
+    """Return the loss and the accuracy, which rounding of means must not raise above 1."""
     return {"loss": float(terms[_LOSS]), "accuracy": min(1.0, float(terms["accuracy"]))}
 
 

@@ -71,8 +71,8 @@ def read_arrays(
     """Return the arrays of numbers and texts in an .npz file.
 
     `most` is the largest size of all arrays together, in bytes; `allowance`, shared with further
-    files, replaces it. The file may have as many bytes, or 256 MiB if that is more. `wanted` says
-    by name which arrays to read.
+    files, replaces it. The file itself may have `most` bytes, but no limit below 256 MiB or above
+    2 GiB is applied. `wanted` says by name which arrays to read.
 
     Raises:
         InputError: The file is unusable, or an array holds objects.

@@ -9,6 +9,6 @@ CERTIFICATE_REFUSED = 14  # `check`
 NOT_PROVED = 15  # `prove`: some placements fail or are undecided
 PROOF_MISSING = 16  # `verdict`: no certificate proves every placement, which `require` demands
 NOT_COVERED = 17  # `verdict`: the policy was not found to be good in the required operating domain
-TRIVIAL = 18
+TRIVIAL = 18  # `verdict` and `explain`: good, but a baseline succeeds without observations
 INTERRUPTED = 128 + 2  # Ctrl-C, as if SIGINT ended the process
 OUTPUT_CLOSED = 128 + 13  # standard output is closed, as if SIGPIPE ended the process

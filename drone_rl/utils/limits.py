@@ -1,8 +1,9 @@
 """Limits on files, which all readers check before they allocate memory.
 
-Reading any file takes less than 1 GiB of memory and about two seconds. Readers check the limits on
-what a file states (its size, a directory, a header, the number of separators) before they parse
-the content. `where` names the file or a part of it in messages.
+Reading a file takes less than 1 GiB of memory and about two seconds, except the saved state of a
+proof with many boxes. Readers check the limits on what a file states (its size, a directory, a
+header, the number of separators) before they parse the content. `where` names the file or a part
+of it in messages.
 """
 
 import math
@@ -28,7 +29,7 @@ SWEEP_METRICS_BYTES = 2**26  # metrics.csv of all runs of a sweep together
 LOG_BYTES = 2**16  # end of a log that is searched for an error
 JOURNAL_BYTES = 2**23  # journal of a search by Optuna
 CHECKPOINT_BYTES = 2**28  # a checkpoint; also unpacked
-ARCHIVE_BYTES = 2**28  # an .npz file, compressed
+ARCHIVE_BYTES = 2**28  # least limit of an .npz file, compressed; see `read_arrays`
 ARRAYS_BYTES = 5 * 2**26  # the .npz files of one command together, unpacked
 FILM_BYTES = 2**23  # the film of a report
 

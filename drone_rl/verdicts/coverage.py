@@ -206,7 +206,8 @@ def compare_with_required(
     See `read_requirements` and `find_domain`.
 
     Raises:
-        InputError: The file is unusable, or no operating domain was measured, or it is refused.
+        InputError: The file is unusable, the policy is no policy file, or its operating domain was
+            not measured or is refused.
     """
     needs = read_requirements(as_path(needed, "require_domain"))
     if not isinstance(policy, Policy):

@@ -189,7 +189,7 @@ def chances(
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**as_changes(task, "task"))
     task_settings = require_cubes(policy.description, "exact probabilities")
-    if settings.within:  # bounds that there can't be are refused before anything is computed
+    if settings.within:  # refuse policies that can't be bounded before anything is computed
         how = (policy.make_network(), ProveSettings.logit_gap, settings.renderer)
         make_policy_spec(policy.description, *how).close()
     placed = (

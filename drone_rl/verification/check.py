@@ -105,7 +105,7 @@ def check(
     """Check a certificate independently of the prover: exact sums, and simulated episodes.
 
     Args:
-        certificate: The file, or "latest" for the newest one.
+        certificate: The file or its folder, or "latest" for the newest one.
         policy: The policy, or an argument of `load_policy`; by default the policy that the
             certificate names, if it is shipped with the package.
         settings: Settings of the check.

@@ -42,6 +42,21 @@ def test_specs_with_transforms():
     env.close()
 
 
+def test_another_device_is_refused():
+    env = make_transformed_env()
+    assert env.to("cpu") is env
+    with pytest.raises(InputError, match=r"on cpu can't move to cuda; make it with device='cuda'"):
+        env.to("cuda")
+    env.close()
+
+
+def test_a_reset_takes_no_seed():
+    env = make_transformed_env()
+    with pytest.raises(InputError, match=r"call env\.set_seed\(seed\)"):
+        env.reset(seed=0)
+    env.close()
+
+
 def compare_with_one_batch(kind, **how):
     """Compare two workers with two environments each with one batch of four."""
     make = [functools.partial(make_transformed_env, seed=4, first_world=first) for first in (0, 2)]

@@ -1,6 +1,8 @@
 """Runs are begun, gone on with, left alone or given up, each without harm to the others."""
 
+import contextlib
 import json
+import logging
 import signal
 import sys
 import time
@@ -115,6 +117,58 @@ def test_clusters_of_this_machine(make_runs, tmp_path, cluster):
     assert "output.log" in read_failure(lost)
 
 
+@pytest.mark.parametrize("setting", [{"partitio": "gpu"}, {"timeout_min": 2.5}])
+def test_a_setting_that_submitit_refuses_is_told_in_one_line(tmp_path, setting):
+    pytest.importorskip("submitit", reason="pip install -e '.[slurm]'")
+    (name,) = setting
+    with pytest.raises(InputError, match=rf"submitit refuses .*{name}.*\+hydra.launcher.slurm_"):
+        SlurmExecutor(tmp_path, cluster="local", num_jobs=2, **setting)
+
+
+def test_what_slurm_refuses_is_told_in_one_line(make_runs, tmp_path):
+    executor = slurm(tmp_path)
+
+    @contextlib.contextmanager
+    def batch():
+        yield
+        raise RuntimeError("sbatch: error: invalid partition\n specified: gpu")
+
+    executor._executor = types.SimpleNamespace(batch=batch, submit=lambda *_: None)
+    with pytest.raises(InputError, match=r"refuses the jobs .*invalid partition specified: gpu"):
+        list(executor.finish(make_runs("seed=0")))
+
+
+def fake_ray(given):
+    task = types.SimpleNamespace(remote=lambda *args: given.append(args) or len(given))
+    return types.SimpleNamespace(
+        is_initialized=lambda: True,
+        init=lambda **_: None,
+        remote=lambda **_: lambda function: task,
+        nodes=lambda: [{"Alive": True, "Resources": {"CPU": 4.0}}],
+        wait=lambda tasks: (tasks, []),
+        get=lambda task: 0,
+    )
+
+
+def test_runs_on_ray_work_in_the_folder_of_the_sweep(make_runs, monkeypatch, tmp_path):
+    given = []
+    monkeypatch.setitem(sys.modules, "ray", fake_ray(given))
+    monkeypatch.chdir(tmp_path)
+    (run,) = make_runs("seed=0")
+    assert dict(RayExecutor(address=None, num_cpus=1, num_gpus=0).finish([run])) == {run: 0}
+    assert given == [(run, tmp_path.resolve())]
+
+
+def test_runs_that_fit_on_no_machine_are_warned_about(monkeypatch, caplog):
+    monkeypatch.setitem(sys.modules, "ray", fake_ray([]))
+    with caplog.at_level(logging.WARNING):
+        RayExecutor(address="auto", num_cpus=4, num_gpus=0)
+        assert caplog.text == ""
+        RayExecutor(address="auto", num_cpus=4.5, num_gpus=1)
+    assert "num_cpus=4.5, but no machine has more than 4; runs wait" in caplog.text
+    assert "num_gpus=1, but no machine has more than 0; runs wait" in caplog.text
+
+
 def test_an_unknown_cluster_is_refused(tmp_path):
     with pytest.raises(
         InputError, match=r"hydra\.launcher\.cluster='Slurm' is unknown; give slurm, local"
@@ -138,6 +192,7 @@ def test_ray_does_not_take_over_sigterm(monkeypatch):
         is_initialized=lambda: False,
         init=lambda **_: signal.signal(signal.SIGTERM, lambda *_: sys.exit(15)),
         remote=lambda **_: lambda function: function,
+        nodes=lambda: [],
     )
     monkeypatch.setitem(sys.modules, "ray", fake)
     before = signal.getsignal(signal.SIGTERM)

@@ -31,6 +31,15 @@ def test_a_failure_is_forgotten_when_the_run_succeeds(make_runs):
     assert read_failure(run) is None
 
 
+def test_a_run_works_in_the_given_folder(make_runs, monkeypatch, tmp_path):
+    code = "import os, sys; sys.exit('error: ' + os.getcwd())"
+    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", code))
+    (run,) = make_runs("seed=0")
+    (tmp_path / "project").mkdir()
+    assert finish_run(run, tmp_path / "project") != 0
+    assert read_failure(run) == str((tmp_path / "project").resolve())
+
+
 def test_a_run_that_another_process_works_on_is_waited_for(make_runs):
     (run,) = make_runs("seed=0")
     run.folder.mkdir()

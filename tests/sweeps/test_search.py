@@ -7,6 +7,7 @@ optuna = pytest.importorskip("optuna", reason="pip install -e '.[optuna]'")
 from drone_rl.sweeps import search  # noqa: E402
 from drone_rl.sweeps.search import next_trials, note_outcome, open_study  # noqa: E402
 from drone_rl.utils.errors import InputError  # noqa: E402
+from drone_rl.utils.files import refuse_links  # noqa: E402
 
 SPACE = {"optimizer.lr": optuna.distributions.FloatDistribution(1e-4, 1e-1, log=True)}
 
@@ -34,6 +35,15 @@ def test_a_killed_search_goes_on_with_the_trials_it_had_begun(tmp_path):
     assert params(next_trials(study, SPACE, 3, seed=0)) == params(first)
     note_outcome(study, 1, {"reason": "frames", "running_reward": 2.0})
     assert [t.number for t in next_trials(study, SPACE, 3, seed=0)] == [0, 1, 2]
+
+
+def test_the_lock_of_the_journal_is_no_link(tmp_path):
+    lock = begin(tmp_path)._storage._backend._lock
+    lock.acquire()
+    try:
+        refuse_links(tmp_path)
+    finally:
+        lock.release()
 
 
 def test_the_same_results_lead_to_the_same_questions(tmp_path):

@@ -31,6 +31,12 @@ def test_no_run_is_best_without_a_verdict(begin_sweep):
     assert "none" not in found["sentences"]["verdicts.older_rule"]
 
 
+def test_runs_that_only_clone_are_no_copies(begin_sweep):
+    none = {"reason": "frames", "frames": 0, "episodes": 0, "seconds": 0.0, "running_reward": 0.0}
+    sweep = begin_sweep({"seed=0": none, "seed=1": none})
+    assert "runs.copies" not in summarise_sweep(sweep, read_rows(sweep))["sentences"]
+
+
 def test_it_names_the_commands_to_report_and_to_judge(sweep, monkeypatch):
     monkeypatch.chdir(sweep.folder.parent)
     found = summarise_sweep(sweep, read_rows(sweep))

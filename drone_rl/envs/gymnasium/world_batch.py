@@ -90,7 +90,7 @@ METADATA: dict[str, Any] = {
     "render_modes": ["rgb_array"],
     "render_fps": round(1 / CONTROL_TIMESTEP_S),
 }
-"""Metadata of every environment."""
+"""Metadata of every environment; the frame rate is that of the default control step."""
 _PARTS: dict[str, type[Settings]] = {
     "camera": CameraSettings,
     "dynamics": DynamicsSettings,

@@ -37,7 +37,7 @@ class CameraState:
     detected: tuple[str, ...] = ()
     """Patterns of the names of objects that `simGetDetections` reports."""
     detection_radius: float = 200.0
-    """Metres from the camera within which it does."""
+    """Metres from the camera within which objects are reported."""
 
     def capture(self, kind: ImageType) -> Capture:
         """Return the size and field of view of images of a type."""

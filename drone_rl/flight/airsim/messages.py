@@ -199,7 +199,7 @@ def read_yaw_mode(value: Any, drivetrain: Any) -> tuple[str, YawMode]:
     """Return the drivetrain and the yaw mode of a movement.
 
     Raises:
-        InputError: Numbers are wrong, or a rate is combined with ForwardOnly.
+        InputError: Numbers are wrong, or a rate other than 0 is combined with ForwardOnly.
     """
     is_forward = whole(drivetrain, "drivetrain", 0, 1) == 1
     if not isinstance(value, Mapping):

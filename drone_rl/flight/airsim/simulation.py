@@ -215,7 +215,7 @@ class Simulation:
 
     @property
     def is_blocked(self) -> bool:
-        """Whether the client of such a call does nothing else until it is answered."""
+        """Whether time is not paused, and a waiting call keeps its client from asking more."""
         return self.is_due and any(wait.blocks for wait, _ in self._waits)
 
     def pause(self, is_paused: bool) -> None:
@@ -284,7 +284,7 @@ class Simulation:
         return self.settle()
 
     def settle(self) -> bool:
-        """Answer the calls that are done, in the order in which they came."""
+        """Answer the calls that are done, in the order they came in; return whether any was."""
         if not self._waits:
             return False
         done = [(wait, reply) for wait, reply in self._waits if wait.is_done()]

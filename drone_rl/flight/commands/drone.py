@@ -237,7 +237,8 @@ class Drone:
         The size, in pixels, is the worlds' by default. A drone without worlds raises `PilotError`.
 
         Returns:
-            One tensor per request. Shapes: (H, W, 3), uint8; or (H, W), float32, for `as_float`.
+            One tensor per request. Shapes: (H, W, 3), uint8; (H, W), float32, for `as_float`; or
+            (bytes,), uint8, for `compress`: a PNG file.
         """
         requests = Several(Instance(ImageRequest), 1, 1000).read(requests, "requests")
         worlds, state = self._scene("images")

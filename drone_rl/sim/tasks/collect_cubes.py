@@ -184,12 +184,11 @@ class CollectCubes(PropTask[WorldState]):
 
     def info(self, state: WorldState) -> dict[str, Tensor]:
         """See `entries`."""
-        same = {name: getattr(state, name).clone() for name in ("collected", "side", "lateral")}
         return {
             "cubes": state.collected.sum(-1, keepdim=True),
-            **same,
+            **{name: getattr(state, name) for name in ("collected", "side", "lateral")},
             "next_cube": state.next_cube[:, None],
-            "end_reason": state.end_reason[:, None].clone(),
+            "end_reason": state.end_reason[:, None],
             "cube_positions": state.cubes.float(),
         }
 

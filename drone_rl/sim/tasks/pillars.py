@@ -204,9 +204,9 @@ class Pillars(common.PropTask[FieldState]):
         """Return the values of `entries`."""
         names = ("passed", "touched", "side", "gap")
         return {
-            **{name: getattr(state, name).clone() for name in names},
+            **{name: getattr(state, name) for name in names},
             "next_row": state.next_row[:, None],
-            "end_reason": state.end_reason[:, None].clone(),
+            "end_reason": state.end_reason[:, None],
             "rows": state.rows.float(),
         }
 

@@ -219,7 +219,7 @@ class Task(abc.ABC, Generic[S]):
     def info(self, state: S) -> dict[str, Tensor]:
         """Return the true state of each environment, as `entries` describes. Shapes: (N, *)."""
         sampled: Tensor = getattr(state, "sampled")  # noqa: B009 (of `SampledState`)
-        return {"sampled": sampled.float(), "end_reason": state.end_reason[:, None].clone()}
+        return {"sampled": sampled.float(), "end_reason": state.end_reason[:, None]}
 
     def score(self, info: Mapping[str, Tensor]) -> Goals:
         """Return the goals from the entries `scored` at the ends of episodes. Shapes: (n, *)."""

@@ -21,8 +21,8 @@ _MAX_WORK = 2**31  # comparisons in the search for borders
 def sample_inside(boxes: Boxes, count: int, rng: np.random.Generator) -> Points:
     """Return `count` centres, corners and random points of boxes.
 
-    As many centres as there are boxes, at most half; if there are more, large, thin and random
-    boxes in turn. Then all corners of as many boxes as half of the rest allows.
+    A centre of each box, for at most half of the points. If there are more boxes than that, large,
+    thin and random boxes take turns. Then all corners of as many boxes as half of the rest allows.
     """
     chosen = boxes[_mixed(boxes, rng)]
     centres = chosen[: -(-count // 2)].mean(-1)

@@ -219,7 +219,7 @@ def _meetings(pieces: Pieces, most: int) -> tuple[NDArray, NDArray]:
         total += len(meets)
     if total > 2 * most:
         raise InputError(
-            f"the images of one cube have more than {most} cells (most_cells); give a smaller "
+            f"the images of one cube may have more than {most} cells (most_cells); give a smaller "
             "window (farthest, sideways) or raise most_cells"
         )
     return np.stack([np.concatenate(xs), np.concatenate(ys)], -1), np.concatenate(ons)

@@ -265,7 +265,7 @@ class CubeImages:
         return compared
 
     def _gone(self, cubes: NDArray[np.float64], places: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return which cubes are out of sight. Shape: (N, num_cubes)."""
+        """Return which cubes the drone has touched or passed. Shape: (N, num_cubes)."""
         task = self._lattice.task
         ahead = self._lattice.cubes - places[:, :1] * task.step_length
         left = cubes - places[:, 1:] * task.step_length

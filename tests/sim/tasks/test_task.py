@@ -4,6 +4,7 @@ import dataclasses
 
 import pytest
 import torch
+from tensordict import TensorDict
 from torchrl.envs.utils import check_env_specs
 
 from drone_rl.config import TaskSettings
@@ -87,6 +88,24 @@ class Minimal(Task):
         end = (body.position[:, 0] > state.sampled[:, 0]).long() * EndReason.SUCCESS
         steps = state.steps + 1
         return dataclasses.replace(state, body=body, steps=steps, end_reason=end), end.double()
+
+
+class Single(Minimal):
+    name = "single"
+
+    def sample(self, random_state):
+        return super().sample(random_state).float()
+
+
+@pytest.mark.parametrize("task", [None, Single(), Posts()])
+def test_a_reset_leaves_earlier_information_alone(task):
+    env = DroneEnv(2, task, pixels=False)
+    before = env.step(env.rand_action(env.reset()))["next", "info"]
+    kept = before.clone()
+    env.reset(TensorDict({"_reset": torch.tensor([[True], [False]])}, [2]))
+    for name, value in kept.items():
+        assert torch.equal(before[name].nan_to_num(), value.nan_to_num()), name
+    env.close()
 
 
 def test_base_class_has_defaults():
