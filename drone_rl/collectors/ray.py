@@ -19,8 +19,8 @@ from torch import nn
 from torchrl.collectors import BaseCollector
 
 from drone_rl.collectors.episodes import EpisodeCollector
-from drone_rl.utils.errors import InputError, extra
-from drone_rl.utils.imports import kept_sigterm
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.ray_cluster import connect
 
 WorkerComponents = tuple[EpisodeCollector, nn.Module, torch.Generator]
 """A worker's collector, the network inside it and the stream of its actions."""
@@ -192,18 +192,7 @@ def _start(
     makers: Sequence[Callable[[], WorkerComponents]], address: str | None, num_cpus: float
 ) -> tuple[Any, Any]:
     """Return the module ray and TorchRL's collector, whose workers are ready."""
-    ray = extra("ray", "ray", "collector=ray")
-    own = {"include_dashboard": False, "log_to_driver": False, "logging_level": "warning"}
-    try:
-        is_own = not ray.is_initialized()
-        if is_own:
-            with kept_sigterm():
-                ray.init(address=address, **own)
-    except (ConnectionError, ValueError) as error:
-        raise InputError(
-            f"collector.address={address} can't be reached; start a cluster with "
-            "ray start --head, or set it to local for one on this machine"
-        ) from error
+    ray, is_own = connect(address, "collector=ray")
     try:
         return ray, _start_workers(ray, makers, num_cpus)
     except InputError:

@@ -41,10 +41,10 @@ class Layer(abc.ABC):
         """Evaluate the layer in float32."""
 
     @abc.abstractmethod
-    def bound(self, largest: Tensor, error: Tensor) -> Tensor:
-        """Return bounds on the errors of outputs, for bounded inputs. Shapes: (1, *), float64.
+    def bound(self, value: Tensor, error: Tensor) -> Tensor:
+        """Return bounds on the errors of outputs that hold for all inputs. Shape: (1, *), float64.
 
-        `largest` and `error` of each input: largest absolute value in float32, and error.
+        `value` are the inputs in float32, (N, *), and `error` bounds their errors, (1, *).
         """
 
     @abc.abstractmethod
@@ -66,15 +66,15 @@ class _Affine(Layer):
         weight, bias = (layer.get_parameter(name).detach() for name in ("weight", "bias"))
         self._single = weight, bias
         self._weight, self._bias = weight.double(), bias.double()
-        self._size = self._weight.abs()
+        self._size, self._ones = self._weight.abs(), torch.ones_like(self._weight[:1])
         self._stride = layer.stride if isinstance(layer, nn.Conv2d) else None
         self._terms = weight[0].numel() + 1
 
     def __call__(self, value: Tensor) -> Tensor:
         return self._apply(value, *self._single)
 
-    def bound(self, largest: Tensor, error: Tensor) -> Tensor:
-        size = largest + 2 * error  # covers exact inputs and those of any evaluation
+    def bound(self, value: Tensor, error: Tensor) -> Tensor:
+        size = largest_of(value) + 2 * error  # covers exact inputs and those of any evaluation
         total = self._apply(size, self._size, self._bias.abs())
         carried = self._apply(error, self._size, None)
         return SLACK * carried + self._local(total, total, size)
@@ -111,7 +111,7 @@ class _Affine(Layer):
         roundings = SLACK / (1 - self._terms * UNIT)
         rounded = roundings * UNIT * (self._terms * most + 2 * total)
         # weights, inputs, products and sums that are too small to be normal
-        inputs = self._apply(size, torch.ones_like(self._weight), None)
+        inputs = self._apply(size, self._ones, None)  # the same of each output
         weights = self._size.flatten(1).sum(-1).view(-1, *[1] * (total.ndim - 2))
         lost = 2 * TINY * (inputs + weights + 4 * self._terms)
         return (rounded + lost).masked_fill(~(SLACK * total < LARGEST), torch.inf)
@@ -123,7 +123,7 @@ class _Rectified(Layer):
     def __call__(self, value: Tensor) -> Tensor:
         return value.clamp(min=0)
 
-    def bound(self, largest: Tensor, error: Tensor) -> Tensor:
+    def bound(self, value: Tensor, error: Tensor) -> Tensor:
         return error
 
     def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
@@ -142,7 +142,7 @@ class _Flat(Layer):
     def __call__(self, value: Tensor) -> Tensor:
         return value.flatten(1)
 
-    def bound(self, largest: Tensor, error: Tensor) -> Tensor:
+    def bound(self, value: Tensor, error: Tensor) -> Tensor:
         return error.flatten(1)
 
     def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
@@ -161,7 +161,7 @@ class _Maximum(Layer):
     def __call__(self, value: Tensor) -> Tensor:
         return functional.max_pool2d(value, self._side)
 
-    def bound(self, largest: Tensor, error: Tensor) -> Tensor:
+    def bound(self, value: Tensor, error: Tensor) -> Tensor:
         return functional.max_pool2d(error, self._side)
 
     def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
@@ -182,6 +182,12 @@ class _Maximum(Layer):
         wide = slope.repeat_interleave(self._side, -1).repeat_interleave(self._side, -2)
         missing = (0, columns - wide.shape[-1], 0, rows - wide.shape[-2])
         return functional.pad(wide, missing).where(note.mask[:, None], 0.0)
+
+
+def largest_of(value: Tensor) -> Tensor:
+    """Return the largest absolute values in a batch (N, *). Shape: (1, *), float64."""
+    value = value.contiguous()  # a convolution's outputs may not be, which takes 50 times as long
+    return torch.maximum(value.amax(0, keepdim=True), -value.amin(0, keepdim=True)).double()
 
 
 def layer_of(layer: nn.Module) -> Layer | None:

@@ -19,7 +19,7 @@ import torch
 from torch import Tensor, nn
 
 from drone_rl.policies.networks import ImageNetwork, PolicyNetwork
-from drone_rl.policies.rounded_layers import SLACK, UNIT, Layer, layer_of
+from drone_rl.policies.rounded_layers import SLACK, UNIT, Layer, largest_of, layer_of
 from drone_rl.sim.actions import Actions, DiscreteActions
 from drone_rl.utils.errors import InputError
 
@@ -103,12 +103,11 @@ class RoundingBound:
 
         The bound is each output's largest error, (outputs,), float64; infinite if it may overflow.
         """
-        largest = pixels.abs().amax(0, keepdim=True).double()
+        largest = largest_of(pixels)
         error = _pixel_error(largest.amax().clamp(min=UNIT)).expand_as(largest)
         value = pixels
         for layer in self._layers:
-            largest = value.abs().amax(0, keepdim=True).double()
-            error = layer.bound(largest, error)
+            error = layer.bound(value, error)
             value = layer(value)
         return value, error[0].nan_to_num(nan=torch.inf)
 

@@ -19,9 +19,9 @@ from typing import Any, Protocol
 from drone_rl.sweeps.manifest import THREADS, Run, read_result
 from drone_rl.utils.errors import InputError, extra
 from drone_rl.utils.files import is_locked, read_tail, write_atomically
-from drone_rl.utils.imports import kept_sigterm
 from drone_rl.utils.limits import LOG_BYTES
 from drone_rl.utils.provenance import num_cores
+from drone_rl.utils.ray_cluster import connect
 from drone_rl.utils.schema import OneOf
 
 PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")
@@ -220,17 +220,7 @@ class RayExecutor:
         Raises:
             InputError: Ray isn't installed or the cluster can't be reached.
         """
-        self._ray = extra("ray", "ray", "hydra/launcher=ray")
-        self._started = not self._ray.is_initialized()
-        try:
-            options = {"include_dashboard": False, "log_to_driver": False}
-            with kept_sigterm():
-                self._ray.init(address=address, ignore_reinit_error=True, **options)
-        except (ConnectionError, ValueError) as error:
-            raise InputError(
-                f"hydra.launcher.address={address} can't be reached; start a cluster with "
-                "ray start --head, or set it to local for one on this machine"
-            ) from error
+        self._ray, self._started = connect(address, "hydra/launcher=ray")
         remote = self._ray.remote(num_cpus=num_cpus, num_gpus=num_gpus, max_retries=3)
         self._finish_run = remote(finish_run)
         self._check_room({"cpus": num_cpus, "gpus": num_gpus})

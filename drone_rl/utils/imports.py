@@ -4,9 +4,7 @@ import contextlib
 import functools
 import importlib
 import os
-import signal
 import sys
-import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from importlib.machinery import ModuleSpec, PathFinder
@@ -176,15 +174,3 @@ class _Unloaded(ModuleType):
             for function in self._allowed:
                 real.allow_in_graph(function)
         return sys.modules[NAME]
-
-
-@contextlib.contextmanager
-def kept_sigterm() -> Iterator[None]:
-    """Keep the handler of SIGTERM, which `ray.init` replaces by one that exits with status 15."""
-    is_main = threading.current_thread() is threading.main_thread()
-    before = signal.getsignal(signal.SIGTERM) if is_main else None
-    try:
-        yield
-    finally:
-        if before is not None:
-            signal.signal(signal.SIGTERM, before)

@@ -3,7 +3,6 @@
 import contextlib
 import json
 import logging
-import signal
 import sys
 import time
 import types
@@ -185,19 +184,3 @@ def test_at_least_one_job():
 
 def test_folders_with_odd_names_reach_the_program_whole(make_runs):
     assert quoted("a'b,c=d") == "'a\\'b,c=d'"
-
-
-def test_ray_does_not_take_over_sigterm(monkeypatch):
-    fake = types.SimpleNamespace(
-        is_initialized=lambda: False,
-        init=lambda **_: signal.signal(signal.SIGTERM, lambda *_: sys.exit(15)),
-        remote=lambda **_: lambda function: function,
-        nodes=lambda: [],
-    )
-    monkeypatch.setitem(sys.modules, "ray", fake)
-    before = signal.getsignal(signal.SIGTERM)
-    try:
-        RayExecutor(address=None, num_cpus=1, num_gpus=0)
-        assert signal.getsignal(signal.SIGTERM) is before
-    finally:
-        signal.signal(signal.SIGTERM, before)
