@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 import enum
 import json
+import logging
 import signal
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -18,7 +19,7 @@ from drone_rl.config.configuration import (
     from_arguments,
     from_config,
 )
-from drone_rl.config.training import TrainSettings
+from drone_rl.config.training import CloningSettings, TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.recurrent import refusal
 from drone_rl.policies.zoo import describe, read_checkpoint
@@ -42,6 +43,7 @@ from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import Real, shown
 from drone_rl.utils.settings import current_names, kinds_of
 
+_log = logging.getLogger(__name__)
 MAY_CHANGE = (
     "trainer.total_frames",
     "trainer.total_episodes",
@@ -169,6 +171,8 @@ class RunFolder:
             if describe(settings).is_recurrent:
                 raise InputError(refusal("the policy", "cloning", "set another network=..."))
             found = read_demonstrations(folder, FlightConditions.of(settings))
+        elif settings.cloning != CloningSettings():
+            _log.warning("settings of cloning have no effect without demonstrations=FOLDER")
         remove_leftovers(self.path, *_WRITTEN)
         return found
 

@@ -117,6 +117,16 @@ def test_a_run_without_a_clone_is_resumed_without_demonstrations(flights, tmp_pa
     assert "cloning" not in drone_rl.train(folder=tmp_path, resume=True, progress=silent).result
 
 
+@pytest.mark.parametrize(("epochs", "warned"), [(3, True), (30, False)])
+def test_settings_without_demonstrations_are_warned_about(tmp_path, caplog, epochs, warned):
+    settings = TINY.replace(cloning=CloningSettings(epochs=epochs))
+    drone_rl.train(settings, folder=tmp_path, trainer=NOTHING, progress=silent)
+    assert ("no effect without demonstrations=FOLDER" in caplog.text) == warned
+    caplog.clear()
+    drone_rl.train(folder=tmp_path, resume=True, progress=silent)
+    assert "no effect" not in caplog.text
+
+
 def test_recurrent_policies_are_not_cloned(flights, tmp_path):
     with pytest.raises(InputError, match=r"remembers earlier frames .* cloning .* set another"):
         drone_rl.train(TINY, network=Lstm(), demonstrations=str(flights), folder=tmp_path)
