@@ -183,7 +183,7 @@ class Demonstration:
         if not ((self.actions >= low) & (self.actions <= high)).all():
             raise InputError(f"actions are not all from {low} to {high}")
         if not np.isfinite(self.rewards).all():
-            raise InputError("rewards hold NaN or infinity")
+            raise InputError("rewards hold NaN or infinity; give finite numbers")
         if self.done[:-1].any():
             raise InputError("done is true before the last step; write one file for each episode")
         size = sum(getattr(self, name).nbytes for name in _ARRAYS)

@@ -112,12 +112,14 @@ class RunFolder:
 
         Raises:
             InputError: The folder holds a run that would be lost, or has no checkpoint to resume
-                from, or an argument has the wrong type.
+                from, or an argument is missing or has the wrong type.
         """
         if not isinstance(resume, bool):
             raise InputError(
                 f"resume={shown(resume)} is neither true nor false; give folder=RUN, resume=True"
             )
+        if resume and path is None:
+            raise InputError("resume=True needs the run to resume; give folder=RUN")
         folder = new_folder() if path is None else as_path(path, "folder")
         if resume and folder.suffix == ".pt":  # what load_policy takes
             raise InputError(

@@ -121,7 +121,7 @@ def _members(
     except InputError:
         raise
     except _DAMAGE as error:
-        raise InputError(f"{where} is damaged or cut short ({error}); write it again") from None
+        raise InputError(f"{where} is damaged or cut short ({error}); give another file") from None
 
 
 def _array(file: Any, size: int, where: str) -> NDArray:

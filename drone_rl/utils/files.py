@@ -119,8 +119,11 @@ def parse_json(
         text = content if isinstance(content, str) else content.decode()
         value = json.loads(text, object_pairs_hook=_once, **_NUMBERS[allow_nan])
     except (ValueError, RecursionError) as error:
-        reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
-        raise InputError(f"{where} is damaged: no plain JSON ({reason[:200]})") from None
+        reasons = {RecursionError: "nested too deeply", UnicodeDecodeError: "no utf-8 text"}
+        reason = reasons.get(type(error), str(error)[:200])
+        raise InputError(
+            f"{where} is damaged or no plain JSON ({reason}); give another file"
+        ) from None
     check_depth(value, where)
     return value
 

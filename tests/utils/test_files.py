@@ -253,3 +253,18 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path):
 
 def test_seeds_of_128_bits_are_read():
     assert parse_json(str(2**128 - 1), "x") == 2**128 - 1
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"\xe8\x00", "no text in UTF-8"),
+        (b"{", "Expecting property name"),
+        (b"[" * 70_000 + b"]" * 70_000, "nested too deeply"),
+    ],
+)
+def test_a_file_of_another_kind_is_told_in_one_line(content, reason):
+    with pytest.raises(
+        InputError, match=rf"^x is no plain JSON \({reason}.*\); give another file$"
+    ):
+        parse_json(content, "x")

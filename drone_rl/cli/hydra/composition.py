@@ -84,6 +84,8 @@ PARTS: dict[str, type[Variant]] = {
     "collector": Collector,
 }
 """Groups whose files start from the schema of a variant, `base_<its name>`."""
+_EXTENSIBLE = ("task", "network", "returns", "objective", "collector")
+"""Groups for which modules of the user's register choices."""
 SEVERAL: dict[str, type[Variant]] = {"transforms": Transform, "logger": Logger}
 """Groups whose files name several variants, each by `schema@<name>: <the variant's name>`."""
 
@@ -236,7 +238,7 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     overrides = spare_run(command.prepare([*map(whole_numbers, words)]))
     import_plugins(overrides)
     register_schemas(**{name: command})
-    check_choices(overrides, conf_dir())
+    check_choices(overrides, conf_dir(), _EXTENSIBLE)
     check_launcher(name, overrides)
     if "hydra.mode=RUN" not in overrides:  # else a sweep starts it
         for override in repeated(words):

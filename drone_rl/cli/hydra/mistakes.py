@@ -5,7 +5,7 @@ Hydra's own messages are about its grammar and classes.
 
 import difflib
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +25,11 @@ OWN_FOLDERS = ("--config-dir", "-cd", "hydra.searchpath")
 _IN_FILE = re.compile(r"In '(\S+/\S+)': \w+ raised while composing config:\n(.*)\n +full_key: (.*)")
 
 
-def check_choices(overrides: Sequence[str], conf: Path) -> None:
-    """Raise an `InputError` for the first unknown choice of a group."""
+def check_choices(overrides: Sequence[str], conf: Path, extensible: Collection[str] = ()) -> None:
+    """Raise an `InputError` for the first unknown choice of a group.
+
+    `extensible` are the groups for which modules of the user's register choices.
+    """
     if any(override.startswith(OWN_FOLDERS) for override in overrides):
         return
     for override in overrides:
@@ -41,8 +44,10 @@ def check_choices(overrides: Sequence[str], conf: Path) -> None:
             if name not in offered:
                 near = difflib.get_close_matches(name.lower(), offered, 1)
                 meant = f"did you mean {group}={near[0]}? " if near else ""
+                own = "; if a module of yours registers it, add plugins=[MODULE]"
                 raise InputError(
                     f"{group}={name} is unknown; {meant}give one of: {', '.join(offered)}"
+                    f"{own if group in extensible and not near else ''}"
                 )
 
 

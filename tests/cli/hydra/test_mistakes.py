@@ -178,6 +178,19 @@ def test_schemas_and_unknown_choices_are_refused(override, message):
         check_choices(["seed=1", override], conf_dir())
 
 
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("task=hurry", r"pillars; if a module of yours registers it, add plugins=\[MODULE\]$"),
+        ("task=pillar", "collect_cubes, collect_one, pillars$"),  # rather a typing error
+        ("sweep=nope", "cubes, high_rate$"),
+    ],
+)
+def test_choices_of_a_users_module_need_it(override, message):
+    with pytest.raises(InputError, match=message):
+        check_choices([override], conf_dir(), ["task"])
+
+
 def test_all_else_is_accepted():
     plain = ["task=pillars", "network=mlp,small_cnn", "sweep=seeds", "-m", "seed=1,2"]
     check_choices(
