@@ -296,6 +296,7 @@ def test_a_finished_run_is_not_replaced(tmp_path):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
+        ({"resume": True}, "resume=True needs the run to resume; give folder=RUN"),
         ({"resume": "RUN"}, "resume='RUN' is neither true nor false; give folder=RUN, resume=True"),
         ({"folder": 5}, "folder=5 is no path"),
         ({"folder": ""}, "folder='' is no path"),

@@ -258,13 +258,12 @@ def test_seeds_of_128_bits_are_read():
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
-        (b"\xe8\x00", "no text in UTF-8"),
+        (b"\xe8\x00", "no utf-8 text"),
         (b"{", "Expecting property name"),
         (b"[" * 70_000 + b"]" * 70_000, "nested too deeply"),
     ],
 )
 def test_a_file_of_another_kind_is_told_in_one_line(content, reason):
-    with pytest.raises(
-        InputError, match=rf"^x is no plain JSON \({reason}.*\); give another file$"
-    ):
+    message = rf"^x is damaged or no plain JSON \({reason}.*\); give another file$"
+    with pytest.raises(InputError, match=message):
         parse_json(content, "x")

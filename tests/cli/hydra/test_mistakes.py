@@ -183,7 +183,7 @@ def test_schemas_and_unknown_choices_are_refused(override, message):
     [
         ("task=hurry", r"pillars; if a module of yours registers it, add plugins=\[MODULE\]$"),
         ("task=pillar", "collect_cubes, collect_one, pillars$"),  # rather a typing error
-        ("sweep=nope", "cubes, high_rate$"),
+        ("sweep=nope", r"^sweep=nope is unknown; give one of: [\w, ]+$"),
     ],
 )
 def test_choices_of_a_users_module_need_it(override, message):
