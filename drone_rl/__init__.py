@@ -120,7 +120,9 @@ import_quietly("torchrl.collectors.distributed.rpc", "DeprecationWarning", "Weig
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used."""
     if name not in _HOMES:
-        raise AttributeError(f"module 'drone_rl' has no attribute {name!r}")
+        of_command = {"verdict": "judge", "chain": "chances"}.get(name)
+        hint = f"; drone-rl {name} is drone_rl.{of_command}" if of_command else ""
+        raise AttributeError(f"module 'drone_rl' has no attribute {name!r}{hint}")
     with collecting_no_garbage():
         value = getattr(importlib.import_module(_HOMES[name]), name)
     globals()[name] = value

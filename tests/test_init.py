@@ -16,7 +16,9 @@ def test_every_public_name_is_available():
 
 
 def test_an_unknown_name_raises():
-    with pytest.raises(AttributeError, match="no attribute 'walk'"):
+    with pytest.raises(AttributeError, match=r"no attribute 'verdict'; .* is drone_rl.judge"):
+        drone_rl.verdict  # noqa: B018
+    with pytest.raises(AttributeError, match=r"no attribute 'walk'$"):
         drone_rl.walk  # noqa: B018
 
 

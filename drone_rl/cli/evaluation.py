@@ -179,7 +179,10 @@ class ExportCommand(CommandSettings, HeldOutSettings):
     under outputs/shifts of this network and task."""
 
     def check(self) -> None:
-        """Reject files for the model card with an ONNX model, which has none."""
+        """Reject extensions, and files for the model card with an ONNX model, which has none."""
+        stem, _, extension = self.name.rpartition(".")
+        if extension in ("safetensors", "onnx", "pt"):
+            raise InputError(f"name={self.name} has an extension; give name={stem or 'policy'}")
         for name in ("certificate", "shifts"):
             if self.format == "onnx" and getattr(self, name) is not None:
                 raise InputError(

@@ -18,7 +18,7 @@ from drone_rl.config import (
     named_settings,
 )
 from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.schema import Instance, as_mapping, shown
+from drone_rl.utils.schema import as_mapping, shown
 from drone_rl.utils.settings import (
     Settings,
     check_names,
@@ -305,7 +305,13 @@ def from_arguments(
     Raises:
         InputError: `settings` is of another class, or a change is no setting.
     """
-    given = of() if settings is None else Instance(of).read(settings, "settings")
+    if not isinstance(settings, of | None):
+        several = ", and several policies as a list" if isinstance(settings, str) else ""
+        raise InputError(
+            f"settings={shown(settings)} is no {of.__name__}; give settings by name, such as "
+            f"{next(iter(kinds_of(of)))}=...{several}"
+        )
+    given = of() if settings is None else settings
     parameters = inspect.signature(function).parameters.values()
     others = [p.name for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY]
     groups = {"task": Changes(), "dynamics": Changes(DynamicsSettings)}

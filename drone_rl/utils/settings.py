@@ -6,6 +6,7 @@ A setting is defined in one such field, which checks files, Hydra's values and P
 import contextlib
 import dataclasses
 import functools
+import math
 import operator
 import re
 import types
@@ -15,7 +16,7 @@ from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
 from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.schema import Flag, Instance, Kind, Maybe, Record, Text, as_mapping
+from drone_rl.utils.schema import Flag, Instance, Kind, Maybe, Real, Record, Text, as_mapping
 
 S = TypeVar("S", bound="Settings")
 FORMER_NAMES = {"optimiser": "optimizer", "trainer.minibatch_frames": "trainer.chunk_frames"}
@@ -246,6 +247,8 @@ def _kind(hint: Any, where: str) -> Kind:
         return Maybe(_kind(inner[0], where))
     if hint in (bool, str):
         return Flag() if hint is bool else Text()
+    if hint is float:
+        return Real(-math.inf)
     if origin is None and isinstance(hint, type):
         return Instance(hint)
     raise InputError(

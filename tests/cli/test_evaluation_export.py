@@ -30,6 +30,7 @@ def test_an_export_for_other_programs(in_process, tmp_path, monkeypatch):
             ["certificate", "format=safetensors"],
         ),
         (["export", "policy=none.pt", "name=../x"], ["name='../x'", "without /"]),
+        (["export", "policy=good", "name=mine.onnx"], ["has an extension", "name=mine"]),
         (["export", "policy=none.pt", "name=a/b"], ["name='a/b'", "without /"]),
         (["export", "policy=good", "episodes=0"], ["episodes=0", "1 or more"]),
     ],

@@ -128,6 +128,15 @@ def test_kinds_and_types_of_each_field():
     }
 
 
+def test_numbers_without_bounds_are_finite():
+    class Priced(Settings):
+        cost: float = 0.5
+
+    assert Priced(cost=-3).cost == -3.0
+    with pytest.raises(InputError, match="cost=nan is out of range; give a finite number"):
+        Priced(cost=float("nan"))
+
+
 @pytest.mark.parametrize(
     "hint", [int | str, list[int], Annotated[int, 3], Annotated[int, Whole], dict[str, int]]
 )

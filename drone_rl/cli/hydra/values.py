@@ -80,7 +80,13 @@ def several_values(command: Command, override: Override, text: str) -> InputErro
     key, _, value = text.partition("=")
     if override.is_interval_sweep():
         return InputError(f"{text}: only a search tries an interval; add -m hydra/sweeper=optuna")
-    if re.fullmatch(r"\d{1,3}(,\d{3})+", value):
+    point = value.replace(",", ".")
+    is_decimal = re.fullmatch(r"0,\d{3,}", value) is not None
+    if is_decimal and not wrong_type(
+        command, OverridesParser.create().parse_override(f"{key}={point}")
+    ):
+        return InputError(f"{text}: commas separate values; type {key}={point}")
+    if re.fullmatch(r"[1-9]\d{0,2}(,\d{3})+", value):
         return InputError(f"{text}: commas separate values; type {key}={value.replace(',', '')}")
     line = f"drone-rl {command.name} -m {in_quotes(text) if '(' in text else text}"
     listed = OverridesParser.create().parse_override(f"{key}=[{value}]")

@@ -134,8 +134,14 @@ def _bare(command: Command, words: Sequence[str], position: int) -> InputError:
 def no_command(word: str, following: Sequence[str], known: Sequence[str]) -> str:
     """Return the message about an unknown command."""
     if "=" in word or word.startswith(tuple(_DASHES)):
-        command = next((w for w in following if w in known), "train")
-        others = [w for w in (word, *following) if w != command]
+        command = next((w for w in following if w in known), None)
+        if command is None and word.startswith("--"):
+            return (
+                f"{word}: the command comes first, then settings as name=value without dashes, as "
+                "in drone-rl train seed=1"
+            )
+        command = command or "train"
+        others = [re.sub(r"^--(?=\w+=)", "", w) for w in (word, *following) if w != command]
         return f"{word}: the command comes first; type drone-rl {shlex.join([command, *others])}"
     near = difflib.get_close_matches(word.lower(), known, 1)
     meant = OTHER_NAMES["commands"].get(word.lower()) or (near and near[0])

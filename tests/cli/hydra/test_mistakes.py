@@ -49,6 +49,8 @@ def said(*overrides, command="train"):
         ("network.hidden=64", "network.hidden=64 has the wrong .* network.hidden=\\[64\\]"),
         ("network.hidden=[a]", "network.hidden=\\[a\\] has the wrong .* network.hidden=\\[128\\]"),
         ("network={a:1}", "network"),
+        ("optimizer.lr=0,001", r"commas separate values; type optimizer.lr=0.001"),
+        ("seed=0,001", "seed=0,001 gives several values"),
         ("seed=1,000", "commas separate values; type seed=1000"),
         ("seed=0,1", "for one run with each, type drone-rl train -m seed=0,1$"),
         ("network.hidden=1,2", "for a list, type network.hidden=\\[1,2\\]; "),

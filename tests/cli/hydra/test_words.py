@@ -65,6 +65,8 @@ def test_settings_and_options_of_hydra_are_accepted():
         (["eval", "policy=x"], "did you mean drone-rl evaluate?"),
         (["qwertz"], "command 'qwertz' is unknown; use one of: train, "),
         (["-m", "train", "seed=0,1"], "type drone-rl train -m seed=0,1"),
+        (["--seed=1", "train"], "the command comes first; type drone-rl train seed=1"),
+        (["--policy", "good"], "first, then settings as name=value without dashes, as in drone-rl"),
         (["seed=1"], "seed=1: the command comes first; type drone-rl train seed=1"),
     ],
 )
