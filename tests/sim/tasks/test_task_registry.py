@@ -66,7 +66,7 @@ class WithUnion(BaseTaskSettings):
     ("settings", "message"),
     [
         (WithoutDefault, r"^WithoutDefault\.cost has no default; give it one"),
-        (WithText, r"^WithText\.cost='0\.005' is no float; give a float$"),
+        (WithText, r"^WithText\.cost='0\.005' is a text; give a finite number$"),
         (WithUnion, r"^WithUnion\.cost is of type int \| str; annotate it with a kind"),
     ],
 )
