@@ -308,6 +308,11 @@ def test_folders_that_do_not_work_are_named(given, message):
         drone_rl.train(TINY, progress=silent, **given)
 
 
+def test_plugins_are_imported_in_python():
+    with pytest.raises(InputError, match="^plugins belongs to the command line; in Python, import"):
+        drone_rl.train(plugins=["mine"], progress=silent)
+
+
 def test_settings_of_another_kind_are_named():
     for wrong in ({"seed": 1}, "latest", drone_rl.TaskSettings()):
         with pytest.raises(InputError, match=r"^settings=.* is no TrainSettings"):

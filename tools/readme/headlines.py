@@ -25,7 +25,7 @@ HEADLINES = (
     ),
     Row(
         "peers",
-        "Time until solved, relative to the fastest of Stable-Baselines3's PPO and A2C and "
+        "Time until solved, relative to the fastest other: Stable-Baselines3's PPO or A2C, or "
         "TorchRL's Collector (means of 3 seeds)",
         _relative_time,
     ),
@@ -41,7 +41,7 @@ HEADLINES = (
     ),
     Row(
         "maps",
-        "Fake heat maps (noise, blobs, edges and others) that pass the tests",
+        "Heat maps of noise, edges and the like, regardless of the policy, that pass the tests",
         lambda f: f"{f['placebo_maps_trusted']} of {f['placebo_maps_total']}",
     ),
     Row(
