@@ -41,7 +41,7 @@ HEADLINES = (
     ),
     Row(
         "maps",
-        "Heat maps of noise, edges and the like, regardless of the policy, that pass the tests",
+        "Heat maps that ignore the policy (noise, edges and others) yet pass the tests",
         lambda f: f"{f['placebo_maps_trusted']} of {f['placebo_maps_total']}",
     ),
     Row(
