@@ -231,9 +231,14 @@ def _metrics_columns(path: Path, allowance: TablesAllowance) -> Array:
     """Return the `_COLUMNS` of each update. Shape: (num_updates, 4)."""
     rows = read_table(path, allowance)
     header = [NAMES_OF_0_1.get(name, name) for name in next(rows, [])]
-    table = [dict(zip(header, row, strict=False)) for row in rows]
-    columns = [
-        [float(row.get(name) or ("" if empty is None else empty)) for row in table]
-        for name, empty in _COLUMNS.items()
+    places = {name: place for place, name in enumerate(header)}
+    wanted = [
+        (places.get(name), "" if empty is None else empty) for name, empty in _COLUMNS.items()
     ]
-    return np.array(columns, np.float64).T
+    table = [[float(_cell(row, place) or empty) for place, empty in wanted] for row in rows]
+    return np.array(table, np.float64).reshape(-1, len(wanted))
+
+
+def _cell(row: list[str], place: int | None) -> str:
+    """Return the text in a column; empty if the row or the table lacks it."""
+    return "" if place is None or place >= len(row) else row[place]

@@ -1,9 +1,9 @@
 """Limits on files, which all readers check before they allocate memory.
 
 Reading a file takes less than 1 GiB of memory and about two seconds, except the saved state of a
-proof with many boxes. Readers check the limits on what a file states (its size, a directory, a
-header, the number of separators) before they parse the content. `where` names the file or a part
-of it in messages.
+proof with many boxes; the metrics of a large sweep take about half a minute together. Readers check
+the limits on what a file states (its size, a directory, a header, the number of separators) before
+they parse the content. `where` names the file or a part of it in messages.
 """
 
 import math
@@ -24,8 +24,8 @@ SHIFTS_BYTES = 2**26  # shifts.json, most of which are images
 CERTIFICATE_BYTES = 2**25
 LEDGER_BYTES = 2**24  # results of benchmarks
 YAML_BYTES = 2**16  # overrides of a run, a required domain
-METRICS_BYTES = 2**24  # metrics.csv of one run
-SWEEP_METRICS_BYTES = 2**26  # metrics.csv of all runs of a sweep together
+METRICS_BYTES = 2**25  # metrics.csv of one run
+SWEEP_METRICS_BYTES = 2**30  # metrics.csv of all runs of a sweep together
 LOG_BYTES = 2**16  # end of a log that is searched for an error
 JOURNAL_BYTES = 2**23  # journal of a search by Optuna
 CHECKPOINT_BYTES = 2**28  # a checkpoint; also unpacked
@@ -46,9 +46,9 @@ MEMBERS = 10_000  # files in one archive
 DIMENSIONS = 8  # of an array
 ELEMENTS = 2**30  # of an array; also of one without any, if its dimensions of 0 were 1
 METRICS_ROWS = 2**17  # updates in metrics.csv
-METRICS_CELLS = 2**21  # cells in metrics.csv
-SWEEP_METRICS_ROWS = 2**19  # updates in metrics.csv of all runs of a sweep together
-SWEEP_METRICS_CELLS = 2**23  # cells in these
+METRICS_CELLS = 2**22  # cells in metrics.csv
+SWEEP_METRICS_ROWS = 2**22  # updates in metrics.csv of all runs of a sweep together
+SWEEP_METRICS_CELLS = 2**27  # cells in these
 FOLDER_ENTRIES = 50_000  # files and folders below a folder that is searched for links
 
 

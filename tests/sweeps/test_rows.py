@@ -180,6 +180,22 @@ def test_a_run_that_failed_before_its_first_update_has_nothing(sweep):
     assert (failed.state, failed.frames, failed.seconds) == ("failed", 0, 0)
 
 
+def test_a_long_run_is_no_damage(sweep):
+    names = ["frames", "train/running_reward", "seconds", "loss/entropy"]
+    header = ",".join([*names, *(f"other_{number}" for number in range(15))])
+    row = ",".join(["9", "1.5", "9", "0.25", *["1.23456"] * 15])
+    (sweep.folder / "0" / "metrics.csv").write_text("\n".join([header, *[row] * 120_000]))
+    long = read_rows(sweep)[0]
+    assert (long.state, len(long.curve[0]), long.entropy) == ("finished", 120_000, 0.25)
+
+
+def test_a_cell_beyond_the_header_is_in_no_column(sweep):
+    (sweep.folder / "0" / "metrics.csv").write_text(
+        "frames,train/running_reward,seconds\n900,1.5,9,0.25\n"
+    )
+    assert read_rows(sweep)[0].entropy is None
+
+
 def test_unreadable_metrics_are_damage_and_an_unreadable_result_must_be_made_again(sweep):
     (sweep.folder / "0" / "metrics.csv").write_text("frames\nrubbish\n")
     (sweep.folder / "1" / "result.json").write_text("{")
