@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from drone_rl.policies.networks import ImageNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.plugins import failure
 
 Logits = Callable[[Any], Any]
 """From a batch of frames to logits (N, number of actions), a tensor or an array."""
@@ -55,6 +56,8 @@ class ExternalNetwork(ImageNetwork):
             found = self(image)
         except InputError:
             raise
+        except (NameError, AttributeError, ImportError) as error:
+            raise InputError(failure("the network", error, type(logits).__name__)) from error
         except Exception as error:
             what = " ".join(f"{type(error).__name__}: {error}".split())[:200]
             given = self._given(image)

@@ -8,6 +8,7 @@ from typing import Any
 
 from drone_rl.config.transforms import Fault
 from drone_rl.sim.vocabulary import terms_of
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.text import Evidence, Sentence, fixed_seed, listed, percent, plural, say
 
 TABLE: Mapping[str, Mapping[str, Any]] = tomllib.loads(
@@ -324,16 +325,22 @@ QUOTED = (
 )
 
 
-def needed_range(along: Evidence, need: Mapping[str, float | None]) -> tuple[float, float]:
-    """Return the ends of a required range on an axis, as in `shifts.json`.
+def needed_range(
+    name: str, along: Evidence, need: Mapping[str, float | None]
+) -> tuple[float, float]:
+    """Return the ends of a required range on an axis, whose entry in `shifts.json` is `along`.
 
-    An end that is None is the value without perturbation, or the other end if that lies beyond it.
+    None stands for the value without perturbation; an `InputError` is raised if that is beyond.
     """
     neutral = _number(along["neutral"])
-    given = [end for end in (need["low"], need["high"]) if end is not None]
-    low = min([neutral, *given]) if need["low"] is None else need["low"]
-    high = max([neutral, *given]) if need["high"] is None else need["high"]
-    return low, high
+    low, high = (neutral if need[end] is None else need[end] for end in ("low", "high"))
+    if low <= high:
+        return low, high
+    missing, given = ("low", "high") if need["low"] is None else ("high", "low")
+    raise InputError(
+        f"{NAMES[name]}: {missing} is missing and therefore {neutral:.4g} {along['unit']}, the "
+        f"value without perturbation, but {given} is {need[given]:.4g}; give {missing}, too"
+    )
 
 
 def contradicted(name: str | None, value: float, unit: str, probed: Evidence) -> str | None:
@@ -356,13 +363,12 @@ def contradicted(name: str | None, value: float, unit: str, probed: Evidence) ->
 def lacking(shifts: Evidence, name: str, need: Mapping[str, float | None]) -> str | None:
     """Return what an operating domain lacks of a required range of an axis, or None.
 
-    `shifts` is the content of `shifts.json`, which must have a domain; `need` is that of
-    `needed_range`.
+    `shifts` is the content of `shifts.json`, which must have a domain; see `needed_range`.
     """
     found, along = shifts["domain"]["ranges"].get(name), shifts["axes"].get(name)
     if found is None or along is None:
         return f"{NAMES[name]}: not evaluated; run drone-rl shifts with axes=[{name}] among others"
-    low, high = needed_range(along, need)
+    low, high = needed_range(name, along, need)
     needed = f"{NAMES[name]}: needed {_span(low, high, along['unit'])}"
     if found["positions"] is None:
         return f"{needed}; it is not certainly good even without perturbation"

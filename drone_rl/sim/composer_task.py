@@ -25,6 +25,7 @@ from drone_rl.sim.rendering.scene import Scene, SemanticClass, compiled
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.visual_randomization import AppearanceSampler, object_region_of
+from drone_rl.utils.plugins import errors_of, place_of
 
 _SKY = 0.69 * entities.DRAW_DISTANCE
 """Metres beyond which only sky is rendered, a ball of 0.7 of MuJoCo's drawing distance."""
@@ -82,7 +83,9 @@ class ComposerTask(composer.Task):
         model.option.gravity = (0, 0, 0)
         self.drone = entities.Drone(size=self.rules.drone_size, camera=self.camera)
         self._arena.add_free_entity(self.drone)
-        self._props = [*self.rules.make_props(), *entities.make_distractors(distractors)]
+        with errors_of(f"task={self.rules.name}", place_of(self.rules.make_props)):
+            props = self.rules.make_props()
+        self._props = [*props, *entities.make_distractors(distractors)]
         self._frames = [self._arena.attach(prop) for prop in self._props]
         for frame in self._frames:
             frame.mocap = True

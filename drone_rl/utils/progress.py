@@ -48,6 +48,7 @@ class Bar:
         self._interval_s = interval_s
         self._bar: tqdm | None = None
         self._drawn_at = 0.0
+        self._began = time.time()
 
     def __call__(self, text: str, done: int = 0, total: int = 0) -> None:
         """See `Progress`."""
@@ -59,6 +60,7 @@ class Bar:
             from tqdm.auto import tqdm  # slow to import
 
             self._bar = tqdm(total=total or None, leave=True)
+            self._bar.start_t = self._bar.last_print_t = self._began  # of the work, for its rate
         self._bar.total = total or None
         self._bar.set_postfix_str(text, refresh=False)
         self._bar.update(done - self._bar.n)
@@ -69,4 +71,4 @@ class Bar:
         """Close the bar; the next call opens another."""
         if self._bar is not None:
             self._bar.close()
-        self._bar = None
+        self._bar, self._began = None, time.time()

@@ -100,10 +100,13 @@ class _PlainLoader(yaml.SafeLoader):
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         """Construct a mapping with each name once."""
-        made = super().construct_mapping(node, deep)
-        if len(made) < len(node.value):
-            raise InputError("a name occurs twice")
-        return made
+        seen = set()
+        for key, _ in node.value:
+            name = self.construct_object(key, deep)
+            if name in seen:
+                raise yaml.MarkedYAMLError(None, None, f"{name} occurs twice", key.start_mark)
+            seen.add(name)
+        return super().construct_mapping(node, deep)
 
 
 class TablesAllowance:

@@ -176,6 +176,8 @@ def _read_need(name: str, value: Any) -> Need:
         raise InputError(f"{shown(name)} is not an axis; give one or more of: {', '.join(AXES)}")
     axis = AXES[name]
     example = f"give low, high or both, and unit: {axis.unit}"
+    if not isinstance(value, Mapping):
+        raise InputError(f"{name}={shown(value)} must be a mapping; {example}")
     given = as_mapping(value, name)
     unknown = [key for key in given if key not in _KEYS]
     if unknown:
@@ -224,7 +226,10 @@ def compare_with_required(
         raise InputError(
             f"require_domain={needed}, but {measured.path} has no ranges (domain=false); {remedy}"
         )
-    lacks = {name: lacking(measured.numbers, name, need) for name, need in needs.items()}
+    try:
+        lacks = {name: lacking(measured.numbers, name, need) for name, need in needs.items()}
+    except InputError as error:
+        raise InputError(f"require_domain={needed}: {error}") from None
     return Coverage(needs, {name: line for name, line in lacks.items() if line is not None})
 
 
@@ -279,7 +284,7 @@ def _strengths(
     rng: np.random.Generator,
 ) -> Iterator[float]:
     """The ends other than no perturbation, and random strengths between them, each once."""
-    low, high = needed_range(numbers["axes"][axis.name], need)
+    low, high = needed_range(axis.name, numbers["axes"][axis.name], need)
     ends = sorted(axis.position(axis.strength(value, subject)) for value in (low, high))
     sampled = rng.uniform(ends[0], ends[1], NUM_RANDOM_STRENGTHS) if ends[0] < ends[1] else []
     seen: set[float] = set()

@@ -25,7 +25,7 @@ def require_cubes(described: PolicyDescription, what: str) -> TaskSettings:
         problem = f"task={TaskSettings.name}, got task={task.name}"
     elif not dynamics.is_computer_vision:
         problem = f"dynamics=computer_vision, got dynamics.mode={dynamics.mode}"
-        remedy = "give another policy, without other dynamics"
+        remedy = "leave dynamics out or give another policy"
     elif actions.kind != "moves":
         problem = f"actions=moves, got actions.kind={actions.kind}"
     elif not (problem := _ambiguity(described)):

@@ -97,6 +97,8 @@ def test_mistakes_are_one_line(folder):
     (folder / "nameless.py").write_text("import drone_rl\n@drone_rl.register_returns\nclass A: 0\n")
     (folder / "leaves.py").write_text("import sys\nsys.exit(0)\n")
     (folder / "unclosed.py").write_text("x = 1\ny = (\n")
+    for name in ("mujoco", "attr"):
+        (folder / f"{name}.py").write_text("import drone_rl")
     for given, told in (
         (["plugins=[nowhere]"], "plugins=nowhere can't be imported"),
         (["plugins=[nowhere]"], "give a module in this folder or on PYTHONPATH"),
@@ -113,6 +115,8 @@ def test_mistakes_are_one_line(folder):
             ["plugins=[random]"],
             "module of Python, which has precedence over your random.py; rename",
         ),
+        (["plugins=[mujoco]"], "has precedence over your mujoco.py; rename the file"),
+        (["plugins=[attr]"], "has precedence over your attr.py; rename the file"),
         (["plugins=[./my_parts]"], "is a path; type the module's name, plugins=[my_parts]"),
         (["plugins=my_parts"], "type a list such as plugins=[my_parts]"),
         (["plugins=[unclosed]"], "plugins=unclosed failed in line 2 of "),
@@ -121,6 +125,13 @@ def test_mistakes_are_one_line(folder):
         (["network=cells"], "network=cells is unknown"),
     ):
         assert told in error_line(drone_rl("train", *TINY, *given, cwd=folder))
+
+
+def test_a_file_beside_the_plug_in_replaces_no_installed_package(folder):
+    (folder / "tree.py").write_text("raise ValueError")  # dm_control imports another tree
+    given = ["policy=run", "plugins=[my_parts]", *FEW]
+    done = drone_rl("evaluate", *given, cwd=folder)
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_run_is_resumed_only_with_the_plug_in_typed(folder):

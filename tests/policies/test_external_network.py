@@ -1,5 +1,7 @@
 """External callables as networks."""
 
+import importlib
+
 import numpy as np
 import pytest
 import torch
@@ -85,7 +87,10 @@ def test_module_is_copied_in_eval_mode():
     [
         (nn.Linear(7, 3), r"can't take images of shape \(1, 1, 2, 4\), torch\.float32 "
          r"\(RuntimeError: .*\); give the camera and transforms that it was trained with"),
-        (lambda x: x.fly(), "can't take images of .*AttributeError: 'Tensor' object has no"),
+        (lambda x: x.fly(), r"failed in line \d+ of .*test_external_network\.py "
+         r"\(AttributeError: 'Tensor' object has no attribute 'fly'\); correct it$"),
+        (lambda x: importlib.import_module("numpie"), r"failed in line \d+ of .*_network\.py "
+         r"\(ModuleNotFoundError: No module named 'numpie'\); correct it$"),
         (lambda x: left_half(x)[:, :2], r"returned logits of shape \(1, 2\); give one that returns "
          r"\(1, 3\), one for each of forward, left, right"),
         (lambda x: left_half(x).argmax(-1), r"returned logits of shape \(1,\); give one that"),

@@ -9,6 +9,7 @@ from drone_rl.robustness.shifts_text import (
     not_evaluated,
     why_not,
 )
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.text import said
 
 GOOD = {"verdict": {**VERDICT, "kind": "good", "certain": True}, "shifts": SHIFTS}
@@ -61,7 +62,7 @@ def test_what_was_not_flown_was_not_evaluated():
     [
         ("sun", 21.07, 60.0, None),
         ("sun", 30.0, None, None),
-        ("sun", None, 30.0, None),
+        ("sun", None, 60.0, None),
         ("sun", 21.0, None, "needed 21 to 55 degrees, good 21.07 to 60 degrees"),
         ("sun", 30.0, 61.0, "needed 30 to 61 degrees"),
         ("blur", None, 1.5, None),
@@ -73,6 +74,20 @@ def test_what_was_not_flown_was_not_evaluated():
 def test_what_is_lacking(name, low, high, words):
     found = lacking(SHIFTS, name, {"low": low, "high": high})
     assert found == words if words is None else words in found
+
+
+@pytest.mark.parametrize(
+    ("name", "need", "words"),
+    [
+        ("sun", {"low": None, "high": 50.0}, "sun: low is missing and therefore 55.2 degrees, the "
+         "value without perturbation, but high is 50; give low, too"),
+        ("sun", {"low": 70.0, "high": None}, "sun: high is missing and therefore 55.2 degrees, the "
+         "value without perturbation, but low is 70; give high, too"),
+    ],
+)  # fmt: skip
+def test_a_single_end_beyond_no_perturbation_is_no_range(name, need, words):
+    with pytest.raises(InputError, match=f"^{words}$"):
+        lacking(SHIFTS, name, need)
 
 
 def test_fog_is_needed_up_to_none():

@@ -3,14 +3,15 @@ import math
 import numpy as np
 import pytest
 import torch
-from dm_control import composer
+from dm_control import composer, mjcf
 
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.sim import entities
 from drone_rl.sim.actions import Move
 from drone_rl.sim.composer_task import ComposerTask, make_environment
-from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
+from drone_rl.utils.errors import InputError
 
 
 @pytest.fixture
@@ -139,6 +140,23 @@ def test_a_turned_drone_has_the_new_attitude(env):
     turned = [math.cos(half), 0.0, 0.0, math.sin(half)]
     env.task.drone.set_pose(env.physics, body.position[0].numpy(), turned)
     assert env.task._found(env.physics).attitude[0].tolist() == pytest.approx(turned)
+
+
+class Lost(CollectCubes):
+    """Its props are of a mesh that is not there."""
+
+    name = "lost"
+
+    def make_props(self):
+        return mjcf.RootElement().asset.add("mesh", name="tree", file="no_tree.obj")
+
+
+def test_a_missing_mesh_is_named_with_the_task_and_its_line():
+    with pytest.raises(
+        InputError,
+        match=r"^task=lost failed in line \d+ of .*test_composer_task\.py \(.*no_tree\.obj.*\); c",
+    ):
+        make_environment(Lost(), pixels=False)
 
 
 def test_distractors_without_an_appearance_are_out_of_sight():

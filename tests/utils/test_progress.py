@@ -1,4 +1,5 @@
 import logging
+import time
 
 import pytest
 
@@ -14,6 +15,20 @@ def test_a_bar_ends_when_all_is_done(capsys):
     bar("done", 3, 3)
     assert bar._bar is None
     assert "done" in capsys.readouterr().err
+
+
+def test_the_rate_of_a_bar_counts_from_the_start_of_the_work(capsys, monkeypatch):
+    now = time.time()
+    monkeypatch.setattr("time.time", lambda: now)
+    bar = Bar()
+    now += 4
+    bar("flying", 8, 8)
+    assert "00:04" in (shown := capsys.readouterr().err) and "2.00it/s" in shown
+    now += 3  # between two pieces of work
+    bar("landing", 1, 8)
+    now += 1
+    bar("landed", 8, 8)
+    assert "00:04" in (shown := capsys.readouterr().err) and "2.00it/s" in shown
 
 
 def test_a_bar_is_not_drawn_all_the_time():

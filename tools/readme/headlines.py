@@ -36,7 +36,7 @@ HEADLINES = (
     ),
     Row(
         "gamed",
-        "Adversarial policies that `verdict` called good or proved",
+        "Policies built to deceive `verdict` that it called good or proved",
         lambda f: f"{f['gamed_verdicts']} of {f['gamed_total']}",
     ),
     Row(

@@ -3,7 +3,7 @@
 import contextlib
 import dataclasses
 import functools
-import importlib
+import importlib.util
 import logging
 import os
 import re
@@ -137,12 +137,12 @@ def import_plugins(overrides: Sequence[str]) -> None:
     """Import the modules that `plugins=[MODULE, ...]` names on a command line, and none from files.
 
     Raises:
-        InputError: A module is not found, has the name of one of Python's, or fails.
+        InputError: A module is not found, has the name of an installed one, or fails.
     """
     typed = [o.partition("=")[2] for o in overrides if re.match(r"\+{0,2}plugins=", o)]
     names = re.findall(r"[^\[\]\s,'\"]+", typed[-1]) if typed else []
     if names and os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())
+        sys.path.append(os.getcwd())  # the end: no file here replaces an installed package
     for name in names:
         _check_module(name)
         try:
@@ -160,17 +160,21 @@ def import_plugins(overrides: Sequence[str]) -> None:
 
 
 def _check_module(name: str) -> None:
-    """Raise an `InputError` for a path, and for a module of Python itself."""
+    """Raise an `InputError` for a path, and for a file that another module has precedence over."""
     if "/" in name or name.startswith("."):
         own = Path(name).name.removesuffix(".py")
         raise InputError(
             f"plugins={name} is a path; type the module's name, plugins=[{own}], in its folder "
             "or with the folder on PYTHONPATH"
         )
-    if name in sys.stdlib_module_names:
+    own, found = Path(f"{name}.py"), None
+    if own.is_file() and name not in sys.stdlib_module_names:
+        found = importlib.util.find_spec(name)
+    is_other = found is not None and Path(found.origin or "").resolve() != own.resolve()
+    if name in sys.stdlib_module_names or is_other:
         raise InputError(
-            f"plugins={name} is a module of Python, which has precedence over your {name}.py; "
-            "rename the file"
+            f"plugins={name} is a module of Python or of an installed package, which has "
+            f"precedence over your {own}; rename the file"
         )
 
 

@@ -27,7 +27,7 @@ from drone_rl.sim.entities import CHASE
 from drone_rl.sim.rendering import check_device
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.worlds import Worlds
-from drone_rl.utils.errors import InputError
+from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.settings import Settings, kinds_of
 
 _MOST = float(np.finfo(np.float32).max)
@@ -195,7 +195,8 @@ def _make_task(task: Chosen, changes: Mapping[str, Any]) -> Task[Any]:
     known = kinds_of(type(chosen)) if isinstance(chosen, Settings) else {}
     for name in changes:
         if name not in known:
-            there = ", ".join((*kinds_of(GymnasiumSettings), *known))
-            raise InputError(f"{name} is unknown; valid names: {there}")
+            there = (*kinds_of(GymnasiumSettings), *known)
+            meant = did_you_mean(name, there)
+            raise InputError(f"{name} is unknown; valid names: {', '.join(there)}{meant}")
     made: Any = chosen.replace(**changes) if changes else chosen
     return as_task(made)

@@ -38,7 +38,8 @@ def test_options_set_task_and_camera(task):
     [
         (
             {"num_cube": 2},
-            "num_cube is unknown; valid names: .*observations, camera, .*, num_cubes, ",
+            r"num_cube is unknown; valid names: .*observations, camera, .*, num_cubes, .*"
+            r"; did you mean num_cubes\?$",
         ),
         ({"num_cubes": 0}, "num_cubes=0 is out of range"),
         ({"step_limit": 5}, "step_limit=5 ends every episode"),
