@@ -100,13 +100,13 @@ class _PlainLoader(yaml.SafeLoader):
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         """Construct a mapping with each name once."""
-        seen = set()
-        for key, _ in node.value:
-            name = self.construct_object(key, deep)
-            if name in seen:
-                raise yaml.MarkedYAMLError(None, None, f"{name} occurs twice", key.start_mark)
-            seen.add(name)
-        return super().construct_mapping(node, deep)
+        made = super().construct_mapping(node, deep)
+        if len(made) < len(node.value):
+            names = [self.construct_object(key, deep) for key, _ in node.value]
+            at = next(i for i, name in enumerate(names) if name in names[:i])
+            mark = node.value[at][0].start_mark
+            raise yaml.MarkedYAMLError(None, None, f"{names[at]} occurs twice", mark)
+        return made
 
 
 class TablesAllowance:

@@ -113,7 +113,7 @@ def test_mistakes_are_one_line(folder):
         (["plugins=[leaves]"], "plugins=leaves failed in line 2 of "),
         (
             ["plugins=[random]"],
-            "module of Python, which has precedence over your random.py; rename",
+            "module of Python or of an installed package, which has precedence over your random.py",
         ),
         (["plugins=[mujoco]"], "has precedence over your mujoco.py; rename the file"),
         (["plugins=[attr]"], "has precedence over your attr.py; rename the file"),

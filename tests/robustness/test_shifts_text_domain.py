@@ -79,10 +79,10 @@ def test_what_is_lacking(name, low, high, words):
 @pytest.mark.parametrize(
     ("name", "need", "words"),
     [
-        ("sun", {"low": None, "high": 50.0}, "sun: low is missing and therefore 55.2 degrees, the "
-         "value without perturbation, but high is 50; give low, too"),
-        ("sun", {"low": 70.0, "high": None}, "sun: high is missing and therefore 55.2 degrees, the "
-         "value without perturbation, but low is 70; give high, too"),
+        ("sun", {"low": None, "high": 50.0}, "elevation of the sun: low is missing and therefore "
+         "55 degrees, the value without perturbation, but high is 50; give low, too"),
+        ("sun", {"low": 70.0, "high": None}, "elevation of the sun: high is missing and therefore "
+         "55 degrees, the value without perturbation, but low is 70; give high, too"),
     ],
 )  # fmt: skip
 def test_a_single_end_beyond_no_perturbation_is_no_range(name, need, words):

@@ -19,7 +19,8 @@ def test_a_bar_ends_when_all_is_done(capsys):
 
 def test_the_rate_of_a_bar_counts_from_the_start_of_the_work(capsys, monkeypatch):
     now = time.time()
-    monkeypatch.setattr("time.time", lambda: now)
+    for clock in ("time.time", "tqdm.std.time"):
+        monkeypatch.setattr(clock, lambda: now)
     bar = Bar()
     now += 4
     bar("flying", 8, 8)
