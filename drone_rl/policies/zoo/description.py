@@ -193,8 +193,9 @@ class PolicyDescription:
             with torch.random.fork_rng(devices=()):
                 network = self._network(self.make_dynamics().actions, torch.Generator())
         else:
-            network = self._without_weights().to_empty(device="cpu")
-        network.load_state_dict(weights)
+            network = self._without_weights()
+        own = {name: weight.to("cpu", copy=True) for name, weight in weights.items()}
+        network.load_state_dict(own, assign=True)  # `to_empty` imports sympy: 0.3 s
         return self._checked(network, network.actions.num_outputs).eval()
 
     def build_critic(self, generator: torch.Generator | None = None) -> ImageNetwork:

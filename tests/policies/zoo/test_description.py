@@ -265,13 +265,15 @@ def test_invalid_descriptions_raise(data):
         parse(data)
 
 
-def test_parsing_computes_nothing(tmp_path):
+def test_parsing_and_loading_compute_nothing(tmp_path):
     """Computing on the meta device would load torch's symbolic algebra, which takes 0.5 s."""
     code = """import sys
-from drone_rl.config.configuration import as_config
+import torch
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.zoo import describe
-describe(TrainSettings()).expected_weights()
+described = describe(TrainSettings())
+wanted = described.expected_weights()
+described.load_network({name: torch.zeros(one.shape) for name, one in wanted.items()})
 print("sympy" in sys.modules)"""
     done = run_forked(code, cwd=tmp_path)
     assert done.stdout == "False\n", done.stderr
