@@ -333,7 +333,8 @@ def needed_range(
     None stands for the value without perturbation; an `InputError` is raised if that is beyond.
     """
     neutral = _number(along["neutral"])
-    low, high = (neutral if need[end] is None else need[end] for end in ("low", "high"))
+    low = neutral if need["low"] is None else need["low"]
+    high = neutral if need["high"] is None else need["high"]
     if low <= high:
         return low, high
     missing, given = ("low", "high") if need["low"] is None else ("high", "low")
