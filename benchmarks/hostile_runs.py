@@ -18,6 +18,8 @@ METRICS: dict[str, bytes] = {
     "one_line_of_a_megabyte": b"a" * 2**20,
     "field_of_a_megabyte": _HEADER + b'"' + b"a" * 2**20 + b'"\n',
     "commas": b"," * 2**22,
+    "too_many_commas": _HEADER + b"," * (2**22 + 1),
+    "unnamed_columns": b",,,,,\n",
     "lines": _HEADER + b"\n" * 2**19,
     "many_rows": _HEADER + _ROW * 200_000,
 }

@@ -224,7 +224,7 @@ _COLUMNS = {
     "seconds": 0.0,
     "loss/entropy": _EMPTY,
 }
-"""Required columns of `metrics.csv`, with the value of an empty cell (None: not allowed)."""
+"""Columns read from `metrics.csv`, with the value of an empty or missing cell (None: required)."""
 
 
 def _metrics_columns(path: Path, allowance: TablesAllowance) -> Array:
@@ -232,6 +232,9 @@ def _metrics_columns(path: Path, allowance: TablesAllowance) -> Array:
     rows = read_table(path, allowance)
     header = [NAMES_OF_0_1.get(name, name) for name in next(rows, [])]
     places = {name: place for place, name in enumerate(header)}
+    for name, empty in _COLUMNS.items():
+        if header and empty is None and name not in places:
+            raise InputError(f"metrics.csv has no column {name}")
     wanted = [
         (places.get(name), "" if empty is None else empty) for name, empty in _COLUMNS.items()
     ]

@@ -137,10 +137,12 @@ def read_table(path: Path, allowance: TablesAllowance | None = None) -> Iterator
     rows = max(content.count(b"\n"), content.count(b"\r"))
     cells = content.count(b",")
     if rows > 1 + METRICS_ROWS:
-        raise InputError(f"{path} has more than {METRICS_ROWS} rows; files of its kind have fewer")
+        raise InputError(
+            f"{path} has more than {METRICS_ROWS:,} rows; files of its kind have fewer"
+        )
     if cells > METRICS_CELLS:
         raise InputError(
-            f"{path} has more than {METRICS_CELLS} cells; files of its kind have fewer"
+            f"{path} has more than {METRICS_CELLS:,} cells; files of its kind have fewer"
         )
     if allowance is not None:
         allowance.rows.take(rows, str(path))
