@@ -233,7 +233,7 @@ def _metrics_columns(path: Path, allowance: TablesAllowance) -> Array:
     header = [NAMES_OF_0_1.get(name, name) for name in next(rows, [])]
     places = {name: place for place, name in enumerate(header)}
     for name, empty in _COLUMNS.items():
-        if header and empty is None and name not in places:
+        if empty is None and name not in places:
             raise InputError(f"metrics.csv has no column {name}")
     wanted = [
         (places.get(name), "" if empty is None else empty) for name, empty in _COLUMNS.items()

@@ -202,11 +202,6 @@ def test_a_table_without_a_required_column_is_damaged_even_without_rows(sweep, h
     assert read_rows(sweep)[0].state == "damaged"
 
 
-def test_a_table_without_a_header_is_that_of_a_run_before_its_first_update(sweep):
-    (sweep.folder / "0" / "metrics.csv").write_text("")
-    assert read_rows(sweep)[0].state == "finished"
-
-
 def test_unreadable_metrics_are_damage_and_an_unreadable_result_must_be_made_again(sweep):
     (sweep.folder / "0" / "metrics.csv").write_text("frames\nrubbish\n")
     (sweep.folder / "1" / "result.json").write_text("{")
