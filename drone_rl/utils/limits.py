@@ -7,7 +7,7 @@ they parse the content. `where` names the file or a part of it in messages.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from numpy.typing import NDArray
@@ -82,8 +82,8 @@ def check_json_size(content: bytes | str, where: str, most: int = JSON_VALUES) -
 
 
 def check_depth(value: Any, where: str, most: int = JSON_DEPTH) -> None:
-    """Raise an `InputError` if lists and mappings are nested more than `most` times."""
-    level = [value]
+    """Raise an `InputError` if lists and dicts are nested more than `most` times."""
+    level = _containers([value])
     for _ in range(most):
         level = [inner for outer in level for inner in _containers(outer)]
         if not level:
@@ -91,12 +91,9 @@ def check_depth(value: Any, where: str, most: int = JSON_DEPTH) -> None:
     raise InputError(f"{where} is nested more than {most} times; files of its kind are not")
 
 
-def _containers(value: Any) -> Iterator[Any]:
-    if isinstance(value, Mapping):
-        value = value.values()
-    elif not isinstance(value, list):
-        return
-    yield from (inner for inner in value if isinstance(inner, list | Mapping))
+def _containers(value: list[Any] | dict[Any, Any]) -> list[Any]:
+    inside = value.values() if isinstance(value, dict) else value
+    return [inner for inner in inside if isinstance(inner, (list, dict))]
 
 
 def check_shape(shape: Sequence[int], itemsize: int, most: int, where: str) -> int:
