@@ -22,6 +22,9 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.memory import return_freed_memory
 from drone_rl.utils.plugins import place_of
 
+_REPEAT_S = 1.0
+"""Seconds in which another SIGTERM is the same request: a cluster and a sweep may both send it."""
+
 
 def episode_rewards(batch: TensorDictBase) -> Tensor:
     """Return the rewards of the episodes that end in a batch, in order. Shape: (num_episodes,).
@@ -132,8 +135,8 @@ class Trainer:
         """Provide the batches of a training run; pass each with its metrics to `finish_update`.
 
         The batches end when the task is solved, the budget is spent or a signal arrives. Ctrl-C and
-        SIGTERM let the current update finish, so that nothing is lost; a second signal acts at
-        once. Signals are watched in the main thread only.
+        SIGTERM let the current update finish, so that nothing is lost; a second Ctrl-C, or a
+        SIGTERM more than a second later, acts at once. Signals are watched in the main thread only.
 
         Raises:
             NotANumberError: A loss or gradient was NaN or infinite.
@@ -233,9 +236,10 @@ class Trainer:
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
-        """Record the first Ctrl-C or SIGTERM; restore the handlers then and at the end.
+        """Record the first Ctrl-C or SIGTERM; the next one acts at once.
 
-        A signal that the process ignores, as Ctrl-C in the background, stops a training, too.
+        Another SIGTERM within `_REPEAT_S` counts as the same one. A signal that the process
+        ignores, as Ctrl-C in the background, stops a training, too.
         """
         if threading.current_thread() is not threading.main_thread():
             yield
@@ -244,14 +248,20 @@ class Trainer:
         found = {number: signal.getsignal(number) for number in watched}
         before = {n: handler for n, handler in found.items() if handler is not None}
 
+        first_s = 0.0
+
         def restore() -> None:
             for number, handler in before.items():
                 signal.signal(number, handler)
 
         def note(number: int, frame: FrameType | None) -> None:
+            nonlocal first_s
             del frame
-            self.stop_signal = signal.Signals(number)
-            restore()
+            if self.stop_signal is None:
+                self.stop_signal, first_s = signal.Signals(number), time.monotonic()
+            elif number == signal.SIGINT or time.monotonic() - first_s > _REPEAT_S:
+                restore()
+                signal.raise_signal(number)
 
         for number in before:  # one set outside Python can't be restored, so it is left alone
             signal.signal(number, note)

@@ -114,6 +114,40 @@ def test_handler_from_outside_python_is_kept(make_trainer, monkeypatch):
     assert installed == []
 
 
+class Terminated(BaseException):
+    """Raised by the handler of SIGTERM that the caller of a training had set."""
+
+
+@pytest.fixture
+def sigterm_raises():
+    def stop(*_):
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, stop)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+def test_sigterm_of_a_cluster_and_of_its_sweep_lets_the_update_finish(make_trainer, sigterm_raises):
+    def twice(_):
+        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGTERM)
+
+    trainer = make_trainer(callbacks=[At(2, twice)])
+    assert run(trainer) == "SIGTERM"
+    assert trainer.progress.updates == 2
+
+
+def test_a_later_sigterm_aborts_at_once(make_trainer, sigterm_raises, monkeypatch):
+    def twice(_):
+        signal.raise_signal(signal.SIGTERM)
+        monkeypatch.setattr(trainer_module, "_REPEAT_S", -1.0)
+        signal.raise_signal(signal.SIGTERM)
+
+    with pytest.raises(Terminated):
+        run(make_trainer(callbacks=[At(2, twice)]))
+
+
 def test_second_ctrl_c_aborts_at_once(make_trainer):
     def twice(_):
         signal.raise_signal(signal.SIGINT)
