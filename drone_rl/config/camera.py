@@ -17,7 +17,7 @@ class CameraSettings(Settings):
     """Width of the image in pixels."""
     height: Annotated[int, Whole(1, 1024, "pixels")] = 25
     """Height of the image in pixels."""
-    horizontal_fov: Annotated[float, Real(1.0, 170.0, unit="degrees")] = 135.0
+    horizontal_fov: Annotated[float, Real(4.0, 170.0, unit="degrees")] = 135.0
     """Horizontal field of view in degrees."""
 
     @property

@@ -42,9 +42,9 @@ class TrainerSettings(Settings):
     """Settings of the training loop: stopping rule, gradients, threads, checkpoints."""
 
     total_frames: Annotated[int, Whole(0, unit="frames")] = 2_000_000
-    """Stop once this many frames were collected; 0 collects none, to clone only."""
+    """Stop after the batch that reaches this many frames; 0 collects none, to clone only."""
     total_episodes: Annotated[int, Whole(1, unit="episodes")] | None = None
-    """Stop once this many episodes were collected; null for no limit."""
+    """Stop after the batch that reaches this many episodes; null for no limit."""
     target_share: Annotated[float, Real(0.0, 1.0, is_above=True)] | None = 0.99
     """Stop once the running reward reaches this fraction of the task's `largest_reward`; null
     disables this rule."""

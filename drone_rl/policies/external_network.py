@@ -113,7 +113,10 @@ def _remedy(module: nn.Module) -> str:
     for parameter in module.parameters():
         if parameter.dtype != torch.float32:
             return f"network.float(), since its parameters are {parameter.dtype}"
-    return "the camera and transforms that it was trained with"
+    return (
+        "drone_rl.policy_from its camera= and transforms=, such as drone_rl.policy_from(network, "
+        "transforms=[Rgb()]) for color images"
+    )
 
 
 def _copied(module: nn.Module) -> nn.Module:

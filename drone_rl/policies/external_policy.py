@@ -11,6 +11,7 @@ from torchrl.envs import TransformedEnv
 
 from drone_rl.config import (
     COMPUTER_VISION,
+    MINIMAL,
     MOVES_SETTINGS,
     ActionSettings,
     AppearanceSettings,
@@ -54,11 +55,20 @@ class ExternalPolicy(BasePolicy):
     """One action for each logit."""
     used_dynamics: DynamicsSettings | None = None
     """Vehicle dynamics of the evaluation; those in training by default."""
+    own_appearance: AppearanceSettings = MINIMAL  # pyright: ignore[reportIncompatibleMethodOverride] (a field)
+    """The appearance of the scenes in training."""
+    used_appearance: AppearanceSettings | None = None
+    """Appearance of the scenes in the evaluation; that in training by default."""
 
     @property
     def dynamics(self) -> DynamicsSettings:
         """The vehicle dynamics."""
         return self.used_dynamics or self.own_dynamics
+
+    @property
+    def appearance(self) -> AppearanceSettings:
+        """The appearance of the scenes."""
+        return self.used_appearance or self.own_appearance
 
     @property
     def task(self) -> BaseTaskSettings | Task[Any]:
@@ -91,8 +101,14 @@ class ExternalPolicy(BasePolicy):
         used_dynamics.check_air()
         return dataclasses.replace(self, used_dynamics=used_dynamics)
 
+    def in_appearance(self, appearance: AppearanceSettings | str) -> "ExternalPolicy":
+        """Return the same policy in scenes of another appearance, which may be a name."""
+        used = Instance(AppearanceSettings).read(appearance, "appearance")
+        return dataclasses.replace(self, used_appearance=used)
+
     def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv:
         task: Any = self.task
+        options.setdefault("appearance", self.appearance)
         dynamics = options.pop("dynamics", None) or self.dynamics
         if isinstance(dynamics, DynamicsSettings):
             options.setdefault("actions", self.actions)
@@ -128,6 +144,7 @@ def policy_from(
     camera: CameraSettings | None = None,
     dynamics: DynamicsSettings = COMPUTER_VISION,
     actions: ActionSettings = MOVES_SETTINGS,
+    appearance: AppearanceSettings | str = MINIMAL,
     transforms: Transform | Sequence[Transform] | None = None,
     name: str | None = None,
 ) -> ExternalPolicy:
@@ -144,6 +161,7 @@ def policy_from(
             `logits.observation_shape` if there is one, as in `Sb3Logits`.
         dynamics: Vehicle dynamics.
         actions: The action space.
+        appearance: Appearance of the scenes in training, or the name of one such as "fog".
         transforms: Transform of the image, or several in order; an empty list for the camera's RGB
             bytes (N, H, W, 3). By default `Gray` and `Standardize`, or `Rgb` if `logits` was
             trained on color frames.
@@ -180,6 +198,7 @@ def policy_from(
         transforms=_transforms_of(logits) if transforms is None else as_transforms(transforms),
         own_dynamics=dynamics,
         actions=actions,
+        own_appearance=Instance(AppearanceSettings).read(appearance, "appearance"),
     )
     policy.make_network()  # raises errors early
     return policy

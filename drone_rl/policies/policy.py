@@ -25,11 +25,10 @@ from drone_rl.config.configuration import Changes
 from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
 from drone_rl.policies.recurrent import Memory
-from drone_rl.policies.zoo import PolicyDescription, parse, policy_names, policy_path, read_policy
+from drone_rl.policies.zoo import PolicyDescription, find_policy, parse, read_policy
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.display import table
-from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.files import trained_policies
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, shown
 from drone_rl.utils.seeding import Stream, torch_generator
 
@@ -61,24 +60,39 @@ class BasePolicy(abc.ABC):
         """The vehicle dynamics in training."""
 
     @property
+    @abc.abstractmethod
+    def appearance(self) -> AppearanceSettings:
+        """The appearance of the scenes."""
+
+    @property
+    @abc.abstractmethod
+    def own_appearance(self) -> AppearanceSettings:
+        """The appearance of the scenes in training."""
+
+    @property
     def unlike(self) -> dict[str, dict[str, Any]]:
-        """Settings of `dynamics` that differ from its own: "own" and "flown" values by name."""
+        """Settings that differ from those in training: "own" and "flown" values by name.
+
+        Names are of `dynamics`, or "appearance.NAME".
+        """
         own, used = self.own_dynamics.values(), self.dynamics.values()
         if self.dynamics.is_computer_vision:  # where little else counts
             timing = ("control_ticks", "tick") if self.actions.kind == "velocity" else ()
             own, used = ({n: of[n] for n in ("mode", *timing)} for of in (own, used))
+        looks = (self.own_appearance.values(), self.appearance.values())
+        own, used = (
+            {**of, **{f"appearance.{name}": value for name, value in look.items()}}
+            for of, look in zip((own, used), looks, strict=True)
+        )
         return {n: {"own": own[n], "flown": v} for n, v in used.items() if own[n] != v}
 
+    @abc.abstractmethod
     def in_appearance(self, appearance: AppearanceSettings | str) -> Self:
-        """Return the same policy in scenes of another appearance.
+        """Return the same policy in scenes of another appearance, which may be a name.
 
         Raises:
-            InputError: It was made elsewhere, and its appearance is unknown.
+            InputError: There is no appearance of this name.
         """
-        del appearance
-        raise InputError(
-            f"policy={self.name} was made elsewhere, in an unknown appearance; leave appearance out"
-        )
 
     @property
     @abc.abstractmethod
@@ -203,12 +217,14 @@ class Policy(BasePolicy):
         return parse(self.state["description"]).dynamics
 
     @property
-    def unlike(self) -> dict[str, dict[str, Any]]:
-        """See `BasePolicy`; settings of another appearance are named "appearance.NAME"."""
-        own = parse(self.state["description"]).appearance.values()
-        here = self.description.appearance.values().items()
-        other = {f"appearance.{n}": {"own": own[n], "flown": v} for n, v in here if own[n] != v}
-        return {**super().unlike, **other}
+    def appearance(self) -> AppearanceSettings:
+        """The appearance of the scenes."""
+        return self.description.appearance
+
+    @property
+    def own_appearance(self) -> AppearanceSettings:
+        """The appearance of the scenes in training."""
+        return parse(self.state["description"]).appearance
 
     @property
     def origin(self) -> dict[str, Any]:
@@ -374,27 +390,3 @@ def _name_of(path: Path) -> str:
         return path.stem
     run = path.parents[1].name
     return run if path.stem == "last" else f"{run}_{path.stem}"
-
-
-def find_policy(which: str | Path, outputs: str | Path = "outputs") -> Path:
-    """Return the file of a policy, see `load_policy`; raise an `InputError` if there is none.
-
-    The checkpoint of a folder may be missing.
-    """
-    if which == "latest":
-        trained = trained_policies(outputs)
-        if not trained:
-            raise InputError(
-                f"policy=latest, but there is no run under {outputs}/train; "
-                "run drone-rl train first or give the path of a checkpoint"
-            )
-        return trained[0]
-    if which in policy_names():
-        return policy_path(str(which))
-    path = Path(which)
-    if not str(which) or not path.exists():
-        raise InputError(
-            f"policy={which} does not exist; give a file, the folder of a run, latest, or one of "
-            f"{', '.join(policy_names())}{did_you_mean(which, policy_names())}"
-        )
-    return path / "checkpoints" / "last.pt" if path.is_dir() else path

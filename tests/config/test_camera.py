@@ -15,7 +15,9 @@ def test_vertical_fov_of_square_pixels():
     assert original.vertical_fov == pytest.approx(2 * half)
 
 
-@pytest.mark.parametrize("change", [{"width": 0}, {"height": 1025}, {"horizontal_fov": 180.0}])
+@pytest.mark.parametrize(
+    "change", [{"width": 0}, {"height": 1025}, {"horizontal_fov": 180.0}, {"horizontal_fov": 2.36}]
+)
 def test_bad_camera_is_refused(change):
     with pytest.raises(InputError, match="out of range"):
         CameraSettings(**change)

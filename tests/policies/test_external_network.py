@@ -86,7 +86,7 @@ def test_module_is_copied_in_eval_mode():
     ("logits", "message"),
     [
         (nn.Linear(7, 3), r"can't take images of shape \(1, 1, 2, 4\), torch\.float32 "
-         r"\(RuntimeError: .*\); give the camera and transforms that it was trained with"),
+         r"\(RuntimeError: .*\); give drone_rl\.policy_from its camera= and transforms="),
         (lambda x: x.fly(), r"failed in line \d+ of .*test_external_network\.py "
          r"\(AttributeError: 'Tensor' object has no attribute 'fly'\); correct it$"),
         (lambda x: importlib.import_module("numpie"), r"failed in line \d+ of .*_network\.py "
@@ -133,7 +133,7 @@ def test_the_type_of_parameters_is_named():
     network = nn.Sequential(nn.Flatten(), nn.Linear(8, 3)).double()
     with pytest.raises(InputError, match=r"give network\.float\(\), since its parameters"):
         make(network)
-    with pytest.raises(InputError, match="give the camera and transforms"):
+    with pytest.raises(InputError, match=r"give drone_rl\.policy_from its camera= and transforms="):
         make(nn.Sequential(nn.Flatten(), nn.Linear(9, 3)))
 
 

@@ -231,6 +231,25 @@ def test_dynamics_can_be_replaced(monkeypatch):
         policy.in_dynamics(mass=-1.0)
 
 
+def test_appearance_can_be_replaced(network):
+    def look(policy):
+        with policy.flying(2, seed=3) as (env, _):
+            return env.reset()["pixels"]
+
+    policy = drone_rl.policy_from(network)
+    foggy, made = policy.in_appearance("fog"), drone_rl.policy_from(network, appearance="fog")
+    assert policy.unlike == made.unlike == {}
+    assert foggy.unlike["appearance.fog_visibility"] == {"own": None, "flown": 40.0}
+    own = look(drone_rl.load_policy("good").in_appearance("fog"))
+    assert torch.equal(look(foggy), own) and torch.equal(look(made), own)
+    assert not torch.equal(look(policy), own)
+    done = drone_rl.judge(network, appearance="fog", task=ONE, **FEW)
+    assert "It was trained with another appearance: here it flew with" in str(done)
+    for refused in (policy.in_appearance, lambda x: drone_rl.policy_from(network, appearance=x)):
+        with pytest.raises(InputError, match=r"^appearance='foggy' is unknown; .*did you mean fog"):
+            refused("foggy")
+
+
 def test_tasks_by_name_and_values_of_wrong_type():
     found = drone_rl.policy_from(left, task="pillars")
     assert found.task == drone_rl.PillarsSettings()

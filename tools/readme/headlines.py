@@ -41,7 +41,7 @@ HEADLINES = (
     ),
     Row(
         "maps",
-        "Heat maps that ignore the policy (noise, edges and others) yet pass the tests",
+        "Heat maps that ignore the policy (such as noise) but pass the tests",
         lambda f: f"{f['placebo_maps_trusted']} of {f['placebo_maps_total']}",
     ),
     Row(

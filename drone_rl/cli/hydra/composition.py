@@ -36,7 +36,7 @@ from drone_rl.cli.hydra.mistakes import (
 )
 from drone_rl.cli.hydra.resuming import spare_run
 from drone_rl.cli.hydra.values import whole_numbers
-from drone_rl.cli.hydra.words import check_words
+from drone_rl.cli.hydra.words import check_words, sweep_flag_first
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config import (
     TASKS,
@@ -239,7 +239,7 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
     is_help = bool({"--help", "-h"} & set(overrides))
     topics = [word for word in overrides if is_help and re.fullmatch(r"[A-Za-z_][\w.]*", word)]
     words = [word for word in overrides if word not in topics]
-    overrides = spare_run(command.prepare([*map(whole_numbers, words)]))
+    overrides = sweep_flag_first(spare_run(command.prepare([*map(whole_numbers, words)])))
     import_plugins(overrides)
     register_schemas(**{name: command})
     check_choices(overrides, conf_dir(), _EXTENSIBLE)

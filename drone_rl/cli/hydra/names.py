@@ -110,9 +110,10 @@ class Command:
                 f"{override}: drone-rl {self.name} can't change {first}; {self.list_all}"
             )
         if group in self.groups and self.config[group] is None:
-            offered = ", ".join(choices(self.conf, group))
-            why = f"{group} is null, which has no settings; type {group}=NAME {override}"
-            return InputError(f"{override}: {why} with one of the names {offered}")
+            offered = choices(self.conf, group)
+            name = "minimal" if "minimal" in offered else "NAME"
+            why = f"{group} is null, which has no settings; type {group}={name} {override}"
+            return InputError(f"{override}: {why} ({group} is one of {', '.join(offered)})")
         if first in self.groups and (others := self._choices_with(first, name)):
             return InputError(
                 f"{override} needs {' or '.join(others)}; type {others[0]} {override}"

@@ -12,7 +12,8 @@ from drone_rl.cli.hydra.names import OTHER_NAMES, Command, choices
 from drone_rl.cli.hydra.values import in_quotes
 from drone_rl.utils.errors import InputError
 
-_FLAGS = {"-m", "--multirun", "-h", "--help", "-r", "--run", "--hydra-help", "--resolve"}
+_SWEEP_FLAGS = {"-m", "--multirun"}
+_FLAGS = {*_SWEEP_FLAGS, "-h", "--help", "-r", "--run", "--hydra-help", "--resolve"}
 _VALUED = {
     *("-c", "--cfg", "-i", "--info", "-p", "--package", "-cp", "--config-path", "-cn"),
     *("--config-name", "-cd", "--config-dir", "-sc", "--shell-completion"),
@@ -56,8 +57,13 @@ def check_words(name: str, conf: Path, words: Sequence[str]) -> None:
         position += 1
 
 
+def sweep_flag_first(words: Sequence[str]) -> list[str]:
+    """Put -m before the settings: Hydra's parser rejects settings on both sides of it."""
+    return sorted(words, key=lambda word: word not in _SWEEP_FLAGS)
+
+
 def _check_resume(words: Sequence[str]) -> None:
-    if {"-m", "--multirun"} & {*words} and any(word.startswith("resume=") for word in words):
+    if _SWEEP_FLAGS & {*words} and any(word.startswith("resume=") for word in words):
         raise InputError(
             "resume= continues one run, not with -m; to continue a sweep, repeat its command"
         )

@@ -11,8 +11,8 @@ from safetensors.torch import load, save
 
 from drone_rl.policies.zoo.description import FORMAT, MAX_PARAMETERS, parse
 from drone_rl.utils.checkpoint import check_weights, load_checkpoint, other_format
-from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.errors import InputError, did_you_mean
+from drone_rl.utils.files import parse_json, read_bytes, trained_policies
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.readers import with_current_names
 from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
@@ -75,6 +75,30 @@ def policy_names() -> list[str]:
 def policy_path(name: str) -> Path:
     """Return the file of a policy in the package."""
     return _FOLDER / f"{name}.safetensors"
+
+
+def find_policy(which: str | Path, outputs: str | Path = "outputs") -> Path:
+    """Return the file of a policy, see `load_policy`; raise an `InputError` if there is none.
+
+    `outputs` is the folder of the runs. The checkpoint of a folder may be missing.
+    """
+    if which == "latest":
+        trained = trained_policies(outputs)
+        if not trained:
+            raise InputError(
+                f"policy=latest, but there is no run under {outputs}/train; "
+                "run drone-rl train first or give the path of a checkpoint"
+            )
+        return trained[0]
+    if which in policy_names():
+        return policy_path(str(which))
+    path = Path(which)
+    if not str(which) or not path.exists():
+        raise InputError(
+            f"policy={which} does not exist; give a file, the folder of a run, latest, or one of "
+            f"{', '.join(policy_names())}{did_you_mean(which, policy_names())}"
+        )
+    return path / "checkpoints" / "last.pt" if path.is_dir() else path
 
 
 def card_path(name: str) -> Path:

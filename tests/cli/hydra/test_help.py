@@ -93,7 +93,7 @@ def test_help_begins_with_the_most_used_settings(command, config, capsys):
 def test_help_shows_units_defaults_and_choices(config, capsys):
     show_help("train", CONF, ["--help", "seed=7"], find_command("train"))
     text = capsys.readouterr().out
-    assert "  trainer.total_frames=2000000  (frames)\n      Stop once" in text
+    assert "  trainer.total_frames=2000000  (frames)\n      Stop after" in text
     assert "  seed=7\n" in text
     assert "  objective=reinforce\n      One of: a2c, ppo, reinforce.\n" in text
     assert "drone-rl evaluate" not in text

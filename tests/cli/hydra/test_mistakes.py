@@ -115,7 +115,7 @@ def test_settings_that_are_given_twice():
 
 def test_a_group_without_a_choice_has_no_settings():
     found = said("appearance.sun_elevation=9", command="evaluate")
-    assert "type appearance=NAME appearance.sun_elevation=9 with one of the names blocks," in found
+    assert "type appearance=minimal appearance.sun_elevation=9 (appearance is one of " in found
 
 
 def test_lists_are_offered_where_they_are_accepted():

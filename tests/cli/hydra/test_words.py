@@ -2,7 +2,7 @@
 
 import pytest
 
-from drone_rl.cli.hydra.words import check_words, no_command
+from drone_rl.cli.hydra.words import check_words, no_command, sweep_flag_first
 from drone_rl.cli.main import COMMANDS
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import conf_dir
@@ -51,6 +51,12 @@ def test_what_to_type(line, message):
     command, *words = line.split(" ")
     with pytest.raises(InputError, match=message):
         check_words(command, conf_dir(), words)
+
+
+@pytest.mark.parametrize("line", ["-m a=1 b=2", "a=1 -m b=2", "a=1 b=2 -m"])
+def test_the_flag_of_a_sweep_may_be_anywhere(line):
+    assert sweep_flag_first(line.split()) == ["-m", "a=1", "b=2"]
+    assert sweep_flag_first(line.replace("-m", "--multirun").split())[0] == "--multirun"
 
 
 def test_settings_and_options_of_hydra_are_accepted():

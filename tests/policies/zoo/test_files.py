@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+import os
+import shutil
 from collections import OrderedDict
 from pathlib import Path
 
@@ -16,6 +18,7 @@ from drone_rl.policies.networks import orthogonal
 from drone_rl.policies.zoo import (
     card_path,
     certificate_path,
+    find_policy,
     load_exported,
     parse,
     policy_names,
@@ -253,3 +256,13 @@ def test_masks_of_the_users_own_networks_are_read(tmp_path, registered):
     path = tmp_path / "masked.safetensors"
     path.write_bytes(exported_bytes(weights, description, ABOUT))
     assert load_exported(path)["policy"]["mask"].dtype == torch.bool
+
+
+def test_latest_and_folders_are_resolved(tmp_path):
+    runs = tmp_path / "train" / "runs"
+    for number, name in enumerate(("b", "a")):
+        (runs / name / "checkpoints").mkdir(parents=True)
+        shutil.copy(policy_path("good"), runs / name / "checkpoints" / "last.pt")
+        os.utime(runs / name / "checkpoints" / "last.pt", (number, number))
+    assert find_policy("latest", tmp_path) == runs / "a" / "checkpoints" / "last.pt"
+    assert find_policy(runs / "b") == runs / "b" / "checkpoints" / "last.pt"
