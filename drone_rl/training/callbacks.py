@@ -201,7 +201,7 @@ class CollapseCheck(Callback):
             _log.warning(
                 "the policy has become deterministic: for %d updates its gradient has been 0, so "
                 "it learns no more; unless its reward is good enough, stop and try a lower "
-                "optimizer.lr, objective.entropy_coeff=0.01 or another seed",
+                "optimizer.lr, a higher objective.entropy_coeff or another seed",
                 self.UPDATES,
             )
 

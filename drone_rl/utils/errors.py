@@ -15,9 +15,15 @@ class InputError(ValueError):
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
-    """Return the end of a message with the known name that is most like an unknown one."""
-    lower = {one.lower(): one for one in known}
-    near = difflib.get_close_matches(str(name)[:100].lower(), lower, 1, 0.7)
+    """Return the end of a message with the known name that is most like an unknown one.
+
+    Else it is the only one with the unknown name among its words, as in fov and horizontal_fov.
+    """
+    lower, word = {one.lower(): one for one in known}, str(name)[:100].lower()
+    near = difflib.get_close_matches(word, lower, 1, 0.7)
+    if not near:
+        longer = [one for one in lower if word in one.split("_")]
+        near = longer if len(longer) == 1 else []
     return f"; did you mean {lower[near[0]]}?" if near else ""
 
 

@@ -171,7 +171,7 @@ def test_no_latest_run_is_named_where_there_is_none(in_process, caplog):
 def test_latest_is_named_by_its_file(run, in_process, tmp_path, monkeypatch, caplog):
     """Which run `latest` is changes with the next one."""
     monkeypatch.setattr("drone_rl.cli.settings.trained_policies", lambda _: [run / "checkpoints/x"])
-    monkeypatch.setattr("drone_rl.policies.policy.trained_policies", lambda _: [run / LAST])
+    monkeypatch.setattr("drone_rl.policies.zoo.files.trained_policies", lambda _: [run / LAST])
     caplog.set_level("INFO")
     in_process("verdict", "policy=latest", "episodes=4", "hydra.run.dir=v")
     assert f"policy=latest is {run}" in caplog.text

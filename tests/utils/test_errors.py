@@ -11,3 +11,5 @@ def test_the_known_name_that_is_most_like_an_unknown_one():
     assert did_you_mean("GOOD", ["good", "proved"]) == "; did you mean good?"
     assert did_you_mean("grid_snaped", ["rgb", "Grid_Snapped"]) == "; did you mean Grid_Snapped?"
     assert did_you_mean("x", ["good", "proved"]) == ""
+    assert did_you_mean("fov", ["width", "horizontal_fov"]) == "; did you mean horizontal_fov?"
+    assert did_you_mean("fov", ["vertical_fov", "horizontal_fov"]) == ""

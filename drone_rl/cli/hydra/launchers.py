@@ -33,6 +33,7 @@ from drone_rl.sweeps.search import import_optuna, next_trials, note_outcome, ope
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, refuse_links
 from drone_rl.utils.schema import Whole, shown
+from drone_rl.utils.text import plural
 
 NAMESPACE = "hydra_plugins.drone_rl"
 """Module of the plugins, as in the files of conf/."""
@@ -73,7 +74,8 @@ class SweepLauncher(Launcher):
                 begun = {run.number: run for run in sweep.runs}
                 runs = [begun[run.number] for run in runs]  # in the folders of the first start
                 finished = sum(read_result(run.folder) is not None for run in runs)
-                _log.info("sweep of %d runs, %d finished before: %s", len(runs), finished, folder)
+                count = plural(len(runs), "run")
+                _log.info("sweep of %s, %d finished before: %s", count, finished, folder)
                 failed = self._finish(sweep, runs)
         except InputError:
             self._restore_multirun()

@@ -128,10 +128,14 @@ class Command:
                 f"settings of it, such as task.num_cubes=5 ({self.list_all})"
             )
         if ours:
-            return InputError(f"{text}did you mean {ours}? ({self.list_all})")
+            others = "" if ours.startswith(f"{group}.") else self._inside(group)
+            return InputError(f"{text}did you mean {ours}? ({others or self.list_all})")
+        return InputError(text + (self._inside(group) or self.list_all))
+
+    def _inside(self, group: str) -> str:
+        """Return the names of the settings of a group; empty if there are none."""
         inside = [k.removeprefix(f"{group}.") for k in self.keys if k.startswith(f"{group}.")]
-        listed = f"{group} has: {', '.join(inside[:40])}" if inside else self.list_all
-        return InputError(text + listed)
+        return f"{group} has: {', '.join(inside[:40])}" if inside else ""
 
     def _choices_with(self, group: str, name: str) -> list[str]:
         """Return the choices of a group, as overrides, whose files have a setting."""

@@ -71,6 +71,7 @@ def said(*overrides, command="train"):
         ("objective.critic_coeff=1", "needs objective=a2c or objective=ppo; type objective=a2c"),
         ("task.density=1", "needs task=pillars; type task=pillars task.density=1$"),
         ("task.num=1", "did you mean task.num_cubes=1\\?"),
+        ("network.width=3", r"did you mean camera.width=3\? \(network has: .*hidden"),
         ("dynamics.w=1", "did you mean dynamics.wind=1\\?"),
         ("appearance.suns=1", "did you mean appearance.sun_color=1"),
         ("resume=a=b", "need quotes; type \"resume='a=b'\""),
