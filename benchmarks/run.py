@@ -1,6 +1,7 @@
 """Run benchmarks in sequence; skip those whose figures are current."""
 
 import logging
+import os
 import shutil
 from collections.abc import Mapping, Sequence
 
@@ -35,6 +36,7 @@ def run_benchmarks(
         The error message of each benchmark that failed, by name.
     """
     shutil.rmtree(setup.runs, ignore_errors=True)
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # a user's second command has compiled files
     failures = {}
     settings = _settings(setup)
     for name in names:

@@ -4,11 +4,10 @@ Public names are imported when they are first used, so that `import drone_rl` is
 """
 
 import importlib
-import re
 from typing import TYPE_CHECKING, Any
 
 from drone_rl.utils.imports import import_quietly, register, when_imported
-from drone_rl.utils.memory import collecting_no_garbage
+from drone_rl.utils.memory import collecting_no_garbage, with_one_stack_block
 
 if TYPE_CHECKING:
     from drone_rl.config import ActionSettings as ActionSettings
@@ -104,8 +103,8 @@ __version__ = "0.2.0.dev0"
 
 # the imports above are for type checkers, and the list of public names
 with open(__file__, encoding="utf-8") as _own_source:  # importing pathlib takes longer
-    _FOUND = re.findall(r"^    from (\S+) import (\w+) as \2$", _own_source.read(), re.M)
-_HOMES = {name: module for module, name in _FOUND}
+    _FOUND = [line.split() for line in _own_source if line.startswith("    from ")]
+_HOMES = {name: module for _, module, _, name, *_ in _FOUND}
 
 __all__ = [*_HOMES]  # pyright: ignore[reportUnsupportedDunderAll] (aliases above are public)
 
@@ -124,8 +123,8 @@ def __getattr__(name: str) -> Any:
         hint = f"; drone-rl {name} is drone_rl.{of_command}" if of_command else ""
         raise AttributeError(f"module 'drone_rl' has no attribute {name!r}{hint}")
     with collecting_no_garbage():
-        value = getattr(importlib.import_module(_HOMES[name]), name)
-    globals()[name] = value
+        module = with_one_stack_block(lambda: importlib.import_module(_HOMES[name]))
+    value = globals()[name] = getattr(module, name)
     return value
 
 

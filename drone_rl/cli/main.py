@@ -9,7 +9,7 @@ import drone_rl
 from drone_rl.cli.commands import COMMANDS, TABLE
 from drone_rl.utils.exit_codes import INTERRUPTED, OUTPUT_CLOSED, USER_ERROR
 from drone_rl.utils.imports import leave_compiler_unloaded
-from drone_rl.utils.memory import look_for_garbage_rarely
+from drone_rl.utils.memory import look_for_garbage_rarely, with_one_stack_block
 
 USAGE = """\
 drone-rl: train, evaluate and audit vision policies of a drone.
@@ -103,7 +103,8 @@ def _main(args: list[str]) -> int:
 
     leave_compiler_unloaded()
     steps = [("train", overrides), *((step, _same_policy(overrides)) for step in _DEMO)]
-    return guarded(lambda: _run_all(steps if name == "demo" else [(name, overrides)]))
+    steps = steps if name == "demo" else [(name, overrides)]
+    return with_one_stack_block(lambda: guarded(lambda: _run_all(steps)))
 
 
 def _same_policy(overrides: list[str]) -> list[str]:

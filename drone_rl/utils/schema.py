@@ -44,7 +44,9 @@ class Whole:
     def read(self, value: Any, where: str) -> int:
         """See `Kind`."""
         _refuse_text(value, where, self.words)
-        if not _is_number(value, numbers.Integral) or not self.low <= value <= self.high:
+        if not _is_number(value, numbers.Integral):
+            raise InputError(f"{where}={shown(value)} is not a whole number; give {self.words}")
+        if not self.low <= value <= self.high:
             raise InputError(f"{where}={shown(value)} is out of range; give {self.words}")
         return int(value)
 
@@ -72,6 +74,7 @@ class Real:
     def read(self, value: Any, where: str) -> float:
         """See `Kind`."""
         _refuse_text(value, where, self.words)
+        value = _unboxed(value)
         if not _is_number(value, numbers.Real) or not self._holds(value):
             raise InputError(f"{where}={shown(value)} is out of range; give {self.words}")
         return float(value)
@@ -142,6 +145,7 @@ class Instance:
             example = _example_of(self.of)
             remedy = f"{example.__module__}.{example.__name__}(...)"
             remedy = f"a {self.of.__name__}" if self.of.__module__ == "builtins" else remedy
+            remedy += " or a registered name" if hasattr(self.of, "from_name") else ""
             raise InputError(f"{where}={shown(value)} is no {self.of.__name__}; give {remedy}")
         return value
 
@@ -342,6 +346,8 @@ def as_mapping(value: Any, where: str) -> Mapping[str, Any]:
 def shown(value: Any) -> str:
     """Return a value for a message: short, on one line."""
     value = _unboxed(value)
+    if isinstance(value, type):
+        return f"(the class {value.__name__})"
     if value is not None and not isinstance(value, str | int | float):
         return f"({type(value).__name__})"
     if isinstance(value, int) and value.bit_length() > _MOST_BITS:  # Python refuses to write it

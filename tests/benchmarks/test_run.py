@@ -1,4 +1,5 @@
 import json
+import os
 
 import pytest
 
@@ -64,3 +65,9 @@ def test_runs_of_an_earlier_command_are_deleted_but_not_its_log(bench, tmp_path)
     bench([])
     assert not (tmp_path / "work").exists()
     assert log.exists()
+
+
+def test_measured_programs_may_keep_compiled_files(bench, monkeypatch):
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    bench()
+    assert "PYTHONDONTWRITEBYTECODE" not in os.environ

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.config.networks import Network
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import (
     Flag,
@@ -178,14 +179,18 @@ def test_missing_settings_and_other_objects_are_named():
         InputError, match=r"^x=3 is no Whole; give drone_rl.utils.schema.Whole\(\.\.\.\)"
     ):
         Instance(Whole).read(3, "x")
+    with pytest.raises(InputError, match=r"^network=\(the class dict\) is no Network; give "):
+        Instance(Network).read(dict, "network")
+    with pytest.raises(InputError, match=r"networks\.SmallCnn\(\.\.\.\) or a registered name$"):
+        Instance(Network).read(3, "network")
 
 
 def test_numbers_of_numpy_are_numbers():
     found = Whole(0, 9).read(np.int64(3), "x"), Real(0.0, 1.0).read(np.float32(0.5), "x")
     assert found == (3, 0.5) and [type(f) for f in found] == [int, float]
-    with pytest.raises(InputError, match="x=True is out of range"):
+    with pytest.raises(InputError, match="x=True is not a whole number"):
         Whole(0, 9).read(True, "x")
-    with pytest.raises(InputError, match=r"x=3\.0 is out of range"):
+    with pytest.raises(InputError, match=r"x=3\.0 is not a whole number"):
         Whole(0, 9).read(np.float64(3.0), "x")
     with pytest.raises(InputError, match="x=10 is out of range"):
         Whole(0, 9).read(np.int64(10), "x")

@@ -71,8 +71,10 @@ def complete(overrides: Sequence[str]) -> list[str]:
     folder = Path(_unquoted(folders[-1]))
     if folders[-1] == "latest":
         folder = _newest_run(_outputs(typed))
-    if not (folder / "checkpoints" / "last.pt").is_file():
-        raise InputError(f"resume={folder} has no checkpoints/last.pt; give the folder of a run")
+    if not _is_run(folder):
+        above = next(filter(_is_run, folder.parents), None)
+        remedy = "the folder of a run" if above is None else f"its folder, {_resume(above)}"
+        raise InputError(f"resume={folder} has no checkpoints/last.pt; give {remedy}")
     refuse_links(folder)
     former = [re.sub(r"^(\+{0,2}|~)network(?=[.=])", r"\1policy", o) for o in typed]
     kept = translate_former(taken_over(folder, [*typed, *former]))
@@ -87,9 +89,13 @@ def spare_run(overrides: Sequence[str]) -> list[str]:
     `resume=` and model cards read them; those of another command, or a refused one, are not its.
     """
     given = [o.partition("=")[2] for o in overrides if o.startswith("hydra.run.dir=")]
-    is_run = bool(given) and (Path(_unquoted(given[-1])) / "checkpoints" / "last.pt").exists()
+    is_run = bool(given) and _is_run(Path(_unquoted(given[-1])))
     is_kept = not is_run or _NO_EARLY_FILES[0] in overrides
     return [*overrides] if is_kept else [*overrides, _NO_EARLY_FILES[0]]
+
+
+def _is_run(folder: Path) -> bool:
+    return (folder / "checkpoints" / "last.pt").is_file()
 
 
 def _sweep_folder(typed: Sequence[str]) -> str:

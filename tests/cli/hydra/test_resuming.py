@@ -120,6 +120,12 @@ def test_no_run_to_go_on_with(tmp_path):
         complete([f"resume={tmp_path}"])
 
 
+def test_a_path_in_a_run_is_answered_with_the_run(run):
+    for path in ("checkpoints", "checkpoints/last.pt", "checkpoints/policy.safetensors"):
+        with pytest.raises(InputError, match=f"; give its folder, resume={run}$"):
+            complete([f"resume={run}/{path}"])
+
+
 def test_a_setting_has_its_former_name_on_command_lines(run):
     assert complete(["optimiser=sgd", "optimiser.lr=1"]) == ["optimizer=sgd", "optimizer.lr=1"]
 
