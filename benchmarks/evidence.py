@@ -341,7 +341,7 @@ def _found(low: float, high: float, positions: list[float], **more: Any) -> Plai
 
 
 _DARK = {
-    "good": False, "bad": True, "refused": None, "success": 0.4, "value": 0.8,
+    "good": False, "bad": True, "refused": None, "success": 0.4, "fragile": 0, "value": 0.8,
     "worst": {"side": "right", "share": 0.47}, "end": "low", "impossible": False,
     "oracle": _share(400, 400, 0.99, 1.0),
 }  # fmt: skip

@@ -336,7 +336,7 @@ _NOT_GOOD = {
     "domain.ranges.brightness.positions": None,
 }
 _UNCHANGED_BLUR = "axes.blur.levels.1.modes.constant.unchanged"
-_TOO_FEW = {"domain.ranges.brightness.failed.0.bad": False}
+_UNCERTAIN = {"domain.ranges.brightness.failed.0.bad": False}
 OF_SHIFTS = (
     ("shifts.good", _NOT_GOOD),
     ("shifts.good", {"domain.ranges.sun.low": 40.0}),
@@ -344,11 +344,14 @@ OF_SHIFTS = (
     ("shifts.good", {_UNCHANGED_BLUR: True}),
     ("shifts.good", {"domain": None}),
     ("shifts.not", _NOT_GOOD),
-    ("shifts.not", _TOO_FEW),
+    ("shifts.not", _UNCERTAIN),
     ("shifts.not", {"domain.ranges.brightness.failed.0.worst": {"side": "left", "share": 0.2}}),
     ("shifts.not", {"domain.ranges.brightness.positions": [-0.1, 0.0]}),
     ("shifts.not", {"domain.ranges.brightness.failed.0.impossible": True}),
-    ("shifts.too_few", {"domain.ranges.brightness.failed.0.bad": True}, _TOO_FEW),
+    ("shifts.uncertain", {"domain.ranges.brightness.failed.0.bad": True}, _UNCERTAIN),
+    ("shifts.uncertain", {"domain.ranges.brightness.failed.0.impossible": True}, _UNCERTAIN),
+    ("shifts.uncertain", {"domain.ranges.brightness.failed.0.fragile": 31}, _UNCERTAIN),
+    ("shifts.uncertain", {"domain.ranges.brightness.failed.0.success": 0.9}, _UNCERTAIN),
     ("shifts.none", {"domain.plain.good": True}, _NOT_GOOD),
     ("shifts.none", {"domain": None}, _NOT_GOOD),
     ("shifts.untested", {_UNCHANGED_BLUR: False}, {_UNCHANGED_BLUR: True}),

@@ -180,7 +180,8 @@ class _ForgedProber(Prober):
 
     def probe(self, condition: Any, part: float) -> dict[str, Any]:
         """See `Prober`."""
-        return {"good": True, "bad": False, "refused": None, "success": 1.0, "worst": None}
+        counts = {"success": 1.0, "fragile": 0, "worst": None}
+        return {"good": True, "bad": False, "refused": None, **counts}
 
 
 def _always_won(plain: dict[str, Any], episodes: int) -> dict[str, Any]:

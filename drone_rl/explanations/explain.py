@@ -28,7 +28,7 @@ from drone_rl.policies.policy import BasePolicy
 from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.utils.display import page
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import as_path, to_file_name
+from drone_rl.utils.files import as_path, new_run_folder, to_file_name
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.schema import Whole
@@ -79,7 +79,7 @@ class Explanations:
             verdict = numbers["verdict"]
             certainty = "" if verdict["certain"] else " (not certain)"
             lines.append(f"{name}: {verdict['kind']}{certainty}. {verdict['sentence']}")
-        return "\n".join([*lines, seed_line(self.seed.as_dict())])
+        return "\n".join([*lines, f"report: {self.report}", seed_line(self.seed.as_dict())])
 
     def _repr_html_(self) -> str:
         return page(self.report.read_text(encoding="utf-8"))
@@ -89,7 +89,7 @@ def explain(
     policies: Given | Sequence[Given],
     settings: ExplainSettings | None = None,
     *,
-    folder: str | Path = "outputs/explain/notebook",
+    folder: str | Path | None = None,
     num_envs: int = 128,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
@@ -101,7 +101,7 @@ def explain(
         policies: One or several: policies, what `load_policy` takes, or callables, see
             `policy_from`.
         settings: What to compute.
-        folder: Folder of explanations and report.
+        folder: Folder of explanations and report; by default a new one under `outputs`.
         num_envs: Environments in a batch; bounds memory.
         outputs: Folder of all runs, see `load_policy` and `find_domain`.
         progress: Callback for progress; shows a bar by default.
@@ -113,7 +113,8 @@ def explain(
     settings, seed = with_seed(from_arguments(ExplainSettings, settings, changes, explain))
     Whole(1).read(num_envs, "num_envs")
     chosen = _named(policies, outputs)
-    folder, progress = as_path(folder, "folder"), as_progress(progress)
+    progress = as_progress(progress)
+    folder = new_run_folder("explain", outputs) if folder is None else as_path(folder, "folder")
     folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(chosen)}
 
     def explain_one(policy: BasePolicy, folder: Path) -> dict[str, Any]:

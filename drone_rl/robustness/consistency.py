@@ -101,12 +101,14 @@ def check_probe(found: Mapping[str, Any], episodes: int, where: str) -> None:
     Raises:
         InputError: It contradicts itself.
     """
-    for name in ("success", "worst"):
+    for name in ("success", "fragile", "worst"):
         if found["refused"] is None and name not in found:
             raise InputError(f"{where} is not refused, and has no {name}; {_REMEDY}")
     success = found.get("success")
     if success is not None and abs(success * episodes - round(success * episodes)) > 1e-6:
         raise InputError(f"{where}.success is not a fraction of {episodes} episodes; {_REMEDY}")
+    if found.get("fragile", 0) > episodes:
+        raise InputError(f"{where}.fragile is more than its {episodes} episodes; {_REMEDY}")
     if found["good"] and (found["bad"] or found["refused"] is not None):
         raise InputError(f"{where} is good, but also bad or refused; {_REMEDY}")
     _refuse(_wrong_oracle(found.get("oracle"), episodes), where)

@@ -139,7 +139,8 @@ class Prober:
         part of the axis's error.
 
         Returns:
-            "good" and "bad" (certainly; neither if there are too few episodes), "success", and
+            "good" and "bad" (certainly; neither if there are too few episodes, or too many depend
+            on rounding), "success", "fragile": the number of episodes that depend on rounding, and
             "worst": the side with the least goals reached, with "share"; or "refused", the reason
             why the task does not allow the condition.
         """
@@ -162,6 +163,7 @@ class Prober:
             "bad": Kind.GOOD not in _kinds(found, rule),
             "refused": None,
             "success": float(greedy.success.mean()),
+            "fragile": int(agent.is_fragile.sum()),
             "worst": _worst(found, rule),
         }
 

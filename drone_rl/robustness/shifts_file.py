@@ -185,9 +185,10 @@ _PROBE: dict[str, Kind] = {
     "bad": Flag(),
     "refused": Maybe(Text()),
     "success": _PART,
+    "fragile": _COUNT,
     "worst": Maybe(_WORST),
 }
-_UNLESS_REFUSED = frozenset({"success", "worst"})
+_UNLESS_REFUSED = frozenset({"success", "fragile", "worst"})
 _END = {"end": OneOf(("low", "high")), "value": Maybe(_ANY)}
 _FAILED = Record(
     {**_END, "oracle": Maybe(_Counted()), "impossible": Flag(), **_PROBE}, optional=_UNLESS_REFUSED

@@ -57,22 +57,23 @@ def is_tested(e: Evidence, name: str) -> bool:
 
 def wide(e: Evidence) -> list[str]:
     """Return the axes with a range in which the policy is good."""
-    limits = {name: found["positions"] or (0.0, 0.0) for name, found in _ranges(e).items()}
-    return [name for name, (low, high) in limits.items() if low < high and is_tested(e, name)]
+    limits = ((name, found["positions"] or (0, 0)) for name, found in _ranges(e).items())
+    return [name for name, (low, high) in limits if low < high and is_tested(e, name)]
 
 
-def _shut(e: Evidence, is_sure: bool) -> list[str]:
-    """Axes without a range, of a policy that is good without perturbation.
-
-    Either axes on which it is certainly not good, or those with too few episodes to be certain.
-    """
+def _shut(e: Evidence) -> list[str]:
+    """Axes on which a policy that is good without perturbation is certainly not good."""
     return [
         name
         for name, found in _ranges(e).items()
-        if found["positions"] == [0.0, 0.0]
-        and (failed := _own_failures(found))
-        and any(failure["bad"] for failure in failed) == is_sure
+        if found["positions"] == [0.0, 0.0] and any(f["bad"] for f in _own_failures(found))
     ]
+
+
+def _unknown(e: Evidence) -> list[tuple[str, Mapping[str, Any]]]:
+    """Axes, with the result at the end of a side where it is neither certainly good nor not."""
+    ends = [(name, end) for name, found in _ranges(e).items() for end in _own_failures(found)]
+    return [(name, end) for name, end in ends if not end["bad"]]
 
 
 def _own_failures(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -109,20 +110,21 @@ def _good(e: Evidence) -> str:
 
 def _not(e: Evidence) -> str:
     parts = []
-    for name in _shut(e, True):
+    for name in _shut(e):
         found = next(f for f in _own_failures(_ranges(e)[name]) if f["bad"])
         parts.append(f"{_at(e, name, found['value'])}{_why(e, found)}")
     return f"Not with {listed(parts)}."
 
 
-def _too_few(e: Evidence) -> str:
-    parts = [
-        _at(e, name, found["value"])
-        for name in _shut(e, False)
-        for found in _own_failures(_ranges(e)[name])[:1]
-    ]
-    count = e["settings"]["domain_episodes"]
-    return f"{count} episodes are too few to tell whether it is good with {listed(parts, 'or')}."
+def _uncertain(e: Evidence) -> str:
+    parts = [f"{_at(e, name, end['value'])} ({_counted(end)})" for name, end in _unknown(e)]
+    episodes = plural(e["settings"]["domain_episodes"], "episode")
+    return f"Not certain, in {episodes}, whether it is good with {listed(parts, 'or')}."
+
+
+def _counted(end: Mapping[str, Any]) -> str:
+    rounding = f"; rounding can change {end['fragile']}" if end["fragile"] else ""
+    return f"{percent(end['success'])} succeed{rounding}"
 
 
 def _at(e: Evidence, name: str, value: float) -> str:
@@ -198,14 +200,14 @@ SHIFTS = (
     Sentence(
         "shifts.not",
         "certainly good without perturbation, certainly not at the next strength of an axis",
-        lambda e: bool(_shut(e, True)),
+        lambda e: bool(_shut(e)),
         _not,
     ),
     Sentence(
-        "shifts.too_few",
-        "certainly good without perturbation, nowhere else on an axis, and not certainly bad",
-        lambda e: bool(_shut(e, False)),
-        _too_few,
+        "shifts.uncertain",
+        "at a possible strength at which a side ends, neither certainly good nor certainly not",
+        lambda e: bool(_unknown(e)),
+        _uncertain,
     ),
     Sentence(
         "shifts.none",

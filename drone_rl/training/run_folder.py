@@ -6,7 +6,6 @@ import enum
 import json
 import logging
 import signal
-import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Self
@@ -35,6 +34,7 @@ from drone_rl.utils.files import (
     as_path,
     folder_lock,
     make_folder,
+    new_run_folder,
     remove_leftovers,
     write_atomically,
 )
@@ -120,7 +120,7 @@ class RunFolder:
             )
         if resume and path is None:
             raise InputError("resume=True needs the run to resume; give folder=RUN")
-        folder = new_folder() if path is None else as_path(path, "folder")
+        folder = new_run_folder("train") if path is None else as_path(path, "folder")
         if resume and folder.suffix == ".pt":  # what load_policy takes
             raise InputError(
                 f"folder={folder} is a checkpoint; give the folder of its run, the one with "
@@ -339,10 +339,3 @@ def _read_best(value: Any) -> float:
 def last_of(folder: Path) -> Path:
     """Return the path of a run's newest checkpoint."""
     return folder / "checkpoints" / "last.pt"
-
-
-def new_folder() -> Path:
-    """Return a path named by the present time, as `drone-rl train` does."""
-    now = time.time()
-    stamp = time.strftime("%Y-%m-%d_%H-%M-%S", time.localtime(now))
-    return Path("outputs/train/runs") / f"{stamp}-{int(now % 1 * 1e6):06d}"

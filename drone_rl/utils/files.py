@@ -88,6 +88,13 @@ def _open_plain(path: Path) -> Iterator[tuple[BinaryIO, int]]:
         raise InputError(f"{path} can't be read ({reason}); give another file") from None
 
 
+def new_run_folder(command: str, outputs: str | Path = "outputs") -> Path:
+    """Return a path named by the present time, as `drone-rl` names the folders of a command."""
+    now = time.time()
+    stamp = time.strftime("%Y-%m-%d_%H-%M-%S", time.localtime(now))
+    return Path(outputs) / command / "runs" / f"{stamp}-{int(now % 1 * 1e6):06d}"
+
+
 def newest(paths: Iterable[Path]) -> Path | None:
     """Return the file or folder that was changed last; None if there are none."""
     return max(paths, key=lambda path: path.stat().st_mtime, default=None)

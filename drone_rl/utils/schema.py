@@ -247,6 +247,7 @@ class Span:
     def read(self, value: Any, where: str) -> Any:
         """See `Kind`."""
         if not self._is_range(value):
+            self._refuse_mixture(value, where)
             return self.kind.read(value, where)
         low, high = (self.kind.read(item, f"{where}[{i}]") for i, item in enumerate(value))
         pairs = zip(low, high, strict=True) if isinstance(low, tuple) else [(low, high)]
@@ -256,6 +257,17 @@ class Span:
                     f"{where} goes from {least:g} to {most:g}, which is less; give the lower first"
                 )
         return low, high
+
+    def _refuse_mixture(self, value: Any, where: str) -> None:
+        """Raise an `InputError` for a list of which an item is a list."""
+        inside = value if isinstance(value, list | tuple) else ()
+        if isinstance(self.kind, Several) and any(isinstance(i, list | tuple) for i in inside):
+            count = self.kind.most
+            low, high = (f"[{','.join([name] * count)}]" for name in ("LOW", "HIGH"))
+            raise InputError(
+                f"{where} has ranges of single values; give {count} numbers, or the range of all "
+                f"as [{low},{high}]"
+            )
 
     def _is_range(self, value: Any) -> bool:
         if not isinstance(value, list | tuple) or len(value) != 2:

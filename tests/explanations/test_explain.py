@@ -70,11 +70,27 @@ def test_all_policies_are_explained_from_one_fresh_seed(tmp_path, monkeypatch):
     assert one[2] == again[2] != other[2]
 
 
+def test_each_report_has_a_folder_of_its_own_and_its_path_is_printed(tmp_path, monkeypatch):
+    verdict = {"kind": "good", "certain": True, "sentence": "It does."}
+    monkeypatch.setattr(explaining, "explain_policy", lambda *_, **__: {"verdict": verdict})
+    monkeypatch.setattr(explaining, "write_report", lambda _, folder: folder / "report.html")
+    how = {"outputs": tmp_path, "num_envs": 2, "progress": silent}
+    first, second = (drone_rl.explain("good", **how) for _ in range(2))
+    assert first.folder.parent == second.folder.parent == tmp_path / "explain" / "runs"
+    assert first.folder != second.folder
+    assert f"report: {first.folder}/report.html" in str(first).splitlines()
+
+
 def test_they_show_their_report(tmp_path):
     (tmp_path / "report.html").write_text("<h1>trusted?</h1>")
     verdict = {"kind": "good", "certain": False, "sentence": "It does."}
     shown = Explanations(tmp_path, tmp_path / "report.html", {"x": {"verdict": verdict}}, SEED)
-    assert str(shown) == "x: good (not certain). It does.\nenvironments: seed 6 (fresh)"
+    report = f"report: {tmp_path / 'report.html'}"
+    assert str(shown).splitlines() == [
+        "x: good (not certain). It does.",
+        report,
+        "environments: seed 6 (fresh)",
+    ]
     assert shown._repr_html_().startswith(
         '<iframe sandbox="allow-scripts" srcdoc="&lt;h1&gt;trusted?'
     )

@@ -75,6 +75,7 @@ def found_to(axis, of, last, impossible=False):
         (axis.position(s), value(s), good) for e in ends.values() for s, good in e.tested
     )
     about = {"good": False, "bad": True, "worst": None, "refused": None, "success": 0.5}
+    about["fragile"] = 0
     about |= {"oracle": share(100 if impossible else 400, 400), "impossible": impossible}
     return {
         **{end: value(walked.limit) for end, walked in ends.items()},
@@ -116,7 +117,14 @@ def shifts_of(policy, *, axes=("blur", "dead_rows"), weights=None):
         "axes": {name: along(owned(name, of), of, AXES[name].strengths[2]) for name in axes},
         "together": flown(),
         "domain": {
-            "plain": {"good": True, "bad": False, "refused": None, "success": 1.0, "worst": None},
+            "plain": {
+                "good": True,
+                "bad": False,
+                "refused": None,
+                "success": 1.0,
+                "fragile": 0,
+                "worst": None,
+            },
             "ranges": {n: found_to(owned(n, of), of, AXES[n].strengths[2]) for n in axes},
         },
         "seconds": 1.0,

@@ -66,23 +66,24 @@ def test_no_strength_is_good_at_which_the_counts_say_otherwise(good, numbers):
     ("change", "message"),
     [
         ({"success": 0.5012}, "here.success is not a fraction of 400 episodes"),
+        ({"fragile": 401}, "here.fragile is more than its 400 episodes"),
         ({"good": True}, "here is good, but also bad or refused"),
         ({"oracle": share(9, 10)}, "here.oracle is of 10 episodes, not of 400"),
     ],
 )
 def test_a_strength_has_to_agree_with_itself(change, message):
     found = {"good": False, "bad": True, "refused": None, "success": 0.5, "worst": None}
-    found["oracle"] = share(1, 400)
+    found |= {"fragile": 400, "oracle": share(1, 400)}
     check_probe(found, 400, "here")
     with pytest.raises(InputError, match=message):
         check_probe({**found, **change}, 400, "here")
 
 
-@pytest.mark.parametrize("name", ["success", "worst"])
+@pytest.mark.parametrize("name", ["success", "fragile", "worst"])
 def test_a_strength_that_is_allowed_has_figures(name):
     refused = {"good": False, "bad": True, "refused": "task.cube_size=9"}
     check_probe(refused, 400, "here")
-    found = {**refused, "refused": None, "success": 0.5, "worst": None}
+    found = {**refused, "refused": None, "success": 0.5, "fragile": 0, "worst": None}
     check_probe(found, 400, "here")
     del found[name]
     with pytest.raises(InputError, match=f"here is not refused, and has no {name}; run drone-rl"):

@@ -104,11 +104,24 @@ def test_what_nobody_can_is_not_the_policys_failure():
     failed = EVIDENCE["domain"]["ranges"]["brightness"]["failed"][0]
     failed = {**failed, "impossible": True, "oracle": {"share": 0.3}}
     text = said(SHIFTS, changed(EVIDENCE, {"domain.ranges.brightness.failed": [failed]}))
-    assert "shifts.not" not in text and "shifts.too_few" not in text
+    assert "shifts.not" not in text and "shifts.uncertain" not in text
     assert "brightness at 0.8 times, 30.0%" in text["shifts.impossible"]
     end = {**failed, "end": "high", "value": 2.0}
     text = said(SHIFTS, changed(EVIDENCE, {"domain.ranges.blur.failed": [end]}))
     assert "blur of up to 1.5 pixels (no more is possible)" in text["shifts.good"]
+
+
+def test_strengths_between_good_and_not_good_are_named_with_the_reason():
+    dark = EVIDENCE["domain"]["ranges"]["brightness"]["failed"][0]
+    near = {**dark, "bad": False, "success": 0.945}
+    end = {**near, "end": "high", "value": 2.0, "success": 1.0, "fragile": 31}
+    changes = {"domain.ranges.brightness.failed": [near], "domain.ranges.blur.failed": [end]}
+    text = said(SHIFTS, changed(EVIDENCE, changes))
+    assert text["shifts.uncertain"] == (
+        "Not certain, in 400 episodes, whether it is good with blur at 2 pixels (100% succeed; "
+        "rounding can change 31) or brightness at 0.8 times (94.5% succeed)."
+    )
+    assert "shifts.not" not in text and "blur of up to 1.5 pixels" in text["shifts.good"]
 
 
 def test_camera_faults_of_the_training_are_named():

@@ -159,6 +159,13 @@ def test_a_span_is_a_value_or_two_in_order():
             Span(kind).read(value, "x")
 
 
+@pytest.mark.parametrize("value", [[0, [1, 2]], [[1, 2]], [0, 0, [1, 2]], [0, [1, 2]]])
+def test_ranges_of_single_values_are_answered_with_the_form_of_a_range(value):
+    words = r"^x has ranges of single values; give 2 numbers, .* as \[\[LOW,LOW\],\[HIGH,HIGH\]\]$"
+    with pytest.raises(InputError, match=words):
+        Span(Several(Real(0.0), 2, 2)).read(value, "x")
+
+
 def test_texts_are_no_numbers():
     for kind in (Whole(1), Real(0.0)):
         with pytest.raises(InputError, match=r"^n='1' is a text; give a (whole )?number"):

@@ -21,7 +21,7 @@ from drone_rl.utils.settings import Settings, kinds_of, plain
 BAR = "&#124;"
 """A bar within a cell."""
 _TASK = "task"
-_OR = {Maybe: "; or null", Span: ", or a range of it"}
+_OR = {Maybe: "; or null", Span: ", or a range [LOW,HIGH] of such values"}
 _HEAD = "| setting | values | unit | default | meaning |\n| --- | --- | --- | --- | --- |"
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import difflib
+import shlex
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -111,8 +112,8 @@ class Command:
             )
         if group in self.groups and self.config[group] is None:
             offered = choices(self.conf, group)
-            name = "minimal" if "minimal" in offered else "NAME"
-            why = f"{group} is null, which has no settings; type {group}={name} {override}"
+            typed = self._with_choice(group, offered, override, name)
+            why = f"{group} is null, which has no settings; type {typed}"
             return InputError(f"{override}: {why} ({group} is one of {', '.join(offered)})")
         if first in self.groups and (others := self._choices_with(first, name)):
             return InputError(
@@ -131,6 +132,15 @@ class Command:
             others = "" if ours.startswith(f"{group}.") else self._inside(group)
             return InputError(f"{text}did you mean {ours}? ({others or self.list_all})")
         return InputError(text + (self._inside(group) or self.list_all))
+
+    def _with_choice(self, group: str, offered: Sequence[str], override: str, name: str) -> str:
+        """Return what to type instead of a setting of a group that is null."""
+        if "minimal" not in offered:
+            return f"{group}=NAME {override}"
+        chosen = f"{group}=minimal"
+        within = Command(self.name, self.conf, [chosen])
+        meant = within.instead(name, override.partition("=")[2]) or override
+        return f"{chosen} {override if name in within.keys else shlex.quote(meant)}"
 
     def _inside(self, group: str) -> str:
         """Return the names of the settings of a group; empty if there are none."""
