@@ -262,12 +262,8 @@ class Span:
         """Raise an `InputError` for a list of which an item is a list."""
         inside = value if isinstance(value, list | tuple) else ()
         if isinstance(self.kind, Several) and any(isinstance(i, list | tuple) for i in inside):
-            count = self.kind.most
-            low, high = (f"[{','.join([name] * count)}]" for name in ("LOW", "HIGH"))
-            raise InputError(
-                f"{where} has ranges of single values; give {count} numbers, or the range of all "
-                f"as [{low},{high}]"
-            )
+            remedy = "give numbers, or the range of all as [[LOW,...],[HIGH,...]]"
+            raise InputError(f"{where} has ranges of single values; {remedy}")
 
     def _is_range(self, value: Any) -> bool:
         if not isinstance(value, list | tuple) or len(value) != 2:

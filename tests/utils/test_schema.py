@@ -161,7 +161,9 @@ def test_a_span_is_a_value_or_two_in_order():
 
 @pytest.mark.parametrize("value", [[0, [1, 2]], [[1, 2]], [0, 0, [1, 2]], [0, [1, 2]]])
 def test_ranges_of_single_values_are_answered_with_the_form_of_a_range(value):
-    words = r"^x has ranges of single values; give 2 numbers, .* as \[\[LOW,LOW\],\[HIGH,HIGH\]\]$"
+    words = (
+        r"^x has ranges of single values; give numbers, .* as \[\[LOW,\.\.\.\],\[HIGH,\.\.\.\]\]$"
+    )
     with pytest.raises(InputError, match=words):
         Span(Several(Real(0.0), 2, 2)).read(value, "x")
 
