@@ -44,7 +44,6 @@ class ExplainCommand(CommandSettings, ExplainSettings):
             progress=log,
         )
         print(done)
-        _log.info("report: %s", done.report)
         verdicts = [numbers["verdict"] for numbers in done.numbers.values()]
         refused = [v for v in verdicts if not (v["certain"] and v["kind"] == self.require)]
         statuses = [verdict["exit_code"] or Kind.NONE.exit_code for verdict in refused]

@@ -4,10 +4,12 @@ import dataclasses
 import functools
 import importlib
 import inspect
+import tomllib
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
 from importlib import metadata
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from drone_rl.config import (
@@ -95,7 +97,8 @@ class Variant(Settings):
                 return variants[name]
         raise InputError(
             f"{where}={shown(name)} is not registered; valid names: {', '.join(variants)}; if it "
-            "is a part of your own, give plugins=[MODULE] with the module that registers it"
+            "is a part of your own, give plugins=[MODULE] with the module that registers it, or "
+            "import it in Python"
             f"{did_you_mean(name, variants)}"
         )
 
@@ -295,6 +298,12 @@ def as_changes(value: Any, where: str) -> Mapping[str, Any]:
     )
 
 
+@functools.cache
+def read_other_names() -> dict[str, Any]:
+    """Return names of other projects' settings and commands, with ours; see `names.toml`."""
+    return tomllib.loads(Path(__file__).with_name("names.toml").read_text("utf-8"))
+
+
 def from_arguments(
     of: type[S], settings: S | None, changes: Mapping[str, Any], function: Callable[..., Any]
 ) -> S:
@@ -325,7 +334,7 @@ def from_arguments(
             raise InputError(f"{name} is a setting of {group}; give {text}")
     if "plugins" in changes:
         raise InputError("plugins belongs to the command line; in Python, import the modules")
-    check_names(of, changes, others=others)
+    check_names(of, changes, others=others, synonyms=read_other_names()["settings"])
     return given.replace(**changes)
 
 

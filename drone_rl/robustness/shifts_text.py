@@ -349,8 +349,7 @@ def needed_range(
 def contradicted(name: str | None, value: float, unit: str, probed: Evidence) -> str | None:
     """Return how new episodes contradict a file, or None if they do not.
 
-    They are at a value of an axis (None without perturbation); see
-    `drone_rl.robustness.domain.Prober.probe` for their result.
+    They are at a value of an axis (None without perturbation); `probed` is from `Prober.probe`.
     """
     if not probed["bad"]:
         return None

@@ -26,8 +26,8 @@ class Confirmation:
     def __init__(self, settings: TrainSettings, network: nn.Module) -> None:
         self._settings, self._network = settings, network
         self._description = describe(settings)
-        self.episodes = 0
-        """Episodes since the run began or was last resumed."""
+        self.attempts = 0
+        """Confirmations since the run began or was last resumed."""
         self.succeeded = 0
         """Successes in the last confirmation."""
 
@@ -44,7 +44,7 @@ class Confirmation:
             greedy = run_episodes(env, actor, episodes, is_compiled=True)
         finally:
             self._network.train()
-        self.episodes += episodes
+        self.attempts += 1
         self.succeeded = int(greedy.success.sum())
         return self.succeeded >= settings.trainer.confirm_share * episodes - 1e-9
 
@@ -66,5 +66,9 @@ class Confirmation:
 
     @property
     def result(self) -> Mapping[str, Any]:
-        """Entries of `result.json`."""
-        return {"confirming_flights": self.episodes, "confirming_flights_succeeded": self.succeeded}
+        """Entries of `result.json`: attempts, and episodes and successes of the last one."""
+        return {
+            "confirming_attempts": self.attempts,
+            "confirming_flights": self._settings.trainer.confirm_episodes if self.attempts else 0,
+            "confirming_flights_succeeded": self.succeeded,
+        }

@@ -131,14 +131,23 @@ def types_of(cls: type[Settings]) -> Mapping[str, Any]:
 
 
 def check_names(
-    cls: type[Settings], given: Mapping[str, Any], prefix: str = "", others: Sequence[str] = ()
+    cls: type[Settings],
+    given: Mapping[str, Any],
+    prefix: str = "",
+    others: Sequence[str] = (),
+    synonyms: Mapping[str, Sequence[str]] = types.MappingProxyType({}),
 ) -> None:
-    """Raise an `InputError` with the valid names, and others, if a name is not one of the valid."""
+    """Raise an `InputError` with the valid names, and others, if a name is not one of the valid.
+
+    `synonyms` are the settings that other projects' names mean, dotted as on the command line.
+    """
     known = kinds_of(cls)
     for name in given:
         if name not in known:
             names = [*known, *others]
-            meant = _inside(cls, name) or did_you_mean(name, names)
+            ours = [name, *(other.rpartition(".")[2] for other in synonyms.get(name.lower(), ()))]
+            hints = (_inside(cls, our) or did_you_mean(our, names) for our in ours)
+            meant = next(filter(None, hints), "")
             raise InputError(f"{prefix}{name} is unknown; valid names: {', '.join(names)}{meant}")
 
 

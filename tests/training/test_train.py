@@ -309,6 +309,9 @@ def test_folders_that_do_not_work_are_named(given, message):
 
 
 def test_plugins_are_imported_in_python():
+    for name, meant in (("learning_rate", r"Adam\(lr"), ("n_envs", r"Episodes\(num_envs")):
+        with pytest.raises(InputError, match=rf"^{name} is unknown; .*did you mean .*{meant}="):
+            drone_rl.train(**{name: 1})
     with pytest.raises(InputError, match=r"^plugins belongs to the command .*import the"):
         drone_rl.train(plugins=["mine"], progress=silent)
 

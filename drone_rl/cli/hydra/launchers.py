@@ -187,12 +187,21 @@ def _job_return(run: Run) -> JobReturn:
     return job
 
 
+_NOT_SOLVED = {
+    "frames": "not solved in trainer.total_frames",
+    "episodes": "not solved in trainer.total_episodes",
+}
+
+
 def _outcome(run: Run) -> str:
     result = read_result(run.folder)
     if result is None:
         return f"failed: {read_failure(run) or 'reason unknown'}"
     reward = _number(result.get("running_reward"))
-    return f"{result['reason']}, running reward {'none' if reward is None else f'{reward:.3f}'}"
+    why = _NOT_SOLVED.get(result["reason"], result["reason"])
+    judged = result.get("verdict")
+    kind = f", verdict: {judged.get('kind')}" if isinstance(judged, dict) else ""
+    return f"{why}, running reward {'none' if reward is None else f'{reward:.3f}'}{kind}"
 
 
 def _number(value: object) -> float | None:

@@ -3,7 +3,6 @@
 import contextlib
 import difflib
 import shlex
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,10 +13,10 @@ from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
 from omegaconf import DictConfig, OmegaConf
 
+from drone_rl.config.configuration import read_other_names
 from drone_rl.utils.errors import InputError
 
-OTHER_NAMES = tomllib.loads(Path(__file__).parent.with_name("names.toml").read_text("utf-8"))
-"""Names of other projects' settings and commands, with ours."""
+OTHER_NAMES = read_other_names()
 SCHEMA = "base_"
 """Prefix of schemas' names, see `drone_rl.cli.hydra.composition`."""
 _HYDRAS_OWN = ("hydra.run.dir", "hydra.sweep.dir", "hydra.launcher.num_jobs", "hydra.verbose")
@@ -131,6 +130,11 @@ class Command:
         if ours:
             others = "" if ours.startswith(f"{group}.") else self._inside(group)
             return InputError(f"{text}did you mean {ours}? ({others or self.list_all})")
+        meant = closest(name, self.keys)
+        if meant is not None and meant in self.groups:
+            return InputError(
+                f"{text}type {meant}=NAME, one of {', '.join(choices(self.conf, meant))}"
+            )
         return InputError(text + (self._inside(group) or self.list_all))
 
     def _with_choice(self, group: str, offered: Sequence[str], override: str, name: str) -> str:

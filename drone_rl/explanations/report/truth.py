@@ -209,7 +209,7 @@ def _say_tests(evidence: Evidence) -> Claims:
         claims["truth.trusted"] = (
             f"The heat map to trust is {_name(name)}: it shows which patches of a frame affect the "
             f"policy (score {score['mean']:.2f}, {bounds(score)}) reliably better than every map "
-            f"that does not use the policy (the best, {rival!r}: "
+            f"that does not use the policy (the best on the same frames, {rival!r}: "
             f"{truth['placebos'][rival]['mean']:.2f}), and it depends on the weights."
         )
         claims["truth.hits"] = (

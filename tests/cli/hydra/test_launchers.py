@@ -34,7 +34,10 @@ def test_a_finished_run_returns_its_running_mean(run):
     (run.folder / "result.json").write_text(json.dumps(result))
     job = _job_return(run)
     assert (job.return_value, job.overrides) == (1.5, ["seed=1"])
-    assert _outcome(run) == "frames, running reward 1.500"
+    assert _outcome(run) == "not solved in trainer.total_frames, running reward 1.500"
+    result = {"reason": "solved", "running_reward": 2.98, "verdict": {"kind": "good"}}
+    (run.folder / "result.json").write_text(json.dumps(result))
+    assert _outcome(run) == "solved, running reward 2.980, verdict: good"
 
 
 def test_an_unfinished_run_returns_nothing_and_says_why(run):

@@ -17,7 +17,7 @@ def test_the_map_to_trust_stands_beside_the_best_placebo():
     found = speak()
     assert "The heat map to trust is saliency" in found["truth.trusted"]
     assert "(score 0.50, 95%: 0.40 to 0.60)" in found["truth.trusted"]
-    assert "(the best, 'horizon': 0.30)" in found["truth.trusted"]
+    assert "(the best on the same frames, 'horizon': 0.30)" in found["truth.trusted"]
     assert "60.0% of these frames (chance: 10.0%)" in found["truth.hits"]
     assert "truth.none" not in found
     assert best_placebo(EXPLANATION["truth"]) == "horizon"
