@@ -132,9 +132,8 @@ class Command:
             return InputError(f"{text}did you mean {ours}? ({others or self.list_all})")
         meant = closest(name, self.keys)
         if meant is not None and meant in self.groups:
-            return InputError(
-                f"{text}type {meant}=NAME, one of {', '.join(choices(self.conf, meant))}"
-            )
+            offered = ", ".join(choices(self.conf, meant))
+            return InputError(f"{text}type {meant}=NAME, one of {offered} ({self.list_all})")
         return InputError(text + (self._inside(group) or self.list_all))
 
     def _with_choice(self, group: str, offered: Sequence[str], override: str, name: str) -> str:
