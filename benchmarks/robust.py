@@ -20,7 +20,8 @@ from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.robustness.axes import AXES, GROUPS, find_axes
 from drone_rl.robustness.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.robustness.shifts import make_evaluated_policy
-from drone_rl.training.run_folder import last_of, settings_of
+from drone_rl.training.run_folder import settings_of
+from drone_rl.utils.files import last_of
 
 DEFAULT, ALL = "default", "all"
 ALL_KINDS = "all_kinds"

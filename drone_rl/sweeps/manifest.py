@@ -12,7 +12,14 @@ from typing import Any
 from drone_rl.config.configuration import check_same_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import parse_json, read_bytes, read_json, refuse_links, write_atomically
+from drone_rl.utils.files import (
+    last_of,
+    parse_json,
+    read_bytes,
+    read_json,
+    refuse_links,
+    write_atomically,
+)
 from drone_rl.utils.limits import RESULT_BYTES, SWEEP_BYTES
 from drone_rl.utils.overrides import COMMAND, MOST_OVERRIDES, check_harmless
 from drone_rl.utils.provenance import provenance
@@ -64,7 +71,7 @@ class Run:
     @property
     def checkpoint(self) -> Path:
         """Path of the newest checkpoint."""
-        return self.folder / "checkpoints" / "last.pt"
+        return last_of(self.folder)
 
     @property
     def failure(self) -> Path:

@@ -19,7 +19,7 @@ from drone_rl.sweeps.rows import read_rows
 from drone_rl.sweeps.summary import Group, make_groups, summarise_sweep, to_csv
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import folder_lock, newest, write_atomically
+from drone_rl.utils.files import folder_lock, last_of, newest, write_atomically
 from drone_rl.utils.text import seed_line
 
 if TYPE_CHECKING:
@@ -127,8 +127,7 @@ def judge_run(
         result = read_result(folder)
         if result is None:
             raise InputError(f"{folder} has no result.json; give the sweep's command to finish it")
-        last = folder / "checkpoints" / "last.pt"
-        verdict, progress = judge_for_selection(last, episodes, device, seed=seed)
+        verdict, progress = judge_for_selection(last_of(folder), episodes, device, seed=seed)
         if progress["frames"] != result.get("frames"):
             raise InputError(
                 f"{folder}/checkpoints/last.pt is of frame {progress['frames']}, result.json of "

@@ -33,6 +33,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import (
     as_path,
     folder_lock,
+    last_of,
     make_folder,
     new_run_folder,
     remove_leftovers,
@@ -334,8 +335,3 @@ def _read_best(value: Any) -> float:
     if type(value) is float and value == _NONE_YET:
         return value
     return Real(-1e15, 1e15).read(value, "the checkpoint's best")
-
-
-def last_of(folder: Path) -> Path:
-    """Return the path of a run's newest checkpoint."""
-    return folder / "checkpoints" / "last.pt"

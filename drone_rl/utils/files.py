@@ -95,6 +95,11 @@ def new_run_folder(command: str, outputs: str | Path = "outputs") -> Path:
     return Path(outputs) / command / "runs" / f"{stamp}-{int(now % 1 * 1e6):06d}"
 
 
+def last_of(folder: Path) -> Path:
+    """Return the path of a run's newest checkpoint."""
+    return folder / "checkpoints" / "last.pt"
+
+
 def newest(paths: Iterable[Path]) -> Path | None:
     """Return the file or folder that was changed last; None if there are none."""
     return max(paths, key=lambda path: path.stat().st_mtime, default=None)

@@ -29,14 +29,13 @@ from drone_rl.training.run_folder import (
     RunFolder,
     Training,
     finish,
-    last_of,
     reraise_signal,
     settings_of,
 )
 from drone_rl.training.train import learn
 from drone_rl.utils.archives import read_array
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import read_json, write_atomically
+from drone_rl.utils.files import last_of, read_json, write_atomically
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.schema import Instance, Maybe, Plain, Real, Record, Several, Whole
 from drone_rl.utils.seeding import Stream

@@ -12,12 +12,12 @@ from drone_rl.sim.tasks.task import MAKERS, as_settings
 from drone_rl.training.run_folder import (
     RunFolder,
     _read_best,
-    last_of,
     possible_ends,
     settings_of,
     target_of,
 )
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import last_of
 from tests.second_task import Posts
 
 

@@ -14,7 +14,9 @@ from drone_rl.utils.files import (
     as_path,
     folder_lock,
     is_locked,
+    last_of,
     make_folder,
+    new_run_folder,
     newest,
     parse_json,
     read_bytes,
@@ -44,6 +46,12 @@ def test_the_newest_is_the_one_that_was_changed_last(tmp_path):
         os.utime(path, (99, changed))
     assert newest(paths) == tmp_path / "b"
     assert newest([]) is None
+
+
+def test_places_of_runs_and_their_checkpoints(tmp_path):
+    assert new_run_folder("train").parent == Path("outputs/train/runs")
+    assert new_run_folder("explain", tmp_path).parent == tmp_path / "explain" / "runs"
+    assert last_of(tmp_path) == tmp_path / "checkpoints" / "last.pt"
 
 
 def test_trained_policies_are_sorted_by_the_time_of_their_last_checkpoint(tmp_path):

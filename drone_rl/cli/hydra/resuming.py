@@ -13,7 +13,7 @@ from omegaconf import OmegaConf
 import drone_rl
 from drone_rl.sweeps.manifest import is_sweep, quoted, sweep_name
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import refuse_links, trained_policies, write_atomically
+from drone_rl.utils.files import last_of, refuse_links, trained_policies, write_atomically
 from drone_rl.utils.overrides import must_be_typed, taken_over, with_current_name
 from drone_rl.utils.settings import FORMER_CHOICES, FORMER_NAMES
 
@@ -95,7 +95,7 @@ def spare_run(overrides: Sequence[str]) -> list[str]:
 
 
 def _is_run(folder: Path) -> bool:
-    return (folder / "checkpoints" / "last.pt").is_file()
+    return last_of(folder).is_file()
 
 
 def _sweep_folder(typed: Sequence[str]) -> str:

@@ -12,7 +12,7 @@ from safetensors.torch import load, save
 from drone_rl.policies.zoo.description import FORMAT, MAX_PARAMETERS, parse
 from drone_rl.utils.checkpoint import check_weights, load_checkpoint, other_format
 from drone_rl.utils.errors import InputError, did_you_mean
-from drone_rl.utils.files import parse_json, read_bytes, trained_policies
+from drone_rl.utils.files import last_of, parse_json, read_bytes, trained_policies
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.readers import with_current_names
 from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
@@ -98,7 +98,7 @@ def find_policy(which: str | Path, outputs: str | Path = "outputs") -> Path:
             f"policy={which} does not exist; give a file, the folder of a run, latest, or one of "
             f"{', '.join(policy_names())}{did_you_mean(which, policy_names())}"
         )
-    return path / "checkpoints" / "last.pt" if path.is_dir() else path
+    return last_of(path) if path.is_dir() else path
 
 
 def card_path(name: str) -> Path:
