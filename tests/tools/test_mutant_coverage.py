@@ -4,6 +4,8 @@ import types
 
 import pytest
 
+pytest.importorskip("cosmic_ray", reason="pip install -e '.[mutants]'")
+
 from tools.mutants import coverage
 
 MODULE = """\

@@ -1,9 +1,11 @@
-"""The parts of `make mutants` that do not need Cosmic Ray."""
+"""Targets, filters and results of `make mutants`."""
 
 import json
 from pathlib import Path
 
 import pytest
+
+pytest.importorskip("cosmic_ray", reason="pip install -e '.[mutants]'")
 
 from tools.mutants import filters, results, targets
 
