@@ -1,9 +1,13 @@
 """A short film of the page in a real browser."""
 
+import shutil
+
 import pytest
 
 pytest.importorskip("selenium.webdriver")
 pytest.importorskip("uvicorn")
+if not shutil.which("chromedriver"):
+    pytest.skip("no chromium with chromedriver on this machine", allow_module_level=True)
 
 from PIL import Image
 
