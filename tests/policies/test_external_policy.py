@@ -257,17 +257,6 @@ def test_methods_of_a_policy_are_refused_by_its_name():
         drone_rl.policy_from(policy.act_batch)
 
 
-def test_batches_of_several_frames_are_tried():
-    with pytest.raises(InputError, match=r"on images of shape \(2, 1, 25, 64\)"):
-        drone_rl.policy_from(lambda images: left(images.reshape(1, 1, 25, 64)))
-
-    def mean_of_batch(images):
-        return images[:, 0, 10, :3] + 10 * images.mean()
-
-    with pytest.raises(InputError, match=r"^policy=mean_of_batch gives other logits .* a batch of"):
-        drone_rl.policy_from(mean_of_batch)
-
-
 def test_a_class_is_no_policy():
     with pytest.raises(InputError, match=r"^policy=Flatten is a class; .* such as Flatten\(\)$"):
         drone_rl.policy_from(nn.Flatten)
