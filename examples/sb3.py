@@ -36,8 +36,7 @@ def train(frames: int = 80_000, *, num_envs: int = 64, steps: int = 64, seed: in
 
 def success(model: PPO, episodes: int = 200) -> float:
     """Return the success rate of the greedy policy in unseen episodes."""
-    policy = drone_rl.policy_from(drone_rl.Sb3Logits(model), transforms=TRANSFORMS)
-    return drone_rl.evaluate(policy, episodes=episodes, baselines=False).success
+    return drone_rl.evaluate(model, episodes=episodes, baselines=False).success
 
 
 if __name__ == "__main__":

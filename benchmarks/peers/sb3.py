@@ -17,7 +17,7 @@ from drone_rl.config.transforms import Gray, Standardize, Transform
 from drone_rl.envs.gymnasium.environments import DroneWorlds
 from drone_rl.envs.sb3.worlds import Sb3Worlds
 from drone_rl.policies.external_policy import policy_from
-from drone_rl.policies.sb3 import Sb3Logits, Sb3Trunk
+from drone_rl.policies.sb3 import Sb3Trunk
 from drone_rl.training.trainer import running_mean
 from drone_rl.utils.errors import InputError
 
@@ -104,13 +104,6 @@ def train_sb3(
     )
     model.learn(max_frames, callback=solved)
     solved.history.append((time.time(), solved.running_reward))
-    batch = worlds.batch
     env.close()
-    policy = policy_from(
-        Sb3Logits(model),
-        task=batch.worlds.task,
-        camera=batch.worlds.camera,
-        transforms=TRANSFORMS,
-        name=f"sb3 {algorithm}",
-    )
+    policy = policy_from(model, name=f"sb3 {algorithm}")
     return PeerTraining(solved.is_reached, model.num_timesteps, solved.history, policy)

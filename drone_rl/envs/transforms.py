@@ -213,10 +213,12 @@ def memory_of(transforms: Iterable[Transform]) -> int:
 
 
 def apply_to_frames(transforms: Iterable[Transform], frames: Sequence[Tensor]) -> Tensor:
-    """Apply transforms to the last of consecutive images; stacks repeat the first if needed."""
+    """Apply transforms to the last of consecutive images; stacks pad as at an episode's start."""
     for transform in transforms:
         if isinstance(transform, CatFrames):
-            padded = [*frames[:1]] * (transform.N - 1) + [*frames]
+            is_same, value = transform.padding == "same", transform.padding_value
+            missing = frames[0] if is_same else torch.full_like(frames[0], value)
+            padded = [missing] * (transform.N - 1) + [*frames]
             windows = (padded[i : i + transform.N] for i in range(len(frames)))
             frames = [torch.cat(window, dim=transform.dim) for window in windows]
         else:

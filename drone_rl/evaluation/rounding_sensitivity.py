@@ -52,6 +52,9 @@ COMPARED = 50
 ALONE = 16
 """Episodes that a third-party network runs again one frame at a time and in other batches."""
 
+_BATCH_SIZES = (*range(1, 65), 100, 128, 200, 250, 256, 400, 500, 512, 1000)
+"""Sizes of the batches in which the same frames are evaluated."""
+
 
 def run_compared(
     env: EnvBase, actor: TensorDictModuleBase, num_episodes: int
@@ -341,4 +344,4 @@ def _require_function_of_frames(
                 f"{network.owner} depends on more than the frame: evaluated {how} it takes other "
                 f"actions in {other} of {count} episodes; {REMEDY}"
             )
-    require_same_in_any_batch(network, frames, env.batch_size[0])
+    require_same_in_any_batch(network, frames, sorted({*_BATCH_SIZES, env.batch_size[0]}))

@@ -36,7 +36,7 @@ class Region(enum.IntEnum):
 class Scenes:
     """Renders any `State` with the camera and the transforms of an environment.
 
-    Where the transforms stack frames, a single frame is repeated, as at the start of an episode.
+    Where the transforms stack frames, a single frame is padded as at the start of an episode.
     """
 
     def __init__(self, env: TransformedEnv) -> None:
@@ -69,7 +69,7 @@ class Scenes:
     def transform(self, frames: Tensor, earlier: Sequence[Tensor] = ()) -> Tensor:
         """Apply the transforms to RGB frames. Shape: (T, H, W, 3) to (T, C, h, w).
 
-        `earlier` has frames of earlier steps, oldest first; the oldest one replaces missing ones.
+        `earlier` has frames of earlier steps, oldest first; missing ones are those of a start.
         """
         return apply_to_frames(self._transforms, [*earlier, frames])
 

@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import torch
@@ -11,10 +11,23 @@ from torch import Tensor, nn
 from drone_rl.policies.networks import ImageNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.plugins import failure
+from drone_rl.utils.plugins import line_of
 
-Logits = Callable[[Any], Any]
+Function = Callable[[Any], Any]
 """From a batch of frames to logits (N, number of actions), a tensor or an array."""
+
+
+class Model(Protocol):
+    """A model of Stable-Baselines3."""
+
+    policy: Any
+
+    def get_env(self) -> Any:
+        """Return its environment, if any."""
+
+
+Logits = Function | Model
+"""What `policy_from` takes."""
 _TOLERANCE = 1e-5
 """Largest difference of the logits of one frame between two calls of a deterministic network."""
 
@@ -29,7 +42,7 @@ class ExternalNetwork(ImageNetwork):
 
     def __init__(
         self,
-        logits: Logits,
+        logits: Function,
         in_shape: tuple[int, ...],
         actions: Actions,
         *,
@@ -48,23 +61,11 @@ class ExternalNetwork(ImageNetwork):
         super().__init__()
         self.in_shape, self.actions = tuple(in_shape), actions
         self._takes_bytes = takes_bytes
-        self._logits = _copied(logits).to(device) if isinstance(logits, nn.Module) else logits
+        self._logits = copied(logits).to(device) if isinstance(logits, nn.Module) else logits
         self._logit_factor = torch.ones(self.num_actions, device=device)
         self._logit_bias = torch.zeros(self.num_actions, device=device)
         image = torch.full((1, *self.in_shape), 0.5, device=device)
-        try:
-            found = self(image)
-        except InputError:
-            raise
-        except (NameError, AttributeError, ImportError) as error:
-            raise InputError(failure("the network", error, type(logits).__name__)) from error
-        except Exception as error:
-            what = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-            given = self._given(image)
-            raise InputError(
-                f"the network can't take images of shape {tuple(given.shape)}, {given.dtype} "
-                f"({what}); give {_remedy(self.parts)}"
-            ) from error
+        found = self(image)
         if not torch.allclose(found, self(image), atol=_TOLERANCE):
             raise InputError(
                 "the network returned different logits for one image; give a deterministic network"
@@ -79,7 +80,7 @@ class ExternalNetwork(ImageNetwork):
     def forward(self, pixels: Tensor) -> Tensor:
         """See `ImageNetwork`; raise an `InputError` if the result is not finite logits."""
         flat = pixels.reshape(-1, *self.in_shape)
-        outputs = self._logits(self._given(flat))
+        outputs = self._outputs(self._given(flat))
         wanted, names = (len(flat), self.num_actions), ", ".join(self.actions.output_names)
         if not isinstance(outputs, Tensor | np.ndarray):
             raise InputError(
@@ -102,6 +103,19 @@ class ExternalNetwork(ImageNetwork):
         self._logit_factor = self._logit_factor * factor
         self._logit_bias = self._logit_bias * factor + shift
 
+    def _outputs(self, images: Tensor) -> Any:
+        try:
+            return self._logits(images)
+        except InputError:
+            raise
+        except Exception as error:
+            what = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+            where = line_of(error) or type(self._logits).__name__
+            raise InputError(
+                f"the network failed in {where} on images of shape {tuple(images.shape)}, "
+                f"{images.dtype} ({what}); {_remedy(self.parts)}"
+            ) from error
+
     def _given(self, flat: Tensor) -> Tensor:
         if not self._takes_bytes:
             return flat
@@ -109,20 +123,20 @@ class ExternalNetwork(ImageNetwork):
 
 
 def _remedy(module: nn.Module) -> str:
-    """Return what to give in place of a network that does not take the images."""
+    """Return what to do about a network that fails."""
     for parameter in module.parameters():
         if parameter.dtype != torch.float32:
-            return f"network.float(), since its parameters are {parameter.dtype}"
+            return f"give network.float(), since its parameters are {parameter.dtype}"
     return (
-        "drone_rl.policy_from its camera= and transforms=, such as drone_rl.policy_from(network, "
-        "transforms=[Rgb()]) for color images"
+        "correct it, or give drone_rl.policy_from the camera= and transforms= that it needs, such "
+        "as transforms=[Rgb()] for color images"
     )
 
 
-def _copied(module: nn.Module) -> nn.Module:
-    """Return a copy in evaluation mode."""
+def copied(module: nn.Module, memo: dict[int, Any] | None = None) -> nn.Module:
+    """Return a copy in evaluation mode; `memo` has what replaces parts, by their `id`."""
     try:
-        own = copy.deepcopy(module).eval()
+        own = copy.deepcopy(module, memo).eval()
     except Exception as error:
         raise InputError(
             f"the network {type(module).__name__} can't be copied ({type(error).__name__}); give a "
@@ -143,6 +157,6 @@ def _has_gradients(network: nn.Module, image: Tensor) -> bool:
         if not logits.requires_grad:
             return False
         (gradient,) = torch.autograd.grad(logits.sum(), image, allow_unused=True)
-    except (RuntimeError, BufferError):  # NumPy and DLPack take no tensor that requires gradients
+    except (InputError, RuntimeError):  # NumPy and DLPack take no tensor that requires gradients
         return False
     return gradient is not None

@@ -1,6 +1,7 @@
 """Third-party policies: any callable from frames to logits."""
 
 import dataclasses
+import functools
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -25,8 +26,9 @@ from drone_rl.config.configuration import Changes, as_changes
 from drone_rl.config.transforms import Frame, Gray, Rgb, Standardize, Transform, as_transforms
 from drone_rl.policies import ExternalNetwork
 from drone_rl.policies.environment import make_env
-from drone_rl.policies.external_network import Logits
+from drone_rl.policies.external_network import Function, Logits
 from drone_rl.policies.policy import BasePolicy, load_policy
+from drone_rl.policies.self_check import check_on_episodes
 from drone_rl.policies.zoo.description import output_of
 from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import Task, as_task
@@ -44,7 +46,7 @@ class ExternalPolicy(BasePolicy):
     """
 
     name: str
-    logits: Logits = dataclasses.field(repr=False)
+    logits: Function = dataclasses.field(repr=False)
     own_task: BaseTaskSettings | Task[Any]
     camera: CameraSettings
     transforms: tuple[Transform, ...]
@@ -146,33 +148,89 @@ def policy_from(
     actions: ActionSettings = MOVES_SETTINGS,
     appearance: AppearanceSettings | str = MINIMAL,
     transforms: Transform | Sequence[Transform] | None = None,
+    env: Any = None,
     name: str | None = None,
 ) -> ExternalPolicy:
     """Return a third-party policy to judge, evaluate and explain.
 
     A torch module is copied and set to evaluation mode; all explanations support it. Fewer
-    explanations support other torch functions, and still fewer support other callables.
+    explanations support other torch functions, and still fewer support other callables. The policy
+    takes a few steps, in which its logits must not depend on the batch and, of a model of
+    Stable-Baselines3, its actions must be those of the model's own `predict`.
 
     Args:
         logits: Callable from a batch of transformed frames, floats (N, C, H, W), to a logit for
-            each action, a tensor or an array (N, number of actions).
+            each action, a tensor or an array (N, number of actions); or a model of
+            Stable-Baselines3.
         task: The task, its settings, or a name such as "pillars" for the default settings.
         camera: The policy's camera. By default, its images have the size in
-            `logits.observation_shape` if there is one, as in `Sb3Logits`.
+            `logits.observation_shape` if there is one.
         dynamics: Vehicle dynamics.
         actions: The action space.
         appearance: Appearance of the scenes in training, or the name of one such as "fog".
         transforms: Transform of the image, or several in order; an empty list for the camera's RGB
             bytes (N, H, W, 3). By default `Gray` and `Standardize`, or `Rgb` if `logits` was
-            trained on color frames.
+            trained on color frames. Those of a model of Stable-Baselines3 come before the wrappers
+            of its environment.
+        env: Environment of Stable-Baselines3 in which the model was trained, with its wrappers
+            (`VecNormalize`, `VecFrameStack`, observation wrappers of Gymnasium); that of the model
+            by default. Task, camera, dynamics and actions default to those of the environment.
         name: Name in reports; that of the callable by default.
 
     Raises:
-        InputError: It does not accept such frames, or does not return one logit for each action.
+        InputError: It does not accept such frames, does not return one logit for each action, or
+            acts otherwise than its library.
     """
-    if isinstance(logits, str | Path | BasePolicy):
+    network = _checked_logits(logits, env)
+    if camera is not None:
+        Instance(CameraSettings).read(camera, "camera")
+    Instance(DynamicsSettings).read(dynamics, "dynamics")
+    dynamics.check_air()
+    Instance(ActionSettings).read(actions, "actions")
+    if isinstance(task, str):
+        task = settings_of(task, "task")()
+    given = None if transforms is None else as_transforms(transforms)
+    own: Mapping[str, Any] = getattr(network, "conditions", {})
+    observations: Any = getattr(network, "observations", None)
+    is_default = dynamics is COMPUTER_VISION, actions is MOVES_SETTINGS
+    policy = ExternalPolicy(
+        name=name or own.get("name") or getattr(network, "__name__", type(network).__name__),
+        logits=network,
+        own_task=task or own.get("task") or TaskSettings(),
+        camera=camera or own.get("camera") or _camera_of(network),
+        transforms=(
+            _transforms_of(network, given)
+            if observations is None
+            else observations.all_transforms(given)
+        ),
+        own_dynamics=own.get("dynamics", dynamics) if is_default[0] else dynamics,
+        actions=own.get("actions", actions) if is_default[1] else actions,
+        own_appearance=Instance(AppearanceSettings).read(appearance, "appearance"),
+    )
+    policy.make_network()  # raises errors early
+    if observations is None:
+        check_on_episodes(policy)
+    else:
+        model: Any = network
+        predict = functools.partial(model.predict, transforms=given)
+        check_on_episodes(policy, predict, observations.names)
+    return policy
+
+
+def _checked_logits(logits: Any, env: Any) -> Function:
+    """Return the callable, of a model of Stable-Baselines3 its logits; see `policy_from`."""
+    owner = getattr(logits, "__self__", logits)  # of a bound method, such as policy.act_batch
+    if isinstance(owner, str | Path | BasePolicy):
+        what = f"policy={owner.name}" if isinstance(owner, BasePolicy) else shown(owner)
+        raise InputError(f"policy_from takes callables; give {what} itself to judge or explain")
+    if _is_sb3_model(logits):
+        from drone_rl.policies.sb3 import Sb3Logits  # needs Stable-Baselines3
+
+        return Sb3Logits(logits, env)
+    if env is not None:
         raise InputError(
-            f"policy_from takes callables; give {shown(logits)} itself to judge or explain"
+            f"env= is of models of Stable-Baselines3, but policy={shown(logits)} is none; give "
+            "task=, camera= and transforms="
         )
     if isinstance(logits, type):
         raise InputError(
@@ -183,36 +241,19 @@ def policy_from(
             f"policy={shown(logits)} is no policy; give a callable from images to logits, or the "
             "name or file of a policy"
         )
-    if camera is not None:
-        Instance(CameraSettings).read(camera, "camera")
-    Instance(DynamicsSettings).read(dynamics, "dynamics")
-    dynamics.check_air()
-    Instance(ActionSettings).read(actions, "actions")
-    if isinstance(task, str):
-        task = settings_of(task, "task")()
-    policy = ExternalPolicy(
-        name=name or getattr(logits, "__name__", type(logits).__name__),
-        logits=logits,
-        own_task=task or TaskSettings(),
-        camera=camera or _camera_of(logits),
-        transforms=_transforms_of(logits) if transforms is None else as_transforms(transforms),
-        own_dynamics=dynamics,
-        actions=actions,
-        own_appearance=Instance(AppearanceSettings).read(appearance, "appearance"),
-    )
-    policy.make_network()  # raises errors early
-    return policy
+    return logits
 
 
-def _camera_of(logits: Logits) -> CameraSettings:
+def _camera_of(logits: Function) -> CameraSettings:
     shape = getattr(logits, "observation_shape", None)
     return CameraSettings() if shape is None else CameraSettings(height=shape[1], width=shape[2])
 
 
-def _transforms_of(logits: Logits) -> tuple[Transform, ...]:
+def _transforms_of(logits: Function, given: tuple[Transform, ...] | None) -> tuple[Transform, ...]:
+    if given is not None:
+        return given
     shape = getattr(logits, "observation_shape", None)
-    is_color = getattr(logits, "observes_bytes", False) or (shape is not None and shape[0] == 3)
-    return (Rgb(),) if is_color else (Gray(), Standardize())
+    return (Rgb(),) if shape is not None and shape[0] == 3 else (Gray(), Standardize())
 
 
 def _is_sb3_model(which: Any) -> bool:
@@ -246,10 +287,5 @@ def as_policy(
 def _converted(which: str | Path | BasePolicy | Logits, outputs: str | Path) -> BasePolicy:
     if isinstance(which, BasePolicy):
         return which
-    if _is_sb3_model(which):
-        from drone_rl.policies.sb3 import Sb3Logits  # needs Stable-Baselines3
-
-        model: Any = which
-        return policy_from(Sb3Logits(model), name=f"{type(model).__name__} of Stable-Baselines3")
     is_file = isinstance(which, str | Path)
     return load_policy(which, outputs=outputs) if is_file else policy_from(which)

@@ -12,7 +12,7 @@ Winograd's or Fourier's transform.
 
 import copy
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Self
 
 import torch
@@ -276,16 +276,13 @@ class Regrouped(ImageNetwork):
 
 
 @torch.no_grad()
-def require_same_in_any_batch(network: ImageNetwork, frames: Tensor, largest: int) -> None:
-    """Raise an `InputError` if outputs for frames (N, C, H, W) depend on the size of the batch.
-
-    Many sizes are tried, `largest` among them.
-    """
+def require_same_in_any_batch(network: ImageNetwork, frames: Tensor, sizes: Iterable[int]) -> None:
+    """Raise an `InputError` if outputs for frames (N, C, H, W) depend on the size of the batch."""
     rows = torch.linspace(0, len(frames) - 1, min(len(frames), 64)).long().to(frames.device)
     frames = frames[rows]
     alone = torch.cat([network(frame) for frame in frames.split(1)])
     allowed = TOLERANCE * (1 + alone.abs().amax(-1))
-    for size in sorted({*range(1, 65), 100, 128, 200, 250, 256, 400, 500, 512, 1000, largest}):
+    for size in sizes:
         which = (torch.arange(size, device=frames.device) + size) % len(frames)
         difference = (network(frames[which]) - alone[which]).abs().amax(-1)
         if bool((difference > allowed[which]).any()):

@@ -1,5 +1,7 @@
 """Networks of this project in Stable-Baselines3, and its policies as networks of this project."""
 
+import copy
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -7,86 +9,111 @@ import torch
 from torch import Tensor, nn
 
 from drone_rl.config.networks import Network, SmallCnn
+from drone_rl.config.transforms import Transform
+from drone_rl.policies.external_network import copied
 from drone_rl.policies.networks import PolicyNetwork
 from drone_rl.utils.errors import InputError, extra
 from drone_rl.utils.schema import shown
 
 extra("stable_baselines3", "sb3", "drone_rl.policies.sb3")
 
-from gymnasium import spaces  # noqa: E402 (after the check that the extra is installed)
+import gymnasium  # noqa: E402 (after the check that the extra is installed)
+from gymnasium import spaces  # noqa: E402
 from stable_baselines3.common.base_class import BaseAlgorithm  # noqa: E402
 from stable_baselines3.common.policies import ActorCriticPolicy  # noqa: E402
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor  # noqa: E402
+from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv  # noqa: E402
 
-_SAME = 1e-4
-"""Log-probabilities that differ by less count as equal."""
+from drone_rl.policies.sb3_observations import Observations, to_space  # noqa: E402
 
 
 class Sb3Logits(nn.Module):
-    """The logits of a PPO or A2C policy: `drone_rl.judge(Sb3Logits(model))`.
-
-    A policy that was trained on bytes gets frames from 0 to 1, as from the transform `Rgb`.
+    """The log-probabilities of a PPO or A2C policy, a copy in evaluation mode; see `policy_from`.
 
     Raises:
-        InputError: It is no model, or no actor-critic with discrete actions, is recurrent, or needs
-            more than one array.
+        InputError: It is no model, or no actor-critic with discrete actions, or needs a state, more
+            than one array, or an environment that was not given.
     """
 
-    def __init__(self, model: BaseAlgorithm) -> None:
-        """Take the modules between frame and logits, which it shares with the model."""
+    def __init__(self, model: BaseAlgorithm, env: VecEnv | gymnasium.Env | None = None) -> None:
+        """Copy the policy; read the wrappers of its environment, by default those of the model."""
         super().__init__()
         if not isinstance(model, BaseAlgorithm):
             raise InputError(
                 f"model={shown(model)} is no model of Stable-Baselines3; give one, such as "
                 "stable_baselines3.PPO.load(path)"
             )
-        policy, space = model.policy, model.policy.observation_space
-        if not isinstance(policy, ActorCriticPolicy) or not hasattr(policy.action_space, "n"):
-            raise _refusal(model)
-        if not isinstance(space, spaces.Box):
-            raise _refusal(model)
-        self.observes_bytes = space.dtype == np.uint8
-        self.observation_shape = _channels_first(space.shape)
-        self.scale = 255.0 if self.observes_bytes and not policy.normalize_images else 1.0
-        self.trunk = policy.pi_features_extractor
-        self.hidden = policy.mlp_extractor.policy_net
-        self.logits = policy.action_net
-        if not self._agrees(policy):
-            raise _refusal(model)
+        kind, space = type(model).__name__, model.policy.observation_space
+        is_discrete = isinstance(model.policy.action_space, spaces.Discrete)
+        is_actor = isinstance(model.policy, ActorCriticPolicy) and is_discrete
+        if not is_actor or not isinstance(space, spaces.Box):
+            raise InputError(
+                f"the policy of {kind} gives no logits of a single image; give one of PPO or A2C "
+                "with discrete actions, or a callable from images to logits"
+            )
+        self.policy: Any = _copy_of(model.policy)
+        sample = np.zeros((1, *space.shape), space.dtype)
+        _, state = self.policy.predict(sample, deterministic=True)
+        if state is not None:
+            raise InputError(
+                f"the policy of {kind} is recurrent: it needs its state of the frames before; give "
+                "a policy of single images, or of a stack of them (VecFrameStack)"
+            )
+        given = model.get_env() if env is None else _as_vec_env(env)
+        self.observations = Observations(given, space)
+        if model.get_vec_normalize_env() and "VecNormalize" not in self.observations.names:
+            raise InputError(
+                f"{kind} was trained with VecNormalize, which its environment lacks; give "
+                "drone_rl.policy_from env=, the environment of the training with its wrappers"
+            )
+        self.conditions = {"name": f"{kind} of Stable-Baselines3", **self.observations.conditions}
 
-    observes_bytes: bool
-    """Whether the model was trained on frames of bytes; three channels are RGB."""
-    observation_shape: tuple[int, ...] | None
-    """Of one frame, channels first; None if the model was not trained on frames."""
+    conditions: dict[str, Any]
+    """Name, camera, task, dynamics and actions, as far as they are known."""
 
     def forward(self, pixels: Tensor) -> Tensor:
-        """Frames (N, C, H, W) to logits (N, number of actions)."""
-        return self.logits(self.hidden(self.trunk(pixels * self.scale)))
+        """Frames (N, C, H, W), bytes as 0 to 1, to log-probabilities (N, number of actions)."""
+        seen = to_space(pixels, self.observations.space)
+        return self._log_probabilities(seen)
 
-    @torch.no_grad()
-    def _agrees(self, policy: ActorCriticPolicy) -> bool:
-        """Return whether it gives the policy's logits of a random image; recurrent ones differ."""
-        shape = policy.observation_space.shape or ()
-        image = torch.rand(1, *shape, generator=torch.Generator().manual_seed(0)).to(policy.device)
-        try:
-            given = image * 255.0 if self.observes_bytes else image
-            distribution: Any = policy.get_distribution(given).distribution
-        except TypeError:
-            return False
-        own = self(image).log_softmax(-1)
-        return bool(torch.allclose(own, distribution.logits, atol=_SAME))
+    def predict(
+        self, frames: Tensor, transforms: Sequence[Transform] | None = None
+    ) -> tuple[Tensor, Tensor]:
+        """Return what the library itself does in an episode, with its wrappers.
+
+        Args:
+            frames: RGB, uint8. Shape: (T, H, W, 3).
+            transforms: Those up to the wrappers, where the environment's are unknown.
+
+        Returns:
+            The deterministic actions, (T,), and the log-probabilities, (T, number of actions).
+        """
+        seen = self.observations.of_episode(frames, transforms)
+        actions, _ = self.policy.predict(seen, deterministic=True)
+        tensor, _ = self.policy.obs_to_tensor(seen)
+        return torch.from_numpy(actions), self._log_probabilities(tensor)
+
+    def _log_probabilities(self, seen: Tensor) -> Tensor:
+        made = self.policy.get_distribution(seen)
+        logits = made.distribution.logits
+        made.distribution = None  # the policy holds it, and torch copies no results
+        return logits
 
 
-def _channels_first(shape: tuple[int, ...]) -> tuple[int, ...] | None:
-    if len(shape) != 3:
-        return None
-    return shape if shape[0] <= shape[-1] else (shape[-1], *shape[:-1])
+def _copy_of(policy: Any) -> nn.Module:
+    """Return a copy without the optimizer and without the last distribution."""
+    actions: Any = copy.copy(policy.action_dist)
+    actions.distribution = None
+    return copied(policy, {id(policy.action_dist): actions, id(policy.optimizer): None})
 
 
-def _refusal(model: BaseAlgorithm) -> InputError:
-    return InputError(
-        f"the policy of {type(model).__name__} gives no logits of a single image; give one of PPO "
-        "or A2C with discrete actions, or a callable from images to logits"
+def _as_vec_env(env: VecEnv | gymnasium.Env) -> VecEnv:
+    if isinstance(env, VecEnv):
+        return env
+    if isinstance(env, gymnasium.Env):
+        return DummyVecEnv([lambda: env])
+    raise InputError(
+        f"env={shown(env)} is no environment of Stable-Baselines3; give the one of the training"
     )
 
 

@@ -66,8 +66,10 @@ SMALLER = {
     },
     "docs/tutorials/sb3.md": {
         "num_envs=32": "num_envs=4",
-        "n_steps=128, batch_size=512": "n_steps=16, batch_size=64",
-        "40_000": "64",
+        '"n_steps": 128': '"n_steps": 16',
+        '"batch_size": 512': '"batch_size": 64',
+        "n_eval_episodes=200, eval_freq=128": "n_eval_episodes=4, eval_freq=16",
+        "200_000": "64",
         "episodes=400": "episodes=8",
         'folder="outputs/explain/sb3"': 'folder="sb3", frames=30, episodes=6, perplexity=5',
     },

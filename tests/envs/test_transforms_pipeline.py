@@ -46,9 +46,10 @@ def test_film_is_transformed_per_frame_and_stacked():
     assert (memory_of([standard, stack]), memory_of([standard])) == (2, 0)
 
 
+@pytest.mark.parametrize("padding", ["same", "constant"])
 @pytest.mark.parametrize("sizes", [(3,), (2, 2), (2, 3)])
-def test_stacks_of_stacks_are_those_of_the_environment(sizes):
-    stacks = [CatFrames(N=n, dim=-3, in_keys=["pixels"]) for n in sizes]
+def test_stacks_of_stacks_are_those_of_the_environment(sizes, padding):
+    stacks = [CatFrames(N=n, dim=-3, in_keys=["pixels"], padding=padding) for n in sizes]
     env, film = with_transforms(DroneEnv(2), [GrayPixels(), *stacks]), []
     transforms, state = [*env.transform], env.reset()
     for _ in range(6):

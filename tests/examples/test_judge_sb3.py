@@ -29,8 +29,10 @@ def test_a_model_is_trained_saved_judged_and_explained(example, tmp_path, capsys
     verdict, *_, report = capsys.readouterr().out.splitlines()
     assert "episodes are too few to be certain" in verdict
     page = Path(report).read_text()
-    assert "Grad-CAM of layer trunk.cnn.5" in page  # the nonlinearity after the last convolution
-    assert "features of layer trunk.linear.1" in page
+    assert (
+        "Grad-CAM of layer policy.features_extractor.cnn.5" in page
+    )  # the nonlinearity after the last convolution
+    assert "features of layer policy.features_extractor.linear.1" in page
     assert "What is left out" not in page
 
 

@@ -117,29 +117,6 @@ def test_accepted_types_of_policies(network):
     assert as_policy(network).logits is network
 
 
-def test_stable_baselines3_model_uses_its_training_observations():
-    """It observes RGB bytes, as the Gymnasium environments in the README return them."""
-    gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
-    sb3 = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
-    env = gymnasium.make(
-        "drone_rl/CollectCubes-v0", camera=drone_rl.CameraSettings(width=48, height=40)
-    )
-    model = sb3.A2C("CnnPolicy", env, seed=0)
-    for given in (model, drone_rl.Sb3Logits(model)):
-        policy = as_policy(given)
-        assert policy.transforms == (Rgb(),)
-        assert (policy.camera.height, policy.camera.width) == (40, 48)
-    few = {**FEW, "episodes": 2}
-    (done,) = drone_rl.judge([model], **few)
-    assert done.name == "A2C of Stable-Baselines3"
-    frames = env.observation_space.sample()[None]
-    network = as_policy(model).make_network()
-    images = torch.from_numpy(frames).movedim(-1, 1).float() / 255
-    wanted = model.policy.get_distribution(torch.from_numpy(frames).movedim(-1, 1)).distribution
-    torch.testing.assert_close(network(images).softmax(-1), wanted.probs)
-    env.close()
-
-
 def test_network_attributes_define_transforms():
     class Color:
         observation_shape = (3, 8, 9)
@@ -159,7 +136,7 @@ def test_network_attributes_define_transforms():
     ("given", "options", "message"),
     [
         (3, {}, "policy=3 is no policy; give a callable from images to logits, or the name"),
-        (nn.Linear(9, 3), {}, r"the network can't take images of shape \(1, 1, 25, 64\)"),
+        (nn.Linear(9, 3), {}, r"the network failed in Linear on images of shape \(1, 1, 25, 64\)"),
         (lambda x: left(x)[:, :2], {}, r"the network returned logits of shape \(1, 2\); give one"),
         (left, {"transforms": [Resize()]}, "the transform resize needs floats; put gray before"),
         (left, {"transforms": [Gray(), Gray()]}, "the transform gray needs the camera's bytes"),
@@ -272,6 +249,12 @@ def test_wind_that_moves_nothing_is_refused():
 def test_functions_of_dlpack_have_no_gradients():
     policy = drone_rl.policy_from(lambda x: np.from_dlpack(x).reshape(len(x), -1)[:, :3])
     assert not policy.make_network().is_differentiable
+
+
+def test_methods_of_a_policy_are_refused_by_its_name():
+    policy = drone_rl.load_policy("good")
+    with pytest.raises(InputError, match=r"^policy_from takes callables; give policy=good itself"):
+        drone_rl.policy_from(policy.act_batch)
 
 
 def test_a_class_is_no_policy():

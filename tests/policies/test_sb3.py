@@ -1,135 +1,94 @@
-"""Logits of Stable-Baselines3 models, compared with hand-computed ones and the model."""
+"""Models of Stable-Baselines3 are copied, and refused where a single image does not decide."""
+
+import copy
 
 import numpy as np
 import pytest
 import torch
-from torch import nn
 
-from drone_rl.policies import ExternalNetwork
-from drone_rl.sim.actions import MOVES
+import drone_rl
+from drone_rl.config.transforms import Gray
+from drone_rl.policies.external_policy import as_policy
 from drone_rl.utils.errors import InputError
-
-gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
-sb3 = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
-from drone_rl.policies.sb3 import Sb3Logits, _channels_first  # noqa: E402 (after the skip)
-
-
-class StaticEnv(gymnasium.Env):
-    """An environment without dynamics."""
-
-    action_space = gymnasium.spaces.Discrete(3)
-
-    def __init__(self, space):
-        self.observation_space = space
-
-    def reset(self, *, seed=None, options=None):
-        return self.observation_space.sample(), {}
-
-    def step(self, action):
-        return self.observation_space.sample(), float(action), False, False, {}
-
-
-BYTES = gymnasium.spaces.Box(0, 255, (40, 48, 3), np.uint8)
-FLOATS = gymnasium.spaces.Box(-1, 1, (3,), np.float32)
-
-
-def test_byte_observations_are_scaled_from_0_to_1():
-    model = sb3.A2C("CnnPolicy", StaticEnv(BYTES), seed=0)
-    frames = np.stack([BYTES.sample() for _ in range(4)])
-    images = torch.from_numpy(frames).movedim(-1, 1).float() / 255
-    probabilities = Sb3Logits(model)(images).softmax(-1)
-    bytes_first = torch.from_numpy(frames).movedim(-1, 1)
-    wanted = model.policy.get_distribution(bytes_first).distribution.probs
-    torch.testing.assert_close(probabilities, wanted)
-    images.requires_grad_()
-    (gradient,) = torch.autograd.grad(Sb3Logits(model)(images)[:, 0].sum(), images)
-    assert gradient.abs().sum() > 0
-
-
-@pytest.mark.parametrize(
-    ("space", "shape", "is_bytes"),
-    [
-        (BYTES, (3, 40, 48), True),
-        (gymnasium.spaces.Box(0, 255, (3, 40, 48), np.uint8), (3, 40, 48), True),
-        (gymnasium.spaces.Box(-1, 1, (1, 40, 48), np.float32), (1, 40, 48), False),
-    ],
+from tests.policies.sb3_models import (
+    CAMERA,
+    NAME,
+    Playback,
+    batched,
+    gymnasium,
+    make_model,
+    of_floats,
+    sb3,
 )
-def test_observation_shape_and_type_are_read_from_the_model(space, shape, is_bytes):
-    kwargs = {"normalize_images": is_bytes}
-    model = sb3.A2C(
-        "CnnPolicy" if is_bytes else "MlpPolicy", StaticEnv(space), policy_kwargs=kwargs
-    )
-    logits = Sb3Logits(model)
-    assert (logits.observation_shape, logits.observes_bytes) == (shape, is_bytes)
+
+policies = pytest.importorskip("stable_baselines3.common.policies")
 
 
-def test_float_observations_are_unchanged():
-    model = sb3.PPO("MlpPolicy", StaticEnv(FLOATS), seed=0, policy_kwargs={"net_arch": []})
-    with torch.no_grad():
-        model.policy.action_net.weight.copy_(torch.eye(3))
-        model.policy.action_net.bias.zero_()
-    assert Sb3Logits(model).observation_shape is None
-    probabilities = Sb3Logits(model)(torch.tensor([[0.0, 1.0, -1.0]])).softmax(-1)
-    torch.testing.assert_close(probabilities, torch.tensor([[0.0, 1.0, -1.0]]).softmax(-1))
+@pytest.mark.parametrize("kind", ["Dropout", "BatchNorm", "normalized"])
+def test_model_and_random_numbers_stay_as_they_were(kind):
+    model = make_model(kind)
+    model.policy.train()
+    normalization = copy.deepcopy(model.get_vec_normalize_env())
+    before = copy.deepcopy(model.policy.state_dict())
+    states = torch.get_rng_state(), np.random.get_state()[1].copy()
+    as_policy(model)
+    assert all(part.training for part in model.policy.modules())
+    after = model.policy.state_dict()
+    assert all(torch.equal(after[name], value) for name, value in before.items())
+    assert torch.equal(torch.get_rng_state(), states[0])
+    assert (np.random.get_state()[1] == states[1]).all()
+    if normalization is not None:
+        assert (model.get_vec_normalize_env().obs_rms.mean == normalization.obs_rms.mean).all()
 
 
-def test_unnormalized_byte_observations_are_supported():
-    kwargs = {"normalize_images": False}
-    model = sb3.A2C("CnnPolicy", StaticEnv(BYTES), seed=0, policy_kwargs=kwargs)
-    frame = torch.from_numpy(BYTES.sample()).movedim(-1, 0)[None]
-    wanted = model.policy.get_distribution(frame.float()).distribution.probs
-    torch.testing.assert_close(Sb3Logits(model)(frame / 255).softmax(-1), wanted)
+def test_trained_models_are_copied():
+    env = batched(Gray())(gymnasium.make(NAME, camera=CAMERA))
+    model = sb3.PPO("MlpPolicy", env, n_steps=4, batch_size=4, **of_floats()).learn(4)
+    network = as_policy(model).make_network()
+    image = torch.rand(1, 1, 40, 48, generator=torch.Generator().manual_seed(0))
+    before = network(image.requires_grad_())
+    model.learn(4)
+    assert torch.equal(copy.deepcopy(network)(image), before)
 
 
-def test_trained_model_is_copied():
-    model = sb3.A2C("MlpPolicy", StaticEnv(FLOATS), n_steps=5, seed=0).learn(5)
-    network = ExternalNetwork(nn.Sequential(nn.Flatten(), Sb3Logits(model)), (1, 1, 3), MOVES)
-    before = network(torch.ones(1, 1, 1, 3))
-    model.learn(5)
-    assert torch.equal(network(torch.ones(1, 1, 1, 3)), before)
+def test_a_normalization_that_is_missing_is_refused(tmp_path):
+    model, plain_env = make_model("normalized bytes"), make_model("bytes, MLP").get_env()
+    with pytest.raises(InputError, match=r"^PPO was trained with VecNormalize, which its env"):
+        drone_rl.policy_from(model, env=plain_env)
 
 
-def test_policy_with_custom_forward_raises():
-    model = sb3.PPO("MlpPolicy", StaticEnv(FLOATS), seed=0)
-    with torch.no_grad():  # so that the two networks differ
-        model.policy.mlp_extractor.value_net[0].bias.fill_(1.0)
-        model.policy.action_net.weight.mul_(100)
-    model.policy.mlp_extractor.forward_actor = model.policy.mlp_extractor.forward_critic
-    with pytest.raises(InputError, match=r"^the policy of PPO gives no logits of a single image"):
-        Sb3Logits(model)
+class Remembering(policies.ActorCriticPolicy):
+    """A recurrent policy, as far as its interface goes."""
+
+    def get_distribution(self, obs, lstm_states, episode_starts):
+        raise AssertionError("it needs a state")
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        return np.zeros(len(observation), np.int64), (np.zeros((1, len(observation), 8)),)
 
 
-def test_a_path_is_no_model():
+def test_recurrent_models_are_refused():
+    model = sb3.PPO(Remembering, gymnasium.make(NAME, camera=CAMERA))
+    with pytest.raises(InputError, match=r"^the policy of PPO is recurrent: it needs its state"):
+        as_policy(model)
+
+
+def test_models_without_logits_of_an_image_are_refused():
+    space = gymnasium.spaces.Box(-1, 1, (3,), np.float32)
+    env = Playback(np.zeros((1, 2, 3)))
+    env.observation_space = space
+    refused = [sb3.DQN("MlpPolicy", env, buffer_size=10)]
+    env.observation_space = gymnasium.spaces.Dict({"a": space, "b": space})
+    refused.append(sb3.PPO("MultiInputPolicy", env))
+    for model in refused:
+        with pytest.raises(InputError, match=r"^the policy of \w+ gives no logits of a single"):
+            as_policy(model)
+
+
+def test_other_values_are_no_models_and_no_environments():
     with pytest.raises(InputError, match=r"model='model.zip' is no model.*PPO\.load\(path\)"):
-        Sb3Logits("model.zip")
-
-
-def test_model_without_action_probabilities_raises():
-    model = sb3.DQN("MlpPolicy", StaticEnv(FLOATS), buffer_size=10)
-    with pytest.raises(InputError, match=r"^the policy of DQN gives no logits of a single image"):
-        Sb3Logits(model)
-
-
-def test_model_of_several_observations_raises():
-    space = gymnasium.spaces.Dict({"a": FLOATS, "b": FLOATS})
-    model = sb3.PPO("MultiInputPolicy", StaticEnv(space), seed=0)
-    with pytest.raises(InputError, match=r"^the policy of PPO gives no logits of a single image"):
-        Sb3Logits(model)
-
-
-def test_model_that_scales_features_itself_raises():
-    """Its logits of a black image are the same."""
-    model = sb3.PPO("MlpPolicy", StaticEnv(FLOATS), seed=0)
-    network = model.policy.mlp_extractor
-    network.forward_actor = lambda features: network.policy_net(0.5 * features)
-    with torch.no_grad():
-        model.policy.action_net.weight.mul_(100)
-    with pytest.raises(InputError, match=r"^the policy of PPO gives no logits of a single image"):
-        Sb3Logits(model)
-
-
-def test_the_smaller_end_of_a_shape_is_the_channels():
-    assert _channels_first((40, 48, 3)) == (3, 40, 48)
-    assert _channels_first((3, 40, 48)) == (3, 40, 48)
-    assert _channels_first((3, 5, 3)) == (3, 5, 3)  # either; as it is
-    assert _channels_first((40, 48)) is None
+        drone_rl.Sb3Logits("model.zip")
+    with pytest.raises(InputError, match=r"^env='venv' is no environment of Stable-Baselines3"):
+        drone_rl.policy_from(make_model("bytes, CNN"), env="venv")
+    with pytest.raises(InputError, match=r"^env= is of models of Stable-Baselines3"):
+        drone_rl.policy_from(lambda images: images[:, :3], env="venv")

@@ -124,9 +124,12 @@ class WorldBatch:
         options.dynamics.check_air()
         changes = {name: value for name, value in given.items() if name not in own}
         check_device(options.device)
+        self.options = options
+        self.task = _chosen_task(task, changes)
+        """The task or its settings."""
         self.worlds = Worlds(
             num_envs,
-            _make_task(task, changes),
+            as_task(self.task),
             options.camera,
             dynamics=options.dynamics,
             actions=options.actions,
@@ -190,7 +193,7 @@ class WorldBatch:
         return worlds.render(worlds.state, view).cpu().numpy()
 
 
-def _make_task(task: Chosen, changes: Mapping[str, Any]) -> Task[Any]:
+def _chosen_task(task: Chosen, changes: Mapping[str, Any]) -> BaseTaskSettings | Task[Any]:
     chosen: Any = settings_of(task, "task")() if isinstance(task, str) else task or TaskSettings()
     known = kinds_of(type(chosen)) if isinstance(chosen, Settings) else {}
     for name in changes:
@@ -199,4 +202,4 @@ def _make_task(task: Chosen, changes: Mapping[str, Any]) -> Task[Any]:
             meant = did_you_mean(name, there)
             raise InputError(f"{name} is unknown; valid names: {', '.join(there)}{meant}")
     made: Any = chosen.replace(**changes) if changes else chosen
-    return as_task(made)
+    return made

@@ -55,11 +55,12 @@ class Sb3Worlds(VecEnv):
         if strange := [t.name for t in transforms if isinstance(t, Fault)]:
             raise InputError(f"the transform {strange[0]} needs a TorchRL environment; omit it")
         self.env = env
+        self.transforms = transforms
         self._transform = on_pixels([transform.make() for transform in transforms])
         self._actions: NDArray[Any] = np.zeros(env.num_envs, np.int64)
         space = env.single_observation_space
         if transforms:
-            seen = self._seen(np.zeros((1, *(space.shape or ())), space.dtype))[0]
+            seen = self.observe(np.zeros((1, *(space.shape or ())), space.dtype))[0]
             space = spaces.Box(-np.inf, np.inf, seen.shape, np.float32)
         super().__init__(env.num_envs, space, env.single_action_space)
 
@@ -70,7 +71,7 @@ class Sb3Worlds(VecEnv):
         seen, info = self.env.reset(seed=self._seeds)  # pyright: ignore[reportArgumentType] (one a world, as SyncVectorEnv)
         self.reset_infos = [_of_world(info, i) for i in range(self.num_envs)]
         self._reset_seeds()
-        return self._seen(seen)
+        return self.observe(seen)
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Store the actions."""
@@ -88,14 +89,18 @@ class Sb3Worlds(VecEnv):
         infos: list[dict[str, Any]] = [{} for _ in done]
         if done.any():
             worlds = np.flatnonzero(done)
-            last = self._seen(np.stack([info["final_obs"][i] for i in worlds]))
+            last = self.observe(np.stack([info["final_obs"][i] for i in worlds]))
             for i, observation in zip(worlds.tolist(), last, strict=True):
                 infos[i] = {
                     **_of_world(info["final_info"], i),
                     "terminal_observation": observation,
                     "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
                 }
-        return self._seen(seen), rewards.astype(np.float32), done, infos
+        return self.observe(seen), rewards.astype(np.float32), done, infos
+
+    def observe(self, images: NDArray[Any]) -> NDArray[Any]:
+        """Apply the transforms to images, (N, H, W, 3)."""
+        return self._transform(torch.from_numpy(images)).numpy()
 
     def close(self) -> None:
         """Close the renderer."""
@@ -124,9 +129,6 @@ class Sb3Worlds(VecEnv):
     ) -> list[bool]:
         """Return False for each environment."""
         return [False for _ in self._get_indices(indices)]
-
-    def _seen(self, images: NDArray[Any]) -> NDArray[Any]:
-        return self._transform(torch.from_numpy(images)).numpy()
 
 
 def _of_world(info: dict[str, Any], world: int) -> dict[str, Any]:

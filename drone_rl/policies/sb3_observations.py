@@ -1,0 +1,344 @@
+"""Observations of Stable-Baselines3 models: what the wrappers of an environment do to frames."""
+
+import copy
+import itertools
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+import torch
+from gymnasium import ObservationWrapper, RewardWrapper, Wrapper, spaces
+from gymnasium.vector import (
+    SyncVectorEnv,
+    VectorEnv,
+    VectorObservationWrapper,
+    VectorRewardWrapper,
+    VectorWrapper,
+)
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import (
+    DummyVecEnv,
+    VecEnv,
+    VecEnvWrapper,
+    VecFrameStack,
+    VecNormalize,
+    VecTransposeImage,
+)
+from stable_baselines3.common.vec_env.stacked_observations import StackedObservations
+from torch import Tensor
+
+from drone_rl.config import CameraSettings
+from drone_rl.config.transforms import Frame, Rgb, Stack, Transform
+from drone_rl.envs.gymnasium.environments import DroneWorld, DroneWorlds
+from drone_rl.envs.sb3.worlds import Sb3Worlds
+from drone_rl.envs.transforms import PixelTransform, on_pixels
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Instance, Whole
+
+Function = Callable[[NDArray[Any]], NDArray[Any]]
+"""A batch of observations to a batch of observations."""
+_LIBRARIES = ("gymnasium.", "stable_baselines3.")
+
+
+class Observations:
+    """How an environment makes a model's observations from camera frames.
+
+    It reads the wrappers and copies those with statistics; the environment does not change.
+    """
+
+    def __init__(self, env: VecEnv | None, space: spaces.Box) -> None:
+        """Read the wrappers of an environment with observations of `space`; None: only the space.
+
+        Raises:
+            InputError: The environment observes the ground truth instead of images.
+        """
+        wrappers, world = _unwrap(env)
+        self.space, self.names = space, [type(wrapper).__name__ for wrapper in wrappers]
+        self.conditions: dict[str, Any] = _conditions(world)
+        self.transforms: tuple[Transform, ...] | None = None
+        self.reason = "no environment is given" if env is None else "it observes no RGB images"
+        first = space if world is None else _space_of(world)
+        if _is_color(first):
+            self.transforms = (Rgb(),)
+            self.conditions.setdefault("camera", _camera(first))
+        if wrappers and isinstance(wrappers[0], Sb3Worlds):
+            self.transforms, wrappers = wrappers[0].transforms, wrappers[1:]
+        unknown = [i for i, wrapper in enumerate(wrappers) if not _is_known(wrapper)]
+        if unknown:
+            self.transforms, self.reason = None, f"it has {type(wrappers[unknown[-1]]).__name__}"
+            wrappers = wrappers[unknown[-1] + 1 :]
+        if all(isinstance(wrapper, VecTransposeImage) for wrapper in wrappers):
+            wrappers = []  # `to_space` moves the channels
+        self._wrappers = wrappers
+        self._inner = _space_of(_inside(wrappers[0])) if wrappers else space
+
+    space: spaces.Box
+    """Of the model."""
+    names: list[str]
+    """Names of the wrappers that change observations, the innermost first."""
+    conditions: dict[str, Any]
+    """Camera, task, dynamics and actions of the environment, as far as they are known."""
+    transforms: tuple[Transform, ...] | None
+    """From the camera to the innermost wrapper; None if unknown."""
+    reason: str
+    """Why they are unknown."""
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Observations":
+        """Return itself, so that copies of a network share the environment."""
+        return self
+
+    def all_transforms(self, given: Sequence[Transform] | None = None) -> tuple[Transform, ...]:
+        """Return the transforms from the camera's frame to (C, H, W) with those of the wrappers.
+
+        Args:
+            given: Transforms up to the wrappers; by default those of the environment.
+
+        Raises:
+            InputError: There are none, and those of the environment are unknown.
+        """
+        first = self.transforms if given is None else tuple(given)
+        if first is None:
+            raise InputError(
+                f"the model observes {self.space.dtype} of shape {self.space.shape}, and how its "
+                f"environment makes them from images is unknown ({self.reason}); give "
+                "drone_rl.policy_from env=, the environment of the training with its wrappers, or "
+                "transforms="
+            )
+        if not self._wrappers:
+            return first
+        steps: list[Transform] = []
+        functions: list[Function] = [_into(self._inner)]
+        for is_stack, some in itertools.groupby(
+            self._wrappers, lambda wrapper: isinstance(wrapper, VecFrameStack)
+        ):
+            if not is_stack:
+                functions += map(_function, some)
+                continue
+            for wrapper in some:
+                steps += [Wrapped(functions=Functions(functions)), _stack(wrapper)]
+                functions = []
+        functions.append(_from(self.space))
+        return (*first, *steps, Wrapped(functions=Functions(functions)))
+
+    def of_episode(self, frames: Tensor, given: Sequence[Transform] | None = None) -> NDArray[Any]:
+        """Return the observations of one episode by the library's own wrappers.
+
+        Args:
+            frames: RGB, uint8. Shape: (T, H, W, 3).
+            given: Transforms up to the wrappers, if those of the environment are unknown.
+        """
+        first = given if self.transforms is None else self.transforms
+        pixels = on_pixels([transform.make() for transform in first or ()])(frames)
+        seen = [one[None] for one in _into(self._inner)(pixels.numpy())]
+        for wrapper in self._wrappers:
+            if isinstance(wrapper, VecFrameStack):
+                seen = _stacked(wrapper, seen)
+            else:
+                seen = list(map(_function(wrapper), seen))
+        return np.concatenate(seen)
+
+
+class Functions:
+    """Functions of NumPy arrays, applied in order."""
+
+    def __init__(self, functions: Sequence[Function]) -> None:
+        self.functions = tuple(functions)
+
+    def __call__(self, batch: NDArray[Any]) -> NDArray[Any]:
+        """Apply them to a batch."""
+        for function in self.functions:
+            batch = function(batch)
+        return batch
+
+
+class Wrapped(Transform):
+    """What wrappers do to observations; it has no name, so that no file can contain it."""
+
+    functions: Annotated[Functions, Instance(Functions)] = Functions(())
+    """From a batch of observations to one."""
+
+    def output(self, frame: Frame) -> Frame | None:
+        """Return None: only a call shows the shape."""
+        return None
+
+    def make(self, *args: Any, **kwargs: Any) -> PixelTransform:
+        """Return the transform."""
+        return _WrappedPixels(self.functions)
+
+
+class _WrappedPixels(PixelTransform):
+    def __init__(self, functions: Functions) -> None:
+        super().__init__()
+        self._functions = functions
+
+    def _apply_transform(self, obs: Tensor) -> Tensor:
+        return torch.from_numpy(self._functions(obs.cpu().numpy())).to(obs.device)
+
+
+class StackedFrames(Stack):
+    """Frames as `VecFrameStack` stacks them: zeros before the first one of an episode."""
+
+    dim: Annotated[int, Whole(-3, -1)] = -3
+    """Dimension along which they are concatenated."""
+
+    def arguments(self) -> dict[str, Any]:
+        """Return the arguments of TorchRL's transform."""
+        return {**super().arguments(), "dim": self.dim, "padding": "constant"}
+
+    def _transformed(self, frame: Frame) -> Frame:
+        shape = list(frame.shape)
+        shape[self.dim] *= self.N
+        return Frame(tuple(shape), frame.is_float)
+
+
+def to_space(pixels: Tensor, space: spaces.Box) -> Tensor:
+    """Convert frames (N, C, H, W), bytes as 0 to 1, to observations (N, *) in a model's layout.
+
+    Raises:
+        InputError: They have another shape.
+    """
+    shape = tuple(pixels.shape[1:])
+    if space.dtype == np.uint8:
+        pixels = pixels * 255.0
+    if space.shape != shape and space.shape == (*shape[1:], shape[0]):
+        return pixels.movedim(1, -1)
+    is_flat = shape[0] == 1 and np.prod(shape) == np.prod(space.shape)
+    if space.shape != shape and not is_flat:
+        raise InputError(
+            f"the model observes {space.shape}, and the transforms return images of {shape}; give "
+            "drone_rl.policy_from the camera= and transforms= of its training"
+        )
+    return pixels.reshape(len(pixels), *space.shape)
+
+
+def channels_first(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the shape (C, H, W) of observations; the smaller end of a shape is the channels."""
+    if len(shape) != 3:
+        return (1,) * (3 - len(shape)) + shape
+    return shape if shape[0] <= shape[-1] else (shape[-1], *shape[:-1])
+
+
+def _into(space: spaces.Box) -> Function:
+    def convert(batch: NDArray[Any]) -> NDArray[Any]:
+        seen = to_space(torch.from_numpy(batch), space).numpy()
+        return seen.round().astype(np.uint8) if space.dtype == np.uint8 else seen
+
+    return convert
+
+
+def _from(space: spaces.Box) -> Function:
+    def convert(batch: NDArray[Any]) -> NDArray[Any]:
+        batch = batch.astype(np.float32) / (255 if space.dtype == np.uint8 else 1)
+        shape = channels_first(batch.shape[1:])
+        is_last = batch.ndim == 4 and batch.shape[1:] != shape
+        return np.moveaxis(batch, -1, 1) if is_last else batch.reshape(len(batch), *shape)
+
+    return convert
+
+
+def _unwrap(env: Any) -> tuple[list[Any], Any]:
+    """Return the wrappers that change observations, innermost first, and the environment in them.
+
+    Of several environments side by side it is the first.
+    """
+    wrappers: list[Any] = []
+    while (inside := _inside(env)) is not None:
+        if not _keeps(env):
+            wrappers.insert(0, env)
+        env = inside
+    return wrappers, env
+
+
+def _inside(env: Any) -> Any:
+    """Return the environment in a wrapper; None if it is no wrapper, or that can't be seen."""
+    if isinstance(env, DummyVecEnv | SyncVectorEnv):
+        return env.envs[0]
+    if isinstance(env, VecEnvWrapper):
+        return env.venv
+    return env.env if isinstance(env, Sb3Worlds | Wrapper | VectorWrapper) else None
+
+
+def _space_of(env: Any) -> Any:
+    """Return the space of one environment's observations."""
+    return env.single_observation_space if isinstance(env, VectorEnv) else env.observation_space
+
+
+def _keeps(wrapper: Any) -> bool:
+    """Return whether observations pass a wrapper unchanged."""
+    if isinstance(wrapper, VecNormalize):
+        return not wrapper.norm_obs
+    if isinstance(wrapper, Sb3Worlds):
+        return not wrapper.transforms
+    if isinstance(wrapper, RewardWrapper | VectorRewardWrapper):
+        return True
+    is_library = f"{type(wrapper).__module__}.".startswith(_LIBRARIES)
+    is_same = _space_of(wrapper) == _space_of(_inside(wrapper))
+    return is_library and is_same and not isinstance(wrapper, _OBSERVING)
+
+
+_OBSERVING = (ObservationWrapper, VectorObservationWrapper)
+
+
+def _is_known(wrapper: Any) -> bool:
+    known = (VecNormalize, VecTransposeImage, VecFrameStack, Sb3Worlds, *_OBSERVING)
+    return isinstance(wrapper, known)
+
+
+def _function(wrapper: Any) -> Function:
+    """Return what a wrapper without memory does to a batch, with a copy of its statistics."""
+    if isinstance(wrapper, Sb3Worlds):
+        return wrapper.observe
+    if isinstance(wrapper, VecTransposeImage):
+        return VecTransposeImage.transpose_image
+    if isinstance(wrapper, VecNormalize):
+        return copy.deepcopy(wrapper).normalize_obs  # pyright: ignore[reportReturnType] (a Box)
+    own: Any = copy.copy(wrapper)
+    own.env = None
+    own = copy.deepcopy(own)
+    if hasattr(own, "update_running_mean"):
+        own.update_running_mean = False
+    if isinstance(own, VectorObservationWrapper):
+        return own.observations
+    return lambda batch: np.stack([own.observation(one) for one in batch])
+
+
+def _stack(wrapper: VecFrameStack) -> StackedFrames:
+    own = wrapper.stacked_obs
+    dim = -len(own.stacked_shape) if own.channels_first else -1
+    return StackedFrames(N=own.n_stack, dim=dim)
+
+
+def _stacked(wrapper: VecFrameStack, seen: list[NDArray[Any]]) -> list[NDArray[Any]]:
+    own = wrapper.stacked_obs
+    order = "first" if own.channels_first else "last"
+    stack: Any = StackedObservations(1, own.n_stack, own.observation_space, order)
+    running = np.zeros(1, bool)
+    later = (stack.update(one, running, [{}])[0].copy() for one in seen[1:])
+    return [stack.reset(seen[0]).copy(), *later]
+
+
+def _is_color(space: Any) -> bool:
+    is_bytes = isinstance(space, spaces.Box) and space.dtype == np.uint8
+    return is_bytes and len(space.shape) == 3 and channels_first(space.shape)[0] == 3
+
+
+def _camera(space: spaces.Box) -> CameraSettings:
+    _, height, width = channels_first(space.shape)
+    return CameraSettings(height=height, width=width)
+
+
+def _conditions(world: Any) -> dict[str, Any]:
+    if not isinstance(world, DroneWorld | DroneWorlds):
+        return {}
+    options = world.batch.options
+    if not world.batch.has_images:
+        raise InputError(
+            "observations=state: the model observes the ground truth instead of images; give a "
+            "callable from images to logits"
+        )
+    return {
+        "task": world.batch.task,
+        "camera": options.camera,
+        "dynamics": options.dynamics,
+        "actions": options.actions,
+    }
