@@ -28,7 +28,7 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.sim.vocabulary import ShownActions, shown_actions
-from drone_rl.utils.display import aligned, picture, table
+from drone_rl.utils.display import Result, aligned, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
@@ -65,11 +65,11 @@ _BATCH = 64
 
 
 @dataclasses.dataclass(frozen=True)
-class ClassModels:
+class ClassModels(Result):
     """Observations optimized for each action of a policy, with one or several settings."""
 
     policy: BasePolicy
-    tried: Mapping[str, Attempts] = dataclasses.field(repr=False)
+    tried: Mapping[str, Attempts]
     """Results by title of the settings."""
     statistics: ImageStatistics
     """Of the observations in the policy's episodes, the training set."""

@@ -26,7 +26,7 @@ from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.policies.recurrent import require_memoryless
-from drone_rl.utils.display import page
+from drone_rl.utils.display import Result, page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path, new_run_folder, to_file_name
 from drone_rl.utils.progress import Progress, as_progress
@@ -61,7 +61,7 @@ THREADED = frozenset({"attribution", "class_models", "embedding", "flaws"})
 
 
 @dataclasses.dataclass(frozen=True)
-class Explanations:
+class Explanations(Result):
     """Explanations of one or several policies, and the report that shows them."""
 
     folder: Path

@@ -24,7 +24,7 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.robustness.shifts_text import QUOTED, why_not
-from drone_rl.utils.display import aligned, paragraph, table
+from drone_rl.utils.display import Result, aligned, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import NOT_COVERED, PROOF_MISSING
 from drone_rl.utils.progress import Progress, as_progress
@@ -36,7 +36,7 @@ from drone_rl.verdicts.coverage import Coverage, compare_with_required, find_dom
 
 
 @dataclasses.dataclass(frozen=True)
-class Judgement:
+class Judgement(Result):
     """A verdict on a policy, with certificate and operating domain."""
 
     name: str
@@ -105,7 +105,7 @@ class Judgement:
         return lines + table(["quantity", "value", "lower", "upper"], shown)
 
 
-class Judgements(tuple[Judgement, ...]):
+class Judgements(Result, tuple[Judgement, ...]):
     """Several judgements, in the order of the policies."""
 
     __slots__ = ()
