@@ -91,6 +91,10 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
                 "one of them out"
             )
 
+    def ends_alone(self) -> bool:
+        """See `CommandSettings`."""
+        return not self.viewer
+
     def run(self, folder: Path) -> tuple[int, None]:
         """Record a policy's episodes, or open the viewer; return the exit status."""
         policy = self.load_policy()

@@ -18,7 +18,7 @@ from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import make_folder, remove_leftovers, write_atomically
 from drone_rl.utils.progress import Progress as Report
-from drone_rl.utils.progress import as_progress
+from drone_rl.utils.progress import as_progress, note_shown
 from drone_rl.utils.readers import NAMES_OF_0_1, read_table
 from drone_rl.utils.schema import Instance, Several, shown
 
@@ -232,8 +232,8 @@ class CollapseCheck(Callback):
         if is_over and self.collapsed_at is None:
             self.collapsed_at = progress.frames
             _log.warning(
-                "learning has collapsed: for %d episodes the policy has been deterministic (entropy "
-                "below %g) and not improved (running reward %.2f); stop and try a lower "
+                "learning has collapsed: for %d episodes the policy has been deterministic "
+                "(entropy below %g) and not improved (running reward %.2f); stop and try a lower "
                 "optimizer.lr, a higher objective.entropy_coeff or another seed",
                 *(episodes, self.DETERMINISTIC, progress.running_reward),
             )
@@ -297,6 +297,7 @@ class ProgressCallback(Callback):
         progress = training.progress
         text = f"episodes {progress.episodes}, running reward {progress.running_reward:.2f}"
         if self._bar is not None:
+            note_shown()
             self._bar.set_postfix_str(text, refresh=False)
             self._bar.update(progress.frames - self._bar.n)
         elif time.monotonic() - self._said_at >= self.interval_s:
