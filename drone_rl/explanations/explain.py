@@ -36,6 +36,7 @@ from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import seed_line
 from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import find_domain
+from drone_rl.verdicts.recorded import record_verdict
 from drone_rl.verification.prover.policy_spec import one_thread
 
 _Result = tuple[dict[str, Any], dict[str, NDArray], float] | LeftOutError  # with seconds
@@ -140,6 +141,8 @@ def explain(
         require_memoryless(one.make_network(), "explain")
     with one_thread():  # same results for any number of cores; threads would gain nothing
         numbers = {name: explain_one(one, folders[name]) for name, one in chosen.items()}
+    for name, one in chosen.items():
+        record_verdict(folders[name], one, numbers[name]["verdict"])
     progress("report")
     report = write_report(list(folders.values()), folder)
     progress("explained", 1, 1)

@@ -33,6 +33,7 @@ from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator,
 from drone_rl.utils.text import rate, say, seed_line
 from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import Coverage, compare_with_required, find_domain, recheck_domain
+from drone_rl.verdicts.recorded import identify
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,6 +47,8 @@ class Judgement(Result):
     """The given file or that next to the policy, even if the verdict does not quote it."""
     measured: SavedShifts | None = None
     """Its robustness evaluation, if there is one."""
+    weights: str | None = None
+    """Hash of the policy's weights if it was judged in the conditions of its training."""
     coverage: Coverage | None = None
     """The required operating domain compared with its own, if one is required."""
 
@@ -53,6 +56,7 @@ class Judgement(Result):
         """Return plain values, as in `verdict.json`."""
         return {
             "policy": self.name,
+            "weights": self.weights,
             "certificate": self.certificate and str(self.certificate),
             "shifts": self.measured and str(self.measured.path),
             "domain": self.domain or None,
@@ -241,7 +245,7 @@ def judge_one(
     with worlds as (env, actor):
         verdict = judge_policy(env, actor, settings.episodes, sampled=is_sampled, **known)
     progress("judged", 1, 1)
-    done = Judgement(name, settings, verdict, claim and claim.path, measured)
+    done = Judgement(name, settings, verdict, claim and claim.path, measured, identify(loaded))
     if coverage is None or measured is None:
         return done
     against = why_not(_quoted(measured, verdict))
