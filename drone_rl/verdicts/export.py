@@ -15,8 +15,8 @@ from drone_rl.evaluation.verdict_text import best_baseline, is_quoted
 from drone_rl.policies.policy import Policy
 from drone_rl.policies.zoo import certificate_path, shifts_path
 from drone_rl.policies.zoo.files import exported_bytes
-from drone_rl.robustness.shifts_text import QUOTED, not_evaluated
-from drone_rl.robustness.shifts_text import is_quoted as has_domain
+from drone_rl.robustness.quoted_text import QUOTED, not_evaluated
+from drone_rl.robustness.quoted_text import is_quoted as has_domain
 from drone_rl.sim.vocabulary import some_cubes, terms_of
 from drone_rl.sweeps.manifest import read_sweep
 from drone_rl.sweeps.rows import read_rows

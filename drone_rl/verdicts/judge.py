@@ -22,8 +22,8 @@ from drone_rl.evaluation.verdict_text import quantity_label
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
+from drone_rl.robustness.quoted_text import BRIEF, why_not
 from drone_rl.robustness.shifts_file import SavedShifts
-from drone_rl.robustness.shifts_text import QUOTED, why_not
 from drone_rl.utils.display import Result, aligned, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import NOT_COVERED, PROOF_MISSING
@@ -68,7 +68,7 @@ class Judgement(Result):
     @property
     def domain(self) -> str:
         """The operating domain as text; empty if it was not measured."""
-        return "" if self.measured is None else say(QUOTED, _quoted(self.measured, self.verdict))
+        return "" if self.measured is None else say(BRIEF, _quoted(self.measured, self.verdict))
 
     def status(self, require: str | None = None) -> int:
         """Return the exit code of `drone-rl verdict`.
