@@ -191,7 +191,7 @@ def _style(kind: str) -> dict[str, Any]:
 
 def _explain_colors(axes: Axes) -> None:
     """Add one legend above the image."""
-    figure = axes.get_figure()
+    figure = axes.get_figure(root=True)
     if figure is None or figure.legends:
         return
     handles = [Line2D([], [], label=kind, **_style(kind)) for kind in COLORS]

@@ -10,7 +10,7 @@ from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import parse
 from drone_rl.sweeps.manifest import read_result
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import read_json, write_atomically
+from drone_rl.utils.files import make_folder, read_json, write_atomically
 from drone_rl.utils.schema import Text, as_mapping
 from drone_rl.utils.text import rate
 from drone_rl.verification.checker.certificate import fingerprint
@@ -32,6 +32,7 @@ def identify(policy: BasePolicy | None) -> str | None:
 def record_verdict(folder: Path, policy: BasePolicy, verdict: Mapping[str, Any]) -> None:
     """Write a verdict, as in `verdict.json`, to a command's folder, for `recorded_verdict`."""
     content = {"policy": policy.origin["policy"], "weights": identify(policy), **verdict}
+    make_folder(folder)
     write_atomically(folder / NAME, json.dumps(content, indent=2))
 
 

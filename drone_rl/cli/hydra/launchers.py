@@ -207,7 +207,7 @@ def _outcome(run: Run) -> str:
     if result is None:
         return f"failed: {read_failure(run) or 'reason unknown'}"
     reward = _number(result.get("running_reward"))
-    why = _NOT_SOLVED.get(result["reason"], result["reason"])
+    why = str(_NOT_SOLVED.get(result["reason"], result["reason"]))
     collapsed_at = _number(result.get("collapsed_at_frames"))
     if collapsed_at is not None and result["reason"] in _NOT_SOLVED:
         why += f" (learning collapsed after {collapsed_at:,.0f} frames)"
