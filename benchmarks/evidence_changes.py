@@ -154,6 +154,8 @@ OF_REPORTS = (
     ("domain.quoted", {"shifts.domain.ranges.blur.high": 1.0}, _MEASURED),
     ("domain.quoted", _OTHER_KIND, _MEASURED),
     ("domain.quoted", {"verdict.good_share": 0.99}, _MEASURED),
+    ("domain.brief", _REFUSED_SHIFTS, _MEASURED),
+    ("domain.brief", {"shifts.domain.ranges.blur.high": 1.0}, _MEASURED),
     ("domain.refused", _MEASURED, _REFUSED_SHIFTS),
     ("domain.refused", {"shifts.refused": "it is of another network"}, _REFUSED_SHIFTS),
     ("dataset.size", {"dataset.episodes": 31}),

@@ -25,6 +25,7 @@ from drone_rl.explanations.report.behavior import say_source
 from drone_rl.explanations.report.page import PARTS
 from drone_rl.explanations.report.summary import say_summary
 from drone_rl.robustness import shifts_text as shifts
+from drone_rl.robustness.quoted_text import BRIEF
 from drone_rl.sweeps import text as sweep
 from drone_rl.utils import text as seeds
 from drone_rl.utils.text import Claims, Paragraph, said
@@ -38,6 +39,7 @@ SENTENCES: dict[str, tuple[tuple[Paragraph, ...], Mapping[str, Any]]] = {
         (
             say_source,
             say_summary,
+            BRIEF[:1],
             *(paragraph for part in PARTS.values() for paragraph in part.text.values()),
         ),
         EXPLANATION,

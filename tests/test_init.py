@@ -6,6 +6,7 @@ import sys
 import pytest
 
 import drone_rl
+from drone_rl.utils.display import Result
 
 
 def test_every_public_name_is_available():
@@ -13,6 +14,14 @@ def test_every_public_name_is_available():
         assert getattr(drone_rl, name).__name__ == name
         assert name in dir(drone_rl)
     assert {"train", "load_policy", "judge", "InputError"} <= {*drone_rl.__all__}
+
+
+def test_a_public_result_shows_its_text_at_a_prompt():
+    """Not the thousands of numbers in its fields."""
+    classes = [c for c in map(drone_rl.__getattr__, drone_rl.__all__) if isinstance(c, type)]
+    shown = [c for c in classes if hasattr(c, "_repr_html_") and c.__str__ is not object.__str__]
+    assert len(shown) > 10
+    assert [c.__name__ for c in shown if not issubclass(c, Result)] == []
 
 
 def test_an_unknown_name_raises():

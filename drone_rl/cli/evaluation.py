@@ -91,6 +91,10 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
                 "one of them out"
             )
 
+    def ends_alone(self) -> bool:
+        """See `CommandSettings`."""
+        return not self.viewer
+
     def run(self, folder: Path) -> tuple[int, None]:
         """Record a policy's episodes, or open the viewer; return the exit status."""
         policy = self.load_policy()
@@ -195,6 +199,7 @@ class ExportCommand(CommandSettings, HeldOutSettings):
         from drone_rl.utils.seeding import root_seed  # imports torch
         from drone_rl.verdicts.export import export
         from drone_rl.verdicts.onnx_export import export_onnx
+        from drone_rl.verdicts.recorded import describe, record_verdict, recorded_verdict
 
         policy = drone_rl.load_policy(self.policy, outputs=self.paths.outputs)
         target = folder / f"{self.name}.{self.format}"
@@ -204,11 +209,19 @@ class ExportCommand(CommandSettings, HeldOutSettings):
             found = export_onnx(policy, target, command=self.command, seed=seed.value)
             difference = f"{found.difference:.1e} in {found.frames:,} images"
             _log.info("written: %s, which differs from PyTorch by at most %s", target, difference)
+            recorded = recorded_verdict(policy, self.paths.outputs)
+            kind, success = ("not judged", "") if recorded is None else describe(recorded)
+            print(f"recorded verdict: {' '.join(filter(None, (kind, success)))}")
+            evidence = seed.as_dict()
         else:
             names = ("command", "certificate", "shifts")
             given = {name: getattr(self, name) for name in names}
             _log.info("judges the policy in %s episodes for the model card", f"{self.episodes:,}")
-            seed = export(policy, target, self, **given, outputs=self.paths.outputs)
+            verdict = export(policy, target, self, **given, outputs=self.paths.outputs)
             _log.info("written: %s and %s", target, target.with_suffix(".md").name)
-        _log.info("%s", seed_line(seed.as_dict()))
+            record_verdict(folder, policy, verdict.as_dict())
+            certainty = "" if verdict.certain else " (not certain)"
+            print(f"{verdict.kind.value}{certainty}: {verdict.sentence}")
+            evidence = verdict.evidence
+        _log.info("%s", seed_line(evidence))
         return 0, str(target)

@@ -22,6 +22,10 @@ class FlyCommand(AppearanceCommandSettings, FlySettings):
     browser: bool = True
     """Whether to open the page in the default browser."""
 
+    def ends_alone(self) -> bool:
+        """See `CommandSettings`."""
+        return False
+
     def run(self, folder: Path) -> tuple[int, None]:
         """Serve the page until Ctrl-C; return the exit status."""
         from drone_rl.evaluation.video import has_display  # imports torch

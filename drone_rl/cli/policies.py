@@ -1,18 +1,17 @@
 """`drone-rl policies`: list policies and their verdicts."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import drone_rl
 from drone_rl.cli.settings import CommandSettings
-from drone_rl.sweeps.manifest import read_result
 from drone_rl.utils.display import aligned
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import trained_policies
-from drone_rl.utils.schema import Text, Whole, as_mapping
-from drone_rl.utils.text import plural, rate
+from drone_rl.utils.schema import Whole
+from drone_rl.utils.text import plural
 
 _LONGEST_NAME = 18
 """Characters of a path above which its figures are on a line of their own."""
@@ -38,9 +37,10 @@ class PoliciesCommand(CommandSettings):
         """List the shipped and the trained policies; return the exit status."""
         from drone_rl.policies.zoo import policy_names, policy_path  # imports torch
 
-        shipped = [_row(policy_path(name), name) for name in policy_names()]
-        newest = trained_policies(self.paths.outputs)
-        trained = [_row(path, str(path.parents[1])) for path in newest[: self.most]]
+        outputs = Path(self.paths.outputs)
+        shipped = [_row(policy_path(name), name, outputs) for name in policy_names()]
+        newest = trained_policies(outputs)
+        trained = [_row(path, str(path.parents[1]), outputs) for path in newest[: self.most]]
         head = ("policy=", "task", "verdict", "success (95% CI)", "trained")
         lines = aligned([head, *(_short(row) for row in (*shipped, *trained))]).splitlines()
         names = ["", *(row[0] for row in (*shipped, *trained))]
@@ -59,30 +59,19 @@ def _short(row: Sequence[str]) -> Sequence[str]:
     return ["  ..." if len(row[0]) > _LONGEST_NAME else row[0], *row[1:]]
 
 
-def _row(path: Path, name: str) -> list[str]:
+def _row(path: Path, name: str, outputs: Path) -> list[str]:
     """Return name, task, verdict, success rate and origin of a policy."""
+    from drone_rl.verdicts.recorded import describe, recorded_verdict  # imports torch
+
     try:
         policy = drone_rl.load_policy(path)
     except InputError as error:
         is_plugin = "plugins=" in str(error)
         return [name, "", "needs plugins=[MODULE]" if is_plugin else "can't be read", "", ""]
-    verdict, run = policy.state.get("verdict"), path.parents[1]
     if path.suffix == ".pt":
-        result = read_result(run) or {}
-        is_of_this = result.get("frames") == policy.state["progress"]["frames"]
-        verdict = result.get("verdict") if is_of_this else None
         origin = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
     else:
         origin = f"revision {str(policy.state['provenance']['git_revision'])[:7]}"
-    return [name, policy.task.name, *_figures(verdict), origin]
-
-
-def _figures(verdict: Any) -> Iterator[str]:
-    """Yield the kind and the success rate of a recorded verdict."""
-    try:
-        kind = Text(40).read(verdict["kind"], "kind")
-        success = as_mapping(verdict["greedy"]["success"], "success")
-        figures = [f"{kind}{'' if verdict['certain'] else ' (uncertain)'}"]
-        yield from (*figures, rate(success, label=""))
-    except (KeyError, TypeError, ValueError):
-        yield from ("not judged", "")
+    verdict = recorded_verdict(policy, outputs)
+    figures = ("not judged", "") if verdict is None else describe(verdict)
+    return [name, policy.task.name, *figures, origin]

@@ -37,6 +37,10 @@ class ServeCommand(CommandSettings):
     renderer: RendererName | None = None
     """raytrace or mujoco_warp; null for the one that fits the scene."""
 
+    def ends_alone(self) -> bool:
+        """See `CommandSettings`."""
+        return False
+
     def run(self, folder: Path) -> tuple[int, None]:
         """Serve until Ctrl-C; return the exit status."""
         import torch

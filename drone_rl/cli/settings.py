@@ -31,6 +31,10 @@ class CommandSettings(Settings):
         """Run the command; return the exit status and the value that a sweep maximises."""
         raise NotImplementedError
 
+    def ends_alone(self) -> bool:
+        """Return whether the command ends without the user, and so reports that it still runs."""
+        return True
+
     def used_policy(self, folder: Path) -> str:
         """Return the value of `policy=` that selects the policy which this command used."""
         del folder

@@ -21,7 +21,7 @@ from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.tasks import as_task
-from drone_rl.utils.display import aligned, table
+from drone_rl.utils.display import Result, aligned, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
@@ -30,7 +30,7 @@ from drone_rl.utils.text import Evidence, Sentence, fixed_seed, interval, percen
 
 
 @dataclasses.dataclass(frozen=True)
-class Evaluation:
+class Evaluation(Result):
     """Figures of a policy and of the baselines on the same initial states."""
 
     policy: BasePolicy

@@ -28,7 +28,7 @@ from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frame
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.training.three_state import sample_gradients, train_three_state
-from drone_rl.utils.display import picture
+from drone_rl.utils.display import Result, picture
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import INK, MUTED, css
 from drone_rl.utils.provenance import provenance
@@ -76,11 +76,11 @@ class FigureSettings(Settings):
 
 
 @dataclasses.dataclass(frozen=True)
-class ChapterFigure:
+class ChapterFigure(Result):
     """A figure of the chapter, made again."""
 
     settings: FigureSettings
-    image: Image.Image = dataclasses.field(repr=False)
+    image: Image.Image
     caption: str
     """What the image shows, and how it was made."""
     numbers: Mapping[str, Any]

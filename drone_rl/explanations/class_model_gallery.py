@@ -28,11 +28,11 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.sim.vocabulary import ShownActions, shown_actions
-from drone_rl.utils.display import aligned, picture, table
+from drone_rl.utils.display import Result, aligned, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.text import seed_line
+from drone_rl.utils.text import listed, seed_line
 
 _PRINTED: Mapping[str, Any] = {
     **{"maximize": "probability", "step": "plain", "lr": 1.0, "normalize": "none"},
@@ -65,11 +65,11 @@ _BATCH = 64
 
 
 @dataclasses.dataclass(frozen=True)
-class ClassModels:
+class ClassModels(Result):
     """Observations optimized for each action of a policy, with one or several settings."""
 
     policy: BasePolicy
-    tried: Mapping[str, Attempts] = dataclasses.field(repr=False)
+    tried: Mapping[str, Attempts]
     """Results by title of the settings."""
     statistics: ImageStatistics
     """Of the observations in the policy's episodes, the training set."""
@@ -124,12 +124,27 @@ class ClassModels:
         arrays: dict[str, Any] = {f"images_{i}": found.images.numpy() for i, found in tried}
         np.savez_compressed(folder / "class_models.npz", **arrays)
 
+    def _failures(self) -> list[str]:
+        """Return a line for each setting by which no image makes some action probable."""
+        lines = []
+        for title, found in self.tried.items():
+            reached = values_of(found, found.best())["probabilities"]
+            failed = [self.actions.names[a] for a in self.actions.order if reached[a] <= 0.5]
+            if failed:
+                lines.append(
+                    f"{title}: no image found makes {listed(failed, 'or')} more probable than not; "
+                    "the policy or these settings may be the reason, compare gallery=true"
+                )
+        return lines
+
     def __str__(self) -> str:
-        return f"{aligned(self.rows())}\n{seed_line(self.seed.as_dict())}"
+        notes = [*self._failures(), seed_line(self.seed.as_dict())]
+        return "\n".join([aligned(self.rows()), *notes])
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()
-        return table(head, rows, [seed_line(self.seed.as_dict())]) + picture(self.image())
+        notes = [*self._failures(), seed_line(self.seed.as_dict())]
+        return table(head, rows, notes) + picture(self.image())
 
 
 def class_models(

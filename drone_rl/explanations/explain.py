@@ -26,7 +26,7 @@ from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.policies.recurrent import require_memoryless
-from drone_rl.utils.display import page
+from drone_rl.utils.display import Result, page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path, new_run_folder, to_file_name
 from drone_rl.utils.progress import Progress, as_progress
@@ -36,6 +36,7 @@ from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import seed_line
 from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import find_domain
+from drone_rl.verdicts.recorded import record_verdict
 from drone_rl.verification.prover.policy_spec import one_thread
 
 _Result = tuple[dict[str, Any], dict[str, NDArray], float] | LeftOutError  # with seconds
@@ -61,7 +62,7 @@ THREADED = frozenset({"attribution", "class_models", "embedding", "flaws"})
 
 
 @dataclasses.dataclass(frozen=True)
-class Explanations:
+class Explanations(Result):
     """Explanations of one or several policies, and the report that shows them."""
 
     folder: Path
@@ -140,6 +141,8 @@ def explain(
         require_memoryless(one.make_network(), "explain")
     with one_thread():  # same results for any number of cores; threads would gain nothing
         numbers = {name: explain_one(one, folders[name]) for name, one in chosen.items()}
+    for name, one in chosen.items():
+        record_verdict(folders[name], one, numbers[name]["verdict"])
     progress("report")
     report = write_report(list(folders.values()), folder)
     progress("explained", 1, 1)

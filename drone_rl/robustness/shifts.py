@@ -33,7 +33,7 @@ from drone_rl.robustness.shifts_file import FORMAT, FORMAT_VERSION
 from drone_rl.robustness.shifts_text import SHIFTS, is_tested, rows
 from drone_rl.robustness.suite import Suite, make_strip, packed
 from drone_rl.sim.tasks import as_task
-from drone_rl.utils.display import aligned, picture, table
+from drone_rl.utils.display import Result, aligned, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
@@ -43,14 +43,14 @@ from drone_rl.verification.checker.certificate import fingerprint
 
 
 @dataclasses.dataclass(frozen=True)
-class Shifts:
+class Shifts(Result):
     """Success rates of a policy under perturbations, and its operating domain."""
 
     policy: BasePolicy
     settings: ShiftSettings
-    numbers: dict[str, Any] = dataclasses.field(repr=False)
+    numbers: dict[str, Any]
     """The results as plain values, as in `shifts.json`."""
-    pictures: Mapping[str, Sequence[NDArray | None]] = dataclasses.field(repr=False)
+    pictures: Mapping[str, Sequence[NDArray | None]]
     """Camera images of each axis: without perturbation, then at each of the five strengths; None if
     the task does not allow the strength. Shapes: (H, W, 3), uint8."""
 

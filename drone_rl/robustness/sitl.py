@@ -19,6 +19,7 @@ from drone_rl.flight.in_the_loop.dynamics import InTheLoopDynamics
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
+from drone_rl.utils.display import Result
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import RootSeed, root_seed
@@ -52,14 +53,14 @@ class SitlEpisode:
 
 
 @dataclasses.dataclass(frozen=True)
-class SitlEvaluation:
+class SitlEvaluation(Result):
     """Episodes of a policy with software in the loop."""
 
     policy: str
     seed: RootSeed
     """Root of the environments' random streams."""
     flights: tuple[SitlEpisode, ...]
-    figures: dict[str, Any] = dataclasses.field(repr=False)
+    figures: dict[str, Any]
     """See `drone_rl.evaluation.metrics.summarise`."""
 
     def as_dict(self) -> dict[str, Any]:

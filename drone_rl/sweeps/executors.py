@@ -96,6 +96,18 @@ class RunProcess:
             )
 
 
+def describe_active(runs: Sequence[Run], most: int = 4) -> str:
+    """Return the last line in the log of each run at work here, of `most` runs at most."""
+    active = [r for r in runs if is_locked(r.folder) and (r.folder / "output.log").is_file()]
+    lines = []
+    for run in active[:most]:
+        last = read_tail(run.folder / "output.log", 1000).decode(errors="replace").splitlines()
+        line = re.sub(r"^\[[\d:]+\] ", "", last[-1] if last else "starts")
+        lines.append(f"{run.folder.name}: {line}")
+    left = len(active) - len(lines)
+    return "; ".join(lines) + (f"; and {left} more" if left else "")
+
+
 def note_failure(run: Run, error: str) -> None:
     """Write the reason of a failure to the run's folder."""
     run.folder.mkdir(parents=True, exist_ok=True)

@@ -37,6 +37,8 @@ MAX_LABELS = 7
 UNIFORM = float(np.log(len(SHOWN_MOVES.names)))
 """Entropy of the uniform distribution over the chapter's three moves, nats."""
 _ROUNDING = 1e-4
+_LEGEND_ENTRY_INCHES = 1.5
+"""Width of the longest entry of a legend."""
 
 
 @dataclasses.dataclass
@@ -189,11 +191,12 @@ def _style(kind: str) -> dict[str, Any]:
 
 def _explain_colors(axes: Axes) -> None:
     """Add one legend above the image."""
-    figure = axes.get_figure()
+    figure = axes.get_figure(root=True)
     if figure is None or figure.legends:
         return
     handles = [Line2D([], [], label=kind, **_style(kind)) for kind in COLORS]
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=8)
+    columns = min(len(handles), max(1, int(figure.get_figwidth() / _LEGEND_ENTRY_INCHES)))
+    figure.legend(handles=handles, loc="outside upper center", ncols=columns, fontsize=8)
 
 
 def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:

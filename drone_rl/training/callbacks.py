@@ -18,7 +18,7 @@ from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import make_folder, remove_leftovers, write_atomically
 from drone_rl.utils.progress import Progress as Report
-from drone_rl.utils.progress import as_progress
+from drone_rl.utils.progress import as_progress, note_shown
 from drone_rl.utils.readers import NAMES_OF_0_1, read_table
 from drone_rl.utils.schema import Instance, Several, shown
 
@@ -183,26 +183,59 @@ class CsvCallback(Callback):
 
 
 class CollapseCheck(Callback):
-    """Warn once about a policy that has become deterministic, so that its gradient is zero."""
+    """Warn once that learning has collapsed: a deterministic policy that does not improve.
 
-    SMALLEST = 1e-6
-    """Entropy in nats and norm of the gradient, below which an update can't change a policy."""
+    Its actions hardly vary any more, so that it can learn nothing new, and its reward is clearly
+    below the target.
+    """
+
+    DETERMINISTIC = 0.01
+    """Entropy in nats below which a policy is practically deterministic."""
+    EPISODES = 500
+    """Episodes without improvement before the warning: five memories of the running reward."""
     UPDATES = 20
-    """Consecutive updates without a gradient before the warning."""
+    """Least number of their updates."""
+    CLOSE = 0.9
+    """Fraction of the target from which a policy counts as good enough."""
+    STEP = 0.01
+    """Fraction of the target by which the running reward must rise to count as improvement."""
 
-    def __init__(self) -> None:
-        self._count = 0
+    def __init__(self, target: float) -> None:
+        """Take the running reward at which the task counts as solved."""
+        self._target, self._best = target, float("-inf")
+        self._since = (0, 0)
+        """Episodes and updates at the last sign of learning."""
+        self.collapsed_at: int | None = None
+        """Frames at the warning, if there was one."""
+
+    @property
+    def result(self) -> dict[str, int]:
+        """Entry of `result.json`, if learning collapsed."""
+        return {} if self.collapsed_at is None else {"collapsed_at_frames": self.collapsed_at}
+
+    def on_start(self, training: OngoingTraining) -> None:
+        """Count from here, also in a resumed run."""
+        self._since = training.progress.episodes, training.progress.updates
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
-        """Count the consecutive updates without a gradient."""
-        values = [abs(metrics.get(f"loss/{name}", 1.0)) for name in ("entropy", "grad_norm")]
-        self._count = self._count + 1 if max(values) < self.SMALLEST else 0
-        if self._count == self.UPDATES:
+        """Count the episodes since the policy last varied or improved."""
+        progress = training.progress
+        # continuous actions have densities, whose entropy is also below 0
+        is_deterministic = abs(metrics.get("loss/entropy", 1.0)) < self.DETERMINISTIC
+        is_better = progress.running_reward > self._best + self.STEP * self._target
+        self._best = progress.running_reward if is_better else self._best
+        is_close = progress.running_reward >= self.CLOSE * self._target
+        if is_better or is_close or not is_deterministic:
+            self._since = progress.episodes, progress.updates
+        episodes, updates = progress.episodes - self._since[0], progress.updates - self._since[1]
+        is_over = episodes >= self.EPISODES and updates >= self.UPDATES
+        if is_over and self.collapsed_at is None:
+            self.collapsed_at = progress.frames
             _log.warning(
-                "the policy has become deterministic: for %d updates its gradient has been 0, so "
-                "it learns no more; unless its reward is good enough, stop and try a lower "
+                "learning has collapsed: for %d episodes the policy has been deterministic "
+                "(entropy below %g) and not improved (running reward %.2f); stop and try a lower "
                 "optimizer.lr, a higher objective.entropy_coeff or another seed",
-                self.UPDATES,
+                *(episodes, self.DETERMINISTIC, progress.running_reward),
             )
 
 
@@ -264,6 +297,7 @@ class ProgressCallback(Callback):
         progress = training.progress
         text = f"episodes {progress.episodes}, running reward {progress.running_reward:.2f}"
         if self._bar is not None:
+            note_shown()
             self._bar.set_postfix_str(text, refresh=False)
             self._bar.update(progress.frames - self._bar.n)
         elif time.monotonic() - self._said_at >= self.interval_s:

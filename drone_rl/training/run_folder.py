@@ -28,7 +28,7 @@ from drone_rl.training.cloning import Cloning
 from drone_rl.training.confirmation import Confirmation
 from drone_rl.training.demonstrations import Demonstration, FlightConditions, read_demonstrations
 from drone_rl.training.trainer import Trainer
-from drone_rl.utils.display import picture, table
+from drone_rl.utils.display import Result, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import (
     as_path,
@@ -64,7 +64,7 @@ _NONE_YET = float("-inf")
 
 
 @dataclasses.dataclass(frozen=True)
-class Training:
+class Training(Result):
     """Result of a training run."""
 
     folder: Path
@@ -88,6 +88,14 @@ class Training:
         """Return the columns of `metrics.csv`: one value for each update."""
         head, *rows = read_table(self.folder / "metrics.csv")
         return {name: [float(row[i]) for row in rows] for i, name in enumerate(head)}
+
+    def __str__(self) -> str:
+        judged = self.result.get("verdict")
+        verdict = f", verdict: {judged['kind']}" if judged else ""
+        return (
+            f"stopped ({self.reason}) after {self.result['frames']:,} frames: running reward "
+            f"{self.running_reward:.3f}{verdict}; {self.folder}"
+        )
 
     def _repr_html_(self) -> str:
         from matplotlib.figure import Figure  # slow to import; only a notebook needs it

@@ -20,7 +20,7 @@ from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.objectives import ReinforceLoss
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import describe
-from drone_rl.sim.tasks import FailureReplayTask
+from drone_rl.sim.tasks import FailureReplayTask, as_task
 from drone_rl.training import components, run_folder
 from drone_rl.training.callbacks import Callback, CollapseCheck, CsvCallback, with_progress
 from drone_rl.training.cloning import clone
@@ -103,11 +103,12 @@ def learn(
     parts = components.make_collector(settings, replay)
     confirmation = Confirmation(settings, parts.network) if limits.confirm_episodes else None
     checkpoints = run.checkpoints(settings)
+    collapse = CollapseCheck(target or as_task(settings.task).largest_reward)
     learner = components.make_learner(settings, parts)  # by default `reinforce_learner`, below
     trainer = Trainer(
         collector=parts.collector,
         learner=learner,
-        callbacks=[CsvCallback(folder / "metrics.csv"), checkpoints, CollapseCheck(), *callbacks],
+        callbacks=[CsvCallback(folder / "metrics.csv"), checkpoints, collapse, *callbacks],
         generators=parts.generators,
         target=target,
         confirm=confirmation,
@@ -129,7 +130,7 @@ def learn(
         parts.collector.shutdown()
         if confirmation is not None:
             confirmation.close()
-    return run_folder.result_of(trainer, settings, confirmation, checkpoints)
+    return run_folder.result_of(trainer, settings, confirmation, checkpoints) | collapse.result
 
 
 @implements(Episodes)

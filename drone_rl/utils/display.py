@@ -1,4 +1,4 @@
-"""Tables, figures and HTML pages of results.
+"""Texts, tables, figures and HTML pages of results.
 
 Pages show strings from files of unknown origin. Two defences keep them from execution. Templates
 escape every value. And the page's Content-Security-Policy allows exactly the page's script and
@@ -18,6 +18,24 @@ if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
     from PIL.Image import Image
+
+
+class Result:
+    """Base of the results of analyses: their `repr` is the text that `print` shows."""
+
+    __slots__ = ()
+
+    def __init_subclass__(cls) -> None:
+        """Set `__repr__` before `dataclasses.dataclass` would add one of all fields."""
+        super().__init_subclass__()
+        cls.__repr__ = Result.__repr__
+
+    def __str__(self) -> str:
+        """Return the text for a terminal."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return str(self)
 
 
 def aligned(rows: Sequence[Sequence[str]], *, are_numbers: bool = False) -> str:

@@ -1,7 +1,9 @@
-"""Progress of long work: a bar, lines in the log, or nothing."""
+"""Progress of long work: a bar, lines in the log, or nothing; and a line in long silences."""
 
 import logging
+import threading
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
 from drone_rl.utils.errors import InputError
@@ -56,6 +58,7 @@ class Bar:
         if not is_over and time.monotonic() - self._drawn_at < self._interval_s:
             return
         self._drawn_at = time.monotonic()
+        note_shown()
         if self._bar is None:
             from tqdm.auto import tqdm  # slow to import
 
@@ -72,3 +75,54 @@ class Bar:
         if self._bar is not None:
             self._bar.close()
         self._bar, self._began = None, time.time()
+
+
+_shown_at = [time.monotonic()]
+
+
+def note_shown() -> None:
+    """Note that the user has just been shown progress, for `Heartbeat`."""
+    _shown_at[0] = time.monotonic()
+
+
+class Heartbeat(logging.Handler):
+    """Log a line after each half minute in which a command has shown no progress.
+
+    with Heartbeat():
+        run_long_command()
+    """
+
+    _LINE = "still running after %.0f s%s"
+
+    def __init__(self, describe: Callable[[], str] | None = None, silence_s: float = 30.0) -> None:
+        """Set what returns the state of the work, by default the last logged message."""
+        super().__init__()
+        self._describe = describe or (lambda: self._last)
+        self._silence_s, self._last = silence_s, ""
+        self._over, self._began = threading.Event(), time.monotonic()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Note a line of the log."""
+        note_shown()
+        if record.msg != self._LINE:
+            self._last = record.getMessage()
+
+    def __enter__(self) -> "Heartbeat":
+        note_shown()
+        logging.getLogger().addHandler(self)
+        threading.Thread(target=self._watch, name="heartbeat", daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        logging.getLogger().removeHandler(self)
+
+    def _watch(self) -> None:
+        left = self._silence_s
+        while not self._over.wait(left):
+            left = _shown_at[0] + self._silence_s - time.monotonic()
+            if left <= 0:
+                state = self._describe()
+                state = f": {state}" if state else ""
+                _log.info(self._LINE, time.monotonic() - self._began, state)
+                left = self._silence_s

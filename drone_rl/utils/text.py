@@ -109,10 +109,8 @@ def hundredfold(share: float) -> str:
     """Return a rate times 100 with one decimal; 0.0 and 100.0 only if it is exactly 0 or 1."""
     text = f"{100 * share:.1f}"
     if text == "0.0" and share > 0:
-        return f"{100 * share:.2g}"
-    if text == "100.0" and share < 1:
-        return f"{100 - float(f'{100 * (1 - share):.2g}'):.12g}"
-    return text
+        return "<0.1"
+    return ">99.9" if text == "100.0" and share < 1 else text
 
 
 def rate(figure: Mapping[str, Any], label: str = "95% CI ") -> str:

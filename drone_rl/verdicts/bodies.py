@@ -18,7 +18,7 @@ from drone_rl.flight.in_the_loop.drone import FlightControllerError
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.display import aligned, picture, table
+from drone_rl.utils.display import Result, aligned, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import BAD, EMPTY, FAINT, GOOD, INK, ONE_SIDED, css, light
 from drone_rl.utils.progress import Progress, as_progress, silent
@@ -44,11 +44,11 @@ _WIDTH, _HEIGHT = 1.35, 1.1
 
 
 @dataclasses.dataclass(frozen=True)
-class Bodies:
+class Bodies(Result):
     """Verdicts by policy and dynamics."""
 
     settings: BodiesSettings
-    numbers: dict[str, Any] = dataclasses.field(repr=False)
+    numbers: dict[str, Any]
     """As in `bodies.json`: by policy and dynamics the verdict's evidence, and by policy the
     episodes with software in the loop, if any."""
 

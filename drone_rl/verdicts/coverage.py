@@ -20,6 +20,7 @@ from drone_rl.robustness.paired_evaluation import EvaluatedPolicy, PairedEvaluat
 from drone_rl.robustness.perturbations import Condition
 from drone_rl.robustness.shifts_file import SavedShifts, read_shifts
 from drone_rl.robustness.shifts_text import contradicted, lacking, needed_range
+from drone_rl.utils.display import Result
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path, parse_json, read_bytes
 from drone_rl.utils.intervals import mean_bounds
@@ -41,7 +42,7 @@ _SIGNED = frozenset({"sun"})
 
 
 @dataclasses.dataclass(frozen=True)
-class DomainRecheck:
+class DomainRecheck(Result):
     """New episodes under required conditions, compared with a file."""
 
     episodes: int
@@ -75,7 +76,7 @@ class DomainRecheck:
 
 
 @dataclasses.dataclass(frozen=True)
-class Coverage:
+class Coverage(Result):
     """A required operating domain compared with a measured one."""
 
     needs: Mapping[str, Need]

@@ -10,13 +10,13 @@ from safetensors import SafetensorError
 
 from drone_rl.config.commands import HeldOutSettings
 from drone_rl.evaluation.evaluate import held_out_environments
-from drone_rl.evaluation.verdict import judge_policy
+from drone_rl.evaluation.verdict import Verdict, judge_policy
 from drone_rl.evaluation.verdict_text import best_baseline, is_quoted
 from drone_rl.policies.policy import Policy
 from drone_rl.policies.zoo import certificate_path, shifts_path
 from drone_rl.policies.zoo.files import exported_bytes
-from drone_rl.robustness.shifts_text import QUOTED, not_evaluated
-from drone_rl.robustness.shifts_text import is_quoted as has_domain
+from drone_rl.robustness.quoted_text import QUOTED, not_evaluated
+from drone_rl.robustness.quoted_text import is_quoted as has_domain
 from drone_rl.sim.vocabulary import some_cubes, terms_of
 from drone_rl.sweeps.manifest import read_sweep
 from drone_rl.sweeps.rows import read_rows
@@ -25,7 +25,7 @@ from drone_rl.utils.files import read_bytes, write_all_atomically
 from drone_rl.utils.limits import CERTIFICATE_BYTES, SHIFTS_BYTES
 from drone_rl.utils.overrides import COMMAND, read_overrides
 from drone_rl.utils.schema import Maybe
-from drone_rl.utils.seeding import RootSeed, with_seed
+from drone_rl.utils.seeding import with_seed
 from drone_rl.utils.text import Evidence, Sentence, hundredfold, listed, rate, said, say
 from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import find_domain
@@ -40,8 +40,8 @@ def export(
     certificate: str | Path | None = None,
     shifts: str | Path | None = None,
     outputs: str | Path = "outputs",
-) -> RootSeed:
-    """Judge a policy and write it as safetensors with a model card.
+) -> Verdict:
+    """Judge a policy and write it as safetensors with a model card, next to the verdict.
 
     Args:
         policy: The policy.
@@ -53,7 +53,7 @@ def export(
         outputs: See `find_domain`.
 
     Returns:
-        Root of the random streams of the verdict's environments.
+        The verdict.
 
     Raises:
         InputError: The policy can't be written, or a given file is unusable.
@@ -65,7 +65,8 @@ def export(
     claim = None if claim is None or claim.refused else claim  # cards quote no refused certificate
     measured = find_domain(policy, shifts, outputs)
     with held_out_environments(policy, settings, seed) as (env, actor):
-        verdict = judge_policy(env, actor, settings.episodes, claim=claim, seed=seed).as_dict()
+        judged = judge_policy(env, actor, settings.episodes, claim=claim, seed=seed)
+    verdict = judged.as_dict()
     carried, numbers = {}, measured and measured.numbers
     if numbers is not None:  # the card names the copied file, without its folder
         numbers = {**numbers, "file": {**numbers["file"], "path": shifts_path(target).name}}
@@ -76,7 +77,7 @@ def export(
     about: dict[str, Any] = {"verdict": verdict, "seed": seed.value, "chosen": chosen}
     about |= {"command": command, "shifts": numbers, "carried": carried}
     export_policy(target, policy.state, **about)
-    return seed
+    return judged
 
 
 def origin_of(path: Path, state: dict[str, Any]) -> tuple[str | None, dict[str, Any] | None]:

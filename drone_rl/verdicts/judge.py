@@ -22,9 +22,9 @@ from drone_rl.evaluation.verdict_text import quantity_label
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
+from drone_rl.robustness.quoted_text import BRIEF, why_not
 from drone_rl.robustness.shifts_file import SavedShifts
-from drone_rl.robustness.shifts_text import QUOTED, why_not
-from drone_rl.utils.display import aligned, paragraph, table
+from drone_rl.utils.display import Result, aligned, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import NOT_COVERED, PROOF_MISSING
 from drone_rl.utils.progress import Progress, as_progress
@@ -33,10 +33,11 @@ from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator,
 from drone_rl.utils.text import rate, say, seed_line
 from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import Coverage, compare_with_required, find_domain, recheck_domain
+from drone_rl.verdicts.recorded import identify
 
 
 @dataclasses.dataclass(frozen=True)
-class Judgement:
+class Judgement(Result):
     """A verdict on a policy, with certificate and operating domain."""
 
     name: str
@@ -46,6 +47,8 @@ class Judgement:
     """The given file or that next to the policy, even if the verdict does not quote it."""
     measured: SavedShifts | None = None
     """Its robustness evaluation, if there is one."""
+    weights: str | None = None
+    """Hash of the policy's weights if it was judged in the conditions of its training."""
     coverage: Coverage | None = None
     """The required operating domain compared with its own, if one is required."""
 
@@ -53,6 +56,7 @@ class Judgement:
         """Return plain values, as in `verdict.json`."""
         return {
             "policy": self.name,
+            "weights": self.weights,
             "certificate": self.certificate and str(self.certificate),
             "shifts": self.measured and str(self.measured.path),
             "domain": self.domain or None,
@@ -64,7 +68,7 @@ class Judgement:
     @property
     def domain(self) -> str:
         """The operating domain as text; empty if it was not measured."""
-        return "" if self.measured is None else say(QUOTED, _quoted(self.measured, self.verdict))
+        return "" if self.measured is None else say(BRIEF, _quoted(self.measured, self.verdict))
 
     def status(self, require: str | None = None) -> int:
         """Return the exit code of `drone-rl verdict`.
@@ -105,7 +109,7 @@ class Judgement:
         return lines + table(["quantity", "value", "lower", "upper"], shown)
 
 
-class Judgements(tuple[Judgement, ...]):
+class Judgements(Result, tuple[Judgement, ...]):
     """Several judgements, in the order of the policies."""
 
     __slots__ = ()
@@ -241,7 +245,7 @@ def judge_one(
     with worlds as (env, actor):
         verdict = judge_policy(env, actor, settings.episodes, sampled=is_sampled, **known)
     progress("judged", 1, 1)
-    done = Judgement(name, settings, verdict, claim and claim.path, measured)
+    done = Judgement(name, settings, verdict, claim and claim.path, measured, identify(loaded))
     if coverage is None or measured is None:
         return done
     against = why_not(_quoted(measured, verdict))

@@ -17,7 +17,7 @@ from drone_rl.config.commands import ChanceSettings, ProveSettings
 from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason
-from drone_rl.utils.display import aligned, table
+from drone_rl.utils.display import Result, aligned, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
@@ -46,7 +46,7 @@ PLACEMENTS_AT_A_TIME = 20  # placements between two reports of progress
 
 
 @dataclasses.dataclass(frozen=True)
-class Chances:
+class Chances(Result):
     """How episodes with sampled actions end: exact probabilities, not estimates."""
 
     policy: Policy

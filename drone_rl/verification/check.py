@@ -11,7 +11,7 @@ from drone_rl.config.commands import CheckSettings
 from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import policy_names
-from drone_rl.utils.display import table
+from drone_rl.utils.display import Result, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import CERTIFICATE_REFUSED
 from drone_rl.utils.files import as_path, newest
@@ -28,7 +28,7 @@ from drone_rl.verification.checker.checker import CheckFindings, check_certifica
 
 
 @dataclasses.dataclass(frozen=True)
-class Check:
+class Check(Result):
     """The result of checking a certificate."""
 
     path: Path
@@ -36,7 +36,7 @@ class Check:
     policy: Policy
     """The policy, in the task of the certificate."""
     settings: CheckSettings
-    certificate: Certificate = dataclasses.field(repr=False)
+    certificate: Certificate
     """The statements."""
     findings: CheckFindings
     seed: RootSeed

@@ -17,7 +17,7 @@ from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.evaluation.plots import regions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
-from drone_rl.utils.display import aligned, picture, table
+from drone_rl.utils.display import Result, aligned, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
@@ -30,14 +30,14 @@ from drone_rl.verification.text import rows, say_places
 
 
 @dataclasses.dataclass(frozen=True)
-class Places:
+class Places(Result):
     """The actions of a greedy policy over all positions of one cube: areas, not samples."""
 
     policy: Policy
     settings: PlacesSettings
-    places: ActionMap = dataclasses.field(repr=False)
+    places: ActionMap
     """The cells."""
-    numbers: dict[str, Any] = dataclasses.field(repr=False)
+    numbers: dict[str, Any]
     """Summary, as in `places.json`."""
 
     def at(self, ahead: float, left: float) -> str:

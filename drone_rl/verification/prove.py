@@ -14,7 +14,7 @@ import numpy as np
 from drone_rl.config.commands import ProveSettings
 from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.utils.display import aligned, table
+from drone_rl.utils.display import Result, aligned, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import (
     as_path,
@@ -45,7 +45,7 @@ _BYTES_PER_SIDE = 64  # bytes of a saved state per cube and box: two borders, ke
 
 
 @dataclasses.dataclass(frozen=True)
-class Proof:
+class Proof(Result):
     """The exact outcome of every placement of the cubes, as far as it is decided."""
 
     certificate: dict[str, Any]

@@ -9,6 +9,7 @@ def test_an_export_can_be_judged(in_process, tmp_path):
     done = in_process("export", "policy=good", "name=mine", "episodes=20", "hydra.run.dir=e")
     assert done.returncode == 0, done.stderr
     assert "drone-rl train" in (tmp_path / "e" / "mine.md").read_text()
+    assert done.stdout.startswith("good (not certain): This policy")
     done = in_process("verdict", "policy=e/mine.safetensors", "episodes=20", "hydra.run.dir=v")
     assert done.returncode == 13, done.stderr  # as good as can be, but 20 episodes prove nothing
     assert done.stdout.startswith("good (not certain): ")
@@ -19,6 +20,7 @@ def test_an_export_for_other_programs(in_process, tmp_path, monkeypatch):
     done = in_process("export", "policy=poor", "name=mine", "format=onnx", "hydra.run.dir=e")
     assert done.returncode == 0, done.stderr
     assert {path.name for path in (tmp_path / "e").iterdir()} == {".hydra", "mine.onnx"}
+    assert done.stdout.startswith("recorded verdict: poor 0.0% (0.0 to ")
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,8 @@ def test_gallery_shows_each_refinement():
     first, *_, last = found.tried.values()
     assert first.settings.maximize == "probability" and first.settings.blur == 0.0
     assert last.settings == drone_rl.ClassModelsSettings().as_base(type(last.settings))
+    failed = "defaults: no image found makes forward or right more probable than not"
+    assert failed in str(found) and failed in found._repr_html_()
     width, height = found.image().size
     assert height > len(GALLERY) * 25 and width > 3 * 64
 

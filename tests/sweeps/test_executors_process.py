@@ -9,7 +9,7 @@ import time
 import pytest
 
 from drone_rl.sweeps import executors
-from drone_rl.sweeps.executors import RunProcess, finish_run, note_failure
+from drone_rl.sweeps.executors import RunProcess, describe_active, finish_run, note_failure
 from drone_rl.sweeps.manifest import read_failure, read_result
 from drone_rl.utils.files import folder_lock
 
@@ -54,6 +54,19 @@ def test_a_run_that_another_process_works_on_is_waited_for(make_runs):
     thread.join(10)
     assert statuses == [0]
     assert not (run.folder / "starts").exists()
+
+
+def test_runs_at_work_are_described_by_their_last_line(make_runs):
+    runs = make_runs("seed=0", "seed=1", "seed=2")
+    for run in runs:
+        run.folder.mkdir()
+        (run.folder / "output.log").write_text("[10:00:00] begins\n[10:00:05] frames 2\n")
+    (runs[1].folder / "output.log").write_text("")
+    assert describe_active(runs) == ""
+    with folder_lock(runs[0].folder), folder_lock(runs[1].folder):
+        first, second = (run.folder.name for run in runs[:2])
+        assert describe_active(runs) == f"{first}: frames 2; {second}: starts"
+        assert describe_active(runs, most=1) == f"{first}: frames 2; and 1 more"
 
 
 def test_a_process_that_came_too_late_is_no_failure(make_runs):

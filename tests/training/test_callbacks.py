@@ -13,7 +13,7 @@ from drone_rl.training import (
     ProgressCallback,
     callbacks,
 )
-from drone_rl.training.callbacks import CollapseCheck, ForwardProgress, with_progress
+from drone_rl.training.callbacks import CollapseCheck, ForwardProgress, Progress, with_progress
 from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.utils.errors import InputError
 from tests.training_loop import run
@@ -162,26 +162,48 @@ def test_passes_are_logged_as_lines_now_and_then_and_the_last_one(monkeypatch, c
     ]
 
 
+def collapse(updates, episodes=10, target=3.0):
+    """A check after updates of (entropy, running reward), with so many episodes each."""
+    check, progress = CollapseCheck(target), Progress()
+    training = types.SimpleNamespace(progress=progress)
+    check.on_start(training)
+    for entropy, reward in updates:
+        progress.frames, progress.episodes = progress.frames + 100, progress.episodes + episodes
+        progress.updates, progress.running_reward = progress.updates + 1, reward
+        check.on_update(training, {"loss/entropy": entropy} if entropy is not None else {})
+    return check
+
+
+# 500 episodes are 50 updates of 10; a rise of 0.03 is 1% of the target; 2.7 is 90% of it
+LEARNING = [(1.0, 0.5), (0.5, 1.5)]
+STUCK = [(0.001, 1.5)]
+
+
 @pytest.mark.parametrize(
-    ("updates", "warnings"),
+    ("updates", "collapsed_at"),
     [
-        ([(0.0, 0.0)] * 19, 0),
-        ([(1e-9, 1e-9)] * 60, 1),
-        ([(0.0, 0.0)] * 19 + [(0.1, 0.1)] + [(0.0, 0.0)] * 19, 0),
-        ([(1.0, 0.0)] * 40, 0),  # equal rewards of a policy that still explores
-        ([(0.0, 1e-3)] * 40, 0),
-        ([(-0.5, 0.0)] * 40, 0),  # a density: continuous actions that still vary
+        (LEARNING + STUCK * 49, None),
+        (LEARNING + STUCK * 50, 5200),
+        (LEARNING + STUCK * 300, 5200),  # warns once
+        (LEARNING + STUCK * 30 + [(0.1, 1.5)] + STUCK * 49, None),  # explores in between
+        (LEARNING + STUCK * 40 + [(0.001, 1.6)] * 40, None),  # improves in between
+        ([(0.0, 0.78 - 0.5**n) for n in range(99)], 6100),  # settles: rises by 0.03 until n = 10
+        ([(0.0, 2.8)] * 300, None),  # deterministic and good
+        ([(1.0, 0.5)] * 300, None),  # explores
+        ([(-0.5, 0.5)] * 300, None),  # the density of continuous actions
+        ([(None, 0.5)] * 300, None),  # a learner that logs no entropy
     ],
 )
-def test_a_deterministic_policy_is_warned_about_once(caplog, updates, warnings):
-    check = CollapseCheck()
-    check.on_update(types.SimpleNamespace(), {})  # of a learner that logs neither
-    for entropy, norm in updates:
-        metrics = {"loss/entropy": entropy, "loss/grad_norm": norm}
-        check.on_update(types.SimpleNamespace(), metrics)
-    assert ["deterministic" in record.getMessage() for record in caplog.records] == [
-        True
-    ] * warnings
+def test_a_deterministic_policy_that_does_not_improve_has_collapsed(caplog, updates, collapsed_at):
+    check = collapse(updates)
+    assert check.collapsed_at == collapsed_at
+    assert len(caplog.records) == (collapsed_at is not None)
+    assert check.result == ({} if collapsed_at is None else {"collapsed_at_frames": collapsed_at})
+
+
+def test_a_few_large_batches_are_not_yet_a_collapse():
+    assert collapse(LEARNING + STUCK * 19, episodes=1000).collapsed_at is None
+    assert collapse(LEARNING + STUCK * 20, episodes=1000).collapsed_at == 2200
 
 
 def test_torchrl_loggers_are_supported(make_trainer, tmp_path):

@@ -1,6 +1,8 @@
+import dataclasses
+
 from matplotlib.figure import Figure
 
-from drone_rl.utils.display import aligned, page, paragraph, picture, table
+from drone_rl.utils.display import Result, aligned, page, paragraph, picture, table
 
 NASTY = '<script>alert("x")</script>'
 
@@ -30,3 +32,15 @@ def test_texts_stand_at_the_left_and_figures_at_the_right():
 
 def test_a_picture_needs_no_file():
     assert picture(Figure(figsize=(1, 1))).startswith('<img src="data:image/png;base64,iVBOR')
+
+
+def test_a_result_shows_its_text_at_a_prompt():
+    @dataclasses.dataclass(frozen=True)
+    class Rate(Result):
+        pixels: list[int]
+
+        def __str__(self):
+            return "success 50%"
+
+    assert repr(Rate([0] * 1000)) == "success 50%"
+    assert repr([Rate([1])]) == "[success 50%]"

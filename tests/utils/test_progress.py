@@ -4,7 +4,7 @@ import time
 import pytest
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.progress import Bar, as_progress, log, silent
+from drone_rl.utils.progress import Bar, Heartbeat, as_progress, log, silent
 
 
 def test_a_bar_ends_when_all_is_done(capsys):
@@ -55,3 +55,24 @@ def test_progress_is_a_function_and_a_bar_by_default():
     for wrong in (True, False, 5, "bar"):
         with pytest.raises(InputError, match=rf"^progress={wrong!r} is no function; leave it out"):
             as_progress(wrong)  # pyright: ignore[reportArgumentType]
+
+
+def wait_for(condition):
+    until = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < until
+        time.sleep(0.01)
+
+
+def test_a_command_that_shows_nothing_logs_the_last_step_again_and_again(caplog):
+    caplog.set_level(logging.INFO)
+    with Heartbeat(silence_s=0.05):
+        log("flying", 1, 3)
+        wait_for(lambda: len(caplog.messages) > 2)
+    first, *lines = caplog.messages
+    assert first == "[1/3] flying"
+    assert all(line.startswith("still running after ") for line in lines)
+    assert {line.partition(" s: ")[2] for line in lines} == {"[1/3] flying"}
+    after = len(caplog.messages)
+    time.sleep(0.2)
+    assert len(caplog.messages) == after  # it ends with the work

@@ -70,9 +70,7 @@ def test_percentages_with_one_decimal_are_never_rounded_to_nothing_or_all():
 
 def test_no_rounding_to_certainty():
     all_of_many = {"share": 1.0, "lower95": 0.9996312, "upper95": 1.0}
-    assert rate(all_of_many, label="") == "100.0% (99.963 to 100.0)"
+    assert rate(all_of_many, label="") == "100.0% (>99.9 to 100.0)"
     nearly = {"share": 0.9999, "lower95": 0.99, "upper95": 1.0}
-    assert rate(nearly, label="") == "99.99% (99.0 to 100.0)"
-    assert (
-        rate({"share": 0.0, "lower95": 0.0, "upper95": 0.0003689}) == "0.0% (95% CI 0.0 to 0.037)"
-    )
+    assert rate(nearly, label="") == ">99.9% (99.0 to 100.0)"
+    assert rate({"share": 0.0, "lower95": 0.0, "upper95": 0.0003689}) == "0.0% (95% CI 0.0 to <0.1)"

@@ -90,7 +90,7 @@ def test_a_verdict_tells_the_domain_and_may_speak_against_it(good, tmp_path):
     done = drone_rl.judge(good, episodes=5, sampled=False, **told)
     assert done.coverage.is_covered and "blur of up to 1 pixels" in done.domain
     assert done.domain.startswith(f"Read from {path}, dated 1970-01-01 0")
-    assert "not measured again here: Good with" in done.domain
+    assert "not measured again here: good with" in done.domain
     assert "re-checked by 30 episodes at each of 3 strengths" in str(done)
     assert len(str(done).splitlines()) == 4 and done.domain in done._repr_html_()
     assert done.as_dict()["required_domain"]["lacking"] == {}

@@ -61,7 +61,7 @@ def test_a_small_bound_is_not_zero():
     bound = {"share": 0.0, "lower95": 0.0, "upper95": 0.000369, "trials": 10_000}
     failures = {"rows": [], "largest": None, "bound": bound}
     found = "\n".join(lines(verdict={**VERDICT, "failures": failures}))
-    assert "| upper bound | 0.037% of episodes |" in found
+    assert "| upper bound | <0.1% of episodes |" in found
 
 
 def test_an_unknown_command_is_not_named():

@@ -1,6 +1,7 @@
 """Run every command and code block of README.md and docs/, and compare the output that they show.
 
-`python -m tools.docs [--update] [PAGE ...]` runs pages, `drone-rl bench docs` runs all of them.
+`python -m tools.docs [--update] [PAGE ...]` runs pages, `drone-rl bench docs` runs all of them;
+`--time` times them as printed, see `timing.py`.
 
 Each page runs in a copy of the checkout, from top to bottom:
 

@@ -81,8 +81,8 @@ def describe_failures(outcomes: dict[str, list[Outcome]]) -> list[str]:
     ]
 
 
-def _run_in_copy(page: str, folder: Path, root: Path) -> list[Outcome]:
-    """Run a page in a new copy of the checkout, in a process of its own."""
+def copy_checkout(folder: Path, root: Path = ROOT) -> dict[str, str]:
+    """Copy the checkout to a folder; return the environment in which `drone-rl` is that of it."""
     shutil.rmtree(folder, ignore_errors=True)
     for name in COPIED:
         source, target = root / name, folder / name
@@ -96,8 +96,13 @@ def _run_in_copy(page: str, folder: Path, root: Path) -> list[Outcome]:
         (programs / name).write_text(f'#!/bin/sh\nexec "{sys.executable}" {words}"$@"\n')
         (programs / name).chmod(0o755)
     path = f"{programs}{os.pathsep}{os.environ['PATH']}"
+    return {**os.environ, "PATH": path, "PYTHONPATH": str(folder)}
+
+
+def _run_in_copy(page: str, folder: Path, root: Path) -> list[Outcome]:
+    """Run a page in a new copy of the checkout, in a process of its own."""
+    environment = copy_checkout(folder, root)
     command = [sys.executable, "-m", "tools.docs.session", page, "outcomes.json"]
-    environment = {**os.environ, "PATH": path, "PYTHONPATH": str(folder)}
     done = subprocess.run(
         command, cwd=folder, env=environment, capture_output=True, text=True, check=False
     )

@@ -56,6 +56,7 @@ from drone_rl.config.transforms import Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import USER_ERROR
 from drone_rl.utils.plugins import IMPORTED, failure, line_of
+from drone_rl.utils.progress import Heartbeat
 from drone_rl.utils.schema import Kind
 from drone_rl.utils.settings import Settings, conf_dir, kinds_of, plain, types_of
 
@@ -343,7 +344,8 @@ def _job(
                 _log.info("policy=latest is %s", used)
                 one = used if which == "latest" else (used,)
                 settings = settings.replace(policy=one)  # another may be the newest soon
-            status, value = settings.run(folder)
+            with Heartbeat() if settings.ends_alone() else contextlib.nullcontext():
+                status, value = settings.run(folder)
             if status < 128 and sys.stdout.isatty():  # pipes get only the results
                 used = settings.used_policy(folder)
                 print(next_steps(name.replace("_", "-"), used, folder, IMPORTED))

@@ -27,11 +27,18 @@ from hydra.plugins.sweeper import Sweeper
 from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig, OmegaConf, open_dict
 
-from drone_rl.sweeps.executors import Executor, LocalExecutor, RayExecutor, SlurmExecutor
+from drone_rl.sweeps.executors import (
+    Executor,
+    LocalExecutor,
+    RayExecutor,
+    SlurmExecutor,
+    describe_active,
+)
 from drone_rl.sweeps.manifest import Run, Sweep, open_sweep, read_failure, read_result
 from drone_rl.sweeps.search import import_optuna, next_trials, note_outcome, open_study
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, refuse_links
+from drone_rl.utils.progress import Heartbeat
 from drone_rl.utils.schema import Whole, shown
 from drone_rl.utils.text import plural
 
@@ -100,9 +107,11 @@ class SweepLauncher(Launcher):
         try:
             unfinished = [run for run in runs if read_result(run.folder) is None]
             endings = self.executor(sweep.folder).finish(unfinished) if unfinished else ()
-            for done, (run, status) in enumerate(endings, start=1):
-                failed += status != 0
-                _log.info("[%d/%d] %s: %s", done, len(unfinished), run.folder.name, _outcome(run))
+            with Heartbeat(lambda: describe_active(unfinished)):
+                for done, (run, status) in enumerate(endings, start=1):
+                    failed += status != 0
+                    line = "[%d/%d] %s: %s"
+                    _log.info(line, done, len(unfinished), run.folder.name, _outcome(run))
         except KeyboardInterrupt:
             _log.info("resume with the same command: %s", sweep.command)
             raise
@@ -198,7 +207,10 @@ def _outcome(run: Run) -> str:
     if result is None:
         return f"failed: {read_failure(run) or 'reason unknown'}"
     reward = _number(result.get("running_reward"))
-    why = _NOT_SOLVED.get(result["reason"], result["reason"])
+    why = str(_NOT_SOLVED.get(result["reason"], result["reason"]))
+    collapsed_at = _number(result.get("collapsed_at_frames"))
+    if collapsed_at is not None and result["reason"] in _NOT_SOLVED:
+        why += f" (learning collapsed after {collapsed_at:,.0f} frames)"
     judged = result.get("verdict")
     kind = f", verdict: {judged.get('kind')}" if isinstance(judged, dict) else ""
     return f"{why}, running reward {'none' if reward is None else f'{reward:.3f}'}{kind}"

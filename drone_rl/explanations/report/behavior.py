@@ -8,7 +8,8 @@ from drone_rl.evaluation.verdict_text import SENTENCES, depends_on_rounding
 from drone_rl.explanations.report.explanation import Explanation, Figures, Part
 from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.robustness import charts
-from drone_rl.robustness.shifts_text import QUOTED, is_quoted, not_evaluated, rows
+from drone_rl.robustness.quoted_text import QUOTED, is_quoted, not_evaluated
+from drone_rl.robustness.shifts_text import rows
 from drone_rl.sim.vocabulary import shown_actions, terms_of
 from drone_rl.utils.schema import as_mapping
 from drone_rl.utils.text import (

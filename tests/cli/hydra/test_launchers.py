@@ -35,6 +35,8 @@ def test_a_finished_run_returns_its_running_mean(run):
     job = _job_return(run)
     assert (job.return_value, job.overrides) == (1.5, ["seed=1"])
     assert _outcome(run) == "not solved in trainer.total_frames, running reward 1.500"
+    (run.folder / "result.json").write_text(json.dumps({**result, "collapsed_at_frames": 12_345}))
+    assert "(learning collapsed after 12,345 frames), running reward 1.500" in _outcome(run)
     result = {"reason": "solved", "running_reward": 2.98, "verdict": {"kind": "good"}}
     (run.folder / "result.json").write_text(json.dumps(result))
     assert _outcome(run) == "solved, running reward 2.980, verdict: good"
