@@ -104,11 +104,14 @@ def judge_sweep(sweep: Sweep, episodes: int, device: str) -> None:
     _log.info("%s", seed_line(seed.as_dict()))
     finished = [run for run in sweep.runs if read_result(run.folder) is not None]
     for done, run in enumerate(finished, start=1):
+        name = sweep.name_of(run)
         try:
             verdict = judge_run(run.folder, episodes, device, seed=seed)
-            _log.info("[%d/%d] %s: %s", done, len(finished), run.folder.name, verdict["kind"])
+            _log.info("[%d/%d] %s: %s", done, len(finished), name, verdict["kind"])
         except InputError as error:
-            _log.warning("[%d/%d] %s not judged: %s", done, len(finished), run.folder.name, error)
+            _log.warning(
+                "[%d/%d] %s not judged: %s", done, len(finished), sweep.name_of(run), error
+            )
 
 
 def judge_run(
