@@ -65,7 +65,7 @@ def closest(name: str, known: Sequence[str]) -> str | None:
     ):
         if meant:
             return meant
-    if last.isdigit():  # the index of a list
+    if last.isdigit() or last in others:  # the index of a list; a name for what is not known here
         return None
     others_than_group = [key for key in known if not word.startswith(f"{key}.")]
     if near := difflib.get_close_matches(word, others_than_group, 1, 0.8):
@@ -104,6 +104,9 @@ class Command:
         """Return the error about a name that this command doesn't have."""
         value = override.partition("=")[2]
         text = f"{override}: drone-rl {self.name} has no setting {name}; "
+        for meant in map(_key, OTHER_NAMES["settings"].get(name, ())):
+            if self._choices_with(meant.partition(".")[0], meant) and meant not in self.keys:
+                return self.unknown(f"{meant}={value}", meant)
         group, first = name.rpartition(".")[0], name.partition(".")[0]
         if is_group(self.conf, first) and first not in ("hydra", *self.groups, *self.keys):
             return InputError(

@@ -125,7 +125,7 @@ def test_lists_are_offered_where_they_are_accepted():
 
 
 def test_hydras_words_are_kept_if_the_user_has_files_of_settings():
-    assert "Hydra's words" in said("seed=x", "--config-dir=my")
+    assert "Hydra's words" in said("seed=x", "hydra.searchpath=[file://my]")
 
 
 @pytest.mark.parametrize(
@@ -201,4 +201,4 @@ def test_all_else_is_accepted():
         conf_dir(),
     )
     check_choices(["logger=[csv,tensorboard]", "task='pillars'", "task=choice(a,b)"], conf_dir())
-    check_choices(["sweep=mine", "task=mine", "--config-dir=my"], conf_dir())
+    check_choices(["sweep=mine", "task=mine", "hydra.searchpath=[file://my]"], conf_dir())
