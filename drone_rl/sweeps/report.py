@@ -55,7 +55,7 @@ def write_sweep_report(sweep: Sweep) -> tuple[Path, dict[str, Any]]:
     rows = read_rows(sweep)
     summary = summarise_sweep(sweep, rows)
     write_atomically(sweep.folder / "summary.csv", to_csv(rows))
-    write_atomically(sweep.folder / "summary.json", json.dumps(summary, indent=2))
+    write_atomically(sweep.folder / "summary.json", json.dumps(summary, indent=2, allow_nan=False))
     pictures = _plots(make_groups(rows), summary["sentences"])
     page = sweep.folder / "report.html"
     write_atomically(page, render_page(sweep.folder.name, summary, pictures))
