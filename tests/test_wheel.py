@@ -27,7 +27,7 @@ def test_wheel_contains_the_configuration_and_runs_without_the_checkout(tmp_path
     code = "import sys; sys.path.insert(0, 'site'); from drone_rl.cli.main import main; "
     code += "from drone_rl.utils.settings import conf_dir; "
     code += "assert str(conf_dir()).endswith('site/drone_rl/conf'), conf_dir(); main()"
-    command = [sys.executable, "-c", code, "train", "--cfg", "job"]
+    command = [sys.executable, "-c", code, "train", "--help", "all"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "num_cubes: 3" in done.stdout

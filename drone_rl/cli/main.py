@@ -56,6 +56,10 @@ def main() -> None:
     except BrokenPipeError:
         status = OUTPUT_CLOSED
         _discard_output()
+    except SystemExit as stop:  # a command that a signal or a closed pipe has ended
+        status = stop.code
+        if status == OUTPUT_CLOSED:
+            _discard_output()
     except OSError as error:
         status = USER_ERROR
         print(f"error: standard output can't be written ({error.strerror})", file=sys.stderr)

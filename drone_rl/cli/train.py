@@ -11,11 +11,11 @@ import drone_rl
 from drone_rl.cli.hydra import resuming
 from drone_rl.cli.hydra.launchers import (
     LocalLauncher,
-    OptunaSweeper,
     RayLauncher,
     SlurmLauncher,
     register_plugins,
 )
+from drone_rl.cli.hydra.searching import OptunaSweeper
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.training import Logger, Tensorboard, TrainSettings
@@ -104,6 +104,7 @@ class TrainCommand(CommandSettings, TrainSettings):
 def _callbacks(settings: TrainCommand, folder: Path) -> list["Callback"]:
     """Return the callbacks. A resumed run's files stay unchanged until its state is accepted."""
     from drone_rl.sweeps.pruning import PruneCallback
+    from drone_rl.sweeps.search import study_folder
     from drone_rl.training import Callback, LoggerCallback, ProgressCallback
 
     class WriteSettings(Callback):
@@ -113,7 +114,8 @@ def _callbacks(settings: TrainCommand, folder: Path) -> list["Callback"]:
     def make() -> list[Any]:
         return [logger.make() for logger in settings.logger]
 
-    searching = [] if settings.trial is None else [PruneCallback(folder.parent, settings.trial)]
+    trial = settings.trial
+    searching = [] if trial is None else [PruneCallback(study_folder(folder), trial)]
     if settings.resume is None:
         return [LoggerCallback(make()), ProgressCallback(), *searching]
     resuming.check_folder(settings.resume, folder)

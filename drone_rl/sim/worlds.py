@@ -30,6 +30,8 @@ from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, Maybe, Text, Whole
 
+LARGEST_REWARD = 1e10
+"""Largest reward of a step, so that sums of rewards and of their squares are finite in float32."""
 _POSE = {"drone": Entry((3,), torch.float32), "attitude": Entry((4,), torch.float32)}
 
 
@@ -173,8 +175,12 @@ class Worlds:
                 f"{type(self.task).__name__}.step must return two things: the states after the "
                 "step, and the rewards, a tensor with one number for each environment"
             )
-        if not bool(torch.isfinite(found[1]).all()):
-            raise InputError(f"{type(self.task).__name__}.step returns rewards that are not finite")
+        is_usable = (found[1] <= LARGEST_REWARD) & (found[1] >= -LARGEST_REWARD)  # nor NaN
+        if not bool(is_usable.all()):
+            raise InputError(
+                f"{type(self.task).__name__}.step returns a reward of {found[1][~is_usable][0]:g}; "
+                f"scale rewards to at most {LARGEST_REWARD:g}, so that their sums stay finite"
+            )
         return found
 
     def render(

@@ -6,7 +6,7 @@ import json
 import re
 import shlex
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from drone_rl.config.configuration import check_same_config
@@ -30,6 +30,8 @@ from drone_rl.utils.settings import current_names
 FORMAT = "drone_rl sweep"
 MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s", "renderer")
 """Settings that may differ when a sweep is resumed."""
+_LEVELS = 100
+"""Levels of folders that are searched for links; runs may be in folders of folders."""
 THREADS = {"OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "PASSIVE"}
 """Environment variables of every run, so that parallel runs don't compete for the cores.
 
@@ -131,10 +133,14 @@ class Sweep:
     runs: list[Run]
     """The runs in the order of their numbers."""
 
+    def name_of(self, run: Run) -> str:
+        """Return the path of a run's folder inside the sweep's folder."""
+        return run.folder.relative_to(self.folder).as_posix()
+
     def save(self) -> None:
         """Write `sweep.json`."""
         runs = [
-            {"number": r.number, "overrides": list(r.overrides), "folder": r.folder.name}
+            {"number": r.number, "overrides": list(r.overrides), "folder": self.name_of(r)}
             for r in self.runs
         ]
         own = {"format": FORMAT, "command": self.command, "settings": self.settings, "runs": runs}
@@ -155,20 +161,19 @@ def read_sweep(folder: Path) -> Sweep:
             "give one that drone-rl train -m made, outputs/train/multiruns/..."
         )
     try:
-        refuse_links(folder)
+        refuse_links(folder, _LEVELS)
         content = _SWEEP.read(read_json(path, SWEEP_BYTES), "sweep")
         runs = [
             Run(
                 run["number"],
                 tuple(check_harmless(override, "a run") for override in run["overrides"]),
-                folder / _name(run["folder"]),
+                inside(folder, run["folder"]),
             )
             for run in content["runs"]
         ]
         if len({run.number for run in runs}) < len(runs):
             raise InputError("two runs have the same number")
-        if len({run.folder for run in runs}) < len(runs):
-            raise InputError("two runs have the same folder, so that one result would count twice")
+        check_folders(runs)
         given = as_mapping(content["settings"], "settings")
         settings = current_names(TrainSettings, given)
         return Sweep(folder, content["command"], settings, runs)
@@ -178,11 +183,28 @@ def read_sweep(folder: Path) -> Sweep:
         ) from None
 
 
-def _name(folder: str) -> str:
-    """Return the name of a run's folder, checked to be inside the sweep's folder."""
-    if folder in ("", ".", "..") or "/" in folder:
-        raise InputError(f"a run's folder {shown(folder)} is not inside the sweep's folder")
-    return folder
+def inside(folder: Path, name: str) -> Path:
+    """Return a run's folder by its path inside the sweep's folder.
+
+    Raises:
+        InputError: It is not inside.
+    """
+    path = PurePosixPath(name)
+    if path.is_absolute() or not path.parts or ".." in path.parts:
+        raise InputError(f"a run's folder {shown(name)} is not inside the sweep's folder")
+    return folder / path
+
+
+def check_folders(runs: Sequence[Run]) -> None:
+    """Raise an `InputError` for two runs in the same folder."""
+    owners: dict[Path, Run] = {}
+    for run in runs:
+        other = owners.setdefault(run.folder, run)
+        if other is not run:
+            raise InputError(
+                f"runs {other.number} and {run.number} have the same folder {run.folder}, so that "
+                "one result would count twice; add ${hydra.job.num} to hydra.sweep.subdir"
+            )
 
 
 def open_sweep(
@@ -194,9 +216,9 @@ def open_sweep(
     more seeds, are added. A folder with another sweep is an `InputError`.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    refuse_links(folder)
+    refuse_links(folder, _LEVELS)
     if not (folder / "sweep.json").exists():
-        if other := next(folder.glob("*/run.yaml"), None):
+        if other := next(folder.glob("**/run.yaml"), None):
             raise InputError(
                 f"hydra.sweep.dir={folder} holds other runs ({other.parent.name}); "
                 "choose another folder"
@@ -212,6 +234,7 @@ def open_sweep(
             )
         check_same_config(sweep.settings, json.loads(json.dumps(settings)), MAY_CHANGE)
         sweep.runs += [run for run in runs if run.number not in known]
+        check_folders(sweep.runs)
     sweep.save()
     return sweep
 

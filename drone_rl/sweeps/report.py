@@ -55,7 +55,7 @@ def write_sweep_report(sweep: Sweep) -> tuple[Path, dict[str, Any]]:
     rows = read_rows(sweep)
     summary = summarise_sweep(sweep, rows)
     write_atomically(sweep.folder / "summary.csv", to_csv(rows))
-    write_atomically(sweep.folder / "summary.json", json.dumps(summary, indent=2))
+    write_atomically(sweep.folder / "summary.json", json.dumps(summary, indent=2, allow_nan=False))
     pictures = _plots(make_groups(rows), summary["sentences"])
     page = sweep.folder / "report.html"
     write_atomically(page, render_page(sweep.folder.name, summary, pictures))
@@ -104,11 +104,14 @@ def judge_sweep(sweep: Sweep, episodes: int, device: str) -> None:
     _log.info("%s", seed_line(seed.as_dict()))
     finished = [run for run in sweep.runs if read_result(run.folder) is not None]
     for done, run in enumerate(finished, start=1):
+        name = sweep.name_of(run)
         try:
             verdict = judge_run(run.folder, episodes, device, seed=seed)
-            _log.info("[%d/%d] %s: %s", done, len(finished), run.folder.name, verdict["kind"])
+            _log.info("[%d/%d] %s: %s", done, len(finished), name, verdict["kind"])
         except InputError as error:
-            _log.warning("[%d/%d] %s not judged: %s", done, len(finished), run.folder.name, error)
+            _log.warning(
+                "[%d/%d] %s not judged: %s", done, len(finished), sweep.name_of(run), error
+            )
 
 
 def judge_run(

@@ -35,6 +35,8 @@ class Row:
     run: Run
     choice: dict[str, str]
     """The swept settings and their values, including the seed."""
+    folder: str
+    """Path of the run's folder inside the sweep's folder."""
     state: str
     """"finished", "failed", "damaged" or "unfinished"."""
     error: str | None = None
@@ -116,7 +118,7 @@ class Row:
             **{k: NOT_OFFERED if judged and v is None else v for k, v in sides.items()},
             "entropy": self.entropy,
             "error": self.error,
-            "folder": self.run.folder.name,
+            "folder": self.folder,
         }
 
     def _why_not_judged(self) -> str | None:
@@ -136,7 +138,7 @@ def read_rows(sweep: Sweep) -> list[Row]:
     keys = list(dict.fromkeys(key for choice in choices for key in choice))
     swept = [key for key in keys if len({choice.get(key) for choice in choices}) > 1]
     return [
-        _read_row(run, {key: choice.get(key, "") for key in swept}, metrics)
+        _read_row(run, {key: choice.get(key, "") for key in swept}, sweep.name_of(run), metrics)
         for run, choice in zip(sweep.runs, choices, strict=True)
     ]
 
@@ -146,11 +148,11 @@ def _choice(run: Run) -> dict[str, str]:
     return {key.lstrip("+"): value for key, _, value in parts if key != "trial"}
 
 
-def _read_row(run: Run, choice: dict[str, str], metrics: TablesAllowance) -> Row:
+def _read_row(run: Run, choice: dict[str, str], folder: str, metrics: TablesAllowance) -> Row:
     result = read_result(run.folder)
     error = read_failure(run)
     if result is None:
-        row = Row(run, choice, "unfinished" if error is None else "failed", error)
+        row = Row(run, choice, folder, "unfinished" if error is None else "failed", error)
         with contextlib.suppress(ValueError, KeyError, TypeError):
             if error is not None:  # a failed run may have metrics
                 _, (row.frames, row.seconds), row.entropy = _read_metrics(run.folder, 1, metrics)
@@ -160,13 +162,13 @@ def _read_row(run: Run, choice: dict[str, str], metrics: TablesAllowance) -> Row
         curve, _, entropy = _read_metrics(run.folder, result["largest_reward"], metrics)
         _check_curve(curve)
         had = float(result["frames"]), float(result["seconds"])
-        row = Row(run, choice, "finished", None, result, curve, *had, entropy)
+        row = Row(run, choice, folder, "finished", None, result, curve, *had, entropy)
         if row.verdict is not None:
             check_verdict(row.verdict)
         row.plain()
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         reason = str(error) if isinstance(error, InputError) else repr(error)
-        return Row(run, choice, "damaged", f"its files can't be read ({reason})")
+        return Row(run, choice, folder, "damaged", f"its files can't be read ({reason})")
     return row
 
 

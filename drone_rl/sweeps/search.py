@@ -13,6 +13,7 @@ from drone_rl.utils.limits import JOURNAL_BYTES
 from drone_rl.utils.schema import Whole, as_mapping
 
 NAME = "sweep"
+_JOURNAL = "optuna.journal"
 _OPERATIONS = Whole(0, 100)
 """Operation codes of a journal line."""
 _DAMAGE = (LookupError, TypeError, ValueError, AttributeError, AssertionError)
@@ -24,6 +25,11 @@ def import_optuna() -> Any:
     return extra("optuna", "optuna", "hydra/sweeper=optuna")
 
 
+def study_folder(run: Path) -> Path:
+    """Return the folder of the sweep that a run's folder is in."""
+    return next((above for above in run.parents if (above / _JOURNAL).exists()), run.parent)
+
+
 def open_study(folder: Path, **settings: Any) -> Any:
     """Return the `optuna.Study` in a sweep's folder; create it if `direction` is given.
 
@@ -33,9 +39,9 @@ def open_study(folder: Path, **settings: Any) -> Any:
         InputError: Optuna isn't installed, or the study's file is missing, damaged or too large.
     """
     optuna = import_optuna()
-    path = folder / "optuna.journal"
+    path = folder / _JOURNAL
     if "direction" not in settings and not path.exists():
-        raise InputError(f"{folder} has no search (optuna.journal); leave out trial=")
+        raise InputError(f"{folder} has no search ({_JOURNAL}); leave out trial=")
     _check_journal(path)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     try:

@@ -5,6 +5,7 @@ import dataclasses
 import enum
 import json
 import logging
+import math
 import signal
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -237,13 +238,14 @@ def target_of(settings: TrainSettings) -> float | None:
     """Return the running reward at which a run is solved, if any.
 
     Raises:
-        InputError: It is a fraction of a largest reward that is not above 0, as are all figures.
+        InputError: It is a fraction of a largest reward that is not above 0 and finite, as are all
+            figures.
     """
     share, largest = settings.trainer.target_share, as_task(settings.task).largest_reward
-    if not largest > 0:
+    if not 0 < largest < math.inf:
         raise InputError(
             f"task={settings.task.name} has largest_reward={largest:g}, of which no fraction is a "
-            "target; let a perfect episode return more than 0, as by a reward for success"
+            "target; give a finite one above 0, as by a reward for success"
         )
     return share and share * largest
 
@@ -274,7 +276,7 @@ def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Tra
         last, episodes = last_of(folder), settings.evaluate_after
         given = (settings.device, settings.renderer)
         result["verdict"], _ = judge_for_selection(last, episodes, *given)
-    write_atomically(folder / "result.json", json.dumps(result, indent=2))
+    write_atomically(folder / "result.json", json.dumps(result, indent=2, allow_nan=False))
     return Training(folder, result["reason"], result)
 
 

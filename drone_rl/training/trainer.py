@@ -46,6 +46,13 @@ def episode_rewards(batch: TensorDictBase) -> Tensor:
     return torch.diff(cumulative, prepend=cumulative.new_zeros(1))
 
 
+def check_rewards(batch: TensorDictBase) -> None:
+    """Raise an `InputError` unless the reward of each episode that ends in a batch is finite."""
+    rewards = episode_rewards(batch)
+    if not bool(rewards.isfinite().all()):
+        raise InputError("the reward of an episode is NaN or infinite; scale the rewards down")
+
+
 def running_mean(old: float, values: Tensor, decay: float) -> float:
     """Update a mean with each value: m <- decay * m + (1 - decay) * value."""
     for value in values.tolist():
@@ -164,6 +171,7 @@ class Trainer:
                 break
             self._collected = time.perf_counter()
             check_batch(batch, self.learner.in_keys, type(self.learner).__name__)
+            check_rewards(batch)
             yield batch
             if self.progress.updates % TRIM_INTERVAL == 0:
                 return_freed_memory()

@@ -103,7 +103,7 @@ _TYPES = ("require-trusted-types-for 'script'", "trusted-types 'none'")
 def page_environment(*packages: str) -> "jinja2.Environment":
     """Return an environment for the templates in packages, earlier ones first; values are escaped.
 
-    It has the filters `folder_link`, a relative link to a folder by its name, and jinja's `tojson`,
+    It has the filters `folder_link`, a relative link to a folder by its path, and jinja's `tojson`,
     whose result can stand in a script element: no character of it ends that element.
     """
     import jinja2  # most users of this module need no template
@@ -145,8 +145,8 @@ def content_security_policy(style: str, script: str = "") -> str:
 
 
 def folder_link(name: str) -> str:
-    """Return a link to a folder next to the page, whatever the folder is called."""
-    return f"./{urllib.parse.quote(name, safe='')}/"
+    """Return a link to a folder below that of the page, whatever the folder is called."""
+    return f"./{urllib.parse.quote(name)}/"
 
 
 def _hash(text: str) -> str:

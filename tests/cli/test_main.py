@@ -82,12 +82,13 @@ def test_mistakes_get_one_line_with_the_value_and_the_remedy(in_process, args, w
     assert all(word in line for word in words), line
 
 
-@pytest.mark.parametrize("args", [["--help"], ["export", "--help"]])
+@pytest.mark.parametrize("args", [["--help"], ["export", "--help"], ["policies", "most=0"]])
 def test_a_reader_that_leaves_is_no_error(tmp_path, args):
-    """As in `drone-rl --help | head -1`."""
+    """As in `drone-rl --help | head -1`; lines are written at once, as some are of long outputs."""
     reader, writer = os.pipe()
     os.close(reader)
-    done = drone_rl(*args, cwd=tmp_path, stdout=writer)
+    unbuffered = "import sys; sys.stdout.reconfigure(line_buffering=True)"
+    done = drone_rl(*args, cwd=tmp_path, stdout=writer, setup=unbuffered)
     os.close(writer)
     assert (done.returncode, done.stderr) == (141, "")
 

@@ -1,5 +1,7 @@
 """A batch of environments equals single environments in dm_control."""
 
+import re
+
 import numpy as np
 import pytest
 import torch
@@ -85,10 +87,16 @@ def test_a_task_whose_step_returns_no_pair_is_named(monkeypatch):
         )
         with pytest.raises(InputError, match="a tensor with one number for each environment"):
             worlds.step(*ahead)
-    unknown = torch.full((2,), torch.nan)
-    monkeypatch.setattr(worlds.task, "step", lambda *given: (step(*given)[0], unknown))
-    with pytest.raises(InputError, match=r"CollectCubes\.step returns rewards that are not finite"):
-        worlds.step(*ahead)
+
+
+@pytest.mark.parametrize("reward", [torch.nan, -torch.inf, 2e10])
+def test_a_reward_whose_sums_may_overflow_is_named(monkeypatch, reward):
+    worlds = Worlds(2, TaskSettings(num_cubes=1))
+    worlds.reset(torch.arange(2), [world_random_state(0, i) for i in range(2)])
+    step, rewards = worlds.task.step, torch.tensor([0.0, reward])
+    monkeypatch.setattr(worlds.task, "step", lambda *given: (step(*given)[0], rewards))
+    with pytest.raises(InputError, match=re.escape(f"returns a reward of {reward:g}; ")):
+        worlds.step(torch.arange(2), torch.zeros(2, dtype=torch.int64))
 
 
 def test_combined_appearance_is_cached():

@@ -276,3 +276,15 @@ def test_update_has_the_expected_metrics(make_trainer):
         seconds = metrics["time/collect_s"] + metrics["time/learn_s"]
         frames = metrics["time/frames_per_second"] * seconds
         assert frames == pytest.approx(round(frames), abs=1e-6) and frames > 1
+
+
+@pytest.mark.parametrize("reward", [torch.nan, 3e38])
+def test_rewards_that_overflow_end_the_training(make_trainer, reward):
+    trainer = make_trainer()
+    batch = next(iter(trainer.collector))
+    batch["next", "reward"].fill_(reward)
+    batch["next", "episode_reward"] = batch["next", "reward"] * 2.0  # in float32
+    trainer.collector = [batch]
+    with pytest.raises(InputError, match="the reward of an episode is NaN or infinite"):
+        run(trainer)
+    assert trainer.progress.updates == 0

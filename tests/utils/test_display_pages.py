@@ -63,8 +63,9 @@ def test_static_files_are_joined_and_may_not_end_their_element():
     ("name", "link"),
     [
         ("2", "./2/"),
+        ("lr 0.1/2", "./lr%200.1/2/"),
         ("javascript:alert(1)", "./javascript%3Aalert%281%29/"),
-        ("//evil.invalid/x", "./%2F%2Fevil.invalid%2Fx/"),
+        ("//evil.invalid/x", ".///evil.invalid/x/"),
         ('"><script>', "./%22%3E%3Cscript%3E/"),
     ],
 )

@@ -54,7 +54,7 @@ from drone_rl.config.networks import Network
 from drone_rl.config.training import CloningSettings, Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.exit_codes import USER_ERROR
+from drone_rl.utils.exit_codes import OUTPUT_CLOSED, USER_ERROR
 from drone_rl.utils.plugins import IMPORTED, failure, line_of
 from drone_rl.utils.progress import Heartbeat
 from drone_rl.utils.schema import Kind
@@ -249,11 +249,11 @@ def run_command(name: str, command: type[CommandSettings], overrides: Sequence[s
         for override in repeated(words):
             counts = f"{override.partition('=')[0]} is given several times; {override} counts"
             print(f"warning: {counts}", file=sys.stderr)
+    check_words(name, conf_dir(), overrides)
     if is_help:
         with _explained(name, overrides):
             show_help(name, conf_dir(), overrides, command, topics)
         return 0
-    check_words(name, conf_dir(), overrides)
     statuses: list[int] = []
     job = _job(name, command, statuses, overrides)
     wrapped = hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name=name)(job)
@@ -350,11 +350,13 @@ def _job(
                 used = settings.used_policy(folder)
                 print(next_steps(name.replace("_", "-"), used, folder, IMPORTED))
         except Exception as error:  # a failed run of a sweep does not stop the others
-            is_closed = isinstance(error, BrokenPipeError) and is_output_closed()
-            if is_closed or (text := _mistake(error, overrides)) is None:
-                raise
-            print(f"error: {text}", file=sys.stderr)
             status, value = USER_ERROR, None
+            if isinstance(error, BrokenPipeError) and is_output_closed():
+                status = OUTPUT_CLOSED  # Hydra would print an error that is raised again
+            elif (text := _mistake(error, overrides)) is None:
+                raise
+            else:
+                print(f"error: {text}", file=sys.stderr)
         statuses.append(status)
         if status > 128:  # a signal ends a whole sweep, not one run of it
             sys.exit(status)

@@ -1,31 +1,29 @@
-"""Hydra plugins of `drone-rl train -m`: launchers and a sweeper; each run is its own process.
+"""Launchers, Hydra plugins of `drone-rl train -m`: each run is its own process.
 
 Hydra's default launcher runs all jobs in one process, and its joblib launcher is unmaintained.
 Separate processes all start from the same state, and one can fail without the others.
 """
 
-import copy
 import importlib
 import logging
 import re
 import signal
 import sys
 import types
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from hydra.core.hydra_config import HydraConfig
-from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import ChoiceSweep, IntervalSweep, Override, RangeSweep
 from hydra.core.plugins import Plugins
 from hydra.core.utils import JobReturn, JobStatus, configure_log, setup_globals
+from hydra.errors import HydraException
 from hydra.plugins.launcher import Launcher
 from hydra.plugins.plugin import Plugin
-from hydra.plugins.sweeper import Sweeper
 from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig, OmegaConf, open_dict
+from omegaconf.errors import OmegaConfBaseException
 
 from drone_rl.sweeps.executors import (
     Executor,
@@ -34,12 +32,18 @@ from drone_rl.sweeps.executors import (
     SlurmExecutor,
     describe_active,
 )
-from drone_rl.sweeps.manifest import Run, Sweep, open_sweep, read_failure, read_result
-from drone_rl.sweeps.search import import_optuna, next_trials, note_outcome, open_study
+from drone_rl.sweeps.manifest import (
+    Run,
+    Sweep,
+    check_folders,
+    inside,
+    open_sweep,
+    read_failure,
+    read_result,
+)
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import folder_lock, refuse_links
+from drone_rl.utils.files import folder_lock
 from drone_rl.utils.progress import Heartbeat
-from drone_rl.utils.schema import Whole, shown
 from drone_rl.utils.text import plural
 
 NAMESPACE = "hydra_plugins.drone_rl"
@@ -63,8 +67,10 @@ class SweepLauncher(Launcher):
         """Store Hydra's objects."""
         self.hydra_context, self.config = hydra_context, config
         self.task_function = task_function
-        multirun = Path(str(config.hydra.sweep.dir)) / "multirun.yaml"
+        folder = Path(str(config.hydra.sweep.dir)).absolute()
+        multirun = folder / "multirun.yaml"
         self._multirun = multirun, multirun.read_bytes() if multirun.is_file() else None
+        self._new_folders = [path for path in (folder, *folder.parents) if not path.exists()]
 
     def launch(
         self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int
@@ -73,9 +79,10 @@ class SweepLauncher(Launcher):
         setup_globals()
         configure_log(self.config.hydra.hydra_logging, self.config.hydra.verbose)
         folder = Path(str(self.config.hydra.sweep.dir)).absolute()
-        runs = [self._run(folder, initial_job_idx + i, o) for i, o in enumerate(job_overrides)]
-        folder.mkdir(parents=True, exist_ok=True)
         try:
+            runs = [self._run(folder, initial_job_idx + i, o) for i, o in enumerate(job_overrides)]
+            self._check(runs)
+            folder.mkdir(parents=True, exist_ok=True)
             with folder_lock(folder), _sigterm_as_interrupt():
                 sweep = open_sweep(folder, _command(), self._settings(), runs)
                 begun = {run.number: run for run in sweep.runs}
@@ -84,20 +91,29 @@ class SweepLauncher(Launcher):
                 count = plural(len(runs), "run")
                 _log.info("sweep of %s, %d finished before: %s", count, finished, folder)
                 failed = self._finish(sweep, runs)
-        except InputError:
-            self._restore_multirun()
+        except (InputError, HydraException, OmegaConfBaseException):
+            self._remove_traces()
             raise
         if failed:
             self.task_function.statuses.append(1)  # pyright: ignore[reportFunctionMemberAccess]
         return [_job_return(run) for run in runs]
 
-    def _restore_multirun(self) -> None:
+    def _check(self, runs: Sequence[Run]) -> None:
+        if not runs:
+            typed = " ".join(self.config.hydra.overrides.task)
+            raise InputError(f"{typed}: a sweep of no runs; give each setting at least one value")
+        check_folders(runs)
+
+    def _remove_traces(self) -> None:
         """Restore multirun.yaml, which Hydra's sweeper wrote for a sweep that is refused."""
         path, content = self._multirun
         if content is None:
             path.unlink(missing_ok=True)
         else:
             path.write_bytes(content)
+        for folder in self._new_folders:
+            with suppress(OSError):  # it contains something
+                folder.rmdir()
 
     def _finish(self, sweep: Sweep, runs: Sequence[Run]) -> int:
         """Run the unfinished runs and write the report; return the number of failed ones."""
@@ -111,7 +127,7 @@ class SweepLauncher(Launcher):
                 for done, (run, status) in enumerate(endings, start=1):
                     failed += status != 0
                     line = "[%d/%d] %s: %s"
-                    _log.info(line, done, len(unfinished), run.folder.name, _outcome(run))
+                    _log.info(line, done, len(unfinished), sweep.name_of(run), _outcome(run))
         except KeyboardInterrupt:
             _log.info("resume with the same command: %s", sweep.command)
             raise
@@ -120,8 +136,8 @@ class SweepLauncher(Launcher):
         return failed
 
     def _run(self, folder: Path, number: int, overrides: Sequence[str]) -> Run:
-        """A run in the folder `hydra.sweep.subdir`, resolved without a full composition."""
-        config = copy.deepcopy(self.config)
+        """A run in the folder `hydra.sweep.subdir`, which Hydra resolves with its settings."""
+        config = self.hydra_context.config_loader.load_sweep_config(self.config, [*overrides])
         names = config.hydra.job.config.override_dirname
         left_out = tuple(f"{key}=" for key in names.exclude_keys)
         typed = sorted(o for o in overrides if not o.startswith(left_out))
@@ -130,7 +146,7 @@ class SweepLauncher(Launcher):
             config.hydra.job.id = config.hydra.job.num = number
             config.hydra.job.override_dirname = names.item_sep.join(typed)
         HydraConfig.instance().set_config(config)
-        return Run(number, tuple(overrides), folder / str(config.hydra.sweep.subdir)[:200])
+        return Run(number, tuple(overrides), inside(folder, str(config.hydra.sweep.subdir)[:200]))
 
     def _settings(self) -> dict[str, Any]:
         everything: Any = OmegaConf.to_container(self.config, resolve=False)
@@ -239,131 +255,3 @@ def _sigterm_as_interrupt() -> Iterator[None]:
         raise
     finally:
         signal.signal(signal.SIGTERM, before)
-
-
-class OptunaSweeper(Sweeper):
-    """Maximize the final running mean of rewards, see conf/hydra/sweeper/optuna.yaml."""
-
-    config: DictConfig
-    hydra_context: HydraContext
-    launcher: Launcher
-
-    def __init__(
-        self, *, num_trials: int, batch: int, seed: int, params: dict[str, str], **shared: Any
-    ) -> None:
-        import_optuna()
-        frames = shared["report_frames"]
-        if num_trials < 1 or batch < 1 or frames < 1:
-            raise InputError(
-                f"hydra.sweeper.num_trials={num_trials}, batch={batch} and report_frames={frames} "
-                "must be 1 or more"
-            )
-        seed = Whole(0, 2**31).read(seed, "hydra.sweeper.seed")
-        self.num_trials, self.batch, self.seed = num_trials, batch, seed
-        self.params, self.shared = dict(params), shared
-
-    def setup(
-        self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
-    ) -> None:
-        """Store Hydra's objects and make the launcher."""
-        # set once, before use, though Hydra declares them optional
-        self.hydra_context = hydra_context  # pyright: ignore[reportIncompatibleVariableOverride]
-        self.config = config  # pyright: ignore[reportIncompatibleVariableOverride]
-        self.launcher = Plugins.instance().instantiate_launcher(  # pyright: ignore[reportIncompatibleVariableOverride]
-            hydra_context=hydra_context, task_function=task_function, config=config
-        )
-
-    def sweep(self, arguments: list[str]) -> None:
-        """Sample settings, run them and report the results until all trials are done."""
-        parser = OverridesParser.create(config_loader=self.hydra_context.config_loader)
-        typed = parser.parse_overrides([f"{k}={v}" for k, v in self.params.items()] + arguments)
-        last = {override.get_key_element(): override for override in typed}
-        space = {k: distribution(o) for k, o in last.items() if o.is_sweep_override()}
-        fixed = [
-            f"{k}={o.get_value_element_as_str()}"
-            for k, o in last.items()
-            if not o.is_sweep_override()
-        ]
-        if not space:
-            raise InputError(
-                "there is nothing to search; give a range such as "
-                "'optimizer.lr=tag(log,interval(1e-4,1e-1))' or sweep=search"
-            )
-        folder = Path(str(self.config.hydra.sweep.dir)).absolute()
-        folder.mkdir(parents=True, exist_ok=True)
-        refuse_links(folder)
-        study = open_study(folder, direction="maximize")
-        for name, value in self.shared.items():
-            study.set_user_attr(name, value)
-        self._search(study, space, fixed)
-
-    def _search(self, study: Any, space: dict[str, Any], fixed: list[str]) -> None:
-        optuna = import_optuna()
-        done = optuna.trial.TrialState.is_finished
-        while (left := self.num_trials - sum(done(t.state) for t in study.trials)) > 0:
-            trials = next_trials(study, space, min(left, self.batch), self.seed)
-            for trial in trials:
-                check_params(trial.params, space)
-            batch = [
-                [*fixed, *(f"{k}={v}" for k, v in t.params.items()), f"trial={t.number}"]
-                for t in trials
-            ]
-            self.validate_batch_is_legal(batch)
-            for trial, job in zip(
-                trials, self.launcher.launch(batch, trials[0].number), strict=True
-            ):
-                note_outcome(study, trial.number, read_result(Path(str(job.working_dir))))
-        complete = [t for t in study.trials if t.state == optuna.trial.TrialState.COMPLETE]
-        if complete:
-            best = study.best_trial
-            _log.info("best: run %d, running reward %.3f, %s", best.number, best.value, best.params)
-
-
-def check_params(params: Mapping[str, Any], space: Mapping[str, Any]) -> None:
-    """Raise an `InputError` for parameters of a journal outside this search's space."""
-    for name, value in params.items():
-        if name not in space or not _contains(space[name], value):
-            raise InputError(
-                f"optuna.journal sets {shown(name)} to {shown(value)}, which is outside "
-                "this search's space; choose another folder"
-            )
-
-
-def _contains(searched: Any, value: object) -> bool:
-    """Return whether a distribution of Optuna contains a value."""
-    try:
-        return searched._contains(searched.to_internal_repr(value))
-    except ValueError:  # from Optuna, for none of the choices or no number
-        return False
-
-
-def distribution(override: Override) -> Any:
-    """Return Optuna's distribution of a range in Hydra's grammar.
-
-    Raises:
-        InputError: It is no range that can be searched.
-    """
-    d = import_optuna().distributions
-    value = override.value()
-    if isinstance(value, ChoiceSweep):
-        return d.CategoricalDistribution([str(v) for v in override.sweep_string_iterator()])
-    try:
-        if isinstance(value, RangeSweep):
-            numbers = [int(value.start or 0), int(value.stop or 0), int(value.step)]
-            start, stop, step = numbers
-            if numbers == [value.start or 0, value.stop or 0, value.step] and step > 0:
-                return d.IntDistribution(
-                    start, start + (stop - 1 - start) // step * step, step=step
-                )
-        elif isinstance(value, IntervalSweep):
-            low, high = cast(float, value.start), cast(float, value.end)  # Hydra wants both
-            is_log = "log" in value.tags
-            if isinstance(low, int) and isinstance(high, int):  # int(interval(LOW,HIGH))
-                return d.IntDistribution(low, high, log=is_log)
-            return d.FloatDistribution(float(low), float(high), log=is_log)
-    except (ValueError, OverflowError):  # an empty, negative logarithmic or infinite range
-        pass
-    raise InputError(
-        f"{override.input_line} can't be searched; give a choice, interval(LOW,HIGH), or an "
-        "ascending range of whole numbers"
-    )

@@ -20,8 +20,8 @@ from drone_rl.sweeps.manifest import is_sweep, quoted
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.readers import yaml_mistake
 
-OWN_FOLDERS = ("--config-dir", "-cd", "hydra.searchpath")
-"""Options that add folders of the user, whose files are not known here."""
+OWN_FOLDERS = "hydra.searchpath"
+"""Setting that adds folders of the user, whose files are not known here."""
 _IN_FILE = re.compile(r"In '(\S+/\S+)': \w+ raised while composing config:\n(.*)\n +full_key: (.*)")
 
 
@@ -42,7 +42,7 @@ def check_choices(overrides: Sequence[str], conf: Path, extensible: Collection[s
             if name == "null":
                 raise InputError(f"{override}: leave it out, or give one of: {', '.join(offered)}")
             if name not in offered:
-                near = difflib.get_close_matches(name.lower(), offered, 1)
+                near = difflib.get_close_matches(name.lower(), offered, 1, 0.7)
                 meant = f"did you mean {group}={near[0]}? " if near else ""
                 own = "; if a module of yours registers it, add plugins=[MODULE]"
                 raise InputError(

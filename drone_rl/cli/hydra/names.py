@@ -65,7 +65,7 @@ def closest(name: str, known: Sequence[str]) -> str | None:
     ):
         if meant:
             return meant
-    if last.isdigit():  # the index of a list
+    if last.isdigit() or last in others:  # an index, or a name for what is absent here
         return None
     others_than_group = [key for key in known if not word.startswith(f"{key}.")]
     if near := difflib.get_close_matches(word, others_than_group, 1, 0.8):
@@ -102,6 +102,8 @@ class Command:
 
     def unknown(self, override: str, name: str) -> InputError:
         """Return the error about a name that this command doesn't have."""
+        typed, name = name, self._of_another_choice(name) or name
+        override = override.replace(typed, name, 1)
         value = override.partition("=")[2]
         text = f"{override}: drone-rl {self.name} has no setting {name}; "
         group, first = name.rpartition(".")[0], name.partition(".")[0]
@@ -135,6 +137,15 @@ class Command:
             offered = ", ".join(choices(self.conf, meant))
             return InputError(f"{text}type {meant}=NAME, one of {offered} ({self.list_all})")
         return InputError(text + (self._inside(group) or self.list_all))
+
+    def _of_another_choice(self, name: str) -> str | None:
+        """Return the setting meant by another project's name if only another choice has it."""
+        meant = [_key(ours) for ours in OTHER_NAMES["settings"].get(name, ())]
+        if closest(name, self.keys) is not None:
+            return None
+        groups = {key: key.partition(".")[0] for key in meant}
+        found = (k for k, g in groups.items() if g in self.groups and self._choices_with(g, k))
+        return next(found, None)
 
     def _with_choice(self, group: str, offered: Sequence[str], override: str, name: str) -> str:
         """Return what to type instead of a setting of a group that is null."""

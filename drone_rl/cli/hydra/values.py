@@ -62,7 +62,7 @@ def wrong_type(command: Command, override: Override) -> InputError | None:
             found = wrong_value(command.config, key, value, text, reason)
             if sweep := _RANGE.fullmatch(text):
                 several = f"{sweep[1]}=range({sweep[2]},{int(sweep[3]) + 1})"
-                return InputError(f"{found}; for one run with each, add -m {shlex.quote(several)}")
+                return InputError(f"{found}; for one run with each, type -m {shlex.quote(several)}")
             return found
     return None
 

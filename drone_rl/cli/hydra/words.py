@@ -13,14 +13,8 @@ from drone_rl.cli.hydra.values import in_quotes
 from drone_rl.utils.errors import InputError
 
 _SWEEP_FLAGS = {"-m", "--multirun"}
-_FLAGS = {*_SWEEP_FLAGS, "-h", "--help", "-r", "--run", "--hydra-help", "--resolve"}
-_VALUED = {
-    *("-c", "--cfg", "-i", "--info", "-p", "--package", "-cp", "--config-path", "-cn"),
-    *("--config-name", "-cd", "--config-dir", "-sc", "--shell-completion"),
-    *("--experimental-rerun",),
-}
-_PRINTED = (["job"], ["hydra"], ["all"])
-"""What `--cfg` prints."""
+_OPTIONS = {*_SWEEP_FLAGS, "-h", "--help"}
+"""Options of Hydra that are documented; all others are refused."""
 _SPACED = re.compile(r"(?:^|\s)([\w.]+)(?: =|= | = )([^\s=]\S*)")
 """A setting with spaces around its equals sign."""
 _DASHES = "-\N{EN DASH}\N{EM DASH}\N{MINUS SIGN}"
@@ -35,26 +29,17 @@ _CHOICES = ("experiment", "objective", "network", "appearance", "dynamics", "tas
 def check_words(name: str, conf: Path, words: Sequence[str]) -> None:
     """Raise an `InputError` for the first word that is not a setting."""
     _check_resume(words)
-    position = 0
-    while position < len(words):
-        word = words[position]
-        is_flag = word in _FLAGS or any(word.startswith(f"{f}=") for f in _VALUED)
-        if word in ("-c", "--cfg") and words[position + 1 : position + 2] not in _PRINTED:
-            raise InputError(
-                f"{word} prints settings, with job, hydra or all after it; settings are typed "
-                "name=value, and files of settings are chosen by experiment=NAME"
-            )
-        if word in _VALUED:
-            position += 1
-        elif not is_flag and word.startswith(tuple(_DASHES)):
+    for position, word in enumerate(words):
+        if word in _OPTIONS:
+            continue
+        if word.startswith(tuple(_DASHES)):
             raise _dashed(Command(name, conf), word, words[position + 1 :])
-        elif _EMPTY_FOLDER.fullmatch(word):
+        if _EMPTY_FOLDER.fullmatch(word):
             raise InputError(f"{word} has no value; type a folder, such as {word}outputs")
-        elif not is_flag and "=" in word[1:]:
+        if "=" in word[1:]:
             _check_brackets(word, words[position + 1 :])
-        elif not is_flag and not (word.startswith("~") and len(word) > 1):
+        elif not (word.startswith("~") and len(word) > 1):
             raise _bare(Command(name, conf), words, position)
-        position += 1
 
 
 def sweep_flag_first(words: Sequence[str]) -> list[str]:
@@ -75,7 +60,7 @@ def _dashed(command: Command, word: str, following: Sequence[str]) -> InputError
         is_value = following and "=" not in following[0] and not following[0].startswith("--")
         value = following[0] if is_value else ""
         word = f"{word} {value}" if is_value else word
-    if len(name) > 1 and (ours := command.instead(name, value)):
+    if ours := command.instead(name, value):
         if isinstance(OmegaConf.select(command.config, ours.removesuffix("=VALUE")), bool):
             ours = ours.replace("=VALUE", "=true")
         return InputError(f"{word}: settings have no dashes; type {ours}")

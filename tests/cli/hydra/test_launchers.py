@@ -21,7 +21,20 @@ from drone_rl.cli.hydra.launchers import (
     _sigterm_as_interrupt,
     register_plugins,
 )
+from drone_rl.sweeps import executors
 from drone_rl.sweeps.manifest import Run, Sweep
+from tests.cli.running import error_line
+
+TRAINING = """
+import json, pathlib, sys
+arguments = dict(a.split("=", 1) for a in sys.argv[2:])
+folder = pathlib.Path(arguments["hydra.run.dir"].strip("'"))
+with (folder / "starts").open("a") as file:
+    file.write(f"{arguments['seed']} {arguments['optimizer.lr']}")
+(folder / "result.json").write_text(json.dumps({"reason": "solved", "running_reward": 1.0}))
+"""
+"""A program instead of `drone-rl train` that notes its settings."""
+GRID = ["train", "-m", "seed=0,1", "optimizer.lr=1e-3,1e-2", "hydra.sweep.dir=sweep"]
 
 
 @pytest.fixture
@@ -96,3 +109,34 @@ def test_an_interrupted_sweep_says_how_to_go_on(run, tmp_path, monkeypatch, capl
     with pytest.raises(KeyboardInterrupt):
         launcher._finish(sweep, [run])
     assert "resume with the same command: drone-rl train -m seed=0,1" in caplog.text
+
+
+@pytest.mark.parametrize("subdir", ["seed${seed}_lr${optimizer.lr}", "lr${optimizer.lr}/${seed}"])
+def test_each_run_is_in_the_folder_that_hydra_resolves(in_process, monkeypatch, tmp_path, subdir):
+    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", TRAINING))
+    for _ in range(2):  # the same command finds the finished runs again
+        done = in_process(*GRID, f"hydra.sweep.subdir={subdir}")
+        assert done.returncode == 0, done.stderr
+    settings = {
+        subdir.replace("${seed}", seed).replace("${optimizer.lr}", lr): f"{seed} {lr}"
+        for seed in ("0", "1")
+        for lr in ("0.001", "0.01")
+    }
+    sweep = tmp_path / "sweep"
+    starts = {str(p.parent.relative_to(sweep)): p.read_text() for p in sweep.rglob("starts")}
+    assert starts == settings
+    runs = json.loads((sweep / "sweep.json").read_text())["runs"]
+    assert [run["folder"] for run in runs] == [*settings]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([*GRID, "hydra.sweep.subdir=${seed}"], "runs 0 and 1 have the same folder"),
+        ([*GRID, "hydra.sweep.subdir=../${hydra.job.num}"], "'../0' is not inside"),
+        (["train", "-m", "seed=range(0)"], "seed=range(0): a sweep of no runs"),
+    ],
+)
+def test_a_sweep_that_is_refused_writes_nothing(in_process, tmp_path, words, message):
+    assert message in error_line(in_process(*words))
+    assert [*tmp_path.iterdir()] == []

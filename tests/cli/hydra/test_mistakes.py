@@ -56,6 +56,7 @@ def said(*overrides, command="train"):
         ("network.hidden=1,2", "for a list, type network.hidden=\\[1,2\\]; "),
         ("task=pillars,collect_one", "train -m task=pillars,collect_one$"),
         ("seed=range(3)", "type drone-rl train -m 'seed=range"),
+        ("seed=0..3", r"for one run with each, type -m 'seed=range\(0,4\)'$"),
         ("seed=interval(0,1)", "add -m hydra/sweeper=optuna"),
         ("optimizer=[adam,sgd]", "optimizer is one choice; type optimizer=adam"),
         ("+seed=1", "seed exists already; type seed=1"),
@@ -68,6 +69,7 @@ def said(*overrides, command="train"):
         ("transforms.stack.N=4", "needs transforms=stack; type transforms=stack transforms.stack"),
         ("scheduler.gamma=0.5", "^scheduler.gamma=0.5 needs scheduler=step_decay; type scheduler"),
         ("objective.epochs=3", "needs objective=ppo; type objective=ppo objective.epochs=3$"),
+        ("num_steps=8", "type objective=a2c objective.num_steps=8$"),
         ("objective.critic_coeff=1", "needs objective=a2c or objective=ppo; type objective=a2c"),
         ("task.density=1", "needs task=pillars; type task=pillars task.density=1$"),
         ("task.num=1", "did you mean task.num_cubes=1\\?"),
@@ -125,7 +127,7 @@ def test_lists_are_offered_where_they_are_accepted():
 
 
 def test_hydras_words_are_kept_if_the_user_has_files_of_settings():
-    assert "Hydra's words" in said("seed=x", "--config-dir=my")
+    assert "Hydra's words" in said("seed=x", "hydra.searchpath=[file://my]")
 
 
 @pytest.mark.parametrize(
@@ -172,6 +174,7 @@ def test_mistakes_elsewhere_are_not_those_of_a_file():
         ("task='pillarz'", "task=pillarz"),
         ("logger=[csv,aim]", "logger=aim is unknown; give one of: csv, mlflow, tensorboard, wandb"),
         ("sweep=nope", "sweep=nope is unknown; give one of: cubes, high_rate"),
+        ("objective=sac", "^objective=sac is unknown; give one of: a2c, ppo, reinforce"),
         ("hydra/launcher=pbs", "hydra/launcher=pbs .*local, ray, slurm"),
         ("dynamics=null", "^dynamics=null: leave it out, or give one of: computer_vision, "),
     ],
@@ -201,4 +204,4 @@ def test_all_else_is_accepted():
         conf_dir(),
     )
     check_choices(["logger=[csv,tensorboard]", "task='pillars'", "task=choice(a,b)"], conf_dir())
-    check_choices(["sweep=mine", "task=mine", "--config-dir=my"], conf_dir())
+    check_choices(["sweep=mine", "task=mine", "hydra.searchpath=[file://my]"], conf_dir())

@@ -23,7 +23,11 @@ pytestmark = pytest.mark.usefixtures("registered")
         ("train hydra.run.dir=", "^hydra.run.dir= has no value; type a folder"),
         ("train --lr", "type optimizer.lr=VALUE$"),
         ("train --nope 1", "--nope 1: .* no such option"),
-        ("train -s 1", "-s 1: .* no such option"),
+        ("train -s 1", "^-s 1: settings have no dashes; type seed=1$"),
+        ("train -x 1", "-x 1: .* no such option"),
+        ("verdict -p good", "^-p good: settings have no dashes; type policy=good$"),
+        ("verdict --package good", "^--package good: .* type policy=good$"),
+        ("verdict --package=good policy=good", "^--package=good: .* type policy=good$"),
         ("verdict --sampled", "type sampled=true$"),
         ("verdict good", "^good has no name before it; type policy=good$"),
         ("check x.json", "type certificate=x.json$"),
@@ -41,8 +45,6 @@ pytestmark = pytest.mark.usefixtures("registered")
         ("train device=cpu nothing", "^nothing has no =; settings are typed name=value"),
         ("train network.hidden=[64, 64]", "quotes: 'network.hidden=\\[64,64\\]'"),
         ("train network.hidden=[64", r"has no closing \]; type 'network.hidden=\[64\]'"),
-        ("train -c config.yaml", "^-c prints settings, .* experiment=NAME$"),
-        ("train --cfg", "^--cfg prints settings"),
         ("explain policy=[good poor]", r"quotes: 'policy=\[good,poor\]'$"),
         ("train device='cpu", "has no closing '; type \"device='cpu'\""),
     ],
@@ -59,9 +61,23 @@ def test_the_flag_of_a_sweep_may_be_anywhere(line):
     assert sweep_flag_first(line.replace("-m", "--multirun").split())[0] == "--multirun"
 
 
-def test_settings_and_options_of_hydra_are_accepted():
-    words = ["-m", "seed=0,1", "--config-dir", "my", "--cfg", "job", "~x", "+a.b=1", "a='b c'"]
-    check_words("train", conf_dir(), [*words, "--config-dir=my", "x=[1,2]", "y='[', ']'"])
+def test_settings_and_documented_options_are_accepted():
+    words = ["-m", "seed=0,1", "--multirun", "-h", "--help", "~x", "+a.b=1", "a='b c'"]
+    check_words("train", conf_dir(), [*words, "x=[1,2]", "y='[', ']'"])
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        *("-c", "--cfg", "--resolve", "-p", "--package", "-r", "--run", "-sc", "-cp", "-cn", "-cd"),
+        *("--config-path", "--config-name", "--config-dir", "--experimental-rerun", "-i", "--info"),
+        *("--hydra-help", "--shell-completion"),
+    ],
+)
+def test_all_other_options_of_hydra_are_refused(option):
+    for words in ([option], [option, "job"], [f"{option}=job"]):
+        with pytest.raises(InputError, match=f"^{option}.* typed? "):
+            check_words("verdict", conf_dir(), words)
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,9 @@ from optuna.distributions import (  # noqa: E402
     IntDistribution,
 )
 
-from drone_rl.cli.hydra.launchers import OptunaSweeper, check_params, distribution  # noqa: E402
+from drone_rl.cli.hydra.searching import OptunaSweeper, check_params, distribution  # noqa: E402
 from drone_rl.utils.errors import InputError  # noqa: E402
+from tests.cli.running import error_line  # noqa: E402
 
 
 @pytest.mark.parametrize(
@@ -62,3 +63,16 @@ def test_a_journal_sets_only_what_is_searched():
     for params in ({"policy._target_": "os.system"}, {"a": 2.0}, {"a": "x"}, {"b": "z"}):
         with pytest.raises(InputError, match="outside this search's space"):
             check_params(params, space)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["task=pillars", "task.collision_penalty=interval(0,1)"],
+        ["experiment=smoke,pillars", "optimizer.lr=interval(1e-4,1e-2)"],
+    ],
+)
+def test_settings_that_change_the_task_are_not_searched(in_process, tmp_path, words):
+    line = error_line(in_process("train", "-m", "hydra/sweeper=optuna", *words))
+    assert "can't be searched: it changes the task" in line
+    assert [*tmp_path.iterdir()] == []
