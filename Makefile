@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo notebook test check format bench readme keep stale docs count mutants clean clean-outputs
+.PHONY: demo notebook test check format bench readme keep stale docs mutants clean clean-outputs
 
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -55,16 +55,15 @@ docs: $(STAMP)
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "site/index.html"
 
-# Print size of the package, phrases to rewrite and modules without a test file of the same name as JSON.
-count: $(STAMP)
-	@$(BIN)/python -m tools.size
-
-# Mutation testing of the package: a sample of 1,000 mutants takes about two hours on two idle cores,
-# including half an hour to record the coverage of all tests. It resumes where it stopped. To run only the
-# survivors after adding tests for them: MUTANTS="--again docs/mutants.json".
+# Mutation testing of one module with its tests:
+#   make mutants MODULE=drone_rl/utils/intervals.py TESTS=tests/utils/test_intervals.py
 mutants: $(STAMP)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(EXTRAS),mutants]'
-	@$(BIN)/python -m tools.mutants $(MUTANTS)
+	@printf '[cosmic-ray]\nmodule-path = "%s"\ntimeout = 120\ntest-command = "%s -m pytest -x -q %s"\n\n[cosmic-ray.distributor]\nname = "local"\n' \
+	  '$(MODULE)' '$(BIN)/python' '$(TESTS)' > outputs/mutants.toml
+	@$(BIN)/cosmic-ray init --force outputs/mutants.toml outputs/mutants.sqlite
+	@$(BIN)/cosmic-ray exec outputs/mutants.toml outputs/mutants.sqlite
+	@$(BIN)/cr-report --show-pending outputs/mutants.sqlite | tail -n 4
 
 # Delete files that are created automatically: environment, site, caches, packages. Results are kept.
 clean:

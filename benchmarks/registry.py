@@ -18,14 +18,11 @@ from benchmarks.fly_page import bench_fly_page
 from benchmarks.fragile_honest import bench_fragile_honest
 from benchmarks.gamed import bench_gamed
 from benchmarks.gymnasium import bench_gymnasium
-from benchmarks.hostile import bench_hostile
 from benchmarks.imitation import bench_imitation
 from benchmarks.injections import bench_injections
 from benchmarks.ledger import digest_code
 from benchmarks.maps import bench_maps
 from benchmarks.memory import bench_memory
-from benchmarks.mistakes import bench_mistakes
-from benchmarks.mutants import bench_mutants
 from benchmarks.onnx_export import bench_onnx
 from benchmarks.original import bench_original
 from benchmarks.peers.comparison import bench_peers
@@ -50,7 +47,6 @@ from benchmarks.training import (
 from benchmarks.verdicts import bench_verdicts
 from drone_rl.utils.errors import InputError
 from tools.docs.run import measure as measure_pages
-from tools.size import measure
 
 _RENDERING = ("sim", "envs")
 _COLLECTING = (*_RENDERING, "policies", "collectors")
@@ -113,7 +109,6 @@ BENCHMARKS: dict[str, Benchmark] = {
         "main",
         (*_TRAINING, "conf", "benchmarks/training"),
     ),
-    "size": Benchmark(lambda s: measure(), "main", (".", "conf")),
     "coverage": Benchmark(
         lambda s: bench_coverage(s.quick),
         "adversarial",
@@ -127,35 +122,6 @@ BENCHMARKS: dict[str, Benchmark] = {
             "benchmarks/sentences",
             "benchmarks/evidence",
             "benchmarks/evidence_changes",
-        ),
-    ),
-    "hostile": Benchmark(
-        lambda s: bench_hostile(s.runs / "hostile"),
-        "adversarial",
-        (
-            "utils",
-            "policies/zoo",
-            "training",
-            "sweeps",
-            "explanations/report",
-            "verification/checker",
-            "robustness",
-            "cli/hydra",
-            *(
-                f"benchmarks/hostile{part}"
-                for part in (
-                    "",
-                    "_case",
-                    "_files",
-                    "_folders",
-                    "_json",
-                    "_arrays",
-                    "_policies",
-                    "_claims",
-                    "_explanations",
-                    "_runs",
-                )
-            ),
         ),
     ),
     "injections": Benchmark(
@@ -237,7 +203,6 @@ BENCHMARKS: dict[str, Benchmark] = {
         "adversarial",
         ("sim/rendering", "benchmarks/render_truth", "benchmarks/random_scenes"),
     ),
-    "mutants": Benchmark(lambda s: bench_mutants(), "adversarial", ("benchmarks/mutants",)),
     "docs": Benchmark(lambda s: measure_pages(), "adversarial", (".", "conf")),
     "sweeps": Benchmark(
         lambda s: bench_sweeps(s.runs, s.device, s.quick),
@@ -321,11 +286,6 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_airsim(s.runs / "airsim", s.quick),
         "flight",
         (*_RENDERING, "flight", "benchmarks/airsim"),
-    ),
-    "mistakes": Benchmark(
-        lambda s: bench_mistakes(s.runs / "mistakes"),
-        "adversarial",
-        ("cli", "config", "conf", "utils", "benchmarks/mistakes"),
     ),
     "startup": Benchmark(
         lambda s: bench_startup(s.runs / "startup", s.device, s.quick),

@@ -9,19 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.evaluation.consistency import check_verdict
 from drone_rl.evaluation.rule import SIDES, Kind, Rule
 from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_result
-from drone_rl.utils.consistency import read_entry
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.limits import SWEEP_RESULTS_BYTES, Allowance
 from drone_rl.utils.readers import NAMES_OF_0_1, TablesAllowance, read_table
-from drone_rl.utils.schema import Real, Whole
+from drone_rl.utils.schema import Flag, Maybe, OneOf, Real, Whole
 
 Array = NDArray[np.float64]
 _MAX_VALUE = 1e15
 """Upper bound of every figure of a run."""
-_ROUNDING = 1e-6
 LAST_UPDATES = 20
 """Number of last updates over which the entropy is averaged."""
 NOT_OFFERED = "not offered"
@@ -164,7 +161,10 @@ def _read_row(run: Run, choice: dict[str, str], folder: str, metrics: TablesAllo
         had = float(result["frames"]), float(result["seconds"])
         row = Row(run, choice, folder, "finished", None, result, curve, *had, entropy)
         if row.verdict is not None:
-            check_verdict(row.verdict)
+            _KIND.read(row.verdict["kind"], "verdict.kind")
+            Flag().read(row.verdict["certain"], "verdict.certain")
+            for of in row.verdict["greedy"]["shares"].values():
+                Maybe(Real(0.0, 1.0)).read(of["mean"], "verdict.greedy.shares")
         row.plain()
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         reason = str(error) if isinstance(error, InputError) else repr(error)
@@ -172,6 +172,7 @@ def _read_row(run: Run, choice: dict[str, str], folder: str, metrics: TablesAllo
     return row
 
 
+_KIND = OneOf(tuple(kind.value for kind in Kind))
 _RESULT = {
     "frames": Whole(0, 10**15),
     "episodes": Whole(0, 10**12),
@@ -184,14 +185,7 @@ _RESULT = {
 
 def _check_result(result: dict[str, Any]) -> None:
     for key, kind in _RESULT.items():
-        read_entry(result, key, kind, "result")
-    if result["running_reward"] > result["largest_reward"] * (1 + _ROUNDING):
-        raise InputError(
-            f"running_reward={result['running_reward']} is more than the greatest reward, "
-            f"{result['largest_reward']}"
-        )
-    if result["episodes"] > result["frames"]:
-        raise InputError(f"{result['episodes']} episodes had {result['frames']} frames")
+        kind.read(result.get(key), f"result.{key}")
 
 
 def _check_curve(curve: tuple[Array, Array]) -> None:
@@ -199,8 +193,8 @@ def _check_curve(curve: tuple[Array, Array]) -> None:
     frames, shares = curve
     if not (np.isfinite(frames).all() and (np.diff(frames, prepend=0.0) >= 0).all()):
         raise InputError("metrics.csv: frames decrease or are not finite")
-    if not (np.abs(shares) < _MAX_VALUE).all() or (shares > 1 + _ROUNDING).any():
-        raise InputError("metrics.csv: a reward is not finite or above the greatest one")
+    if not (np.abs(shares) < _MAX_VALUE).all():
+        raise InputError("metrics.csv: a reward is not finite")
 
 
 def _read_metrics(

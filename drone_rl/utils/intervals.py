@@ -66,32 +66,6 @@ def mean_bounds(
     }
 
 
-def may_bound_mean(
-    interval: tuple[float, float],
-    mean: float,
-    count: int,
-    low: float = 0.0,
-    high: float = 1.0,
-    confidence: float = 0.95,
-) -> bool:
-    """Return whether `mean_bounds` can return this interval for so many values with this mean.
-
-    It can't if the interval is too narrow. The narrowest one is that of values which all equal the
-    mean: the capital of a bet grows by a concave function of each value, and so by Jensen's
-    inequality most where the values are alike.
-    """
-    z, lower, upper = ((value - low) / (high - low) for value in (mean, *interval))
-    stakes, needed = _bets(count, (1.0 - confidence) / 2)
-    ends = ((z, lower - _ROUNDING), (1.0 - z, 1.0 - upper - _ROUNDING))
-    return all(
-        end <= 0.0 or _wealth(np.clip([value], 0.0, 1.0), np.array([count]), stakes, end) >= needed
-        for value, end in ends
-    )
-
-
-_ROUNDING = 1e-6
-
-
 def _refuted_below(z: NDArray, tail: float) -> float:
     """Return the mean up to which every mean is refuted at level `tail`; values in [0, 1]."""
     distinct, counts = np.unique(z, return_counts=True)

@@ -78,7 +78,6 @@ def test_styles_fetch_nothing_from_elsewhere(site):
 def test_the_readers_files_are_beside_the_pages(site):
     for name in ("results.json", "tutorials/notebook.ipynb", "flight.gif"):
         assert (site / name).read_bytes() == (ROOT / "docs" / name).read_bytes()
-    assert not (site / "mutants.json").exists()
 
 
 @pytest.fixture

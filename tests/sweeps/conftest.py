@@ -7,7 +7,6 @@ import sys
 import numpy as np
 import pytest
 
-from drone_rl.evaluation.consistency import _expected
 from drone_rl.evaluation.rule import BLIND_BASELINES, Kind, Rule
 from drone_rl.sweeps import executors
 from drone_rl.sweeps.manifest import Run, open_sweep
@@ -73,7 +72,7 @@ def _verdict(
         "greedy": greedy,
         "baselines": {**blind, "oracle": oracle},
     }
-    return {**evidence, "quantities": _quantities(evidence), **others}
+    return {**evidence, **others}
 
 
 EPISODES = 200
@@ -92,21 +91,6 @@ def _flights(shares, success):
 def _constant_bounds(count, value, *others):
     """The interval of the mean of equal values, of which tests need the same ones many times."""
     return mean_bounds(np.full(count, value), *others)
-
-
-def _quantities(evidence):
-    """The rule's quantities of evaluations whose episodes are all alike."""
-    strata = tuple(name for name in evidence["greedy"]["shares"] if name != "all")
-    rule, found = Rule(strata=strata), {}
-    for name, thresholds in zip(rule.quantities, rule.thresholds, strict=True):
-        value, (low, high), count = _expected(evidence, name, rule)
-        if name.startswith("offered "):
-            bounds = proportion(round(value * count), count, rule.confidence)
-        else:
-            bounds = _constant_bounds(count, value, low, high, rule.confidence)
-        ends = {"lower": bounds["lower95"], "upper": bounds["upper95"]}
-        found[name] = {"value": value, **ends, "thresholds": list(thresholds)}
-    return found
 
 
 CURVE = (

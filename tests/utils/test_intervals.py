@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from drone_rl.utils.intervals import may_bound_mean, mean_bounds, median_bounds, proportion
+from drone_rl.utils.intervals import mean_bounds, median_bounds, proportion
 
 QUICK = settings(max_examples=30, deadline=None)
 
@@ -171,23 +171,3 @@ def test_median_bounds_are_the_narrowest_that_cover(count, confidence):
         r for r in range(1, count // 2 + 1) if 2 * binom.cdf(r - 1, count, 0.5) <= 1 - confidence
     ]
     assert found == ((max(ranks) - 1, count - max(ranks)) if len(ranks) else None)
-
-
-@QUICK
-@given(st.lists(st.floats(0, 1), min_size=1, max_size=60))
-def test_an_interval_of_any_values_may_bound_their_mean(values):
-    found = mean_bounds(values)
-    interval = found["lower95"], found["upper95"]
-    assert may_bound_mean(interval, found["mean"], len(values))
-    assert may_bound_mean((0.0, 1.0), found["mean"], len(values))
-
-
-@pytest.mark.parametrize("bounds", [(0.0, 1.0), (-1.0, 1.0), (-0.9, 1.0)])
-@pytest.mark.parametrize("count", [1, 5, 400])
-def test_no_interval_is_narrower_than_that_of_equal_values(count, bounds):
-    found = mean_bounds([0.4] * count, *bounds, confidence=0.99)
-    lower, upper = found["lower95"], found["upper95"]
-    assert may_bound_mean((lower, upper), 0.4, count, *bounds, 0.99)
-    assert not may_bound_mean((lower + 1e-4, upper), 0.4, count, *bounds, 0.99)
-    assert not may_bound_mean((lower, upper - 1e-4), 0.4, count, *bounds, 0.99)
-    assert may_bound_mean((lower, upper), 0.4, 10 * count, *bounds, 0.99)  # more values, wider

@@ -49,11 +49,6 @@ HEADLINES = (
         "Simulated episodes that end differently than proved",
         lambda f: f"{f['proof_contradicted']} of {f['proof_flights']:,}",
     ),
-    Row(
-        "hostile",
-        "Malicious files refused, with nothing executed",
-        lambda f: f"{f['hostile_refused']} of {f['hostile_total']}",
-    ),
 )
 """Most important first."""
 

@@ -83,18 +83,6 @@ TRUTH = (
         "all",
     ),
     Row(
-        "hostile",
-        "malicious files refused in one line, with nothing executed, read or written",
-        lambda f: f"{f['hostile_refused']} of {f['hostile_total']}",
-        "all",
-    ),
-    Row(
-        "hostile",
-        "greatest memory and processor time of a refusal after imports",
-        lambda f: f"{f['hostile_peak_mib']:,.0f} MiB; {f['hostile_max_s']:.1f} s",
-        "1,024 MiB; 2 s",
-    ),
-    Row(
         "gamed",
         "adversarial policies judged good and certain, or proved",
         lambda f: f"{f['gamed_verdicts']} of {f['gamed_total']}",
@@ -174,25 +162,10 @@ TRUTH = (
         "-; at most 1",
     ),
     Row(
-        "mutants",
-        "fraction of sampled, non-equivalent mutants that are killed (run `make mutants` before)",
-        lambda f: (
-            f"{percent(f['mutation_score_at_first_sight'])} for a new sample of "
-            f"{f['mutants_sampled']}; {percent(f['mutation_score'])} with tests for its survivors"
-        ),
-        "90%",
-    ),
-    Row(
         "explain",
         "time and memory of `drone-rl explain policy=good`, 600 frames, with the report",
         lambda f: f"{f['explain_s']:.0f} s, {f['explain_peak_memory_mib'] / 1024:.1f} GiB",
         "120 s, 2 GiB",
-    ),
-    Row(
-        "mistakes",
-        "wrong inputs on the command line that are answered in one line with a remedy",
-        lambda f: f"{f['mistakes_ok']} of {f['mistakes_total']}",
-        "all",
     ),
     Row(
         "docs",
@@ -480,15 +453,6 @@ MAIN = (
         "frames/s with `collector=ray` relative to the default collector",
         lambda f: f"{f['ray_over_plain']:.2f}",
         "0.8",
-    ),
-    Row(
-        "size",
-        "lines and modules of the package; lines of the training file, of a minimal task",
-        lambda f: (
-            f"{f['package_lines']:,}; {f['package_modules']}; {f['training_file_lines']}; "
-            f"{f['minimal_task_lines']}"
-        ),
-        "48,000; 350; 200; 80",
     ),
 )
 """Training and sweeps."""

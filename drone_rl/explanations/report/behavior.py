@@ -5,8 +5,7 @@ from PIL import Image
 from drone_rl.evaluation.plots import images
 from drone_rl.evaluation.plots.saving import Rows
 from drone_rl.evaluation.verdict_text import SENTENCES, depends_on_rounding
-from drone_rl.explanations.report.explanation import Explanation, Figures, Part
-from drone_rl.explanations.report.validation import METHOD_NAMES
+from drone_rl.explanations.report.explanation import METHOD_NAMES, Explanation, Figures, Part
 from drone_rl.robustness import charts
 from drone_rl.robustness.quoted_text import QUOTED, is_quoted, not_evaluated
 from drone_rl.robustness.shifts_text import rows

@@ -11,8 +11,7 @@ from PIL import Image
 
 from drone_rl.evaluation.plots import images
 from drone_rl.evaluation.plots.saving import new_chart
-from drone_rl.explanations.report.explanation import Explanation, Part
-from drone_rl.explanations.report.validation import METHOD_NAMES
+from drone_rl.explanations.report.explanation import METHOD_NAMES, Explanation, Part
 from drone_rl.sim.vocabulary import terms_of
 from drone_rl.utils.palette import (
     FAINT,

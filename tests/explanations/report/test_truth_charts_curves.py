@@ -1,6 +1,6 @@
+from drone_rl.explanations.report.explanation import METHOD_NAMES as NAMES
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.truth import curves_charts
-from drone_rl.explanations.report.validation import METHOD_NAMES as NAMES
 from drone_rl.utils.palette import MUTED, css
 
 

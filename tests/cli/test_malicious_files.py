@@ -1,0 +1,289 @@
+"""Malicious files, one for each kind of attack: one line, nothing executed, nothing revealed."""
+
+import io
+import json
+import os
+import pickle
+import struct
+import zipfile
+
+import numpy as np
+import pytest
+import torch
+import yaml
+from safetensors.torch import save
+
+from drone_rl.policies.zoo import parse
+from tests.cli.running import error_line
+
+SECRET = "the canary's secret 4711"
+DESCRIPTION = {
+    "format": "drone_rl policy",
+    "format_version": 2,
+    "task": {
+        **{"num_cubes": 1, "first_distance": 8.0, "spacing": 9.0, "lateral_bound": 6.0},
+        **{"vertical_bound": 0.0, "cube_size": 2.5, "cube_color": [0.75, 0.12, 0.08]},
+        **{"drone_size": 0.8, "altitude": 2.5, "step_length": 1.0, "step_limit": 60},
+        **{"front_margin": 11.0, "side_margin": 20.0},
+    },
+    "camera": {"width": 16, "height": 8, "horizontal_fov": 135.0},
+    "transforms": [{"name": "gray"}, {"name": "standardize", "mean": 0.5, "std": 0.2}],
+    "network": {"name": "small_cnn", "patch": 4, "channels": [2], "hidden": []},
+}
+PROGRESS = {"frames": 1, "episodes": 1, "updates": 1, "seconds": 1.0, "running_reward": 0.5}
+ORIGIN = {"versions": {"torch": "2"}, "git_revision": None}
+SWEEP = {
+    **{"format": "drone_rl sweep", "command": "drone-rl train -m seed=0,1", "settings": {}},
+    **{"versions": {}, "git_revision": None, "machine": {}},
+    "runs": [{"number": 0, "overrides": ["seed=0"], "folder": "0"}],
+}
+NOT_REGULAR = {
+    "folder": lambda path: path.mkdir(),
+    "pipe": os.mkfifo,
+    "zeros": lambda path: path.symlink_to("/dev/zero"),
+    "loop": lambda path: path.symlink_to(path),
+    "sparse": lambda path: os.truncate(os.open(path, os.O_WRONLY | os.O_CREAT), 2**40),
+}
+
+
+class Call:
+    """An object that calls a function when it is unpickled."""
+
+    def __init__(self, function, *args):
+        self.call = function, args
+
+    def __reduce__(self):
+        return self.call
+
+
+@pytest.fixture
+def refused(in_process, tmp_path, monkeypatch):
+    """Runs a command that must end with one line of error and leave the canary alone."""
+    (tmp_path / "canary").write_text(SECRET)
+    monkeypatch.setenv("HOSTILE_SECRET", SECRET)
+
+    def run(*args):
+        done = in_process(*args)
+        assert error_line(done) and len(done.stderr.splitlines()) == 1, done.stderr
+        assert done.returncode == 2
+        assert SECRET not in done.stderr + done.stdout
+        assert (tmp_path / "canary").read_text() == SECRET
+        assert not (tmp_path / "ran").exists()
+        return done.stderr
+
+    return run
+
+
+def weights(value=0.1):
+    expected = parse(DESCRIPTION).expected_weights()
+    return {name: torch.full(tensor.shape, value) for name, tensor in expected.items()}
+
+
+def exported(description=DESCRIPTION, tensors=None, **about):
+    text = description if isinstance(description, str) else json.dumps(description)
+    about = {"progress": PROGRESS, "provenance": ORIGIN, "command": "drone-rl train", **about}
+    texts = {"format": "drone_rl policy", "description": text, "about": json.dumps(about)}
+    return save(tensors or weights(), texts)
+
+
+def with_part(**parts):
+    return exported({**DESCRIPTION, **parts})
+
+
+def checkpoint(**changes):
+    state = {
+        **{"format": "drone_rl checkpoint", "format_version": 2, "policy": weights()},
+        **{"config": {}, "description": DESCRIPTION, "progress": PROGRESS, "best": 0.5},
+        "provenance": ORIGIN,
+    }
+    file = io.BytesIO()
+    torch.save({**state, **changes}, file)
+    return file.getvalue()
+
+
+def zipped(members):
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return file.getvalue()
+
+
+def npz(**arrays):
+    file = io.BytesIO()
+    np.savez_compressed(file, **(arrays or {"a": np.zeros(3)}))
+    return file.getvalue()
+
+
+def array_file(shape, dtype, data):
+    """An archive of one array whose header may be a lie."""
+    header = f"{{'descr': '{dtype}', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
+    head = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header))
+    return zipped({"a.npy": head + header + data})
+
+
+POLICIES = {
+    "description_names_a_function.safetensors": lambda: with_part(
+        network={**DESCRIPTION["network"], "_target_": "os.system"}
+    ),
+    "network_by_import.safetensors": lambda: with_part(network={"name": "os.system"}),
+    "unknown_key.safetensors": lambda: with_part(hooks=["os.system"]),
+    "interpolation.safetensors": lambda: with_part(
+        task={**DESCRIPTION["task"], "spacing": "${oc.env:HOSTILE_SECRET}"}
+    ),
+    "wrong_type.safetensors": lambda: with_part(task={**DESCRIPTION["task"], "num_cubes": True}),
+    "not_finite.safetensors": lambda: with_part(
+        task={**DESCRIPTION["task"], "spacing": float("nan")}
+    ),
+    "huge_image.safetensors": lambda: with_part(
+        camera={"width": 4096, "height": 4096, "horizontal_fov": 90.0}
+    ),
+    "huge_network.safetensors": lambda: with_part(
+        network={**DESCRIPTION["network"], "hidden": [10**9]}
+    ),
+    "future_version.safetensors": lambda: with_part(format_version=99),
+    "weights_not_finite.safetensors": lambda: exported(tensors=weights(float("nan"))),
+    "weights_missing.safetensors": lambda: exported(tensors=dict([*weights().items()][:1])),
+    "weights_of_other_type.safetensors": lambda: exported(
+        tensors={name: value.double() for name, value in weights().items()}
+    ),
+    "deep_json.safetensors": lambda: exported('{"a":' * 50_000 + "1" + "}" * 50_000),
+    "name_twice.safetensors": lambda: exported('{"format": 1, "format": "drone_rl policy"}'),
+    "huge_number.safetensors": lambda: exported('{"format": 1' + "0" * 400 + "}"),
+    "escape_sequence.safetensors": lambda: exported(command="drone-rl train \x1b]0;owned\x07"),
+    "truncated.safetensors": lambda: exported()[:500],
+    "header_of_a_terabyte.safetensors": lambda: struct.pack("<Q", 2**40) + b"{}",
+    "pickle.pt": lambda: pickle.dumps(Call(os.system, "touch ran")),
+    "function_in_checkpoint.pt": lambda: checkpoint(x=Call(os.system, "touch ran")),
+    "open_in_checkpoint.pt": lambda: checkpoint(x=Call(open, "ran", "w")),
+    "allocation.pt": lambda: checkpoint(x=Call(bytearray, 10**11)),
+    "strides_of_zero.pt": lambda: checkpoint(
+        policy={**weights(), "layers.logits.bias": torch.zeros(1).expand(10**6, 10**6)}
+    ),
+    "module.pt": lambda: checkpoint(policy=torch.nn.Linear(2, 2)),
+    "many_members.pt": lambda: zipped({f"a/data/{i}": b"" for i in range(10_001)}),
+    "bomb.pt": lambda: zipped({"a/data.pkl": bytes(2**28)}),
+    "text.pt": lambda: b"print('hello')",
+}
+
+
+@pytest.mark.parametrize("name", POLICIES)
+def test_policy_files(refused, tmp_path, name):
+    (tmp_path / name).write_bytes(POLICIES[name]())
+    refused("verdict", f"policy={name}")
+
+
+def test_the_same_policy_without_an_attack_is_read(in_process, tmp_path):
+    (tmp_path / "x.safetensors").write_bytes(exported())
+    (tmp_path / "x.pt").write_bytes(checkpoint())
+    for name in ("x.safetensors", "x.pt"):
+        assert in_process("export", f"policy={name}", "name=copy").returncode == 0
+
+
+@pytest.mark.parametrize("kind", NOT_REGULAR)
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["verdict", "policy=x.safetensors"],
+        ["verdict", "policy=x.pt"],
+        ["verdict", "policy=good", "require_domain=x.yaml"],
+        ["check", "policy=good", "certificate=x.json"],
+    ],
+    ids=lambda command: command[-1].rpartition(".")[2],
+)
+def test_what_is_no_regular_file(refused, tmp_path, kind, command):
+    NOT_REGULAR[kind](tmp_path / command[-1].rpartition("=")[2])
+    refused(*command)
+
+
+def make_run(folder, overrides):
+    (folder / "run" / ".hydra").mkdir(parents=True)
+    (folder / "run" / "checkpoints").mkdir()
+    (folder / "run" / "checkpoints" / "last.pt").write_bytes(checkpoint())
+    (folder / "run" / ".hydra" / "overrides.yaml").write_text(overrides)
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        yaml.safe_dump(["policy._target_=os.system"]),
+        yaml.safe_dump(["hydra.run.dir=elsewhere"]),
+        yaml.safe_dump(["task.spacing=${oc.env:HOSTILE_SECRET}"]),
+        yaml.safe_dump(["--config-dir=/tmp"]),
+        yaml.safe_dump([{"a": 1}]),
+        "- !!python/object/apply:os.system ['touch ran']\n",
+        "a: &a [x, x]\nb: &b [*a, *a]\nc: [*b, *b]\n",
+        "[" * 5000,
+    ],
+)
+def test_overrides_of_a_run_that_is_resumed(refused, tmp_path, overrides):
+    make_run(tmp_path, overrides)
+    refused("train", "resume=run")
+
+
+def test_links_out_of_a_run_that_is_resumed(refused, tmp_path):
+    make_run(tmp_path, "- seed=0\n")
+    (tmp_path / "run" / "metrics.csv").symlink_to(tmp_path / "canary")
+    refused("train", "resume=run")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        json.dumps({**SWEEP, "runs": [{**SWEEP["runs"][0], "folder": "../x"}]}),
+        json.dumps({**SWEEP, "runs": 5}),
+        json.dumps({**SWEEP, "plugins": ["os.system"]}),
+        "[" * 10**5,
+        '{"runs": [',
+    ],
+)
+def test_sweeps(refused, tmp_path, content):
+    (tmp_path / "sweep").mkdir()
+    (tmp_path / "sweep" / "sweep.json").write_text(content)
+    refused("sweep-report", "folder=sweep")
+
+
+ARCHIVES = {
+    "objects": lambda: npz(a=np.array([{}], dtype=object)),
+    "negative_shape": lambda: array_file((-1, 3), "<f8", bytes(24)),
+    "more_than_there_is": lambda: array_file((2**40,), "<f8", bytes(8)),
+    "code_as_shape": lambda: array_file("__import__('os').system('touch ran')", "<f8", bytes(8)),
+    "bomb": lambda: array_file((2**27,), "<f8", bytes(2**30)),
+    "no_archive": lambda: b"PK\x03\x04 and so on",
+}
+
+
+@pytest.mark.parametrize("name", ARCHIVES)
+@pytest.mark.parametrize("reader", ["explanation", "demonstration"])
+def test_arrays(refused, tmp_path, name, reader):
+    (tmp_path / "x").mkdir()
+    if reader == "explanation":
+        about = {"format": "drone_rl explanation", "format_version": 3, "name": "x"}
+        (tmp_path / "x" / "explanation.json").write_text(json.dumps(about))
+        (tmp_path / "x" / "dataset.npz").write_bytes(npz())
+        (tmp_path / "x" / "arrays.npz").write_bytes(ARCHIVES[name]())
+        refused("report", "explanations=x")
+    else:
+        (tmp_path / "x" / "flight_00000.npz").write_bytes(ARCHIVES[name]())
+        refused("train", "demonstrations=x", "logger=csv")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b'{"fog": {"low": true, "unit": "m of sight"}}',
+        b'{"fog": {"low": 90, "high": 40, "unit": "m of sight"}}',
+        b'{"luck": {"low": 1, "unit": "x"}}',
+        b"a: !!python/name:os.system",
+        b"# " + b"a" * 70_000,
+        bytes(range(128, 256)),
+    ],
+)
+def test_required_domains(refused, tmp_path, content):
+    (tmp_path / "x.yaml").write_bytes(content)
+    refused("verdict", "policy=good", "require_domain=x.yaml")
+
+
+@pytest.mark.parametrize("name", ["../x", "a/b", "/tmp/x", ".x"])
+def test_output_names_that_are_paths(refused, tmp_path, name):
+    refused("export", "policy=good", f"name={name}")
