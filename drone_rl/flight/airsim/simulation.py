@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from torch import Tensor
+
 from drone_rl.config import DynamicsSettings
 from drone_rl.flight.airsim.cameras import CameraState, make_cameras
 from drone_rl.flight.airsim.messages import (
@@ -19,7 +21,7 @@ from drone_rl.flight.airsim.messages import (
     read_pose,
 )
 from drone_rl.flight.airsim.messages import pose as pose_map
-from drone_rl.flight.airsim.recording import Recording
+from drone_rl.flight.airsim.recording import RecordedImage, Recording
 from drone_rl.flight.airsim.settings_file import (
     FLYING,
     POSING,
@@ -30,7 +32,6 @@ from drone_rl.flight.airsim.settings_file import (
 from drone_rl.flight.airsim.stage import Stage
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.flight.commands.state import Attitude
-from drone_rl.sim.image_types import ImageType
 from drone_rl.utils.errors import InputError, did_you_mean
 
 _log = logging.getLogger(__name__)
@@ -99,6 +100,8 @@ class Simulation:
         """Time at which `simContinueForTime` pauses."""
         self._anchor = (time.monotonic(), 0.0)
         """A time of `time.monotonic`, and the simulated seconds then."""
+        if settings.recording.is_enabled:
+            self.start_recording()
 
     @property
     def period_s(self) -> float:
@@ -298,21 +301,27 @@ class Simulation:
 
     def start_recording(self) -> None:
         """Record states and images to a new folder; do nothing if that goes on already."""
-        if self._recordings is None:
+        choice = self.settings.recording
+        folder = Path(choice.folder) if choice.folder else self._recordings
+        if folder is None:
             raise InputError("there is no folder for recordings; start the server with one")
         if self.recording is None:
-            self.recording = Recording(self._recordings, self.time)
+            self.recording = Recording(choice, folder, self.time)
             self._record()
 
     def _record(self) -> None:
         if self.recording is None or not self.recording.take_turn(self.time):
             return
         for name, vehicle in self.vehicles.items():
-            camera = self.cameras[name]["front_center"]
-            (shot,) = self.stage.render(vehicle.body, camera, [ImageType.SCENE])
-            image = self.stage.image(ImageType.SCENE, shot, as_float=False)
+
+            def render(image: RecordedImage, of: Vehicle = vehicle) -> Tensor:
+                camera = self.cameras[of.choice.name][image.camera]
+                (shot,) = self.stage.render(of.body, camera, [image.kind])
+                return self.stage.image(image.kind, shot, as_float=image.as_float)
+
+            images = self.recording.images_of(name, is_first=vehicle is self.find(""))
             try:
-                self.recording.write(self.time, name, vehicle.pose, image)
+                self.recording.write(self.time, name, vehicle.pose, images, render)
             except OSError as error:
                 _log.error("the recording ends: it can't be written (%s)", error.strerror)
                 with contextlib.suppress(OSError):
