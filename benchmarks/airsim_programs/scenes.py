@@ -203,7 +203,7 @@ def spawn(s: Session) -> Found:
     same=True,
 )
 def weather(s: Session) -> Found:
-    """Fog with a visibility of 20 m: e^-1 of the contrast is left at 20 m / 1. Rain does nothing."""
+    """Fog with a visibility of 20 m at most; rain, which does nothing; and clear air again."""
     s.client.simEnableWeather(True)
     fog, rain = s.airsim.WeatherParameter.Fog, s.airsim.WeatherParameter.Rain
     clear = s.colors()
