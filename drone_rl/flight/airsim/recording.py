@@ -10,7 +10,7 @@ from typing import Any
 from PIL import Image
 from torch import Tensor
 
-from drone_rl.flight.airsim.messages import Pose, nanoseconds
+from drone_rl.flight.airsim.messages import Pose
 from drone_rl.utils.errors import InputError
 
 INTERVAL = 0.05
@@ -52,9 +52,8 @@ class Recording:
         self._next = time + INTERVAL
         return True
 
-    def write(self, time: float, name: str, pose: Pose, image: Tensor) -> None:
-        """Write the row of a vehicle at a simulated time, with its image (H, W, 3), uint8."""
-        stamp = nanoseconds(time)
+    def write(self, stamp: int, name: str, pose: Pose, image: Tensor) -> None:
+        """Write the row of a vehicle at a time stamp, with its image (H, W, 3), uint8."""
         letters = to_letters(name)
         if letters != name:  # other names may have the same letters
             letters += f"_{zlib.crc32(name.encode('utf-8', 'replace')):08x}"
