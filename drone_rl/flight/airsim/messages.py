@@ -2,8 +2,7 @@
 
 import datetime
 import math
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import torch
@@ -26,9 +25,6 @@ MAX_PATTERN = 200
 """Most letters of a regular expression."""
 MOST_TURN = 3600.0
 """Greatest yaw rate, degrees per second."""
-_REPETITION = re.compile(r"(?<!\\)[*+?{]")
-_REPEATED_GROUP = re.compile(r"\)[*+?{]")
-_MOST_REPETITIONS = 3
 _LARGEST = 3.5e38
 """Above all finite float32, such as AirSim's default timeout of 3e38."""
 
@@ -161,26 +157,6 @@ def text(value: Any, name: str, most: int = 10_000) -> str:
             f"{name}={shown(value)} is not a text of at most {most:,} letters; give one"
         )
     return value
-
-
-def matching(pattern: str, names: Iterable[str]) -> list[str]:
-    """Return the names that match a regular expression, ignoring case, as a whole.
-
-    Raises:
-        InputError: It is none, or one whose search could take forever.
-    """
-    parts = [pattern] if "(" in pattern else pattern.split("|")
-    most = max(len(_REPETITION.findall(part)) for part in parts)
-    if most > _MOST_REPETITIONS or _REPEATED_GROUP.search(pattern):
-        raise InputError(
-            f"name={shown(pattern)} repeats too much; give at most {_MOST_REPETITIONS} of * + ? "
-            "and {, and none after a group"
-        )
-    try:
-        compiled = re.compile(pattern, re.IGNORECASE)
-    except (re.error, RecursionError, OverflowError) as error:
-        raise InputError(f"name={shown(pattern)} is no regular expression ({error})") from error
-    return [name for name in names if compiled.fullmatch(name)]
 
 
 def read_map(

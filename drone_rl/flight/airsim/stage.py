@@ -17,11 +17,11 @@ from drone_rl.flight.airsim.cameras import CameraState
 from drone_rl.flight.airsim.messages import (
     NO_POSE,
     Pose,
-    matching,
     ned,
     ned_attitude,
     to_world,
 )
+from drone_rl.flight.airsim.patterns import matching
 from drone_rl.flight.airsim.scenes import make_task
 from drone_rl.flight.airsim.settings_file import Capture
 from drone_rl.sim.dynamics import BodyState

@@ -13,7 +13,6 @@ from drone_rl.flight.airsim.messages import (
     NO_POSE,
     Map,
     flag,
-    matching,
     number,
     read_pose,
     read_vector,
@@ -22,6 +21,7 @@ from drone_rl.flight.airsim.messages import (
     whole,
 )
 from drone_rl.flight.airsim.methods.registry import argument, method
+from drone_rl.flight.airsim.patterns import matching
 from drone_rl.flight.airsim.simulation import Simulation
 from drone_rl.utils.errors import InputError
 
