@@ -14,7 +14,8 @@ from drone_rl.utils.errors import InputError
 from tools.airsim_clients import CLIENTS, python_of
 
 ROOT = Path(__file__).resolve().parents[1]
-CLIENT_OF = dict(zip(VERSIONS, CLIENTS, strict=True))
+_NAMES = ("airsim-1.1.7", "airsim-1.2.8", "airsim-1.8.1", "cosysairsim-3.5.0")
+CLIENT_OF = dict(zip(VERSIONS, _NAMES, strict=True))
 """Installed clients by version."""
 PAIRS = [(name, version) for name, one in PROGRAMS.items() for version in one.clients]
 """Programs, and the versions that have their calls."""
@@ -52,7 +53,8 @@ def run_script(name: str, version: str, folder: Path) -> list[str]:
     folder.mkdir(parents=True, exist_ok=True)
     settings = parse_settings(one.settings.replace("FOLDER", str(folder)))
     usual = {"scene": "empty", "clock": "lockstep", "patience_s": 0.002}  # programs join at once
-    with serve(settings, port=0, **{**usual, **one.options}) as server:
+    channels = {"raw_channels": 4} if version == "airsim-1.2" else {}
+    with serve(settings, port=0, **{**usual, **channels, **one.options}) as server:
         client = CLIENT_OF[version]
         command = [
             *(str(python_of(client)), "-m", "benchmarks.airsim_programs"),

@@ -39,6 +39,14 @@ CLIENTS = {
             ("--no-build-isolation", "--no-deps", "airsim==1.8.1"),
         ),
     ),
+    "airsim-1.8.1-tornado": ClientPackage(  # AirSim's own transport, for Python up to 3.11
+        "airsim",
+        (
+            ("numpy", "setuptools<66", "wheel"),
+            ("--no-build-isolation", "msgpack-rpc-python"),
+            ("--no-build-isolation", "--no-deps", "airsim==1.8.1"),
+        ),
+    ),
     "cosysairsim-3.5.0": ClientPackage("cosysairsim", (("cosysairsim==3.5.0",),)),
 }
 

@@ -94,8 +94,8 @@ class Airframe(Pilot):
             self.home = self.body.position[0].clone()
         self._home = self.home.tolist()
         self._initial = (copy.deepcopy(self.body), None, None)  # the scene resets itself
-        self.epoch = 0.0
-        """Simulated seconds of the server when the vehicle was created or last reset."""
+        self.epoch = 0
+        """Time stamp of the vehicle's time 0: of its creation or last reset."""
         self.begin()
 
     def begin(self) -> None:
@@ -154,6 +154,11 @@ class Airframe(Pilot):
         """Ticks of one control period."""
         return self._period
 
+    @property
+    def left(self) -> int:
+        """Ticks to the end of the present control period."""
+        return self._left or self._period
+
     # Frames
 
     def _world(self, position: Sequence[float]) -> tuple[float, float, float]:
@@ -179,7 +184,7 @@ class Airframe(Pilot):
     # State
 
     def kinematics(self) -> Map:
-        """Return a KinematicsState; accelerations are means of the last control period."""
+        """Return a KinematicsState; accelerations are means of the last step."""
         now, before = self.body.numbers[0].tolist(), self._before.numbers[0].tolist()
         seconds = (now[TICKS] - before[TICKS]) * self.settings.tick
         rate, pose = 1.0 / seconds if seconds > 0 else 0.0, self.pose
@@ -199,7 +204,7 @@ class Airframe(Pilot):
 
     def _stamp(self, seconds: float) -> int:
         """Return the time stamp of a time of this vehicle."""
-        return nanoseconds(self.epoch + seconds)
+        return self.epoch + nanoseconds(seconds)
 
     def rotor_states(self) -> Map:
         """Return RotorStates: thrust in newtons; speed in radians per second."""

@@ -12,7 +12,7 @@ from typing import Any
 from PIL import Image
 from torch import Tensor
 
-from drone_rl.flight.airsim.messages import Pose, nanoseconds
+from drone_rl.flight.airsim.messages import Pose
 from drone_rl.sim.entities import find_camera
 from drone_rl.sim.image_types import ImageType
 from drone_rl.utils.errors import InputError
@@ -143,20 +143,19 @@ class Recording:
 
     def write(
         self,
-        time: float,
+        stamp: int,
         name: str,
         pose: Pose,
         images: list[RecordedImage],
         render: Callable[[RecordedImage], Tensor],
     ) -> None:
-        """Write the row of a vehicle at a simulated time, if it is to be recorded.
+        """Write the row of a vehicle at a time stamp, if it is to be recorded.
 
         `render` returns an image: (H, W, 3) uint8, or (H, W) float32.
         """
         if self.choice.on_move and self._poses.get(name, _ORIGIN) == pose:
             return
         self._poses[name] = pose
-        stamp = nanoseconds(time)
         letters = to_letters(name)
         if letters != name:  # other names may have the same letters
             letters += f"_{zlib.crc32(name.encode('utf-8', 'replace')):08x}"

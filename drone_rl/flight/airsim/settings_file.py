@@ -190,6 +190,12 @@ _FILE = _Table(
 )
 
 
+def find_settings() -> Path | None:
+    """Return settings.json of the working directory, else of ~/Documents/AirSim; None without."""
+    folders = (Path.cwd(), Path.home() / "Documents" / "AirSim")
+    return next(filter(Path.is_file, (folder / "settings.json" for folder in folders)), None)
+
+
 def read_settings(path: Path) -> AirsimSettings:
     """Read a settings file.
 

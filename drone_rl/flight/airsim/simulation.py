@@ -5,7 +5,7 @@ import dataclasses
 import logging
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +16,12 @@ from drone_rl.flight.airsim.cameras import CameraState, make_cameras
 from drone_rl.flight.airsim.messages import (
     Pose,
     attitude_to_world,
+    nanoseconds,
     ned,
     ned_attitude,
+    read_date,
     read_pose,
+    to_world,
 )
 from drone_rl.flight.airsim.messages import pose as pose_map
 from drone_rl.flight.airsim.recording import RecordedImage, Recording
@@ -37,6 +40,8 @@ from drone_rl.utils.errors import InputError, did_you_mean
 _log = logging.getLogger(__name__)
 
 CLOCKS = ("wall", "lockstep")
+DATE = "2024-01-01T00:00:00"
+"""Default of the time, UTC, at which lockstep starts."""
 _MOST_VEHICLES = 100
 
 
@@ -63,7 +68,9 @@ class Simulation:
         scene: str = "cubes",
         *,
         clock: str = "wall",
+        date: str = DATE,
         seed: int = 0,
+        raw_channels: int = 3,
         renderer: str | None = None,
         recordings: Path | None = None,
     ) -> None:
@@ -73,11 +80,15 @@ class Simulation:
             settings: Content of settings.json.
             scene: See `scenes.make_task`.
             clock: "wall" or "lockstep".
+            date: Time at which lockstep starts, as ISO 8601, UTC unless it says otherwise; an
+                `InputError` if it is none, or before 1970.
             seed: Of placements, gusts and sensor noise.
+            raw_channels: Channels of raw images of clients from version 1.2 on: 3 or 4.
             renderer: Name of a renderer; by default the one that fits the scene.
             recordings: Folder for recordings; None refuses to record.
         """
         self.settings, self.clock, self.seed = settings, clock, seed
+        self.raw_channels = raw_channels
         self.stage = Stage(scene, seed, renderer=renderer)
         if settings.segmentation == "None":
             self.stage.clear_ids()
@@ -85,8 +96,12 @@ class Simulation:
         self._dynamics = DynamicsSettings().replace(
             mode="simple_flight", camera_mount="body", wind=(x, -y, -z)
         )
-        self._periods = 0
-        """Control periods that have passed."""
+        posing = settings.sim_mode == POSING
+        self._origin = self.stage.start_height if posing else self._dynamics.radius
+        """Height at which vehicles start, and z is 0 for clients, metres."""
+        self._start = time.time_ns() if clock == "wall" else read_date(date)
+        self._ticks = 0
+        """Physics ticks that have passed."""
         self.vehicles: dict[str, Vehicle] = {}
         self.cameras: dict[str, dict[str, CameraState]] = {}
         """Of each vehicle, by our names of cameras."""
@@ -98,6 +113,8 @@ class Simulation:
         self._waits: list[tuple[Wait, Callable[[Any], None]]] = []
         self._until: float | None = None
         """Time at which `simContinueForTime` pauses."""
+        self._surplus = 0.0
+        """Seconds by which the last such call lasted too long, which the next one lasts less."""
         self._anchor = (time.monotonic(), 0.0)
         """A time of `time.monotonic`, and the simulated seconds then."""
         if settings.recording.is_enabled:
@@ -106,13 +123,17 @@ class Simulation:
     @property
     def period_s(self) -> float:
         """Seconds of one control period."""
-        first = next(iter(self.vehicles.values()))
-        return first.period * first.settings.tick
+        return self.find("").period * self._dynamics.tick
 
     @property
     def time(self) -> float:
         """Simulated seconds since the start; `reset` does not change it."""
-        return self._periods * self.period_s
+        return self._ticks * self._dynamics.tick
+
+    @property
+    def stamp(self) -> int:
+        """The present time stamp: nanoseconds since 1970."""
+        return self._start + nanoseconds(self.time)
 
     def add(self, choice: VehicleChoice) -> Vehicle:
         """Create a vehicle; an `InputError` if its name is taken, or there are too many."""
@@ -120,17 +141,17 @@ class Simulation:
             raise InputError(f"vehicle {choice.name!r} is there already; give another name")
         if len(self.vehicles) >= _MOST_VEHICLES:
             raise InputError(f"there are {_MOST_VEHICLES} vehicles; no more can be added")
-        names = self.stage.names[1:]
+        names, home = self.stage.names[1:], self.settings.home
         vehicle = Vehicle(
             choice,
             self._dynamics,
             self.stage.worlds,
             names=names,
-            home=self.settings.home,
+            home=home._replace(altitude=home.altitude - self._origin),  # the vehicles' start
             height=self.stage.start_height,
             seed=(self.seed + len(self.vehicles)) % 2**31,
         )
-        vehicle.epoch = self.time if self.vehicles else 0.0
+        vehicle.epoch = self.stamp
         self.vehicles[choice.name] = vehicle
         self.cameras[choice.name] = make_cameras(self.settings.captures, choice.cameras)
         return vehicle
@@ -176,19 +197,26 @@ class Simulation:
             vehicle.change_dynamics(self._dynamics)
 
     def object_pose(self, name: str) -> dict[str, Any]:
-        """Return the Pose of an object or a vehicle in the world's NED frame."""
+        """Return the Pose of an object or a vehicle in NED, see `place`."""
         if name in self.vehicles:
             body = self.vehicles[name].body
             x, y, z = ned(body.position)
             w, i, j, k = ned_attitude(body.attitude)
-            return pose_map(Pose((x, y, z), (w, i, j, k)))
-        return pose_map(self.stage.object_pose(name))
+        else:
+            (x, y, z), (w, i, j, k) = self.stage.object_pose(name)
+        return pose_map(Pose((x, y, z + self._origin), (w, i, j, k)))
+
+    def place(self, position: Sequence[float]) -> tuple[float, float, float]:
+        """Return the position in our world of one in NED from where vehicles start by default."""
+        x, y, z = to_world(position)
+        return x, y, z + self._origin
 
     def move_vehicle(self, name: str, pose: Pose) -> None:
-        """Set a vehicle's pose in the world's NED frame; NaN components stay."""
+        """Set a vehicle's pose in NED, see `place`; NaN components stay."""
         vehicle = self.vehicles[name]
-        start = ned(vehicle.home[None])
-        x, y, z = (there - here for there, here in zip(pose.position, start, strict=True))
+        x, y, z = to_world(
+            [a - b for a, b in zip(self.place(pose.position), vehicle.home.tolist(), strict=True)]
+        )
         vehicle.set_airsim_pose(Pose((x, y, z), pose.attitude), ignore_collision=True)
         self.stage.touch(vehicle.body.position[0])
 
@@ -197,7 +225,7 @@ class Simulation:
         self.stage.reset()
         for vehicle in self.vehicles.values():
             vehicle.reset()
-            vehicle.epoch = self.time
+            vehicle.epoch = self.stamp
         self.settle()
 
     # Time
@@ -223,14 +251,27 @@ class Simulation:
 
     def pause(self, is_paused: bool) -> None:
         """Stop or continue simulated time."""
+        if not (self.is_paused and is_paused):
+            self._surplus = 0.0
         self.is_paused, self._until = is_paused, None
         self._hold_anchor()
 
     def continue_for(self, seconds: float) -> Wait:
-        """Let time pass for some seconds, then pause; return the wait for that."""
-        self.pause(seconds <= 0.0)
-        end = self._until = self.time + seconds
+        """Let time pass for some seconds, then pause; return the wait for that.
+
+        A call lasts whole physics ticks, and the calls of a loop together as long as they say.
+        """
+        end = self._until = self.time - self._surplus + seconds
+        self.is_paused = False
+        self._pause_if_due()
+        self._hold_anchor()
         return Wait(lambda: self.is_paused or self.time >= end - 1e-9, lambda: None, blocks=True)
+
+    def _pause_if_due(self) -> None:
+        """Pause at the end of `continue_for`."""
+        if self._until is not None and self.time >= self._until - 1e-9:
+            self._surplus = self.time - self._until
+            self.is_paused, self._until = True, None
 
     def follow(self, budget: float) -> float:
         """Catch up with real time, in at most `budget` seconds of it.
@@ -243,7 +284,7 @@ class Simulation:
             self._hold_anchor()
             return math.inf
         while (left := self._left()) <= 0.0:
-            self._period()
+            self._step()
             if self.is_paused:
                 return math.inf
             if time.monotonic() > end:
@@ -260,30 +301,38 @@ class Simulation:
         """
         end = time.monotonic() + budget
         while self.is_due and self.time < until - 1e-9:
-            if self._period():
+            if self._step():
                 return True
             if time.monotonic() > end:
                 return False
         return not self.is_due
 
     def _left(self) -> float:
-        """Seconds of real time until the next control period is due."""
+        """Seconds of real time until the end of the next step is due."""
         then, simulated = self._anchor
-        due = then + (self.time + self.period_s - simulated) / self.settings.clock_speed
-        return due - time.monotonic()
+        end = (self._ticks + self._next_ticks()) * self._dynamics.tick
+        return then + (end - simulated) / self.settings.clock_speed - time.monotonic()
+
+    def _next_ticks(self) -> int:
+        """Return the ticks of the next step: to the end of a control period, or to a pause."""
+        left = self.find("").left
+        if self._until is not None:
+            due = math.ceil((self._until - self.time) / self._dynamics.tick - 1e-6)
+            left = max(1, min(left, due))
+        return left
 
     def _hold_anchor(self) -> None:
         self._anchor = (time.monotonic(), self.time)
 
-    def _period(self) -> bool:
-        """Advance all vehicles by a control period; return whether a call was answered."""
+    def _step(self) -> bool:
+        """Advance all vehicles by a step; return whether a call was answered."""
+        ticks = self._next_ticks()
         for vehicle in self.vehicles.values():
-            vehicle.run(vehicle.period)
+            vehicle.run(ticks)
             self.stage.touch(vehicle.body.position[0])
-        self._periods += 1
+        self._ticks += ticks
         self._record()
-        if self._until is not None and self.time >= self._until - 1e-9:
-            self.is_paused, self._until = True, None
+        self._pause_if_due()
         return self.settle()
 
     def settle(self) -> bool:
@@ -321,7 +370,7 @@ class Simulation:
 
             images = self.recording.images_of(name, is_first=vehicle is self.find(""))
             try:
-                self.recording.write(self.time, name, vehicle.pose, images, render)
+                self.recording.write(self.stamp, name, vehicle.pose, images, render)
             except OSError as error:
                 _log.error("the recording ends: it can't be written (%s)", error.strerror)
                 with contextlib.suppress(OSError):

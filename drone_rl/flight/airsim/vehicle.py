@@ -205,7 +205,7 @@ class Vehicle(Airframe):
         """
         turn: dict[str, Any] = {}
         if yaw is not None:
-            turn["yaw"] = yaw * _DEGREES
+            turn["yaw"] = math.remainder(yaw * _DEGREES, 360.0)
         if yaw_rate is not None:
             turn["yaw_rate"] = yaw_rate * _DEGREES
         lift = {"z": self._height(z)} if z is not None else {"throttle": throttle}

@@ -5,6 +5,7 @@
 
 import base64
 import json
+import re
 import subprocess
 from pathlib import Path
 
@@ -70,6 +71,18 @@ def test_flight(run):
     assert found["landed_again"] == 0
     assert found["after_reset"] == [0.0, 0.0, 0.0]
     assert "getLidarData is not supported" in found["refused"]
+
+
+def test_commands_that_are_not_joined_are_sent(run, tmp_path, monkeypatch):
+    """With rpc-msgpack by the module of the page."""
+    page = (Path(__file__).parents[3] / "docs" / "airsim.md").read_text()
+    (module,) = re.findall(r'title="airsim_fixes.py"\n(.*?)```', page, re.DOTALL)
+    (tmp_path / "airsim_fixes.py").write_text(module)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    found, _ = run("not_joined.py", clock="wall")
+    assert found["moved"] > 0.2
+    assert found["twice"] == [2.0, 4.0, 6.0]
+    assert found["bytes"] == 256 * 144 * 3
 
 
 def test_computer_vision(run):

@@ -1,6 +1,7 @@
 """Simulated time: periods, waits, pauses."""
 
 import math
+import time
 
 import pytest
 
@@ -103,8 +104,9 @@ def test_time_stamps_of_vehicles_go_on_after_a_reset_and_from_their_creation(mak
     simulation.wait_for(simulation.continue_for(1.0), [].append)
     simulation.advance(60.0, math.inf)
     simulation.add_named("B", "simpleflight", pose(0.0, 5.0, 0.0))
-    now = nanoseconds(simulation.time)
-    assert now >= 1e9
+    now = simulation.stamp
+    assert now == 1_704_067_200_000_000_000 + nanoseconds(simulation.time)  # from 2024-01-01
+    assert simulation.time >= 1.0
     assert simulation.find("B").multirotor_state()["timestamp"] == now
     simulation.reset()
     for vehicle in simulation.vehicles.values():
@@ -114,7 +116,25 @@ def test_time_stamps_of_vehicles_go_on_after_a_reset_and_from_their_creation(mak
     simulation.advance(60.0, math.inf)
     read = [simulation.find("").sensor(kind)["time_stamp"] for kind in ("imu", "barometer")]
     read.append(simulation.find("").collision()["time_stamp"])
-    assert min(read) > now and max(read) <= nanoseconds(simulation.time + 1e-6)  # float32
+    assert min(read) > now and max(read) <= simulation.stamp + 1000  # float32
+
+
+@pytest.mark.parametrize("seconds", [0.01, 0.05, 0.1])
+def test_continuing_keeps_the_remainder(make, seconds):
+    """Ticks of 3 ms: no call takes as long as it says, but their sum does."""
+    simulation = make(clock="lockstep")
+    simulation.pause(True)
+    for _ in range(40):
+        answers = []
+        simulation.wait_for(simulation.continue_for(seconds), answers.append)
+        simulation.advance(60.0, math.inf)
+        assert answers and simulation.is_paused
+        simulation.pause(True)  # of a paused simulation: changes nothing
+    assert simulation.time == pytest.approx(40 * seconds, abs=0.003)
+
+
+def test_the_wall_clock_has_the_present_time(make):
+    assert make(clock="wall").stamp == pytest.approx(time.time_ns(), abs=60e9)
 
 
 def test_added_vehicles_have_the_heading_of_their_pose(make):

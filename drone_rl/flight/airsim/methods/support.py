@@ -63,7 +63,7 @@ PARTLY = {
     "simSetDetectionFilterRadius": "for all image types of a camera",
     "simClearDetectionMeshNames": "for all image types of a camera",
     "simTestLineOfSightBetweenPoints": "boxes that can be touched hide; other objects do not",
-    "simSetWeatherParameter": "fog",
+    "simSetWeatherParameter": "fog; others are accepted without effect",
     "simSetTimeOfDay": "the sun's place at that hour, which then stands still",
     "simAddVehicle": "SimpleFlight, which starts on the ground, and ComputerVision",
     "simRunConsoleCommand": "returns false",
