@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import torch
+
 from drone_rl.config import DynamicsSettings
 from drone_rl.flight.airsim.cameras import CameraState, make_cameras
 from drone_rl.flight.airsim.messages import (
@@ -123,6 +125,7 @@ class Simulation:
             self._dynamics,
             self.stage.worlds,
             names=names,
+            object_id=self.stage.get_id,
             home=self.settings.home,
             height=self.stage.start_height,
             seed=(self.seed + len(self.vehicles)) % 2**31,
@@ -186,8 +189,33 @@ class Simulation:
         vehicle = self.vehicles[name]
         start = ned(vehicle.home[None])
         x, y, z = (there - here for there, here in zip(pose.position, start, strict=True))
-        vehicle.set_airsim_pose(Pose((x, y, z), pose.attitude), ignore_collision=True)
-        self.stage.touch(vehicle.body.position[0])
+        self.teleport(vehicle, Pose((x, y, z), pose.attitude), ignore_collision=True)
+
+    def teleport(self, vehicle: Vehicle, pose: Pose, *, ignore_collision: bool) -> None:
+        """Put a vehicle somewhere, see `Airframe.set_airsim_pose`; it touches cubes on its way."""
+        before = None if ignore_collision else vehicle.body.position[0].clone()
+        others = (one for one in self._flying() if one is not vehicle)
+        vehicle.set_airsim_pose(pose, ignore_collision=ignore_collision, others=others)
+        self.touch(vehicle, before)
+
+    def touch(self, vehicle: Vehicle, before: torch.Tensor | None = None) -> None:
+        """Apply the scene's rules of contact to a vehicle; see `Stage.touch`."""
+        for contact in self.stage.touch(vehicle.body.position[0], before):
+            vehicle.collide(*contact)
+
+    def _flying(self) -> list[Vehicle]:
+        """Return the vehicles that collide with each other: those with dynamics."""
+        return [one for one in self.vehicles.values() if not one.is_computer_vision]
+
+    def _bump(self) -> None:
+        """Let vehicles that overlap bounce off each other."""
+        flying = self._flying()
+        if len(flying) < 2:
+            return
+        places = torch.cat([vehicle.body.position for vehicle in flying])
+        overlaps = torch.cdist(places, places) < 2.0 * self._dynamics.radius
+        for i, j in overlaps.triu(1).nonzero().tolist():
+            flying[i].bump(flying[j])
 
     def reset(self) -> None:
         """Reset vehicles and scene; running movements are cancelled."""
@@ -276,7 +304,8 @@ class Simulation:
         """Advance all vehicles by a control period; return whether a call was answered."""
         for vehicle in self.vehicles.values():
             vehicle.run(vehicle.period)
-            self.stage.touch(vehicle.body.position[0])
+            self.touch(vehicle)
+        self._bump()
         self._periods += 1
         self._record()
         if self._until is not None and self.time >= self._until - 1e-9:

@@ -3,8 +3,7 @@
 import copy
 import dataclasses
 import math
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import mujoco as _mujoco
@@ -15,7 +14,9 @@ from torch import Tensor
 
 from drone_rl.config import CameraSettings
 from drone_rl.flight.airsim.cameras import CameraState
+from drone_rl.flight.airsim.collisions import nearest
 from drone_rl.flight.airsim.messages import NO_POSE, Pose, ned, ned_attitude, to_world
+from drone_rl.flight.airsim.patterns import matching
 from drone_rl.flight.airsim.scenes import make_task
 from drone_rl.flight.airsim.settings_file import Capture
 from drone_rl.sim.dynamics import BodyState
@@ -27,7 +28,6 @@ from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import shown
 
 mujoco: Any = _mujoco  # its stubs lack what is used here
 
@@ -37,9 +37,6 @@ SPARE = 12
 _PLAIN = Appearance()
 _MOST_SHOWN = 100
 """Appearances that are kept."""
-_REPETITION = re.compile(r"(?<!\\)[*+?{]")
-_REPEATED_GROUP = re.compile(r"\)[*+?{]")
-_MOST_REPETITIONS = 3
 
 
 class Shot(NamedTuple):
@@ -104,9 +101,33 @@ class Stage:
         """Height at which a vehicle without dynamics starts, metres."""
         return float(self.task.origin[2])
 
-    def touch(self, position: Tensor) -> None:
-        """Apply the task's rules to a vehicle: the chapter's cubes vanish when touched. (3,)."""
-        self.task.touch(self.worlds.state, position[None])
+    def touch(
+        self, position: Tensor, before: Tensor | None = None
+    ) -> list[tuple[str, Tensor, Tensor]]:
+        """Apply the task's rules to a vehicle: the chapter's cubes vanish when touched.
+
+        Args:
+            position: Of the vehicle. Shape: (3,).
+            before: Where it comes from, if it touches what is on the straight path. Shape: (3,).
+
+        Returns:
+            Names of what it touches, with its position there, and the point nearest to that.
+        """
+        start = None if before is None else before[None]
+        ways = self.task.touch(self.worlds.state, position[None], start)[0].tolist()
+        found = []
+        for index in sorted(range(len(ways)), key=ways.__getitem__):
+            if ways[index] < math.inf:
+                there = position if before is None else torch.lerp(before, position, ways[index])
+                name, center = self._names[index], self._placed[0, index]
+                half = center.new_tensor(self.worlds.scene.model.geom_size[self._geoms(name)[0]])
+                found.append((name, there, nearest(there, center, half)))
+        return found
+
+    @property
+    def _placed(self) -> Tensor:
+        """Where the scene's objects stand, or stood before they vanished. Shape: (1, *, 3)."""
+        return getattr(self.worlds.state, getattr(self.task, "props", "sampled"))
 
     # Objects
 
@@ -166,9 +187,7 @@ class Stage:
         if name in self._spawned:
             self._spawned[name] = dataclasses.replace(self._spawned[name], place=(x, y, z))
             return True
-        state = self.worlds.state
-        field = getattr(self.task, "props", "sampled")
-        known = getattr(state, field)
+        known = self._placed
         if known.shape[-2] != len(self._names):
             return False
         known[0, self._names.index(name)] = torch.tensor((x, y, z), dtype=known.dtype)
@@ -372,26 +391,6 @@ class Stage:
     def close(self) -> None:
         """Close the renderer."""
         self.worlds.close()
-
-
-def matching(pattern: str, names: Iterable[str]) -> list[str]:
-    """Return the names that match a regular expression, ignoring case, as a whole.
-
-    Raises:
-        InputError: It is none, or one whose search could take forever.
-    """
-    parts = [pattern] if "(" in pattern else pattern.split("|")
-    most = max(len(_REPETITION.findall(part)) for part in parts)
-    if most > _MOST_REPETITIONS or _REPEATED_GROUP.search(pattern):
-        raise InputError(
-            f"name={shown(pattern)} repeats too much; give at most {_MOST_REPETITIONS} of * + ? "
-            "and {, and none after a group"
-        )
-    try:
-        compiled = re.compile(pattern, re.IGNORECASE)
-    except (re.error, RecursionError, OverflowError) as error:
-        raise InputError(f"name={shown(pattern)} is no regular expression ({error})") from error
-    return [name for name in names if compiled.fullmatch(name)]
 
 
 def png(image: Tensor) -> bytes:

@@ -20,8 +20,8 @@ from drone_rl.flight.airsim.messages import (
     whole,
 )
 from drone_rl.flight.airsim.methods.registry import argument, method
+from drone_rl.flight.airsim.patterns import matching
 from drone_rl.flight.airsim.simulation import Simulation
-from drone_rl.flight.airsim.stage import matching
 from drone_rl.utils.errors import InputError
 
 
