@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
@@ -147,6 +148,7 @@ class Simulation:
             self._dynamics,
             self.stage.worlds,
             names=names,
+            object_id=self.stage.get_id,
             home=home._replace(altitude=home.altitude - self._origin),  # the vehicles' start
             height=self.stage.start_height,
             seed=(self.seed + len(self.vehicles)) % 2**31,
@@ -217,8 +219,33 @@ class Simulation:
         x, y, z = to_world(
             [a - b for a, b in zip(self.place(pose.position), vehicle.home.tolist(), strict=True)]
         )
-        vehicle.set_airsim_pose(Pose((x, y, z), pose.attitude), ignore_collision=True)
-        self.stage.touch(vehicle.body.position[0])
+        self.teleport(vehicle, Pose((x, y, z), pose.attitude), ignore_collision=True)
+
+    def teleport(self, vehicle: Vehicle, pose: Pose, *, ignore_collision: bool) -> None:
+        """Put a vehicle somewhere, see `Airframe.set_airsim_pose`; it touches cubes on its way."""
+        before = None if ignore_collision else vehicle.body.position[0].clone()
+        others = (one for one in self._flying() if one is not vehicle)
+        vehicle.set_airsim_pose(pose, ignore_collision=ignore_collision, others=others)
+        self.touch(vehicle, before)
+
+    def touch(self, vehicle: Vehicle, before: torch.Tensor | None = None) -> None:
+        """Apply the scene's rules of contact to a vehicle; see `Stage.touch`."""
+        for contact in self.stage.touch(vehicle.body.position[0], before):
+            vehicle.collide(*contact)
+
+    def _flying(self) -> list[Vehicle]:
+        """Return the vehicles that collide with each other: those with dynamics."""
+        return [one for one in self.vehicles.values() if not one.is_computer_vision]
+
+    def _bump(self) -> None:
+        """Let vehicles that overlap bounce off each other."""
+        flying = self._flying()
+        if len(flying) < 2:
+            return
+        places = torch.cat([vehicle.body.position for vehicle in flying])
+        overlaps = torch.cdist(places, places) < 2.0 * self._dynamics.radius
+        for i, j in overlaps.triu(1).nonzero().tolist():
+            flying[i].bump(flying[j])
 
     def reset(self) -> None:
         """Reset vehicles and scene; running movements are cancelled."""
@@ -329,7 +356,8 @@ class Simulation:
         ticks = self._next_ticks()
         for vehicle in self.vehicles.values():
             vehicle.run(ticks)
-            self.stage.touch(vehicle.body.position[0])
+            self.touch(vehicle)
+        self._bump()
         self._ticks += ticks
         self._record()
         self._pause_if_due()

@@ -14,13 +14,8 @@ from torch import Tensor
 
 from drone_rl.config import CameraSettings
 from drone_rl.flight.airsim.cameras import CameraState
-from drone_rl.flight.airsim.messages import (
-    NO_POSE,
-    Pose,
-    ned,
-    ned_attitude,
-    to_world,
-)
+from drone_rl.flight.airsim.collisions import nearest
+from drone_rl.flight.airsim.messages import NO_POSE, Pose, ned, ned_attitude, to_world
 from drone_rl.flight.airsim.patterns import matching
 from drone_rl.flight.airsim.scenes import make_task
 from drone_rl.flight.airsim.settings_file import Capture
@@ -107,9 +102,33 @@ class Stage:
         """Height at which a vehicle without dynamics starts, metres."""
         return float(self.task.origin[2])
 
-    def touch(self, position: Tensor) -> None:
-        """Apply the task's rules to a vehicle: the chapter's cubes vanish when touched. (3,)."""
-        self.task.touch(self.worlds.state, position[None])
+    def touch(
+        self, position: Tensor, before: Tensor | None = None
+    ) -> list[tuple[str, Tensor, Tensor]]:
+        """Apply the task's rules to a vehicle: the chapter's cubes vanish when touched.
+
+        Args:
+            position: Of the vehicle. Shape: (3,).
+            before: Where it comes from, if it touches what is on the straight path. Shape: (3,).
+
+        Returns:
+            Names of what it touches, with its position there, and the point nearest to that.
+        """
+        start = None if before is None else before[None]
+        ways = self.task.touch(self.worlds.state, position[None], start)[0].tolist()
+        found = []
+        for index in sorted(range(len(ways)), key=ways.__getitem__):
+            if ways[index] < math.inf:
+                there = position if before is None else torch.lerp(before, position, ways[index])
+                name, center = self._names[index], self._placed[0, index]
+                half = center.new_tensor(self.worlds.scene.model.geom_size[self._geoms(name)[0]])
+                found.append((name, there, nearest(there, center, half)))
+        return found
+
+    @property
+    def _placed(self) -> Tensor:
+        """Where the scene's objects stand, or stood before they vanished. Shape: (1, *, 3)."""
+        return getattr(self.worlds.state, getattr(self.task, "props", "sampled"))
 
     # Objects
 
@@ -174,9 +193,7 @@ class Stage:
         if name in self._spawned:
             self._spawned[name] = dataclasses.replace(self._spawned[name], place=(x, y, z))
             return True
-        state = self.worlds.state
-        field = getattr(self.task, "props", "sampled")
-        known = getattr(state, field)
+        known = self._placed
         if known.shape[-2] != len(self._names):
             return False
         known[0, self._names.index(name)] = torch.tensor((x, y, z), dtype=known.dtype)

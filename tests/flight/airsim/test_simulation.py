@@ -5,11 +5,12 @@ import time
 
 import pytest
 
-from drone_rl.flight.airsim.messages import nanoseconds
+from drone_rl.flight.airsim.messages import Pose, nanoseconds
 from drone_rl.flight.airsim.settings_file import parse_settings
 from drone_rl.flight.airsim.simulation import Simulation, Wait
 from drone_rl.utils.errors import InputError
 from tests.flight.airsim.conftest import pose
+from tests.flight.airsim.flying import FREE, KEEP
 
 
 @pytest.fixture
@@ -160,3 +161,27 @@ def test_reset_keeps_the_time_and_drops_api_control(make):
     simulation.reset()
     assert answers == [False]
     assert simulation.time == before and not vehicle.has_api_control
+
+
+def test_multirotors_collide_with_each_other(make):
+    """B hovers 3 m ahead of A, which flies into it at 2 m/s, and is pushed away."""
+    text = '{"Vehicles": {"A": {"Z": -3, "AllowAPIAlways": true}, "B": {"X": 3, "Z": -3}}}'
+    simulation = make(text, clock="lockstep")
+    a, b = simulation.find("A"), simulation.find("B")
+    future = a.move_velocity((2.0, 0.0, 0.0), 4.0, FREE, KEEP)
+    simulation.wait_for(Wait(lambda: future.done, future.result), [].append)
+    simulation.advance(60.0, math.inf)
+    seen = a.collision(), b.collision()
+    assert [one["object_name"] for one in seen] == ["B", "A"]
+    assert all(one["has_collided"] for one in seen)
+    assert [one["normal"]["x_val"] for one in seen] == pytest.approx([-1.0, 1.0], abs=0.01)
+    assert float(b.body.position[0, 0]) > 3.1
+    apart = float((a.body.position - b.body.position).norm())
+    assert apart >= 2 * a.settings.radius - 1e-6
+    simulation.reset()
+    start = a.pose
+    beyond = Pose((9.0, 0.0, 0.0), start.attitude)
+    simulation.teleport(a, beyond, ignore_collision=False)
+    assert a.collision()["object_name"] == "B" and 2.3 < a.pose.position[0] <= 2.4
+    simulation.teleport(a, beyond, ignore_collision=True)
+    assert a.pose.position[0] == 9.0 and not a.collision()["has_collided"]

@@ -65,7 +65,7 @@ PARTLY = {
     "simTestLineOfSightBetweenPoints": "boxes that can be touched hide; other objects do not",
     "simSetWeatherParameter": "fog; others are accepted without effect",
     "simSetTimeOfDay": "the sun's place at that hour, which then stands still",
-    "simAddVehicle": "SimpleFlight, which starts on the ground, and ComputerVision",
+    "simAddVehicle": "SimpleFlight and ComputerVision",
     "simRunConsoleCommand": "returns false",
     "simGetImages": "types 0 to 7; vehicles do not see each other",
     "simGetImage": "types 0 to 7; vehicles do not see each other",
