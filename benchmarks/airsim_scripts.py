@@ -1,6 +1,8 @@
 """Run the programs of `airsim_programs` through AirSim's own clients, each against a new server."""
 
 import json
+import os
+import re
 import subprocess
 from collections.abc import Mapping
 from pathlib import Path
@@ -53,6 +55,12 @@ def run_script(name: str, version: str, folder: Path) -> list[str]:
     folder.mkdir(parents=True, exist_ok=True)
     settings = parse_settings(one.settings.replace("FOLDER", str(folder)))
     usual = {"scene": "empty", "clock": "lockstep", "patience_s": 0.002}  # programs join at once
+    page = (ROOT / "docs" / "airsim.md").read_text()
+    fixes = re.search(r'title="airsim_fixes.py"\n(.*?)```', page, re.DOTALL)
+    assert fixes is not None
+    if version in VERSIONS[2:]:  # those with the transport that the page recommends
+        (folder / "airsim_fixes.py").write_text(fixes[1])
+    environment = {**os.environ, "PYTHONPATH": str(folder)}
     channels = {"raw_channels": 4} if version == "airsim-1.2" else {}
     with serve(settings, port=0, **{**usual, **channels, **one.options}) as server:
         client = CLIENT_OF[version]
@@ -61,7 +69,13 @@ def run_script(name: str, version: str, folder: Path) -> list[str]:
             *(CLIENTS[client].module, str(server.address[1]), name),
         ]
         done = subprocess.run(
-            command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
+            command,
+            cwd=ROOT,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
         )
     if done.returncode:
         return [done.stderr.strip().splitlines()[-1]]

@@ -1,5 +1,7 @@
 """Programs that move a vehicle by commands."""
 
+import contextlib
+import io
 import math
 from typing import Any
 
@@ -7,6 +9,25 @@ from benchmarks.airsim_programs.program import Near, program
 from benchmarks.airsim_programs.session import Session
 
 Found = dict[str, Any]
+
+
+@program(since="airsim-1.2", upgrade=False, armed=True, control=[False, True], refused=True)
+def hello(s: Session) -> Found:
+    """Connect without a warning; a method that is not supported is refused."""
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        s.client.confirmConnection()
+    control = [s.client.isApiControlEnabled()]
+    s.client.enableApiControl(True)
+    control.append(s.client.isApiControlEnabled())
+    try:
+        s.client.getLidarData()
+        refused = False
+    except Exception as error:  # each transport has its own class
+        refused = "getLidarData is not supported" in str(error)
+    armed = s.client.armDisarm(True)
+    upgrade = "upgrade" in printed.getvalue()
+    return {"upgrade": upgrade, "armed": armed, "control": control, "refused": refused}
 
 
 @program(climbed=Near(-2.0, 0.2), seconds=Near(4.0, 0.2), flying=True)

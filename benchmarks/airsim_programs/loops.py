@@ -1,13 +1,16 @@
 """Programs that control time or loop over actions: pauses, reinforcement learning."""
 
+import importlib.util
 import itertools
 import time
+from pathlib import Path
 from typing import Any
 
 from benchmarks.airsim_programs.program import Near, program
 from benchmarks.airsim_programs.session import Session
 
 Found = dict[str, Any]
+_CHAPTER = Path(__file__).parents[2] / "examples" / "airsim_chapter.py"
 _MOVES = ((1, 0), (0, -1), (0, 1))
 
 
@@ -115,3 +118,31 @@ def dqn(s: Session) -> Found:
             s.take_off()
             s.collision()
     return {"steps": 200, "seconds": seconds, "collisions": collisions > 3}
+
+
+_CHAPTER_SETTINGS = """{"SettingsVersion": 1, "CameraDefaults": {"CaptureSettings": [
+  {"ImageType": 0, "Width": 64, "Height": 25, "FOV_Degrees": 135}]}, %s
+  "Vehicles": {"Drone": {"VehicleType": "SimpleFlight", "X": 0, "Y": 0, "Z": -2.5}}}"""
+
+
+def _chapter(s: Session) -> Found:
+    """Fly five episodes of the chapter's program by its oracle, which collects all three cubes."""
+    spec: Any = importlib.util.spec_from_file_location(_CHAPTER.stem, _CHAPTER)
+    example: Any = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(example)
+    cubes = example.fly(example.ChapterEnv(s.client), example.oracle, 5)
+    return {"cubes": sum(cubes) / len(cubes)}
+
+
+for _name, _clock, _mode in (
+    ("chapter_wall", "wall", ""),
+    ("chapter_lockstep", "lockstep", ""),
+    ("chapter_computer_vision", "wall", '"SimMode": "ComputerVision",'),
+):
+    program(
+        _name,
+        until="AirSimClient",
+        settings=_CHAPTER_SETTINGS % _mode,
+        options={"scene": "cubes", "clock": _clock},
+        cubes=Near(3.0, 0.1),
+    )(_chapter)

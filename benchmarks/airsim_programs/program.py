@@ -35,6 +35,7 @@ PROGRAMS: dict[str, Program] = {}
 
 
 def program(
+    label: str = "",
     *,
     since: str = VERSIONS[0],
     until: str = VERSIONS[-1],
@@ -45,6 +46,7 @@ def program(
     """Enter a function into `PROGRAMS`.
 
     Args:
+        label: Its name; that of the function by default.
         since: First of `VERSIONS` that has its calls.
         until: Last one.
         settings: See `Program`.
@@ -54,7 +56,7 @@ def program(
     clients = VERSIONS[VERSIONS.index(since) : VERSIONS.index(until) + 1]
 
     def enter(run: Callable[[Any], Mapping[str, Any]]) -> Callable[[Any], Mapping[str, Any]]:
-        PROGRAMS[run.__name__] = Program(run, right, clients, settings, options or {})
+        PROGRAMS[label or run.__name__] = Program(run, right, clients, settings, options or {})
         return run
 
     return enter

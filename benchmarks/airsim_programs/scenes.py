@@ -21,7 +21,6 @@ _RADIUS = 0.3
 
 @program(
     options=_BLOCKS,
-    collided=True,
     name=WALL,
     point=Near(10.0, 0.05),
     normal=Near([-1.0, 0.0, 0.0], 0.01),
@@ -34,7 +33,6 @@ def wall(s: Session) -> Found:
     s.fly("moveByVelocityZ", 3, 0, -2, 5)
     found = s.collision()
     return {
-        "collided": found.has_collided,
         "name": _text(found.object_name),
         "point": components(found.impact_point)[0],
         "normal": components(found.normal),

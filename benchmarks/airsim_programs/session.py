@@ -1,6 +1,7 @@
 """A connected client, and what the versions of AirSim's clients spell differently."""
 
 import importlib
+import importlib.util
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -15,6 +16,8 @@ class Session:
 
     def __init__(self, module: str, port: int) -> None:
         """Connect to a server of this machine."""
+        if importlib.util.find_spec("airsim_fixes") and module != "AirSimClient":
+            importlib.import_module("airsim_fixes")
         self.airsim: Any = importlib.import_module(module)
         self.is_first = module == "AirSimClient"
         """Whether it is version 1.1: movements wait, nothing has a vehicle's name."""

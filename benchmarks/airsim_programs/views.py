@@ -31,6 +31,7 @@ def _before_the_wall(s: Session) -> float:
     settings=_POSING,
     raw={version: [_PIXELS * count] * 4 for version, count in _CHANNELS.items()},
     numbers=[_PIXELS] * 7,
+    cameras=[_PIXELS] * 5,
     png=["89504e47"] * 4,
     kinds=list(range(7)),
 )
@@ -38,10 +39,12 @@ def image_types(s: Session) -> Found:
     """Take images of all types, as bytes, as numbers and as PNG."""
     raw = s.images(*((0, kind, False, False) for kind in (0, 3, 5, 6)))
     floats = s.images(*((0, kind, True, False) for kind in range(7)))
+    others = s.images(*((camera, 1, True, False) for camera in range(5)))
     encoded = s.images(*((0, kind, False, True) for kind in (0, 3, 5, 6)))
     return {
         "raw": [len(one.image_data_uint8) for one in raw],
         "numbers": [len(one.image_data_float) for one in floats],
+        "cameras": [len(one.image_data_float) for one in others],
         "png": [bytes(one.image_data_uint8[:4]).hex() for one in encoded],
         "kinds": [one.image_type for one in floats],
     }

@@ -132,8 +132,8 @@ class Airframe(Pilot):
         self._before = self.body
         was_flying = self._is_flying
         self._advance(ticks)
-        before, row = self._before.numbers.numpy()[0], self.body.numbers.numpy()[0]
-        if row[THING] != NOTHING and row[TIME] > (before[TICKS] + 0.5) * self.settings.tick:
+        row = self.body.numbers.numpy()[0]
+        if row[THING] != NOTHING and row[TIME] > (row[TICKS] - ticks + 0.5) * self.settings.tick:
             self._note_contact(row.tolist())
         if self._is_flying and not was_flying:
             self.collisions.forget()

@@ -115,8 +115,10 @@ class Stage:
             Names of what it touches, with its position there, and the point nearest to that.
         """
         start = None if before is None else before[None]
-        ways = self.task.touch(self.worlds.state, position[None], start)[0].tolist()
-        found = []
+        contacts = self.task.touch(self.worlds.state, position[None], start)
+        if contacts is None:
+            return []
+        found, ways = [], contacts[0].tolist()
         for index in sorted(range(len(ways)), key=ways.__getitem__):
             if ways[index] < math.inf:
                 there = position if before is None else torch.lerp(before, position, ways[index])

@@ -168,15 +168,18 @@ class CollectCubes(PropTask[WorldState]):
         launch(step_all, self.settings, new, *others)
         return new, reward
 
-    def touch(self, state: WorldState, position: Tensor, before: Tensor | None = None) -> Tensor:
+    def touch(
+        self, state: WorldState, position: Tensor, before: Tensor | None = None
+    ) -> Tensor | None:
         """Collect the cubes that the drones touch, see `Task.touch`."""
         reach = self.settings.touch_distance
         if before is None:
             away = (position[:, None] - state.cubes).abs().amax(-1)
-            contact = torch.where(away <= reach, 1.0, torch.inf)
-        else:
-            contact = first_contact(reach, before, position, state.cubes)
-        contact = torch.where(state.present, contact, torch.inf)
+            if not bool(((away <= reach) & state.present).any()):
+                return None
+            before = position
+        contact = first_contact(reach, before, position, state.cubes)
+        contact = contact.masked_fill(~state.present, torch.inf)
         state.collected |= contact.isfinite()
         return contact
 
