@@ -17,7 +17,7 @@ from tools.airsim_clients import CLIENTS, python_of
 
 ROOT = Path(__file__).resolve().parents[1]
 _NAMES = ("airsim-1.1.7", "airsim-1.2.8", "airsim-1.8.1", "cosysairsim-3.5.0")
-CLIENT_OF = dict(zip(VERSIONS, _NAMES, strict=True))
+CLIENT_OF: dict[str, str] = dict(zip(VERSIONS, _NAMES, strict=True))
 """Installed clients by version."""
 PAIRS = [(name, version) for name, one in PROGRAMS.items() for version in one.clients]
 """Programs, and the versions that have their calls."""
