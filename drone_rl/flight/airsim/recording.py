@@ -1,8 +1,10 @@
 """Recordings: the vehicles' poses and images over time, as AirSim records them."""
 
+import contextlib
 import dataclasses
 import datetime
 import io
+import logging
 import re
 import zlib
 from collections.abc import Callable, Mapping
@@ -17,6 +19,8 @@ from drone_rl.sim.entities import find_camera
 from drone_rl.sim.image_types import ImageType
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Flag, Real, Text, Whole
+
+_log = logging.getLogger(__name__)
 
 _COLUMNS = (
     "VehicleName TimeStamp POS_X POS_Y POS_Z Q_W Q_X Q_Y Q_Z ImageFile".replace(" ", "\t") + "\n"
@@ -134,28 +138,39 @@ class Recording:
         self._next = time + self.choice.interval
         return True
 
-    def images_of(self, name: str, *, is_first: bool) -> list[RecordedImage]:
-        """Return the images to record of a vehicle."""
-        chosen = self.choice.images
-        if chosen is None:
-            return [*_USUAL]
-        return [i for i in chosen if i.vehicle == name or (is_first and i.vehicle is None)]
-
     def write(
+        self,
+        stamp: int,
+        poses: Mapping[str, Pose],
+        render: Callable[[str, RecordedImage], Tensor],
+    ) -> bool:
+        """Write the rows of a time stamp; return whether that works, else close and log why.
+
+        `render` returns an image of the named vehicle: (H, W, 3) uint8, or (H, W) float32.
+        """
+        first = next(iter(poses))
+        try:
+            for name, pose in poses.items():
+                if not self.choice.on_move or self._poses.get(name, _ORIGIN) != pose:
+                    self._poses[name] = pose
+                    chosen = [i for i in self.choice.images or () if name == (i.vehicle or first)]
+                    images = [*_USUAL] if self.choice.images is None else chosen
+                    self._write_row(stamp, name, pose, images, render)
+        except OSError as error:
+            _log.error("the recording ends: it can't be written (%s)", error.strerror)
+            with contextlib.suppress(OSError):
+                self.close()
+            return False
+        return True
+
+    def _write_row(
         self,
         stamp: int,
         name: str,
         pose: Pose,
         images: list[RecordedImage],
-        render: Callable[[RecordedImage], Tensor],
+        render: Callable[[str, RecordedImage], Tensor],
     ) -> None:
-        """Write the row of a vehicle at a time stamp, if it is to be recorded.
-
-        `render` returns an image: (H, W, 3) uint8, or (H, W) float32.
-        """
-        if self.choice.on_move and self._poses.get(name, _ORIGIN) == pose:
-            return
-        self._poses[name] = pose
         letters = to_letters(name)
         if letters != name:  # other names may have the same letters
             letters += f"_{zlib.crc32(name.encode('utf-8', 'replace')):08x}"
@@ -163,7 +178,7 @@ class Recording:
         for image in images:
             ending = "pfm" if image.as_float else "png" if image.compress else "ppm"
             files.append(f"img_{letters}_{image.label}_{image.kind.value}_{stamp}.{ending}")
-            _save(render(image), self.path / "images" / files[-1])
+            _save(render(name, image), self.path / "images" / files[-1])
         values = (*pose.position, *pose.attitude)
         word = re.sub(r"[\s#]", "_", name) or "Vehicle"  # a column of numpy has no spaces
         row: list[Any] = [word, stamp // 1_000_000, *(f"{v:.6g}" for v in values), ";".join(files)]

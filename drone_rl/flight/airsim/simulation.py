@@ -1,8 +1,6 @@
 """The world behind the server: vehicles, scene, simulated time, and calls that wait for it."""
 
-import contextlib
 import dataclasses
-import logging
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -37,8 +35,6 @@ from drone_rl.flight.airsim.stage import Stage
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.flight.commands.state import Attitude
 from drone_rl.utils.errors import InputError, did_you_mean
-
-_log = logging.getLogger(__name__)
 
 CLOCKS = ("wall", "lockstep")
 DATE = "2024-01-01T00:00:00"
@@ -389,22 +385,14 @@ class Simulation:
     def _record(self) -> None:
         if self.recording is None or not self.recording.take_turn(self.time):
             return
-        for name, vehicle in self.vehicles.items():
+        poses = {name: vehicle.pose for name, vehicle in self.vehicles.items()}
+        if not self.recording.write(self.stamp, poses, self._recorded):
+            self.recording = None
 
-            def render(image: RecordedImage, of: Vehicle = vehicle) -> Tensor:
-                camera = self.cameras[of.choice.name][image.camera]
-                (shot,) = self.stage.render(of.body, camera, [image.kind])
-                return self.stage.image(image.kind, shot, as_float=image.as_float)
-
-            images = self.recording.images_of(name, is_first=vehicle is self.find(""))
-            try:
-                self.recording.write(self.stamp, name, vehicle.pose, images, render)
-            except OSError as error:
-                _log.error("the recording ends: it can't be written (%s)", error.strerror)
-                with contextlib.suppress(OSError):
-                    self.stop_recording()
-                self.recording = None
-                return
+    def _recorded(self, name: str, image: RecordedImage) -> Tensor:
+        camera = self.cameras[name][image.camera]
+        (shot,) = self.stage.render(self.vehicles[name].body, camera, [image.kind])
+        return self.stage.image(image.kind, shot, as_float=image.as_float)
 
     def stop_recording(self) -> None:
         """End a recording."""
