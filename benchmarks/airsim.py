@@ -129,11 +129,12 @@ def bench_airsim(folder: Path, quick: bool) -> dict[str, Any]:
     Returns:
         "airsim_images_per_s": simGetImages, raw scene of 144x256, round trips per second of one
         client; "airsim_calls_per_s": simGetVehiclePose likewise; "airsim_lockstep_factor":
-        simulated over real seconds while a drone flies; "airsim_ready_s": from the command to its
-        first connection; "airsim_methods_share": of `asked_for`; "airsim_fuzz_survived": crafted
-        messages after which other clients are served; "airsim_growth_mib": growth of memory over an
-        hour of simulated traffic; "airsim_lockstep_repeats": whether two runs of a script have the
-        same states, byte for byte.
+        simulated over real seconds while a drone flies; "airsim_continue_s": simulated seconds of
+        200 calls of `simContinueForTime` of 0.01 s, and of 0.05 s; "airsim_ready_s": from the
+        command to its first connection; "airsim_methods_share": of `asked_for`;
+        "airsim_fuzz_survived": crafted messages after which other clients are served;
+        "airsim_growth_mib": growth of memory over an hour of simulated traffic;
+        "airsim_lockstep_repeats": whether two runs of a script have the same states, byte for byte.
     """
     share = 0.05 if quick else 1.0
     with served(folder / "posing", "clock=lockstep", settings=_POSING) as (port, _, ready):
@@ -141,6 +142,7 @@ def bench_airsim(folder: Path, quick: bool) -> dict[str, Any]:
         calls = _rate(port, 5 * share, lambda p: p.call("simGetVehiclePose", ""))
     with served(folder / "flying", "clock=lockstep", "scene=empty") as (port, _, _):
         factor = _factor(port, 600 * share)
+        continued = [_continued(port, 200, seconds) for seconds in (0.01, 0.05)]
     states = [_script(folder / f"script_{i}") for i in range(2)]
     with served(folder / "fuzzed", "clock=lockstep", "scene=empty") as (port, _, _):
         survived = fuzz(port, round(100_000 * share))
@@ -151,6 +153,7 @@ def bench_airsim(folder: Path, quick: bool) -> dict[str, Any]:
         "airsim_images_per_s": images,
         "airsim_calls_per_s": calls,
         "airsim_lockstep_factor": factor,
+        "airsim_continue_s": continued,
         "airsim_ready_s": ready,
         "airsim_methods_share": len(known & METHODS.keys()) / len(known),
         "airsim_fuzz_survived": survived,
@@ -194,6 +197,19 @@ def _factor(port: int, seconds: float) -> float:
     passed = (peer.call("timestampNow") - start) / 1e9
     peer.close()
     return passed / (time.perf_counter() - begin)
+
+
+def _continued(port: int, count: int, seconds: float) -> float:
+    """Return the simulated seconds of calls of `simContinueForTime`."""
+    peer = Peer(port)
+    peer.call("simPause", True)
+    start = peer.call("timestampNow")
+    for _ in range(count):
+        peer.call("simContinueForTime", seconds)
+    passed = (peer.call("timestampNow") - start) / 1e9
+    peer.call("simPause", False)
+    peer.close()
+    return passed
 
 
 def _script(folder: Path) -> bytes:

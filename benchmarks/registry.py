@@ -5,6 +5,8 @@ from typing import Any
 
 from benchmarks.accessibility import bench_accessibility
 from benchmarks.airsim import bench_airsim
+from benchmarks.airsim_chapter import bench_airsim_chapter
+from benchmarks.airsim_scripts import bench_scripts
 from benchmarks.benchmark import Benchmark, Setup
 from benchmarks.chapter import bench_chapter
 from benchmarks.coverage import bench_coverage
@@ -283,9 +285,19 @@ BENCHMARKS: dict[str, Benchmark] = {
         (*_RENDERING, "flight", "policies", "explanations/fly_page", "benchmarks/fly_page"),
     ),
     "airsim": Benchmark(
-        lambda s: bench_airsim(s.runs / "airsim", s.quick),
+        lambda s: {
+            **bench_airsim(s.runs / "airsim", s.quick),
+            **bench_scripts(s.runs / "airsim_scripts"),
+            **bench_airsim_chapter(s.runs / "airsim_chapter", s.quick),
+        },
         "flight",
-        (*_RENDERING, "flight", "benchmarks/airsim"),
+        (
+            *_RENDERING,
+            "flight",
+            "benchmarks/airsim",
+            "benchmarks/airsim_chapter",
+            "benchmarks/airsim_programs",
+        ),
     ),
     "startup": Benchmark(
         lambda s: bench_startup(s.runs / "startup", s.device, s.quick),

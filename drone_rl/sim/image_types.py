@@ -42,9 +42,12 @@ def palette() -> Tensor:
 
 
 def segmentation_ids(scene: Scene) -> Tensor:
-    """Return AirSim's ids of geoms, by their classes' names. Shape: (num_geoms,), int64."""
+    """Return AirSim's ids of geoms, by their classes' names, and of the sky, which has index -1.
+
+    Shape: (num_geoms + 1,), int64.
+    """
     names = [semantic_class.name.lower() for semantic_class in scene.semantic_classes]
-    return torch.tensor([(5 + sum(map(ord, name))) % NUM_IDS for name in names])
+    return torch.tensor([*((5 + sum(map(ord, name))) % NUM_IDS for name in names), 0])
 
 
 FARTHEST = 65504.0
@@ -167,7 +170,7 @@ def pixels(
     """Convert a rendered image of the type's modality, see `Renderer.render`, to an image type.
 
     `focal` is the focal length in pixels, for disparity. `ids` are the segmentation ids of the
-    geoms, (num_geoms,), by default their indices.
+    geoms and, last, of the sky, (num_geoms + 1,), by default the geoms' indices and 0.
 
     Returns:
         As numbers, float32, shape (*, H, W): metres of depth, at most `FARTHEST`, also where
@@ -180,8 +183,8 @@ def pixels(
         return _color(values, as_float)
     if image_type is ImageType.SEGMENTATION:
         geoms = values.long()
-        known = geoms if ids is None else ids.to(geoms.device)[geoms.clamp(min=0)]
-        colors = palette().to(geoms.device)[torch.where(geoms < 0, 0, known)]
+        known = geoms.clamp(min=0) if ids is None else ids.to(geoms.device)[geoms]
+        colors = palette().to(geoms.device)[known]
         return _color(colors, as_float)
     if image_type is ImageType.SURFACE_NORMALS:
         is_hit = (values != 0).any(-1, keepdim=True)

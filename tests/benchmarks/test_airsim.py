@@ -27,6 +27,7 @@ def test_survived_messages_are_counted():
     with serve(scene="empty", port=0, clock="lockstep") as server:
         assert airsim.fuzz(server.address[1], 300) == 300
         assert airsim._rate(server.address[1], 0.1, lambda p: p.call("ping")) > 10
+        assert airsim._continued(server.address[1], 10, 0.01) == pytest.approx(0.1, abs=0.003)
 
 
 def test_a_server_that_stops_answering_is_noticed():

@@ -22,7 +22,7 @@ def test_ids_follow_from_names():
     """G, r, o, u, n, d: 103 + 114 + 111 + 117 + 110 + 100 = 655; 660 - 512 = 148."""
     scene = Worlds(1).scene
     ids = segmentation_ids(scene)
-    assert len(ids) == scene.model.ngeom
+    assert len(ids) == scene.model.ngeom + 1 and ids[-1] == 0  # of the sky
     grounds = scene.geoms(SemanticClass.GROUND)
     assert ids[grounds].tolist() == [148] * len(grounds)
     assert len(set(ids[scene.geoms(SemanticClass.TARGET)].tolist())) == 1

@@ -50,6 +50,17 @@ FLIGHT = (
         "95%; 100,000; 5; yes",
     ),
     Row(
+        "airsim",
+        "the chapter's program for AirSim 1.1: mean cubes of 3 over 20 resets, collected by an "
+        "oracle that sees images only, with the default clock, in lockstep, in computer-vision "
+        "mode; trained through the client: success rate, lower end of the 95% CI; minutes",
+        lambda f: (
+            f"{', '.join(f'{cubes:.2f}' for cubes in f['airsim_chapter_cubes'])}; "
+            f"{percent(f['airsim_chapter_lower95'])}; {f['airsim_chapter_minutes']:.0f}"
+        ),
+        "2.9 each; 90%; 20",
+    ),
+    Row(
         "flight_speed",
         "environment steps per second of 256 drones (33 physics steps with all controllers each); "
         "ratio to MuJoCo Warp with the same body and no controller",

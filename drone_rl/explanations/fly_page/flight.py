@@ -5,7 +5,7 @@ import logging
 import math
 import struct
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from drone_rl.explanations.fly_page.saliency import LiveSaliency
 from drone_rl.explanations.fly_page.world import Seen, World
 from drone_rl.flight.commands.state import Attitude
 from drone_rl.policies.policy import Policy
+from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.image_types import encode
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
@@ -49,8 +50,7 @@ _LOOK_PERIOD = 0.1
 """Seconds between two observations while a person moves freely."""
 _SIZE = 1.0
 """Edge of objects on the map if the task does not state it, metres."""
-_QUALITY = 85
-"""Of JPEG images."""
+JPEG_QUALITY = 85
 _log = logging.getLogger(__name__)
 _LONGEST = 0.1
 """Most seconds that pass at once; a slow machine falls behind instead."""
@@ -257,27 +257,16 @@ class Flight:
         }
 
     def frame(self) -> bytes:
-        """Return the present state and images.
-
-        A little-endian uint32 is the length of the JSON text that follows; then come the images
-        that its "images" lists by name, type and size.
-        """
+        """Return the present state and images; see `packed`."""
         images = [
             ("view", "image/jpeg", self._view()),
             ("observation", "image/png", self._observed()),
         ]
         self._number += 1
-        state = {
-            "frame": self._number,
-            **self._state(),
-            "images": [{"name": n, "type": t, "size": len(data)} for n, t, data in images],
-        }
-        text = json.dumps(state, allow_nan=False, separators=(",", ":")).encode()
-        return b"".join([struct.pack("<I", len(text)), text, *(data for *_, data in images)])
+        return packed({"frame": self._number, **self._state()}, images)
 
     def _state(self) -> dict[str, Any]:
-        world, body = self.world, self.world.body
-        attitude = Attitude.of(body.attitude[0].tolist())
+        world = self.world
         seen, goals = self._look(), world.goals
         speed, direction = world.wind
         return {
@@ -286,9 +275,7 @@ class Flight:
             "pilot": self.pilot,
             "mode": self.mode,
             "camera": self.camera,
-            "position": _rounded(body.position[0].tolist()),
-            "attitude": _rounded((attitude.roll, attitude.pitch, attitude.yaw)),
-            "velocity": round(float(body.velocity[0].norm()), 2),
+            **pose_of(world.body),
             "objects": [None if place is None else _rounded(place) for place in world.objects],
             "goals": goals,
             "reward": round(world.reward, 3),
@@ -328,7 +315,7 @@ class Flight:
     def _view(self) -> bytes:
         def draw() -> bytes:
             picture = Image.fromarray(self.world.render(self.camera).numpy())
-            return encode(picture, "jpeg", quality=_QUALITY)
+            return encode(picture, "jpeg", quality=JPEG_QUALITY)
 
         return self._kept("view", (self.world.version, self.camera), draw)
 
@@ -352,6 +339,28 @@ class Flight:
         if known is None or known[0] != key:
             self._images[name] = known = (key, draw())
         return known[1]
+
+
+def packed(state: Mapping[str, Any], images: Sequence[tuple[str, str, bytes]]) -> bytes:
+    """Return a frame for browsers, of a state and images: names, media types and contents.
+
+    A little-endian uint32 is the length of the JSON text that follows; then come the images that
+    its "images" lists by name, type and size.
+    """
+    listed = [{"name": n, "type": t, "size": len(data)} for n, t, data in images]
+    whole = {**state, "images": listed}
+    text = json.dumps(whole, allow_nan=False, separators=(",", ":")).encode()
+    return b"".join([struct.pack("<I", len(text)), text, *(data for *_, data in images)])
+
+
+def pose_of(body: BodyState) -> dict[str, Any]:
+    """Return the position, attitude in degrees and speed of a single drone, for browsers."""
+    attitude = Attitude.of(body.attitude[0].tolist())
+    return {
+        "position": _rounded(body.position[0].tolist()),
+        "attitude": _rounded((attitude.roll, attitude.pitch, attitude.yaw)),
+        "velocity": round(float(body.velocity[0].norm()), 2),
+    }
 
 
 def _rounded(values: Any) -> list[float]:

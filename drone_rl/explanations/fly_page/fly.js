@@ -109,6 +109,12 @@ function take(next) {
 const shownOf = s => [s.pilot, s.mode, s.camera, s.end, s.goals, s.recording, s.saliency, s.settings, s.note];
 
 function describe() {
+  if (hello.watch) {
+    $("camera").value = state.camera;
+    set("flyer", `A program flies ${state.vehicle}`);
+    set("note", state.note);
+    return;
+  }
   const s = state, isPerson = s.pilot === "person", c = words(s);
   $("person").setAttribute("aria-pressed", isPerson);
   $("policy").setAttribute("aria-pressed", !isPerson);
@@ -198,7 +204,7 @@ const byKey = {};
 for (const [name, [, , keys]] of Object.entries(CONTROLS)) for (const key of keys) byKey[key] = name;
 
 $("deck").addEventListener("keydown", event => {
-  if (event.ctrlKey || event.altKey || event.metaKey || !hello) return;
+  if (event.ctrlKey || event.altKey || event.metaKey || !hello || hello.watch) return;
   const key = keyOf(event);
   if (byKey[key]) {
     event.preventDefault();
@@ -238,6 +244,13 @@ $("saliency").addEventListener("change", () => send({ type: "saliency", on: $("s
 
 function begin() {
   state = null; // the next frame updates what is built here, also after a lost connection
+  set("legend", `Seen from above, ahead is up. Triangle: drone. Line: trail. Squares: ${hello.object}s, dashed where one has gone.`);
+  if (hello.watch) {
+    document.body.classList.add("watching");
+    set("title", document.title = "Watch a program fly");
+    set("task", `AirSim's server: ${hello.watch}.`);
+    return;
+  }
   set("name", hello.policy);
   set("task", `Task: ${hello.task.replaceAll("_", " ")}. The policy's actions: ${hello.actions.join(", ")}.`);
   buildPad();
@@ -245,7 +258,6 @@ function begin() {
   buildKeys();
   buildBars();
   document.querySelector("details").open = matchMedia("(min-width: 34rem)").matches;
-  set("legend", `Seen from above, ahead is up. Triangle: drone. Line: trail. Squares: ${hello.object}s, dashed where one has gone.`);
   $("deck").focus({ preventScroll: true });
   hint();
 }
@@ -514,7 +526,8 @@ function drawHorizon() {
 
 function drawNumbers() {
   const [roll, pitch, yaw] = state.attitude.map(angle => `${Math.round(angle)}°`);
-  const rows = { roll, pitch, yaw, height: `${state.position[2].toFixed(1)} m`, speed: `${state.velocity.toFixed(1)} m/s`, steps: state.steps };
+  const rows = { roll, pitch, yaw, height: `${state.position[2].toFixed(1)} m`, speed: `${state.velocity.toFixed(1)} m/s` };
+  if (hello.watch) rows.time = `${state.time.toFixed(2)} s`; else rows.steps = state.steps;
   const list = $("numbers");
   if (!list.children.length) for (const name of Object.keys(rows)) { element("dt", list, name); element("dd", list); }
   Object.values(rows).forEach((value, i) => { list.children[2 * i + 1].textContent = value; });
@@ -552,12 +565,12 @@ function loop(now) {
     fresh.clear();
     if (drawn !== state && now - drawnAt >= CHARTS_MS) {
       [drawn, drawnAt] = [state, now];
-      drawBars();
+      if (!hello.watch) drawBars();
       drawMap();
       drawHorizon();
       drawNumbers();
     }
-    readGamepad(now);
+    if (!hello.watch) readGamepad(now);
   }
   for (; pendingAcks > 0; pendingAcks -= 1) send({ type: "ack" });
   requestAnimationFrame(loop);

@@ -16,7 +16,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 from drone_rl.config.commands import FlySettings
 from drone_rl.config.configuration import from_arguments
@@ -129,15 +129,45 @@ class _Page:
                 await self._changed.wait()
 
 
+class Shown(Protocol):
+    """What a page shows; see `Flight`."""
+
+    def hello(self) -> dict[str, Any]:
+        """Return what does not change."""
+        ...
+
+    def frame(self) -> bytes:
+        """Return the present state and images; nothing if there are no new ones."""
+        ...
+
+    def handle(self, message: Any) -> None:
+        """Do what a browser's message says."""
+        ...
+
+    def release(self) -> None:
+        """Let go of all controls."""
+        ...
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass."""
+        ...
+
+    def close(self) -> None:
+        """End it."""
+        ...
+
+
 class FlyPage:
     """A page in threads of this process; a context manager that closes it."""
 
-    def __init__(self, policy: Policy, settings: FlySettings, demonstrations: Path) -> None:
-        """Start the simulation and the server; see `fly`."""
+    def __init__(
+        self, make: Callable[[], Shown], *, port: int = 0, frames_per_second: int = 40
+    ) -> None:
+        """Start the server and a thread that lets what `make` returns pass; see `fly`."""
         uvicorn = extra("uvicorn", "fly", _ASKED_BY)
         extra("websockets", "fly", _ASKED_BY)
-        self._settings = settings
-        self._socket = _listen(settings.port)
+        self._asked_port, self._period = port, 1.0 / frames_per_second
+        self._socket = _listen(port)
         self._token = secrets.token_urlsafe(24)
         port = self._socket.getsockname()[1]
         self.url = f"http://{ADDRESS}:{port}/{self._token}/"
@@ -153,7 +183,7 @@ class FlyPage:
         self._is_stopping = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         try:
-            self._flight = Flight(policy, settings, demonstrations)
+            self._flight = make()
         except BaseException:
             self._socket.close()
             raise
@@ -204,9 +234,7 @@ class FlyPage:
         while not self._server.started:
             if time.monotonic() > until or not self._threads[0].is_alive():
                 self.close()
-                raise InputError(
-                    f"port={self._settings.port}: the server did not start; try port=0"
-                )
+                raise InputError(f"port={self._asked_port}: the server did not start; try port=0")
             time.sleep(0.01)
 
     # The server's thread
@@ -289,14 +317,15 @@ class FlyPage:
             self._server.should_exit = True
 
     def _run(self) -> None:
-        period, before = 1.0 / self._settings.frames_per_second, time.monotonic()
+        period, before = self._period, time.monotonic()
         due = before
         while not self._is_stopping.is_set():
             now = time.monotonic()
             self._handle_messages()
             if self._pages:
                 self._flight.advance(now - before)
-                self._offer(self._flight.frame())
+                if frame := self._flight.frame():
+                    self._offer(frame)
             before, due = now, max(due + period, time.monotonic() - period)
             self._is_stopping.wait(max(0.0, due - time.monotonic()))
 
@@ -372,4 +401,8 @@ def fly(
     settings = from_arguments(FlySettings, settings, changes, fly)
     found = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     folder = settings.demonstrations or as_path(outputs, "outputs") / "demonstrations"
-    return FlyPage(found, settings, Path(folder))
+    return FlyPage(
+        lambda: Flight(found, settings, Path(folder)),
+        port=settings.port,
+        frames_per_second=settings.frames_per_second,
+    )

@@ -3,7 +3,7 @@
 import copy
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import torch
@@ -12,6 +12,7 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.config.sensors import SensorSettings
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.cameras import CameraState
+from drone_rl.flight.airsim.collisions import Collision, CollisionRecord, Solids, collision_info
 from drone_rl.flight.airsim.messages import Map, Pose, nanoseconds, ned, to_world
 from drone_rl.flight.airsim.sensors import read_sensor
 from drone_rl.flight.airsim.settings_file import POSING, Offset, VehicleChoice
@@ -21,24 +22,28 @@ from drone_rl.sim.coordinates import GeoPoint, geo_from_world, world_from_geo
 from drone_rl.sim.dynamics import FlightState, Obstacles, SingleQuadrotor
 from drone_rl.sim.dynamics.state import (
     ATTITUDE,
+    DEPTH,
     GROUND,
+    NORMAL,
     NOTHING,
+    POINT,
     POSITION,
     RATES,
+    THING,
     TICKS,
+    TIME,
     VELOCITY,
     BodyState,
 )
 from drone_rl.sim.rendering.appearance import rotate
 from drone_rl.sim.worlds import Worlds
-from drone_rl.utils.errors import InputError
 
 RECENT = 16
 """Control periods that sensors look back, a third of a second: longer than any latency."""
-_SWEEP = 0.05
-"""Metres between two tests for contact along a straight move."""
-_LONGEST_SWEEP = 2000.0
-"""Metres of such a move: its tests take memory."""
+_EARTH = 1e6
+"""Half the height of the box that is the ground, metres."""
+_STANDS = 0.01
+"""Metres above the ground up to which a vehicle stands on it."""
 _FASTEST = 668.0
 """Speed of a rotor at full thrust, radians per second."""
 
@@ -58,6 +63,7 @@ class Airframe(Pilot):
         *,
         obstacles: Obstacles | None = None,
         names: Sequence[str] = (),
+        object_id: Callable[[str], int] = lambda name: -1,
         home: GeoPoint,
         height: float = 0.0,
         seed: int = 0,
@@ -70,19 +76,23 @@ class Airframe(Pilot):
             worlds: A single world that the cameras render; None for nothing to see.
             obstacles: What it can touch; by default the objects of `worlds`, where they stand.
             names: Names of the obstacles.
+            object_id: Returns the segmentation id of an object by its name.
             home: Place on Earth of the world's origin.
-            height: Metres by which a vehicle without dynamics starts above its start pose.
+            height: Height in metres at which a vehicle without dynamics starts if its start pose
+                is not above the ground.
             seed: Of gusts and sensor noise.
         """
         self.choice, self.geo_home, self.names = choice, home, tuple(names)
-        self._home = [0.0, 0.0, 0.0]
+        self._object_id = object_id
         start = _known(choice.start)
         x, y, up = to_world((start.x, start.y, start.z))
         posed = choice.kind == POSING
+        if up < dynamics.radius:
+            up = height if posed else dynamics.radius
         super().__init__(
             SingleQuadrotor(dynamics),
             mode="computer_vision" if posed else "simple_flight",
-            start=(x, y, up + height) if posed else (x, y),
+            start=(x, y, up) if posed else (x, y),
             yaw=start.yaw,
             seed=seed,
             obstacles=obstacles,
@@ -90,20 +100,22 @@ class Airframe(Pilot):
             sensors=None,
         )
         if posed and (start.roll or start.pitch):
-            self.set_pose((x, y, up + height), roll=start.roll, pitch=start.pitch, yaw=start.yaw)
-            self.home = self.body.position[0].clone()
+            self.set_pose((x, y, up), roll=start.roll, pitch=start.pitch, yaw=start.yaw)
+        self.body = self.body.moved(self.body.position.new_tensor([[x, y, up]]))
+        self.home = self.body.position[0].clone()
         self._home = self.home.tolist()
         self._initial = (copy.deepcopy(self.body), None, None)  # the scene resets itself
-        self.epoch = 0.0
-        """Simulated seconds of the server when the vehicle was created or last reset."""
+        self.epoch = 0
+        """Time stamp of the vehicle's time 0: of its creation or last reset."""
         self.begin()
 
     def begin(self) -> None:
         """Take the state in which AirSim creates and resets vehicles."""
         self.has_api_control = self.choice.has_api_control
-        self._read_contact = -1.0
+        self.collisions = CollisionRecord()
         self._before = self.body
         self._is_armed = self.choice.is_armed and not self.is_computer_vision
+        self._hover()
         self._unseen: deque[tuple[FlightState, float]] = deque()
         """States that the sensors have not been updated to, and their seconds."""
         self.trajectory = Trajectory(1)  # a server runs for days
@@ -118,7 +130,29 @@ class Airframe(Pilot):
     def run(self, ticks: int) -> None:
         """Advance simulated time by physics ticks."""
         self._before = self.body
+        was_flying = self._is_flying
         self._advance(ticks)
+        row = self.body.numbers.numpy()[0]
+        if row[THING] != NOTHING and row[TIME] > (row[TICKS] - ticks + 0.5) * self.settings.tick:
+            self._note_contact(row.tolist())
+        if self._is_flying and not was_flying:
+            self.collisions.forget()
+
+    def _note_contact(self, row: Sequence[float]) -> None:
+        """Note the last contact of the dynamics; `row` is from `FlightState.numbers`."""
+        thing = int(row[THING])
+        name = "Ground" if thing == GROUND else self.names[thing]
+        normal, point = row[NORMAL : NORMAL + 3], row[POINT : POINT + 3]
+        place = [p + self.settings.radius * n for p, n in zip(point, normal, strict=True)]
+        self.collisions.add(Collision(name, place, point, normal, row[DEPTH], row[TIME]))
+
+    def _hover(self) -> None:
+        """Let an armed vehicle that was put into the air fly: it holds its place there."""
+        height = float(self.body.position[0, 2]) - self.settings.radius
+        if self._is_armed and not self._is_flying and height > _STANDS:
+            self._settle()
+            self._landed = LandedState.FLYING
+            self.collisions.forget()
 
     @property
     def sensors(self) -> Sensors:
@@ -154,6 +188,11 @@ class Airframe(Pilot):
         """Ticks of one control period."""
         return self._period
 
+    @property
+    def left(self) -> int:
+        """Ticks to the end of the present control period."""
+        return self._left or self._period
+
     # Frames
 
     def _world(self, position: Sequence[float]) -> tuple[float, float, float]:
@@ -179,7 +218,7 @@ class Airframe(Pilot):
     # State
 
     def kinematics(self) -> Map:
-        """Return a KinematicsState; accelerations are means of the last control period."""
+        """Return a KinematicsState; accelerations are means of the last step."""
         now, before = self.body.numbers[0].tolist(), self._before.numbers[0].tolist()
         seconds = (now[TICKS] - before[TICKS]) * self.settings.tick
         rate, pose = 1.0 / seconds if seconds > 0 else 0.0, self.pose
@@ -199,7 +238,7 @@ class Airframe(Pilot):
 
     def _stamp(self, seconds: float) -> int:
         """Return the time stamp of a time of this vehicle."""
-        return nanoseconds(self.epoch + seconds)
+        return self.epoch + nanoseconds(seconds)
 
     def rotor_states(self) -> Map:
         """Return RotorStates: thrust in newtons; speed in radians per second."""
@@ -269,33 +308,20 @@ class Airframe(Pilot):
             },
         }
 
-    def collision(self, *, read: bool = True) -> Map:
-        """Return a CollisionInfo; `read` clears `has_collided` until the next contact."""
-        contact = self.body.contact
-        thing, time = int(contact.thing[0]), float(contact.time[0])
-        touched = thing != NOTHING
-        is_new = touched and time > self._read_contact
-        if read and touched:
-            self._read_contact = time
-        if not touched:
-            name, number = "", -1
-        elif thing == GROUND:
-            name, number = "Ground", 0
-        else:
-            name = self.names[thing] if thing < len(self.names) else f"obstacle_{thing}"
-            number = thing + 1
-        nothing = (0.0, 0.0, 0.0)
-        place = contact.point + self.settings.radius * contact.normal - self.home  # at the contact
-        return {
-            "has_collided": is_new,
-            "penetration_depth": float(contact.depth[0]) if touched else 0.0,
-            "time_stamp": self._stamp(time) if touched else 0,
-            "normal": messages.vector(ned(contact.normal) if touched else nothing),
-            "impact_point": messages.vector(ned(contact.point - self.home) if touched else nothing),
-            "position": messages.vector(ned(place) if touched else nothing),
-            "object_name": name,
-            "object_id": number,
-        }
+    def collision(self, *, read: bool = True, is_legacy: bool = False) -> Map:
+        """Return a CollisionInfo; `read` clears `has_collided` until the next collision.
+
+        With `is_legacy` it is that of AirSim 1.1, see `CollisionRecord.read_current`.
+        """
+        record = self.collisions
+        found, is_new = record.read_current(self.time) if is_legacy else record.read(clear=read)
+        return collision_info(
+            found,
+            has_collided=is_new,
+            home=self._home,
+            time_stamp=self._stamp(found.time) if found else 0,
+            number=self._object_id(found.name) if found else -1,
+        )
 
     def sensor(self, kind: str) -> Map:
         """Return ImuData, BarometerData, MagnetometerData or GpsData."""
@@ -308,11 +334,13 @@ class Airframe(Pilot):
         self.body.numbers[0, RATES : RATES + 3] = torch.tensor(to_world(rates))
         self._before = self.body  # the jump is no acceleration
 
-    def set_airsim_pose(self, pose: Pose, *, ignore_collision: bool) -> None:
+    def set_airsim_pose(
+        self, pose: Pose, *, ignore_collision: bool, others: Iterable["Airframe"] = ()
+    ) -> None:
         """Put it somewhere at once; NaN components stay. Velocities are kept.
 
-        Without `ignore_collision` it stops before the first obstacle on the straight line there;
-        an `InputError` if that is too far.
+        Without `ignore_collision` it collides with the first obstacle on the straight line there,
+        one of the `others` included, and stops before it; an `InputError` if that is too far.
         """
         now = self.pose
         place = [
@@ -320,34 +348,49 @@ class Airframe(Pilot):
         ]
         turn = pose.attitude if not any(map(math.isnan, pose.attitude)) else now.attitude
         there = self.home + torch.tensor(to_world(place), dtype=torch.float64)
+        hit = None
         if not ignore_collision:
-            there = self._sweep(there)
+            solids, here = self._solids(others), self.body.position[0]
+            there, hit = solids.sweep(here, there, self.settings.radius)
         self.body = self.body.moved(there[None], messages.attitude_to_world(turn))
         self._place, self._coasting = None, 0
         self.trajectory.append(self.time, self.body)
+        self.collisions.part()
+        self._hover()
+        if hit is not None:
+            self.collide(hit[0], there, hit[1])
 
-    def _sweep(self, there: torch.Tensor) -> torch.Tensor:
-        """Return the last position on the line to another one that touches nothing. Shape: (3,)."""
-        here = self.body.position[0]
-        distance = float((there - here).norm())
-        if distance > _LONGEST_SWEEP:
-            raise InputError(
-                f"the pose is {distance:.6g} m away; give ignore_collision=True, or at most "
-                f"{_LONGEST_SWEEP:g} m"
-            )
-        steps = max(1, math.ceil(distance / _SWEEP))
+    def collide(self, name: str, position: torch.Tensor, point: torch.Tensor) -> None:
+        """Note a collision, at a position, with the nearest point of an object. Shapes: (3,)."""
         radius = self.settings.radius
-        ways = torch.linspace(0.0, 1.0, steps + 1, dtype=torch.float64)[:, None]
-        places = here + ways * (there - here)
-        free = places[:, 2] >= min(radius, float(here[2])) - 1e-9
-        around = self._around
-        if around is not None:
-            half = places.new_tensor(around.half_sizes)
-            apart = (places[:, None] - around.centers[0]).abs() - half
-            inside = apart.clamp(min=0.0).norm(dim=-1) < radius
-            free &= ~inside.any(-1)
-        free[0] = True
-        return places[int(free.long().cumprod(0).sum()) - 1]
+        self.collisions.add(Collision.event(name, position, point, radius, self.time))
+
+    def bump(self, other: "Airframe") -> None:
+        """Let it and another vehicle of the same mass, which overlap, bounce off each other."""
+        apart = self.body.position[0] - other.body.position[0]
+        distance = float(apart.norm())
+        normal = apart / distance if distance > 0.0 else apart.new_tensor((0.0, 1.0, 0.0))
+        into = float((other.body.velocity[0] - self.body.velocity[0]) @ normal)
+        push = 0.5 * (1.0 + self.settings.restitution) * max(0.0, into)
+        point = 0.5 * (self.body.position[0] + other.body.position[0])
+        depth = 2.0 * self.settings.radius - distance
+        for one, met, way in ((self, other, normal), (other, self, -normal)):
+            contact = (one.body.position[0].tolist(), point.tolist(), way.tolist())
+            one.collisions.add(Collision(met.choice.name, *contact, depth, one.time))
+            one.body.position[0] += 0.5 * depth * way
+            one.body.velocity[0] += push * way
+
+    def _solids(self, others: Iterable["Airframe"]) -> Solids:
+        """Return what stops a teleport: the scene's obstacles, other vehicles and the ground."""
+        rows = [("Ground", [0.0, 0.0, -_EARTH], (math.inf, math.inf, _EARTH), 0.0)]
+        if self._around is not None:
+            centers, half = self._around.centers[0].tolist(), self._around.half_sizes
+            rows += [(name, at, half, 0.0) for name, at in zip(self.names, centers, strict=False)]
+        for other in others:
+            at, radius = other.body.position[0].tolist(), other.settings.radius
+            rows.append((other.choice.name, at, (0.0, 0.0, 0.0), radius))
+        names, *parts = zip(*rows, strict=True)
+        return Solids(names, *(torch.tensor(part, dtype=torch.float64) for part in parts))
 
 
 def _known(offset: Offset) -> Offset:

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import msgpack
 
 from drone_rl.flight.airsim import methods
+from drone_rl.flight.airsim.calls import Calls, remark
 from drone_rl.flight.airsim.methods import UnknownMethodError
 from drone_rl.flight.airsim.simulation import Simulation, Wait
 from drone_rl.utils.errors import InputError
@@ -67,6 +68,7 @@ class Connection(asyncio.Protocol):
         self._unpacker = _unpacker()
         self._transport: Any = None
         self._name = "client"
+        self._calls = Calls()
         self._pending = 0
         self._is_full = False
         """Whether the client leaves too many replies unread."""
@@ -100,7 +102,7 @@ class Connection(asyncio.Protocol):
             self._server.simulation.forget(reply)
         self._replies.clear()
         self._server.dismiss(self)
-        _log.info("%s has gone", self._name)
+        _log.info("%s has gone after %s", self._name, self._calls)
 
     def pause_writing(self) -> None:
         """See `asyncio.Protocol`: the client doesn't read its replies."""
@@ -180,6 +182,10 @@ class Connection(asyncio.Protocol):
             self._break("a request has no name or no list of arguments")
             return
         label = label[:_MOST_SHOWN]  # all names of methods are shorter
+        with self._calls.call(self._name, label):
+            self._compute(number, label, args)
+
+    def _compute(self, number: int | None, label: str, args: Any) -> None:
         try:
             if self._pending >= MAX_PENDING:
                 raise InputError(f"{MAX_PENDING} calls of this client wait; join some first")
@@ -190,20 +196,25 @@ class Connection(asyncio.Protocol):
                 self._answer(number, None, result)
         except UnknownMethodError:
             hint = methods.suggestion(label)
-            self._fail(
+            remark(f"unknown{hint}")
+            self._answer(
                 number,
                 f"rpclib: server could not find function '{label}' with argument count "
                 f"{len(args)}.{hint}",
+                None,
             )
         except InputError as error:
-            self._fail(
+            remark(str(error))
+            self._answer(
                 number,
                 f"rpclib: function '{label}' (called with {len(args)} arg(s)) threw an exception. "
                 f"The exception contained this information: {error}.",
+                None,
             )
         except Exception as error:
             _log.exception("%s: %s failed", self._name, label)
-            self._fail(number, f"rpclib: function '{label}' failed: {type(error).__name__}.")
+            reason = type(error).__name__
+            self._answer(number, f"rpclib: function '{label}' failed: {reason}.", None)
 
     def _wait(self, number: int | None, wait: Wait) -> None:
         self._pending += 1
@@ -216,10 +227,6 @@ class Connection(asyncio.Protocol):
         self._replies[reply] = number
         self.is_pilot = True
         self._server.simulation.wait_for(wait, reply)
-
-    def _fail(self, number: int | None, message: str) -> None:
-        _log.warning("%s: %s", self._name, message)
-        self._answer(number, message, None)
 
     def _answer(self, number: int | None, error: str | None, result: Any) -> None:
         if number is not None and self.is_open:

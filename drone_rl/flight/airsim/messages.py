@@ -1,5 +1,6 @@
 """Values on the wire: maps with AirSim's keys, in NED, from and to the simulator's tensors."""
 
+import datetime
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -7,6 +8,7 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
+from drone_rl.flight.airsim.calls import remark
 from drone_rl.flight.commands.checks import FARTHEST
 from drone_rl.flight.commands.path_following import Drivetrain, YawMode
 from drone_rl.sim.coordinates import GeoPoint, ned_attitude_from_world, ned_from_world
@@ -21,6 +23,8 @@ MAX_NAME = 50
 """Most letters of a new name."""
 MAX_PATTERN = 200
 """Most letters of a regular expression."""
+MOST_TURN = 3600.0
+"""Greatest yaw rate, degrees per second."""
 _LARGEST = 3.5e38
 """Above all finite float32, such as AirSim's default timeout of 3e38."""
 
@@ -71,6 +75,23 @@ def nanoseconds(seconds: float) -> int:
     return max(0, round(seconds * NANOSECONDS))
 
 
+def read_date(text: str) -> int:
+    """Return the nanoseconds from 1970 to a date and time, ISO 8601, by default UTC.
+
+    Raises an `InputError` if it is none, or before 1970.
+    """
+    try:
+        found = datetime.datetime.fromisoformat(text)
+    except ValueError as error:
+        raise InputError(
+            f"date={shown(text)} is no date and time; give YYYY-MM-DDTHH:MM:SS"
+        ) from error
+    seconds = (found if found.tzinfo else found.replace(tzinfo=datetime.UTC)).timestamp()
+    if seconds < 0.0:
+        raise InputError(f"date={shown(text)} is before 1970; give a later one")
+    return nanoseconds(seconds)
+
+
 def ned(values: Tensor) -> list[float]:
     """Convert a vector of our world, or of our body's frame, to NED or FRD. Shape: (1, 3)."""
     return ned_from_world(values[0].double()).tolist()
@@ -103,19 +124,20 @@ def attitude_to_world(values: Sequence[float]) -> Tensor:
 
 
 def number(value: Any, name: str, low: float = -_LARGEST, high: float = _LARGEST) -> float:
-    """Return a finite number from `low` to `high`, else raise an `InputError`."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    """Return a number, limited to `low` and `high` with a remark; an `InputError` if it is none."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
         raise InputError(f"{name}={shown(value)} is not a number; give one")
-    if not low <= value <= high:
-        raise InputError(f"{name}={value} is out of range; give {low:g} to {high:g}")
-    return float(value)
+    limited = min(max(value, low), high)
+    if limited != value:
+        remark(f"{name} is limited to {limited:g}")
+    return float(limited)
 
 
 def whole(value: Any, name: str, low: int, high: int) -> int:
     """Return a whole number from `low` to `high`, else raise an `InputError`."""
-    found = number(value, name, low, high)
-    if found != int(found):
-        raise InputError(f"{name}={value} is not a whole number; give {low} to {high}")
+    found = number(value, name)
+    if not low <= found <= high or found != int(found):
+        raise InputError(f"{name}={shown(value)} is out of range; give {low} to {high}")
     return int(found)
 
 
@@ -147,8 +169,8 @@ def read_map(
 ) -> list[float]:
     """Return the numbers of a map, in the order of `keys`; other keys are ignored.
 
-    Raises an `InputError` if it is no map, or a value is missing or no number of at most `most` in
-    magnitude; NaN is accepted if `can_be_nan`.
+    Numbers are limited to `most` in magnitude. Raises an `InputError` if it is no map, or a value
+    is missing or no number; NaN is accepted if `can_be_nan`.
     """
     if not isinstance(value, Mapping):
         raise InputError(f"{name}={shown(value)} is not a map; give {', '.join(keys)}")
@@ -173,7 +195,7 @@ def read_vector(
 def read_pose(value: Any, name: str = "pose") -> Pose:
     """Return a Pose, whose components may be NaN; errors as of `read_map`.
 
-    Coordinates are at most `checks.FARTHEST` in magnitude.
+    Coordinates are limited to `checks.FARTHEST` in magnitude.
     """
     parts = [_part(value, name, part) for part in ("position", "orientation")]
     keys = ("w_val", "x_val", "y_val", "z_val")
@@ -192,7 +214,7 @@ def read_path(value: Any, name: str = "path") -> list[tuple[float, float, float]
     """Return the points of a path, at least one; errors as of `read_map`."""
     if not isinstance(value, list | tuple) or not 0 < len(value) <= MAX_POINTS:
         raise InputError(f"{name} is not a list of 1 to {MAX_POINTS} points; give one")
-    return [read_vector(point, f"{name}[{i}]") for i, point in enumerate(value)]
+    return [read_vector(point, name, most=FARTHEST) for point in value]
 
 
 def read_yaw_mode(value: Any, drivetrain: Any) -> tuple[str, YawMode]:
@@ -205,7 +227,8 @@ def read_yaw_mode(value: Any, drivetrain: Any) -> tuple[str, YawMode]:
     if not isinstance(value, Mapping):
         raise InputError(f"yaw_mode={shown(value)} is not a map; give is_rate and yaw_or_rate")
     is_rate = flag(value.get("is_rate", value.get(b"is_rate")), "yaw_mode.is_rate")
-    (amount,) = read_map(value, "yaw_mode", ("yaw_or_rate",))
+    most = MOST_TURN if is_rate else _LARGEST
+    (amount,) = read_map(value, "yaw_mode", ("yaw_or_rate",), most=most)
     if is_forward and is_rate:
         if amount != 0.0:
             raise InputError("Yaw cannot be specified as rate if drivetrain is ForwardOnly")

@@ -26,15 +26,21 @@ _BLOCK = (4.0, 4.0)
 class _Fixed(Task[Any]):
     """A scene without rules: entities at fixed places.
 
-    `solid` has the half sizes, in metres, of the boxes around places that can be touched.
+    `solid` has the half sizes, in metres, of the boxes around the first `count` places, by default
+    all, that can be touched.
     """
 
     name = "scene"
 
     def __init__(
-        self, entities: Sequence[Any], places: Tensor, solid: Sequence[float] | None
+        self,
+        entities: Sequence[Any],
+        places: Tensor,
+        solid: Sequence[float] | None,
+        count: int | None = None,
     ) -> None:
         self._entities, self._places, self._solid = entities, places, solid
+        self._count = count
 
     def make_props(self) -> Sequence[Any]:
         """Return the entities."""
@@ -53,7 +59,7 @@ class _Fixed(Task[Any]):
         if self._solid is None:
             return None
         x, y, z = self._solid
-        return Obstacles(state.sampled, (x, y, z))
+        return Obstacles(state.sampled[:, : self._count], (x, y, z))
 
     def step(self, state: Any, body: BodyState) -> tuple[Any, Tensor]:
         """Apply no rule."""
@@ -133,7 +139,10 @@ def make_task(scene: str) -> Task[Any]:
 
 
 def _blocks() -> Task[Any]:
-    """Blocks in a grid around the start, with streets between them."""
+    """Blocks in a grid around the start, with streets between them, and objects of AirSim's Blocks.
+
+    Vehicles fly through all but the blocks.
+    """
     width, height = _BLOCK
     grid = [(x, y) for x in range(-24, 49, 12) for y in range(-24, 25, 12) if (x, y) != (0, 0)]
     places = torch.tensor([(x, y, height / 2) for x, y in grid], dtype=torch.float64)
@@ -141,4 +150,35 @@ def _blocks() -> Task[Any]:
     blocks = [
         Pillar(width, height, shades[i % len(shades)], name=f"block_{i}") for i in range(len(grid))
     ]
-    return _Fixed(blocks, places, (width / 2, width / 2, height / 2))
+    orange, gray, white = (0.95, 0.45, 0.1), (0.5, 0.5, 0.5), (0.9, 0.9, 0.9)
+    steps = [((0.3 * (5 - i), 0.25), 0.5 * i - 1.0) for i in range(5)]
+    others = [
+        (_Landmark("OrangeBall", [("sphere", (1.0,), 0.0)], orange), (6.0, -4.0, 1.0)),
+        (_Landmark("PulsingCone", [("cylinder", *of) for of in steps], white), (6.0, 4.0, 1.25)),
+        (_Landmark("Cylinder", [("cylinder", (0.75, 1.5), 0.0)], gray), (18.0, 6.0, 1.5)),
+    ]
+    beside = torch.tensor([place for _, place in others], dtype=torch.float64)
+    return _Fixed(
+        [*blocks, *(one for one, _ in others)],
+        torch.cat([places, beside]),
+        (width / 2, width / 2, height / 2),
+        len(blocks),
+    )
+
+
+class _Landmark(VisualEntity):
+    """An object of geoms on one axis: their types, sizes, and heights above its centre, metres."""
+
+    semantic_class = SemanticClass.OBSTACLE
+
+    def _build(
+        self,
+        name: str,
+        geoms: Sequence[tuple[str, Sequence[float], float]],
+        color: Sequence[float],
+    ) -> None:
+        self._mjcf_root = mjcf.RootElement(model=name)
+        for kind, size, z in geoms:
+            self._mjcf_root.worldbody.add(
+                "geom", type=kind, size=size, pos=(0, 0, z), rgba=(*color, 1)
+            )

@@ -9,24 +9,24 @@ from drone_rl.flight.airsim.messages import Map, nanoseconds, ned, ned_attitude
 from drone_rl.flight.commands.state import Sensors
 
 
-def read_sensor(sensors: Sensors, kind: str, epoch: float = 0.0) -> Map:
+def read_sensor(sensors: Sensors, kind: str, epoch: int = 0) -> Map:
     """Return ImuData, BarometerData, MagnetometerData or GpsData.
 
     Args:
         sensors: Sensors of one vehicle.
         kind: imu, barometer, magnetometer or gps.
-        epoch: Seconds that time stamps add to the vehicle's time.
+        epoch: Time stamp of the vehicle's time 0.
     """
     return _SENSORS[kind](sensors, epoch)
 
 
-def _time(of: Tensor, epoch: float) -> int:
+def _time(of: Tensor, epoch: int) -> int:
     """Return the time stamp of a reading; 0 if there is none yet."""
     seconds = float(of[0])
-    return nanoseconds(epoch + seconds) if math.isfinite(seconds) else 0
+    return epoch + nanoseconds(seconds) if math.isfinite(seconds) else 0
 
 
-def _imu(sensors: Sensors, epoch: float) -> Map:
+def _imu(sensors: Sensors, epoch: int) -> Map:
     reading = sensors.imu()
     return {
         "time_stamp": _time(reading.time, epoch),
@@ -36,7 +36,7 @@ def _imu(sensors: Sensors, epoch: float) -> Map:
     }
 
 
-def _barometer(sensors: Sensors, epoch: float) -> Map:
+def _barometer(sensors: Sensors, epoch: int) -> Map:
     reading = sensors.barometer()
     return {
         "time_stamp": _time(reading.time, epoch),
@@ -46,7 +46,7 @@ def _barometer(sensors: Sensors, epoch: float) -> Map:
     }
 
 
-def _magnetometer(sensors: Sensors, epoch: float) -> Map:
+def _magnetometer(sensors: Sensors, epoch: int) -> Map:
     reading = sensors.magnetometer()
     return {
         "time_stamp": _time(reading.time, epoch),
@@ -55,7 +55,7 @@ def _magnetometer(sensors: Sensors, epoch: float) -> Map:
     }
 
 
-def _gps(sensors: Sensors, epoch: float) -> Map:
+def _gps(sensors: Sensors, epoch: int) -> Map:
     reading = sensors.gps()
     error = float(reading.error[0])
     return {

@@ -10,7 +10,7 @@ from typing import Self
 from drone_rl.flight.airsim.lockstep import PATIENCE
 from drone_rl.flight.airsim.server import AirsimServer
 from drone_rl.flight.airsim.settings_file import AirsimSettings, parse_settings, read_settings
-from drone_rl.flight.airsim.simulation import CLOCKS, Simulation
+from drone_rl.flight.airsim.simulation import CLOCKS, DATE, Simulation
 from drone_rl.utils.files import as_path
 from drone_rl.utils.schema import OneOf, Real, Text, Whole
 
@@ -78,10 +78,12 @@ def serve(
     *,
     scene: str | Path = "cubes",
     clock: str = "wall",
+    date: str = DATE,
     patience_s: float = PATIENCE,
     address: str | None = None,
     port: int | None = None,
     seed: int = 0,
+    raw_channels: int = 3,
     renderer: str | None = None,
     recordings: str | Path | None = None,
 ) -> RunningServer:
@@ -94,11 +96,14 @@ def serve(
         settings: Path of a settings.json, or parsed settings; by default one multirotor.
         scene: cubes, blocks, pillars, empty, or the path of an MJCF file.
         clock: "wall", or "lockstep", in which time passes only while a call waits for it.
+        date: Time at which lockstep starts, as ISO 8601, UTC; time stamps count from 1970.
         patience_s: Real seconds without a request before time advances for a waiting call in
             lockstep.
         address: Address to listen at; that of the settings by default.
         port: Port; that of the settings by default, and 0 for a free one.
         seed: Of placements, gusts and sensor noise.
+        raw_channels: Channels of raw images of AirSim's clients from version 1.2 on: 3, or 4 as
+            AirSim 1.2 had.
         renderer: raytrace or mujoco_warp; by default the one that fits the scene.
         recordings: Folder for recordings; None refuses `startRecording`.
 
@@ -110,9 +115,11 @@ def serve(
         settings,
         scene=scene,
         clock=clock,
+        date=date,
         address=address,
         port=port,
         seed=seed,
+        raw_channels=raw_channels,
         renderer=renderer,
         recordings=recordings,
     )
@@ -124,9 +131,11 @@ def make_simulation(
     *,
     scene: str | Path,
     clock: str,
+    date: str,
     address: str | None,
     port: int | None,
     seed: int,
+    raw_channels: int,
     renderer: str | None,
     recordings: str | Path | None,
 ) -> tuple[Simulation, str, int]:
@@ -137,6 +146,7 @@ def make_simulation(
         settings = read_settings(as_path(settings, "settings"))
     scene = Text().read(scene, "scene")
     clock = OneOf(CLOCKS).read(clock, "clock")
+    date = Text().read(date, "date")
     seed = Whole(0, 2**31 - 1).read(seed, "seed")
     host = settings.address if address is None else Text().read(address, "address")
     number = settings.port if port is None else Whole(0, 65535).read(port, "port")
@@ -146,6 +156,13 @@ def make_simulation(
         )
     folder = None if recordings is None else as_path(recordings, "recordings")
     simulation = Simulation(
-        settings, scene, clock=clock, seed=seed, renderer=renderer, recordings=folder
+        settings,
+        scene,
+        clock=clock,
+        date=date,
+        seed=seed,
+        raw_channels=Whole(3, 4).read(raw_channels, "raw_channels"),
+        renderer=renderer,
+        recordings=folder,
     )
     return simulation, host, number

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from drone_rl.flight.airsim.recording import RECORDED, RECORDING, RecordingChoice, read_choice
 from drone_rl.sim.coordinates import HOME, GeoPoint
 from drone_rl.sim.entities import find_camera
 from drone_rl.sim.image_types import ImageType
@@ -104,6 +105,7 @@ class AirsimSettings:
     vehicles: tuple[VehicleChoice, ...] = ()
     segmentation: str = "CommonObjectsRandomIDs"
     """How segmentation ids are assigned at the start; "None" for 0 everywhere."""
+    recording: RecordingChoice = dataclasses.field(default_factory=RecordingChoice)
     text: str = "{}"
     """The file, as JSON."""
 
@@ -173,18 +175,25 @@ _FILE = _Table(
         "Wind": _Table(dict.fromkeys(("X", "Y", "Z"), Real(-50.0, 50.0))),
         "CameraDefaults": _CAMERA,
         "Vehicles": {"": _VEHICLE},
+        "Recording": _Table({**RECORDING, "Cameras": [_Table(RECORDED)]}),
         "SegmentationSettings": _Table(
             {"InitMethod": OneOf(("CommonObjectsRandomIDs", "None"), also=("",))},
             frozenset({"MeshNamingMethod", "OverrideExisting"}),
         ),
     },
     _words(
-        "ClockType ViewMode SubWindows Recording PawnPaths TimeOfDay LogMessagesVisible RpcEnabled "
+        "ClockType ViewMode SubWindows PawnPaths TimeOfDay LogMessagesVisible RpcEnabled "
         "PhysicsEngineName EngineSound SpeedUnitFactor SpeedUnitLabel RecordUIVisible "
         "MoveWorldOrigin PawnPaths CameraDirector DefaultSensors Beacons ExternalCameras "
         "ShowLosDebugLines InitialInstanceSegmentation ApiServerEndpoint PhysicsEngine"
     ),
 )
+
+
+def find_settings() -> Path | None:
+    """Return settings.json of the working directory, else of ~/Documents/AirSim; None without."""
+    folders = (Path.cwd(), Path.home() / "Documents" / "AirSim")
+    return next(filter(Path.is_file, (folder / "settings.json" for folder in folders)), None)
 
 
 def read_settings(path: Path) -> AirsimSettings:
@@ -241,6 +250,7 @@ def parse_settings(text: str, name: str = "settings.json") -> AirsimSettings:
         vehicles=tuple(vehicles) or (default,),
         segmentation=found.get("SegmentationSettings", {}).get("InitMethod")
         or AirsimSettings.segmentation,
+        recording=read_choice(found.get("Recording", {}), name),
         text=json.dumps(data),
     )
 

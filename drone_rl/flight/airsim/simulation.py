@@ -1,25 +1,29 @@
 """The world behind the server: vehicles, scene, simulated time, and calls that wait for it."""
 
-import contextlib
 import dataclasses
-import logging
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
+
+import torch
+from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.flight.airsim.cameras import CameraState, make_cameras
 from drone_rl.flight.airsim.messages import (
     Pose,
     attitude_to_world,
+    nanoseconds,
     ned,
     ned_attitude,
+    read_date,
     read_pose,
+    to_world,
 )
 from drone_rl.flight.airsim.messages import pose as pose_map
-from drone_rl.flight.airsim.recording import Recording
+from drone_rl.flight.airsim.recording import RecordedImage, Recording
 from drone_rl.flight.airsim.settings_file import (
     FLYING,
     POSING,
@@ -30,12 +34,11 @@ from drone_rl.flight.airsim.settings_file import (
 from drone_rl.flight.airsim.stage import Stage
 from drone_rl.flight.airsim.vehicle import Vehicle
 from drone_rl.flight.commands.state import Attitude
-from drone_rl.sim.image_types import ImageType
 from drone_rl.utils.errors import InputError, did_you_mean
 
-_log = logging.getLogger(__name__)
-
 CLOCKS = ("wall", "lockstep")
+DATE = "2024-01-01T00:00:00"
+"""Default of the time, UTC, at which lockstep starts."""
 _MOST_VEHICLES = 100
 
 
@@ -62,7 +65,9 @@ class Simulation:
         scene: str = "cubes",
         *,
         clock: str = "wall",
+        date: str = DATE,
         seed: int = 0,
+        raw_channels: int = 3,
         renderer: str | None = None,
         recordings: Path | None = None,
     ) -> None:
@@ -72,11 +77,15 @@ class Simulation:
             settings: Content of settings.json.
             scene: See `scenes.make_task`.
             clock: "wall" or "lockstep".
+            date: Time at which lockstep starts, as ISO 8601, UTC unless it says otherwise; an
+                `InputError` if it is none, or before 1970.
             seed: Of placements, gusts and sensor noise.
+            raw_channels: Channels of raw images of clients from version 1.2 on: 3 or 4.
             renderer: Name of a renderer; by default the one that fits the scene.
             recordings: Folder for recordings; None refuses to record.
         """
         self.settings, self.clock, self.seed = settings, clock, seed
+        self.raw_channels = raw_channels
         self.stage = Stage(scene, seed, renderer=renderer)
         if settings.segmentation == "None":
             self.stage.clear_ids()
@@ -84,8 +93,12 @@ class Simulation:
         self._dynamics = DynamicsSettings().replace(
             mode="simple_flight", camera_mount="body", wind=(x, -y, -z)
         )
-        self._periods = 0
-        """Control periods that have passed."""
+        posing = settings.sim_mode == POSING
+        self._origin = self.stage.start_height if posing else self._dynamics.radius
+        """Height at which vehicles start, and z is 0 for clients, metres."""
+        self._start = time.time_ns() if clock == "wall" else read_date(date)
+        self._ticks = 0
+        """Physics ticks that have passed."""
         self.vehicles: dict[str, Vehicle] = {}
         self.cameras: dict[str, dict[str, CameraState]] = {}
         """Of each vehicle, by our names of cameras."""
@@ -97,19 +110,27 @@ class Simulation:
         self._waits: list[tuple[Wait, Callable[[Any], None]]] = []
         self._until: float | None = None
         """Time at which `simContinueForTime` pauses."""
+        self._surplus = 0.0
+        """Seconds by which the last such call lasted too long, which the next one lasts less."""
         self._anchor = (time.monotonic(), 0.0)
         """A time of `time.monotonic`, and the simulated seconds then."""
+        if settings.recording.is_enabled:
+            self.start_recording()
 
     @property
     def period_s(self) -> float:
         """Seconds of one control period."""
-        first = next(iter(self.vehicles.values()))
-        return first.period * first.settings.tick
+        return self.find("").period * self._dynamics.tick
 
     @property
     def time(self) -> float:
         """Simulated seconds since the start; `reset` does not change it."""
-        return self._periods * self.period_s
+        return self._ticks * self._dynamics.tick
+
+    @property
+    def stamp(self) -> int:
+        """The present time stamp: nanoseconds since 1970."""
+        return self._start + nanoseconds(self.time)
 
     def add(self, choice: VehicleChoice) -> Vehicle:
         """Create a vehicle; an `InputError` if its name is taken, or there are too many."""
@@ -117,17 +138,18 @@ class Simulation:
             raise InputError(f"vehicle {choice.name!r} is there already; give another name")
         if len(self.vehicles) >= _MOST_VEHICLES:
             raise InputError(f"there are {_MOST_VEHICLES} vehicles; no more can be added")
-        names = self.stage.names[1:]
+        names, home = self.stage.names[1:], self.settings.home
         vehicle = Vehicle(
             choice,
             self._dynamics,
             self.stage.worlds,
             names=names,
-            home=self.settings.home,
+            object_id=self.stage.get_id,
+            home=home._replace(altitude=home.altitude - self._origin),  # the vehicles' start
             height=self.stage.start_height,
             seed=(self.seed + len(self.vehicles)) % 2**31,
         )
-        vehicle.epoch = self.time if self.vehicles else 0.0
+        vehicle.epoch = self.stamp
         self.vehicles[choice.name] = vehicle
         self.cameras[choice.name] = make_cameras(self.settings.captures, choice.cameras)
         return vehicle
@@ -173,28 +195,60 @@ class Simulation:
             vehicle.change_dynamics(self._dynamics)
 
     def object_pose(self, name: str) -> dict[str, Any]:
-        """Return the Pose of an object or a vehicle in the world's NED frame."""
+        """Return the Pose of an object or a vehicle in NED, see `place`."""
         if name in self.vehicles:
             body = self.vehicles[name].body
             x, y, z = ned(body.position)
             w, i, j, k = ned_attitude(body.attitude)
-            return pose_map(Pose((x, y, z), (w, i, j, k)))
-        return pose_map(self.stage.object_pose(name))
+        else:
+            (x, y, z), (w, i, j, k) = self.stage.object_pose(name)
+        return pose_map(Pose((x, y, z + self._origin), (w, i, j, k)))
+
+    def place(self, position: Sequence[float]) -> tuple[float, float, float]:
+        """Return the position in our world of one in NED from where vehicles start by default."""
+        x, y, z = to_world(position)
+        return x, y, z + self._origin
 
     def move_vehicle(self, name: str, pose: Pose) -> None:
-        """Set a vehicle's pose in the world's NED frame; NaN components stay."""
+        """Set a vehicle's pose in NED, see `place`; NaN components stay."""
         vehicle = self.vehicles[name]
-        start = ned(vehicle.home[None])
-        x, y, z = (there - here for there, here in zip(pose.position, start, strict=True))
-        vehicle.set_airsim_pose(Pose((x, y, z), pose.attitude), ignore_collision=True)
-        self.stage.touch(vehicle.body.position[0])
+        x, y, z = to_world(
+            [a - b for a, b in zip(self.place(pose.position), vehicle.home.tolist(), strict=True)]
+        )
+        self.teleport(vehicle, Pose((x, y, z), pose.attitude), ignore_collision=True)
+
+    def teleport(self, vehicle: Vehicle, pose: Pose, *, ignore_collision: bool) -> None:
+        """Put a vehicle somewhere, see `Airframe.set_airsim_pose`; it touches cubes on its way."""
+        before = None if ignore_collision else vehicle.body.position[0].clone()
+        others = (one for one in self._flying() if one is not vehicle)
+        vehicle.set_airsim_pose(pose, ignore_collision=ignore_collision, others=others)
+        self.touch(vehicle, before)
+
+    def touch(self, vehicle: Vehicle, before: torch.Tensor | None = None) -> None:
+        """Apply the scene's rules of contact to a vehicle; see `Stage.touch`."""
+        for contact in self.stage.touch(vehicle.body.position[0], before):
+            vehicle.collide(*contact)
+
+    def _flying(self) -> list[Vehicle]:
+        """Return the vehicles that collide with each other: those with dynamics."""
+        return [one for one in self.vehicles.values() if not one.is_computer_vision]
+
+    def _bump(self) -> None:
+        """Let vehicles that overlap bounce off each other."""
+        flying = self._flying()
+        if len(flying) < 2:
+            return
+        places = torch.cat([vehicle.body.position for vehicle in flying])
+        overlaps = torch.cdist(places, places) < 2.0 * self._dynamics.radius
+        for i, j in overlaps.triu(1).nonzero().tolist():
+            flying[i].bump(flying[j])
 
     def reset(self) -> None:
         """Reset vehicles and scene; running movements are cancelled."""
         self.stage.reset()
         for vehicle in self.vehicles.values():
             vehicle.reset()
-            vehicle.epoch = self.time
+            vehicle.epoch = self.stamp
         self.settle()
 
     # Time
@@ -220,14 +274,27 @@ class Simulation:
 
     def pause(self, is_paused: bool) -> None:
         """Stop or continue simulated time."""
+        if not (self.is_paused and is_paused):
+            self._surplus = 0.0
         self.is_paused, self._until = is_paused, None
         self._hold_anchor()
 
     def continue_for(self, seconds: float) -> Wait:
-        """Let time pass for some seconds, then pause; return the wait for that."""
-        self.pause(seconds <= 0.0)
-        end = self._until = self.time + seconds
+        """Let time pass for some seconds, then pause; return the wait for that.
+
+        A call lasts whole physics ticks, and the calls of a loop together as long as they say.
+        """
+        end = self._until = self.time - self._surplus + seconds
+        self.is_paused = False
+        self._pause_if_due()
+        self._hold_anchor()
         return Wait(lambda: self.is_paused or self.time >= end - 1e-9, lambda: None, blocks=True)
+
+    def _pause_if_due(self) -> None:
+        """Pause at the end of `continue_for`."""
+        if self._until is not None and self.time >= self._until - 1e-9:
+            self._surplus = self.time - self._until
+            self.is_paused, self._until = True, None
 
     def follow(self, budget: float) -> float:
         """Catch up with real time, in at most `budget` seconds of it.
@@ -240,7 +307,7 @@ class Simulation:
             self._hold_anchor()
             return math.inf
         while (left := self._left()) <= 0.0:
-            self._period()
+            self._step()
             if self.is_paused:
                 return math.inf
             if time.monotonic() > end:
@@ -257,30 +324,39 @@ class Simulation:
         """
         end = time.monotonic() + budget
         while self.is_due and self.time < until - 1e-9:
-            if self._period():
+            if self._step():
                 return True
             if time.monotonic() > end:
                 return False
         return not self.is_due
 
     def _left(self) -> float:
-        """Seconds of real time until the next control period is due."""
+        """Seconds of real time until the end of the next step is due."""
         then, simulated = self._anchor
-        due = then + (self.time + self.period_s - simulated) / self.settings.clock_speed
-        return due - time.monotonic()
+        end = (self._ticks + self._next_ticks()) * self._dynamics.tick
+        return then + (end - simulated) / self.settings.clock_speed - time.monotonic()
+
+    def _next_ticks(self) -> int:
+        """Return the ticks of the next step: to the end of a control period, or to a pause."""
+        left = self.find("").left
+        if self._until is not None:
+            due = math.ceil((self._until - self.time) / self._dynamics.tick - 1e-6)
+            left = max(1, min(left, due))
+        return left
 
     def _hold_anchor(self) -> None:
         self._anchor = (time.monotonic(), self.time)
 
-    def _period(self) -> bool:
-        """Advance all vehicles by a control period; return whether a call was answered."""
+    def _step(self) -> bool:
+        """Advance all vehicles by a step; return whether a call was answered."""
+        ticks = self._next_ticks()
         for vehicle in self.vehicles.values():
-            vehicle.run(vehicle.period)
-            self.stage.touch(vehicle.body.position[0])
-        self._periods += 1
+            vehicle.run(ticks)
+            self.touch(vehicle)
+        self._bump()
+        self._ticks += ticks
         self._record()
-        if self._until is not None and self.time >= self._until - 1e-9:
-            self.is_paused, self._until = True, None
+        self._pause_if_due()
         return self.settle()
 
     def settle(self) -> bool:
@@ -298,27 +374,25 @@ class Simulation:
 
     def start_recording(self) -> None:
         """Record states and images to a new folder; do nothing if that goes on already."""
-        if self._recordings is None:
+        choice = self.settings.recording
+        folder = Path(choice.folder) if choice.folder else self._recordings
+        if folder is None:
             raise InputError("there is no folder for recordings; start the server with one")
         if self.recording is None:
-            self.recording = Recording(self._recordings, self.time)
+            self.recording = Recording(choice, folder, self.time)
             self._record()
 
     def _record(self) -> None:
         if self.recording is None or not self.recording.take_turn(self.time):
             return
-        for name, vehicle in self.vehicles.items():
-            camera = self.cameras[name]["front_center"]
-            (shot,) = self.stage.render(vehicle.body, camera, [ImageType.SCENE])
-            image = self.stage.image(ImageType.SCENE, shot, as_float=False)
-            try:
-                self.recording.write(self.time, name, vehicle.pose, image)
-            except OSError as error:
-                _log.error("the recording ends: it can't be written (%s)", error.strerror)
-                with contextlib.suppress(OSError):
-                    self.stop_recording()
-                self.recording = None
-                return
+        poses = {name: vehicle.pose for name, vehicle in self.vehicles.items()}
+        if not self.recording.write(self.stamp, poses, self._recorded):
+            self.recording = None
+
+    def _recorded(self, name: str, image: RecordedImage) -> Tensor:
+        camera = self.cameras[name][image.camera]
+        (shot,) = self.stage.render(self.vehicles[name].body, camera, [image.kind])
+        return self.stage.image(image.kind, shot, as_float=image.as_float)
 
     def stop_recording(self) -> None:
         """End a recording."""

@@ -3,8 +3,7 @@
 import copy
 import dataclasses
 import math
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import mujoco as _mujoco
@@ -15,7 +14,9 @@ from torch import Tensor
 
 from drone_rl.config import CameraSettings
 from drone_rl.flight.airsim.cameras import CameraState
+from drone_rl.flight.airsim.collisions import nearest
 from drone_rl.flight.airsim.messages import NO_POSE, Pose, ned, ned_attitude, to_world
+from drone_rl.flight.airsim.patterns import matching
 from drone_rl.flight.airsim.scenes import make_task
 from drone_rl.flight.airsim.settings_file import Capture
 from drone_rl.sim.dynamics import BodyState
@@ -27,19 +28,16 @@ from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import shown
 
 mujoco: Any = _mujoco  # its stubs lack what is used here
 
+SKY = "SkySphere"
 SPARE = 12
 """Objects that can be spawned: boxes, balls and cylinders in turn."""
 
 _PLAIN = Appearance()
 _MOST_SHOWN = 100
 """Appearances that are kept."""
-_REPETITION = re.compile(r"(?<!\\)[*+?{]")
-_REPEATED_GROUP = re.compile(r"\)[*+?{]")
-_MOST_REPETITIONS = 3
 
 
 class Shot(NamedTuple):
@@ -85,7 +83,7 @@ class Stage:
         ] = (_PLAIN, (), {})
         """Weather, spawned objects, and the appearances that were made for them, by camera."""
         self._ids = self._first_ids = segmentation_ids(self.worlds.scene)
-        """Segmentation ids of all geoms, and those without the clients' own."""
+        """Segmentation ids of all geoms and the sky, and those without the clients' own."""
         self._own_ids: dict[str, int] = {}
         self._of_file = self._read_file()
         """Poses in NED of the named geoms of a file, relative to its model."""
@@ -104,16 +102,47 @@ class Stage:
         """Height at which a vehicle without dynamics starts, metres."""
         return float(self.task.origin[2])
 
-    def touch(self, position: Tensor) -> None:
-        """Apply the task's rules to a vehicle: the chapter's cubes vanish when touched. (3,)."""
-        self.task.touch(self.worlds.state, position[None])
+    def touch(
+        self, position: Tensor, before: Tensor | None = None
+    ) -> list[tuple[str, Tensor, Tensor]]:
+        """Apply the task's rules to a vehicle: the chapter's cubes vanish when touched.
+
+        Args:
+            position: Of the vehicle. Shape: (3,).
+            before: Where it comes from, if it touches what is on the straight path. Shape: (3,).
+
+        Returns:
+            Names of what it touches, with its position there, and the point nearest to that.
+        """
+        start = None if before is None else before[None]
+        contacts = self.task.touch(self.worlds.state, position[None], start)
+        if contacts is None:
+            return []
+        found, ways = [], contacts[0].tolist()
+        for index in sorted(range(len(ways)), key=ways.__getitem__):
+            if ways[index] < math.inf:
+                there = position if before is None else torch.lerp(before, position, ways[index])
+                name, center = self._names[index], self._placed[0, index]
+                half = center.new_tensor(self.worlds.scene.model.geom_size[self._geoms(name)[0]])
+                found.append((name, there, nearest(there, center, half)))
+        return found
+
+    @property
+    def _placed(self) -> Tensor:
+        """Where the scene's objects stand, or stood before they vanished. Shape: (1, *, 3)."""
+        return getattr(self.worlds.state, getattr(self.task, "props", "sampled"))
 
     # Objects
 
     @property
     def names(self) -> list[str]:
-        """Names of all objects: the ground, the scene's, and spawned ones."""
-        return ["Ground", *self._names, *self._of_file, *self._spawned]
+        """Names of all objects: the ground, the scene's, spawned ones, and the sky."""
+        return ["Ground", *self._names, *self._of_file, *self._spawned, SKY]
+
+    @property
+    def movable(self) -> list[str]:
+        """Names of the scene's and spawned objects, parts of a file excepted."""
+        return [*self._names, *self._spawned]
 
     def _read_file(self) -> dict[str, Pose]:
         """Return the poses of a file's geoms, by their names."""
@@ -140,7 +169,7 @@ class Stage:
     def object_pose(self, name: str) -> Pose:
         """Return the pose in NED, of the world; NaN if there is no such object, or it vanished."""
         level = (1.0, 0.0, 0.0, 0.0)
-        if name == "Ground":
+        if name in ("Ground", SKY):
             return Pose((0.0, 0.0, 0.0), level)
         if name in self._of_file:
             own, by = self._of_file[name], ned(self.task.places(self.worlds.state)[:, 0])
@@ -160,15 +189,13 @@ class Stage:
     def move_object(self, name: str, place: Sequence[float]) -> bool:
         """Move an object, NaN coordinates excepted; return whether that is possible."""
         now = to_world(self.object_pose(name).position)
-        if any(map(math.isnan, now)) or name in ("Ground", *self._of_file):
+        if any(map(math.isnan, now)) or name in ("Ground", SKY, *self._of_file):
             return False
         x, y, z = (n if math.isnan(v) else v for v, n in zip(place, now, strict=True))
         if name in self._spawned:
             self._spawned[name] = dataclasses.replace(self._spawned[name], place=(x, y, z))
             return True
-        state = self.worlds.state
-        field = getattr(self.task, "props", "sampled")
-        known = getattr(state, field)
+        known = self._placed
         if known.shape[-2] != len(self._names):
             return False
         known[0, self._names.index(name)] = torch.tensor((x, y, z), dtype=known.dtype)
@@ -184,7 +211,7 @@ class Stage:
             InputError: There is no such shape, or no spare object of it.
         """
         kinds = {"cube": 0, "box": 0, "sphere": 1, "ball": 1, "cylinder": 2}
-        kind = kinds.get(asset.lower().removeprefix("1m_"))
+        kind = kinds.get(asset.lower().removeprefix("1m_").removesuffix("_chamfer"))
         if kind is None:
             raise InputError(f"asset {asset!r} is unknown; give cube, sphere or cylinder")
         taken = {one.number for one in self._spawned.values()}
@@ -283,6 +310,8 @@ class Stage:
         scene = self.worlds.scene
         if name == "Ground":
             return scene.geoms(SemanticClass.GROUND)
+        if name == SKY:
+            return [-1]
         if name in self._names:
             index = self._names.index(name)
         elif name in self._spawned:
@@ -339,14 +368,18 @@ class Stage:
             known[key] = camera, None if is_own else found
         return known[key][1]
 
+    @property
+    def appearance(self) -> Appearance:
+        """Weather, light and spawned objects, in no camera of a vehicle."""
+        return dataclasses.replace(self._weather, distractors=self._spares())
+
     def image(self, kind: ImageType, shot: Shot, *, as_float: bool) -> Tensor:
         """Return the pixels of a rendered image: (H, W) float32, or (H, W, 3) uint8."""
         return pixels(kind, shot.values, as_float=as_float, focal=shot.focal, ids=self._ids)[0]
 
     def infrared(self, shot: Shot, *, as_float: bool) -> Tensor:
         """Return a segmentation image with the ids in gray; shapes as of `image`."""
-        geoms = shot.values[0].long().cpu()
-        ids = torch.where(geoms < 0, 0, self._ids[geoms.clamp(min=0)])
+        ids = self._ids[shot.values[0].long().cpu()]
         if as_float:
             return ids.float() / 255.0
         return ids.to(torch.uint8)[..., None].expand(-1, -1, 3).contiguous()
@@ -372,26 +405,6 @@ class Stage:
     def close(self) -> None:
         """Close the renderer."""
         self.worlds.close()
-
-
-def matching(pattern: str, names: Iterable[str]) -> list[str]:
-    """Return the names that match a regular expression, ignoring case, as a whole.
-
-    Raises:
-        InputError: It is none, or one whose search could take forever.
-    """
-    parts = [pattern] if "(" in pattern else pattern.split("|")
-    most = max(len(_REPETITION.findall(part)) for part in parts)
-    if most > _MOST_REPETITIONS or _REPEATED_GROUP.search(pattern):
-        raise InputError(
-            f"name={shown(pattern)} repeats too much; give at most {_MOST_REPETITIONS} of * + ? "
-            "and {, and none after a group"
-        )
-    try:
-        compiled = re.compile(pattern, re.IGNORECASE)
-    except (re.error, RecursionError, OverflowError) as error:
-        raise InputError(f"name={shown(pattern)} is no regular expression ({error})") from error
-    return [name for name in names if compiled.fullmatch(name)]
 
 
 def png(image: Tensor) -> bytes:

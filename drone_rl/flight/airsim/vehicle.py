@@ -27,17 +27,15 @@ class Vehicle(Airframe):
 
     def allow(self, enable: bool) -> None:
         """Enable API control, or disable it and hover."""
-        self._require_flight("enableApiControl")
         self.enable_api_control(enable)
 
     def set_armed(self, arm: bool) -> bool:
         """Arm or disarm; return whether it is in that state, False if API control is off.
 
-        A vehicle that falls can't be armed.
+        A vehicle that falls can't be armed. Without dynamics there is nothing to arm.
         """
-        self._require_flight("armDisarm")
-        if not self.has_api_control:
-            return False
+        if not self.has_api_control or self.is_computer_vision:
+            return self.has_api_control
         if not arm:
             self.disarm(force=True)
         elif not self._is_flying:
@@ -205,7 +203,7 @@ class Vehicle(Airframe):
         """
         turn: dict[str, Any] = {}
         if yaw is not None:
-            turn["yaw"] = yaw * _DEGREES
+            turn["yaw"] = math.remainder(yaw * _DEGREES, 360.0)
         if yaw_rate is not None:
             turn["yaw_rate"] = yaw_rate * _DEGREES
         lift = {"z": self._height(z)} if z is not None else {"throttle": throttle}

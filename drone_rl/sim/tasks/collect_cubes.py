@@ -23,6 +23,7 @@ from drone_rl.sim.tasks.collect_cubes_kernel import (
 from drone_rl.sim.tasks.common import (
     PropTask,
     Side,
+    first_contact,
     interval_classes,
     number_classes,
     place_in_view,
@@ -167,12 +168,20 @@ class CollectCubes(PropTask[WorldState]):
         launch(step_all, self.settings, new, *others)
         return new, reward
 
-    def touch(self, state: WorldState, position: Tensor) -> None:
+    def touch(
+        self, state: WorldState, position: Tensor, before: Tensor | None = None
+    ) -> Tensor | None:
         """Collect the cubes that the drones touch, see `Task.touch`."""
-        away = (position[:, None] - state.cubes).abs().amax(-1)
-        near = (away <= self.settings.touch_distance) & state.present
-        if bool(near.any()):
-            state.collected |= near
+        reach = self.settings.touch_distance
+        if before is None:
+            away = (position[:, None] - state.cubes).abs().amax(-1)
+            if not bool(((away <= reach) & state.present).any()):
+                return None
+            before = position
+        contact = first_contact(reach, before, position, state.cubes)
+        contact = contact.masked_fill(~state.present, torch.inf)
+        state.collected |= contact.isfinite()
+        return contact
 
     def fused_rules(self, dynamics: Dynamics, num_envs: int) -> FusedCubes | None:
         """See `Task.fused_rules`."""

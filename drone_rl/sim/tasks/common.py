@@ -61,6 +61,27 @@ class PropTask(Task[S]):
         return dataclasses.replace(state, **{self.props: moved})
 
 
+def first_contact(reach: float, before: Tensor, now: Tensor, places: Tensor) -> Tensor:
+    """Return where drones that fly straight from `before` to `now`, (N, D), touch `places`.
+
+    A drone touches a place, (N, P, D), if it is at most `reach` metres away along every axis. Its
+    path enters all slabs of that box before it leaves any.
+
+    Returns:
+        Fraction of the path before the first contact; inf without contact. Shape: (N, P).
+    """
+    away, path = places - before[:, None], (now - before)[:, None]
+    is_still = path == 0
+    pace = torch.where(is_still, 1.0, path)
+    ends = torch.stack([(away - reach) / pace, (away + reach) / pace])
+    low, high = ends.amin(0), ends.amax(0)
+    inside = away.abs() <= reach
+    low = torch.where(is_still, torch.where(inside, 0.0, torch.inf), low)
+    high = torch.where(is_still, torch.where(inside, 1.0, -torch.inf), high)
+    enters = low.amax(-1).clamp(min=0.0)
+    return torch.where(enters <= high.amin(-1).clamp(max=1.0), enters, torch.inf)
+
+
 def number_classes(name: str, goals: Goals) -> Iterator[tuple[str, str, Tensor]]:
     """Yield one class for each goal of an episode: first, second, and so on."""
     for number in range(goals.reached.shape[-1]):

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from drone_rl.config import PillarsSettings
 from drone_rl.sim.actions import Move
+from drone_rl.sim.tasks.common import first_contact
 
 EDGE = 1e-6
 """Metres by which rounding may move a lane at the field's edge, also in float32."""
@@ -141,15 +142,7 @@ def nearest_pillar(rows: Tensor, y: Tensor, next_row: Tensor) -> Tensor:
 def meets(touch: float, before: Tensor, now: Tensor, pillars: Tensor) -> Tensor:
     """Return whether drones that fly straight between positions, (N, 3), touch pillars, (N, P, 3).
 
-    A drone touches a pillar if its centre is at most `touch` metres away along both axes. Its path
-    enters all slabs of that square before it leaves any. Shape: (N, P).
+    A drone touches a pillar if its centre is at most `touch` metres away along x and y.
+    Shape: (N, P).
     """
-    away, path = pillars[..., :2] - before[:, None, :2], (now - before)[:, None, :2]
-    is_still = path == 0
-    pace = torch.where(is_still, 1.0, path)
-    ends = torch.stack([(away - touch) / pace, (away + touch) / pace])
-    low, high = ends.amin(0), ends.amax(0)
-    inside = away.abs() <= touch
-    low = torch.where(is_still, torch.where(inside, 0.0, torch.inf), low)
-    high = torch.where(is_still, torch.where(inside, 1.0, -torch.inf), high)
-    return low.amax(-1).clamp(min=0.0) <= high.amin(-1).clamp(max=1.0)
+    return first_contact(touch, before[:, :2], now[:, :2], pillars[..., :2]).isfinite()

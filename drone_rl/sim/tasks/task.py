@@ -200,10 +200,15 @@ class Task(abc.ABC, Generic[S]):
         `state` is that before the step and stays as it is; `body` are the drones after it.
         """
 
-    def touch(self, state: S, position: Tensor) -> None:
+    def touch(self, state: S, position: Tensor, before: Tensor | None = None) -> Tensor | None:
         """Apply the rules of contact in place, without a step or reward; by default there are none.
 
-        `position` is that of each drone, metres. Shape: (num_envs, 3).
+        `position` is that of each drone, metres, and `before` where it comes from, if it touches
+        what is on the straight path. Shapes: (num_envs, 3).
+
+        Returns:
+            Fraction of the path before each prop was touched; inf without contact, (N, P). Without
+            any contact it may be None.
         """
 
     def fused_rules(self, dynamics: Dynamics, num_envs: int) -> Any:

@@ -8,7 +8,6 @@ import torch
 from drone_rl.flight.airsim.messages import Pose
 from drone_rl.flight.airsim.settings_file import Offset
 from drone_rl.sim.coordinates import HOME, GeoPoint, geo_from_world
-from drone_rl.utils.errors import InputError
 from tests.flight.airsim.flying import BOX, FREE, KEEP, fly, make
 
 HALF = math.sqrt(0.5)
@@ -44,7 +43,7 @@ def test_collisions_latch_until_they_are_read():
     seen = vehicle.multirotor_state()["collision"]
     assert seen["has_collided"] and seen["object_name"] == "box"
     read = vehicle.collision()
-    assert read["has_collided"] and read["object_id"] == 1
+    assert read["has_collided"] and read["object_id"] == -1  # there is no scene
     assert read["normal"]["x_val"] == pytest.approx(-1.0)
     assert read["impact_point"]["x_val"] == pytest.approx(4.0, abs=0.1)
     radius = vehicle.settings.radius
@@ -54,13 +53,6 @@ def test_collisions_latch_until_they_are_read():
     later = vehicle.collision()
     assert not later["has_collided"]
     assert later["position"] == read["position"]  # at the contact, not now
-
-
-def test_a_long_way_is_refused_before_it_takes_memory():
-    vehicle = make(obstacles=BOX)
-    there = Pose((1e9, 0.0, 0.0), SAME)
-    with pytest.raises(InputError, match=r"the pose is 1e\+09 m away; give ignore_collision=True"):
-        vehicle.set_airsim_pose(there, ignore_collision=False)
 
 
 def test_a_velocity_that_is_set_is_no_acceleration():
@@ -99,3 +91,60 @@ def test_the_trajectory_does_not_grow():
     for _ in range(50):
         vehicle.run(vehicle.period)
     assert len(vehicle.trajectory) == 1
+
+
+def test_ground_is_no_new_collision_at_rest_and_forgotten_at_takeoff():
+    vehicle = make()
+    for _ in range(20):
+        vehicle.run(vehicle.period)
+    assert vehicle.collision()["object_name"] == "Ground"
+    for _ in range(20):
+        vehicle.run(vehicle.period)
+        assert not vehicle.collision()["has_collided"]
+        assert vehicle.collision(is_legacy=True)["has_collided"]
+    vehicle.reset()
+    vehicle.run(vehicle.period)
+    fly(vehicle, vehicle.takeoff(20.0))
+    assert not vehicle.collision()["has_collided"]
+    assert not vehicle.collision(is_legacy=True)["has_collided"]
+    fly(vehicle, vehicle.land_down(30.0))
+    assert vehicle.collision()["object_name"] == "Ground"
+
+
+@pytest.mark.parametrize("kind", ["SimpleFlight", "ComputerVision"])
+def test_a_vehicle_starts_at_the_z_of_the_settings_and_stays_there(kind):
+    vehicle = make(kind, start=Offset(1.0, 2.0, -4.0))
+    assert vehicle.body.position[0].tolist() == [1.0, -2.0, 4.0]
+    for _ in range(2):
+        for _ in range(50):
+            vehicle.run(vehicle.period)
+        assert vehicle.pose.position == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
+        vehicle.reset()
+    heights = [make(kind, start=Offset(z=z)).body.position[0, 2] for z in (0.0, 1.0)]
+    usual = vehicle.settings.radius if kind == "SimpleFlight" else 2.5  # of `make`
+    assert heights == [usual, usual]
+
+
+def test_an_armed_vehicle_that_is_put_into_the_air_hovers():
+    for is_armed, height in ((True, -3.0), (False, 0.0)):
+        vehicle = make(is_armed=is_armed)
+        vehicle.set_airsim_pose(Pose((5.0, 0.0, -3.0), SAME), ignore_collision=True)
+        for _ in range(100):
+            vehicle.run(vehicle.period)
+        assert vehicle.pose.position[2] == pytest.approx(height, abs=0.2)
+
+
+def test_teleports_that_an_obstacle_stops_are_collisions():
+    vehicle = make(obstacles=BOX)
+    for is_legacy in (True, False):
+        vehicle.set_airsim_pose(Pose((0.0, 0.0, -0.7), SAME), ignore_collision=True)
+        assert not vehicle.collision(is_legacy=is_legacy)["has_collided"]
+        vehicle.set_airsim_pose(Pose((9.0, 0.0, -0.7), SAME), ignore_collision=False)
+        found = vehicle.collision(is_legacy=is_legacy)
+        assert (found["has_collided"], found["object_name"]) == (True, "box")
+        assert [*found["normal"].values()] == pytest.approx([-1.0, 0.0, 0.0])
+        assert found["impact_point"]["x_val"] == pytest.approx(4.0)
+        assert found["position"] == vehicle.kinematics()["position"]
+        assert not vehicle.collision(is_legacy=is_legacy)["has_collided"]
+    vehicle.set_airsim_pose(Pose((0.0, 0.0, 1.0), SAME), ignore_collision=False)
+    assert vehicle.collision()["object_name"] == "Ground"

@@ -5,6 +5,7 @@
 
 import base64
 import json
+import re
 import subprocess
 from pathlib import Path
 
@@ -12,11 +13,11 @@ import numpy as np
 import pytest
 import torch
 
+from benchmarks.airsim_scripts import CLIENT_OF, PAIRS, run_script
 from drone_rl.config import CameraSettings
 from drone_rl.policies.policy import load_policy
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.worlds import Worlds
-from tests.flight.airsim.conftest import CV
 from tools.airsim_clients import CLIENTS, python_of
 
 SCRIPTS = Path(__file__).parent / "clients"
@@ -25,7 +26,7 @@ POLICY_CAMERA = """{"SettingsVersion": 1.2, "CameraDefaults": {"CaptureSettings"
 EPISODES, MOST_ACTIONS = 3, 70
 
 
-@pytest.fixture(params=[*CLIENTS])
+@pytest.fixture(params=[name for name in CLIENTS if name > "airsim-1.3"])
 def command(request, start):
     """Return a function: the command of a script with one of the clients, against a server."""
     name = request.param
@@ -55,42 +56,23 @@ def run(command):
     return call
 
 
-def test_flight(run):
-    found, printed = run("fly.py")
-    assert "Please upgrade" not in printed
-    assert found["armed"] is True
-    assert found["landed"] == 1 and found["height"] == pytest.approx(-2.0, abs=0.15)
-    assert max(found["corners"]) < 0.8
-    assert found["path"] == pytest.approx(12.0, abs=0.8)
-    assert found["orbit"] == pytest.approx(6.0, abs=1.5)
-    assert found["imu"] == pytest.approx(-9.8, abs=1.0)
-    assert found["gps"] == pytest.approx(47.6415, abs=1e-3)
-    assert (found["raw"], found["png"], found["floats"]) == (256 * 144 * 3, "89504e47", 256 * 144)
-    assert found["below"] == pytest.approx(3.0, abs=0.5)
-    assert found["landed_again"] == 0
-    assert found["after_reset"] == [0.0, 0.0, 0.0]
-    assert "getLidarData is not supported" in found["refused"]
+@pytest.mark.parametrize(("name", "version"), PAIRS)
+def test_program(name, version, tmp_path):
+    if not python_of(CLIENT_OF[version]).exists():
+        pytest.skip(f"{CLIENT_OF[version]} is not installed; run python -m tools.airsim_clients")
+    assert run_script(name, version, tmp_path) == []
 
 
-def test_computer_vision(run):
-    found, _ = run("look.py", CV, scene="cubes")
-    for step, (x, y, z) in enumerate(found["poses"]):
-        assert (x, y) == pytest.approx((step, -step))
-        assert z == pytest.approx([0.0, 0.2588, 0.5, 0.7071, 0.8660][step], abs=1e-4)
-    assert len(found["sizes"]) == 35
-    assert all(size > 0 for size in found["sizes"].values())
-    assert found["objects"] == ["cube_0", "cube_1", "cube_2"]
-    assert found["moved"] is True and found["there"] == 9.0
-    assert found["id"] == 20
-    assert found["fov"] == 90.0
-    assert found["paused"] is True
-
-
-def test_environment_for_reinforcement_learning(run):
-    found, _ = run("gym_env.py", None, 200, scene="cubes")
-    assert found["steps"] == 200
-    assert found["shapes"] == [[144, 256, 3]]
-    assert found["x"] > 5.0
+def test_commands_that_are_not_joined_are_sent(run, tmp_path, monkeypatch):
+    """With rpc-msgpack by the module of the page."""
+    page = (Path(__file__).parents[3] / "docs" / "airsim.md").read_text()
+    (module,) = re.findall(r'title="airsim_fixes.py"\n(.*?)```', page, re.DOTALL)
+    (tmp_path / "airsim_fixes.py").write_text(module)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    found, _ = run("not_joined.py", clock="wall")
+    assert found["moved"] > 0.2
+    assert found["twice"] == [2.0, 4.0, 6.0]
+    assert found["bytes"] == 256 * 144 * 3
 
 
 @pytest.mark.parametrize("name", ["good", "right_and_forward"])

@@ -1,9 +1,13 @@
 """Recordings: a table that numpy reads, and its images."""
 
 import numpy as np
+import pytest
 from PIL import Image
 
-from drone_rl.flight.airsim.recording import INTERVAL, to_letters
+from drone_rl.flight.airsim.recording import to_letters
+from drone_rl.flight.airsim.settings_file import parse_settings
+from drone_rl.utils.errors import InputError
+from tests.flight.airsim.conftest import pose
 
 
 def test_a_recording_is_a_table_and_images(start, tmp_path):
@@ -18,7 +22,7 @@ def test_a_recording_is_a_table_and_images(start, tmp_path):
     (folder,) = (tmp_path / "recordings").iterdir()
     rows = np.genfromtxt(folder / "airsim_rec.txt", names=True, dtype=None, encoding="utf-8")
     assert rows["POS_Z"][-1] < -1.8
-    assert np.diff(rows["TimeStamp"]).min() >= INTERVAL * 1e9 - 1
+    assert np.diff(rows["TimeStamp"]).min() >= 50  # milliseconds
     for name in rows["ImageFile"]:
         assert Image.open(folder / "images" / name).size == (256, 144)
 
@@ -32,6 +36,34 @@ def test_numpy_reads_rows_of_any_name(start, tmp_path):
     (table,) = tmp_path.glob("*/airsim_rec.txt")
     rows = np.genfromtxt(table, names=True, dtype=None, encoding="utf-8")
     assert set(rows["VehicleName"]) == {"red_drone__1"}
+
+
+def test_rows_and_images_are_those_of_the_settings(start, tmp_path):
+    """Every 0.2 s, but without a move no row"""
+    text = f"""{{"SimMode": "ComputerVision", "Recording": {{"RecordOnMove": true,
+      "RecordInterval": 0.2, "Enabled": true, "Folder": "{tmp_path}", "Cameras": [
+        {{"CameraName": "3", "ImageType": 1, "PixelsAsFloat": true}},
+        {{"CameraName": "0", "ImageType": 5, "Compress": false}}]}}}}"""
+    _server, client = start(text)
+    assert client.call("isRecording") is True
+    for x in (1.0, 2.0):
+        client.call("simSetVehiclePose", pose(x, 0.0, 0.0), True, "")
+        client.call("simContinueForTime", 0.6)
+    client.call("stopRecording")
+    (table,) = tmp_path.glob("*/airsim_rec.txt")
+    rows = np.genfromtxt(table, names=True, dtype=None, encoding="utf-8")
+    assert rows["POS_X"].tolist() == [1.0, 2.0]
+    depth, ids = rows["ImageFile"][0].split(";")
+    content = (table.parent / "images" / depth).read_bytes()
+    assert content.startswith(b"Pf\n256 144\n-1.0\n")
+    assert np.frombuffer(content[-4 * 256 * 144 :], "<f4").min() > 0.5
+    assert ids.startswith("img_ComputerVision_0_5_") and ids.endswith(".ppm")
+    assert Image.open(table.parent / "images" / ids).size == (256, 144)
+
+
+def test_an_unknown_camera_is_named():
+    with pytest.raises(InputError, match=r"Recording\.Cameras: camera 'left'"):
+        parse_settings('{"Recording": {"Cameras": [{"CameraName": "left"}]}}')
 
 
 def test_names_of_files_hold_letters_alone():

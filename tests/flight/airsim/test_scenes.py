@@ -12,8 +12,17 @@ from tests.flight.airsim.looking import look
 
 def test_blocks_can_be_touched_and_a_file_is_shown(tmp_path):
     blocks = Stage("blocks", 0)
-    assert len(blocks.names) == 35
-    assert tuple(blocks.task.obstacles(blocks.worlds.state).half_sizes) == (2.0, 2.0, 2.0)
+    assert {"OrangeBall", "PulsingCone", "Cylinder", "SkySphere"} < {*blocks.names}
+    around = blocks.task.obstacles(blocks.worlds.state)
+    assert tuple(around.half_sizes) == (2.0, 2.0, 2.0)
+    assert around.centers.shape[1] == len(blocks.find("block_.*"))
+    x, y, z = blocks.object_pose("OrangeBall").position
+    depth = look(
+        blocks, kind=ImageType.DEPTH_PLANAR, position=(x - 3.4, -y, -z)
+    )  # camera 0.4 m ahead
+    assert float(depth[9, 16]) == pytest.approx(2.0, abs=0.02)  # its radius is 1 m
+    assert blocks.move_object("PulsingCone", (9.0, 0.0, 1.25))
+    assert blocks.object_pose("PulsingCone").position == (9.0, 0.0, -1.25)
     blocks.close()
     path = tmp_path / "house.xml"
     path.write_text(

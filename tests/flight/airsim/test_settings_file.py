@@ -13,6 +13,7 @@ from drone_rl.flight.airsim.settings_file import (
     MAX_BYTES,
     Capture,
     VehicleChoice,
+    find_settings,
     parse_settings,
     read_settings,
 )
@@ -198,3 +199,16 @@ def test_a_file_is_not_read_beyond_its_limit(tmp_path):
 def test_px4_is_warned_about(caplog):
     parse_settings('{"Vehicles": {"A": {"VehicleType": "PX4Multirotor"}}}')
     assert "there is no PX4" in caplog.text
+
+
+def test_settings_are_found_where_airsim_looks_for_them(tmp_path, monkeypatch):
+    here, documents = tmp_path / "here", tmp_path / "Documents" / "AirSim"
+    here.mkdir()
+    documents.mkdir(parents=True)
+    monkeypatch.chdir(here)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert find_settings() is None
+    (documents / "settings.json").write_text("{}")
+    assert find_settings() == documents / "settings.json"
+    (here / "settings.json").write_text("{}")
+    assert find_settings() == here / "settings.json"

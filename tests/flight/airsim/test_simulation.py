@@ -1,14 +1,16 @@
 """Simulated time: periods, waits, pauses."""
 
 import math
+import time
 
 import pytest
 
-from drone_rl.flight.airsim.messages import nanoseconds
+from drone_rl.flight.airsim.messages import Pose, nanoseconds
 from drone_rl.flight.airsim.settings_file import parse_settings
 from drone_rl.flight.airsim.simulation import Simulation, Wait
 from drone_rl.utils.errors import InputError
 from tests.flight.airsim.conftest import pose
+from tests.flight.airsim.flying import FREE, KEEP
 
 
 @pytest.fixture
@@ -103,8 +105,9 @@ def test_time_stamps_of_vehicles_go_on_after_a_reset_and_from_their_creation(mak
     simulation.wait_for(simulation.continue_for(1.0), [].append)
     simulation.advance(60.0, math.inf)
     simulation.add_named("B", "simpleflight", pose(0.0, 5.0, 0.0))
-    now = nanoseconds(simulation.time)
-    assert now >= 1e9
+    now = simulation.stamp
+    assert now == 1_704_067_200_000_000_000 + nanoseconds(simulation.time)  # from 2024-01-01
+    assert simulation.time >= 1.0
     assert simulation.find("B").multirotor_state()["timestamp"] == now
     simulation.reset()
     for vehicle in simulation.vehicles.values():
@@ -114,7 +117,25 @@ def test_time_stamps_of_vehicles_go_on_after_a_reset_and_from_their_creation(mak
     simulation.advance(60.0, math.inf)
     read = [simulation.find("").sensor(kind)["time_stamp"] for kind in ("imu", "barometer")]
     read.append(simulation.find("").collision()["time_stamp"])
-    assert min(read) > now and max(read) <= nanoseconds(simulation.time + 1e-6)  # float32
+    assert min(read) > now and max(read) <= simulation.stamp + 1000  # float32
+
+
+@pytest.mark.parametrize("seconds", [0.01, 0.05, 0.1])
+def test_continuing_keeps_the_remainder(make, seconds):
+    """Ticks of 3 ms: no call takes as long as it says, but their sum does."""
+    simulation = make(clock="lockstep")
+    simulation.pause(True)
+    for _ in range(40):
+        answers = []
+        simulation.wait_for(simulation.continue_for(seconds), answers.append)
+        simulation.advance(60.0, math.inf)
+        assert answers and simulation.is_paused
+        simulation.pause(True)  # of a paused simulation: changes nothing
+    assert simulation.time == pytest.approx(40 * seconds, abs=0.003)
+
+
+def test_the_wall_clock_has_the_present_time(make):
+    assert make(clock="wall").stamp == pytest.approx(time.time_ns(), abs=60e9)
 
 
 def test_added_vehicles_have_the_heading_of_their_pose(make):
@@ -140,3 +161,27 @@ def test_reset_keeps_the_time_and_drops_api_control(make):
     simulation.reset()
     assert answers == [False]
     assert simulation.time == before and not vehicle.has_api_control
+
+
+def test_multirotors_collide_with_each_other(make):
+    """B hovers 3 m ahead of A, which flies into it at 2 m/s, and is pushed away."""
+    text = '{"Vehicles": {"A": {"Z": -3, "AllowAPIAlways": true}, "B": {"X": 3, "Z": -3}}}'
+    simulation = make(text, clock="lockstep")
+    a, b = simulation.find("A"), simulation.find("B")
+    future = a.move_velocity((2.0, 0.0, 0.0), 4.0, FREE, KEEP)
+    simulation.wait_for(Wait(lambda: future.done, future.result), [].append)
+    simulation.advance(60.0, math.inf)
+    seen = a.collision(), b.collision()
+    assert [one["object_name"] for one in seen] == ["B", "A"]
+    assert all(one["has_collided"] for one in seen)
+    assert [one["normal"]["x_val"] for one in seen] == pytest.approx([-1.0, 1.0], abs=0.01)
+    assert float(b.body.position[0, 0]) > 3.1
+    apart = float((a.body.position - b.body.position).norm())
+    assert apart >= 2 * a.settings.radius - 1e-6
+    simulation.reset()
+    start = a.pose
+    beyond = Pose((9.0, 0.0, 0.0), start.attitude)
+    simulation.teleport(a, beyond, ignore_collision=False)
+    assert a.collision()["object_name"] == "B" and 2.3 < a.pose.position[0] <= 2.4
+    simulation.teleport(a, beyond, ignore_collision=True)
+    assert a.pose.position[0] == 9.0 and not a.collision()["has_collided"]

@@ -119,8 +119,8 @@ def test_computer_vision_has_no_dynamics():
     assert vehicle.body.position[0].tolist() == [1.0, 0.0, 2.5]
     with pytest.raises(PilotError, match="needs a vehicle with dynamics"):
         vehicle.takeoff(1.0)
-    with pytest.raises(PilotError, match="enableApiControl needs"):
-        vehicle.allow(True)
+    vehicle.allow(True)
+    assert vehicle.has_api_control and vehicle.set_armed(True) is True
     vehicle.set_airsim_pose(Pose((2.0, 1.0, -3.0), (HALF, 0.0, 0.0, HALF)), ignore_collision=True)
     assert vehicle.pose.position == pytest.approx((2.0, 1.0, -3.0))
     assert vehicle.body.position[0].tolist() == pytest.approx([3.0, -1.0, 5.5])

@@ -15,6 +15,9 @@ from drone_rl.sim.entities import find_camera
 from drone_rl.sim.image_types import ImageType
 from drone_rl.sim.rendering.appearance import product
 
+_NEAR = 10.0
+"""Unreal's near plane, centimetres."""
+
 
 def read_camera(value: Any) -> str:
     """Return our name of a camera."""
@@ -31,27 +34,34 @@ def camera_in_world(
     return messages.ned(place[None]), messages.ned_attitude(turn[None])
 
 
-@method("simGetCameraInfo", least=1)
-def _camera_info(simulation: Simulation, args: Sequence[Any]) -> Map:
+@method("getCameraInfo", least=1)
+def _camera_pose(simulation: Simulation, args: Sequence[Any]) -> Map:
     camera = read_camera(args[0])
     vehicle = sim_vehicle_at(simulation, args, 1)
     place, turn = camera_in_world(simulation, vehicle, camera)
     capture = simulation.cameras[vehicle.choice.name][camera].capture(ImageType.SCENE)
-    return {
-        "pose": {"position": messages.vector(place), "orientation": messages.quaternion(turn)},
-        "fov": capture.fov,
-        "proj_mat": {"matrix": _projection(capture.fov, capture.width / capture.height)},
-    }
+    pose = {"position": messages.vector(place), "orientation": messages.quaternion(turn)}
+    return {"pose": pose, "fov": capture.fov}
 
 
-def _projection(fov: float, aspect: float, near: float = 0.1) -> list[list[float]]:
-    """Return Unreal's reversed projection matrix for a horizontal field of view, degrees."""
-    scale = 1.0 / math.tan(math.radians(fov) / 2)
+@method("simGetCameraInfo", least=1)
+def _camera_info(simulation: Simulation, args: Sequence[Any]) -> Map:
+    capture = camera_at(simulation, args, 1).capture(ImageType.SCENE)
+    matrix = _projection(capture.fov, capture.width, capture.height)
+    return {**_camera_pose(simulation, args), "proj_mat": {"matrix": matrix}}
+
+
+def _projection(fov: float, width: int, height: int) -> list[list[float]]:
+    """Return AirSim's matrix: of Unreal's reversed depth, times (north, east, down, 1).
+
+    `fov`, degrees, is that of the longer side.
+    """
+    scale, longer = 1.0 / math.tan(math.radians(fov) / 2), max(width, height)
     return [
-        [scale, 0.0, 0.0, 0.0],
-        [0.0, scale * aspect, 0.0, 0.0],
-        [0.0, 0.0, 0.0, near],
-        [0.0, 0.0, 1.0, 0.0],
+        [0.0, scale * longer / width, 0.0, 0.0],
+        [0.0, 0.0, -scale * longer / height, 0.0],
+        [0.0, 0.0, 0.0, _NEAR],
+        [-1.0, 0.0, 0.0, 0.0],
     ]
 
 
@@ -68,7 +78,7 @@ def _set_camera_pose(simulation: Simulation, args: Sequence[Any]) -> None:
     put_camera(simulation, args, dataclasses.replace(camera, position=(x, y, z), attitude=attitude))
 
 
-@method("simSetCameraOrientation", least=2)
+@method("simSetCameraOrientation", "setCameraOrientation", least=2)
 def _set_camera_orientation(simulation: Simulation, args: Sequence[Any]) -> None:
     keys = ("w_val", "x_val", "y_val", "z_val")
     attitude = messages.attitude_to_world(read_map(args[1], "orientation", keys))[0]

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.messages import flag, number, whole
 from drone_rl.flight.airsim.methods.registry import method, vehicle_at
 from drone_rl.flight.airsim.simulation import Simulation, Wait
@@ -49,7 +48,7 @@ def _debug_info(simulation: Simulation, args: Sequence[Any]) -> str:
 
 @method("timestampNow")
 def _timestamp(simulation: Simulation, args: Sequence[Any]) -> int:
-    return messages.nanoseconds(simulation.time)
+    return simulation.stamp
 
 
 @method("enableApiControl", least=1)

@@ -101,7 +101,8 @@ def _response(simulation: Simulation, vehicle: Vehicle, request: _Request, shot:
     elif request.is_compressed:
         content = png(image)
     else:
-        content = _raw(image, request.channels)
+        is_old = simulation.raw_channels == 4 and request.channels == "bgr"
+        content = _raw(image, "rgba" if is_old else request.channels)
     place, turn = camera_in_world(simulation, vehicle, request.camera)
     legacy = request.channels == "rgba"
     response: Map = {
@@ -109,7 +110,7 @@ def _response(simulation: Simulation, vehicle: Vehicle, request: _Request, shot:
         "image_data_float": numbers,
         "camera_position": messages.vector(place),
         "camera_orientation": messages.quaternion(turn),
-        "time_stamp": messages.nanoseconds(simulation.time),
+        "time_stamp": simulation.stamp,
         "message": "",
         "pixels_as_float": request.is_float,
         "compress": request.is_compressed,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from drone_rl.flight.airsim import messages
+from drone_rl.flight.airsim.calls import remark
 from drone_rl.flight.airsim.messages import (
     MAX_NAME,
     MAX_PATTERN,
@@ -20,8 +21,8 @@ from drone_rl.flight.airsim.messages import (
     whole,
 )
 from drone_rl.flight.airsim.methods.registry import argument, method
+from drone_rl.flight.airsim.patterns import matching
 from drone_rl.flight.airsim.simulation import Simulation
-from drone_rl.flight.airsim.stage import matching
 from drone_rl.utils.errors import InputError
 
 
@@ -36,7 +37,7 @@ def _set_object_pose(simulation: Simulation, args: Sequence[Any]) -> bool:
     if name in simulation.vehicles:
         simulation.move_vehicle(name, pose)
         return True
-    return simulation.stage.move_object(name, to_world(pose.position))
+    return simulation.stage.move_object(name, simulation.place(pose.position))
 
 
 @method("simGetObjectScale", least=1)
@@ -51,10 +52,10 @@ def _set_object_scale(simulation: Simulation, args: Sequence[Any]) -> bool:
 
 
 def _read_scale(value: Any) -> float:
-    scale = read_vector(value, "scale")
-    if len({*scale}) > 1 or not 0.0 < scale[0] <= 100.0:
-        raise InputError(f"scale={list(scale)} is not supported; give one above 0, up to 100")
-    return scale[0]
+    x, y, z = (max(abs(part), 0.001) for part in read_vector(value, "scale", most=100.0))
+    if not x == y == z:
+        remark("the mean scale is used for all axes")
+    return x if x == y == z else (x * y * z) ** (1 / 3)
 
 
 @method("simListSceneObjects")
@@ -65,14 +66,14 @@ def _list_objects(simulation: Simulation, args: Sequence[Any]) -> list[str]:
 
 @method("simListAssets")
 def _list_assets(simulation: Simulation, args: Sequence[Any]) -> list[str]:
-    return ["Cube", "Sphere", "Cylinder"]
+    return ["1M_Cube", "1M_Cube_Chamfer", "Cube", "Sphere", "Cylinder"]
 
 
 @method("simSpawnObject", least=3)
 def _spawn(simulation: Simulation, args: Sequence[Any]) -> str:
     name, asset = text(args[0], "object_name", MAX_NAME), text(args[1], "asset_name")
     pose = args[2]
-    place = to_world(read_pose(pose).position)
+    place = simulation.place(read_pose(pose).position)
     if any(map(math.isnan, place)):
         raise InputError("pose has NaN; give the position of a new object")
     if name in simulation.vehicles:
@@ -88,9 +89,9 @@ def _destroy(simulation: Simulation, args: Sequence[Any]) -> bool:
 
 @method("simSetSegmentationObjectID", least=2)
 def _set_id(simulation: Simulation, args: Sequence[Any]) -> bool:
-    name, found = text(args[0], "mesh_name", MAX_PATTERN), whole(args[1], "object_id", -1, 255)
+    name, found = text(args[0], "mesh_name", MAX_PATTERN), number(args[1], "object_id", -1, 255)
     is_pattern = flag(argument(args, 2, False), "is_name_regex")
-    return simulation.stage.set_id(name, found, is_pattern=is_pattern)
+    return simulation.stage.set_id(name, int(found), is_pattern=is_pattern)
 
 
 @method("simGetSegmentationObjectID", least=1)
@@ -106,10 +107,7 @@ def _add_vehicle(simulation: Simulation, args: Sequence[Any]) -> bool:
 
 @method("simSetWind", least=1)
 def _set_wind(simulation: Simulation, args: Sequence[Any]) -> None:
-    wind = to_world(read_vector(args[0], "wind"))
-    if max(map(abs, wind)) > 50.0:
-        raise InputError(f"wind={list(wind)} is out of range; give at most 50 m/s each way")
-    simulation.set_wind(wind)
+    simulation.set_wind(to_world(read_vector(args[0], "wind", most=50.0)))
 
 
 @method("simEnableWeather", least=1)
@@ -127,7 +125,7 @@ def _weather(simulation: Simulation, args: Sequence[Any]) -> None:
     if which == _FOG:
         simulation.stage.set_fog(share)
     elif share > 0.0:
-        raise InputError(f"param={which} is not supported; of the weather only fog ({_FOG}) is")
+        remark("of the weather only fog is shown")
 
 
 @method("simSetTimeOfDay", least=1)

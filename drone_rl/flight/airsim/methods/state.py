@@ -25,8 +25,7 @@ def _pose(simulation: Simulation, args: Sequence[Any]) -> Map:
 def _set_pose(simulation: Simulation, args: Sequence[Any]) -> None:
     vehicle = sim_vehicle_at(simulation, args, 2)
     ignore = flag(args[1], "ignore_collision")
-    vehicle.set_airsim_pose(read_pose(args[0]), ignore_collision=ignore)
-    simulation.stage.touch(vehicle.body.position[0])
+    simulation.teleport(vehicle, read_pose(args[0]), ignore_collision=ignore)
 
 
 @method("simGetGroundTruthKinematics")
@@ -43,7 +42,7 @@ def _set_kinematics(simulation: Simulation, args: Sequence[Any]) -> None:
     )
     vehicle = sim_vehicle_at(simulation, args, 2)
     vehicle.set_kinematics(pose, velocity, rates)
-    simulation.stage.touch(vehicle.body.position[0])
+    simulation.touch(vehicle)
 
 
 _STRATOSPHERE = 11_000.0
@@ -66,9 +65,14 @@ def _environment(simulation: Simulation, args: Sequence[Any]) -> Map:
     }
 
 
-@method("simGetCollisionInfo", "getCollisionInfo")
+@method("simGetCollisionInfo")
 def _collision(simulation: Simulation, args: Sequence[Any]) -> Map:
     return sim_vehicle_at(simulation, args, 0).collision()
+
+
+@method("getCollisionInfo")
+def _legacy_collision(simulation: Simulation, args: Sequence[Any]) -> Map:
+    return simulation.find("", is_sim_api=True).collision(is_legacy=True)
 
 
 @method("getRotorStates")

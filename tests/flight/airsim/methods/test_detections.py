@@ -15,7 +15,7 @@ def client(start):
     _, found = start(SMALL)
     height = found.call("simGetCameraInfo", "0", "")["pose"]["position"]["z_val"]
     two = {"x_val": 2.0, "y_val": 2.0, "z_val": 2.0}
-    found.call("simSpawnObject", "box", "Cube", pose(10.4, 0.0, height - 1.0), two)
+    found.call("simSpawnObject", "box", "Cube", pose(10.4, 0.0, height), two)
     return found
 
 

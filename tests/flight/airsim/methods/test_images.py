@@ -105,3 +105,13 @@ def test_wrong_image_requests(start, args, message):
     _, client = start(SMALL)
     with pytest.raises(RuntimeError, match=message):
         client.call("simGetImages", *args)
+
+
+def test_raw_images_of_the_1_2_clients_have_four_channels(start):
+    _, three = start(SMALL)
+    _, four = start(SMALL, raw_channels=4)
+    (bgr,), (rgba,) = (one.call("simGetImages", [request()], "") for one in (three, four))
+    colors = np.frombuffer(bgr["image_data_uint8"], np.uint8).reshape(8, 16, 3)
+    old = np.frombuffer(rgba["image_data_uint8"], np.uint8).reshape(8, 16, 4)
+    assert np.array_equal(old[..., :3], colors[..., ::-1]) and (old[..., 3] == 255).all()
+    assert rgba["camera_name"] == "0"

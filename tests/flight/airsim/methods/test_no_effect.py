@@ -14,6 +14,6 @@ def test_gains_change_no_flight_and_are_logged(start, caplog):
     _, client = start()
     gains = ([1.0] * 3, [0.0] * 3, [0.0] * 3, "")
     assert client.call("setVelocityControllerGains", *gains) is None
-    assert "controller gains are fixed here" in caplog.text
+    assert "gains are settings of the dynamics" in caplog.text
     with pytest.raises(RuntimeError, match="kp is not a list"):
         client.call("setVelocityControllerGains", 1, 2, 3)

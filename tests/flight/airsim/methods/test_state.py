@@ -1,8 +1,10 @@
 """Poses, sensors and surroundings of a vehicle."""
 
+from math import isnan
+
 import pytest
 
-from tests.flight.airsim.conftest import CV, pose
+from tests.flight.airsim.conftest import CV, YAW, pose
 
 
 def test_the_legacy_pose_is_a_map_in_order(start):
@@ -12,6 +14,52 @@ def test_the_legacy_pose_is_a_map_in_order(start):
     assert [*found["position"].values()] == [0.0, 0.0, 0.0]
     client.call("simSetPose", pose(1.0, 2.0, -3.0), True)
     assert [*client.call("simGetPose")["position"].values()] == [1.0, 2.0, -3.0]
+
+
+@pytest.mark.parametrize("method", ["getCollisionInfo", "simGetCollisionInfo"])
+@pytest.mark.parametrize("mode", ["Multirotor", "ComputerVision"])
+def test_a_cube_that_is_touched_is_reported_once(start, mode, method):
+    """The sweep to x = 30 m passes through cubes 0 and 1; a jump touches only where it ends."""
+    text = f'{{"SimMode": "{mode}", "Vehicles": {{"A": {{"Z": -2.5}}}}}}'
+    _, client = start(text, scene="cubes")
+
+    def teleport(x, ignore_collision):
+        client.call("simSetPose", pose(x, 0.0, 0.0), ignore_collision)
+
+    for _ in range(2):
+        client.call("reset")
+        for i in range(3):
+            client.call("simSetObjectPose", f"cube_{i}", pose(15.0 + 9.0 * i, 1.0, -2.5), True)
+        teleport(30.0, False)
+        for i in range(2):
+            found = client.call(method)
+            assert (found["has_collided"], found["object_name"]) == (True, f"cube_{i}")
+            assert found["object_id"] == client.call("simGetSegmentationObjectID", f"cube_{i}")
+            assert found["position"]["x_val"] == pytest.approx(15.0 - 1.65 + 9.0 * i)
+            assert found["impact_point"]["x_val"] == pytest.approx(15.0 - 1.25 + 9.0 * i)
+            assert isnan(client.call("simGetObjectPose", f"cube_{i}")["position"]["x_val"])
+        assert client.call(method)["has_collided"] is False
+        teleport(40.0, True)
+        assert client.call(method)["has_collided"] is False
+        teleport(34.0, True)
+        found = client.call(method)
+        assert (found["has_collided"], found["object_name"]) == (True, "cube_2")
+        assert client.call(method)["has_collided"] is False
+
+
+def test_a_cube_that_a_flight_touches_is_reported_after_it(start):
+    text = '{"Vehicles": {"A": {"Z": -2.5}}}'
+    _, client = start(text, scene="cubes")
+    client.call("enableApiControl", True)
+    client.call("simSetObjectPose", "cube_0", pose(6.0, 0.0, -2.5), True)
+    before = client.call("timestampNow")
+    client.call("moveToPosition", 9.0, 0.0, 0.0, 4.0, 60.0, 0, YAW, -1.0, 1.0)
+    assert client.call("getMultirotorState")["collision"]["object_name"] == "cube_0"
+    found = client.call("getCollisionInfo")
+    assert (found["has_collided"], found["object_name"]) == (True, "cube_0")
+    assert 4.35 <= found["position"]["x_val"] <= 4.5
+    assert before < found["time_stamp"] < client.call("timestampNow")
+    assert client.call("getCollisionInfo")["has_collided"] is False
 
 
 def test_line_of_sight_and_rotors(start):

@@ -1,0 +1,177 @@
+"""Collisions of a vehicle: which contacts are new, and which a client has not read yet."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple, Self
+
+import torch
+from torch import Tensor
+
+from drone_rl.flight.airsim import messages
+from drone_rl.flight.airsim.messages import Map, to_world
+from drone_rl.utils.errors import InputError
+
+GAP = 0.05
+"""Simulated seconds, over two control periods, after which a contact has ended."""
+_STEP = 0.05
+"""Metres between two tests for contact along a straight move."""
+_LONGEST = 2000.0
+"""Metres of such a move: its tests take memory."""
+
+
+class Collision(NamedTuple):
+    """A contact of a vehicle. World frame, metres."""
+
+    name: str
+    """Of the object."""
+    position: Sequence[float]
+    """The vehicle's."""
+    point: Sequence[float]
+    """On the object, nearest to the vehicle."""
+    normal: Sequence[float]
+    """Unit vector out of the object."""
+    depth: float
+    """Penetration of the vehicle's bounding sphere."""
+    time: float
+    """Seconds of the vehicle."""
+    is_event: bool = False
+    """Whether it is over before a client can ask: with a cube, which vanishes, or of a teleport."""
+
+    @classmethod
+    def event(cls, name: str, position: Tensor, point: Tensor, radius: float, time: float) -> Self:
+        """Return an event at the nearest point of an object. Shapes: (3,)."""
+        away = position - point
+        distance = float(away.norm())
+        normal = (away / distance).tolist() if distance > 0.0 else (0.0, 0.0, 1.0)
+        depth = max(0.0, radius - distance)
+        return cls(name, position.tolist(), point.tolist(), normal, depth, time, is_event=True)
+
+
+def collision_info(
+    found: Collision | None,
+    *,
+    has_collided: bool,
+    home: Sequence[float],
+    time_stamp: int,
+    number: int,
+) -> Map:
+    """Return a CollisionInfo, relative to the start position `home`, of an object's number."""
+    if found is None:
+        found = Collision("", home, home, (0.0, 0.0, 0.0), 0.0, 0.0)
+    point, place = (
+        messages.vector(to_world([a - b for a, b in zip(value, home, strict=True)]))
+        for value in (found.point, found.position)
+    )
+    return {
+        "has_collided": has_collided,
+        "penetration_depth": found.depth,
+        "time_stamp": time_stamp,
+        "normal": messages.vector(to_world(found.normal)),
+        "impact_point": point,
+        "position": place,
+        "object_name": found.name,
+        "object_id": number,
+    }
+
+
+class CollisionRecord:
+    """Collisions of one vehicle.
+
+    A collision is new if it is an event, or if the vehicle has not touched the object for `GAP`. It
+    is kept until a client has read it; of each object, the latest one.
+    """
+
+    def __init__(self) -> None:
+        """Create an empty record."""
+        self._contacts: dict[str, Collision] = {}
+        """Last contact with each object, events excepted."""
+        self.forget()
+
+    def forget(self) -> None:
+        """Drop all collisions, as at take-off. A contact that lasts does not become new by that."""
+        self._last: Collision | None = None
+        self._unread: dict[str, Collision] = {}
+
+    def part(self) -> None:
+        """Note that the vehicle was put elsewhere: contacts have ended."""
+        self._contacts.clear()
+
+    def add(self, found: Collision) -> None:
+        """Note a contact."""
+        if not found.is_event:
+            earlier = self._contacts.get(found.name)
+            self._contacts[found.name] = found
+            if earlier is not None and found.time - earlier.time <= GAP:
+                return
+        self._last = self._unread[found.name] = found
+
+    def read(self, *, clear: bool = True) -> tuple[Collision | None, bool]:
+        """Return an unread collision, else the last one, and whether it was unread.
+
+        With `clear` it is then read.
+        """
+        found, is_unread = next(iter(self._unread.values()), self._last), bool(self._unread)
+        if clear and found is not None:
+            self._unread.pop(found.name, None)
+        return found, is_unread
+
+    def read_current(self, now: float) -> tuple[Collision | None, bool]:
+        """Return an unread event, else a contact that lasts at the vehicle's time `now`, seconds.
+
+        See `read`; this is what clients of AirSim 1.1 expect.
+        """
+        event = next((one for one in self._unread.values() if one.is_event), None)
+        if event is not None:
+            return self._unread.pop(event.name), True
+        lasting = (one for one in self._contacts.values() if now - one.time <= GAP)
+        found = next(lasting, None)
+        return found or self._last, found is not None
+
+
+class Solids(NamedTuple):
+    """Axis-aligned boxes with a margin around them, which stop vehicles. Metres."""
+
+    names: Sequence[str]
+    centers: Tensor
+    """Shape: (S, 3)."""
+    half_sizes: Tensor
+    """Shape: (S, 3)."""
+    margins: Tensor
+    """Distances from a box up to which it is solid. Shape: (S,)."""
+
+    def sweep(
+        self, here: Tensor, there: Tensor, radius: float
+    ) -> tuple[Tensor, tuple[str, Tensor] | None]:
+        """Move a ball of a radius on a straight line, up to the first solid that it gets into.
+
+        Returns:
+            Its last free position, (3,); name of what stops it, and the point of that nearest to
+            the ball, (3,), or None if nothing does.
+
+        Raises:
+            InputError: The line is too long.
+        """
+        distance = float((there - here).norm())
+        if distance > _LONGEST:
+            raise InputError(
+                f"the pose is {distance:.6g} m away; give ignore_collision=True, or at most "
+                f"{_LONGEST:g} m"
+            )
+        shares = torch.linspace(0.0, 1.0, math.ceil(distance / _STEP) + 1, dtype=here.dtype)
+        places = here + shares[:, None] * (there - here)
+        apart = ((places[:, None] - self.centers).abs() - self.half_sizes).clamp(min=0.0)
+        gaps = apart.norm(dim=-1) - self.margins - radius
+        hits = gaps < gaps[0].clamp(max=0.0) - 1e-9
+        rows = hits.any(-1).nonzero()
+        if not len(rows):
+            return there, None
+        place, hit = places[int(rows[0]) - 1], int(hits[int(rows[0])].long().argmax())
+        point = nearest(place, self.centers[hit], self.half_sizes[hit])
+        away = place - point
+        point = point + away * (self.margins[hit] / away.norm().clamp(min=1e-9))
+        return place, (self.names[hit], point)
+
+
+def nearest(place: Tensor, center: Tensor, half_sizes: Tensor) -> Tensor:
+    """Return the point of an axis-aligned box that is nearest to a place. Shapes: (3,)."""
+    return torch.minimum(torch.maximum(place, center - half_sizes), center + half_sizes)
