@@ -247,7 +247,7 @@ function begin() {
   set("legend", `Seen from above, ahead is up. Triangle: drone. Line: trail. Squares: ${hello.object}s, dashed where one has gone.`);
   if (hello.watch) {
     document.body.classList.add("watching");
-    set("title", document.title = "Watch a program fly");
+    document.querySelector("h1").textContent = document.title = "Watch a program fly";
     set("task", `AirSim's server: ${hello.watch}.`);
     return;
   }
