@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
-from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from benchmarks.gamed_case import GamedCase
 from drone_rl.collectors import EpisodeCollector
@@ -24,6 +23,7 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.evaluation.evaluate import evaluate
 from drone_rl.evaluation.verdict import judge_for_selection
 from drone_rl.policies import MLP
+from drone_rl.policies.actor import exploring
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import ExternalPolicy, policy_from
 from drone_rl.policies.policy import BasePolicy, load_policy
@@ -79,8 +79,7 @@ def record(episodes: int, *, seed: int = KNOWN_SEED, stream: Stream = Stream.REP
         stream: Purpose of the environments.
     """
     policy = load_policy("good").in_task(num_cubes=TASK.num_cubes)
-    greedy = set_exploration_type(ExplorationType.DETERMINISTIC)
-    with policy.flying(episodes, seed=seed, stream=stream) as (env, actor), greedy:
+    with policy.flying(episodes, seed=seed, stream=stream) as (env, actor), exploring(greedy=True):
         batch = EpisodeCollector(env, actor).collect()
     frames: Any = batch["pixels"]
     actions: Any = batch["action"]

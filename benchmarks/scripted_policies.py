@@ -8,9 +8,10 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
-from torchrl.envs.utils import ExplorationType, exploration_type
+from torchrl.envs.utils import ExplorationType
 
 from drone_rl.config import TaskSettings
+from drone_rl.policies.actor import current_exploration
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import Side
 
@@ -150,7 +151,7 @@ class ScriptedPolicy(TensorDictModuleBase):
         return tensordict.set("action", self._sample(action))
 
     def _sample(self, action: Tensor) -> Tensor:
-        if self.script.confidence == 1 or exploration_type() != ExplorationType.RANDOM:
+        if self.script.confidence == 1 or current_exploration() != ExplorationType.RANDOM:
             return action
         shift = torch.randint(1, len(Move), action.shape, generator=self.generator)
         keeps = torch.rand(action.shape, generator=self.generator) < self.script.confidence

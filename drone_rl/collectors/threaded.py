@@ -1,5 +1,6 @@
 """Runs several collectors in parallel threads of one process."""
 
+import contextvars
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,7 @@ from torchrl.collectors import BaseCollector
 
 from drone_rl.collectors.batched_collector import BatchedCollector
 from drone_rl.collectors.episodes import EpisodeCollector
+from drone_rl.utils.threads import set_torch_threads
 
 if TYPE_CHECKING:
     from drone_rl.acceleration import ActivationCache
@@ -38,7 +40,7 @@ class ThreadedCollector(BaseCollector):
         self.collectors = list(collectors)
         # one torch thread each: the collectors are what runs in parallel
         self._pool = ThreadPoolExecutor(
-            len(self.collectors), "collect", initializer=torch.set_num_threads, initargs=(1,)
+            len(self.collectors), "collect", initializer=set_torch_threads, initargs=(1,)
         )
 
     @property
@@ -63,7 +65,8 @@ class ThreadedCollector(BaseCollector):
 
         ("collector", "traj_ids") are unique only within the part of one collector.
         """
-        parts = list(self._pool.map(lambda collector: collector.collect(), self.collectors))
+        own = [contextvars.copy_context() for _ in self.collectors]  # as in the calling thread
+        parts = list(self._pool.map(lambda c, at: at.run(c.collect), self.collectors, own))
         joined: Any = torch.cat  # its annotation lacks TensorDicts
         batch = parts[0] if len(parts) == 1 else joined(parts)
         return batch if self.postproc is None else self.postproc(batch)

@@ -12,11 +12,11 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
-from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.metrics import Episodes
+from drone_rl.policies.actor import exploring
 from drone_rl.sim.tasks import State
 from drone_rl.utils.provenance import num_cores
 
@@ -35,11 +35,6 @@ class StepLog:
     def add(self, batch: TensorDictBase) -> None:
         """Add a batch of complete episodes, one after the other."""
         self.actions += cast(Tensor, batch["action"]).cpu().split(_lengths(batch).tolist())
-
-
-def exploration(greedy: bool) -> ExplorationType:
-    """Return how actors choose actions: the most probable one, or a sample."""
-    return ExplorationType("deterministic" if greedy else "random")
 
 
 def run_episodes(
@@ -95,7 +90,7 @@ def episode_batches(
     if log is not None:
         log.implementation = collector.source.implementation
     while (missing := num_episodes - collector.episodes) > 0:
-        with set_exploration_type(exploration(greedy)):
+        with exploring(greedy=greedy):
             batch = collector.collect(min(missing, env.batch_size[0]) if is_exact else None)
         if log is not None:
             log.add(batch)

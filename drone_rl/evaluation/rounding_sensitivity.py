@@ -97,7 +97,8 @@ def check_rounding(
     """Run the first episodes again in PyTorch, with a bound on the rounding error at every frame.
 
     They are compared with greedy episodes and their actions, `greedy` and `log`, which started from
-    the present state of the environments. Return None for an actor without a network.
+    the present state of the environments. Return None for an actor without a
+    network that depends on single images only.
 
     Raises:
         InputError: An output is not finite, or a third-party network depends on other frames.
@@ -108,7 +109,8 @@ def check_rounding(
 
 def _network_of(actor: TensorDictModuleBase) -> ImageNetwork | None:
     network = getattr(actor, "network", None)
-    return network if isinstance(network, ImageNetwork) else None
+    is_checked = isinstance(network, ImageNetwork) and not network.is_recurrent
+    return network if is_checked else None
 
 
 def _check_rounding(

@@ -17,12 +17,11 @@ from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import TransformedEnv
-from torchrl.envs.utils import set_exploration_type
 
 from drone_rl.envs import DroneEnv
 from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
 from drone_rl.evaluation import instruments
-from drone_rl.evaluation.rollouts import exploration
+from drone_rl.policies.actor import exploring
 from drone_rl.policies.policy import Policy
 from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.sim.actions import MOVES, Actions
@@ -122,7 +121,7 @@ def view(policy: Policy, *, greedy: bool = True, seed: int = 0, **how: Any) -> N
         seen = TensorDict(
             {"pixels": apply_to_frames(transforms, frames)}, [1], device=worlds.device
         )
-        with set_exploration_type(exploration(greedy)):
+        with exploring(greedy=greedy):
             return actor(seen)["action"][0].cpu().numpy()
 
     with contextlib.closing(env):
@@ -170,7 +169,7 @@ def run_episode(
     """
     state = env.reset()
     while not bool(state["done"].all()):
-        with set_exploration_type(exploration(greedy)):  # not while the caller has the state
+        with exploring(greedy=greedy):  # not while the caller has the state
             acted = actor(state.clone(False))
         yield state, acted
         state = env.step(acted)["next"]

@@ -3,7 +3,6 @@
 import copy
 import dataclasses
 import itertools
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import torch
@@ -19,6 +18,7 @@ from drone_rl.explanations.settings import ClassModelSettings
 from drone_rl.policies import ImageNetwork
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import plain_generator
+from drone_rl.utils.threads import pool_like_caller
 
 OBJECTIVES: tuple[Objective, ...] = ("probability", "logit")
 NO_GRADIENTS = (
@@ -38,7 +38,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
         network = copy.deepcopy(context.network)  # it accumulates gradients
         return search(network, statistics, objective, seed=context.seed.value)
 
-    with ThreadPoolExecutor(len(OBJECTIVES)) as pool:  # a small batch uses one core
+    with pool_like_caller(len(OBJECTIVES)) as pool:  # a small batch uses one core
         found = dict(zip(OBJECTIVES, pool.map(optimize, OBJECTIVES), strict=True))
     numbers = {
         "statistics": dataclasses.asdict(statistics),

@@ -4,7 +4,6 @@ import dataclasses
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
@@ -34,10 +33,10 @@ from drone_rl.utils.provenance import provenance
 from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import seed_line
+from drone_rl.utils.threads import pool_like_caller, torch_threads
 from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import find_domain
 from drone_rl.verdicts.recorded import record_verdict
-from drone_rl.verification.prover.policy_spec import one_thread
 
 _Result = tuple[dict[str, Any], dict[str, NDArray], float] | LeftOutError  # with seconds
 Given = str | Path | BasePolicy | Logits  # a policy or something that `as_policy` converts to one
@@ -139,7 +138,7 @@ def explain(
 
     for one in chosen.values():  # refused before any analysis
         require_memoryless(one.make_network(), "explain")
-    with one_thread():  # same results for any number of cores; threads would gain nothing
+    with torch_threads(1):  # same results for any number of cores; more would gain nothing
         numbers = {name: explain_one(one, folders[name]) for name, one in chosen.items()}
     for name, one in chosen.items():
         record_verdict(folders[name], one, numbers[name]["verdict"])
@@ -216,7 +215,7 @@ def _run(
 ) -> dict[str, _Result]:
     """Run all sections, those in `THREADED` in a second thread."""
     twin, results = context.copied_for_thread(), dict[str, _Result]()
-    with ThreadPoolExecutor(1) as pool:
+    with pool_like_caller(1) as pool:
         aside = {t: pool.submit(_compute, sections[t], twin) for t in sections if t in THREADED}
         for title in sorted(sections, key=THREADED.__contains__):
             progress(title.replace("_", " "))

@@ -17,13 +17,13 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import TransformedEnv
-from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.envs import worlds_of
 from drone_rl.explanations.hooks import features, outputs, probabilities
 from drone_rl.explanations.scenes import Region, Scenes
 from drone_rl.policies import ImageNetwork
+from drone_rl.policies.actor import exploring
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.dynamics.state import heading_of
@@ -128,7 +128,7 @@ def collect(
     reader = _WithTruth(actor, (*worlds.task.entries, *_POSE))
     collector = EpisodeCollector(env, reader, next_keys=after)
     batches = []
-    with set_exploration_type(ExplorationType.RANDOM):
+    with exploring(greedy=False):
         while collector.episodes < num_episodes or collector.frames < num_frames:
             missing = num_episodes - collector.episodes
             batches.append(collector.collect(missing if missing > 0 else None))

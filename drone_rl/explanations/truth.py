@@ -1,7 +1,6 @@
 """Section "truth": tests of the heat maps against the effects of changes to the scene."""
 
 import dataclasses
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import State
 from drone_rl.utils.intervals import episode_means, mean_bounds, mean_interval
+from drone_rl.utils.threads import pool_like_caller
 
 SHARES = (0.0, 0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
 """Fractions of the pixels that are replaced. A far cube covers a hundredth of the frame."""
@@ -65,7 +65,7 @@ def _tests(context: Context, trial: Trial) -> dict[str, Any]:
     methods = trust.method_maps(context.explainer) if context.network.has_weights else {}
     maps = {name: trial.maps(method) for name, method in methods.items()}
     every = {**maps, **trial.placebos}
-    with ThreadPoolExecutor(2) as pool:
+    with pool_like_caller(2) as pool:
         found = pool.map(
             lambda heat: deletion_insertion(trial, heat, context.absent), every.values()
         )

@@ -7,11 +7,13 @@ from tensordict import TensorDict, TensorDictBase, TensorDictParams
 from tensordict.nn import ProbabilisticTensorDictSequential, dispatch
 from tensordict.utils import NestedKey
 from torch import Tensor
-from torchrl.modules import set_recurrent_mode
+from torchrl.envs.utils import ExplorationType, exploration_type
 from torchrl.objectives import LossModule
 
 from drone_rl.config.learning import Reinforce
+from drone_rl.policies.recurrent import WHOLE_EPISODES
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.threads import set_in_thread
 
 _DONE: NestedKey = ("next", "done")
 
@@ -79,6 +81,11 @@ class ReinforceLoss(LossModule):
         self.register_buffer("entropy_coeff", torch.tensor(float(entropy_coeff)))
 
     @property
+    def deterministic_sampling_mode(self) -> ExplorationType | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The current type, which TorchRL therefore leaves to other threads; nothing is sampled."""
+        return exploration_type()
+
+    @property
     def in_keys(self) -> list[NestedKey]:
         """What `forward` reads."""
         keys = self.tensor_keys
@@ -120,7 +127,8 @@ class ReinforceLoss(LossModule):
                 f"the batch has no entry {self.tensor_keys.return_to_go!r}; "
                 "pass it through a return estimator first"
             )
-        with self.actor_network_params.to_module(self.actor_network), set_recurrent_mode(True):
+        whole = set_in_thread(WHOLE_EPISODES, True)
+        with self.actor_network_params.to_module(self.actor_network), whole:
             distribution = self.actor_network.get_dist(
                 tensordict.select(*self.actor_network.in_keys)
             )

@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
 import torch
 from tensordict import TensorDictBase
-from tensordict.nn import InteractionType, TensorDictModule, TensorDictModuleBase, dispatch
+from tensordict.nn import InteractionType, TensorDictModule, dispatch
 from torch import Tensor, nn
 from torch.distributions import Categorical, Distribution
 from torch.distributions.constraints import Constraint
@@ -17,7 +19,9 @@ from torchrl.envs.utils import ExplorationType, exploration_type
 from torchrl.modules import ProbabilisticActor
 
 from drone_rl.policies.networks import ImageNetwork
+from drone_rl.policies.recurrent import WHOLE_EPISODES
 from drone_rl.sim.continuous_actions import normal_of
+from drone_rl.utils.threads import set_in_thread
 
 
 class RandomSource:
@@ -29,6 +33,22 @@ class RandomSource:
     def __deepcopy__(self, memo: dict) -> "RandomSource":
         """Return itself."""
         return self
+
+
+_EXPLORATION: ContextVar[ExplorationType | None] = ContextVar("exploration", default=None)
+
+
+def exploring(*, greedy: bool) -> AbstractContextManager[None]:
+    """Make actors take the most probable action, or sample, in the calling thread only.
+
+    TorchRL's `set_exploration_type`, which this overrides, changes all threads of the process.
+    """
+    return set_in_thread(_EXPLORATION, ExplorationType("deterministic" if greedy else "random"))
+
+
+def current_exploration() -> ExplorationType | None:
+    """Return how actors choose actions: by `exploring`, else by `set_exploration_type`."""
+    return _EXPLORATION.get() or exploration_type()
 
 
 MAX_ACTION = 1 - 1e-6
@@ -131,8 +151,8 @@ class DirectActor(ProbabilisticActor):
 
     @property
     def exploration(self) -> ExplorationType | None:
-        """How actions are chosen now: by `set_exploration_type`, else by default."""
-        return exploration_type() or self._parts[1].default_interaction_type
+        """How actions are chosen now: as in `current_exploration`, else by default."""
+        return current_exploration() or self._parts[1].default_interaction_type
 
     @property
     def generator(self) -> torch.Generator | None:
@@ -151,22 +171,34 @@ class DirectActor(ProbabilisticActor):
         tensordict_out: TensorDictBase | None = None,
         **kwargs: object,
     ) -> TensorDictBase:
-        """Write "logits", the network's outputs, and actions."""
+        """Write the network's outputs, of which "logits" are the first, and actions."""
         network, head = self._parts
         how = self.exploration
         is_known = how in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
         if tensordict_out is not None or kwargs or not is_known:
             return super().forward(tensordict, tensordict_out, **kwargs)
-        logits = network.module(*(tensordict.get(key) for key in network.in_keys))
+        outputs = network.module(*(tensordict.get(key) for key in network.in_keys))
+        outputs = outputs if isinstance(outputs, tuple) else (outputs,)
+        logits = outputs[0]
         distribution = head.distribution_class(logits=logits, **head.distribution_kwargs)
         random = how == ExplorationType.RANDOM
         action = distribution.sample() if random else distribution.deterministic_sample
-        tensordict.set(network.out_keys[0], logits)
+        for key, value in zip(network.out_keys, outputs, strict=True):
+            tensordict.set(key, value)
         return tensordict.set(head.out_keys[0], action)
 
 
 class CategoricalActor(DirectActor):
     """A `DirectActor` with discrete actions; the fused kernel requires exactly this type."""
+
+
+class RecurrentActor(DirectActor):
+    """A `DirectActor` whose network remembers; it acts in one step of each environment."""
+
+    def forward(self, *args: Any, **kwargs: Any) -> TensorDictBase:
+        """See `DirectActor.forward`."""
+        with set_in_thread(WHOLE_EPISODES, False):
+            return super().forward(*args, **kwargs)
 
 
 def distribution_of(dtype: torch.dtype) -> type[SeededCategorical | SquashedNormal]:
@@ -179,8 +211,9 @@ def make_actor(
 ) -> ProbabilisticActor:
     """Return a stochastic policy: "pixels" to "logits" to "action" (chapter, Eq. 9).
 
-    It samples by default. Under `set_exploration_type(ExplorationType.DETERMINISTIC)` it takes the
-    most probable action, or the median of continuous ones.
+    It samples by default. Within `exploring(greedy=True)`, or TorchRL's
+    `set_exploration_type(ExplorationType.DETERMINISTIC)`, it takes the most probable action, or the
+    median of continuous ones.
 
     Args:
         network: Frames (*, C, H, W) to outputs (*, num_outputs): logits of discrete actions. A
@@ -193,7 +226,7 @@ def make_actor(
     make = CategoricalActor if kind is SeededCategorical else DirectActor
     image_network = network if isinstance(network, ImageNetwork) else ImageNetwork
     if image_network.is_recurrent:
-        make = ProbabilisticActor  # a `DirectActor` supports only networks with one output
+        make = RecurrentActor
     return make(
         TensorDictModule(
             network, in_keys=list(image_network.in_keys), out_keys=list(image_network.out_keys)
@@ -204,18 +237,3 @@ def make_actor(
         distribution_class=kind,
         distribution_kwargs={"source": None if generator is None else RandomSource(generator)},
     )
-
-
-def choose_action(
-    actor: TensorDictModuleBase, tensordict: TensorDictBase, *, greedy: bool
-) -> TensorDictBase:
-    """Write what an actor of `make_actor` writes, whatever the exploration type is.
-
-    `set_exploration_type` changes all threads of the process; this may run in any of them.
-    """
-    parts: Any = actor.module  # torch's modules are annotated to hold anything
-    network, head = parts
-    acted = network(tensordict)
-    distribution = head.get_dist(acted)
-    action = distribution.deterministic_sample if greedy else distribution.sample()
-    return acted.set(head.out_keys[0], action)

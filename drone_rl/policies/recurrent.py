@@ -1,6 +1,7 @@
 """Policies that remember: an LSTM between the layers that see a frame and the logits."""
 
 from collections.abc import Sequence
+from contextvars import ContextVar
 from typing import NamedTuple
 
 import torch
@@ -26,6 +27,19 @@ _REMEDY = "give another policy; verdict, evaluate, shifts, play and export suppo
 _FEATURES, _REMEMBERED = "features", "remembered"
 
 
+WHOLE_EPISODES: ContextVar[bool | None] = ContextVar("whole_episodes", default=None)
+"""Whether a network evaluates whole episodes in this thread; None for TorchRL's mode, which loss
+modules set for all threads of the process."""
+
+
+class _Lstm(LSTMModule):
+    @property
+    def recurrent_mode(self) -> bool:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """See `WHOLE_EPISODES`."""
+        mode = WHOLE_EPISODES.get()
+        return super().recurrent_mode if mode is None else mode
+
+
 class Memory(NamedTuple):
     """State of the LSTM for N environments, zero when an episode starts."""
 
@@ -37,9 +51,10 @@ class Memory(NamedTuple):
 class RecurrentNetwork(ImageNetwork):
     """`SmallCNN`'s layers up to the features, TorchRL's `LSTMModule`, and a linear layer.
 
-    Within `set_recurrent_mode(True)` it evaluates whole episodes, one after the other, each from
-    the state of its first step; else one step of each environment. The forget gates' biases are
-    initially 1, so that the gradient of early frames doesn't vanish; other weights are orthogonal.
+    If `WHOLE_EPISODES`, or within TorchRL's `set_recurrent_mode(True)`, it evaluates whole
+    episodes, one after the other, each from the state of its first step; else one step of each
+    environment. The forget gates' biases are initially 1, so that the gradient of early frames
+    doesn't vanish; other weights are orthogonal.
     """
 
     is_recurrent = True
@@ -62,7 +77,7 @@ class RecurrentNetwork(ImageNetwork):
         sizes = {"patch": patch, "channels": channels, "hidden": hidden}
         seeing = SmallCNN(in_shape, 1, **sizes, generator=generator)
         self.trunk = Trunk(seeing)
-        self.lstm = LSTMModule(
+        self.lstm = _Lstm(
             input_size=seeing.layers.get_parameter("logits.weight").shape[1],
             hidden_size=memory,
             in_keys=[_FEATURES, HIDDEN, CELL],

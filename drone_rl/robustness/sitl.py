@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torchrl.envs.utils import ExplorationType, set_exploration_type, step_mdp
+from torchrl.envs.utils import step_mdp
 
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.metrics import Episodes, summarise
@@ -16,6 +16,7 @@ from drone_rl.flight.betaflight.build import find_firmware
 from drone_rl.flight.betaflight.sitl import Betaflight, betaflight_drone
 from drone_rl.flight.in_the_loop.drone import NotReadyError
 from drone_rl.flight.in_the_loop.dynamics import InTheLoopDynamics
+from drone_rl.policies.actor import exploring
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
@@ -144,7 +145,7 @@ def _fly(
     began = time.monotonic()
     settings = policy.dynamics.replace(mode="simple_flight")
     with contextlib.ExitStack() as stack:
-        stack.enter_context(set_exploration_type(ExplorationType.DETERMINISTIC))
+        stack.enter_context(exploring(greedy=True))
         drone = stack.enter_context(
             betaflight_drone(settings, firmware=program, folder=folder, isolated=isolated)
         )

@@ -80,19 +80,12 @@ def make_learner(settings: TrainSettings, components: Components) -> Any:
 
 
 def learning_actor(settings: TrainSettings, components: Components) -> Any:
-    """Return the actor that the loss evaluates, with a fused network if it is supported.
-
-    The fused kernel has `trainer.num_threads` threads of its own; PyTorch then gets one.
-    """
+    """Return the actor that the loss evaluates, with a fused network if it is supported."""
     actor, threads = components.collector.actor, settings.trainer.num_threads
-    if components.network.is_recurrent:
-        torch.set_num_threads(1)  # the steps of an LSTM are too small to share
-        return actor
-    if not settings.trainer.compiled:
+    if components.network.is_recurrent or not settings.trainer.compiled:
         return actor
     cache = components.collector.cache_activations
     fused = accelerated_gradients(components.network, threads, cache=cache)
     if fused is components.network:
         return actor
-    torch.set_num_threads(1)
     return make_actor(fused, actor.spec["action"])

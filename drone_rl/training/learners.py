@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Protocol
 
@@ -23,6 +24,10 @@ from drone_rl.utils.errors import InputError
 ADVANTAGE, TARGET, ENTROPY = "advantage", "value_target", "entropy"
 _OPTIMIZER = "optimiser"
 """Key of the optimizer's state in checkpoints; the spelling is part of the file format."""
+
+
+_MODES = threading.Lock()
+"""TorchRL's loss modules set modes of the whole process, and restore them afterwards."""
 
 
 class NotANumberError(RuntimeError):
@@ -86,6 +91,8 @@ class GradientLearner:
     """Stepped after each update."""
     max_grad_norm: float | None = None
     """Clip the gradient to this norm; None for no clipping."""
+    num_threads: int | None = None
+    """PyTorch's threads while it learns; None for those of the trainer's settings."""
 
     def _step_scheduler(self) -> float:
         """Step the scheduler; return the learning rate of the next update."""
@@ -340,7 +347,8 @@ def accumulate(
     for chunk in batch.split(chunks):
         share = len(chunk) / len(batch)
         weight = divisor(chunk) / divisor(batch)
-        metrics = losses(chunk)
+        with _MODES:
+            metrics = losses(chunk)
         terms = {k: v for k, v in metrics.items() if k.startswith("loss_")}
         for name, value in terms.items():
             check_finite(value, name)

@@ -5,20 +5,20 @@ script of the same components. A critic and Ray workers are in `variants.py`, fi
 `run_folder.py`, imitation in `cloning.py`.
 """
 
+import contextlib
 import logging
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import torch
-
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
 from drone_rl.config.learning import Episodes, Reinforce
-from drone_rl.config.registry import implements
+from drone_rl.config.registry import implements, modules_of
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.objectives import ReinforceLoss
 from drone_rl.policies import make_actor
+from drone_rl.policies.actor import exploring
 from drone_rl.policies.zoo import describe
 from drone_rl.sim.tasks import FailureReplayTask, as_task
 from drone_rl.training import components, run_folder
@@ -33,7 +33,8 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.memory import bound_kernels
 from drone_rl.utils.progress import Progress
 from drone_rl.utils.provenance import num_cores
-from drone_rl.utils.seeding import Stream, torch_generator
+from drone_rl.utils.seeding import Stream, as_global_stream, torch_generator
+from drone_rl.utils.threads import torch_threads
 
 _log = logging.getLogger(__name__)
 
@@ -98,39 +99,49 @@ def learn(
     run, limits = RunFolder(folder), settings.trainer
     target = run_folder.target_of(settings)
     demonstrations = run.prepare(settings, state)
-    torch.set_num_threads(limits.num_threads)  # sums depend on it: equal on every machine
-    bound_kernels()
-    parts = components.make_collector(settings, replay)
-    confirmation = Confirmation(settings, parts.network) if limits.confirm_episodes else None
-    checkpoints = run.checkpoints(settings)
-    collapse = CollapseCheck(target or as_task(settings.task).largest_reward)
-    learner = components.make_learner(settings, parts)  # by default `reinforce_learner`, below
-    trainer = Trainer(
-        collector=parts.collector,
-        learner=learner,
-        callbacks=[CsvCallback(folder / "metrics.csv"), checkpoints, collapse, *callbacks],
-        generators=parts.generators,
-        target=target,
-        confirm=confirmation,
-        total_frames=limits.total_frames,
-        total_episodes=limits.total_episodes,
-        running_decay=limits.running_decay,
-        ends=run_folder.possible_ends(settings),
-    )
-    try:
-        run.resume(trainer, checkpoints, state)
-        checkpoints.extra |= clone(settings, parts.network, demonstrations, trainer.callbacks)
-        del demonstrations  # release memory
-        with trainer.running() as batches:
-            for batch in batches:
-                trainer.finish_update(batch, learner.update(batch))  # log, save, other callbacks
-    except NotANumberError as error:
-        raise InputError(f"{error}; the last good checkpoint is {checkpoints.last_path}") from error
-    finally:
-        parts.collector.shutdown()
+    stream = torch_generator(settings.seed, Stream.TORCH)
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(exploring(greedy=False))
+        stack.enter_context(torch_threads(limits.num_threads))  # sums depend on it
+        bound_kernels()
+        with as_global_stream(stream):
+            parts = components.make_collector(settings, replay)
+            stack.callback(parts.collector.shutdown)
+            learner = components.make_learner(settings, parts)  # by default `reinforce_learner`
+        confirmation = Confirmation(settings, parts.network) if limits.confirm_episodes else None
         if confirmation is not None:
-            confirmation.close()
-    return run_folder.result_of(trainer, settings, confirmation, checkpoints) | collapse.result
+            stack.callback(confirmation.close)
+        checkpoints = run.checkpoints(settings)
+        collapse = CollapseCheck(target or as_task(settings.task).largest_reward)
+        first = (CsvCallback(folder / "metrics.csv"), checkpoints, collapse)
+        trainer = Trainer(
+            collector=parts.collector,
+            learner=learner,
+            callbacks=[*first, *callbacks],
+            generators=parts.generators,
+            stream=stream if modules_of(settings) else None,
+            target=target,
+            confirm=confirmation,
+            total_frames=limits.total_frames,
+            total_episodes=limits.total_episodes,
+            running_decay=limits.running_decay,
+            ends=run_folder.possible_ends(settings),
+        )
+        own_threads = getattr(learner, "num_threads", None)
+        stack.enter_context(torch_threads(own_threads or limits.num_threads))
+        run.resume(trainer, checkpoints, state)
+        with as_global_stream(stream):
+            cloned = clone(settings, parts.network, demonstrations, trainer.callbacks)
+        checkpoints.extra |= cloned
+        del demonstrations  # release memory
+        try:
+            with trainer.running() as batches:
+                for batch in batches:
+                    trainer.finish_update(batch, learner.update(batch))  # log, save, callbacks
+        except NotANumberError as error:
+            last = checkpoints.last_path
+            raise InputError(f"{error}; the last good checkpoint is {last}") from error
+        return run_folder.result_of(trainer, settings, confirmation, checkpoints) | collapse.result
 
 
 @implements(Episodes)
@@ -185,6 +196,7 @@ def make_groups(
 def reinforce_learner(settings: TrainSettings, parts: Components, **own: Any) -> ReinforceLearner:
     """Make the learner without a critic; `own` are the settings of its loss."""
     limits, actor = settings.trainer, components.learning_actor(settings, parts)
+    is_fused = actor is not parts.collector.actor  # its kernel has `limits.num_threads` threads
     optimizer = settings.optimizer.make(parts.network.parameters())
     return ReinforceLearner(
         network=parts.network,
@@ -194,4 +206,6 @@ def reinforce_learner(settings: TrainSettings, parts: Components, **own: Any) ->
         max_grad_norm=limits.max_grad_norm,
         chunk_frames=limits.chunk_frames,
         whole_episodes=parts.network.is_recurrent,
+        # the steps of an LSTM are too small to share
+        num_threads=1 if is_fused or parts.network.is_recurrent else None,
     )

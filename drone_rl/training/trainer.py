@@ -6,7 +6,7 @@ import enum
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from types import FrameType
 from typing import Any, cast
 
@@ -21,6 +21,7 @@ from drone_rl.training.restore import check_fits
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.memory import return_freed_memory
 from drone_rl.utils.plugins import place_of
+from drone_rl.utils.seeding import as_global_stream
 
 _REPEAT_S = 1.0
 """Seconds in which another SIGTERM is the same request: a cluster and a sweep may both send it."""
@@ -106,6 +107,9 @@ class Trainer:
     """Called after every update, in order."""
     generators: Mapping[str, torch.Generator] = dataclasses.field(default_factory=dict)
     """Random streams to save and restore, by name."""
+    stream: torch.Generator | None = None
+    """Stream of code that draws from torch's global one, such as dropout; it is the global one in
+    each iteration, and other threads that need theirs wait. None if there is no such code."""
     total_frames: int = 2_000_000
     """Stop once this many frames were collected."""
     total_episodes: int | None = None
@@ -152,7 +156,8 @@ class Trainer:
         with self._signals():
             self._notify("on_start")
             try:
-                yield self._batches()
+                with contextlib.closing(self._batches()) as batches:
+                    yield batches
             except NotANumberError as error:
                 self._notify("on_failure")
                 raise NotANumberError(
@@ -161,18 +166,21 @@ class Trainer:
                 ) from None
             self._notify("on_end", self._reason)
 
-    def _batches(self) -> Iterator[TensorDictBase]:
+    def _batches(self) -> Generator[TensorDictBase]:
         batches = iter(self.collector)
-        while not (reason := self._stop_reason()):
-            self._begin = time.perf_counter()
-            batch = next(batches, None)
-            if batch is None:
-                reason = "frames"
-                break
-            self._collected = time.perf_counter()
-            check_batch(batch, self.learner.in_keys, type(self.learner).__name__)
-            check_rewards(batch)
-            yield batch
+        while True:
+            with as_global_stream(self.stream):
+                if reason := self._stop_reason():
+                    break
+                self._begin = time.perf_counter()
+                batch = next(batches, None)
+                if batch is None:
+                    reason = "frames"
+                    break
+                self._collected = time.perf_counter()
+                check_batch(batch, self.learner.in_keys, type(self.learner).__name__)
+                check_rewards(batch)
+                yield batch
             if self.progress.updates % TRIM_INTERVAL == 0:
                 return_freed_memory()
         self._reason = reason
@@ -206,6 +214,8 @@ class Trainer:
             "time/collect_s": self._collected - self._begin,
             "time/learn_s": end - self._collected,
         }
+        if self.stream is not None:
+            self.stream.set_state(torch.get_rng_state())
         self._notify("on_update", logged)
 
     @property
@@ -286,7 +296,7 @@ class Trainer:
             **({} if estimator is None else {"estimator": estimator.state_dict()}),
             "collector": self.collector.state_dict(),
             "generators": {k: g.get_state() for k, g in self.generators.items()},
-            "torch_rng": torch.get_rng_state(),
+            "torch_rng": (self.stream or torch.default_generator).get_state(),
             "progress": dataclasses.asdict(self.progress),
         }
 
@@ -309,9 +319,10 @@ class Trainer:
             self.collector.load_state_dict(state["collector"])
             if self._estimator is not None:
                 self._estimator.load_state_dict(state["estimator"])
-            for name, generator in self.generators.items():
-                generator.set_state(state["generators"][name])
-            torch.set_rng_state(state["torch_rng"])
+            streams = {**self.generators, **({"": self.stream} if self.stream else {})}
+            states = {**state["generators"], "": state["torch_rng"]}
+            for name, generator in streams.items():
+                generator.set_state(states[name])
             self.progress = Progress(**state["progress"])
         except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__

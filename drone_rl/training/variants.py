@@ -6,6 +6,7 @@ import logging
 from typing import Any
 
 import torch
+from torchrl.envs.utils import exploration_type
 
 from drone_rl.collectors import EpisodeCollector, RolloutCollector, ThreadedCollector
 from drone_rl.config.configuration import as_config, from_config, locate
@@ -54,6 +55,7 @@ def actor_critic_learner(
     critic = None if objective.shares_trunk else describe(settings).build_critic(weights)
     model = ActorCritic(components.network, critic, weights).to(settings.device)
     loss = locate(objective.target)(model.actor, model.critic, functional=False, **own)
+    loss.deterministic_sampling_mode = exploration_type()  # see `ReinforceLoss`
     optimizer = settings.optimizer.make(model.parameters())
     learner = ActorCriticLearner(
         network=components.network,

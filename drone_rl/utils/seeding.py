@@ -5,9 +5,12 @@ environments, of two purposes, or of seed and seed + 1 don't overlap. The except
 `side_stream`, and `plain_generator` and `legacy_seed`, which use the seed itself.
 """
 
+import contextlib
 import dataclasses
 import enum
 import secrets
+import threading
+from collections.abc import Iterator
 from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
@@ -44,12 +47,17 @@ class Stream(enum.IntEnum):
     """Positions of targets in explanations."""
     CLONING = 13
     """Held-out demonstrations, and the order of frames, in behavior cloning."""
+    TORCH = 14
+    """Draws of a training's parts that have no generator of their own, such as dropout."""
 
 
 FRESH_BITS = 48
 """Bits of a fresh seed: exact in JSON and JavaScript, and short."""
 _LEGACY_BITS = 32
 """Bits of the largest seed of `numpy.random.RandomState`."""
+
+_GLOBAL = threading.RLock()
+"""Held while torch's global generator continues another stream."""
 
 
 class _Seeded(Protocol):
@@ -143,6 +151,26 @@ def torch_generator(
     """
     state = seed_sequence(seed, stream, number).generate_state(1, np.uint64)[0]
     return torch.Generator(device).manual_seed(int(state >> np.uint64(1)))
+
+
+@contextlib.contextmanager
+def as_global_stream(generator: torch.Generator | None) -> Iterator[None]:
+    """Continue a CPU stream by torch's global generator; then restore that. None: do nothing.
+
+    For code that draws from no other, such as the initialization of layers and dropout. Other
+    threads wait to enter.
+    """
+    if generator is None:
+        yield
+        return
+    with _GLOBAL:
+        before = torch.get_rng_state()
+        torch.set_rng_state(generator.get_state())
+        try:
+            yield
+        finally:
+            generator.set_state(torch.get_rng_state())
+            torch.set_rng_state(before)
 
 
 def get_state(random_state: np.random.RandomState) -> dict[str, int]:

@@ -9,9 +9,9 @@ import torch
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import TransformedEnv
-from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.envs import worlds_of
+from drone_rl.policies.actor import exploring
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import make_onnx, open_onnx
 from drone_rl.utils.errors import InputError
@@ -53,7 +53,7 @@ def agreement(
     base: Any = env.base_env
     actions = worlds_of(env).dynamics.actions
     probs, others, state = [], [], env.reset()
-    with set_exploration_type(ExplorationType.RANDOM):
+    with exploring(greedy=False):
         for _ in range(steps):
             state = actor(state)
             probs.append(actions.probabilities(state["logits"]).cpu())

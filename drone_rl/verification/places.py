@@ -23,9 +23,10 @@ from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import say
+from drone_rl.utils.threads import torch_threads
 from drone_rl.verification.prover.action_map import ActionMap, map_actions
 from drone_rl.verification.prover.arrangement import Window
-from drone_rl.verification.prover.policy_spec import make_policy_spec, one_thread
+from drone_rl.verification.prover.policy_spec import make_policy_spec
 from drone_rl.verification.text import rows, say_places
 
 
@@ -120,7 +121,7 @@ def places(
         shown = [(whole, torch.from_numpy(faces))]
         return spec.compositor.see(spec.compositor.paint_one(shown, len(faces)))
 
-    with one_thread(), closing(spec):
+    with torch_threads(1), closing(spec):
         progress("comparing the renderer's images")
         compared = spec.images.check(
             settings.compared, np.random.RandomState(legacy_seed(fresh_seed()))

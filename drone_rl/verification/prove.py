@@ -30,11 +30,11 @@ from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import plural
+from drone_rl.utils.threads import torch_threads
 from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.prover.policy_spec import (
     PolicySpec,
     make_policy_spec,
-    one_thread,
     partition_placements,
 )
 from drone_rl.verification.prover.proof_files import FORMAT, certify, load, save
@@ -140,7 +140,7 @@ def prove(
     policy = policy.in_task(**as_changes(task, "task"))
     network, gap = policy.make_network(), settings.logit_gap
     spec = make_policy_spec(policy.description, network, gap, settings.renderer)
-    with one_thread(), closing(spec), contextlib.ExitStack() as stack:
+    with torch_threads(1), closing(spec), contextlib.ExitStack() as stack:
         partition_placements(spec, settings.most_combinations)  # refuses what takes days
         spec.images.check(settings.compared, np.random.RandomState(legacy_seed(fresh_seed())))
         if folder is not None:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import torch
 from PIL import Image
-from torchrl.envs.utils import set_exploration_type
 
 import drone_rl
 from drone_rl.config import (
@@ -24,7 +23,6 @@ from drone_rl.config.networks import Lstm
 from drone_rl.config.training import TrainSettings
 from drone_rl.evaluation.baselines import constant_policy
 from drone_rl.evaluation.plots.images import heated, shown_picture
-from drone_rl.evaluation.rollouts import exploration
 from drone_rl.evaluation.video import CAMERAS, render_step
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.rerun_export import (
@@ -35,6 +33,7 @@ from drone_rl.explanations.rerun_export import (
     record_episode,
 )
 from drone_rl.policies import make_actor
+from drone_rl.policies.actor import exploring
 from drone_rl.policies.zoo import describe
 from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S, seconds_per_step
 from drone_rl.sim.dynamics import ComputerVision, Kinematic, Quadrotor
@@ -313,7 +312,7 @@ def test_a_recording_is_of_the_policys_episodes(tmp_path):
             poses = found["/world/drone"]["Transform3D:translation"]
             chances = found["/action/probabilities"]["Scalars:scalars"]
             while not state["done"].all():
-                with set_exploration_type(exploration(greedy=False)):
+                with exploring(greedy=False):
                     acted = actor(state.clone(False))
                 assert poses[step] == [pytest.approx(state["info", "drone"][0].tolist())]
                 assert sum(chances[step]) == pytest.approx(1.0)

@@ -14,8 +14,8 @@ from drone_rl.policies.actor import (
     RandomSource,
     SeededCategorical,
     SquashedNormal,
-    choose_action,
     distribution_of,
+    exploring,
 )
 
 
@@ -74,8 +74,10 @@ def test_an_action_can_be_chosen_whatever_the_exploration_type_is(outer):
     pixels = TensorDict({"pixels": torch.zeros(500, 1)}, [500])
     expected = build(3)(pixels.clone())
     with set_exploration_type(outer):
-        drawn = choose_action(build(3), pixels.clone(), greedy=False)
-        greedy = choose_action(build(3), pixels.clone(), greedy=True)
+        with exploring(greedy=False):
+            drawn = build(3)(pixels.clone())
+        with exploring(greedy=True):
+            greedy = build(3)(pixels.clone())
     assert set(drawn.keys()) == set(expected.keys())
     assert all(torch.equal(drawn[key], expected[key]) for key in ("logits", "action"))
     assert (greedy["action"] == 1).all()

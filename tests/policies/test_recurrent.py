@@ -5,7 +5,6 @@ import math
 import pytest
 import torch
 from tensordict import TensorDict
-from torchrl.envs.utils import set_exploration_type
 from torchrl.modules import set_recurrent_mode
 
 import drone_rl
@@ -15,10 +14,10 @@ from drone_rl.config.commands import HeldOutSettings
 from drone_rl.config.learning import Ppo, Rollouts
 from drone_rl.config.networks import Lstm
 from drone_rl.config.training import TrainSettings
-from drone_rl.evaluation.rollouts import exploration
 from drone_rl.evaluation.video import view
 from drone_rl.objectives import LeaveOneOut, ReinforceLoss
 from drone_rl.policies import RecurrentNetwork, make_actor
+from drone_rl.policies.actor import exploring
 from drone_rl.policies.policy import load_policy
 from drone_rl.policies.recurrent import CELL, HIDDEN, Memory
 from drone_rl.policies.zoo import describe
@@ -208,7 +207,7 @@ def test_act_remembers_until_reset(trained):
     policy = load_policy(trained.folder)
     with torch.no_grad():  # so that actions depend on the state
         policy.state["policy"]["logits.weight"].mul_(300)
-    with policy.flying(1) as (env, actor), set_exploration_type(exploration(greedy=True)):
+    with policy.flying(1) as (env, actor), exploring(greedy=True):
         state, images, logits = env.reset(), [], []
         while not state["done"].all() and len(images) < 6:
             images.append(env.base_env.last_pixels.clone())

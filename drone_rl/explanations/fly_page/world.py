@@ -14,7 +14,7 @@ from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.video import render_chase
 from drone_rl.explanations.scenes import Scenes
-from drone_rl.policies.actor import choose_action
+from drone_rl.policies.actor import exploring
 from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, ComputerVision, FlightState, Quadrotor
@@ -166,7 +166,8 @@ class World:
             frame = self.worlds.render(state, appearance=self._look())
             observation = self.scenes.transform(frame, [*self._earlier_frames])
             observed = TensorDict({"pixels": observation, **self._memory}, [1])
-            acted = choose_action(self._actor, observed, greedy=self._greedy)
+            with exploring(greedy=self._greedy):
+                acted = self._actor(observed)
             shares = self.actions.probabilities(acted["logits"])[0]
             after: Any = acted.get("next", {})
             memory = {name: after.get(name, start) for name, start in self._forgotten.items()}

@@ -37,6 +37,7 @@ from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.plugins import described, errors_of
 from drone_rl.utils.schema import Several, as_mapping, shown
+from drone_rl.utils.seeding import as_global_stream, plain_generator
 from drone_rl.utils.settings import Settings
 
 FORMAT = "drone_rl policy"
@@ -190,8 +191,7 @@ class PolicyDescription:
     def load_network(self, weights: Mapping[str, torch.Tensor]) -> ImageNetwork:
         """Return the network, in evaluation mode, with given weights, as in `expected_weights`."""
         if own_place(self.network):  # may hold tensors that are no weights, and so not on meta
-            with torch.random.fork_rng(devices=()):
-                network = self._network(self.make_dynamics().actions, torch.Generator())
+            network = self._network(self.make_dynamics().actions, torch.Generator())
         else:
             network = self._without_weights()
         own = {name: weight.to("cpu", copy=True) for name, weight in weights.items()}
@@ -217,7 +217,9 @@ class PolicyDescription:
         return network
 
     def _layers(self, outputs: int, generator: torch.Generator | None) -> ImageNetwork:
-        return self.network.make(self.input.shape, outputs, generator=generator)
+        layers = None if generator is None else plain_generator(generator.initial_seed() + 1)
+        with as_global_stream(layers):  # layers draw from it what the generator then replaces
+            return self.network.make(self.input.shape, outputs, generator=generator)
 
     def _checked(self, network: ImageNetwork, outputs: int) -> ImageNetwork:
         """Return a network; raise an `InputError` if it is the user's own with other outputs."""

@@ -17,7 +17,7 @@ from drone_rl.utils.imports import standard_error_closed
 from drone_rl.utils.provenance import num_cores
 
 _LOADING = threading.Lock()
-"""Two threads may both be the first to load kernels."""
+"""Two threads may both be the first to start Warp or to load kernels."""
 
 
 def check_device(device: str) -> None:
@@ -37,9 +37,14 @@ def check_device(device: str) -> None:
         )
 
 
-@functools.cache
 def start_warp(device: str) -> None:
     """Start Warp once, on a CPU without warnings about CUDA; for errors see `check_device`."""
+    with _LOADING:
+        _start_warp(device)
+
+
+@functools.cache
+def _start_warp(device: str) -> None:
     check_device(device)
     if device == "cpu":
         wp.config.log_level = max(wp.config.log_level, wp.LOG_ERROR)

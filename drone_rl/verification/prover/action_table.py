@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from drone_rl.utils.provenance import num_cores
+from drone_rl.utils.threads import set_torch_threads
 from drone_rl.verification.prover.bounds import Compositor, Crop, ImageRanges, NetworkBounds
 from drone_rl.verification.prover.boxes import Boxes, blocks, merge, ragged
 from drone_rl.verification.prover.cells import Cells
@@ -219,9 +220,7 @@ def _halve(blocks: NDArray, doubts: NDArray) -> NDArray:
 @functools.cache
 def workers() -> ThreadPoolExecutor:
     """Return one thread per core, each running torch with one thread."""
-    return ThreadPoolExecutor(
-        num_cores(), "prove", initializer=torch.set_num_threads, initargs=(1,)
-    )
+    return ThreadPoolExecutor(num_cores(), "prove", initializer=set_torch_threads, initargs=(1,))
 
 
 def _alike(near: Cells, far: Cells, part: Crop) -> NDArray[np.int64]:

@@ -1,12 +1,9 @@
 """A policy and a task in the form that proofs need; partition of the placements of large tasks."""
 
-import contextlib
 import dataclasses
 import math
-from collections.abc import Iterator
 
 import numpy as np
-import torch
 
 from drone_rl.config import TaskSettings
 from drone_rl.envs import GrayPixels, StandardizePixels, on_pixels
@@ -137,17 +134,6 @@ def make_compositor(description: PolicyDescription, images: CubeImages) -> Compo
     background = shade(images.background[None])[0, 0]
     faces = shade(images.colors[None, None, FRONT:])[0, 0, 0]
     return Compositor(background, faces, rest if made[count:] else None)
-
-
-@contextlib.contextmanager
-def one_thread() -> Iterator[None]:
-    """Run torch with one thread, for proofs that start their own threads."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
 
 
 IMAGES_PER_BORDER = 3  # approximate number: the one beyond it, and two within its rounding band
