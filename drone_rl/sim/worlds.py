@@ -36,6 +36,7 @@ _POSE = {"drone": Entry((3,), torch.float32), "attitude": Entry((4,), torch.floa
 class Worlds:
     """`num_envs` environments that step, reset and render together, or any of them alone."""
 
+    @torch.inference_mode(False)
     def __init__(
         self,
         num_envs: int,
@@ -85,6 +86,10 @@ class Worlds:
         self.policy_view = self.view()
         sampled = self.task.sample(np.random.RandomState(0))
         self.state = self.start(torch.zeros_like(sampled).expand(num_envs, *sampled.shape).clone())
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state of a copy, which builds its own scene and renderer when needed."""
+        return {k: v for k, v in vars(self).items() if k not in ("scene", "renderer")}
 
     @property
     def entries(self) -> Mapping[str, Entry]:
@@ -145,6 +150,7 @@ class Worlds:
         place = torch.tensor(self.task.origin, dtype=torch.float64).repeat(count, 1)
         return self.dynamics.start(place) if seeds is None else self.dynamics.start(place, seeds)
 
+    @torch.inference_mode(False)
     def reset(self, env_ids: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
         """Start new episodes in environments, shape (k,), each from a random state."""
         if not len(env_ids):
@@ -153,6 +159,7 @@ class Worlds:
         seeds = draw_seeds(random_states) if self.dynamics.is_random else None
         self.state[env_ids] = self.start(sampled, seeds)
 
+    @torch.inference_mode(False)
     def step(self, env_ids: Tensor, action: Tensor) -> Tensor:
         """Take actions, (k, *), in environments, (k,). Returns rewards, (k,), float64."""
         is_whole = torch.equal(env_ids, self._every)
@@ -193,6 +200,7 @@ class Worlds:
             )
         return self.render_all(state, view, appearance)[view.modalities[0]][:, 0]
 
+    @torch.inference_mode(False)
     def render_all(
         self, state: State, view: View, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
