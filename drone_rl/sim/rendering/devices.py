@@ -75,7 +75,7 @@ def _initialize_warp(*, is_quiet: bool) -> None:
     with standard_error_closed() if is_quiet else nullcontext():  # Warp ignores the log level
         with suppress(OSError):
             wp.init()
-            if os.access(wp.config.kernel_cache_dir, os.W_OK):
+            if os.access(str(wp.config.kernel_cache_dir), os.W_OK):
                 return
         unwritable = wp.config.kernel_cache_dir
         wp.config.kernel_cache_dir = folder = tempfile.mkdtemp(prefix="warp-")
