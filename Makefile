@@ -5,12 +5,19 @@ EXTRAS ?= dev
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+# Compare the interpreter with the bounds in pyproject.toml.
+CHECK_PYTHON := import re, sys; \
+  text = open("pyproject.toml").read(); \
+  low, high = re.search("requires-python = .>=3.([0-9]+),<3.([0-9]+)", text).groups(); \
+  fits = (3, int(low)) <= sys.version_info[:2] < (3, int(high)); \
+  version = "%d.%d" % sys.version_info[:2]; \
+  sys.exit(None if fits else "error: $(PYTHON) is Python %s; this project needs at least 3.%s and \
+less than 3.%s, such as make PYTHON=python3.%s" % (version, low, high, low))
 
 .PHONY: demo notebook test check format bench readme keep stale docs mutants clean clean-outputs
 
 $(STAMP): pyproject.toml
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
-	  { echo "error: $(PYTHON) is older than Python 3.11; try make PYTHON=python3.11"; exit 1; }
+	@$(PYTHON) -c '$(CHECK_PYTHON)'
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@echo "Installing into $(VENV) (a few minutes the first time) ..."
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(EXTRAS)]'

@@ -26,6 +26,7 @@ from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transform
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
 from drone_rl.policies.recurrent import Memory
 from drone_rl.policies.zoo import PolicyDescription, find_policy, parse, read_policy
+from drone_rl.sim.rendering.devices import check_defaults
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError
@@ -369,6 +370,7 @@ def load_policy(which: str | Path | Policy, *, outputs: str | Path = "outputs") 
     Raises:
         InputError: There is none, or it is unusable.
     """
+    check_defaults()
     if isinstance(which, Policy):
         return which
     if not isinstance(which, str | Path):

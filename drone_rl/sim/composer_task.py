@@ -25,6 +25,7 @@ from drone_rl.sim.rendering.scene import Scene, SemanticClass, compiled
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.visual_randomization import AppearanceSampler, object_region_of
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.plugins import errors_of, place_of
 
 _SKY = 0.69 * entities.DRAW_DISTANCE
@@ -104,6 +105,13 @@ class ComposerTask(composer.Task):
             info.enabled = True
         steps = (seconds_per_step(self.dynamics),) * 2
         self.set_timesteps(*(steps if self._flight is None else self._flight.timesteps))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Refuse to copy or pickle, which dm_control's models do not support."""
+        raise InputError(
+            f"a dm_control environment of task={self.rules.name} can't be copied or pickled; "
+            "call make_environment again"
+        )
 
     @property
     def root_entity(self) -> entities.Field:

@@ -1,8 +1,8 @@
 """A batch of environments of a task: rules, dynamics and a renderer."""
 
 import functools
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import torch
@@ -32,12 +32,27 @@ from drone_rl.utils.schema import Instance, Maybe, Text, Whole
 
 LARGEST_REWARD = 1e10
 """Largest reward of a step, so that sums of rewards and of their squares are finite in float32."""
+Method = TypeVar("Method", bound=Callable[..., Any])
 _POSE = {"drone": Entry((3,), torch.float32), "attitude": Entry((4,), torch.float32)}
+
+
+def _outside_inference_mode(method: Method) -> Method:
+    """Leave PyTorch's inference mode, whose tensors can't be changed after it."""
+
+    @functools.wraps(method)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        if not torch.is_inference_mode_enabled():
+            return method(*args, **kwargs)
+        with torch.inference_mode(False), torch.no_grad():  # leaving it alone records gradients
+            return method(*args, **kwargs)
+
+    return cast(Method, call)
 
 
 class Worlds:
     """`num_envs` environments that step, reset and render together, or any of them alone."""
 
+    @_outside_inference_mode
     def __init__(
         self,
         num_envs: int,
@@ -87,6 +102,10 @@ class Worlds:
         self.policy_view = self.view()
         sampled = self.task.sample(np.random.RandomState(0))
         self.state = self.start(torch.zeros_like(sampled).expand(num_envs, *sampled.shape).clone())
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state of a copy, which builds its own scene and renderer when needed."""
+        return {k: v for k, v in vars(self).items() if k not in ("scene", "renderer")}
 
     @property
     def entries(self) -> Mapping[str, Entry]:
@@ -147,6 +166,7 @@ class Worlds:
         place = torch.tensor(self.task.origin, dtype=torch.float64).repeat(count, 1)
         return self.dynamics.start(place) if seeds is None else self.dynamics.start(place, seeds)
 
+    @_outside_inference_mode
     def reset(self, env_ids: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
         """Start new episodes in environments, shape (k,), each from a random state."""
         if not len(env_ids):
@@ -155,6 +175,7 @@ class Worlds:
         seeds = draw_seeds(random_states) if self.dynamics.is_random else None
         self.state[env_ids] = self.start(sampled, seeds)
 
+    @_outside_inference_mode
     def step(self, env_ids: Tensor, action: Tensor) -> Tensor:
         """Take actions, (k, *), in environments, (k,). Returns rewards, (k,), float64."""
         is_whole = torch.equal(env_ids, self._every)
@@ -199,6 +220,7 @@ class Worlds:
             )
         return self.render_all(state, view, appearance)[view.modalities[0]][:, 0]
 
+    @_outside_inference_mode
     def render_all(
         self, state: State, view: View, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:

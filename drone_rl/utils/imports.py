@@ -54,6 +54,28 @@ def import_quietly(name: str, category: str, words: str) -> None:
     sys.meta_path.insert(0, _Hook(name, execute_quietly))
 
 
+def import_with_fallback(name: str, variable: str, value: str) -> None:
+    """Import a module of another package with an environment variable set if it fails without.
+
+    `name` is the module's dotted name. The variable is restored after the import.
+    """
+
+    def execute_again(module: ModuleType, execute: Callable[[ModuleType], None]) -> None:
+        given = os.environ.get(variable)
+        try:
+            execute(module)
+        except Exception:
+            if given is None:
+                raise
+            os.environ[variable] = value
+            try:
+                execute(module)
+            finally:
+                os.environ[variable] = given
+
+    sys.meta_path.insert(0, _Hook(name, execute_again))
+
+
 class _Hook:
     """A finder of one module that wraps the module's execution."""
 

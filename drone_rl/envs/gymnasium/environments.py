@@ -50,8 +50,8 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
             InputError: An option is unknown or out of range.
         """
         Whole(1).read(num_envs, "num_envs")
-        self.mode = _mode(autoreset_mode)
-        self.metadata = {**self.metadata, "autoreset_mode": self.mode}
+        self.autoreset_mode = _mode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.batch = WorldBatch(num_envs, task, options)
         self.num_envs = num_envs
         self.render_mode = self.batch.render_mode
@@ -106,7 +106,7 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         if self._ended is None:
             raise InputError("step() needs a running episode; call reset() first")
         given = read_action(actions, self.batch.worlds.dynamics.actions, (self.num_envs,))
-        if self.mode is AutoresetMode.DISABLED and self._ended.any():
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._ended.any():
             raise InputError(
                 f"worlds {np.flatnonzero(self._ended).tolist()} have ended; reset them by "
                 "reset(options={'reset_mask': mask}), or choose another autoreset_mode"
@@ -116,7 +116,7 @@ class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
         flags = self.batch.flags()
         self._ended = flags[0] | flags[1]
         final = {}
-        if self.mode is AutoresetMode.SAME_STEP and self._ended.any():
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
             final = self._finish(self._ended)
         info = {**_masked(self.batch.info(), np.ones(self.num_envs, bool)), **final}
         return self.batch.observe(), rewards, *flags, info

@@ -104,6 +104,10 @@ Chosen = str | BaseTaskSettings | Task[Any] | None
 """A task, its settings or its registered name; cube collection by default."""
 
 
+class KeywordError(InputError, TypeError):
+    """An option that does not exist; a `TypeError`, by which TorchRL's `GymEnv` probes options."""
+
+
 class WorldBatch:
     """A batch of environments, their observations and their spaces."""
 
@@ -200,6 +204,8 @@ def _chosen_task(task: Chosen, changes: Mapping[str, Any]) -> BaseTaskSettings |
         if name not in known:
             there = (*kinds_of(GymnasiumSettings), *known)
             meant = did_you_mean(name, there)
-            raise InputError(f"{name} is unknown; valid names: {', '.join(there)}{meant}")
+            raise KeywordError(
+                f"unexpected keyword argument {name!r}; valid names: {', '.join(there)}{meant}"
+            )
     made: Any = chosen.replace(**changes) if changes else chosen
     return made

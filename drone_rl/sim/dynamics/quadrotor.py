@@ -1,6 +1,7 @@
 """Simple flight (Table 1): a drone with four rotors, flown by SimpleFlight's controller."""
 
 import functools
+from typing import Any
 
 import torch
 import warp as wp
@@ -24,7 +25,7 @@ class Quadrotor:
     def __init__(self, settings: DynamicsSettings, actions: ActionSettings | None = None) -> None:
         """Take the drone's body, controller and air, and its actions (moves by default)."""
         self.settings = settings
-        actions = actions or ActionSettings()
+        self._action_settings = actions = actions or ActionSettings()
         self.steering = Moves(actions) if actions.kind == "moves" else Velocities(actions)
         self.frame = make_airframe(settings)
         self.actions: Actions = self.steering.actions
@@ -33,6 +34,10 @@ class Quadrotor:
         """Whether there are gusts, which `seeds` make different."""
         self.needs_obstacles = True
         self.timestep: float | None = settings.control_timestep
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy the settings; Warp's structs can't be copied."""
+        return type(self), (self.settings, self._action_settings)
 
     def start(self, position: Tensor, seeds: Tensor | None = None) -> FlightState:
         """Return drones that hover at rest; see `Dynamics`."""

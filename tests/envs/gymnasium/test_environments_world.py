@@ -155,7 +155,7 @@ def test_rgb_array_list_is_supported(make):
     ("options", "message"),
     [
         ({"render_mode": "ansi"}, "render_mode='ansi' is unknown; give rgb_array"),
-        ({"wind": 1}, "wind is unknown; valid names: .*observations"),
+        ({"wind": 1}, "unexpected keyword argument 'wind'; valid names: .*observations"),
         ({"num_cubes": "two"}, "num_cubes='two' is a text"),
     ],
 )
