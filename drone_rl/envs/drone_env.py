@@ -24,6 +24,7 @@ from drone_rl.sim.rendering import RendererFactory, check_device
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.available_memory import environment_bytes, require_memory
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Text, Whole
 from drone_rl.utils.seeding import Stream, get_state, set_state, side_stream, world_random_state
@@ -76,11 +77,18 @@ class DroneEnv(EnvBase):
 
         Raises:
             InputError: A setting is out of range, a texture can't be read, there is no room for
-                the camera or for distractors, or `actions` are given with dynamics that have some.
+                the camera or for distractors, there is too little memory, or `actions` are given
+                with dynamics that have some.
         """
         Whole(1).read(num_envs, "num_envs")
         device = Text().read(device, "device")  # torch's, too
         check_device(device)
+        if device == "cpu":
+            image = camera or CameraSettings()
+            size = image.height * image.width if pixels else 0
+            kind = renderer if isinstance(renderer, str) else ""
+            needed = num_envs * environment_bytes(size, kind)
+            require_memory(needed, f"num_envs={num_envs}", "give fewer environments")
         super().__init__(device=torch.device(device), batch_size=torch.Size([num_envs]))
         task = as_task(task)
         self.appearances = AppearanceSampler(

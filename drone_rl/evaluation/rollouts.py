@@ -18,6 +18,7 @@ from drone_rl.envs import worlds_of
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.policies.actor import exploring
 from drone_rl.sim.tasks import State
+from drone_rl.utils.available_memory import EPISODE_BYTES, require_memory
 from drone_rl.utils.provenance import num_cores
 
 _PLACEMENT = ("collected", "cube_positions")
@@ -46,6 +47,8 @@ def run_episodes(
     same initial state for every policy. Arguments are those of `episode_batches`; by default the
     last batch is whole, and its surplus episodes, whose actions `log` receives, too, are dropped.
     """
+    setting = f"episodes={num_episodes}"
+    require_memory(num_episodes * EPISODE_BYTES, setting, "give fewer episodes")
     how.setdefault("is_exact", False)
     batches = episode_batches(env, actor, num_episodes, **how)
     return Episodes.joined([final_episodes(env, batch) for batch in batches])[:num_episodes]

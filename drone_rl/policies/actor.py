@@ -137,7 +137,16 @@ class SeededCategorical(Categorical):
         return self.logits.argmax(-1)
 
 
-class DirectActor(ProbabilisticActor):
+class KeepsModes:
+    """Mixin of a sequence that ends in its only distribution."""
+
+    def get_dist_params(self, *args: Any, **kwargs: Any) -> TensorDictBase:
+        """Evaluate the networks, without an exploration type that TorchRL sets for all threads."""
+        sequence: Any = self
+        return sequence.det_part(*args, **kwargs)
+
+
+class DirectActor(KeepsModes, ProbabilisticActor):
     """A `ProbabilisticActor` that calls network and distribution directly.
 
     TensorDict's modules, which `get_dist` and everything else use, take longer than a small network

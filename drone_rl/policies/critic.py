@@ -10,13 +10,17 @@ from tensordict.nn import (
 )
 from torch import nn
 
-from drone_rl.policies.actor import distribution_of
+from drone_rl.policies.actor import KeepsModes, distribution_of
 from drone_rl.policies.networks import ImageNetwork, PolicyNetwork, Trunk, orthogonal
 from drone_rl.utils.errors import InputError
 
 PIXELS, FEATURES = "pixels", "features"
 LOG_PROB = "action_log_prob"
 VALUE = "state_value"
+
+
+class _Actor(KeepsModes, ProbabilisticTensorDictSequential):
+    pass
 
 
 class ActorCritic(nn.Module):
@@ -57,7 +61,7 @@ class ActorCritic(nn.Module):
             log_prob_key=LOG_PROB,
         )
         modules: Any = (TensorDictModule(last, in_keys=[FEATURES], out_keys=["logits"]), head)
-        self.actor = ProbabilisticTensorDictSequential(*modules)
+        self.actor = _Actor(*modules)
         """"features" to "logits" and the distribution of "action"."""
         self.critic = TensorDictModule(
             own or _one_number(last, generator),
