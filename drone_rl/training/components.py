@@ -1,5 +1,6 @@
 """Components of a training run, which its collectors and learners share."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -10,8 +11,10 @@ from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.config.learning import CompleteEpisodes, Ray
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies import ImageNetwork, make_actor
+from drone_rl.policies.zoo import describe
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.tasks import FailureReplayTask
+from drone_rl.utils.available_memory import require_memory
 from drone_rl.utils.errors import InputError
 
 
@@ -64,7 +67,22 @@ def make_collector(settings: TrainSettings, replay: FailureReplayTask | None = N
         InputError: There is no such device, or an extra isn't installed.
     """
     check_device(settings.device)
+    if not settings.device.startswith("cuda"):
+        _require_batch(settings)
     return settings.collector.make(settings, replay)  # by default `train.threaded_collector`
+
+
+def _require_batch(settings: TrainSettings) -> None:
+    """Raise an `InputError` unless a batch of frames fits into memory.
+
+    Complete episodes count a quarter of the longest one, which untrained policies reach on average.
+    """
+    chosen, frame = settings.collector, describe(settings).input
+    longest = getattr(settings.task, "step_limit", 1)
+    steps = getattr(settings.objective, "num_steps", max(1, longest // 4))
+    needed = chosen.num_envs * steps * math.prod(frame.shape) * (4 if frame.is_float else 1)
+    setting = f"collector.num_envs={chosen.num_envs}, batches of about {steps} steps of each,"
+    require_memory(needed, setting, "give fewer environments, steps or pixels")
 
 
 def make_learner(settings: TrainSettings, components: Components) -> Any:

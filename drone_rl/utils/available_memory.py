@@ -1,5 +1,6 @@
 """Compare the memory that settings need with what is available, before it is allocated."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +12,8 @@ _LIMITS = (  # of a container: version 2, version 1
     (_CGROUP / "memory.max", _CGROUP / "memory.current"),
     (_CGROUP / "memory/memory.limit_in_bytes", _CGROUP / "memory/memory.usage_in_bytes"),
 )
+_CACHE = re.compile(r"^(?:in)?active_file (\d+)$", re.MULTILINE)
+"""Entries of memory.stat: files that the system drops when memory is needed."""
 RANDOM_STATE_BYTES = 2_000
 """Least memory of an environment's random stream and state."""
 EPISODE_BYTES = 50
@@ -50,7 +53,8 @@ def _available() -> Iterator[int]:
     for most, used in _LIMITS:
         limit, taken = _read(most).strip(), _read(used).strip()
         if limit.isdigit() and taken.isdigit():
-            yield max(0, int(limit) - int(taken))
+            cache = sum(map(int, _CACHE.findall(_read(most.with_name("memory.stat")))))
+            yield max(0, int(limit) - max(0, int(taken) - cache))
     try:
         import resource  # not on Windows
     except ImportError:

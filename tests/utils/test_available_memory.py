@@ -17,6 +17,9 @@ def test_a_container_limits_memory(files, tmp_path, monkeypatch):
     assert available_bytes() != 1000
     limit.write_text("5000\n")
     assert available_bytes() == 1000
+    (tmp_path / "memory.stat").write_text("anon 7\ninactive_file 300\nactive_file 200\n")
+    assert available_bytes() == 1500
+    (tmp_path / "memory.stat").unlink()
     require_memory(1000, "num_envs=2", "give fewer")
     with pytest.raises(InputError, match=r"^num_envs=2 needs at least .* available; give fewer$"):
         require_memory(1001, "num_envs=2", "give fewer")
