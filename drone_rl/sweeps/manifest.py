@@ -42,7 +42,7 @@ _RUN = Record(
     {
         "number": Whole(0, 10**6),
         "overrides": Several(Text(500), 0, MOST_OVERRIDES),
-        "folder": Text(255),
+        "folder": Text(1000),
     }
 )
 _SWEEP = Record(
@@ -183,15 +183,18 @@ def read_sweep(folder: Path) -> Sweep:
         ) from None
 
 
-def inside(folder: Path, name: str) -> Path:
-    """Return a run's folder by its path inside the sweep's folder.
+def inside(folder: Path, name: str, where: str = "a run's folder ") -> Path:
+    """Return a run's folder by its path inside the sweep's folder; `where` names its origin.
 
     Raises:
         InputError: It is not inside.
     """
     path = PurePosixPath(name)
     if path.is_absolute() or not path.parts or ".." in path.parts:
-        raise InputError(f"a run's folder {shown(name)} is not inside the sweep's folder")
+        raise InputError(
+            f"{where}{shown(name)} is not inside the sweep's folder; give a relative path, such as "
+            "run${hydra.job.num}"
+        )
     return folder / path
 
 

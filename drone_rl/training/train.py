@@ -11,6 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import torch
+
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
 from drone_rl.config.learning import Episodes, Reinforce
 from drone_rl.config.registry import implements, modules_of
@@ -101,6 +103,8 @@ def learn(
     demonstrations = run.prepare(settings, state)
     stream = torch_generator(settings.seed, Stream.TORCH)
     with contextlib.ExitStack() as stack:
+        stack.enter_context(torch.inference_mode(False))
+        stack.enter_context(torch.enable_grad())
         stack.enter_context(exploring(greedy=False))
         stack.enter_context(torch_threads(limits.num_threads))  # sums depend on it
         bound_kernels()

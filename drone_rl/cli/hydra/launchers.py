@@ -4,8 +4,10 @@ Hydra's default launcher runs all jobs in one process, and its joblib launcher i
 Separate processes all start from the same state, and one can fail without the others.
 """
 
+import hashlib
 import importlib
 import logging
+import os
 import re
 import signal
 import sys
@@ -46,6 +48,7 @@ from drone_rl.utils.files import folder_lock
 from drone_rl.utils.progress import Heartbeat
 from drone_rl.utils.text import plural
 
+_LONGEST_NAME = 180
 NAMESPACE = "hydra_plugins.drone_rl"
 """Module of the plugins, as in the files of conf/."""
 
@@ -144,9 +147,10 @@ class SweepLauncher(Launcher):
         typed = [re.sub(r"[^\w.-]+", names.kv_sep, o) for o in typed]  # needs no quotes in a shell
         with open_dict(config):
             config.hydra.job.id = config.hydra.job.num = number
-            config.hydra.job.override_dirname = names.item_sep.join(typed)
+            config.hydra.job.override_dirname = _shortened(names.item_sep.join(typed))
         HydraConfig.instance().set_config(config)
-        return Run(number, tuple(overrides), inside(folder, str(config.hydra.sweep.subdir)[:200]))
+        subdir = os.path.normpath(str(config.hydra.sweep.subdir))
+        return Run(number, tuple(overrides), inside(folder, subdir, "hydra.sweep.subdir="))
 
     def _settings(self) -> dict[str, Any]:
         everything: Any = OmegaConf.to_container(self.config, resolve=False)
@@ -235,6 +239,13 @@ def _outcome(run: Run) -> str:
 def _number(value: object) -> float | None:
     """A number from a file; None if the file contains something else."""
     return float(value) if isinstance(value, int | float) else None
+
+
+def _shortened(name: str) -> str:
+    """Return a name that fits into the name of a folder; a hash replaces the rest."""
+    if len(name) <= _LONGEST_NAME:
+        return name
+    return f"{name[: _LONGEST_NAME - 9]}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
 
 
 @contextmanager

@@ -185,6 +185,8 @@ def _masked(info: Info, mask: Mask) -> Info:
 
 
 def _mode(given: AutoresetMode | str) -> AutoresetMode:
+    if given in AutoresetMode.__members__:  # SAME_STEP, as in messages of other libraries
+        return AutoresetMode[str(given)]
     try:
         return AutoresetMode(given)
     except ValueError:

@@ -129,6 +129,17 @@ def test_each_run_is_in_the_folder_that_hydra_resolves(in_process, monkeypatch, 
     assert [run["folder"] for run in runs] == [*settings]
 
 
+def test_long_names_of_folders_are_shortened_alone(in_process, monkeypatch, tmp_path):
+    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", TRAINING))
+    long = [f"trainer.checkpoint_interval_s={i}" for i in range(1000, 1012)]
+    subdir = "hydra.sweep.subdir=a/../${hydra.job.override_dirname}/${hydra.job.num}"
+    done = in_process(*GRID, *long, subdir)
+    assert done.returncode == 0, done.stderr
+    runs = json.loads((tmp_path / "sweep" / "sweep.json").read_text())["runs"]
+    assert [run["folder"].rpartition("/")[2] for run in runs] == ["0", "1", "2", "3"]
+    assert all(len(run["folder"]) < 200 for run in runs)
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
