@@ -8,10 +8,12 @@ import contextlib
 import functools
 import gc
 import os
+import threading
 from collections.abc import Callable, Iterator
 from typing import TypeVar
 
 T = TypeVar("T")
+_ENVIRONMENT = threading.Lock()
 
 _STACK = 20_000
 """Values on Python's stack that fit into one block of memory, 8 bytes each."""
@@ -20,8 +22,23 @@ KEPT_KERNELS = 128
 
 
 def bound_kernels() -> None:
-    """Limit oneDNN's cache of kernels; no effect once a kernel has run in this process."""
-    os.environ.setdefault("ONEDNN_PRIMITIVE_CACHE_CAPACITY", str(KEPT_KERNELS))
+    """Limit oneDNN's cache of kernels; no effect once a kernel has run in this process.
+
+    oneDNN reads the limit from the environment with its first kernel, which this runs. A limit of
+    the user's own has precedence.
+    """
+    import torch  # not at the start of every program
+
+    name = "ONEDNN_PRIMITIVE_CACHE_CAPACITY"
+    with _ENVIRONMENT:
+        if name in os.environ or not torch.backends.mkldnn.is_available():
+            return
+        os.environ[name] = str(KEPT_KERNELS)
+        try:
+            one = torch.zeros(1, 1, 1, 1, device="cpu")
+            torch.mkldnn_convolution(one, one, None, [0, 0], [1, 1], [1, 1], 1)
+        finally:
+            del os.environ[name]
 
 
 def return_freed_memory() -> None:

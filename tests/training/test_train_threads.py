@@ -1,5 +1,6 @@
 """Trainings in two threads of one process, and what a training leaves behind."""
 
+import os
 import random
 import threading
 from collections import OrderedDict
@@ -61,6 +62,7 @@ def process_state():
         random.getstate(),
         (torch.get_num_threads(), *counts),
         exploration_type(),
+        dict(os.environ),
         recurrent_mode(),
     )
 
