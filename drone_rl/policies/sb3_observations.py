@@ -99,7 +99,7 @@ class Observations:
             self.transforms = None
             self.reason = (
                 f"it has {type(wrappers[unknown[-1]]).__name__}; replace it with a "
-                "gymnasium.ObservationWrapper without a step of its own"
+                "gymnasium.ObservationWrapper (or RewardWrapper) without a step of its own"
             )
             wrappers = wrappers[unknown[-1] + 1 :]
         if all(isinstance(wrapper, VecTransposeImage) for wrapper in wrappers):
