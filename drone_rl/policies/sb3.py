@@ -21,8 +21,18 @@ import gymnasium  # noqa: E402 (after the check that the extra is installed)
 from gymnasium import spaces  # noqa: E402
 from stable_baselines3.common.base_class import BaseAlgorithm  # noqa: E402
 from stable_baselines3.common.policies import ActorCriticPolicy  # noqa: E402
+from stable_baselines3.common.preprocessing import (  # noqa: E402
+    is_image_space,
+    is_image_space_channels_first,
+)
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor  # noqa: E402
-from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv  # noqa: E402
+from stable_baselines3.common.utils import check_for_correct_spaces  # noqa: E402
+from stable_baselines3.common.vec_env import (  # noqa: E402
+    DummyVecEnv,
+    VecEnv,
+    VecTransposeImage,
+    is_vecenv_wrapped,
+)
 
 from drone_rl.policies.sb3_observations import Observations, to_space  # noqa: E402
 
@@ -32,7 +42,7 @@ class Sb3Logits(nn.Module):
 
     Raises:
         InputError: It is no model, or no actor-critic with discrete actions, or needs a state, more
-            than one array, or an environment that was not given.
+            than one array, or an environment that was not given, or is not that of the model.
     """
 
     def __init__(self, model: BaseAlgorithm, env: VecEnv | gymnasium.Env | None = None) -> None:
@@ -66,6 +76,8 @@ class Sb3Logits(nn.Module):
                 f"{kind} was trained with VecNormalize, which its environment lacks; give "
                 "drone_rl.policy_from env=, the environment of the training with its wrappers"
             )
+        if given is not None:
+            _check_spaces(given, model.policy)
         self.conditions = {"name": f"{kind} of Stable-Baselines3", **self.observations.conditions}
 
     conditions: dict[str, Any]
@@ -108,13 +120,26 @@ def _copy_of(policy: Any) -> nn.Module:
 
 
 def _as_vec_env(env: VecEnv | gymnasium.Env) -> VecEnv:
-    if isinstance(env, VecEnv):
-        return env
-    if isinstance(env, gymnasium.Env):
-        return DummyVecEnv([lambda: env])
-    raise InputError(
-        f"env={shown(env)} is no environment of Stable-Baselines3; give the one of the training"
-    )
+    """Return a vector environment, with the channels first where the library moves them."""
+    if not isinstance(env, VecEnv | gymnasium.Env):
+        raise InputError(
+            f"env={shown(env)} is no environment of Stable-Baselines3; give the one of the training"
+        )
+    batch = env if isinstance(env, VecEnv) else DummyVecEnv([lambda: env])
+    space: Any = batch.observation_space
+    is_last = is_image_space(space) and not is_image_space_channels_first(space)
+    is_moved = is_vecenv_wrapped(batch, VecTransposeImage)
+    return VecTransposeImage(batch) if is_last and not is_moved else batch
+
+
+def _check_spaces(env: VecEnv, policy: Any) -> None:
+    try:
+        check_for_correct_spaces(env, policy.observation_space, policy.action_space)
+    except ValueError as error:
+        raise InputError(
+            f"env= is not the environment of the model: {' '.join(str(error).split())}; give "
+            "drone_rl.policy_from env=, the environment of the training with its wrappers"
+        ) from None
 
 
 class Sb3Trunk(BaseFeaturesExtractor):

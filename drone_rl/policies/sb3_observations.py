@@ -2,16 +2,16 @@
 
 import copy
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Annotated, Any
 
 import numpy as np
 import torch
-from gymnasium import ObservationWrapper, RewardWrapper, Wrapper, spaces
+from gymnasium import ActionWrapper, Env, ObservationWrapper, RewardWrapper, Wrapper, spaces
 from gymnasium.vector import (
     SyncVectorEnv,
+    VectorActionWrapper,
     VectorEnv,
-    VectorObservationWrapper,
     VectorRewardWrapper,
     VectorWrapper,
 )
@@ -38,6 +38,33 @@ from drone_rl.utils.schema import Instance, Whole
 Function = Callable[[NDArray[Any]], NDArray[Any]]
 """A batch of observations to a batch of observations."""
 _LIBRARIES = ("gymnasium.", "stable_baselines3.")
+_NEUTRAL = {
+    "Autoreset",
+    "DictInfoToList",
+    "DummyVecEnv",
+    "HumanRendering",
+    "Monitor",
+    "NormalizeReward",
+    "OrderEnforcing",
+    "PassiveEnvChecker",
+    "RecordEpisodeStatistics",
+    "RecordVideo",
+    "RenderCollection",
+    "SyncVectorEnv",
+    "TimeLimit",
+    "VecCheckNan",
+    "VecMonitor",
+    "VecVideoRecorder",
+}
+"""Classes of these libraries that change neither observations nor actions."""
+_REPEATING = {
+    "AtariPreprocessing",
+    "MaxAndSkipEnv",
+    "MaxAndSkipObservation",
+    "RepeatAction",
+    "StickyActionEnv",
+}
+"""Classes of these libraries that repeat actions and are no `ActionWrapper`."""
 
 
 class Observations:
@@ -50,13 +77,17 @@ class Observations:
         """Read the wrappers of an environment with observations of `space`; None: only the space.
 
         Raises:
-            InputError: The environment observes the ground truth instead of images.
+            InputError: Its wrappers can't be read, or change actions, or it observes the ground
+                truth instead of images.
         """
-        wrappers, world = _unwrap(env)
+        wrappers, world = ([], None) if env is None else _unwrap(env)
         self.space, self.names = space, [type(wrapper).__name__ for wrapper in wrappers]
         self.conditions: dict[str, Any] = _conditions(world)
         self.transforms: tuple[Transform, ...] | None = None
-        self.reason = "no environment is given" if env is None else "it observes no RGB images"
+        self.reason = (
+            "no environment is given; give drone_rl.policy_from env=, the environment of the "
+            "training with its wrappers"
+        )
         first = space if world is None else _space_of(world)
         if _is_color(first):
             self.transforms = (Rgb(),)
@@ -65,7 +96,11 @@ class Observations:
             self.transforms, wrappers = wrappers[0].transforms, wrappers[1:]
         unknown = [i for i, wrapper in enumerate(wrappers) if not _is_known(wrapper)]
         if unknown:
-            self.transforms, self.reason = None, f"it has {type(wrappers[unknown[-1]]).__name__}"
+            self.transforms = None
+            self.reason = (
+                f"it has {type(wrappers[unknown[-1]]).__name__}; replace it with a "
+                "gymnasium.ObservationWrapper (or RewardWrapper) without a step of its own"
+            )
             wrappers = wrappers[unknown[-1] + 1 :]
         if all(isinstance(wrapper, VecTransposeImage) for wrapper in wrappers):
             wrappers = []  # `to_space` moves the channels
@@ -81,7 +116,7 @@ class Observations:
     transforms: tuple[Transform, ...] | None
     """From the camera to the innermost wrapper; None if unknown."""
     reason: str
-    """Why they are unknown."""
+    """Why they are unknown, and the remedy."""
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Observations":
         """Return itself, so that copies of a network share the environment."""
@@ -100,9 +135,8 @@ class Observations:
         if first is None:
             raise InputError(
                 f"the model observes {self.space.dtype} of shape {self.space.shape}, and how its "
-                f"environment makes them from images is unknown ({self.reason}); give "
-                "drone_rl.policy_from env=, the environment of the training with its wrappers, or "
-                "transforms="
+                f"environment makes them from images is unknown: {self.reason}, or give "
+                "drone_rl.policy_from transforms= that do the same"
             )
         if not self._wrappers:
             return first
@@ -236,17 +270,33 @@ def _from(space: spaces.Box) -> Function:
     return convert
 
 
-def _unwrap(env: Any) -> tuple[list[Any], Any]:
+def _unwrap(env: Any) -> tuple[list[Any], DroneWorld | DroneWorlds]:
     """Return the wrappers that change observations, innermost first, and the environment in them.
 
     Of several environments side by side it is the first.
     """
-    wrappers: list[Any] = []
-    while (inside := _inside(env)) is not None:
-        if not _keeps(env):
-            wrappers.insert(0, env)
-        env = inside
-    return wrappers, env
+    *outer, world = _layers(env)
+    if not isinstance(world, DroneWorld | DroneWorlds):
+        name = type(world).__name__
+        raise InputError(
+            f"{name} is no environment of drone_rl, or hides those in other processes, so that its "
+            "wrappers can't be read; give drone_rl.policy_from env=, a DummyVecEnv of the "
+            "environment of the training with its wrappers"
+        )
+    acting = [type(wrapper).__name__ for wrapper in outer if _changes_actions(wrapper)]
+    if acting:
+        raise InputError(
+            f"{acting[0]} changes actions, and a policy is judged by its own actions; train "
+            "without it, or give a callable from images to the logits of the changed actions"
+        )
+    return [wrapper for wrapper in reversed(outer) if not _keeps(wrapper)], world
+
+
+def _layers(env: Any) -> Iterator[Any]:
+    """Yield an environment and those in it, the outermost first."""
+    while env is not None:
+        yield env
+        env = _inside(env)
 
 
 def _inside(env: Any) -> Any:
@@ -264,24 +314,37 @@ def _space_of(env: Any) -> Any:
 
 
 def _keeps(wrapper: Any) -> bool:
-    """Return whether observations pass a wrapper unchanged."""
+    """Return whether observations and actions pass a wrapper unchanged."""
     if isinstance(wrapper, VecNormalize):
         return not wrapper.norm_obs
     if isinstance(wrapper, Sb3Worlds):
         return not wrapper.transforms
-    if isinstance(wrapper, RewardWrapper | VectorRewardWrapper):
-        return True
-    is_library = f"{type(wrapper).__module__}.".startswith(_LIBRARIES)
-    is_same = _space_of(wrapper) == _space_of(_inside(wrapper))
-    return is_library and is_same and not isinstance(wrapper, _OBSERVING)
+    kind = type(wrapper)
+    is_library = f"{kind.__module__}.".startswith(_LIBRARIES)
+    return (is_library and kind.__name__ in _NEUTRAL) or any(
+        isinstance(wrapper, base) and kind.step is base.step
+        for base in (RewardWrapper, VectorRewardWrapper)
+    )
 
 
-_OBSERVING = (ObservationWrapper, VectorObservationWrapper)
+def _changes_actions(wrapper: Any) -> bool:
+    is_repeating = any(kind.__name__ in _REPEATING for kind in type(wrapper).__mro__)
+    return is_repeating or isinstance(wrapper, ActionWrapper | VectorActionWrapper)
 
 
 def _is_known(wrapper: Any) -> bool:
-    known = (VecNormalize, VecTransposeImage, VecFrameStack, Sb3Worlds, *_OBSERVING)
-    return isinstance(wrapper, known)
+    if isinstance(wrapper, ObservationWrapper):
+        return type(wrapper).step is ObservationWrapper.step
+    return isinstance(wrapper, VecNormalize | VecTransposeImage | VecFrameStack | Sb3Worlds)
+
+
+class _Spaces(Env[Any, Any]):
+    """What a wrapper may read of its environment: constants, not the state."""
+
+    def __init__(self, env: Any) -> None:
+        self.observation_space, self.action_space = env.observation_space, env.action_space
+        self.metadata, self.render_mode = env.metadata, env.render_mode
+        self.spec = env.unwrapped.spec
 
 
 def _function(wrapper: Any) -> Function:
@@ -292,13 +355,9 @@ def _function(wrapper: Any) -> Function:
         return VecTransposeImage.transpose_image
     if isinstance(wrapper, VecNormalize):
         return copy.deepcopy(wrapper).normalize_obs  # pyright: ignore[reportReturnType] (a Box)
-    own: Any = copy.copy(wrapper)
-    own.env = None
-    own = copy.deepcopy(own)
+    own: Any = copy.deepcopy(wrapper, {id(env): _Spaces(env) for env in _layers(wrapper.env)})
     if hasattr(own, "update_running_mean"):
         own.update_running_mean = False
-    if isinstance(own, VectorObservationWrapper):
-        return own.observations
     return lambda batch: np.stack([own.observation(one) for one in batch])
 
 
@@ -327,8 +386,8 @@ def _camera(space: spaces.Box) -> CameraSettings:
     return CameraSettings(height=height, width=width)
 
 
-def _conditions(world: Any) -> dict[str, Any]:
-    if not isinstance(world, DroneWorld | DroneWorlds):
+def _conditions(world: DroneWorld | DroneWorlds | None) -> dict[str, Any]:
+    if world is None:
         return {}
     options = world.batch.options
     if not world.batch.has_images:

@@ -98,6 +98,14 @@ def floats(env):
     return wrappers.TransformObservation(env, lambda x: x / np.float32(255), space)
 
 
+class Inverted(gymnasium.ObservationWrapper):
+    """A wrapper of the user's own, which reads the spaces of itself and of its environment."""
+
+    def observation(self, observation):
+        low = self.env.observation_space.low
+        return (self.observation_space.high - observation + low).astype(np.uint8)
+
+
 def gray(env):
     return wrappers.GrayscaleObservation(env, keep_dim=True)
 
@@ -130,6 +138,7 @@ KINDS = {
     "bytes, channels first": ("CnnPolicy", single(channels_first), plain, {}),
     "floats, channels last": ("MlpPolicy", single(floats), plain, {}),
     "floats, channels first": ("CnnPolicy", batched(Gray(), Standardize()), plain, of_floats()),
+    "own wrapper": ("CnnPolicy", single(Inverted), plain, {}),
     "gray": ("CnnPolicy", single(gray), plain, {}),
     "flat": ("MlpPolicy", single(wrappers.FlattenObservation), plain, {}),
     "stacked": ("CnnPolicy", single(), stacked, {}),

@@ -17,6 +17,8 @@ from tests.policies.sb3_models import (
     KINDS,
     NAME,
     TASK,
+    Inverted,
+    Playback,
     gymnasium,
     library_actions,
     make_model,
@@ -25,6 +27,7 @@ from tests.policies.sb3_models import (
 )
 
 vec_env = pytest.importorskip("stable_baselines3.common.vec_env")
+atari_wrappers = pytest.importorskip("stable_baselines3.common.atari_wrappers")
 STEPS = 8
 
 
@@ -97,10 +100,98 @@ def own_wrapper():
 
 def test_unknown_wrappers_need_transforms():
     model = own_wrapper()
-    with pytest.raises(InputError, match=r"\(it has Brighter\); give drone_rl\.policy_from env="):
+    with pytest.raises(InputError, match=r"it has Brighter; ((?!env=).)* transforms="):
         as_policy(model)
     policy = drone_rl.policy_from(model, transforms=[Rgb(), Standardize(mean=0.0, std=200 / 255)])
     assert policy.make_network().in_shape == (3, 40, 48)
+
+
+class Skipping(gymnasium.ObservationWrapper):
+    """An observation wrapper that changes the time, too."""
+
+    def observation(self, observation):
+        return observation
+
+    def step(self, action):
+        self.env.step(action)
+        return super().step(action)
+
+
+class Mirrored(gymnasium.ActionWrapper):
+    def action(self, action):
+        return (0, 2, 1)[int(action)]
+
+
+class Peeking(gymnasium.ObservationWrapper):
+    """A wrapper whose result depends on more than the current observation."""
+
+    def observation(self, observation):
+        return observation + np.uint8(self.unwrapped.batch.observe().min())
+
+
+def model_of(env):
+    return sb3.PPO("MlpPolicy", env, seed=0, n_steps=4, batch_size=4)
+
+
+def single_of(*layers):
+    return single(*layers)(gymnasium.make(NAME, camera=CAMERA))
+
+
+def test_wrappers_of_rewards_and_records_are_neutral():
+    layers = (
+        lambda env: gymnasium.wrappers.TimeLimit(env, 50),
+        gymnasium.wrappers.RecordEpisodeStatistics,
+        lambda env: gymnasium.wrappers.TransformReward(env, lambda reward: 2 * reward),
+    )
+    model = model_of(vec_env.VecCheckNan(vec_env.VecMonitor(single_of(*layers))))
+    assert as_policy(model).transforms == (Rgb(),)
+
+
+@pytest.mark.parametrize(
+    "layer",
+    [
+        Mirrored,
+        atari_wrappers.MaxAndSkipEnv,
+        lambda env: gymnasium.wrappers.MaxAndSkipObservation(env, 4),
+        lambda env: gymnasium.wrappers.StickyAction(env, 0.2),
+    ],
+)
+def test_changed_actions_are_refused_with_transforms_too(layer):
+    model = model_of(single_of(layer))
+    for transforms in (None, [Rgb()]):
+        with pytest.raises(InputError, match=r"^\w+ changes actions"):
+            drone_rl.policy_from(model, transforms=transforms)
+
+
+def test_observation_wrappers_must_not_change_time_or_read_the_state():
+    with pytest.raises(InputError, match="it has Skipping"):
+        as_policy(model_of(single_of(Skipping)))
+    with pytest.raises(InputError, match="has no attribute 'batch'"):
+        as_policy(model_of(single_of(Peeking)))
+
+
+def hidden():
+    frames = np.zeros((1, 2, CAMERA.height, CAMERA.width, 3), np.uint8)
+    return Inverted(Playback(frames))
+
+
+def test_wrappers_in_other_processes_are_refused():
+    env = vec_env.SubprocVecEnv([hidden])
+    try:
+        model = model_of(env)
+        with pytest.raises(InputError, match=r"SubprocVecEnv .* other processes.* DummyVecEnv"):
+            drone_rl.policy_from(model, transforms=[Rgb()])
+    finally:
+        env.close()
+    policy = drone_rl.policy_from(model, env=single_of(Inverted))
+    assert len(policy.transforms) == 2
+
+
+def test_an_environment_must_have_the_spaces_of_the_model():
+    with pytest.raises(InputError, match=r"Box\(0\.0, 1\.0, .* != Box\(0, 255, "):
+        drone_rl.policy_from(make_model("floats, channels last"), env=single_of())
+    plain = gymnasium.make(NAME, camera=CAMERA)  # channels last; the library moves them
+    assert drone_rl.policy_from(model_of(single_of()), env=plain).transforms == (Rgb(),)
 
 
 def test_state_observations_are_no_images():
