@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar, cast
+from typing import Any, Self, TypeVar, cast
 
 import numpy as np
 import torch
@@ -104,8 +104,14 @@ class Worlds:
         self.state = self.start(torch.zeros_like(sampled).expand(num_envs, *sampled.shape).clone())
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state of a copy, which builds its own scene and renderer when needed."""
+        """Return the state of a deep copy, which builds its own scene and renderer when needed."""
         return {k: v for k, v in vars(self).items() if k not in ("scene", "renderer")}
+
+    def __copy__(self) -> Self:
+        """Return a shallow copy, which shares scene and renderer."""
+        made = object.__new__(type(self))
+        vars(made).update(vars(self))
+        return made
 
     @property
     def entries(self) -> Mapping[str, Entry]:

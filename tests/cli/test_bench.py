@@ -14,7 +14,7 @@ from drone_rl.cli.bench import BenchCommand
         (
             ["--quick"],
             [
-                "only=[render,collector,dm_control,scaling,memory,solve,seeds,large,size]",
+                "only=[render,collector,dm_control,scaling,memory,solve,seeds,large]",
                 "quick=true",
             ],
         ),

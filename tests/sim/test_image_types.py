@@ -65,10 +65,10 @@ def test_disparity_is_normalized_by_the_width():
 
 def test_segmentation_has_airsims_colors():
     geoms = torch.tensor([[[-1, 0], [1, 1]]], dtype=torch.int32)
-    found = pixels(ImageType.SEGMENTATION, geoms, ids=torch.tensor([3, 255]))
+    found = pixels(ImageType.SEGMENTATION, geoms, ids=torch.tensor([3, 255, 0]))
     white = [255, 255, 255]
     assert found.tolist() == [[[[0, 0, 0], [89, 121, 72]], [white, white]]]
-    reds = pixels(ImageType.SEGMENTATION, geoms, ids=torch.tensor([3, 255]), as_float=True)
+    reds = pixels(ImageType.SEGMENTATION, geoms, ids=torch.tensor([3, 255, 0]), as_float=True)
     torch.testing.assert_close(reds, torch.tensor([[[0.0, 89 / 255], [1.0, 1.0]]]))
     own = pixels(ImageType.SEGMENTATION, geoms)
     assert own[0, 0, 1].tolist() == [0, 0, 0] and own[0, 1, 0].tolist() == [153, 108, 6]

@@ -60,6 +60,7 @@ def test_streams_have_the_numbers_on_which_all_figures_rest():
         "SENSORS": 11,
         "SCENES": 12,
         "CLONING": 13,
+        "TORCH": 14,
     }
     drawn = world_random_state(7, 2).uniform()
     child = np.random.SeedSequence(7, spawn_key=(Stream.WORLDS, 2))
