@@ -340,7 +340,7 @@ class Airframe(Pilot):
         """Put it somewhere at once; NaN components stay. Velocities are kept.
 
         Without `ignore_collision` it collides with the first obstacle on the straight line there,
-        one of the `others` included, and stops before it; an `InputError` if that is too far.
+        one of the `others` included, and stops before it.
         """
         now = self.pose
         place = [
@@ -348,17 +348,21 @@ class Airframe(Pilot):
         ]
         turn = pose.attitude if not any(map(math.isnan, pose.attitude)) else now.attitude
         there = self.home + torch.tensor(to_world(place), dtype=torch.float64)
-        hit = None
+        hit, radius = None, self.settings.radius
+        solids = self._solids(others := [*others])
         if not ignore_collision:
-            solids, here = self._solids(others), self.body.position[0]
-            there, hit = solids.sweep(here, there, self.settings.radius)
+            there, hit = solids.sweep(self.body.position[0], there, radius)
         self.body = self.body.moved(there[None], messages.attitude_to_world(turn))
         self._place, self._coasting = None, 0
         self.trajectory.append(self.time, self.body)
-        self.collisions.part()
+        gaps = zip(solids.names, solids.gaps(there, radius).tolist(), strict=True)
+        self.collisions.move([name for name, gap in gaps if gap <= _STANDS], self.time)
         self._hover()
         if hit is not None:
             self.collide(hit[0], there, hit[1])
+            for other in others:
+                if other.choice.name == hit[0]:
+                    other.collide(self.choice.name, other.body.position[0], hit[1])
 
     def collide(self, name: str, position: torch.Tensor, point: torch.Tensor) -> None:
         """Note a collision, at a position, with the nearest point of an object. Shapes: (3,)."""

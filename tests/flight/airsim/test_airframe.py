@@ -147,4 +147,18 @@ def test_teleports_that_an_obstacle_stops_are_collisions():
         assert found["position"] == vehicle.kinematics()["position"]
         assert not vehicle.collision(is_legacy=is_legacy)["has_collided"]
     vehicle.set_airsim_pose(Pose((0.0, 0.0, 1.0), SAME), ignore_collision=False)
-    assert vehicle.collision()["object_name"] == "Ground"
+    for is_new in (True, False):
+        assert vehicle.collision()["has_collided"] is is_new
+        assert vehicle.collision()["object_name"] == "Ground"
+        for _ in range(20):
+            vehicle.run(vehicle.period)
+
+
+@pytest.mark.parametrize("ignore_collision", [True, False])
+def test_a_vehicle_that_is_moved_along_the_ground_does_not_collide_anew(ignore_collision):
+    vehicle = make()
+    for x in range(10):
+        vehicle.set_airsim_pose(Pose((x, 0.0, 0.0), SAME), ignore_collision=ignore_collision)
+        for _ in range(5):
+            vehicle.run(vehicle.period)
+        assert vehicle.collision()["has_collided"] is (x == 0)
