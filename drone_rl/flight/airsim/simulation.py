@@ -209,13 +209,13 @@ class Simulation:
         x, y, z = to_world(position)
         return x, y, z + self._origin
 
-    def move_vehicle(self, name: str, pose: Pose) -> None:
-        """Set a vehicle's pose in NED, see `place`; NaN components stay."""
+    def move_vehicle(self, name: str, pose: Pose, *, ignore_collision: bool) -> None:
+        """Set a vehicle's pose in NED, see `place` and `teleport`; NaN components stay."""
         vehicle = self.vehicles[name]
         x, y, z = to_world(
             [a - b for a, b in zip(self.place(pose.position), vehicle.home.tolist(), strict=True)]
         )
-        self.teleport(vehicle, Pose((x, y, z), pose.attitude), ignore_collision=True)
+        self.teleport(vehicle, Pose((x, y, z), pose.attitude), ignore_collision=ignore_collision)
 
     def teleport(self, vehicle: Vehicle, pose: Pose, *, ignore_collision: bool) -> None:
         """Put a vehicle somewhere, see `Airframe.set_airsim_pose`; it touches cubes on its way."""

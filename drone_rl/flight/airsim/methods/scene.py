@@ -35,7 +35,8 @@ def _object_pose(simulation: Simulation, args: Sequence[Any]) -> Map:
 def _set_object_pose(simulation: Simulation, args: Sequence[Any]) -> bool:
     name, pose = text(args[0], "object_name"), read_pose(args[1])
     if name in simulation.vehicles:
-        simulation.move_vehicle(name, pose)
+        is_teleport = flag(argument(args, 2, True), "teleport")
+        simulation.move_vehicle(name, pose, ignore_collision=is_teleport)
         return True
     return simulation.stage.move_object(name, simulation.place(pose.position))
 

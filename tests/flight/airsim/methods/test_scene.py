@@ -122,6 +122,15 @@ def test_a_vehicle_that_is_put_into_a_cube_as_an_object_collects_it(start):
     assert gone != gone
 
 
+@pytest.mark.parametrize("teleport", [True, False])
+def test_a_vehicle_that_is_moved_as_an_object_collides_unless_it_is_teleported(start, teleport):
+    _, client = start()
+    vehicle = client.call("listVehicles")[0]
+    client.call("simSetObjectPose", vehicle, pose(0.0, 0.0, -5.0), True)
+    client.call("simSetObjectPose", vehicle, pose(0.0, 0.0, 5.0), teleport)
+    assert client.call("simGetCollisionInfo", "")["has_collided"] is not teleport
+
+
 def test_weather_and_time_of_day_end_apart(start):
     _, client = start(SMALL, scene="cubes")
     client.call("simSetWeatherParameter", 7, 0.8)
