@@ -113,8 +113,7 @@ def _set_wind(simulation: Simulation, args: Sequence[Any]) -> None:
 
 @method("simEnableWeather", least=1)
 def _enable_weather(simulation: Simulation, args: Sequence[Any]) -> None:
-    if not flag(args[0], "enable"):
-        simulation.stage.set_fog(0.0)
+    simulation.stage.enable_weather(flag(args[0], "enable"))
 
 
 _FOG = 7

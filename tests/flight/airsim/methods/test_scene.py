@@ -94,12 +94,16 @@ def test_two_vehicles_fly_on_their_own(start):
 def test_weather_light_and_wind(start):
     _, client = start(SMALL, scene="cubes")
     plain = client.call("simGetImage", "0", 0, "")
-    client.call("simEnableWeather", True)
     client.call("simSetWeatherParameter", 7, 0.8)
+    assert client.call("simGetImage", "0", 0, "") == plain
+    client.call("simEnableWeather", True)
     foggy = client.call("simGetImage", "0", 0, "")
     assert foggy != plain
     client.call("simEnableWeather", False)
     assert client.call("simGetImage", "0", 0, "") == plain
+    client.call("simEnableWeather", True)
+    assert client.call("simGetImage", "0", 0, "") == foggy
+    client.call("simEnableWeather", False)
     client.call("simSetTimeOfDay", True, "2018-02-12 23:00:00", False, 1.0, 60.0, True)
     assert client.call("simGetImage", "0", 0, "") != plain
 
@@ -131,8 +135,23 @@ def test_a_vehicle_that_is_moved_as_an_object_collides_unless_it_is_teleported(s
     assert client.call("simGetCollisionInfo", "")["has_collided"] is not teleport
 
 
+def test_a_fast_vehicle_touches_what_it_passes(start):
+    """At 400 m/s it moves 8.4 m in a control period; the cube is touched from 1.65 m on."""
+    _, client = start(scene="cubes")
+    cube = client.call("simGetObjectPose", "cube_0")["position"]
+    state = {
+        **pose(cube["x_val"] - 4.2, cube["y_val"], cube["z_val"]),
+        "linear_velocity": {"x_val": 400.0, "y_val": 0.0, "z_val": 0.0},
+        "angular_velocity": {"x_val": 0.0, "y_val": 0.0, "z_val": 0.0},
+    }
+    client.call("simSetKinematics", state, True)
+    client.call("simContinueForTime", 0.021)
+    assert client.call("simGetCollisionInfo", "")["object_name"] == "cube_0"
+
+
 def test_weather_and_time_of_day_end_apart(start):
     _, client = start(SMALL, scene="cubes")
+    client.call("simEnableWeather", True)
     client.call("simSetWeatherParameter", 7, 0.8)
     foggy = client.call("simGetImage", "0", 0, "")
     client.call("simSetTimeOfDay", True, "2018-02-12 23:00:00")
