@@ -80,8 +80,7 @@ class Airframe(Pilot):
             names: Names of the obstacles.
             object_id: Returns the segmentation id of an object by its name.
             home: Place on Earth of the world's origin.
-            height: Height in metres at which a vehicle without dynamics starts if its start pose
-                is not above the ground.
+            height: Height in metres at which Z is 0 in start poses.
             seed: Of gusts and sensor noise.
         """
         self.choice, self.geo_home, self.names = choice, home, tuple(names)
@@ -89,8 +88,7 @@ class Airframe(Pilot):
         start = _known(choice.start)
         x, y, up = to_world((start.x, start.y, start.z))
         posed = choice.kind == POSING
-        if up < dynamics.radius:
-            up = height if posed else dynamics.radius
+        up = max(dynamics.radius, height + up)
         super().__init__(
             SingleQuadrotor(dynamics),
             mode="computer_vision" if posed else "simple_flight",

@@ -146,7 +146,7 @@ class Simulation:
             names=names,
             object_id=self.stage.get_id,
             home=home._replace(altitude=home.altitude - self._origin),  # the vehicles' start
-            height=self.stage.start_height,
+            height=self._origin,
             seed=(self.seed + len(self.vehicles)) % 2**31,
         )
         vehicle.epoch = self.stamp

@@ -114,15 +114,15 @@ def test_ground_is_no_new_collision_at_rest_and_forgotten_at_takeoff():
 @pytest.mark.parametrize("kind", ["SimpleFlight", "ComputerVision"])
 def test_a_vehicle_starts_at_the_z_of_the_settings_and_stays_there(kind):
     vehicle = make(kind, start=Offset(1.0, 2.0, -4.0))
-    assert vehicle.body.position[0].tolist() == [1.0, -2.0, 4.0]
+    usual, lower = (vehicle.settings.radius,) * 2 if kind == "SimpleFlight" else (2.5, 1.5)
+    assert vehicle.body.position[0].tolist() == pytest.approx([1.0, -2.0, usual + 4.0])
     for _ in range(2):
         for _ in range(50):
             vehicle.run(vehicle.period)
         assert vehicle.pose.position == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
         vehicle.reset()
-    heights = [make(kind, start=Offset(z=z)).body.position[0, 2] for z in (0.0, 1.0)]
-    usual = vehicle.settings.radius if kind == "SimpleFlight" else 2.5  # of `make`
-    assert heights == [usual, usual]
+    heights = [make(kind, start=Offset(z=z)).body.position[0, 2] for z in (0.0, 1.0, 9.0)]
+    assert heights == [usual, lower, vehicle.settings.radius]
 
 
 def test_an_armed_vehicle_that_is_put_into_the_air_hovers():

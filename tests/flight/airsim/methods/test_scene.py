@@ -108,13 +108,20 @@ def test_weather_light_and_wind(start):
     assert client.call("simGetImage", "0", 0, "") != plain
 
 
-def test_the_pose_of_a_vehicle_as_an_object_is_in_the_world(start):
-    _, client = start('{"SimMode": "ComputerVision", "Vehicles": {"A": {"X": 8, "Y": 2, "Z": -1}}}')
+@pytest.mark.parametrize("mode", ["Multirotor", "ComputerVision"])
+def test_the_pose_of_a_vehicle_as_an_object_is_in_the_world(start, mode):
+    text = f'{{"SimMode": "{mode}", "Vehicles": {{"A": {{"X": 8, "Y": 2, "Z": -1}}}}}}'
+    _, client = start(text)
+    client.call("simAddVehicle", "B", mode.replace("Multirotor", "SimpleFlight"), pose(8, 4, -1))
     found = client.call("simGetObjectPose", "A")
+    assert [*found["position"].values()] == pytest.approx([8.0, 2.0, -1.0])
+    added = client.call("simGetObjectPose", "B")["position"]
+    assert [*added.values()] == pytest.approx([8.0, 4.0, -1.0])
     assert client.call("simSetObjectPose", "A", found, True) is True
     assert client.call("simGetObjectPose", "A") == found
     assert client.call("simSetObjectPose", "A", pose(9.0, NAN, -4.0), True) is True
-    assert [*client.call("simGetObjectPose", "A")["position"].values()] == [9.0, 2.0, -4.0]
+    moved = client.call("simGetObjectPose", "A")["position"]
+    assert [*moved.values()] == pytest.approx([9.0, 2.0, -4.0])
 
 
 def test_a_vehicle_that_is_put_into_a_cube_as_an_object_collects_it(start):
