@@ -1,7 +1,6 @@
 """The chapter's program through the messages of AirSim 1.1: an oracle, and a training."""
 
 import importlib.util
-import json
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,10 +10,12 @@ from benchmarks.airsim import served
 from drone_rl.utils.intervals import proportion
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "airsim_chapter.py"
-MODES = {"wall": ("clock=wall", {}), "lockstep": ("clock=lockstep", {})} | {
-    "computer vision": ("clock=wall", {"SimMode": "ComputerVision"})
+MODES = {
+    "wall": ("clock=wall", "Multirotor"),
+    "lockstep": ("clock=lockstep", "Multirotor"),
+    "computer vision": ("clock=wall", "ComputerVision"),
 }
-"""Clock and settings of each mode in which the oracle flies."""
+"""Clock and SimMode of each mode in which the oracle flies."""
 
 
 def _example() -> Any:
@@ -35,11 +36,12 @@ def bench_airsim_chapter(folder: Path, quick: bool) -> dict[str, Any]:
     """
     example = _example()
     cubes = []
-    for mode, (clock, changes) in MODES.items():
-        settings = json.dumps(json.loads(example.SETTINGS) | changes)
+    for mode, (clock, sim_mode) in MODES.items():
+        settings = example.SETTINGS[sim_mode]
         with served(folder / mode, clock, settings=settings) as (port, _, _):
             cubes.append(_mean(_fly(example, port, 2 if quick else 20)))
-    with served(folder / "training", "clock=lockstep", settings=example.SETTINGS) as (port, _, _):
+    settings = example.SETTINGS["Multirotor"]
+    with served(folder / "training", "clock=lockstep", settings=settings) as (port, _, _):
         client = example.Client(port=port)
         env, begin = example.ChapterEnv(client), time.perf_counter()
         act = example.train(env, **({"batches": 1, "frames": 600} if quick else {}))

@@ -23,15 +23,20 @@ import numpy as np
 
 Act = Callable[[np.ndarray], int]
 """From an image to an action."""
-SETTINGS = json.dumps(
-    {
-        "SettingsVersion": 1,
-        "CameraDefaults": {
-            "CaptureSettings": [{"ImageType": 0, "Width": 64, "Height": 25, "FOV_Degrees": 135}]
-        },
-        "Vehicles": {"Drone": {"VehicleType": "SimpleFlight", "X": 0, "Y": 0, "Z": -2.5}},
-    }
-)
+SETTINGS = {
+    mode: json.dumps(
+        {
+            "SettingsVersion": 1,
+            "SimMode": mode,
+            "CameraDefaults": {
+                "CaptureSettings": [{"ImageType": 0, "Width": 64, "Height": 25, "FOV_Degrees": 135}]
+            },
+            "Vehicles": {"Drone": {"VehicleType": "SimpleFlight", "X": 0, "Y": 0, "Z": z}},
+        }
+    )
+    for mode, z in (("Multirotor", -2.2), ("ComputerVision", 0))
+}
+"""By mode. Z is 0 on the ground, but in computer-vision mode at the height of the cubes, 2.5 m."""
 MOVES = ((1.0, 0.0), (0.0, -1.0), (0.0, 1.0))
 """Forward, left and right, metres."""
 
@@ -232,10 +237,13 @@ def train(
     return act
 
 
-def main(command: str = "oracle", port: str = "41451") -> None:
-    """Print the settings, or fly 20 episodes by the oracle, or train and fly 100."""
+def main(command: str = "oracle", choice: str = "") -> None:
+    """Print the settings of a mode, or fly 20 episodes by the oracle, or train and fly 100.
+
+    `choice` is the mode, else the port.
+    """
     if command == "settings":
-        print(SETTINGS)
+        print(SETTINGS[choice or "Multirotor"])
         return
     try:
         from AirSimClient import MultirotorClient  # pyright: ignore[reportMissingImports]
@@ -243,7 +251,7 @@ def main(command: str = "oracle", port: str = "41451") -> None:
         client = MultirotorClient()  # its port is always 41451
         client.confirmConnection()
     except ImportError:
-        client = Client(int(port))
+        client = Client(int(choice or 41451))
     env = ChapterEnv(client)
     cubes = fly(env, train(env), 100) if command == "train" else fly(env, oracle, 20)
     print(f"{np.mean(cubes):.2f} cubes, all three in {np.mean(np.equal(cubes, 3)):.0%}")

@@ -122,7 +122,7 @@ def dqn(s: Session) -> Found:
 
 _CHAPTER_SETTINGS = """{"SettingsVersion": 1, "CameraDefaults": {"CaptureSettings": [
   {"ImageType": 0, "Width": 64, "Height": 25, "FOV_Degrees": 135}]}, %s
-  "Vehicles": {"Drone": {"VehicleType": "SimpleFlight", "X": 0, "Y": 0, "Z": -2.5}}}"""
+  "Vehicles": {"Drone": {"VehicleType": "SimpleFlight", "X": 0, "Y": 0, "Z": %g}}}"""
 
 
 def _chapter(s: Session) -> Found:
@@ -134,15 +134,15 @@ def _chapter(s: Session) -> Found:
     return {"cubes": sum(cubes) / len(cubes)}
 
 
-for _name, _clock, _mode in (
-    ("chapter_wall", "wall", ""),
-    ("chapter_lockstep", "lockstep", ""),
-    ("chapter_computer_vision", "wall", '"SimMode": "ComputerVision",'),
+for _name, _clock, _mode, _z in (
+    ("chapter_wall", "wall", "", -2.2),
+    ("chapter_lockstep", "lockstep", "", -2.2),
+    ("chapter_computer_vision", "wall", '"SimMode": "ComputerVision",', 0.0),
 ):
     program(
         _name,
         until="AirSimClient",
-        settings=_CHAPTER_SETTINGS % _mode,
+        settings=_CHAPTER_SETTINGS % (_mode, _z),
         options={"scene": "cubes", "clock": _clock},
         cubes=Near(3.0, 0.1),
     )(_chapter)

@@ -18,7 +18,7 @@ class ServeCommand(CommandSettings):
 
     settings: str | None = None
     """AirSim's settings.json; null for settings.json in the working directory, else in
-    ~/Documents/AirSim, else for one multirotor."""
+    ~/Documents/AirSim, else for one multirotor; none for one multirotor."""
     scene: str = "cubes"
     """Objects in the scene: cubes, which vanish when touched; blocks; pillars; empty; or the
     path of an MJCF file, *.xml."""
@@ -59,11 +59,10 @@ class ServeCommand(CommandSettings):
         from drone_rl.flight.airsim.serving import make_simulation
         from drone_rl.flight.airsim.settings_file import find_settings
 
-        settings = self.settings or find_settings()
-        _log.info("settings: %s", settings or "one multirotor")
+        settings = find_settings() if self.settings is None else self.settings
         torch.set_num_threads(1)  # its tensors are too small to split over threads
         simulation, host, port = make_simulation(
-            settings,
+            None if settings == "none" else settings,
             scene=self.scene,
             clock=self.clock,
             date=self.date,

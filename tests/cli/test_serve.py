@@ -18,7 +18,7 @@ def start(tmp_path, *args):
 
 
 def test_it_says_when_clients_can_connect_and_ends_by_ctrl_c(tmp_path):
-    process = start(tmp_path, "port=0", "scene=empty", "clock=lockstep")
+    process = start(tmp_path, "settings=none", "port=0", "scene=empty", "clock=lockstep")
     line = ""
     while "ready" not in line:
         line = process.stdout.readline()

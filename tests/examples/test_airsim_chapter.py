@@ -1,6 +1,5 @@
 """Runs the chapter's program against servers: the oracle in all modes, a short training."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -15,9 +14,9 @@ def connect(example, tmp_path):
     """Return a function that starts a server and returns an environment of the program."""
     open_ones = []
 
-    def run(clock="lockstep", *, ignore_collision=True, **changes):
+    def run(clock="lockstep", mode="Multirotor", *, ignore_collision=True):
         path = tmp_path / "settings.json"
-        path.write_text(json.dumps(json.loads(example.SETTINGS) | changes))
+        path.write_text(example.SETTINGS[mode])
         server = serve(path, clock=clock, port=0)
         client = example.Client(server.address[1])
         open_ones.extend([client, server])
@@ -38,7 +37,7 @@ def connect(example, tmp_path):
     ],
 )
 def test_an_oracle_collects_all_cubes(example, connect, clock, mode, ignore_collision):
-    env = connect(clock, SimMode=mode, ignore_collision=ignore_collision)
+    env = connect(clock, mode, ignore_collision=ignore_collision)
     assert example.fly(env, example.oracle, 2) == [3, 3]
 
 
@@ -73,6 +72,6 @@ def test_the_messages_are_those_of_version_1_1(example):
 
 
 def test_a_short_training_acts(example, connect):
-    env = connect(SimMode="ComputerVision")
+    env = connect(mode="ComputerVision")
     act = example.train(env, batches=1, frames=400)
     assert act(env.reset()) in range(3)

@@ -44,6 +44,8 @@ _EARTH = 1e6
 """Half the height of the box that is the ground, metres."""
 _STANDS = 0.01
 """Metres above the ground up to which a vehicle stands on it."""
+_FAST = 50.0
+"""Speed up to which no vehicle passes a cube within one step, metres per second."""
 _FASTEST = 668.0
 """Speed of a rotor at full thrust, radians per second."""
 
@@ -78,8 +80,7 @@ class Airframe(Pilot):
             names: Names of the obstacles.
             object_id: Returns the segmentation id of an object by its name.
             home: Place on Earth of the world's origin.
-            height: Height in metres at which a vehicle without dynamics starts if its start pose
-                is not above the ground.
+            height: Height in metres at which Z is 0 in start poses.
             seed: Of gusts and sensor noise.
         """
         self.choice, self.geo_home, self.names = choice, home, tuple(names)
@@ -87,8 +88,7 @@ class Airframe(Pilot):
         start = _known(choice.start)
         x, y, up = to_world((start.x, start.y, start.z))
         posed = choice.kind == POSING
-        if up < dynamics.radius:
-            up = height if posed else dynamics.radius
+        up = max(dynamics.radius, height + up)
         super().__init__(
             SingleQuadrotor(dynamics),
             mode="computer_vision" if posed else "simple_flight",
@@ -114,6 +114,8 @@ class Airframe(Pilot):
         self.has_api_control = self.choice.has_api_control
         self.collisions = CollisionRecord()
         self._before = self.body
+        self.came_from: torch.Tensor | None = None
+        """Where the last step began, if it was faster than `_FAST`. Shape: (3,)."""
         self._is_armed = self.choice.is_armed and not self.is_computer_vision
         self._hover()
         self._unseen: deque[tuple[FlightState, float]] = deque()
@@ -133,6 +135,9 @@ class Airframe(Pilot):
         was_flying = self._is_flying
         self._advance(ticks)
         row = self.body.numbers.numpy()[0]
+        vx, vy, vz = row[VELOCITY : VELOCITY + 3].tolist()
+        is_fast = vx * vx + vy * vy + vz * vz > _FAST * _FAST
+        self.came_from = self._before.position[0] if is_fast else None
         if row[THING] != NOTHING and row[TIME] > (row[TICKS] - ticks + 0.5) * self.settings.tick:
             self._note_contact(row.tolist())
         if self._is_flying and not was_flying:
@@ -340,7 +345,7 @@ class Airframe(Pilot):
         """Put it somewhere at once; NaN components stay. Velocities are kept.
 
         Without `ignore_collision` it collides with the first obstacle on the straight line there,
-        one of the `others` included, and stops before it; an `InputError` if that is too far.
+        one of the `others` included, and stops before it.
         """
         now = self.pose
         place = [
@@ -348,17 +353,21 @@ class Airframe(Pilot):
         ]
         turn = pose.attitude if not any(map(math.isnan, pose.attitude)) else now.attitude
         there = self.home + torch.tensor(to_world(place), dtype=torch.float64)
-        hit = None
+        hit, radius = None, self.settings.radius
+        solids = self._solids(others := [*others])
         if not ignore_collision:
-            solids, here = self._solids(others), self.body.position[0]
-            there, hit = solids.sweep(here, there, self.settings.radius)
+            there, hit = solids.sweep(self.body.position[0], there, radius)
         self.body = self.body.moved(there[None], messages.attitude_to_world(turn))
         self._place, self._coasting = None, 0
         self.trajectory.append(self.time, self.body)
-        self.collisions.part()
+        gaps = zip(solids.names, solids.gaps(there, radius).tolist(), strict=True)
+        self.collisions.move([name for name, gap in gaps if gap <= _STANDS], self.time)
         self._hover()
         if hit is not None:
             self.collide(hit[0], there, hit[1])
+            for other in others:
+                if other.choice.name == hit[0]:
+                    other.collide(self.choice.name, other.body.position[0], hit[1])
 
     def collide(self, name: str, position: torch.Tensor, point: torch.Tensor) -> None:
         """Note a collision, at a position, with the nearest point of an object. Shapes: (3,)."""

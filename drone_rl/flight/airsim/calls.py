@@ -30,6 +30,7 @@ class Calls:
     @contextlib.contextmanager
     def call(self, client: str, method: str) -> Iterator[None]:
         """Count a call, and log the remarks on it that are new."""
+        method = _printable(method)
         _count(self._made, method)
         remarks: list[str] = []
         token = _REMARKS.set(remarks)
@@ -37,7 +38,7 @@ class Calls:
             yield
         finally:
             _REMARKS.reset(token)
-            for words in dict.fromkeys(f"{method}: {words}" for words in remarks):
+            for words in dict.fromkeys(f"{method}: {_printable(words)}" for words in remarks):
                 if _count(self._remarks, words) == 1:
                     _log.warning("%s: %s", client, words)
 
@@ -49,6 +50,11 @@ class Calls:
             lines.append("without effect, or with a part of it:")
             lines += [f"  {count} x {words}" for words, count in self._remarks.most_common()]
         return "\n".join(lines)
+
+
+def _printable(text: str) -> str:
+    """Escape what would end a line of the log or control a terminal."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def _count(counter: Counter[Any], key: str) -> int:

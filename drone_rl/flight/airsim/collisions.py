@@ -1,7 +1,7 @@
 """Collisions of a vehicle: which contacts are new, and which a client has not read yet."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple, Self
 
 import torch
@@ -9,14 +9,13 @@ from torch import Tensor
 
 from drone_rl.flight.airsim import messages
 from drone_rl.flight.airsim.messages import Map, to_world
-from drone_rl.utils.errors import InputError
 
 GAP = 0.05
 """Simulated seconds, over two control periods, after which a contact has ended."""
-_STEP = 0.05
-"""Metres between two tests for contact along a straight move."""
-_LONGEST = 2000.0
-"""Metres of such a move: its tests take memory."""
+_APART = 0.005
+"""Metres before an obstacle at which a straight move stops."""
+_PARTS, _ROUNDS = 64, 6
+"""Parts of a straight move that are tested at a time, and times that the search is narrowed."""
 
 
 class Collision(NamedTuple):
@@ -84,26 +83,36 @@ class CollisionRecord:
     def __init__(self) -> None:
         """Create an empty record."""
         self._contacts: dict[str, Collision] = {}
-        """Last contact with each object, events excepted."""
+        """Last contact with each object."""
+        self._unread: dict[str, Collision] = {}
         self.forget()
 
     def forget(self) -> None:
-        """Drop all collisions, as at take-off. A contact that lasts does not become new by that."""
-        self._last: Collision | None = None
-        self._unread: dict[str, Collision] = {}
+        """Drop all collisions but events, as at take-off.
 
-    def part(self) -> None:
-        """Note that the vehicle was put elsewhere: contacts have ended."""
-        self._contacts.clear()
+        A contact that lasts does not become new by that.
+        """
+        self._last: Collision | None = None
+        self._unread = {name: one for name, one in self._unread.items() if one.is_event}
+
+    def move(self, touched: Collection[str], now: float) -> None:
+        """Note that the vehicle was put elsewhere, where it touches the named objects.
+
+        Contacts with other objects have ended; those that lasted go on. `now` is in seconds.
+        """
+        self._contacts = {
+            name: one._replace(time=now)
+            for name, one in self._contacts.items()
+            if name in touched and now - one.time <= GAP
+        }
 
     def add(self, found: Collision) -> None:
         """Note a contact."""
-        if not found.is_event:
-            earlier = self._contacts.get(found.name)
-            self._contacts[found.name] = found
-            if earlier is not None and found.time - earlier.time <= GAP:
-                return
-        self._last = self._unread[found.name] = found
+        earlier = self._contacts.get(found.name)
+        self._contacts[found.name] = found
+        lasts = earlier is not None and found.time - earlier.time <= GAP
+        if found.is_event or not lasts:
+            self._last = self._unread[found.name] = found
 
     def read(self, *, clear: bool = True) -> tuple[Collision | None, bool]:
         """Return an unread collision, else the last one, and whether it was unread.
@@ -124,7 +133,7 @@ class CollisionRecord:
         if event is not None:
             return self._unread.pop(event.name), True
         lasting = (one for one in self._contacts.values() if now - one.time <= GAP)
-        found = next(lasting, None)
+        found = next((one for one in lasting if not one.is_event), None)
         return found or self._last, found is not None
 
 
@@ -139,6 +148,11 @@ class Solids(NamedTuple):
     margins: Tensor
     """Distances from a box up to which it is solid. Shape: (S,)."""
 
+    def gaps(self, places: Tensor, radius: float) -> Tensor:
+        """Return the distances from balls to the solids; places (*, S, 3) or (3,), gaps (*, S)."""
+        apart = ((places - self.centers).abs() - self.half_sizes).clamp(min=0.0)
+        return apart.norm(dim=-1) - self.margins - radius
+
     def sweep(
         self, here: Tensor, there: Tensor, radius: float
     ) -> tuple[Tensor, tuple[str, Tensor] | None]:
@@ -147,25 +161,30 @@ class Solids(NamedTuple):
         Returns:
             Its last free position, (3,); name of what stops it, and the point of that nearest to
             the ball, (3,), or None if nothing does.
-
-        Raises:
-            InputError: The line is too long.
         """
-        distance = float((there - here).norm())
-        if distance > _LONGEST:
-            raise InputError(
-                f"the pose is {distance:.6g} m away; give ignore_collision=True, or at most "
-                f"{_LONGEST:g} m"
-            )
-        shares = torch.linspace(0.0, 1.0, math.ceil(distance / _STEP) + 1, dtype=here.dtype)
-        places = here + shares[:, None] * (there - here)
-        apart = ((places[:, None] - self.centers).abs() - self.half_sizes).clamp(min=0.0)
-        gaps = apart.norm(dim=-1) - self.margins - radius
-        hits = gaps < gaps[0].clamp(max=0.0) - 1e-9
-        rows = hits.any(-1).nonzero()
-        if not len(rows):
+        way = there - here
+        start = torch.zeros(len(self.names), dtype=here.dtype)
+        deepest = self.gaps(here, radius).clamp(max=0.0) - 1e-9
+        low, high = start, start + 1.0
+        parts = torch.linspace(0.0, 1.0, _PARTS + 1, dtype=here.dtype)[:, None]
+
+        def gaps(shares: Tensor) -> Tensor:
+            return self.gaps(here + shares[..., None] * way, radius)
+
+        for _ in range(_ROUNDS):  # the gap is convex: its least value is next to the least of some
+            shares = low + parts * (high - low)
+            least = gaps(shares).argmin(0, keepdim=True)
+            low, high = (shares.gather(0, (least + side).clamp(0, _PARTS))[0] for side in (-1, 1))
+        hits = gaps(high) < deepest
+        if not bool(hits.any()):
             return there, None
-        place, hit = places[int(rows[0]) - 1], int(hits[int(rows[0])].long().argmax())
+        low = start
+        for _ in range(_ROUNDS):  # before its least value the gap falls
+            shares = low + parts * (high - low)
+            first = (gaps(shares) < deepest).long().argmax(0, keepdim=True).clamp(min=1)
+            low, high = (shares.gather(0, first - before)[0] for before in (1, 0))
+        hit = int(torch.where(hits, low, math.inf).argmin())
+        place = here + way * (low[hit] - _APART / way.norm()).clamp(min=0.0)
         point = nearest(place, self.centers[hit], self.half_sizes[hit])
         away = place - point
         point = point + away * (self.margins[hit] / away.norm().clamp(min=1e-9))

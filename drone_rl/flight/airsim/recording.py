@@ -49,7 +49,7 @@ class RecordingChoice:
     on_move: bool = False
     """Whether rows of vehicles that have not moved are left out."""
     interval: float = 0.05
-    """Least simulated seconds between two rows, which are whole control periods apart."""
+    """Mean simulated seconds between two rows, which are whole control periods apart."""
     folder: str = ""
     """Folder; "" for that of the server."""
     is_enabled: bool = False
@@ -135,7 +135,7 @@ class Recording:
         """Return whether rows of this simulated time are due; if so, the next are due later."""
         if time < self._next - 1e-9:
             return False
-        self._next = time + self.choice.interval
+        self._next = max(self._next + self.choice.interval, time)  # late rows are not made up for
         return True
 
     def write(

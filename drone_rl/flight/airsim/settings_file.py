@@ -19,7 +19,7 @@ from drone_rl.sim.entities import find_camera
 from drone_rl.sim.image_types import ImageType
 from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.files import read_bytes
-from drone_rl.utils.schema import Flag, Kind, Maybe, OneOf, Real, Text, Whole
+from drone_rl.utils.schema import Flag, Kind, Maybe, OneOf, Real, Text, Whole, shown
 
 _log = logging.getLogger(__name__)
 
@@ -30,6 +30,8 @@ FLYING, POSING, PX4 = "SimpleFlight", "ComputerVision", "PX4Multirotor"
 MAX_BYTES = 2**20
 _TYPES = (FLYING, POSING, PX4)
 _STATES = ("Armed", "Disarmed")
+_USUAL = ("SettingsVersion", "SimMode", "Vehicles")
+"""Keys by which a file is recognized as AirSim's."""
 _COMMENT = r"//[^\n]*(?![^\n])|/\*(?:(?!\*/).)*(?:\*/|\Z)"
 """Matches one comment in one way only, an open one to the end, so that no search is repeated."""
 _TOKEN = re.compile(
@@ -190,10 +192,39 @@ _FILE = _Table(
 )
 
 
-def find_settings() -> Path | None:
-    """Return settings.json of the working directory, else of ~/Documents/AirSim; None without."""
-    folders = (Path.cwd(), Path.home() / "Documents" / "AirSim")
-    return next(filter(Path.is_file, (folder / "settings.json" for folder in folders)), None)
+def find_settings() -> AirsimSettings | None:
+    """Read settings.json of the working directory, else of ~/Documents/AirSim; None without.
+
+    A file that is not AirSim's is ignored, and so is the address to listen at of one that is: the
+    user has not named the file. Raises an `InputError` if a value is wrong.
+    """
+    for folder in (Path.cwd(), Path.home() / "Documents" / "AirSim"):
+        path = folder / "settings.json"
+        if path.is_file() and _is_of_airsim(path):
+            try:
+                found = read_settings(path)
+            except InputError as error:
+                raise InputError(f"{error}; or give settings=FILE or settings=none") from error
+            _log.info("settings: %s", path)
+            if found.address != ADDRESS:
+                _log.warning(
+                    "%s: LocalHostIp=%s is ignored; give settings=FILE or address=",
+                    *(path, shown(found.address)),
+                )
+            return dataclasses.replace(found, address=ADDRESS)
+    return None
+
+
+def _is_of_airsim(path: Path) -> bool:
+    """Return whether a file is an object with a key of AirSim; log if not."""
+    try:
+        data = _load(_read_text(path), str(path))
+    except InputError:
+        data = None
+    is_of_airsim = isinstance(data, Mapping) and not data.keys().isdisjoint(_USUAL)
+    if not is_of_airsim:
+        _log.warning("%s is ignored: it has none of %s", path, ", ".join(_USUAL))
+    return is_of_airsim
 
 
 def read_settings(path: Path) -> AirsimSettings:
@@ -202,25 +233,19 @@ def read_settings(path: Path) -> AirsimSettings:
     Raises:
         InputError: It can't be read, or a value is wrong; the message has the key's path.
     """
+    return parse_settings(_read_text(path), str(path))
+
+
+def _read_text(path: Path) -> str:
     try:
-        text = read_bytes(path, MAX_BYTES).decode("utf-8-sig")
+        return read_bytes(path, MAX_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"settings={path} is not text in UTF-8; save it as UTF-8") from error
-    return parse_settings(text, str(path))
 
 
 def parse_settings(text: str, name: str = "settings.json") -> AirsimSettings:
     """Read settings from the text of a file; see `read_settings` for errors."""
-    try:
-        data = json.loads("".join(_as_json(text)))
-    except json.JSONDecodeError as error:
-        raise InputError(
-            f"{name}: line {error.lineno} is not JSON ({error.msg}); mend it there"
-        ) from error
-    except RecursionError as error:
-        raise InputError(f"{name} is nested too deeply; give fewer levels") from error
-    except ValueError as error:  # Python refuses to read more digits
-        raise InputError(f"{name} has a number of too many digits; shorten it") from error
+    data = _load(text, name)
     found = _read(_FILE, data, "", name)
     if found.get("SimMode", "").lower() == "car":
         raise InputError(f"{name}: SimMode=Car is not supported; give {' or '.join(SIM_MODES)}")
@@ -253,6 +278,19 @@ def parse_settings(text: str, name: str = "settings.json") -> AirsimSettings:
         recording=read_choice(found.get("Recording", {}), name),
         text=json.dumps(data),
     )
+
+
+def _load(text: str, name: str) -> Any:
+    try:
+        return json.loads("".join(_as_json(text)))
+    except json.JSONDecodeError as error:
+        raise InputError(
+            f"{name}: line {error.lineno} is not JSON ({error.msg}); mend it there"
+        ) from error
+    except RecursionError as error:
+        raise InputError(f"{name} is nested too deeply; give fewer levels") from error
+    except ValueError as error:  # Python refuses to read more digits
+        raise InputError(f"{name} has a number of too many digits; shorten it") from error
 
 
 def _as_json(text: str) -> Iterator[str]:

@@ -146,7 +146,7 @@ class Simulation:
             names=names,
             object_id=self.stage.get_id,
             home=home._replace(altitude=home.altitude - self._origin),  # the vehicles' start
-            height=self.stage.start_height,
+            height=self._origin,
             seed=(self.seed + len(self.vehicles)) % 2**31,
         )
         vehicle.epoch = self.stamp
@@ -209,13 +209,13 @@ class Simulation:
         x, y, z = to_world(position)
         return x, y, z + self._origin
 
-    def move_vehicle(self, name: str, pose: Pose) -> None:
-        """Set a vehicle's pose in NED, see `place`; NaN components stay."""
+    def move_vehicle(self, name: str, pose: Pose, *, ignore_collision: bool) -> None:
+        """Set a vehicle's pose in NED, see `place` and `teleport`; NaN components stay."""
         vehicle = self.vehicles[name]
         x, y, z = to_world(
             [a - b for a, b in zip(self.place(pose.position), vehicle.home.tolist(), strict=True)]
         )
-        self.teleport(vehicle, Pose((x, y, z), pose.attitude), ignore_collision=True)
+        self.teleport(vehicle, Pose((x, y, z), pose.attitude), ignore_collision=ignore_collision)
 
     def teleport(self, vehicle: Vehicle, pose: Pose, *, ignore_collision: bool) -> None:
         """Put a vehicle somewhere, see `Airframe.set_airsim_pose`; it touches cubes on its way."""
@@ -352,7 +352,7 @@ class Simulation:
         ticks = self._next_ticks()
         for vehicle in self.vehicles.values():
             vehicle.run(ticks)
-            self.touch(vehicle)
+            self.touch(vehicle, vehicle.came_from)
         self._bump()
         self._ticks += ticks
         self._record()

@@ -78,6 +78,7 @@ class Stage:
         self._names = [self._name_of(entity) for entity in self.task.make_props()]
         self._spawned: dict[str, _Spawned] = {}
         self._weather = _PLAIN
+        self._fog, self._has_weather = 0.0, False
         self._shown: tuple[
             Appearance, tuple[_Spawned, ...], dict[Any, tuple[CameraState, Appearance | None]]
         ] = (_PLAIN, (), {})
@@ -257,9 +258,18 @@ class Stage:
     # Weather and light
 
     def set_fog(self, density: float) -> None:
-        """Set the density of fog, from 0 for none to 1 for a visibility of 20 m."""
-        visibility = None if density <= 0.0 else 20.0 / density
-        self._change_weather(fog_visibility=visibility)
+        """Set the density of fog, from 0 for none to 1 for a visibility of 20 m.
+
+        It is shown while the weather is enabled.
+        """
+        self._fog = density
+        self.enable_weather(self._has_weather)
+
+    def enable_weather(self, enable: bool) -> None:
+        """Show the fog that is set, or none; at the start none is shown."""
+        self._has_weather = enable
+        is_shown = enable and self._fog > 0.0
+        self._change_weather(fog_visibility=20.0 / self._fog if is_shown else None)
 
     def set_sun(self, elevation: float, azimuth: float = 127.9) -> None:
         """Set the sun's elevation, and its direction to the left of the world's x axis, degrees."""

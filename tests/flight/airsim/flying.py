@@ -17,7 +17,8 @@ def make(kind="SimpleFlight", obstacles=None, home=HOME, **choice):
     given = VehicleChoice("A", kind, **{"has_api_control": True, **choice})
     dynamics = DynamicsSettings(mode="simple_flight")
     around = {"obstacles": obstacles, "names": ["box"]}
-    return Vehicle(given, dynamics, None, **around, home=home, height=2.5)
+    height = dynamics.radius if kind == "SimpleFlight" else 2.5
+    return Vehicle(given, dynamics, None, **around, home=home, height=height)
 
 
 def fly(vehicle, future, seconds=60.0):

@@ -114,15 +114,15 @@ def test_ground_is_no_new_collision_at_rest_and_forgotten_at_takeoff():
 @pytest.mark.parametrize("kind", ["SimpleFlight", "ComputerVision"])
 def test_a_vehicle_starts_at_the_z_of_the_settings_and_stays_there(kind):
     vehicle = make(kind, start=Offset(1.0, 2.0, -4.0))
-    assert vehicle.body.position[0].tolist() == [1.0, -2.0, 4.0]
+    usual, lower = (vehicle.settings.radius,) * 2 if kind == "SimpleFlight" else (2.5, 1.5)
+    assert vehicle.body.position[0].tolist() == pytest.approx([1.0, -2.0, usual + 4.0])
     for _ in range(2):
         for _ in range(50):
             vehicle.run(vehicle.period)
         assert vehicle.pose.position == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
         vehicle.reset()
-    heights = [make(kind, start=Offset(z=z)).body.position[0, 2] for z in (0.0, 1.0)]
-    usual = vehicle.settings.radius if kind == "SimpleFlight" else 2.5  # of `make`
-    assert heights == [usual, usual]
+    heights = [make(kind, start=Offset(z=z)).body.position[0, 2] for z in (0.0, 1.0, 9.0)]
+    assert heights == [usual, lower, vehicle.settings.radius]
 
 
 def test_an_armed_vehicle_that_is_put_into_the_air_hovers():
@@ -147,4 +147,18 @@ def test_teleports_that_an_obstacle_stops_are_collisions():
         assert found["position"] == vehicle.kinematics()["position"]
         assert not vehicle.collision(is_legacy=is_legacy)["has_collided"]
     vehicle.set_airsim_pose(Pose((0.0, 0.0, 1.0), SAME), ignore_collision=False)
-    assert vehicle.collision()["object_name"] == "Ground"
+    for is_new in (True, False):
+        assert vehicle.collision()["has_collided"] is is_new
+        assert vehicle.collision()["object_name"] == "Ground"
+        for _ in range(20):
+            vehicle.run(vehicle.period)
+
+
+@pytest.mark.parametrize("ignore_collision", [True, False])
+def test_a_vehicle_that_is_moved_along_the_ground_does_not_collide_anew(ignore_collision):
+    vehicle = make()
+    for x in range(10):
+        vehicle.set_airsim_pose(Pose((x, 0.0, 0.0), SAME), ignore_collision=ignore_collision)
+        for _ in range(5):
+            vehicle.run(vehicle.period)
+        assert vehicle.collision()["has_collided"] is (x == 0)

@@ -25,6 +25,19 @@ def test_a_remark_outside_of_a_call_is_no_error():
     assert str(Calls()) == "0 calls"
 
 
+def test_clients_write_no_lines_of_their_own(caplog):
+    calls = Calls()
+    with calls.call("me", "evil\n\x1b[31m"):
+        remark("a\r\nb\u2028\ud800")
+    expected = r"evil\n\x1b[31m: a\r\nb\u2028\ud800"
+    assert [record.getMessage() for record in caplog.records] == [f"me: {expected}"]
+    assert str(calls).splitlines() == [
+        r"1 calls: evil\n\x1b[31m 1",
+        "without effect, or with a part of it:",
+        f"  1 x {expected}",
+    ]
+
+
 def test_names_that_a_client_makes_up_take_no_memory():
     calls = Calls()
     for i in range(2000):

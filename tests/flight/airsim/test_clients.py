@@ -72,6 +72,7 @@ def test_commands_that_are_not_joined_are_sent(run, tmp_path, monkeypatch):
     found, _ = run("not_joined.py", clock="wall")
     assert found["moved"] > 0.2
     assert found["twice"] == [2.0, 4.0, 6.0]
+    assert found["numbers"] == [1.0, 2.0, 3.0]
     assert found["bytes"] == 256 * 144 * 3
 
 

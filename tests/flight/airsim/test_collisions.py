@@ -6,7 +6,6 @@ import pytest
 import torch
 
 from drone_rl.flight.airsim.collisions import GAP, Collision, CollisionRecord, Solids
-from drone_rl.utils.errors import InputError
 
 ORIGIN, UP = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 PERIOD = 0.021
@@ -48,8 +47,20 @@ def test_version_1_1_reads_events_and_what_is_touched_now():
     assert [names(record.read_current(0.02)) for _ in range(3)] == ["cube_0", "Ground", "Ground"]
     assert names(record.read_current(0.02 + GAP)) is None
     record.add(contact("wall", 1.0))
-    record.part()
+    record.move([], 1.0)
     assert names(record.read_current(1.0)) is None
+
+
+def test_a_move_ends_contacts_except_with_what_is_still_touched():
+    record = CollisionRecord()
+    for name in ("Ground", "wall"):
+        record.add(contact(name, 0.0))
+    record.move(["Ground"], GAP)
+    while record.read()[1]:
+        pass
+    for name in ("Ground", "wall"):
+        record.add(contact(name, GAP + PERIOD))
+    assert [names(record.read()) for _ in range(2)] == ["wall", None]
 
 
 def test_what_is_touched_at_takeoff_does_not_become_new():
@@ -58,6 +69,14 @@ def test_what_is_touched_at_takeoff_does_not_become_new():
     record.forget()
     record.add(contact("Ground", PERIOD))
     assert record.read() == (None, False)
+
+
+def test_a_touched_cube_is_kept_at_takeoff_until_it_is_read():
+    record = CollisionRecord()
+    record.add(contact("Ground", 0.0))
+    record.add(contact("cube_0", 0.0, is_event=True))
+    record.forget()
+    assert [names(record.read()) for _ in range(2)] == ["cube_0", None]
 
 
 def solids(*rows):
@@ -91,5 +110,10 @@ def test_a_sweep_leaves_what_it_starts_in_and_goes_no_deeper():
     assert floor.sweep(low, high, 0.3)[1] is None
     assert floor.sweep(low, vector(9.0, 0.0, 0.2), 0.3)[1] is None
     assert floor.sweep(low, vector(9.0, 0.0, 0.1), 0.3)[1][0] == "Ground"
-    with pytest.raises(InputError, match=r"the pose is 1e\+09 m away; give ignore_collision=True"):
-        floor.sweep(low, vector(1e9, 0.0, 0.2), 0.3)
+
+
+def test_a_wall_stops_a_sweep_of_any_length():
+    wall = solids(("wall", (5e5, 0.0, 0.0), (0.1, 9.0, 9.0), 0.0))
+    for length in (499_999.7, 1e6):
+        place, hit = wall.sweep(vector(0, 0, 0), vector(length, 0, 0), 0.3)
+        assert hit[0] == "wall" and float(place[0]) == pytest.approx(499_999.6, abs=0.02)

@@ -208,7 +208,26 @@ def test_settings_are_found_where_airsim_looks_for_them(tmp_path, monkeypatch):
     monkeypatch.chdir(here)
     monkeypatch.setenv("HOME", str(tmp_path))
     assert find_settings() is None
-    (documents / "settings.json").write_text("{}")
-    assert find_settings() == documents / "settings.json"
-    (here / "settings.json").write_text("{}")
-    assert find_settings() == here / "settings.json"
+    (documents / "settings.json").write_text("{'SettingsVersion': 1, 'ApiServerPort': 5}")
+    assert find_settings().port == 5
+    (here / "settings.json").write_text("{'Vehicles': {'A': {}}, 'ApiServerPort': 6}")
+    assert find_settings().port == 6
+
+
+@pytest.mark.parametrize("text", ['{"LocalHostIp": "0.0.0.0"}', "[]", "<xml>", "\ud800"])
+def test_a_file_of_another_program_is_ignored(tmp_path, monkeypatch, caplog, text):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "settings.json").write_bytes(text.encode("utf-8", "surrogatepass"))
+    assert find_settings() is None
+    assert "settings.json is ignored" in caplog.text
+
+
+def test_a_file_that_is_not_named_does_not_open_the_server(tmp_path, monkeypatch, caplog):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "settings.json").write_text('{"SimMode": "", "LocalHostIp": "0.0.0.0"}')
+    assert find_settings().address == "127.0.0.1"
+    assert "LocalHostIp='0.0.0.0' is ignored" in caplog.text
+    (tmp_path / "settings.json").write_text('{"SimMode": "Car"}')
+    with pytest.raises(InputError, match=r"settings\.json: .*give settings=FILE or settings=none"):
+        find_settings()

@@ -183,5 +183,6 @@ def test_multirotors_collide_with_each_other(make):
     beyond = Pose((9.0, 0.0, 0.0), start.attitude)
     simulation.teleport(a, beyond, ignore_collision=False)
     assert a.collision()["object_name"] == "B" and 2.3 < a.pose.position[0] <= 2.4
+    assert b.collision()["object_name"] == "A"
     simulation.teleport(a, beyond, ignore_collision=True)
     assert a.pose.position[0] == 9.0 and not a.collision()["has_collided"]

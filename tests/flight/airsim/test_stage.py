@@ -107,6 +107,7 @@ def test_ids_are_those_of_their_objects_only():
 def test_fog_and_night_darken_or_hide(cubes):
     cubes.reset()
     clear = look(cubes)
+    cubes.enable_weather(True)
     cubes.set_fog(1.0)
     assert not torch.equal(look(cubes), clear)
     cubes.set_fog(0.0)

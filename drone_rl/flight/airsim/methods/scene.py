@@ -35,7 +35,8 @@ def _object_pose(simulation: Simulation, args: Sequence[Any]) -> Map:
 def _set_object_pose(simulation: Simulation, args: Sequence[Any]) -> bool:
     name, pose = text(args[0], "object_name"), read_pose(args[1])
     if name in simulation.vehicles:
-        simulation.move_vehicle(name, pose)
+        is_teleport = flag(argument(args, 2, True), "teleport")
+        simulation.move_vehicle(name, pose, ignore_collision=is_teleport)
         return True
     return simulation.stage.move_object(name, simulation.place(pose.position))
 
@@ -112,8 +113,7 @@ def _set_wind(simulation: Simulation, args: Sequence[Any]) -> None:
 
 @method("simEnableWeather", least=1)
 def _enable_weather(simulation: Simulation, args: Sequence[Any]) -> None:
-    if not flag(args[0], "enable"):
-        simulation.stage.set_fog(0.0)
+    simulation.stage.enable_weather(flag(args[0], "enable"))
 
 
 _FOG = 7

@@ -6,6 +6,8 @@ import sys
 import time
 from importlib import metadata
 
+import numpy as np
+
 if any(one.metadata["Name"] == "rpc-msgpack" for one in metadata.distributions()):
     import airsim_fixes
 
@@ -24,5 +26,6 @@ vector = airsim.Vector3r(1.0, 2.0, 3.0) * 2.0
 found["twice"] = [vector.x_val, vector.y_val, vector.z_val]
 request = airsim.ImageRequest("0", airsim.ImageType.Scene, False, False)
 (image,) = client.simGetImages([request])
+found["numbers"] = np.fromstring("1 2 3", sep=" ").tolist()
 found["bytes"] = len(airsim.string_to_uint8_array(image.image_data_uint8))
 print(json.dumps(found))

@@ -94,23 +94,34 @@ def test_two_vehicles_fly_on_their_own(start):
 def test_weather_light_and_wind(start):
     _, client = start(SMALL, scene="cubes")
     plain = client.call("simGetImage", "0", 0, "")
-    client.call("simEnableWeather", True)
     client.call("simSetWeatherParameter", 7, 0.8)
+    assert client.call("simGetImage", "0", 0, "") == plain
+    client.call("simEnableWeather", True)
     foggy = client.call("simGetImage", "0", 0, "")
     assert foggy != plain
     client.call("simEnableWeather", False)
     assert client.call("simGetImage", "0", 0, "") == plain
+    client.call("simEnableWeather", True)
+    assert client.call("simGetImage", "0", 0, "") == foggy
+    client.call("simEnableWeather", False)
     client.call("simSetTimeOfDay", True, "2018-02-12 23:00:00", False, 1.0, 60.0, True)
     assert client.call("simGetImage", "0", 0, "") != plain
 
 
-def test_the_pose_of_a_vehicle_as_an_object_is_in_the_world(start):
-    _, client = start('{"SimMode": "ComputerVision", "Vehicles": {"A": {"X": 8, "Y": 2, "Z": -1}}}')
+@pytest.mark.parametrize("mode", ["Multirotor", "ComputerVision"])
+def test_the_pose_of_a_vehicle_as_an_object_is_in_the_world(start, mode):
+    text = f'{{"SimMode": "{mode}", "Vehicles": {{"A": {{"X": 8, "Y": 2, "Z": -1}}}}}}'
+    _, client = start(text)
+    client.call("simAddVehicle", "B", mode.replace("Multirotor", "SimpleFlight"), pose(8, 4, -1))
     found = client.call("simGetObjectPose", "A")
+    assert [*found["position"].values()] == pytest.approx([8.0, 2.0, -1.0])
+    added = client.call("simGetObjectPose", "B")["position"]
+    assert [*added.values()] == pytest.approx([8.0, 4.0, -1.0])
     assert client.call("simSetObjectPose", "A", found, True) is True
     assert client.call("simGetObjectPose", "A") == found
     assert client.call("simSetObjectPose", "A", pose(9.0, NAN, -4.0), True) is True
-    assert [*client.call("simGetObjectPose", "A")["position"].values()] == [9.0, 2.0, -4.0]
+    moved = client.call("simGetObjectPose", "A")["position"]
+    assert [*moved.values()] == pytest.approx([9.0, 2.0, -4.0])
 
 
 def test_a_vehicle_that_is_put_into_a_cube_as_an_object_collects_it(start):
@@ -122,8 +133,32 @@ def test_a_vehicle_that_is_put_into_a_cube_as_an_object_collects_it(start):
     assert gone != gone
 
 
+@pytest.mark.parametrize("teleport", [True, False])
+def test_a_vehicle_that_is_moved_as_an_object_collides_unless_it_is_teleported(start, teleport):
+    _, client = start()
+    vehicle = client.call("listVehicles")[0]
+    client.call("simSetObjectPose", vehicle, pose(0.0, 0.0, -5.0), True)
+    client.call("simSetObjectPose", vehicle, pose(0.0, 0.0, 5.0), teleport)
+    assert client.call("simGetCollisionInfo", "")["has_collided"] is not teleport
+
+
+def test_a_fast_vehicle_touches_what_it_passes(start):
+    """At 400 m/s it moves 8.4 m in a control period; the cube is touched from 1.65 m on."""
+    _, client = start(scene="cubes")
+    cube = client.call("simGetObjectPose", "cube_0")["position"]
+    state = {
+        **pose(cube["x_val"] - 4.2, cube["y_val"], cube["z_val"]),
+        "linear_velocity": {"x_val": 400.0, "y_val": 0.0, "z_val": 0.0},
+        "angular_velocity": {"x_val": 0.0, "y_val": 0.0, "z_val": 0.0},
+    }
+    client.call("simSetKinematics", state, True)
+    client.call("simContinueForTime", 0.021)
+    assert client.call("simGetCollisionInfo", "")["object_name"] == "cube_0"
+
+
 def test_weather_and_time_of_day_end_apart(start):
     _, client = start(SMALL, scene="cubes")
+    client.call("simEnableWeather", True)
     client.call("simSetWeatherParameter", 7, 0.8)
     foggy = client.call("simGetImage", "0", 0, "")
     client.call("simSetTimeOfDay", True, "2018-02-12 23:00:00")

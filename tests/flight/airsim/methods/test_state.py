@@ -20,7 +20,8 @@ def test_the_legacy_pose_is_a_map_in_order(start):
 @pytest.mark.parametrize("mode", ["Multirotor", "ComputerVision"])
 def test_a_cube_that_is_touched_is_reported_once(start, mode, method):
     """The sweep to x = 30 m passes through cubes 0 and 1; a jump touches only where it ends."""
-    text = f'{{"SimMode": "{mode}", "Vehicles": {{"A": {{"Z": -2.5}}}}}}'
+    z = -2.2 if mode == "Multirotor" else 0.0  # at the height of the cubes
+    text = f'{{"SimMode": "{mode}", "Vehicles": {{"A": {{"Z": {z}}}}}}}'
     _, client = start(text, scene="cubes")
 
     def teleport(x, ignore_collision):
@@ -29,7 +30,7 @@ def test_a_cube_that_is_touched_is_reported_once(start, mode, method):
     for _ in range(2):
         client.call("reset")
         for i in range(3):
-            client.call("simSetObjectPose", f"cube_{i}", pose(15.0 + 9.0 * i, 1.0, -2.5), True)
+            client.call("simSetObjectPose", f"cube_{i}", pose(15.0 + 9.0 * i, 1.0, z), True)
         teleport(30.0, False)
         for i in range(2):
             found = client.call(method)
