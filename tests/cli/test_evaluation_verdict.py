@@ -176,3 +176,11 @@ def test_latest_is_named_by_its_file(run, in_process, tmp_path, monkeypatch, cap
     in_process("verdict", "policy=latest", "episodes=4", "hydra.run.dir=v")
     assert f"policy=latest is {run}" in caplog.text
     assert json.loads((tmp_path / "v" / "verdict.json").read_text())["policy"] == str(run)
+
+
+def test_a_second_verdict_does_not_replace_the_first_in_the_same_folder(in_process, tmp_path):
+    where = ["hydra.sweep.dir=v", "hydra.sweep.subdir=same"]
+    done = in_process("verdict", "-m", "policy=oracle,random", "episodes=20", "seed=0", *where)
+    assert done.returncode == 2
+    assert "an earlier run has the same folder" in error_line(done)
+    assert json.loads((tmp_path / "v" / "same" / "verdict.json").read_text())["policy"] == "oracle"

@@ -332,12 +332,19 @@ def _job(
     name: str, command: type[CommandSettings], statuses: list[int], overrides: Sequence[str] = ()
 ) -> Callable[[DictConfig], object]:
     """Return the function that Hydra calls for each run."""
+    folders: set[Path] = set()
 
     def job(config: DictConfig) -> object:
         try:
             with _explained(name, overrides):
                 settings = read_settings(command, config)
             folder = Path(HydraConfig.get().runtime.output_dir)
+            if folder in folders:
+                raise InputError(
+                    f"an earlier run has the same folder, {folder}; add ${{hydra.job.num}} to "
+                    "hydra.sweep.subdir"
+                )
+            folders.add(folder)
             which = getattr(settings, "policy", None)
             is_latest = which in ("latest", ("latest",))
             if is_latest and (used := settings.used_policy(folder)) != "latest":
