@@ -3,20 +3,21 @@
 import contextlib
 import logging
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from typing import Any
 
 _log = logging.getLogger(__name__)
 
-_REMARKS: ContextVar[list[str]] = ContextVar("remarks")
+_NOTE: ContextVar[Callable[[str], None]] = ContextVar("note", default=lambda words: None)
+"""Takes the remarks on the present call."""
 _MOST = 1000
 """Different methods, and different remarks, that are counted."""
 
 
 def remark(words: str) -> None:
     """Note why the present call has no effect, or not all of it; do nothing outside of a call."""
-    _REMARKS.get([]).append(words)
+    _NOTE.get()(words)
 
 
 class Calls:
@@ -29,18 +30,22 @@ class Calls:
 
     @contextlib.contextmanager
     def call(self, client: str, method: str) -> Iterator[None]:
-        """Count a call, and log the remarks on it that are new."""
+        """Count a call, and log the remarks on it that are new, before it is answered."""
         method = _printable(method)
         _count(self._made, method)
-        remarks: list[str] = []
-        token = _REMARKS.set(remarks)
+        noted: set[str] = set()
+
+        def note(words: str) -> None:
+            words = f"{method}: {_printable(words)}"
+            if words not in noted and _count(self._remarks, words) == 1:
+                _log.warning("%s: %s", client, words)
+            noted.add(words)
+
+        token = _NOTE.set(note)
         try:
             yield
         finally:
-            _REMARKS.reset(token)
-            for words in dict.fromkeys(f"{method}: {_printable(words)}" for words in remarks):
-                if _count(self._remarks, words) == 1:
-                    _log.warning("%s: %s", client, words)
+            _NOTE.reset(token)
 
     def __str__(self) -> str:
         """Return a summary of some lines."""
