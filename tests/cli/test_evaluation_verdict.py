@@ -5,6 +5,7 @@ import json
 import pytest
 
 import drone_rl
+from tests.cli.running import drone_rl as run_program
 from tests.cli.running import error_line
 from tests.robustness.making import shifts_of
 from tests.verification.checker.making import of_every_place
@@ -178,9 +179,9 @@ def test_latest_is_named_by_its_file(run, in_process, tmp_path, monkeypatch, cap
     assert json.loads((tmp_path / "v" / "verdict.json").read_text())["policy"] == str(run)
 
 
-def test_a_second_verdict_does_not_replace_the_first_in_the_same_folder(in_process, tmp_path):
+def test_a_second_verdict_does_not_replace_the_first_in_the_same_folder(tmp_path):
     where = ["hydra.sweep.dir=v", "hydra.sweep.subdir=same"]
-    done = in_process("verdict", "-m", "policy=oracle,random", "episodes=20", "seed=0", *where)
-    assert done.returncode == 2
+    words = ["policy=oracle,random", "episodes=20", "seed=0", *where]
+    done = run_program("verdict", "-m", *words, cwd=tmp_path)
     assert "an earlier run has the same folder" in error_line(done)
     assert json.loads((tmp_path / "v" / "same" / "verdict.json").read_text())["policy"] == "oracle"

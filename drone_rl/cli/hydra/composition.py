@@ -328,6 +328,15 @@ def _mistake(error: Exception, overrides: Sequence[str]) -> str | None:
     return failure(plugins, error) if plugins and line_of(error) else None
 
 
+def _take(folder: Path, taken: set[Path]) -> None:
+    if folder in taken:
+        raise InputError(
+            f"an earlier run has the same folder, {folder}; add ${{hydra.job.num}} to "
+            "hydra.sweep.subdir"
+        )
+    taken.add(folder)
+
+
 def _job(
     name: str, command: type[CommandSettings], statuses: list[int], overrides: Sequence[str] = ()
 ) -> Callable[[DictConfig], object]:
@@ -339,12 +348,7 @@ def _job(
             with _explained(name, overrides):
                 settings = read_settings(command, config)
             folder = Path(HydraConfig.get().runtime.output_dir)
-            if folder in folders:
-                raise InputError(
-                    f"an earlier run has the same folder, {folder}; add ${{hydra.job.num}} to "
-                    "hydra.sweep.subdir"
-                )
-            folders.add(folder)
+            _take(folder, folders)
             which = getattr(settings, "policy", None)
             is_latest = which in ("latest", ("latest",))
             if is_latest and (used := settings.used_policy(folder)) != "latest":
