@@ -34,11 +34,19 @@ SHORT = (
 _MAIN = {
     "judge(training.policy)": "judge(training.policy, episodes=8)",
     "episodes=200": "episodes=8",
-    'explain(["good", "poor"])': 'explain(["good"], frames=30, episodes=8, perplexity=5)',
 }
+_FEW_FRAMES = "frames=30, episodes=8, perplexity=5)"
 SMALLER = {
-    "README.md": {"train(seed=1)": f"train(seed=1, {SHORT})", **_MAIN},
-    "docs/tour.md": {"seed=1)": f"seed=1, {SHORT})", **_MAIN},
+    "README.md": {
+        "train(seed=1)": f"train(seed=1, {SHORT})",
+        'explain(["good", "poor"])': f'explain(["good"], {_FEW_FRAMES}',
+        **_MAIN,
+    },
+    "docs/tour.md": {
+        "seed=1)": f"seed=1, {SHORT})",
+        'explain("good")': f'explain("good", {_FEW_FRAMES}',
+        **_MAIN,
+    },
     "docs/tutorials/notebook.md": {
         "train(seed=1)": f"train(seed=1, {SHORT})",
         "judge(policy)": "judge(policy, episodes=8)",
