@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from drone_rl.sweeps.manifest import THREADS, Run, read_result
+from drone_rl.sweeps.manifest import THREADS, Run, Sweep, read_result
 from drone_rl.utils.errors import InputError, extra
 from drone_rl.utils.files import is_locked, read_tail, write_atomically
 from drone_rl.utils.limits import LOG_BYTES
@@ -96,14 +96,14 @@ class RunProcess:
             )
 
 
-def describe_active(runs: Sequence[Run], most: int = 4) -> str:
+def describe_active(sweep: Sweep, runs: Sequence[Run], most: int = 4) -> str:
     """Return the last line in the log of each run at work here, of `most` runs at most."""
     active = [r for r in runs if is_locked(r.folder) and (r.folder / "output.log").is_file()]
     lines = []
     for run in active[:most]:
         last = read_tail(run.folder / "output.log", 1000).decode(errors="replace").splitlines()
         line = re.sub(r"^\[[\d:]+\] ", "", last[-1] if last else "starts")
-        lines.append(f"{run.folder.name}: {line}")
+        lines.append(f"{sweep.name_of(run)}: {line}")
     left = len(active) - len(lines)
     return "; ".join(lines) + (f"; and {left} more" if left else "")
 

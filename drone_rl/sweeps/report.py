@@ -109,9 +109,7 @@ def judge_sweep(sweep: Sweep, episodes: int, device: str) -> None:
             verdict = judge_run(run.folder, episodes, device, seed=seed)
             _log.info("[%d/%d] %s: %s", done, len(finished), name, verdict["kind"])
         except InputError as error:
-            _log.warning(
-                "[%d/%d] %s not judged: %s", done, len(finished), sweep.name_of(run), error
-            )
+            _log.warning("[%d/%d] %s not judged: %s", done, len(finished), name, error)
 
 
 def judge_run(

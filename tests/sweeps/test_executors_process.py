@@ -10,7 +10,7 @@ import pytest
 
 from drone_rl.sweeps import executors
 from drone_rl.sweeps.executors import RunProcess, describe_active, finish_run, note_failure
-from drone_rl.sweeps.manifest import read_failure, read_result
+from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_result
 from drone_rl.utils.files import folder_lock
 
 pytestmark = pytest.mark.usefixtures("fake_training")
@@ -56,17 +56,17 @@ def test_a_run_that_another_process_works_on_is_waited_for(make_runs):
     assert not (run.folder / "starts").exists()
 
 
-def test_runs_at_work_are_described_by_their_last_line(make_runs):
-    runs = make_runs("seed=0", "seed=1", "seed=2")
+def test_runs_at_work_are_described_by_their_last_line(tmp_path):
+    runs = [Run(i, (), tmp_path / f"lr{i}" / "0") for i in range(3)]
+    sweep = Sweep(tmp_path, "drone-rl train -m", {}, runs)
     for run in runs:
-        run.folder.mkdir()
+        run.folder.mkdir(parents=True)
         (run.folder / "output.log").write_text("[10:00:00] begins\n[10:00:05] frames 2\n")
     (runs[1].folder / "output.log").write_text("")
-    assert describe_active(runs) == ""
+    assert describe_active(sweep, runs) == ""
     with folder_lock(runs[0].folder), folder_lock(runs[1].folder):
-        first, second = (run.folder.name for run in runs[:2])
-        assert describe_active(runs) == f"{first}: frames 2; {second}: starts"
-        assert describe_active(runs, most=1) == f"{first}: frames 2; and 1 more"
+        assert describe_active(sweep, runs) == "lr0/0: frames 2; lr1/0: starts"
+        assert describe_active(sweep, runs, most=1) == "lr0/0: frames 2; and 1 more"
 
 
 def test_a_process_that_came_too_late_is_no_failure(make_runs):

@@ -126,7 +126,7 @@ class SweepLauncher(Launcher):
         try:
             unfinished = [run for run in runs if read_result(run.folder) is None]
             endings = self.executor(sweep.folder).finish(unfinished) if unfinished else ()
-            with Heartbeat(lambda: describe_active(unfinished)):
+            with Heartbeat(lambda: describe_active(sweep, unfinished)):
                 for done, (run, status) in enumerate(endings, start=1):
                     failed += status != 0
                     line = "[%d/%d] %s: %s"
