@@ -36,6 +36,8 @@ from drone_rl.utils.schema import Instance, Real, Several, Whole
 from drone_rl.utils.settings import Settings
 
 MOST_TRANSFORMS = 16
+DETERMINISTIC = 0.01
+"""Entropy in nats below which a policy is practically deterministic."""
 
 
 class TrainerSettings(Settings):

@@ -2,12 +2,11 @@
 
 from collections.abc import Callable
 
+from drone_rl.config.training import DETERMINISTIC
 from drone_rl.utils.text import Evidence, Sentence, percent, plural
 
 MIN_RUNS = 6
 """Fewest runs whose median has an exact 95% interval."""
-DETERMINISTIC = 0.01
-"""Entropy in nats below which a policy is practically deterministic."""
 _ROUNDING = 1e-4
 
 

@@ -14,6 +14,7 @@ from typing import Any, Protocol
 from torchrl.record.loggers import Logger
 from tqdm import tqdm
 
+from drone_rl.config.training import DETERMINISTIC
 from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import make_folder, remove_leftovers, write_atomically
@@ -189,8 +190,6 @@ class CollapseCheck(Callback):
     below the target.
     """
 
-    DETERMINISTIC = 0.01
-    """Entropy in nats below which a policy is practically deterministic."""
     EPISODES = 500
     """Episodes without improvement before the warning: five memories of the running reward."""
     UPDATES = 20
@@ -221,7 +220,7 @@ class CollapseCheck(Callback):
         """Count the episodes since the policy last varied or improved."""
         progress = training.progress
         # continuous actions have densities, whose entropy is also below 0
-        is_deterministic = abs(metrics.get("loss/entropy", 1.0)) < self.DETERMINISTIC
+        is_deterministic = abs(metrics.get("loss/entropy", 1.0)) < DETERMINISTIC
         is_better = progress.running_reward > self._best + self.STEP * self._target
         self._best = progress.running_reward if is_better else self._best
         is_close = progress.running_reward >= self.CLOSE * self._target
@@ -235,7 +234,7 @@ class CollapseCheck(Callback):
                 "learning has collapsed: for %d episodes the policy has been deterministic "
                 "(entropy below %g) and not improved (running reward %.2f); stop and try a lower "
                 "optimizer.lr, a higher objective.entropy_coeff or another seed",
-                *(episodes, self.DETERMINISTIC, progress.running_reward),
+                *(episodes, DETERMINISTIC, progress.running_reward),
             )
 
 
