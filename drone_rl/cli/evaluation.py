@@ -199,7 +199,12 @@ class ExportCommand(CommandSettings, HeldOutSettings):
         from drone_rl.utils.seeding import root_seed  # imports torch
         from drone_rl.verdicts.export import export
         from drone_rl.verdicts.onnx_export import export_onnx
-        from drone_rl.verdicts.recorded import describe, record_verdict, recorded_verdict
+        from drone_rl.verdicts.recorded import (
+            describe,
+            read_verdicts,
+            record_verdict,
+            recorded_verdict,
+        )
 
         policy = drone_rl.load_policy(self.policy, outputs=self.paths.outputs)
         target = folder / f"{self.name}.{self.format}"
@@ -209,7 +214,7 @@ class ExportCommand(CommandSettings, HeldOutSettings):
             found = export_onnx(policy, target, command=self.command, seed=seed.value)
             difference = f"{found.difference:.1e} in {found.frames:,} images"
             _log.info("written: %s, which differs from PyTorch by at most %s", target, difference)
-            recorded = recorded_verdict(policy, self.paths.outputs)
+            recorded = recorded_verdict(policy, read_verdicts(self.paths.outputs))
             kind, success = ("not judged", "") if recorded is None else describe(recorded)
             print(f"recorded verdict: {' '.join(filter(None, (kind, success)))}")
             evidence = seed.as_dict()

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import drone_rl
 from drone_rl.cli.settings import CommandSettings
@@ -36,11 +36,13 @@ class PoliciesCommand(CommandSettings):
     def run(self, folder: Path) -> tuple[int, None]:
         """List the shipped and the trained policies; return the exit status."""
         from drone_rl.policies.zoo import policy_names, policy_path  # imports torch
+        from drone_rl.verdicts.recorded import read_verdicts
 
         outputs = Path(self.paths.outputs)
-        shipped = [_row(policy_path(name), name, outputs) for name in policy_names()]
+        verdicts = read_verdicts(outputs)
+        shipped = [_row(policy_path(name), name, verdicts) for name in policy_names()]
         newest = trained_policies(outputs)
-        trained = [_row(path, str(path.parents[1]), outputs) for path in newest[: self.most]]
+        trained = [_row(path, str(path.parents[1]), verdicts) for path in newest[: self.most]]
         head = ("policy=", "task", "verdict", "success (95% CI)", "trained")
         lines = aligned([head, *(_short(row) for row in (*shipped, *trained))]).splitlines()
         names = ["", *(row[0] for row in (*shipped, *trained))]
@@ -59,7 +61,7 @@ def _short(row: Sequence[str]) -> Sequence[str]:
     return ["  ..." if len(row[0]) > _LONGEST_NAME else row[0], *row[1:]]
 
 
-def _row(path: Path, name: str, outputs: Path) -> list[str]:
+def _row(path: Path, name: str, verdicts: Sequence[tuple[float, Any]]) -> list[str]:
     """Return name, task, verdict, success rate and origin of a policy."""
     from drone_rl.verdicts.recorded import describe, recorded_verdict  # imports torch
 
@@ -72,6 +74,6 @@ def _row(path: Path, name: str, outputs: Path) -> list[str]:
         origin = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
     else:
         origin = f"revision {str(policy.state['provenance']['git_revision'])[:7]}"
-    verdict = recorded_verdict(policy, outputs)
+    verdict = recorded_verdict(policy, verdicts)
     figures = ("not judged", "") if verdict is None else describe(verdict)
     return [name, policy.task.name, *figures, origin]

@@ -1,7 +1,7 @@
 """The recorded verdict of a policy: commands write one, and others look up the newest."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -36,13 +36,18 @@ def record_verdict(folder: Path, policy: BasePolicy, verdict: Mapping[str, Any])
     write_atomically(folder / NAME, json.dumps(content, indent=2))
 
 
-def recorded_verdict(policy: Policy, outputs: str | Path) -> Mapping[str, Any] | None:
+def recorded_verdict(
+    policy: Policy, of_commands: Iterable[tuple[float, Mapping[str, Any]]]
+) -> Mapping[str, Any] | None:
     """Return the newest verdict on a policy, or None.
 
-    It is from the result of the policy's run, from its own file, or from a command's folder below
-    `outputs`. Its "kind", "certain" and success rate are of the right types.
+    It is from the result of the policy's run, from its own file, or from those of commands, see
+    `read_verdicts`. Its "kind", "certain" and success rate are of the right types.
     """
-    found = [*_own(policy), *_of_commands(identify(policy), Path(outputs))]
+    weights = identify(policy)
+    found = [*_own(policy)]
+    if weights is not None:
+        found += [one for one in of_commands if one[1].get("weights") == weights]
     for _, verdict in sorted(found, key=lambda one: one[0], reverse=True):
         with suppress(KeyError, TypeError, ValueError):
             describe(verdict)
@@ -72,13 +77,13 @@ def _own(policy: Policy) -> Iterator[tuple[float, Any]]:
         yield path.stat().st_mtime, result.get("verdict")
 
 
-def _of_commands(weights: str | None, outputs: Path) -> Iterator[tuple[float, Any]]:
-    """Yield the verdicts of commands on a policy with these weights, with their times."""
+def read_verdicts(outputs: str | Path) -> list[tuple[float, Mapping[str, Any]]]:
+    """Return the newest verdicts in folders of commands below `outputs`, with their times."""
     folders = ("*/runs/*", "*/runs/*/*", "*/multiruns/*/*")
-    paths = (path for folder in folders for path in outputs.glob(f"{folder}/{NAME}"))
+    paths = (path for folder in folders for path in Path(outputs).glob(f"{folder}/{NAME}"))
     times = sorted(((path.stat().st_mtime, path) for path in paths), reverse=True)
+    verdicts = []
     for when, path in times[:MAX_FILES]:
         with suppress(InputError):
-            verdict = as_mapping(read_json(path), "it")
-            if weights is not None and verdict.get("weights") == weights:
-                yield when, verdict
+            verdicts.append((when, as_mapping(read_json(path), "it")))
+    return verdicts

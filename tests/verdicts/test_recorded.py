@@ -7,7 +7,12 @@ import pytest
 
 import drone_rl
 from drone_rl.utils.checkpoint import save_checkpoint
-from drone_rl.verdicts.recorded import describe, record_verdict, recorded_verdict
+from drone_rl.verdicts.recorded import (
+    describe,
+    read_verdicts,
+    record_verdict,
+    recorded_verdict,
+)
 
 
 def verdict(kind, **more):
@@ -30,6 +35,10 @@ def trained(tmp_path):
     return drone_rl.load_policy(folder)
 
 
+def newest(policy, outputs):
+    return recorded_verdict(policy, read_verdicts(outputs))
+
+
 def record(policy, outputs, name, kind, when):
     folder = outputs / name
     folder.mkdir(parents=True)
@@ -38,13 +47,13 @@ def record(policy, outputs, name, kind, when):
 
 
 def test_the_newest_of_a_run_and_of_commands_counts(trained, tmp_path):
-    assert describe(recorded_verdict(trained, tmp_path)) == ("poor", "50.0% (40.0 to 60.0)")
+    assert describe(newest(trained, tmp_path)) == ("poor", "50.0% (40.0 to 60.0)")
     record(trained, tmp_path, "verdict/runs/1", "good", 90)  # before the training ended
-    assert recorded_verdict(trained, tmp_path)["kind"] == "poor"
+    assert newest(trained, tmp_path)["kind"] == "poor"
     record(trained, tmp_path, "export/runs/1", "good", 110)
-    assert recorded_verdict(trained, tmp_path)["kind"] == "good"
+    assert newest(trained, tmp_path)["kind"] == "good"
     record(trained, tmp_path, "explain/runs/1/0_one", "one-sided (left)", 120)
-    assert recorded_verdict(trained, tmp_path)["kind"] == "one-sided (left)"
+    assert newest(trained, tmp_path)["kind"] == "one-sided (left)"
 
 
 def test_verdicts_on_others_or_in_other_conditions_do_not_count(trained, tmp_path):
@@ -53,13 +62,13 @@ def test_verdicts_on_others_or_in_other_conditions_do_not_count(trained, tmp_pat
     record(trained.in_dynamics(mode="simple_flight"), tmp_path, "verdict/runs/3", "good", 200)
     (tmp_path / "verdict" / "runs" / "4").mkdir()
     (tmp_path / "verdict" / "runs" / "4" / "verdict.json").write_text("[")
-    assert recorded_verdict(trained, tmp_path)["kind"] == "poor"
+    assert newest(trained, tmp_path)["kind"] == "poor"
 
 
 def test_a_damaged_verdict_is_passed_over(trained, tmp_path):
     record(trained, tmp_path, "verdict/runs/1", "good", 110)
     record(trained, tmp_path, "verdict/runs/2", "\x1b[2Jsplendid", 120)
-    assert recorded_verdict(trained, tmp_path)["kind"] == "good"
+    assert newest(trained, tmp_path)["kind"] == "good"
 
 
 def test_a_judgement_is_found(tmp_path):
@@ -68,4 +77,4 @@ def test_a_judgement_is_found(tmp_path):
     done.save(tmp_path / "verdict" / "runs" / "1" / "verdict.json")
     os.utime(tmp_path / "verdict" / "runs" / "1" / "verdict.json", (1e11, 1e11))
     policy = drone_rl.load_policy("right_and_forward")
-    assert recorded_verdict(policy, tmp_path)["greedy"]["episodes"] == 50
+    assert newest(policy, tmp_path)["greedy"]["episodes"] == 50
