@@ -54,7 +54,7 @@ class EvaluateCommand(AppearanceCommandSettings, EvaluateSettings):
         _log.info("policy: %s", policy.path)
         _log.info("written: %s", folder / "evaluation.json")
         if self.videos:
-            from drone_rl.evaluation.video import film
+            from drone_rl.trust.video import film
 
             film(
                 policy,
@@ -99,7 +99,7 @@ class PlayCommand(AppearanceCommandSettings, DeviceSettings):
         """Record a policy's episodes, or open the viewer; return the exit status."""
         policy = self.load_policy()
         chosen = {k: getattr(self, k) for k in ("greedy", "seed", "device", "renderer")}
-        from drone_rl.evaluation.video import film, view  # slow to import
+        from drone_rl.trust.video import film, view  # slow to import
 
         if self.viewer:
             view(policy, **chosen)
@@ -196,15 +196,15 @@ class ExportCommand(CommandSettings, HeldOutSettings):
 
     def run(self, folder: Path) -> tuple[int, str]:
         """Export one policy; return the exit status and the file's path."""
-        from drone_rl.utils.seeding import root_seed  # imports torch
-        from drone_rl.verdicts.export import export
-        from drone_rl.verdicts.onnx_export import export_onnx
-        from drone_rl.verdicts.recorded import (
+        from drone_rl.trust.export import export
+        from drone_rl.trust.onnx_export import export_onnx
+        from drone_rl.trust.recorded import (
             describe,
             read_verdicts,
             record_verdict,
             recorded_verdict,
         )
+        from drone_rl.utils.seeding import root_seed  # imports torch
 
         policy = drone_rl.load_policy(self.policy, outputs=self.paths.outputs)
         target = folder / f"{self.name}.{self.format}"

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from torchrl.envs import TransformedEnv
 
 from drone_rl.config.configuration import from_arguments
-from drone_rl.evaluation.rounding_sensitivity import require_function
 from drone_rl.explanations import attribution, behavior, class_models, embedding, response, truth
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.report import write_report
@@ -25,6 +24,10 @@ from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.policies.recurrent import require_memoryless
+from drone_rl.trust.certificate import find_claim
+from drone_rl.trust.coverage import find_domain
+from drone_rl.trust.recorded import record_verdict
+from drone_rl.trust.rounding_sensitivity import require_function
 from drone_rl.utils.display import Result, page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path, new_run_folder, to_file_name
@@ -34,9 +37,6 @@ from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import seed_line
 from drone_rl.utils.threads import pool_like_caller, torch_threads
-from drone_rl.verdicts.certificate import find_claim
-from drone_rl.verdicts.coverage import find_domain
-from drone_rl.verdicts.recorded import record_verdict
 
 _Result = tuple[dict[str, Any], dict[str, NDArray], float] | LeftOutError  # with seconds
 Given = str | Path | BasePolicy | Logits  # a policy or something that `as_policy` converts to one

@@ -122,7 +122,7 @@ def judge_run(
     Raises:
         InputError: The run has no result, or its last checkpoint is unusable or of another frame.
     """
-    from drone_rl.evaluation.verdict import judge_for_selection  # imports torch
+    from drone_rl.trust.verdict import judge_for_selection  # imports torch
 
     with folder_lock(folder):
         result = read_result(folder)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.evaluation.rule import SIDES, Kind, Rule
 from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_result
+from drone_rl.trust.rule import SIDES, Kind, Rule
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.limits import SWEEP_RESULTS_BYTES, Allowance
 from drone_rl.utils.readers import NAMES_OF_0_1, TablesAllowance, read_table

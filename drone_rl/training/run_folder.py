@@ -218,7 +218,7 @@ def _check_judged(settings: TrainSettings) -> None:
     """Refuse, before the training, a task that the verdict after it would refuse."""
     if not settings.evaluate_after:
         return
-    from drone_rl.evaluation.verdict import check_judged  # slow to import
+    from drone_rl.trust.verdict import check_judged  # slow to import
 
     try:
         check_judged(as_task(settings.task), describe(settings).make_dynamics().actions)
@@ -271,7 +271,7 @@ def result_of(
 def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Training:
     """Judge the last policy if settings request it and no signal came; write `result.json`."""
     if settings.evaluate_after and not result["reason"].startswith("SIG"):
-        from drone_rl.evaluation.verdict import judge_for_selection  # slow to import
+        from drone_rl.trust.verdict import judge_for_selection  # slow to import
 
         last, episodes = last_of(folder), settings.evaluate_after
         given = (settings.device, settings.renderer)

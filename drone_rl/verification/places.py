@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from drone_rl.config.commands import PlacesSettings
 from drone_rl.config.configuration import as_changes, from_arguments
-from drone_rl.evaluation.plots import regions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
+from drone_rl.trust.plots import regions
 from drone_rl.utils.display import Result, aligned, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress

@@ -17,7 +17,6 @@ from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings, ProveSettings
 from drone_rl.config.configuration import as_config, check_same_config, from_arguments
 from drone_rl.config.training import TrainSettings
-from drone_rl.evaluation.rollouts import find_failures
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import describe, read_checkpoint
 from drone_rl.sim.tasks import FailureReplayTask
@@ -33,6 +32,7 @@ from drone_rl.training.run_folder import (
     settings_of,
 )
 from drone_rl.training.train import learn
+from drone_rl.trust.rollouts import find_failures
 from drone_rl.utils.archives import read_array
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import last_of, read_json, write_atomically

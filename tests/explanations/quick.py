@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import pytest
 from matplotlib.figure import Figure
 
-from drone_rl.evaluation.plots import saving
 from drone_rl.explanations import class_models, response
 from drone_rl.explanations.report import attribution
+from drone_rl.trust.plots import saving
 
 
 @contextlib.contextmanager

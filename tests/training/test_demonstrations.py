@@ -18,8 +18,6 @@ from drone_rl.config import (
 )
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import oracle_policy
-from drone_rl.evaluation.rollouts import StepLog, run_episodes
 from drone_rl.training import demonstrations
 from drone_rl.training.demonstrations import (
     Demonstration,
@@ -29,6 +27,8 @@ from drone_rl.training.demonstrations import (
     read_demonstrations,
     record_oracle,
 )
+from drone_rl.trust.baselines import oracle_policy
+from drone_rl.trust.rollouts import StepLog, run_episodes
 from drone_rl.utils.errors import InputError
 
 CAMERA = CameraSettings(width=4, height=2)

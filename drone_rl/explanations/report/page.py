@@ -10,7 +10,6 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from drone_rl.evaluation.plots.saving import save_drawn, save_numbers, save_rows
 from drone_rl.explanations.report import (
     attribution,
     behavior,
@@ -21,6 +20,7 @@ from drone_rl.explanations.report import (
     truth,
 )
 from drone_rl.explanations.report.explanation import HEADER, Explanation, Figures, Part
+from drone_rl.trust.plots.saving import save_drawn, save_numbers, save_rows
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest, to_file_name

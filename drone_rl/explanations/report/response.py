@@ -12,10 +12,10 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from PIL import Image
 
-from drone_rl.evaluation.plots import images, regions
-from drone_rl.evaluation.plots.saving import Rows, new_chart
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary, terms_of
+from drone_rl.trust.plots import images, regions
+from drone_rl.trust.plots.saving import Rows, new_chart
 from drone_rl.utils.palette import EMPTY, GOOD, css
 from drone_rl.utils.text import Claims, Evidence, bounds, listed, percent
 from drone_rl.verification.text import rows as place_rows
