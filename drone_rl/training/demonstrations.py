@@ -30,10 +30,10 @@ from drone_rl.config import (
 from drone_rl.config.configuration import from_arguments
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
+from drone_rl.policies.baselines import oracle_policy
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import as_task
-from drone_rl.trust.baselines import oracle_policy
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import (

@@ -129,7 +129,7 @@ def bodies(
 
 def _looped(policy: BasePolicy, settings: BodiesSettings, seed: RootSeed) -> dict[str, Any]:
     """Episodes with software in the loop, in still air, or the reason why there are none."""
-    from drone_rl.trust.sitl import evaluate_in_the_loop
+    from drone_rl.flight.sitl_evaluation import evaluate_in_the_loop
 
     count = settings.loop_flights
     try:

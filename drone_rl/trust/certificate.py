@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drone_rl.collectors.complete_episodes import Episodes
 from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks.collect_cubes import EndReason
-from drone_rl.trust.metrics import Episodes
 from drone_rl.trust.outcomes import Rounding
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path

@@ -20,9 +20,9 @@ from typing import Any
 
 import torch
 
+from drone_rl.collectors.complete_episodes import Episodes
 from drone_rl.trust.agents import OracleAgent, PolicyAgent, has_oracle
 from drone_rl.trust.axes import Axis
-from drone_rl.trust.metrics import Episodes
 from drone_rl.trust.outcomes import OutcomeSet
 from drone_rl.trust.paired_evaluation import PairedEvaluator
 from drone_rl.trust.perturbations import Condition

@@ -8,18 +8,19 @@ from typing import Any
 
 from tensordict.nn import TensorDictModuleBase
 
+from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.config import AppearanceSettings
 from drone_rl.config.commands import EvaluateSettings, HeldOutSettings
 from drone_rl.config.configuration import from_arguments
 from drone_rl.envs import worlds_of
+from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.tasks import as_task
-from drone_rl.trust.baselines import check_baselines, run_baselines
+from drone_rl.trust.baselines import run_baselines
 from drone_rl.trust.conditions_text import unlike as unlike_text
 from drone_rl.trust.metrics import summarise
-from drone_rl.trust.rollouts import run_episodes
 from drone_rl.trust.rounding_sensitivity import run_compared
 from drone_rl.utils.display import Result, aligned, table
 from drone_rl.utils.errors import InputError

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from drone_rl.flight.commands.state import Attitude
+from drone_rl.sim.coordinates import Attitude
 from drone_rl.sim.dynamics import FlightState
 
 WIDTH, HEIGHT = 476, 190

@@ -14,10 +14,11 @@ from drone_rl.config import AppearanceSettings, DynamicsSettings, TaskSettings
 from drone_rl.config.commands import HeldOutSettings, JudgeSettings
 from drone_rl.config.configuration import Changes, as_changes, from_arguments
 from drone_rl.envs import DroneEnv
+from drone_rl.policies.baselines import make_baseline
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
-from drone_rl.trust.baselines import BASELINES, make_baseline
+from drone_rl.trust.baselines import BASELINES
 from drone_rl.trust.certificate import find_claim
 from drone_rl.trust.coverage import Coverage, compare_with_required, find_domain, recheck_domain
 from drone_rl.trust.evaluate import held_out_environments

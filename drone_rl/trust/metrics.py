@@ -3,75 +3,12 @@
 Goals within an episode are correlated, so every interval is computed from one value per episode.
 """
 
-import dataclasses
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import torch
-from torch import Tensor
 
-from drone_rl.sim.tasks import Goals, Task
+from drone_rl.collectors.complete_episodes import Episodes
 from drone_rl.utils.intervals import mean_bounds, proportion
-
-
-@dataclasses.dataclass
-class Episodes:
-    """`n` finished episodes of a task."""
-
-    task: Task[Any]
-    goals: Goals
-    """The episodes' goals, and which were reached."""
-    end_reason: Tensor  # (n,) int64
-    """One of the task's ends."""
-    length: Tensor  # (n,) int64
-
-    @classmethod
-    def ended(cls, task: Task[Any], info: Mapping[str, Tensor], length: Tensor) -> "Episodes":
-        """Build episodes from the last step's info, on the CPU.
-
-        `info` has the task's `scored` and "end_reason", as in `Worlds.info`, shapes (n, *), and
-        `length` the steps of each episode, shape (n,).
-        """
-        goals = task.score({name: info[name].cpu() for name in task.scored})
-        return cls(task, goals, info["end_reason"][:, 0].cpu(), length.cpu())
-
-    def __len__(self) -> int:
-        """Return the number of episodes."""
-        return len(self.length)
-
-    def __getitem__(self, rows: slice | Tensor) -> "Episodes":
-        """Return some of the episodes."""
-        return Episodes(self.task, self.goals[rows], self.end_reason[rows], self.length[rows])
-
-    @classmethod
-    def joined(cls, parts: Sequence["Episodes"]) -> "Episodes":
-        """Concatenate episodes of one task."""
-        goals = type(parts[0].goals).joined([part.goals for part in parts])
-        ends, lengths = ([getattr(p, name) for p in parts] for name in ("end_reason", "length"))
-        return cls(parts[0].task, goals, torch.cat(ends), torch.cat(lengths))
-
-    @property
-    def success(self) -> Tensor:
-        """1 where the episode ended with success, else 0. Shape: (n,), float64."""
-        return (self.end_reason == self.task.success_end).double()
-
-    @property
-    def share(self) -> Tensor:
-        """Fraction of goals reached; goals that never came up count as missed. Shape: (n,)."""
-        return self.goals.reached.double().mean(-1)
-
-    def offered(self, stratum: int) -> Tensor:
-        """Return which episodes offered a goal of this stratum. Shape: (n,), bool."""
-        return (self.goals.stratum == stratum).any(-1)
-
-    def stratum_share(self, stratum: int) -> Tensor:
-        """Return the fraction of a stratum's goals that was reached, by episode that offered one.
-
-        Shape: (number of such episodes,), float64.
-        """
-        offered = self.offered(stratum)
-        there = (self.goals.stratum == stratum)[offered]
-        return (there & self.goals.reached[offered]).sum(-1).double() / there.sum(-1)
 
 
 def summarise(episodes: Episodes) -> dict[str, Any]:

@@ -6,10 +6,10 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from drone_rl.collectors.complete_episodes import Episodes
 from drone_rl.envs.direct_renderer import DirectRenderer
 from drone_rl.policies.rounding import Decide
 from drone_rl.sim.tasks import State
-from drone_rl.trust.metrics import Episodes
 
 MAX_FRAGILE = 0.02
 """Largest fraction of fragile frames for a certain verdict; honest policies have at most 0.003."""

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 from torchrl.envs import Transform
 
+from drone_rl.collectors.complete_episodes import Episodes
 from drone_rl.config import (
     COMPUTER_VISION,
     MINIMAL,
@@ -25,7 +26,6 @@ from drone_rl.sim.tasks import State, as_task
 from drone_rl.sim.visual_randomization import AppearanceSampler
 from drone_rl.sim.worlds import Worlds
 from drone_rl.trust.agents import Agent, BaselineAgent, PolicyAgent, StepContext
-from drone_rl.trust.metrics import Episodes
 from drone_rl.trust.perturbations import (
     ONSET_STEP,
     Condition,

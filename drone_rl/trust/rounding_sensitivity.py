@@ -10,6 +10,13 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
 
+from drone_rl.collectors.complete_episodes import (
+    Episodes,
+    StepLog,
+    episode_batches,
+    final_episodes,
+    run_episodes,
+)
 from drone_rl.envs import base_env, worlds_of
 from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
 from drone_rl.policies import ImageNetwork, make_actor
@@ -26,7 +33,6 @@ from drone_rl.policies.rounding import (
 )
 from drone_rl.sim.actions import DiscreteActions
 from drone_rl.sim.dynamics import ComputerVision
-from drone_rl.trust.metrics import Episodes
 from drone_rl.trust.outcomes import (
     MAX_FRAGILE_EPISODES,
     MAX_UNEXPLAINED,
@@ -34,15 +40,7 @@ from drone_rl.trust.outcomes import (
     Rounding,
     enumerate_outcomes,
 )
-from drone_rl.trust.rollouts import (
-    StepLog,
-    episode_batches,
-    final_episodes,
-    first_difference,
-    only_index,
-    outcome_difference,
-    run_episodes,
-)
+from drone_rl.trust.rollouts import first_difference, only_index, outcome_difference
 from drone_rl.utils.errors import InputError
 
 _CHECKED_EPISODES = 32

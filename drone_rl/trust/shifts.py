@@ -16,14 +16,15 @@ from drone_rl.config import MINIMAL, BaseTaskSettings
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.config.configuration import from_arguments
 from drone_rl.envs import worlds_of
+from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.recurrent import require_memoryless
+from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.agents import OracleAgent
 from drone_rl.trust.axes import AXES, Axis, check_axes, find_axes
-from drone_rl.trust.baselines import check_baselines
 from drone_rl.trust.charts import chart, strips
 from drone_rl.trust.domain import Prober
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
@@ -39,7 +40,6 @@ from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import say, seed_line
-from drone_rl.verification.checker.certificate import fingerprint
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 
 from drone_rl.config.commands import MODES, ShiftSettings
-from drone_rl.policies.zoo import PolicyDescription, parse
+from drone_rl.policies.zoo import PolicyDescription, fingerprint, parse
 from drone_rl.sim.tasks import as_task
 from drone_rl.sim.vocabulary import terms_of
 from drone_rl.trust.axes import AXES, GROUPS
@@ -35,7 +35,6 @@ from drone_rl.utils.schema import (
     as_mapping,
 )
 from drone_rl.utils.text import SEED_KEYS
-from drone_rl.verification.checker.certificate import fingerprint
 
 FORMAT = "drone_rl shifts"
 FORMAT_VERSION = 2

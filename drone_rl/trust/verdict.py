@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
+from drone_rl.collectors.complete_episodes import Episodes, StepLog, run_episodes
 from drone_rl.envs import base_env, worlds_of
+from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.policy import load_policy
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Task
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.trust.baselines import check_baselines, run_baselines
-from drone_rl.trust.metrics import Episodes, failure_table, summarise
+from drone_rl.trust.baselines import run_baselines
+from drone_rl.trust.metrics import failure_table, summarise
 from drone_rl.trust.outcomes import OutcomeSet, Rounding
-from drone_rl.trust.rollouts import StepLog, run_episodes
 from drone_rl.trust.rounding_sensitivity import check_rounding
 from drone_rl.trust.rule import Kind, Quantity, Rule, decide, kinds_within
 from drone_rl.trust.verdict_text import SENTENCES, is_proved

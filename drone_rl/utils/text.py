@@ -159,7 +159,7 @@ def fixed_seed(name: str, what: str = "environments") -> Sentence:
 BODIES = (fixed_seed("bodies.fixed_seed"),)
 """Evidence: `bodies.json`."""
 LOOPED = (fixed_seed("looped.fixed_seed"),)
-"""Evidence: see `drone_rl.trust.sitl.SitlEvaluation.as_dict`."""
+"""Evidence: see `drone_rl.flight.sitl_evaluation.SitlEvaluation.as_dict`."""
 CHANCES = (fixed_seed("chances.fixed_seed", "placements"),)
 """Evidence: `chances.json` of held-out placements; those that a user gives have no seed."""
 CHECK = (fixed_seed("check.fixed_seed", "placements"),)

@@ -31,11 +31,11 @@ from drone_rl.explanations.rerun_export import (
 )
 from drone_rl.policies import make_actor
 from drone_rl.policies.actor import exploring
+from drone_rl.policies.baselines import constant_policy
 from drone_rl.policies.zoo import describe
 from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S, seconds_per_step
 from drone_rl.sim.dynamics import ComputerVision, Kinematic, Quadrotor
 from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.trust.baselines import constant_policy
 from drone_rl.trust.plots.images import heated, shown_picture
 from drone_rl.trust.video import CAMERAS, render_step
 from drone_rl.utils.errors import InputError

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.collectors.complete_episodes import StepLog, run_episodes
 from drone_rl.config import (
     ActionSettings,
     CameraSettings,
@@ -18,6 +19,7 @@ from drone_rl.config import (
 )
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
+from drone_rl.policies.baselines import oracle_policy
 from drone_rl.training import demonstrations
 from drone_rl.training.demonstrations import (
     Demonstration,
@@ -27,8 +29,6 @@ from drone_rl.training.demonstrations import (
     read_demonstrations,
     record_oracle,
 )
-from drone_rl.trust.baselines import oracle_policy
-from drone_rl.trust.rollouts import StepLog, run_episodes
 from drone_rl.utils.errors import InputError
 
 CAMERA = CameraSettings(width=4, height=2)

@@ -8,13 +8,13 @@ from tensordict import TensorDict
 from torchrl.objectives import A2CLoss, ClipPPOLoss
 
 from drone_rl.collectors import EpisodeCollector, RolloutCollector
+from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.objectives import Advantages, ReinforceLoss
 from drone_rl.objectives.estimators import LeaveOneOut
 from drone_rl.policies import MLP, ActorCritic, make_actor
 from drone_rl.policies.actor import SquashedNormal
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.training import ActorCriticLearner, ReinforceLearner
-from drone_rl.trust.rollouts import run_episodes
 from tests.continuous import SETTINGS, make_env, make_policy
 
 ACTIONS = ContinuousActions.of(SETTINGS)

@@ -3,10 +3,10 @@
 import pytest
 import torch
 
+from drone_rl.collectors.complete_episodes import Episodes
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import CubeGoals, EndReason, Side
 from drone_rl.trust.baselines import BASELINES
-from drone_rl.trust.metrics import Episodes
 
 METRES = {Side.LEFT: 4.0, Side.AHEAD: 0.0, Side.RIGHT: -4.0}
 

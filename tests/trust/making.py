@@ -7,13 +7,13 @@ import zlib
 import torch
 
 from drone_rl.config.commands import ShiftSettings
+from drone_rl.policies.zoo import fingerprint
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.axes import AXES
 from drone_rl.trust.domain import walk
 from drone_rl.trust.perturbations import Mode
 from drone_rl.trust.suite import finite, mcnemar, success_area
 from drone_rl.utils.intervals import mean_bounds, proportion
-from drone_rl.verification.checker.certificate import fingerprint
 
 EPISODES = 200
 

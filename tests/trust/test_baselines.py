@@ -3,19 +3,13 @@ from types import SimpleNamespace
 import pytest
 import torch
 
+from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
+from drone_rl.policies.baselines import constant_policy, make_baseline, oracle_policy, random_policy
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.worlds import Worlds
-from drone_rl.trust.baselines import (
-    BASELINES,
-    constant_policy,
-    make_baseline,
-    oracle_policy,
-    random_policy,
-    run_baselines,
-)
-from drone_rl.trust.rollouts import run_episodes
+from drone_rl.trust.baselines import BASELINES, run_baselines
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import side_stream, world_random_state
 from tests.continuous import make_env

@@ -3,10 +3,10 @@ import torch
 from tensordict import TensorDict
 
 from drone_rl.config import TaskSettings
+from drone_rl.policies.baselines import constant_policy, oracle_policy, random_policy
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.tasks import CollectCubes
-from drone_rl.trust.baselines import constant_policy, oracle_policy, random_policy
 from drone_rl.utils.errors import InputError
 from tests.continuous import SETTINGS
 from tests.second_task import Posts

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.flight.commands.state import Attitude
+from drone_rl.sim.coordinates import Attitude
 from drone_rl.sim.dynamics import FlightState
 from drone_rl.trust import instruments
 from drone_rl.trust.instruments import HEIGHT, WIDTH, Reading, horizon, panel, read

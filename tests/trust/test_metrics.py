@@ -1,9 +1,10 @@
 import pytest
 import torch
 
+from drone_rl.collectors.complete_episodes import Episodes
 from drone_rl.sim.tasks import CollectCubes, Goals
 from drone_rl.sim.tasks.collect_cubes import Side
-from drone_rl.trust.metrics import Episodes, summarise
+from drone_rl.trust.metrics import summarise
 from drone_rl.utils.intervals import mean_bounds, proportion
 from tests.second_task import End, Posts
 

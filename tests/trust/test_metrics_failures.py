@@ -3,10 +3,11 @@ import enum
 import pytest
 import torch
 
+from drone_rl.collectors.complete_episodes import Episodes
 from drone_rl.config import TaskSettings
 from drone_rl.sim.tasks import CollectCubes, Goals
 from drone_rl.sim.tasks.collect_cubes import EndReason, Side
-from drone_rl.trust.metrics import Episodes, failure_table
+from drone_rl.trust.metrics import failure_table
 from drone_rl.utils.intervals import proportion
 from tests.second_task import End, Posts
 

@@ -4,6 +4,7 @@ import pytest
 import torch
 
 import drone_rl
+from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs.fault_models import late_frames
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -11,7 +12,6 @@ from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.trust.axes import AXES
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
 from drone_rl.trust.perturbations import ONSET_STEP, Condition, Mode, whiten
-from drone_rl.trust.rollouts import run_episodes
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
 from tests.trust.subjects import TASK, Blind, subject

@@ -2,13 +2,13 @@ import pytest
 import torch
 
 from drone_rl.collectors import EpisodeCollector
+from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
+from drone_rl.policies.baselines import constant_policy, oracle_policy, random_policy
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.tasks.collect_cubes import EndReason
-from drone_rl.trust.baselines import constant_policy, oracle_policy, random_policy
 from drone_rl.trust.metrics import summarise
-from drone_rl.trust.rollouts import run_episodes
 from drone_rl.utils.seeding import Stream
 
 

@@ -4,8 +4,8 @@ import numpy as np
 
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
+from drone_rl.policies.baselines import constant_policy
 from drone_rl.sim.actions import Move
-from drone_rl.trust.baselines import constant_policy
 from drone_rl.trust.rollouts import find_failures
 from drone_rl.utils.seeding import world_random_state
 

@@ -6,16 +6,14 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.envs import base_env
-from drone_rl.trust.rollouts import (
+from drone_rl.collectors.complete_episodes import (
     StepLog,
     episode_batches,
     final_episodes,
-    first_difference,
-    only_index,
-    outcome_difference,
     run_episodes,
 )
+from drone_rl.envs import base_env
+from drone_rl.trust.rollouts import first_difference, only_index, outcome_difference
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import torch
 from tensordict import TensorDict
 
 import drone_rl
+from drone_rl.collectors.complete_episodes import StepLog, run_episodes
 from drone_rl.config.transforms import Gray, Stack
 from drone_rl.policies.external_network import ExternalNetwork
 from drone_rl.policies.external_policy import policy_from
@@ -14,7 +15,6 @@ from drone_rl.policies.rounding import Decisions
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.trust import rounding_sensitivity
 from drone_rl.trust.outcomes import OutcomeSet
-from drone_rl.trust.rollouts import StepLog, run_episodes
 from drone_rl.trust.rounding_sensitivity import (
     check_rounding,
     compare_implementations,

@@ -7,14 +7,14 @@ import torch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs import DroneEnv
+from drone_rl.policies.baselines import constant_policy, oracle_policy
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.sim.vocabulary import TaskVocabulary
-from drone_rl.trust.baselines import constant_policy, oracle_policy
 from drone_rl.trust.outcomes import OutcomeSet, Rounding
-from drone_rl.trust.rollouts import run_episodes
 from drone_rl.trust.rule import Kind, Rule
 from drone_rl.trust.verdict import apply_rule, judge_policy, measure, observe, widen
 from drone_rl.utils.errors import InputError

@@ -6,11 +6,11 @@ import math
 import numpy as np
 import pytest
 from PIL import Image
-from tests.explanations.fly_page.conftest import decode
 
 from drone_rl.flight.commands.computer_vision import KEYS
 from drone_rl.sim.dynamics.state import LOST
 from drone_rl.utils.errors import InputError
+from tests.flight.fly_page.conftest import decode
 
 
 def run(flight, seconds, period=0.025):

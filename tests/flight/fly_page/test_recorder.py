@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from tests.explanations.fly_page.test_flight import run, state_of
+
+from tests.flight.fly_page.test_flight import run, state_of
 
 
 class Written(list):

@@ -15,11 +15,11 @@ import urllib.request
 
 import numpy as np
 import pytest
-from tests.explanations.fly_page.conftest import decode
 
 import drone_rl
 from drone_rl.flight.fly_page import server
 from drone_rl.utils.errors import InputError
+from tests.flight.fly_page.conftest import decode
 
 pytest.importorskip("uvicorn")
 client = pytest.importorskip("websockets.sync.client")

@@ -10,6 +10,7 @@ from typing import Any
 import torch
 from torchrl.envs.utils import step_mdp
 
+from drone_rl.collectors.complete_episodes import Episodes
 from drone_rl.envs import worlds_of
 from drone_rl.flight.betaflight.build import find_firmware
 from drone_rl.flight.betaflight.sitl import Betaflight, betaflight_drone
@@ -19,7 +20,7 @@ from drone_rl.policies.actor import exploring
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
-from drone_rl.trust.metrics import Episodes, summarise
+from drone_rl.trust.metrics import summarise
 from drone_rl.utils.display import Result
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.schema import Whole

@@ -10,16 +10,16 @@ import torch
 
 import drone_rl
 from drone_rl.envs import worlds_of
+from drone_rl.flight import sitl_evaluation as looped
 from drone_rl.flight.betaflight.process import FirmwareProcess
 from drone_rl.flight.in_the_loop.drone import FlightControllerError, NotReadyError
-from drone_rl.trust import sitl as looped
+from drone_rl.flight.sitl_evaluation import evaluate_in_the_loop
 from drone_rl.trust.bodies import chart
-from drone_rl.trust.sitl import evaluate_in_the_loop
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from tests.flight.arming import arm_at_once
 
-STUB = Path(__file__).parents[1] / "flight" / "stub_firmware.py"
+STUB = Path(__file__).parent / "stub_firmware.py"
 
 
 @pytest.fixture(scope="module")
