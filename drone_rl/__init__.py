@@ -3,6 +3,7 @@
 Public names are imported when they are first used, so that `import drone_rl` is fast.
 """
 
+import functools
 import importlib
 from typing import TYPE_CHECKING, Any
 
@@ -134,8 +135,43 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'drone_rl' has no attribute {name!r}{hint}")
     with collecting_no_garbage():
         module = with_one_stack_block(lambda: importlib.import_module(_HOMES[name]))
-    value = globals()[name] = getattr(module, name)
+    value = globals()[name] = _with_defaults(getattr(module, name), **_defaults_of(name))
     return value
+
+
+def _defaults_of(name: str) -> dict[str, Any]:
+    """Return the arguments by which packages work together that do not import each other."""
+    if name == "train":
+        from drone_rl.training.run_folder import Judge
+        from drone_rl.trust.verdict import check_judged, judge_for_selection
+
+        return {"judge": Judge(check_judged, judge_for_selection)}
+    if name == "judge":
+        from drone_rl.verification.claim import find_claim
+
+        return {"find_claim": find_claim}
+    if name == "bodies":
+        from drone_rl.flight.sitl_evaluation import figures_in_the_loop
+
+        return {"judge": __getattr__("judge"), "in_the_loop": figures_in_the_loop}
+    if name == "explain":
+        from drone_rl.verification.claim import find_claim
+        from drone_rl.verification.places_section import places_section
+
+        return {"find_claim": find_claim, "more_sections": {"places": places_section}}
+    return {}
+
+
+def _with_defaults(public: Any, **defaults: Any) -> Any:
+    """Return the function with other defaults of some arguments, or anything without such."""
+    if not defaults:
+        return public
+
+    @functools.wraps(public)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        return public(*args, **{**defaults, **kwargs})
+
+    return call
 
 
 def __dir__() -> list[str]:

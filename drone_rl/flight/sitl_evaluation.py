@@ -14,7 +14,7 @@ from drone_rl.collectors.complete_episodes import Episodes
 from drone_rl.envs import worlds_of
 from drone_rl.flight.betaflight.build import find_firmware
 from drone_rl.flight.betaflight.sitl import Betaflight, betaflight_drone
-from drone_rl.flight.in_the_loop.drone import NotReadyError
+from drone_rl.flight.in_the_loop.drone import FlightControllerError, NotReadyError
 from drone_rl.flight.in_the_loop.dynamics import InTheLoopDynamics
 from drone_rl.policies.actor import exploring
 from drone_rl.policies.external_network import Logits
@@ -22,7 +22,8 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.trust.metrics import summarise
 from drone_rl.utils.display import Result
-from drone_rl.utils.progress import Progress, as_progress
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import Progress, as_progress, silent
 from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import RootSeed, root_seed
 from drone_rl.utils.text import LOOPED, interval, say, seed_line
@@ -128,6 +129,14 @@ def evaluate_in_the_loop(
     progress("flown", flights, flights)
     ended, episodes = zip(*results, strict=True)
     return SitlEvaluation(loaded.name, root, episodes, summarise(Episodes.joined(ended)))
+
+
+def figures_in_the_loop(policy: BasePolicy, flights: int, seed: RootSeed) -> dict[str, Any]:
+    """Return `SitlEvaluation.as_dict`, or the reason why there are no episodes as "left_out"."""
+    try:
+        return evaluate_in_the_loop(policy, flights, drawn_seed=seed, progress=silent).as_dict()
+    except (InputError, FlightControllerError) as error:
+        return {"left_out": str(error)}
 
 
 def _fly_or_restart(policy: BasePolicy, world: int, *given: Any) -> tuple[Episodes, SitlEpisode]:

@@ -4,7 +4,7 @@ import dataclasses
 import itertools
 import json
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,10 @@ from matplotlib.patches import Rectangle
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.commands import BodiesSettings, JudgeSettings
 from drone_rl.config.configuration import from_arguments
-from drone_rl.flight.in_the_loop.drone import FlightControllerError
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.trust.judge import judge
+from drone_rl.trust.judge import Judgement, judge_one
 from drone_rl.utils.display import Result, aligned, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import BAD, EMPTY, FAINT, GOOD, INK, ONE_SIDED, css, light
@@ -29,6 +28,8 @@ from drone_rl.utils.text import BODIES, Evidence, interval, percent, rate, say, 
 
 LOOPED = "software in the loop"
 """Name of the column of these episodes, and their key in the evidence."""
+InTheLoop = Callable[[BasePolicy, int, RootSeed], dict[str, Any]]
+"""Runs so many episodes with software in the loop; returns figures, or why they are "left_out"."""
 GUSTS = 0.25
 """Standard deviation of the wind along each axis, as a fraction of its mean."""
 _COLORS = {
@@ -79,6 +80,8 @@ def bodies(
     *,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
+    judge: Callable[..., Judgement] = judge_one,
+    in_the_loop: InTheLoop | None = None,
     **changes: Any,
 ) -> Bodies:
     """Judge policies in computer-vision mode, in flight, in wind, and with worse drones.
@@ -89,6 +92,10 @@ def bodies(
         settings: Policies, dynamics, number of episodes and so on.
         outputs: See `load_policy`.
         progress: Called with what is running; a progress bar by default.
+        judge: Judges one policy, by default without certificates; `drone_rl.bodies` passes
+            `drone_rl.judge`.
+        in_the_loop: Runs episodes for `loop_flights`; `drone_rl.bodies` passes
+            `drone_rl.flight.sitl_evaluation.figures_in_the_loop`.
         changes: Settings to change, as in `bodies("good", episodes=100)`.
 
     Raises:
@@ -118,25 +125,14 @@ def bodies(
             done = judge(policy, shared, **how, progress=silent, drawn_seed=seed)
             verdicts[body] = done.verdict.as_dict()
     numbers: dict[str, Any] = {"bodies": [*settings.bodies], **seed.as_dict(), "policies": found}
-    if settings.loop_flights:
+    if settings.loop_flights and in_the_loop:
         looped = numbers[LOOPED] = {}
         for policy in loaded:
             progress(f"{policy.name}: {LOOPED}", steps - len(loaded) + len(looped), steps)
-            looped[policy.name] = _looped(policy, settings, seed)
+            still = policy.in_dynamics(**changes_of("simple flight", policy.dynamics))
+            looped[policy.name] = in_the_loop(still, settings.loop_flights, seed)
     progress("flown", steps, steps)
     return Bodies(settings, numbers)
-
-
-def _looped(policy: BasePolicy, settings: BodiesSettings, seed: RootSeed) -> dict[str, Any]:
-    """Episodes with software in the loop, in still air, or the reason why there are none."""
-    from drone_rl.flight.sitl_evaluation import evaluate_in_the_loop
-
-    count = settings.loop_flights
-    try:
-        still = policy.in_dynamics(**changes_of("simple flight", policy.dynamics))
-        return evaluate_in_the_loop(still, count, drawn_seed=seed, progress=silent).as_dict()
-    except (InputError, FlightControllerError) as error:
-        return {"left_out": str(error)}
 
 
 def changes_of(body: str, own: DynamicsSettings) -> Mapping[str, Any]:

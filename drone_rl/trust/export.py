@@ -13,14 +13,11 @@ from drone_rl.policies.policy import Policy
 from drone_rl.policies.zoo import certificate_path, shifts_path
 from drone_rl.policies.zoo.files import exported_bytes
 from drone_rl.sim.vocabulary import some_cubes, terms_of
-from drone_rl.sweeps.manifest import read_sweep
-from drone_rl.sweeps.rows import read_rows
-from drone_rl.trust.certificate import find_claim
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.evaluate import held_out_environments
 from drone_rl.trust.quoted_text import QUOTED, not_evaluated
 from drone_rl.trust.quoted_text import is_quoted as has_domain
-from drone_rl.trust.verdict import Verdict, judge_policy
+from drone_rl.trust.verdict import FindClaim, Verdict, judge_policy
 from drone_rl.trust.verdict_text import best_baseline, is_quoted
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes, write_all_atomically
@@ -37,9 +34,11 @@ def export(
     settings: HeldOutSettings,
     *,
     command: str | None = None,
+    chosen: Mapping[str, Any] | None = None,
     certificate: str | Path | None = None,
     shifts: str | Path | None = None,
     outputs: str | Path = "outputs",
+    find_claim: FindClaim | None = None,
 ) -> Verdict:
     """Judge a policy and write it as safetensors with a model card, next to the verdict.
 
@@ -48,9 +47,12 @@ def export(
         target: The file, ending in .safetensors.
         settings: Settings of the card's verdict.
         command: The training command; None takes it from the policy's file or folder.
+        chosen: How it was chosen in a sweep, see `export_policy`; None takes it from the policy's
+            file.
         certificate: See `find_claim`; it is quoted and copied, like the robustness evaluation.
         shifts: See `find_domain`.
         outputs: See `find_domain`.
+        find_claim: Finds and checks certificates, see `judge`.
 
     Returns:
         The verdict.
@@ -59,9 +61,9 @@ def export(
         InputError: The policy can't be written, or a given file is unusable.
     """
     settings, seed = with_seed(settings)
-    noted, chosen = origin_of(policy.path, policy.state)
-    command = Maybe(COMMAND).read(command or noted, "command")
-    claim = find_claim(policy, certificate, seed=seed)
+    noted, noted_choice = recorded_origin(policy.path, policy.state)
+    command, chosen = Maybe(COMMAND).read(command or noted, "command"), chosen or noted_choice
+    claim = None if find_claim is None else find_claim(policy, certificate, seed=seed)
     claim = None if claim is None or claim.refused else claim  # cards quote no refused certificate
     measured = find_domain(policy, shifts, outputs)
     with held_out_environments(policy, settings, seed) as (env, actor):
@@ -80,20 +82,13 @@ def export(
     return judged
 
 
-def origin_of(path: Path, state: dict[str, Any]) -> tuple[str | None, dict[str, Any] | None]:
-    """Return the command that repeats the training run, and the selection in a sweep, if any.
+def recorded_origin(path: Path, state: dict[str, Any]) -> tuple[str | None, dict[str, Any] | None]:
+    """Return the training command of a run or exported file, and the file's "chosen", if any.
 
     The command is None if it is unknown, as of a run that was trained from Python.
     """
-    folder = path.absolute().parent.parent
-    if path.suffix == ".pt" and (folder.parent / "sweep.json").is_file():
-        rows = read_rows(read_sweep(folder.parent))
-        row = next((row for row in rows if row.run.folder == folder), None)
-        if row is not None:
-            episodes = None if row.verdict is None else row.verdict["greedy"]["episodes"]
-            return row.run.repeat_command(), {"runs": len(rows), "episodes": episodes}
     own = state if path.suffix == ".safetensors" else {}  # nobody checked that of a checkpoint
-    noted = own.get("command")
+    noted, folder = own.get("command"), path.absolute().parent.parent
     if noted is None and (folder / ".hydra" / "overrides.yaml").is_file():
         typed = [o for o in read_overrides(folder) if not o.startswith(("resume=", "trial="))]
         noted = shlex.join(["drone-rl", "train", *typed])

@@ -19,14 +19,13 @@ from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.trust.baselines import BASELINES
-from drone_rl.trust.certificate import find_claim
 from drone_rl.trust.coverage import Coverage, compare_with_required, find_domain, recheck_domain
 from drone_rl.trust.evaluate import held_out_environments
 from drone_rl.trust.quoted_text import BRIEF, why_not
 from drone_rl.trust.recorded import identify
 from drone_rl.trust.rule import Rule
 from drone_rl.trust.shifts_file import SavedShifts
-from drone_rl.trust.verdict import Verdict, judge_policy
+from drone_rl.trust.verdict import FindClaim, Verdict, judge_policy
 from drone_rl.trust.verdict_text import quantity_label
 from drone_rl.utils.display import Result, aligned, paragraph, table
 from drone_rl.utils.errors import InputError
@@ -191,6 +190,7 @@ def judge_one(
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
     drawn_seed: RootSeed | None = None,
+    find_claim: FindClaim | None = None,
     **changes: Any,
 ) -> Judgement:
     """Judge the kind of a policy, see `drone_rl.trust.rule`, and whether it is certain.
@@ -203,13 +203,15 @@ def judge_one(
         dynamics: Settings to change of the dynamics, likewise.
         appearance: Appearance of the scenes, or the name of one such as "fog"; by default that of
             the policy's training.
-        certificate: Certificate to quote, see `drone_rl.trust.certificate.find_claim`.
+        certificate: Certificate to quote, passed to `find_claim`.
         shifts: Robustness evaluation to quote, see `drone_rl.trust.coverage.find_domain`.
         require_domain: File of the required domain, see
             `drone_rl.trust.coverage.read_requirements`.
         outputs: Folder of all runs.
         progress: Called with what is running; a progress bar by default.
         drawn_seed: Seed of a larger analysis of which this is a part.
+        find_claim: Finds and checks certificates; by default none is quoted. `drone_rl.judge`
+            passes `drone_rl.verification.claim.find_claim`.
         changes: Settings to change, as in `judge("good", episodes=1000)`.
 
     Raises:
@@ -239,7 +241,8 @@ def judge_one(
         coverage = _reflown(loaded, coverage, measured, settings, seed)
         where = {"device": settings.device, "renderer": settings.renderer}
         flights = settings.certificate_flights
-        claim = find_claim(loaded, certificate, flights=flights, seed=seed, **where)
+        if find_claim is not None:
+            claim = find_claim(loaded, certificate, flights=flights, seed=seed, **where)
         worlds = held_out_environments(loaded, settings, seed)
     is_sampled, rule = settings.sampled and loaded is not None, Rule(good_share=settings.good_share)
     known = {"claim": claim, "unlike": loaded and loaded.unlike, "rule": rule, "seed": seed}

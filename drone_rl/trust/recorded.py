@@ -8,9 +8,9 @@ from typing import Any
 
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import fingerprint, parse
-from drone_rl.sweeps.manifest import read_result
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import make_folder, read_json, write_atomically
+from drone_rl.utils.readers import read_result
 from drone_rl.utils.schema import Text, as_mapping
 from drone_rl.utils.text import rate
 

@@ -14,7 +14,7 @@ from torchrl.envs import EnvBase
 from drone_rl.collectors.complete_episodes import Episodes, StepLog, run_episodes
 from drone_rl.envs import base_env, worlds_of
 from drone_rl.policies.baselines import check_baselines
-from drone_rl.policies.policy import load_policy
+from drone_rl.policies.policy import BasePolicy, load_policy
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Task
 from drone_rl.sim.vocabulary import terms_of
@@ -34,10 +34,37 @@ MANY = (2, 3, 5, 10, 20, 50, 100)
 
 
 class CertificateClaim(Protocol):
-    """A certificate of the policy; `drone_rl.trust.certificate` has the implementation."""
+    """A certificate of the policy; `drone_rl.verification.claim` has the implementation."""
+
+    @property
+    def path(self) -> Path:
+        """Its file."""
+        ...
+
+    @property
+    def refused(self) -> str | None:
+        """Why it is refused, in one line; None if it is not."""
+        ...
 
     def as_evidence(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
         """Return the evidence that a verdict on these greedy episodes may quote."""
+        ...
+
+
+class FindClaim(Protocol):
+    """Finds and checks a policy's certificate; see `drone_rl.verification.claim.find_claim`."""
+
+    def __call__(
+        self,
+        policy: BasePolicy,
+        given: str | Path | None = None,
+        *,
+        flights: int = ...,
+        seed: RootSeed | None = None,
+        device: str = ...,
+        renderer: str = ...,
+    ) -> CertificateClaim | None:
+        """Return the certificate at a path, by default the one next to the policy, if any."""
         ...
 
 

@@ -5,6 +5,7 @@ the JSON files, so that a test can change the evidence and see the sentence chan
 """
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -98,6 +99,10 @@ def percent(share: float, digits: int = 1) -> str:
     if float(text[:-1]) >= 100:
         return f"more than {100 - step:g}%"
     return f"less than {step:g}%" if float(text[:-1]) <= 0 else text
+
+
+exact_percent = functools.partial(percent, digits=2)
+"""Returns a known fraction in percent with two decimals."""
 
 
 def interval(figure: Mapping[str, Any]) -> str:

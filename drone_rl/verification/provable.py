@@ -25,6 +25,7 @@ from drone_rl.training import Callback
 from drone_rl.training.callbacks import OngoingTraining, with_progress
 from drone_rl.training.run_folder import (
     MAY_CHANGE,
+    Judge,
     RunFolder,
     Training,
     finish,
@@ -33,6 +34,7 @@ from drone_rl.training.run_folder import (
 )
 from drone_rl.training.train import learn
 from drone_rl.trust.rollouts import find_failures
+from drone_rl.trust.verdict import check_judged, judge_for_selection
 from drone_rl.utils.archives import read_array
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import last_of, read_json, write_atomically
@@ -251,7 +253,8 @@ def train_until_proved(
         if is_same and not result["reason"].startswith("SIG"):
             result["reason"] = "proved"
         result["rounds"] = [done.values() for done in journal.rounds]
-        done = finish(journal.settings, folder, result)
+        judge = Judge(check_judged, judge_for_selection)
+        done = finish(journal.settings, folder, result, judge)
     return reraise_signal(done, "train_until_proved")
 
 

@@ -9,10 +9,11 @@ import drone_rl
 from drone_rl.config.commands import HeldOutSettings
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sweeps.manifest import Run, Sweep
-from drone_rl.trust.certificate import find_claim
+from drone_rl.sweeps.rows import choice_in_sweep
 from drone_rl.trust.coverage import find_domain
-from drone_rl.trust.export import export, origin_of
+from drone_rl.trust.export import export, recorded_origin
 from drone_rl.utils.errors import InputError
+from drone_rl.verification.claim import find_claim
 from tests.sweeps.conftest import _verdict
 from tests.trust.making import shifts_of
 from tests.verification.checker.making import of_every_place
@@ -42,25 +43,26 @@ def judged(checkpoint, **verdict):
 
 def test_a_run_of_a_sweep_names_the_run_and_not_the_sweep(checkpoint):
     judged(checkpoint)
-    command, chosen = origin_of(checkpoint, {})
+    command, chosen = choice_in_sweep(checkpoint)
     assert command == "drone-rl train seed=1 sweep=seeds hydra.mode=RUN"
     assert chosen == {"runs": 3, "episodes": 200}
 
 
 def test_a_run_that_no_present_rule_has_judged_was_not_chosen_by_episodes(checkpoint):
-    assert origin_of(checkpoint, {})[1] == {"runs": 3, "episodes": None}
+    assert choice_in_sweep(checkpoint)[1] == {"runs": 3, "episodes": None}
     judged(checkpoint, rule="of yore")
-    assert origin_of(checkpoint, {})[1] == {"runs": 3, "episodes": None}
+    assert choice_in_sweep(checkpoint)[1] == {"runs": 3, "episodes": None}
 
 
 def test_a_run_alone_is_named_by_its_own_settings(checkpoint):
     (checkpoint.parents[2] / "sweep.json").unlink()
-    assert origin_of(checkpoint, {}) == ("drone-rl train seed=1", None)
+    assert choice_in_sweep(checkpoint) is None
+    assert recorded_origin(checkpoint, {}) == ("drone-rl train seed=1", None)
 
 
 def test_what_an_exported_file_says_of_its_origin_goes_on(checkpoint):
     said = {"command": "drone-rl train seed=9", "chosen": {"runs": 7, "episodes": 20}}
-    found = origin_of(checkpoint.with_suffix(".safetensors"), said)
+    found = recorded_origin(checkpoint.with_suffix(".safetensors"), said)
     assert found == (said["command"], said["chosen"])
 
 
@@ -73,7 +75,7 @@ def test_a_card_quotes_a_certificate_that_then_travels_with_the_policy(tmp_path)
     policy = drone_rl.load_policy("proved")
     made = certificate_path(policy.path)
     target = tmp_path / "mine.safetensors"
-    export(policy, target, FEW, certificate=made)
+    export(policy, target, FEW, certificate=made, find_claim=find_claim)
     card = (tmp_path / "mine.md").read_text()
     assert "A certificate states for every placement" in card
     assert "re-checked by 1,000 rollouts from fresh placements" in card
@@ -89,7 +91,7 @@ def test_a_card_quotes_no_certificate_that_rollouts_refute(tmp_path):
     made.write_text(json.dumps(of_every_place(policy)))
     target = tmp_path / "mine.safetensors"
     with pytest.raises(InputError, match="ended otherwise than stated"):
-        export(policy, target, FEW, certificate=made)
+        export(policy, target, FEW, certificate=made, find_claim=find_claim)
     assert not target.exists()
 
 
@@ -99,7 +101,7 @@ def test_a_certificate_of_another_is_no_word_of_a_card(tmp_path):
     beside = tmp_path / "mine.certificate.json"
     beside.write_text(json.dumps(of_every_place(good)))
     with pytest.raises(InputError, match="network with hash"):
-        export(policy, target, FEW, certificate=beside)
+        export(policy, target, FEW, certificate=beside, find_claim=find_claim)
     export(policy, target, FEW)
     export(drone_rl.load_policy(target), tmp_path / "again.safetensors", FEW)
     assert "ertificate" not in (tmp_path / "again.md").read_text()
@@ -128,20 +130,20 @@ def test_a_card_quotes_conditions_that_then_travel_with_the_policy(tmp_path, nam
 def test_a_run_from_python_names_no_command(checkpoint):
     (checkpoint.parents[2] / "sweep.json").unlink()
     (checkpoint.parents[1] / ".hydra" / "overrides.yaml").unlink()
-    assert origin_of(checkpoint, {}) == (None, None)
+    assert recorded_origin(checkpoint, {}) == (None, None)
 
 
 def test_a_checkpoint_is_not_believed_about_its_origin(checkpoint):
     (checkpoint.parents[2] / "sweep.json").unlink()
     lie = {"command": "drone-rl train seed=9", "chosen": {"runs": 1, "episodes": None}}
-    assert origin_of(checkpoint, lie) == ("drone-rl train seed=1", None)
+    assert recorded_origin(checkpoint, lie) == ("drone-rl train seed=1", None)
 
 
 def test_the_command_of_a_resumed_run_repeats_all_of_it(checkpoint):
     (checkpoint.parents[2] / "sweep.json").unlink()
     noted = checkpoint.parents[1] / ".hydra" / "overrides.yaml"
     noted.write_text("[seed=1, resume=outputs/a, trainer.total_frames=9]")
-    command, _ = origin_of(checkpoint, {})
+    command, _ = recorded_origin(checkpoint, {})
     assert command == "drone-rl train seed=1 trainer.total_frames=9"
 
 

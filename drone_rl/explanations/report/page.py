@@ -15,6 +15,7 @@ from drone_rl.explanations.report import (
     behavior,
     class_models,
     embedding,
+    places,
     response,
     summary,
     truth,
@@ -37,7 +38,7 @@ PARTS: dict[str, Part] = {
     "attribution": attribution.PART,
     "truth": truth.PART,
     "response": response.RESPONSE_PART,
-    "places": response.PLACES_PART,
+    "places": places.PART,
     "asymmetry": response.ASYMMETRY_PART,
     "left_out": behavior.LEFT_OUT_PART,
 }

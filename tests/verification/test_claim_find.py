@@ -9,9 +9,9 @@ import drone_rl
 from benchmarks.tampering import tampered
 from drone_rl.collectors.complete_episodes import run_episodes
 from drone_rl.policies.zoo import certificate_path
-from drone_rl.trust.certificate import find_claim
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed
+from drone_rl.verification.claim import find_claim
 from tests.verification.checker.making import of_every_place, of_one_cube
 
 

@@ -6,25 +6,26 @@ import pytest
 import torch
 
 from drone_rl.config import AppearanceSettings
+from drone_rl.config.commands import PlacesSettings
 from drone_rl.envs import DroneEnv, GrayPixels, Noise, with_transforms
-from drone_rl.explanations import response
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.scenes import place_target
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import ExternalNetwork, SmallCNN
 from drone_rl.sim.actions import MOVES
+from drone_rl.verification import places_section
 from drone_rl.verification.prover.cube_images import camera_ahead
 from tests.five_actions import FIVE
 
 
 def test_a_map_of_near_places_is_that_of_the_policys_own_pictures(context, monkeypatch):
-    small = response.PlacesSettings(farthest=3.5, sideways=3.0)
-    monkeypatch.setattr(response, "PlacesSettings", lambda: small)
-    numbers, arrays = response.places_section(context)
+    small = PlacesSettings(farthest=3.5, sideways=3.0)
+    monkeypatch.setattr(places_section, "PlacesSettings", lambda: small)
+    numbers, arrays = places_section.places_section(context)
     told = numbers["places"]
     assert told["window"] == {"nearest": 2.5, "farthest": 3.5, "sideways": 3.0}
     assert set(arrays) == {"places_points", "places_ends", "places_labels"}
-    found = response._exact_map(context, small)
+    found = places_section._exact_map(context, small)
     where = np.random.RandomState(0).uniform((2.5, -3.0), (3.5, 3.0), (100, 2))
     ahead, left = torch.from_numpy(where).T
     pictures = context.scenes.observe(place_target(context.scenes, ahead + camera_ahead(), left))
@@ -41,7 +42,7 @@ def test_why_there_is_none(context):
         network = changes.pop("network", None)
         changed = {name: getattr(scenes, name) for name in names} | changes
         given = SimpleNamespace(scenes=SimpleNamespace(**changed), network=network)
-        numbers, arrays = response.places_section(given)
+        numbers, arrays = places_section.places_section(given)
         assert arrays == {}
         return numbers["places"]["refused"]
 
@@ -62,11 +63,11 @@ def test_why_there_is_none(context):
     ],
 )
 def test_there_is_none_where_a_place_has_several_images(look, faults, monkeypatch):
-    small = response.PlacesSettings(farthest=3.5, sideways=3.0)
-    monkeypatch.setattr(response, "PlacesSettings", lambda: small)
+    small = PlacesSettings(farthest=3.5, sideways=3.0)
+    monkeypatch.setattr(places_section, "PlacesSettings", lambda: small)
     env = with_transforms(DroneEnv(1, appearance=look), [GrayPixels(), *faults])
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,))
     settings = ExplainSettings(frames=40, episodes=6, perplexity=5, seed=3)
-    numbers, _ = response.places_section(Context(env, network, settings))
+    numbers, _ = places_section.places_section(Context(env, network, settings))
     env.close()
     assert "several images" in numbers["places"]["refused"]

@@ -1,4 +1,4 @@
-"""Package list and layer diagram, from docstrings and import contracts."""
+"""List of packages and of import rules, from docstrings and import contracts."""
 
 import ast
 import tomllib
@@ -13,36 +13,21 @@ def read_contracts(root: Path) -> list[dict[str, Any]]:
         return tomllib.load(file)["tool"]["importlinter"]["contracts"]
 
 
-def list_packages(contracts: Iterable[dict[str, Any]], package: Path) -> str:
+def list_packages(package: Path) -> str:
     """Return a Markdown table of packages and subpackages with their docstrings' first lines.
 
     Args:
-        contracts: The import contracts, whose layers define the order.
         package: The folder drone_rl.
     """
-    paths = []
-    for name in (name for row in _layers(contracts) for name in row):
-        inner = sorted(file.parent for file in (package / name).glob("*/__init__.py"))
-        paths += [package / name, *inner]
+    found = [*package.glob("*/__init__.py"), *package.glob("*/*/__init__.py")]
+    paths = sorted([file.parent for file in found])
     rows = [f"| `{_name(path, package)}` | {_first_line(path)} |" for path in paths]
     return "\n".join(["| package | holds |", "| --- | --- |", *rows])
 
 
-def draw_layers(contracts: Iterable[dict[str, Any]]) -> str:
-    """Return the layers as an HTML list from the top, and below it the forbidden imports.
-
-    Any Markdown viewer shows the list without a diagram renderer; the site styles items as boxes.
-    """
-    boxes = [" ".join(f"<code>{name}</code>" for name in names) for names in _layers(contracts)]
-    lines = ['<ol class="layers">', *(f"<li>{box}</li>" for box in boxes), "</ol>", ""]
-    forbidden = [c for c in contracts if c["type"] == "forbidden"]
-    return "\n".join([*lines, *(_sentence(c) for c in forbidden)])
-
-
-def _layers(contracts: Iterable[dict[str, Any]]) -> list[list[str]]:
-    """Return the names of packages by layer, from the top."""
-    layers = next(c["layers"] for c in contracts if c["type"] == "layers")
-    return [[name.strip() for name in layer.split("|")] for layer in layers]
+def list_contracts(contracts: Iterable[dict[str, Any]]) -> str:
+    """Return the forbidden imports as a Markdown list."""
+    return "\n".join(_sentence(c) for c in contracts if c["type"] == "forbidden")
 
 
 def _name(path: Path, package: Path) -> str:

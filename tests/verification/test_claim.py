@@ -9,9 +9,9 @@ import drone_rl
 from drone_rl.collectors.complete_episodes import Episodes
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import CubeGoals, EndReason
-from drone_rl.trust.certificate import Claim
 from drone_rl.trust.outcomes import OutcomeSet, Rounding
 from drone_rl.verification.checker.certificate import parse_certificate
+from drone_rl.verification.claim import Claim
 from tests.verification.checker.making import of_every_place
 
 PATH = Path("certificate.json")
