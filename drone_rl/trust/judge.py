@@ -249,7 +249,8 @@ def judge_one(
     with worlds as (env, actor):
         verdict = judge_policy(env, actor, settings.episodes, sampled=is_sampled, **known)
     progress("judged", 1, 1)
-    done = Judgement(name, settings, verdict, claim and claim.path, measured, identify(loaded))
+    path = None if claim is None else claim.path
+    done = Judgement(name, settings, verdict, path, measured, identify(loaded))
     if coverage is None or measured is None:
         return done
     against = why_not(_quoted(measured, verdict))
