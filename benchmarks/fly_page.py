@@ -4,7 +4,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from benchmarks.injections import chromium
+from benchmarks.browser import chromium
 from drone_rl.explanations.fly_page.server import fly
 
 _SIZE = (1300, 900)

@@ -11,7 +11,6 @@ from typing import Any
 import torch
 
 from benchmarks import commands
-from benchmarks.tampering import count_refused
 from drone_rl.config.training import TrainerSettings
 from drone_rl.policies import ImageNetwork
 from drone_rl.policies.policy import load_policy
@@ -134,24 +133,6 @@ def _decided(cubes: int, folder: Path, limit_s: float) -> tuple[float, float]:
         progress=silent,
     )
     return 1.0 - proof.undecided, time.perf_counter() - begin
-
-
-def bench_tampering(folder: Path, quick: bool) -> dict[str, Any]:
-    """Prove a policy in two small tasks and tamper with the certificates in every known way.
-
-    Args:
-        folder: Folder of the certificates.
-        quick: Whether to use only one task.
-
-    Returns:
-        See `count_refused`.
-    """
-    paths = {}
-    for cubes in (1,) if quick else (1, 2):
-        name = "right_and_forward"
-        _timed(name, cubes, folder / f"{name}_{cubes}")
-        paths[folder / f"{name}_{cubes}" / "certificate.json"] = None
-    return count_refused(paths)
 
 
 def _timed(policy: str | Path, num_cubes: int, folder: Path) -> tuple[Proof, float]:

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from benchmarks.accessibility import bench_accessibility
 from benchmarks.airsim import bench_airsim
 from benchmarks.airsim_chapter import bench_airsim_chapter
 from benchmarks.airsim_scripts import bench_scripts
@@ -21,7 +20,6 @@ from benchmarks.fragile_honest import bench_fragile_honest
 from benchmarks.gamed import bench_gamed
 from benchmarks.gymnasium import bench_gymnasium
 from benchmarks.imitation import bench_imitation
-from benchmarks.injections import bench_injections
 from benchmarks.ledger import digest_code
 from benchmarks.maps import bench_maps
 from benchmarks.memory import bench_memory
@@ -29,12 +27,11 @@ from benchmarks.onnx_export import bench_onnx
 from benchmarks.original import bench_original
 from benchmarks.peers.comparison import bench_peers
 from benchmarks.places import bench_places
-from benchmarks.proving import bench_many_cubes, bench_provable, bench_prove, bench_tampering
+from benchmarks.proving import bench_many_cubes, bench_provable, bench_prove
 from benchmarks.render_truth import bench_render_truth
 from benchmarks.revisions import bench_revisions
 from benchmarks.robust import bench_robust
 from benchmarks.scaling import bench_scaling
-from benchmarks.sentences import bench_sentences
 from benchmarks.shifts import bench_shifts
 from benchmarks.speed import bench_collector, bench_dm_control, bench_render
 from benchmarks.startup import bench_startup
@@ -48,7 +45,6 @@ from benchmarks.training import (
 )
 from benchmarks.verdicts import bench_verdicts
 from drone_rl.utils.errors import InputError
-from tools.docs.run import measure as measure_pages
 
 _RENDERING = ("sim", "envs")
 _COLLECTING = (*_RENDERING, "policies", "collectors")
@@ -57,7 +53,6 @@ _JUDGING = (*_RENDERING, "policies", "evaluation", "verdicts")
 _PROVING = (*_RENDERING, "policies", "verification/prover", "verification/checker")
 _EXPLAINING = (*_JUDGING, "explanations")
 _ORIGINAL = (*_TRAINING, "conf", "benchmarks/original")
-_CLAIMS = ("evaluation", "robustness", "verification", "verdicts", "explanations", "sweeps")
 
 
 def _flight_training(setup: Setup, experiment: str, seeds: Sequence[int]) -> dict[str, Any]:
@@ -115,31 +110,6 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_coverage(s.quick),
         "adversarial",
         ("utils/intervals", "evaluation", "benchmarks/coverage", "benchmarks/simulated_policies"),
-    ),
-    "sentences": Benchmark(
-        lambda s: bench_sentences(),
-        "adversarial",
-        (
-            *_CLAIMS,
-            "benchmarks/sentences",
-            "benchmarks/evidence",
-            "benchmarks/evidence_changes",
-        ),
-    ),
-    "injections": Benchmark(
-        lambda s: bench_injections(s.runs / "injections"),
-        "adversarial",
-        (
-            *_CLAIMS,
-            "utils/display",
-            "benchmarks/injections",
-            "benchmarks/injected_pages",
-        ),
-    ),
-    "accessibility": Benchmark(
-        lambda s: bench_accessibility(s.runs / "accessibility", s.quick),
-        "adversarial",
-        ("explanations", "utils/display", "benchmarks/accessibility"),
     ),
     "gamed": Benchmark(
         lambda s: bench_gamed(s.runs / "gamed"),
@@ -205,7 +175,6 @@ BENCHMARKS: dict[str, Benchmark] = {
         "adversarial",
         ("sim/rendering", "benchmarks/render_truth", "benchmarks/random_scenes"),
     ),
-    "docs": Benchmark(lambda s: measure_pages(), "adversarial", (".", "conf")),
     "sweeps": Benchmark(
         lambda s: bench_sweeps(s.runs, s.device, s.quick),
         "parallel",
@@ -225,16 +194,6 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_prove(s.runs / "prove", s.seeds, s.quick),
         "verification",
         (*_PROVING, "benchmarks/proving"),
-    ),
-    "tampering": Benchmark(
-        lambda s: bench_tampering(s.runs / "tampering", s.quick),
-        "verification",
-        (
-            *_PROVING,
-            "benchmarks/tampering",
-            "benchmarks/tampered_inconsistent",
-            "benchmarks/tampered_consistent",
-        ),
     ),
     "places": Benchmark(
         lambda s: bench_places(s.quick), "verification", (*_PROVING, "benchmarks/places")

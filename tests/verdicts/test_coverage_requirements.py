@@ -2,10 +2,10 @@ import json
 
 import pytest
 
-from benchmarks.evidence import SHIFTS, changed
 from drone_rl.robustness.shifts import ranges_of
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.coverage import read_requirements
+from tests.evidence import SHIFTS, changed
 
 
 @pytest.fixture

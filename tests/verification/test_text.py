@@ -2,8 +2,8 @@
 
 import pytest
 
-from benchmarks.evidence import EXPLANATION, changed
 from drone_rl.verification.text import exact_percent, rows, say_places
+from tests.evidence import EXPLANATION, changed
 
 
 def speak(**changes):

@@ -71,12 +71,6 @@ TRUTH = (
     ),
     Row("maps", "networks with a known map whose true map is trusted", _known_maps, "90%"),
     Row(
-        "sentences",
-        "injected changes of evidence that change or remove the sentence",
-        lambda f: f"{f['sentences_flipped']} of {f['sentences_total']}",
-        "all",
-    ),
-    Row(
         "verdicts",
         "certain verdicts that agree with 5,000 other episodes",
         _verdicts,
@@ -92,18 +86,6 @@ TRUTH = (
         "fragile_honest",
         'honest policies, bundled or trained by default, "not certain" because of rounding',
         lambda f: f"{f['fragile_honest']} of {f['fragile_honest_total']}",
-        "0",
-    ),
-    Row(
-        "injections",
-        "injection payloads, one per page, that run in Chromium",
-        lambda f: f"{f['injections_run']} of {f['injections_total']:,}",
-        "0",
-    ),
-    Row(
-        "accessibility",
-        "serious or critical accessibility violations of the report and the site (axe-core)",
-        lambda f: f"{f['a11y_violations']} on {f['a11y_pages']} pages",
         "0",
     ),
     Row(
@@ -167,16 +149,6 @@ TRUTH = (
         lambda f: f"{f['explain_s']:.0f} s, {f['explain_peak_memory_mib'] / 1024:.1f} GiB",
         "120 s, 2 GiB",
     ),
-    Row(
-        "docs",
-        "commands and code blocks of all pages that run and print what the page shows; of these "
-        "with smaller sizes; with other numbers, as training rounds differently on this processor",
-        lambda f: (
-            f"{f['docs_blocks_run']} of {f['docs_blocks']}; {f['docs_blocks_smaller']}; "
-            f"{f['docs_blocks_other_numbers']}"
-        ),
-        "all that need no cluster, account or installation",
-    ),
 )
 """Adversarial tests."""
 PROOF = (
@@ -214,12 +186,6 @@ PROOF = (
         "prove",
         "certificates that the independent checker accepts",
         lambda f: f"{f['proof_checked']} of {f['proof_checked_total']}",
-        "all",
-    ),
-    Row(
-        "tampering",
-        "tampered certificates that the checker rejects",
-        lambda f: f"{f['tampered_refused']} of {f['tampered_total']}",
         "all",
     ),
     Row(
