@@ -117,6 +117,8 @@ def make_peers(figures: Figures) -> str:
             fill(f"{{{key}:{spec}}}", measured) if measured else UNKNOWN
             for key, spec in _PEER_COLUMNS.values()
         ]
+        if unsolved := (measured or {}).get("is_solved", []).count(False):
+            cells[2] += f" ({unsolved} not solved)"
         lines.append([label, settings or ours, *cells])
     return _table(["learner", "settings", *_PEER_COLUMNS], lines)
 
