@@ -57,22 +57,6 @@ def _row(by: str, value: str, failed: int, episodes: int) -> Plain:
 FIXED_SEED: Plain = {"seed": 0, "seed_is_fixed": True}
 """Entries of a result with a fixed seed."""
 
-EVALUATION: Plain = {
-    **FIXED_SEED,
-    "rounding": {
-        "arithmetic": "float32 on cpu, PyTorch",
-        "frames": 2000,
-        "fragile": 0,
-        "fragile_rate": 0.0,
-        "threshold": 0.1,
-        "fragile_episodes_rate": 0.0,
-        "threshold_episodes": 0.25,
-        "compared": "fused kernel",
-        "compared_episodes": 64,
-        "differing": 0,
-    },
-}
-"""Entries of `evaluation.json` about seed and arithmetic."""
 VERDICT: Plain = {
     "kind": "none of these",
     **FIXED_SEED,
@@ -263,15 +247,6 @@ EXPLANATION: Plain = {
     },
 }
 """Content of `explanation.json` of the same policy."""
-
-CARD: Plain = {
-    "verdict": {**VERDICT, "sentence": "It collects 60%."},
-    "worlds": "report",
-    "seed": 0,
-    "chosen": {"runs": 10, "episodes": 200},
-    "task": {"num_cubes": 3, "cube_size": 2.5, "lateral_bound": 6.0, "vertical_bound": 0.0},
-}
-"""Evidence for the model card of an exported policy."""
 
 _OF_SIX = {"certain": 4, **_share(6, 6, 0.5, 1.0)}
 GROUP: Plain = {
