@@ -3,7 +3,6 @@
 from typing import Any, NamedTuple
 
 from dm_control import composer, mjcf
-from dm_control.composer.observation import observable
 from dm_control.mujoco import engine
 
 from drone_rl.config import CameraSettings
@@ -142,21 +141,6 @@ def make_distractors(count: int) -> list[Distractor]:
     return [Distractor(kind, name=f"distractor_{i}") for i, kind in enumerate(kinds)]
 
 
-class DroneObservables(composer.Observables):
-    """What the drone can observe; a task enables what it needs."""
-
-    @composer.observable
-    def front_center(self) -> observable.MJCFCamera:
-        """RGB image of the policy's camera. Shape: (height, width, 3), uint8."""
-        camera = self._entity.camera_settings
-        return observable.MJCFCamera(
-            self._entity.front_center,
-            height=camera.height,
-            width=camera.width,
-            scene_option=hide_drone(),
-        )
-
-
 class Drone(composer.Entity):
     """A quadrotor's shape with AirSim's five cameras and a chase camera; dynamics move it."""
 
@@ -164,7 +148,6 @@ class Drone(composer.Entity):
 
     def _build(self, size: float, camera: CameraSettings, name: str = "drone") -> None:
         """Make the drone, with a bounding box of so many metres, and its cameras."""
-        self.camera_settings = camera
         self._mjcf_root: Any = mjcf.RootElement(model=name)
         self.body: Any = self._mjcf_root.worldbody.add("body", name="body")
         visual = {"group": BODY_GROUP, "contype": 0, "conaffinity": 0}
@@ -179,9 +162,6 @@ class Drone(composer.Entity):
         for spec in DRONE_CAMERAS:
             add_camera(self.body, spec, camera.vertical_fov)
         add_camera(self.body, CHASE, vertical_fov=60.0)
-
-    def _build_observables(self) -> DroneObservables:
-        return DroneObservables(self)
 
     @property
     def mjcf_model(self) -> Any:

@@ -10,9 +10,8 @@ from torch import Tensor
 
 from drone_rl.config import ActionSettings, BaseTaskSettings, CameraSettings, DynamicsSettings
 from drone_rl.sim.actions import Entry
-from drone_rl.sim.composer_task import ComposerTask
+from drone_rl.sim.composer_task import ComposerTask, poses_of
 from drone_rl.sim.dynamics import BodyState, Dynamics, draw_seeds, make_dynamics
-from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.entities import FRONT_CENTER
 from drone_rl.sim.rendering import (
     Appearance,
@@ -26,7 +25,6 @@ from drone_rl.sim.rendering import (
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks import State, Task, as_task
-from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, Maybe, Text, Whole
 
@@ -246,16 +244,7 @@ class Worlds:
 
     def poses(self, state: State, appearance: Appearance | None = None) -> Poses:
         """Return the poses to render, level on a gimbal; `appearance` positions distractors."""
-        props = self.task.places(state)
-        if self.distractors:
-            shown = None if appearance is None else appearance.distractors
-            hidden = torch.tensor([0.0, 0.0, -HIDDEN_DEPTH]).expand(len(props), self.distractors, 3)
-            places = hidden if shown is None else shown.expand(len(props)).places
-            props = torch.cat([props, places.to(props)], 1)
-        attitude = state.body.attitude
-        if self.dynamics.mount == "gimbal":
-            attitude = twist_about_z(attitude)
-        return Poses(state.body.position, attitude, props)
+        return poses_of(self.task, self.dynamics, state, self.distractors, appearance)
 
     def prepare(self, view: View | None = None) -> None:
         """Prepare the renderer for a view before the first image."""

@@ -1,16 +1,28 @@
-"""The vector environment equals Gymnasium's `SyncVectorEnv` of single environments."""
+"""Gymnasium environments, single and vector: checkers, `SyncVectorEnv`, options, episodes."""
+
+import dataclasses
+import pickle
+import warnings
 
 import numpy as np
 import pytest
+import torch
 
 import drone_rl
+from drone_rl.sim.tasks import Task
+from drone_rl.sim.tasks.task import EndReason
 from drone_rl.utils.errors import InputError
+from tests.second_task import Posts
 
 gymnasium = pytest.importorskip("gymnasium", minversion="1.1", reason="Gymnasium is not installed")
-from gymnasium.vector import AutoresetMode  # noqa: E402 (after the skip)
+
 
 NAME = "drone_rl/CollectCubes-v0"
+
+
 SHORT = {"num_cubes": 1, "first_distance": 3.0, "step_limit": 5, "front_margin": 3.0}
+
+
 COUNT = 5
 
 
@@ -72,7 +84,7 @@ def test_batch_equals_gymnasiums_sync_vector_env(make, mode, observations):
 
 
 def test_disabled_autoreset_requires_a_reset(make):
-    ours = make(autoreset_mode=AutoresetMode.DISABLED, **SHORT)
+    ours = make(autoreset_mode=gymnasium.vector.AutoresetMode.DISABLED, **SHORT)
     sync = {"vectorization_mode": "sync", "vector_kwargs": {"autoreset_mode": "Disabled"}}
     theirs = make(**sync, **SHORT)
     assert_same(ours.reset(seed=0), theirs.reset(seed=0))
@@ -161,4 +173,134 @@ def test_step_starts_environments_that_were_never_reset(make):
 def test_class_accepts_settings():
     env = drone_rl.DroneWorlds(2, drone_rl.TaskSettings(num_cubes=2), step_limit=100)
     assert env.reset(seed=0)[1]["collected"].shape == (2, 2)
+    env.close()
+
+
+WIDE = {"width": 64, "height": 64}
+
+
+@pytest.fixture
+def make_one():
+    envs = []
+
+    def build(**options):
+        envs.append(gymnasium.make(NAME, **options))
+        return envs[-1]
+
+    yield build
+    for env in envs:
+        env.close()
+
+
+def put(env, lateral):
+    """Set the lateral positions of the cubes of the running episode in meters to the left."""
+    env.unwrapped.batch.worlds.state.cubes[0, :, 1] = lateral
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"observations": "state"}, {"render_mode": "rgb_array"}, {"num_cubes": 1}]
+)
+def test_gymnasiums_checker_passes(make_one, options):
+    from gymnasium.utils.env_checker import check_env
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(make_one(**options).unwrapped)
+
+
+def test_gymnasiums_checker_passes_for_a_user_task():
+    from gymnasium.utils.env_checker import check_env
+
+    gymnasium.register("posts-v0", entry_point="drone_rl:DroneWorld", kwargs={"task": Posts()})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(gymnasium.make("posts-v0").unwrapped)
+    del gymnasium.registry["posts-v0"]
+
+
+@pytest.mark.parametrize("options", [{"observations": "state"}, {"camera": WIDE}])
+def test_stable_baselines3s_checker_passes(make_one, options):
+    reason = "Stable-Baselines3 is not installed"
+    checker = pytest.importorskip("stable_baselines3.common.env_checker", reason=reason)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checker.check_env(make_one(**options).unwrapped)
+
+
+def test_collecting_all_cubes_terminates_with_success(make_one):
+    env = make_one(num_cubes=1, first_distance=3.0, front_margin=5.0)
+    seen, info = env.reset(seed=0)
+    put(env, 0.0)
+    assert (seen.shape, seen.dtype, info["cubes"].tolist()) == ((25, 64, 3), np.uint8, [0])
+    assert env.step(0)[1:4] == (0.0, False, False)
+    _, reward, terminated, truncated, info = env.step(0)  # 2 m ahead; contact starts at 1.65 m
+    assert (reward, terminated, truncated) == (1.0, True, False)
+    assert (info["is_success"], info["collected"].tolist()) == (True, [True])
+    ends = env.unwrapped.batch.worlds.task.ends
+    assert ends(info["end_reason"]) == ends.ALL_CUBES
+    with pytest.raises(InputError, match=r"needs a running episode; call reset\(\) first"):
+        env.step(0)
+    env.reset()
+    env.step(0)
+
+
+def test_episodes_depend_only_on_the_seed(make_one):
+    def episodes(env, seed):
+        first = env.reset(seed=seed)[1]["cube_positions"]
+        return first, env.reset()[1]["cube_positions"]
+
+    one, two = make_one(), make_one(observations="state")
+    assert np.array_equal(episodes(one, 5), episodes(two, 5))
+    assert not np.array_equal(*episodes(one, 5))
+    assert not np.array_equal(episodes(one, 5), episodes(one, 6))
+    unseeded = [make_one().reset()[1]["cube_positions"] for _ in range(2)]
+    assert not np.array_equal(*unseeded)
+
+
+def test_returned_arrays_are_copies(make_one):
+    env = make_one(observations="state")
+    seen, info = env.reset(seed=1)
+    seen[:], info["cube_positions"][:], info["collected"][:] = 7.0, 7.0, True
+    again = env.step(0)[4]
+    assert again["cube_positions"][0, 0] == 15.0 and not again["collected"].any()
+
+
+def test_invalid_calls_of_one_raise(make_one):
+    env = make_one().unwrapped
+    with pytest.raises(InputError, match=r"call reset\(\) first"):
+        env.step(0)
+    with pytest.raises(InputError, match=r"options=\['start'\] are unknown to reset; give none"):
+        env.reset(options={"start": 3})
+    with pytest.raises(gymnasium.error.Error, match="greater or equal to zero, actual value: -1"):
+        env.reset(seed=-1)
+    env.reset(seed=0)
+    with pytest.raises(InputError, match="action=5 is invalid; give one of: 0 forward"):
+        env.step(5)
+    env.step(0)  # the episode continues
+
+
+def test_second_close_is_allowed_and_spec_recreates_the_environment(make_one):
+    env = make_one(num_cubes=2, camera={"width": 32})
+    assert gymnasium.make(env.spec).observation_space.shape == (25, 32, 3)
+    assert pickle.loads(pickle.dumps(env.spec)) == env.spec
+    assert "num_cubes" in env.spec.to_json()
+    env.close()
+    env.close()
+
+
+class Far(Task):
+    name = "far"
+
+    def sample(self, random_state):
+        return torch.tensor(random_state.uniform(2.0, 4.0), dtype=torch.float64)
+
+    def step(self, state, body):
+        end = (body.position[:, 0] > state.sampled).long() * EndReason.SUCCESS
+        new = dataclasses.replace(state, body=body, steps=state.steps + 1, end_reason=end)
+        return new, end.double()
+
+
+def test_a_task_that_samples_one_number_is_observed():
+    env = drone_rl.DroneWorld(task=Far(), observations="state")
+    assert env.reset(seed=0)[0].shape == env.observation_space.shape
     env.close()
