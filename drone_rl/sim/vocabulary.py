@@ -1,7 +1,6 @@
 """Terms of reports; `vocabulary.toml` has those of the built-in tasks."""
 
 import dataclasses
-import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -151,7 +150,6 @@ def some_cubes(task: Mapping[str, Any]) -> str:
 
 
 MOST_ACTIONS = 16
-_NAME = re.compile(r"[a-z][a-z0-9 _-]{0,23}")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -196,22 +194,10 @@ def shown_actions(numbers: Mapping[str, Any]) -> ShownActions:
     return ShownActions(names, given["order"], given["arrows"], given["colors"], speeds)
 
 
-class _Name:
-    """Schema of an action's name, which pages and tables show."""
-
-    def read(self, value: Any, where: str) -> str:
-        text = Text(24).read(value, where)
-        if not _NAME.fullmatch(text):
-            raise InputError(
-                f"{where}={shown(value)} is not an action's name; give lower-case letters"
-            )
-        return text
-
-
 _INDICES = Several(Whole(0, MOST_ACTIONS - 1), 1, MOST_ACTIONS)
 _ACTION_FIELDS = Record(
     {
-        "names": Several(_Name(), 1, MOST_ACTIONS),
+        "names": Several(Text(24), 1, MOST_ACTIONS),
         "order": _INDICES,
         "arrows": Several(Several(Real(-1.0, 1.0), 2, 2), 1, MOST_ACTIONS),
         "colors": Several(Several(Whole(0, 255), 3, 3), 1, MOST_ACTIONS),

@@ -82,7 +82,7 @@ class Worlds:
         Raises:
             InputError: An argument is unusable.
         """
-        Whole(1).read(num_envs, "num_envs")
+        num_envs = Whole(1).read(num_envs, "num_envs")
         device = Text().read(device, "device")  # torch's, too
         check_device(device)
         Maybe(Instance(Appearance)).read(appearance, "appearance")

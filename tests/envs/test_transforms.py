@@ -129,17 +129,6 @@ def test_on_pixels_applies_only_pixel_transforms_in_order():
     assert on_pixels([])(white) is white
 
 
-def test_film_is_transformed_per_frame_and_stacked():
-    standard = StandardizePixels(mean=0.5, std=0.25)
-    stack = CatFrames(N=3, dim=-3, in_keys=["pixels"])
-    film = [torch.full((2, 1, 2, 2), value) for value in (0.5, 0.75)]
-    seen = apply_to_frames([standard, stack], film)
-    assert seen.shape == (2, 3, 2, 2)
-    assert seen[0, :, 0, 0].tolist() == [0.0, 0.0, 1.0]  # the first frame fills missing ones
-    assert apply_to_frames([standard], film)[0, 0, 0, 0] == 1.0
-    assert (memory_of([standard, stack]), memory_of([standard])) == (2, 0)
-
-
 @pytest.mark.parametrize("padding", ["same", "constant"])
 @pytest.mark.parametrize("sizes", [(3,), (2, 2), (2, 3)])
 def test_stacks_of_stacks_are_those_of_the_environment(sizes, padding):

@@ -82,24 +82,6 @@ def test_as_dict_returns_plain_values():
     }
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"mirrored": (1, 2, 0)}, "mirrored"),
-        ({"mirrored": (0, 0, 0)}, "mirrored"),
-        ({"mirrored": (0, 1, 3)}, "mirrored"),
-        ({"opposite": (1, 2, 0)}, "opposite"),
-        ({"order": (0, 1, 1)}, "order"),
-        ({"colors": ((0, 0, 0),)}, "color"),
-        ({"left": 0}, "left"),
-    ],
-)
-def test_inconsistent_sets_raise(change, message):
-    given = {name: getattr(MOVES, name) for name in MOVES.__dataclass_fields__}
-    with pytest.raises(ValueError, match=message):
-        DiscreteActions(**{**given, **change})
-
-
 def test_moves_in_three_dimensions_extend_the_chapters():
     from drone_rl.sim.actions import DIRECTIONS_3D, MOVES, MOVES_3D
 

@@ -1,7 +1,7 @@
 """The rules of cube collection: the Warp function `step`.
 
-`CollectCubes.touch`, for flights without steps, and the prover (`lattice.py`, `cube_images.py`)
-state the rule of contact again: change them together.
+The rule of contact, half of the edges of cube and drone along every axis, is here for steps, in
+`common.first_contact` for paths without steps, and on purpose again in the prover.
 """
 
 import enum

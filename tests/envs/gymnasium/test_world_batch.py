@@ -47,15 +47,9 @@ def test_options_set_task_and_camera(task):
             r"; did you mean num_cubes\?$",
         ),
         ({"num_cubes": 0}, "num_cubes=0 is out of range"),
-        ({"step_limit": 5}, "step_limit=5 ends every episode"),
-        ({"observations": "depth"}, "observations='depth' is unknown; give pixels, state"),
         ({"render_mode": "human"}, "render_mode='human' is unknown; give rgb_array"),
         ({"camera": {"fov": 3}}, "camera.fov is unknown; valid names: width"),
-        ({"camera": {"width": 0}}, "camera.width=0 is out of range"),
-        (
-            {"camera": 64},
-            "camera=64 is no CameraSettings; give drone_rl.config.camera.CameraSettings",
-        ),
+        ({"camera": 64}, "camera=64 is no CameraSettings"),
         ({"device": "tpu"}, "device=tpu is unknown"),
     ],
 )
@@ -159,17 +153,10 @@ _BOTH = r"an array of shape \(2,\) of: 0 forward, 1 left, 2 right$"
     ("given", "batch", "wanted"),
     [
         (3, (), _MOVES),
-        (-1, (), _MOVES),
         (1.0, (), _MOVES),
-        ("left", (), _MOVES),
         (None, (), _MOVES),
-        (True, (), _MOVES),
-        ([1], (), _MOVES),
-        (1, (2,), _BOTH),
         ([0, 3], (2,), _BOTH),
-        ([0, 1, 2], (2,), _BOTH),
         ([[0], [1, 2]], (2,), _BOTH),
-        ([0.0, 1.0], (2,), _BOTH),
     ],
 )
 def test_invalid_actions_raise(given, batch, wanted):

@@ -8,9 +8,8 @@ import torch
 
 from drone_rl.config import ActionSettings
 from drone_rl.sim.actions import Move
-from drone_rl.sim.dynamics import FlightState, Goals, Mode
+from drone_rl.sim.dynamics import FlightState, Mode
 from drone_rl.sim.dynamics.control import Moves, Velocities
-from drone_rl.utils.errors import InputError
 from tests.flying import (
     ANGLES,
     POSITIONS,
@@ -201,22 +200,6 @@ def test_limits_hold_for_random_goals():
     assert most[2] < math.pi / 5.5 * 1.3 and most[3] < 2.5 * 2**0.5 * 1.1
 
 
-FOUR = doubles((1.0, 2.0, 3.0, 4.0))
-
-
-@pytest.mark.parametrize(
-    ("modes", "message"),
-    [
-        ((*POSITIONS[:2], Mode.POSITION, Mode.POSITION), r"modes\[2\]=.* is unknown; give one of"),
-        ((*(Mode.ROTOR,) * 3, Mode.POSITION), "rotor, rotor, position: rotor is for all axes"),
-        ((Mode.RATE, *ANGLES[1:]), "modes=rate, angle, .*: the first two go together"),
-    ],
-)
-def test_invalid_mode_combinations_raise(modes, message):
-    with pytest.raises(InputError, match=message):
-        Goals(modes, FOUR)
-
-
 def test_reference_after_a_command():
     state = hovering(quadrotor())
     state.attitude[:] = doubles((math.cos(0.2), 0.0, 0.0, math.sin(0.2)))
@@ -224,15 +207,6 @@ def test_reference_after_a_command():
     np.testing.assert_allclose(goals.reference_after(2.0, state)[0], (1.2, 2.4, 1.1, 101.8))
     free = make_goals(VELOCITIES, 1.0, 2.0, 0.5, 1.0)
     np.testing.assert_allclose(free.reference_after(2.0, state)[0], (0, 0, 0.4, 100), atol=1e-9)
-
-
-def test_goals_and_drifts_of_wrong_shape_raise():
-    with pytest.raises(InputError, match=r"goals of shape \(4,\) are not \(num_envs, 4\)"):
-        Goals(POSITIONS, FOUR[0])
-    with pytest.raises(InputError, match=r"goals of shape \(1, 3\)"):
-        Goals(POSITIONS, FOUR[:, :3])
-    with pytest.raises(InputError, match=r"drift of shape \(4,\) is not that of the goals"):
-        Goals(POSITIONS, FOUR, torch.zeros(4))
 
 
 MOVES_SETTINGS = ActionSettings(move_speed=4.0, move_lead=0.5)

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 import torch
-from torchrl.envs.utils import check_env_specs
 
 from drone_rl.config import (
     COMPUTER_VISION,
@@ -16,7 +15,6 @@ from drone_rl.config import (
 )
 from drone_rl.envs import DroneEnv
 from drone_rl.sim.actions import Move
-from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.dynamics import (
     ComputerVision,
@@ -30,7 +28,6 @@ from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
-from tests.composer_env import ComposerEnv
 from tests.fake_flight import FLIGHT, Floating, floating
 from tests.second_dynamics import TURN, Turning
 
@@ -59,21 +56,6 @@ def test_camera_turns_with_the_drone():
     turned, _ = worlds.advance(state, torch.tensor([1]))
     assert worlds.scene.props[int(worlds.render(turned, view)[0, 12, 32])] == 0
     worlds.close()
-
-
-def test_torchrl_specs_follow_the_dynamics():
-    env = DroneEnv(2, dynamics=Turning())
-    check_env_specs(env)
-    assert env.action_spec.space.n == 5
-    state = env.reset()
-    after = env.step(state.set("action", torch.tensor([1, 0])))["next", "info"]
-    torch.testing.assert_close(
-        after["attitude"], torch.tensor([[0.5**0.5, 0, 0, 0.5**0.5], [1, 0, 0, 0]])
-    )
-    torch.testing.assert_close(after["drone"][:, :2], torch.tensor([[0.0, 0.2], [0.2, 0.0]]))
-    env.close()
-    single = make_environment(dynamics=Turning(), pixels=False, random_state=0)
-    assert ComposerEnv(single).action_spec.space.n == 5
 
 
 def test_random_dynamics_are_seeded_by_the_environments_stream():
@@ -105,15 +87,6 @@ def test_gimbal_keeps_cameras_level(mount):
     shown = worlds.poses(worlds.state).attitude
     torch.testing.assert_close(shown, level if mount == "gimbal" else tilted)
     torch.testing.assert_close(worlds.state.body.attitude, tilted)
-    env = make_environment(dynamics=dynamics, pixels=False, random_state=0)
-    env.reset()
-    env.step(0)
-    torch.testing.assert_close(env.task.state.body.attitude, tilted)
-    attitude = torch.tensor(env.task.drone.get_pose(env.physics)[1])[None]
-    torch.testing.assert_close(attitude, shown)
-    env.task.drone.set_pose(env.physics, [0.0, 0.0, 2.5], [0.0, 0.0, 0.0, 1.0])
-    env.step(0)  # after setting the attitude
-    assert env.task.state.body.attitude.tolist() == [[0.0, 0.0, 0.0, 1.0]]
 
 
 def test_lost_drone_ends_only_its_own_episode():

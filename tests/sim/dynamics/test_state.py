@@ -10,6 +10,7 @@ from drone_rl.config import MOVES_SETTINGS, PillarsSettings
 from drone_rl.sim.dynamics import BodyState, FlightState, Obstacles
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.state import twist_about_z
+from drone_rl.sim.rendering.appearance import product, turned
 from drone_rl.sim.tasks import CollectCubes, Pillars
 from drone_rl.sim.worlds import Worlds
 from tests.fake_flight import FLIGHT, Floating
@@ -26,26 +27,15 @@ def test_body_at_rest_is_level_by_default():
     assert BodyState.at_rest(place, turned).attitude is turned
 
 
-@pytest.mark.parametrize("yaw", [0.0, 0.7, -3.0, 3.0])
-def test_heading_only_removes_roll_and_pitch(yaw):
+@pytest.mark.parametrize("yaw", [0.0, 40.0, -170.0, 170.0])
+def test_the_twist_about_z_has_no_roll_and_pitch(yaw):
     """Attitudes apply roll and pitch first, then yaw."""
-
-    def about(axis, angle):
-        return [math.cos(angle / 2), *(math.sin(angle / 2) * float(i == axis) for i in range(3))]
-
-    def times(p, q):
-        a, b = p[0] * q[0] - sum(x * y for x, y in zip(p[1:], q[1:], strict=True)), []
-        for i, j, k in ((1, 2, 3), (2, 3, 1), (3, 1, 2)):
-            b.append(p[0] * q[i] + p[i] * q[0] + p[j] * q[k] - p[k] * q[j])
-        return [a, *b]
-
-    expected = torch.tensor([about(2, yaw)], dtype=torch.float64)
-    for roll, pitch in ((0.0, 0.0), (0.4, 0.0), (0.0, -0.3), (-1.2, 0.0)):
-        q = times(about(2, yaw), times(about(1, pitch), about(0, roll)))
+    expected = turned("yaw", yaw)[None]
+    for roll, pitch in ((0.0, 0.0), (23.0, 0.0), (0.0, -17.0), (-70.0, 0.0)):
+        tilted = product(expected, product(turned("pitch", pitch), turned("roll", roll)))
         for sign in (1.0, -1.0):  # both quaternions of one attitude
-            attitude = sign * torch.tensor([q], dtype=torch.float64)
-            found = twist_about_z(attitude)
-            torch.testing.assert_close(found, sign * expected, atol=1e-12, rtol=0)
+            twist = twist_about_z(sign * tilted)
+            torch.testing.assert_close(twist, sign * expected, atol=1e-12, rtol=0)
 
 
 def test_inverted_attitude_has_no_heading():
@@ -70,18 +60,6 @@ def test_parts_are_views_of_the_state():
     state.rotors[:] = 0.5
     assert state.numbers[1, 7:10].tolist() == [7, 8, 9]
     assert state.numbers[0, 13:17].tolist() == [0.5] * 4
-
-
-def test_moved_state_has_a_moved_reference():
-    state = FlightState.at_rest(doubles((1.0, 2.0, 3.0)))
-    state.velocity[:] = 1.0
-    moved = state.moved(doubles((4.0, 5.0, 6.0)))
-    assert moved.position.tolist() == [[4, 5, 6]] and state.position.tolist() == [[1, 2, 3]]
-    assert moved.reference.tolist() == [[4, 5, 0, 6]] and moved.velocity.tolist() == [[1, 1, 1]]
-    root = math.sqrt(0.5)
-    turned = state.moved(state.position, doubles((root, 0.0, 0.0, root)))
-    assert turned.heading.item() == pytest.approx(math.pi / 2)
-    assert turned.reference[0, 2].item() == pytest.approx(math.pi / 2)
 
 
 SETTINGS = PillarsSettings(num_rows=2, width=0.5, height=6.0)

@@ -2,15 +2,11 @@
 
 from concurrent.futures import ThreadPoolExecutor
 
-import mujoco
-import mujoco_warp as mjw
 import pytest
 import torch
-import warp as wp
 
-from drone_rl.sim.rendering import Appearance, Scene
-from drone_rl.sim.rendering.mujoco_warp import ModelAppearance, WarpRenderer
-from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.rendering.mujoco_warp import WarpRenderer
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
@@ -46,30 +42,3 @@ def test_unsupported_appearances_raise(look):
     with pytest.raises(InputError, match="give renderer=raytrace"):
         worlds.render(worlds.state)
     worlds.close()
-
-
-XML = """<mujoco><worldbody><light directional="true" ambient=".1 .1 .1" diffuse=".5 .5 .5"/>
-<geom name="a" type="plane" size="1 1 1" rgba=".2 .4 .6 1"/>
-<geom name="b" size="1" rgba=".1 .1 .1 1"/></worldbody></mujoco>"""
-
-
-@pytest.fixture
-def applied():
-    """Return the ModelAppearance of three environments and a reader of model values."""
-    model = mujoco.MjModel.from_xml_string(XML)
-    scene = Scene(model, (SemanticClass.GROUND, SemanticClass.TARGET), (-1, 0), (0.0, 0.0, 0.0))
-    with wp.ScopedDevice("cpu"):
-        warped = mjw.put_model(model)
-        appearance = ModelAppearance(scene, warped, 3)
-    return appearance, lambda name: wp.to_torch(getattr(warped, name))
-
-
-def test_appearance_replaces_the_previous_one(applied):
-    appearance, values = applied
-    appearance.apply(
-        Appearance(colors={SemanticClass.TARGET: (1.0, 1.0, 1.0)}, sun=(0.0, 0.0, 0.0)), 3
-    )
-    appearance.apply(Appearance(ambient=(0.9, 0.9, 0.9)), 3)
-    torch.testing.assert_close(values("geom_rgba")[:, 1, :3], torch.full((3, 3), 0.1))
-    assert values("light_diffuse").flatten().tolist() == [0.5] * 9
-    torch.testing.assert_close(values("light_ambient").flatten(), torch.full((9,), 0.9))

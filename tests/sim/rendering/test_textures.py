@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from drone_rl.sim.rendering import textures
 from drone_rl.sim.rendering.textures import PROCEDURAL, levels, load
 from drone_rl.utils.errors import InputError
 
@@ -70,15 +69,3 @@ def test_mip_level_is_the_mean_of_four_texels():
     assert len(rows) == 16 + 4 + 1
     assert rows[16:20].tolist() == [[100, 10, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]
     assert rows[20].tolist() == [25, 2, 0]
-
-
-def test_spots_are_smooth_and_seamless():
-    spots = textures._stretched(np.array([[0.0, 4.0], [8.0, 12.0]]))
-    assert spots.shape == (256, 256)
-    places = {
-        (0, 0): 0.0, (0, 128): 4.0, (128, 0): 8.0, (128, 128): 12.0,
-        (0, 64): 2.0, (0, 192): 2.0, (64, 0): 4.0, (192, 0): 4.0, (64, 64): 6.0,
-        (0, 32): 4 * 0.15625, (32, 0): 8 * 0.15625,  # 3 / 16 - 2 / 64
-    }  # fmt: skip
-    for (row, column), value in places.items():
-        assert spots[row, column] == pytest.approx(value), (row, column)

@@ -30,24 +30,6 @@ def test_invalid_views_raise(change, message):
         dataclasses.replace(VIEW, **change)
 
 
-@pytest.mark.parametrize(
-    ("modality", "shape", "dtype"),
-    [
-        ("rgb", (5, 2, 25, 64, 3), torch.uint8),
-        ("gray", (5, 2, 25, 64), torch.float32),
-        ("depth", (5, 2, 25, 64), torch.float32),
-        ("distance", (5, 2, 25, 64), torch.float32),
-        ("segmentation", (5, 2, 25, 64), torch.int32),
-        ("normals", (5, 2, 25, 64, 3), torch.float32),
-    ],
-)
-def test_images_have_the_shape_and_type_of_their_modality(modality, shape, dtype):
-    view = dataclasses.replace(VIEW, cameras=("a", "b"), modalities=(modality, "rgb"))
-    images = view.new_images(5)
-    assert set(images) == {modality, "rgb"}
-    assert (tuple(images[modality].shape), images[modality].dtype) == (shape, dtype)
-
-
 def test_gray_is_the_luma_with_white_one():
     colors = torch.tensor([[255, 255, 255], [0, 0, 0], [255, 0, 0], [0, 255, 0], [0, 0, 255]])
     gray = to_gray(colors.to(torch.uint8))

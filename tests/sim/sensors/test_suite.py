@@ -93,26 +93,6 @@ def test_noise_depends_only_on_the_seed():
         SensorSuite(seed=-1)
 
 
-def test_no_samples_are_drawn_between_readings():
-    """The sensors sample at 50 Hz."""
-    suite, others = SensorSuite(), SensorSuite()
-    one, two = suite.start(resting(2)), others.start(resting(2))
-    for _ in range(6):
-        one = suite.update(one, resting(2), 0.003)
-    one, two = suite.update(one, resting(2), 0.003), others.update(two, resting(2), 0.021)
-    readings = (
-        reading(suite, "barometer", one),
-        reading(others, "barometer", two),
-    )
-    assert torch.equal(readings[0].pressure, readings[1].pressure)
-    assert readings[0].time.tolist() == pytest.approx([0.021] * 2)
-    readings = (
-        reading(suite, "magnetometer", one),
-        reading(others, "magnetometer", two),
-    )
-    assert torch.equal(readings[0].field, readings[1].field)
-
-
 def test_sensors_use_separate_random_streams():
     """The rate of the GPS does not change the readings of other sensors."""
     settings = SensorSettings(gps=GpsSettings(rate=10.0, startup=0.0))

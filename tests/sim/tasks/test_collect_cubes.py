@@ -450,23 +450,6 @@ def test_inflated_boxes_stay_within_the_placements():
     assert reached.tolist() == [[[0.5, 2.5], [-6.0, -3.5]], [[2.5, 3.5], [-0.5, 1.0]]]
 
 
-@pytest.mark.parametrize(
-    ("boxes", "message"),
-    [
-        (np.empty((0, 2, 2)), r"boxes has shape \(0, 2, 2\); give shape \(N, 2, 2\), N at least 1"),
-        (np.zeros((1, 3, 2)), r"boxes has shape \(1, 3, 2\)"),
-        (np.full((1, 2, 2), 6.5), r"boxes extend to 6.5 m; give bounds within 6 m"),
-        (
-            np.array([[[1.0, 0.0], [0.0, 1.0]]]),
-            r"lower bound above its upper one; give \(lower, upper\)",
-        ),
-    ],
-)
-def test_invalid_boxes_raise(boxes, message):
-    with pytest.raises(InputError, match=message):
-        FailureReplayTask(REPLAYED, boxes, 0.5)
-
-
 def test_elsewhere_places_cubes_at_valid_positions():
     """Positions are in view, from the camera to the distance of the first cube."""
     task, camera = TaskSettings(vertical_bound=1.0, altitude=4.0), CameraSettings()

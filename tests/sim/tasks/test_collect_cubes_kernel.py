@@ -13,7 +13,6 @@ from drone_rl.sim.tasks import CollectCubes, Pillars
 from drone_rl.sim.tasks.collect_cubes import EndReason, Side
 from drone_rl.sim.tasks.collect_cubes_kernel import (
     EnvArrays,
-    FusedCubes,
     move,
     place,
 )
@@ -78,24 +77,6 @@ def test_random_episodes_follow_the_reference_rules(settings, ends):
         seen |= {*state.end_reason.tolist()}
         state, going = state[is_on], going[is_on]
     assert ends <= seen
-
-
-def test_kernel_state_starts_from_a_copy_of_the_environments():
-    settings = TaskSettings(num_cubes=2, altitude=3.0, vertical_bound=0.5)
-    worlds = Worlds(2, settings)
-    cubes = torch.tensor([[[15.0, 1.0, 3.0], [24.0, -2.0, 3.5]], [[15.0, 0.0, 3.0]] * 2])
-    worlds.state = worlds.start(cubes.double())
-    fused = FusedCubes(settings, worlds.dynamics, 3)
-    for values in (fused.steps, fused.end_reasons, fused.state.collected):
-        values.fill_(1)  # left by a previous batch
-    fused.begin(worlds.state)
-    assert wp.to_torch(fused.arrays.drones)[:2].tolist() == [[0.0, 0.0, 3.0]] * 2
-    assert torch.equal(fused.state.cubes[:2], cubes.double())
-    assert not fused.state.collected[:2].any() and fused.state.collected[2].all()
-    assert fused.steps.tolist() == fused.end_reasons.tolist() == [0, 0, 1]
-    wp.to_torch(fused.arrays.drones).fill_(7.0)
-    assert worlds.state.drone[0].tolist() == [0.0, 0.0, 3.0]
-    assert wp.to_torch(fused.poses.attitudes)[0].tolist() == [1.0, 0.0, 0.0, 0.0]
 
 
 def reference_step(settings, state, body):
