@@ -82,7 +82,7 @@ class ComposerTask(composer.Task):
         self._arena = entities.Field()
         model: Any = self._arena.mjcf_model
         model.option.gravity = (0, 0, 0)
-        self.drone = entities.Drone(size=self.rules.drone_size, camera=self.camera)
+        self.drone = entities.DroneEntity(size=self.rules.drone_size, camera=self.camera)
         self._arena.add_free_entity(self.drone)
         with errors_of(f"task={self.rules.name}", place_of(self.rules.make_props)):
             props = self.rules.make_props()

@@ -141,7 +141,7 @@ def make_distractors(count: int) -> list[Distractor]:
     return [Distractor(kind, name=f"distractor_{i}") for i, kind in enumerate(kinds)]
 
 
-class Drone(composer.Entity):
+class DroneEntity(composer.Entity):
     """A quadrotor's shape with AirSim's five cameras and a chase camera; dynamics move it."""
 
     semantic_class = SemanticClass.DRONE

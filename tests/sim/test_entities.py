@@ -12,7 +12,7 @@ from drone_rl.sim.entities import (
     DRONE_CAMERAS,
     FLOOR_COLOR,
     Cube,
-    Drone,
+    DroneEntity,
     Field,
     make_distractors,
 )
@@ -80,7 +80,7 @@ def test_distractors_cycle_through_all_shapes():
 
 
 def test_drone_has_hull_four_rotors_and_six_cameras():
-    drone = Drone(size=0.8, camera=CameraSettings(width=40, height=40, horizontal_fov=90.0))
+    drone = DroneEntity(size=0.8, camera=CameraSettings(width=40, height=40, horizontal_fov=90.0))
     model = mjcf.Physics.from_mjcf_model(drone.mjcf_model).model
     names = {model.geom(i).name for i in range(model.ngeom)}
     rotors = {f"rotor_{end}_{side}" for end in ("front", "rear") for side in ("left", "right")}

@@ -8,7 +8,7 @@ from numpy.random import RandomState
 from drone_rl.config import ActionSettings, DynamicsSettings, TaskSettings
 from drone_rl.sim.dynamics import ComputerVision, Obstacles, Quadrotor
 from drone_rl.sim.rendering.devices import start_warp
-from drone_rl.sim.rendering.raytrace.structs_kernel import Poses
+from drone_rl.sim.rendering.raytrace.structs_kernel import PoseArrays
 from drone_rl.sim.tasks import CollectCubes, Pillars
 from drone_rl.sim.tasks.collect_cubes import EndReason, Side
 from drone_rl.sim.tasks.collect_cubes_kernel import (
@@ -26,7 +26,7 @@ WORLDS = 60
 
 @wp.kernel(enable_backward=False)
 def step(
-    envs: EnvArrays, poses: Poses, actions: wp.array(dtype=int), rewards: wp.array(dtype=float)
+    envs: EnvArrays, poses: PoseArrays, actions: wp.array(dtype=int), rewards: wp.array(dtype=float)
 ) -> None:
     env = wp.tid()
     if envs.end_reasons[env] == 0:

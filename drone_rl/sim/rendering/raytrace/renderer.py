@@ -34,9 +34,9 @@ class Launch(NamedTuple):
 
     num_images: int
     """Environments times cameras."""
-    view: structs.View
+    view: structs.ViewArrays
     geoms: structs.Geoms
-    poses: structs.Poses
+    poses: structs.PoseArrays
     materials: structs.Materials
     images: structs.Images
     effects: "structs.Effects | None" = None
@@ -93,7 +93,7 @@ class Raytracer:
 
     def kernel_inputs(
         self, view: View, num_workers: int
-    ) -> tuple[structs.View, structs.Geoms, structs.Materials, structs.Scratch]:
+    ) -> tuple[structs.ViewArrays, structs.Geoms, structs.Materials, structs.Scratch]:
         """Return the arguments with which another kernel calls `plain_kernel.render_image`.
 
         The appearance is the model's own; `num_workers` images are rendered at the same time.
@@ -106,7 +106,7 @@ class Raytracer:
         """Stop the threads."""
         self._launcher.close()
 
-    def _encode(self, view: View) -> tuple[structs.View, structs.Geoms]:
+    def _encode(self, view: View) -> tuple[structs.ViewArrays, structs.Geoms]:
         view.check_modalities(self, _BITS)
         device = str(self.device)
         with on_torch_stream(self.device):

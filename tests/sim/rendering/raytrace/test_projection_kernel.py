@@ -17,9 +17,9 @@ from tests.box_ahead import SIZE, geoms, poses, scratch, view
 
 @wp.kernel(enable_backward=False)
 def find_visible(
-    seen: structs_kernel.View,
+    seen: structs_kernel.ViewArrays,
     scene: structs_kernel.Geoms,
-    placed: structs_kernel.Poses,
+    placed: structs_kernel.PoseArrays,
     buffers: structs_kernel.Scratch,
     part: wp.array[wp.vec4i],
 ):
