@@ -259,11 +259,24 @@ def make_environment(
     camera: CameraSettings | None = None,
     *,
     random_state: np.random.RandomState | int | None = None,
-    **options: Any,
+    dynamics: Dynamics | DynamicsSettings | None = None,
+    actions: ActionSettings | None = None,
+    pixels: bool = True,
+    distractors: int = 0,
+    appearance: AppearanceSettings | None = None,
 ) -> composer.Environment:
-    """Return the task as a dm_control environment; `options` are those of `ComposerTask`."""
+    """Return the task as a dm_control environment; see `ComposerTask` for the arguments."""
+    made = ComposerTask(
+        task,
+        camera,
+        dynamics=dynamics,
+        actions=actions,
+        pixels=pixels,
+        distractors=distractors,
+        appearance=appearance,
+    )
     return composer.Environment(
-        ComposerTask(task, camera, **options),
+        made,
         random_state=random_state,
         strip_singleton_obs_buffer_dim=True,
         recompile_mjcf_every_episode=False,

@@ -1,5 +1,7 @@
 """Comparison with MuJoCo Warp on scenes with all geom types, and hand-computed images."""
 
+import dataclasses
+
 import mujoco
 import numpy as np
 import pytest
@@ -350,16 +352,25 @@ EFFECTS = Appearance(
         SemanticClass.TARGET: Texture(images=("noise",), size=1.0),
     },
 )
+LOW_SUNS = torch.stack([torch.arange(64.0).cos(), torch.arange(64.0).sin()], -1)
+"""Directions in which the light travels sideways, from all around. Shape: (64, 2)."""
 
 
-@pytest.mark.parametrize("modality", ["rgb", "depth", "segmentation"])
-def test_both_kernels_render_the_same_images(modality):
-    both = [Raytracer(scene(), num_envs=32, num_shards=2) for _ in range(2)]
-    both[1]._launcher = GpuLauncher("cpu")
-    poses = scattered(32, 0.4)
-    ours, theirs = (render(r, view(modality), poses, EFFECTS).double() for r in both)
-    assert ((ours - theirs).abs() > 1e-3).double().mean() < 1e-3
+@pytest.mark.parametrize(
+    ("modality", "down"),
+    [("rgb", -1.0), ("rgb", -0.15), ("rgb", 0.1), ("depth", -1.0), ("segmentation", -1.0)],
+)
+def test_the_gpu_kernel_renders_the_effects_of_the_cpu_kernel(modality, down, both):
+    """On a GPU, each pixel looks for its shadow; on a CPU, each shadow for its pixels."""
+    alike, poses = Raytracer(scene(), num_envs=64), scattered(64, 0.4)
+    alike._launcher.close()
+    alike._launcher = GpuLauncher("cpu")
+    sun = torch.nn.functional.pad(LOW_SUNS, (0, 1), value=down)
+    effects = dataclasses.replace(EFFECTS, sun_direction=sun)
+    ours, theirs = (render(r, view(modality), poses, effects).double() for r in (both[0], alike))
+    assert ((ours - theirs).abs() > 1e-3).double().mean() < 1e-4
     plain = render(both[0], view(modality), poses).double()
     assert (plain != ours).double().mean() > 0.5 if modality == "rgb" else torch.equal(plain, ours)
-    for renderer in both:
-        renderer.close()
+    unshaded = dataclasses.replace(effects, shadows=0)
+    if modality == "rgb" and down < 0:
+        assert (render(both[0], view(), poses, unshaded) != ours).double().mean() > 0.01
