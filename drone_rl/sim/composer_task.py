@@ -189,9 +189,9 @@ class ComposerTask(composer.Task):
 
     def _locate(self, physics: mjcf.Physics) -> BodyState:
         """Return the drone at MuJoCo's pose, which users may have set."""
-        body, shown = self._body, camera_attitude(self.dynamics, self._body)
+        body, expected = self._body, camera_attitude(self.dynamics, self._body)
         place, turn = (torch.from_numpy(np.array(p))[None] for p in self.drone.get_pose(physics))
-        cosine = torch.cosine_similarity(turn, shown).abs()  # MuJoCo normalizes quaternions
+        cosine = torch.cosine_similarity(turn, expected).abs()  # MuJoCo normalizes quaternions
         is_same = bool(cosine > 1.0 - 1e-12) and torch.equal(place, body.position)
         return body if is_same else body.moved(place, turn)
 

@@ -157,8 +157,8 @@ class DroneEntity(composer.Entity):
         for x, end in ((-1, "rear"), (1, "front")):
             for y, side in ((-1, "right"), (1, "left")):
                 place = (x * size * 0.3, y * size * 0.3, size * 0.12)
-                own = {"name": f"rotor_{end}_{side}", "pos": place, "rgba": _DARK, **rotor}
-                self.body.add("geom", type="cylinder", **own)
+                rotor_place = {"name": f"rotor_{end}_{side}", "pos": place, "rgba": _DARK, **rotor}
+                self.body.add("geom", type="cylinder", **rotor_place)
         for spec in DRONE_CAMERAS:
             add_camera(self.body, spec, camera.vertical_fov)
         add_camera(self.body, CHASE, vertical_fov=60.0)

@@ -123,11 +123,11 @@ class _Phrases:
     """Schema of phrases by name; see `drone_rl.utils.schema.Kind`."""
 
     def read(self, value: Any, where: str) -> dict[str, str]:
-        given = as_mapping(value, where)
-        if len(given) > MOST:
-            raise InputError(f"{where} holds {len(given)} phrases; give at most {MOST}")
+        values = as_mapping(value, where)
+        if len(values) > MOST:
+            raise InputError(f"{where} holds {len(values)} phrases; give at most {MOST}")
         phrase = Text(LONGEST)
-        return {phrase.read(k, where): phrase.read(v, f"{where}.{k}") for k, v in given.items()}
+        return {phrase.read(k, where): phrase.read(v, f"{where}.{k}") for k, v in values.items()}
 
 
 def _kind(field: dataclasses.Field) -> Kind:
@@ -181,17 +181,17 @@ def shown_actions(numbers: Mapping[str, Any]) -> ShownActions:
     """Return the actions of `explanation.json`; raises `InputError` if they are invalid."""
     if "actions" not in numbers:
         return SHOWN_MOVES
-    given = _ACTION_FIELDS.read(numbers["actions"], "actions")
-    names, count = given["names"], len(given["names"])
-    if len(set(names)) < count or sorted(given["order"]) != list(range(count)):
+    values = _ACTION_FIELDS.read(numbers["actions"], "actions")
+    names, count = values["names"], len(values["names"])
+    if len(set(names)) < count or sorted(values["order"]) != list(range(count)):
         raise InputError(
-            f"actions.order={shown(str(given['order']))} or a name is invalid; give {count} "
+            f"actions.order={shown(str(values['order']))} or a name is invalid; give {count} "
             "different names, and the index of each once"
         )
-    if not len(given["arrows"]) == len(given["colors"]) == count:
+    if not len(values["arrows"]) == len(values["colors"]) == count:
         raise InputError(f"actions have {count} names; give each an arrow and a color")
-    speeds = given.get("speeds")
-    return ShownActions(names, given["order"], given["arrows"], given["colors"], speeds)
+    speeds = values.get("speeds")
+    return ShownActions(names, values["order"], values["arrows"], values["colors"], speeds)
 
 
 _INDICES = Several(Whole(0, MOST_ACTIONS - 1), 1, MOST_ACTIONS)

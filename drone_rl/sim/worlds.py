@@ -132,8 +132,8 @@ class Worlds:
     @functools.cached_property
     def scene(self) -> Scene:
         """The compiled model of dm_control."""
-        own: dict[str, Any] = {"dynamics": self.dynamics, "distractors": self.distractors}
-        return ComposerTask(self.task, self.camera, pixels=False, **own).compile()
+        options: dict[str, Any] = {"dynamics": self.dynamics, "distractors": self.distractors}
+        return ComposerTask(self.task, self.camera, pixels=False, **options).compile()
 
     @functools.cached_property
     def renderer(self) -> Renderer:
@@ -193,20 +193,20 @@ class Worlds:
     def advance(self, state: State, action: Tensor) -> tuple[State, Tensor]:
         """Return states a step later, and rewards; the environments stay as they are."""
         around = [self.task.obstacles(state)] if self.dynamics.needs_obstacles else []
-        found: Any = self.task.step(state, self.dynamics.step(state.body, action, *around))
-        is_pair = isinstance(found, tuple) and len(found) == 2
-        if not is_pair or getattr(found[1], "shape", None) != action.shape[:1]:
+        outcome: Any = self.task.step(state, self.dynamics.step(state.body, action, *around))
+        reward: Any = outcome[1] if isinstance(outcome, tuple) and len(outcome) == 2 else None
+        if getattr(reward, "shape", None) != action.shape[:1]:
             raise InputError(
                 f"{type(self.task).__name__}.step must return two things: the states after the "
                 "step, and the rewards, a tensor with one number for each environment"
             )
-        is_usable = (found[1] <= LARGEST_REWARD) & (found[1] >= -LARGEST_REWARD)  # nor NaN
+        is_usable = (reward <= LARGEST_REWARD) & (reward >= -LARGEST_REWARD)  # nor NaN
         if not bool(is_usable.all()):
             raise InputError(
-                f"{type(self.task).__name__}.step returns a reward of {found[1][~is_usable][0]:g}; "
+                f"{type(self.task).__name__}.step returns a reward of {reward[~is_usable][0]:g}; "
                 f"scale rewards to at most {LARGEST_REWARD:g}, so that their sums stay finite"
             )
-        return found
+        return outcome
 
     def render(
         self, state: State, view: View | None = None, appearance: Appearance | None = None
@@ -236,11 +236,11 @@ class Worlds:
         """Return the combined appearance; the same object as before if nothing has changed."""
         if appearance is None:
             return self.appearance
-        known = self._combined
-        if known is None or known[0] is not appearance or known[1] is not self.appearance:
+        combined = self._combined
+        if combined is None or combined[0] is not appearance or combined[1] is not self.appearance:
             whole = appearance.over(self.appearance)
-            self._combined = known = (appearance, self.appearance, whole)
-        return known[2]
+            self._combined = combined = (appearance, self.appearance, whole)
+        return combined[2]
 
     def poses(self, state: State, appearance: Appearance | None = None) -> Poses:
         """Return the poses to render, level on a gimbal; `appearance` positions distractors."""

@@ -184,12 +184,12 @@ def _masked(info: Info, mask: Mask) -> Info:
     return masked
 
 
-def _mode(given: AutoresetMode | str) -> AutoresetMode:
+def _mode(name: AutoresetMode | str) -> AutoresetMode:
     try:
-        return AutoresetMode(given)
+        return AutoresetMode(name)
     except ValueError:
         names = ", ".join(mode.value for mode in AutoresetMode)
-        raise InputError(f"autoreset_mode={given!r} is unknown; give one of: {names}") from None
+        raise InputError(f"autoreset_mode={name!r} is unknown; give one of: {names}") from None
 
 
 _ONLY = torch.zeros(1, dtype=torch.int64)

@@ -118,14 +118,14 @@ class WorldBatch:
         Raises:
             InputError: An option or setting is unknown or out of range.
         """
-        own = kinds_of(GymnasiumSettings)
-        options = {name: value for name, value in given.items() if name in own}
+        names = kinds_of(GymnasiumSettings)
+        options = {name: value for name, value in given.items() if name in names}
         for name, kind in _PARTS.items():
             if isinstance(options.get(name), Mapping):
                 options[name] = kind(**Changes(kind).read(options[name], name))
         options = GymnasiumSettings(**options)
         options.dynamics.check_air()
-        changes = {name: value for name, value in given.items() if name not in own}
+        changes = {name: value for name, value in given.items() if name not in names}
         self.options = options
         self.task = _chosen_task(task, changes)
         """The task or its settings."""

@@ -99,16 +99,16 @@ class OracleRule(NamedTuple):
         """Return whether an action set has all parts that the oracle uses, by name."""
         return set(self.actions.names) <= set(actions.names)
 
-    def decide(self, known: Sequence[Tensor], actions: Actions) -> Tensor:
+    def decide(self, values: Sequence[Tensor], actions: Actions) -> Tensor:
         """Return full-speed actions, (N,) and then the entry's, of a set that `can_fly` accepts.
 
-        `known` is what it reads, each of shape (N, *).
+        `values` are the entries that it reads, each of shape (N, *).
         """
-        own = self.act(*known)
+        action = self.act(*values)
         if actions == self.actions:
-            return own
+            return action
         same = torch.stack([actions.always(name) for name in self.actions.names])
-        return same.to(own.device)[self.actions.part(own)]
+        return same.to(action.device)[self.actions.part(action)]
 
 
 class Grid(NamedTuple):
@@ -374,9 +374,9 @@ def as_settings(task: Any) -> Any:
     if not isinstance(task, Task):
         return task
     _require_name(type(task))
-    own: Any = getattr(task, "settings", None)
-    if type(own) in MAKERS and type(as_task(own)) is type(task):
-        return own
+    settings: Any = getattr(task, "settings", None)
+    if type(settings) in MAKERS and type(as_task(settings)) is type(task):
+        return settings
     kind = TASKS.get(task.name)
     if kind is None or not issubclass(kind, ObjectSettings):  # else a notebook's cell ran again
         names = {"name": task.name, "__module__": type(task).__module__}

@@ -81,11 +81,11 @@ class Raytracer:
         self.prepare(view)
         cameras, geoms = self._views[view]
         images = view.new_images(len(poses), self.device)
-        shown = appearance or Appearance()
+        look = appearance or Appearance()
         with on_torch_stream(self.device):
             materials, effects = self._materials.encode(appearance, len(poses))
-            encoded = cameras.encode(shown.camera, len(poses))
-            frames = self._poses.write(poses, shown.distractors)
+            encoded = cameras.encode(look.camera, len(poses))
+            frames = self._poses.write(poses, look.distractors)
             count, out = len(poses) * len(view.cameras), _images(images)
             launch = Launch(count, encoded, geoms, frames, materials, out, effects)
             self._launcher.launch(launch)
