@@ -26,7 +26,7 @@ from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Instance, Maybe, Text, Whole
+from drone_rl.utils.schema import Instance, Maybe
 
 LARGEST_REWARD = 1e10
 """Largest reward of a step, so that sums of rewards and of their squares are finite in float32."""
@@ -82,8 +82,6 @@ class Worlds:
         Raises:
             InputError: An argument is unusable.
         """
-        num_envs = Whole(1).read(num_envs, "num_envs")
-        device = Text().read(device, "device")  # torch's, too
         check_device(device)
         Maybe(Instance(Appearance)).read(appearance, "appearance")
         self.appearance, self.distractors = appearance, distractors

@@ -52,8 +52,6 @@ def test_a_reward_whose_sums_may_overflow_is_named(monkeypatch, reward):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"num_envs": 0}, "^num_envs=0 is out of range"),
-        ({"num_envs": 2.5}, "^num_envs=2.5"),
         ({"device": "gpu"}, "^device=gpu is unknown"),
         ({"appearance": AppearanceSettings()}, "^appearance=.* is no Appearance; give "),
         ({"renderer": 42}, "^renderer=42 is no renderer; give one of: raytrace"),

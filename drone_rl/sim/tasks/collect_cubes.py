@@ -1,7 +1,6 @@
 """Collect the cubes (chapter, section 4): the drone moves until it has touched every cube."""
 
 import dataclasses
-import types
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -81,14 +80,12 @@ class CollectCubes(PropTask[WorldState]):
     observed = ("cubes", "collected", "side", "end_reason")
     props = "cubes"
     scored = ("collected", "side", "lateral", "cube_positions")
-    remembered = types.MappingProxyType(
-        {
-            "cubes": "positions of the cubes, metres, in order of x (T, C, 3)",
-            "present": "whether each cube still stands, bool (T, C)",
-            "collected": "whether each cube has been collected, bool (T, C)",
-            "next_target": "index of the nearest standing cube, C if none (T,)",
-        }
-    )
+    remembered: Mapping[str, str] = {
+        "cubes": "positions of the cubes, metres, in order of x (T, C, 3)",
+        "present": "whether each cube still stands, bool (T, C)",
+        "collected": "whether each cube has been collected, bool (T, C)",
+        "next_target": "index of the nearest standing cube, C if none (T,)",
+    }
 
     def __init__(self, settings: TaskSettings | None = None) -> None:
         self.settings = settings = settings or TaskSettings()

@@ -339,22 +339,15 @@ def register_task(
     if isinstance(settings, Task):
         as_settings(settings)
         return
-    if not (isinstance(settings, type) and issubclass(settings, BaseTaskSettings)):
-        name = getattr(settings, "__name__", shown(settings))
+    is_class = isinstance(settings, type) and issubclass(settings, BaseTaskSettings)
+    if not is_class or not callable(make):
         raise InputError(
-            f"{name} is no class of settings; give it first, then what makes the task: "
-            "register_task(MySettings, MyTask)"
+            f"{shown(settings)} and {shown(make)} make no task; give a task, or the class of its "
+            "settings and what makes it: register_task(MySettings, MyTask)"
         )
     _require_name(settings)
-    if not callable(make):
-        what = f"give what makes the task, as in register_task({settings.__name__}, MyTask)"
-        raise InputError(f"{shown(make)} makes no task; {what}")
     if TASKS.get(settings.name, settings) is not settings:
         raise InputError(f"there is a task called {settings.name}; give another name")
-    for field in dataclasses.fields(settings):
-        if field.default is field.default_factory is dataclasses.MISSING:
-            where = f"{settings.__name__}.{field.name}"
-            raise InputError(f"{where} has no default; give it one, as in = 1.0 behind its type")
     with prefixed_errors(settings.__name__):
         settings()  # its defaults are checked
     TASKS[settings.name], MAKERS[settings] = settings, make

@@ -5,7 +5,6 @@ fog, shadows, textures or a sky gradient) and `gpu_kernel` (both, on a GPU).
 """
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import torch
@@ -22,10 +21,8 @@ from drone_rl.sim.rendering.renderer import Poses
 from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import MODALITIES, Modality, View
 
-_BITS: Mapping[Modality, int] = MappingProxyType(
-    {modality: getattr(structs, modality.upper()) for modality in MODALITIES}
-)
-_VECTORS = MappingProxyType({"rgb": wp.vec3ub, "normals": wp.vec3})
+_BITS: dict[Modality, int] = {name: getattr(structs, name.upper()) for name in MODALITIES}
+_VECTORS = {"rgb": wp.vec3ub, "normals": wp.vec3}
 """Warp types of modalities with several numbers per pixel."""
 
 

@@ -1,7 +1,6 @@
 """Encode a scene for the kernels, in reference frames: 0 world, 1 drone, props from 2."""
 
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
+from collections.abc import Callable
 from typing import Any
 
 import mujoco as _mujoco
@@ -22,14 +21,12 @@ from drone_rl.utils.errors import InputError
 mujoco: Any = _mujoco
 """MuJoCo's bindings, which are untyped."""
 
-HALF_EXTENTS: Mapping[int, Callable[[NDArray], NDArray]] = MappingProxyType(
-    {
-        **dict.fromkeys((solids.PLANE, solids.ELLIPSOID, solids.BOX), lambda size: size),
-        solids.SPHERE: lambda size: size[[0, 0, 0]],
-        solids.CAPSULE: lambda size: size[[0, 0, 1]] + [0.0, 0.0, size[0]],
-        solids.CYLINDER: lambda size: size[[0, 0, 1]],
-    }
-)
+HALF_EXTENTS: dict[int, Callable[[NDArray], NDArray]] = {
+    **dict.fromkeys((solids.PLANE, solids.ELLIPSOID, solids.BOX), lambda size: size),
+    solids.SPHERE: lambda size: size[[0, 0, 0]],
+    solids.CAPSULE: lambda size: size[[0, 0, 1]] + [0.0, 0.0, size[0]],
+    solids.CYLINDER: lambda size: size[[0, 0, 1]],
+}
 """Half extents of the bounding box of each supported kind of geom, from MuJoCo's size; for a plane
 the size itself."""
 
