@@ -7,7 +7,7 @@ from torch import Tensor
 from drone_rl.sim.dynamics import flight_kernel as kernel
 from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.control import Goals
-from drone_rl.sim.dynamics.rigid_body_kernel import Airframe, axes_of, torque_of
+from drone_rl.sim.dynamics.rigid_body_kernel import AirframeNumbers, axes_of, torque_of
 from drone_rl.sim.dynamics.state import FlightState
 from drone_rl.sim.rendering.devices import start_warp
 
@@ -16,7 +16,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.kernel
 def push(
-    command: kernel.Command,
+    command: kernel.FlightCommand,
     tick: int,
     before: wp.array2d[wp.float64],
     after: wp.array2d[wp.float64],
@@ -48,7 +48,7 @@ def push(
 
 
 def forces(
-    frame: Airframe, body: FlightState, goals: Goals, tick: int
+    frame: AirframeNumbers, body: FlightState, goals: Goals, tick: int
 ) -> tuple[FlightState, Tensor]:
     """Compute controllers, rotors and air in tick number `tick` of a command, on the CPU.
 

@@ -1,4 +1,4 @@
-"""Hand-computed images with visual effects, for both kernels."""
+"""Hand-computed images with visual effects, for both launchers."""
 
 import math
 
@@ -12,6 +12,8 @@ from drone_rl.sim.rendering.view import to_gray
 from tests.from_above import LAUNCHERS, SIZE, render, tracer
 
 EVEN = {"ambient": (1.0, 1.0, 1.0), "sun": (0.0, 0.0, 0.0)}
+
+
 WHITE = {SemanticClass.GROUND: (1.0, 1.0, 1.0)}
 
 
