@@ -24,7 +24,6 @@ from drone_rl.utils.schema import as_mapping, shown
 from drone_rl.utils.settings import (
     Settings,
     check_names,
-    current_names,
     kinds_of,
     plain,
     prefixed_errors,
@@ -150,7 +149,7 @@ def from_config(cls: type[S], config: Any, where: str = "") -> S:
     Raises:
         InputError: A name is unknown or a value invalid; the message begins with its place.
     """
-    given = current_names(cls, as_mapping(config, where or "settings"))
+    given = as_mapping(config, where or "settings")
     prefix = f"{where}." if where else ""
     check_names(cls, given, prefix)
     values = {name: _read(types_of(cls)[name], given[name], prefix + name) for name in given}

@@ -7,7 +7,6 @@ import contextlib
 import dataclasses
 import functools
 import math
-import operator
 import re
 import types
 import typing
@@ -19,17 +18,6 @@ from drone_rl.utils.errors import InputError, did_you_mean
 from drone_rl.utils.schema import Flag, Instance, Kind, Maybe, Real, Record, Text, as_mapping
 
 S = TypeVar("S", bound="Settings")
-FORMER_NAMES = {"optimiser": "optimizer", "trainer.minibatch_frames": "trainer.chunk_frames"}
-"""Former names of settings, the newest last. Command lines, arguments and files may have them."""
-FORMER_CHOICES = {
-    "collector=threads": "episodes",
-    "scheduler=none": "constant",
-    "returns=standardised": "standardized",
-    "returns=batch_normalised": "batch_normalized",
-    "appearance=randomised": "randomized",
-}
-"""Former names of choices, accepted in the same places."""
-_FORMER_FIELDS = {k.rpartition(".")[2]: v.rpartition(".")[2] for k, v in FORMER_NAMES.items()}
 
 
 class _Frozen:
@@ -70,8 +58,6 @@ class Settings(_Frozen):
             setattr(cls, name, field)
         _refuse_unknown_names(cls)
         _refuse_untyped(cls)
-        if not cls.__dataclass_fields__.keys().isdisjoint(_FORMER_FIELDS.values()):
-            _accept_former_names(cls)
         del cls.__setattr__, cls.__delattr__
 
     def __post_init__(self) -> None:
@@ -85,7 +71,6 @@ class Settings(_Frozen):
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with other values; raise an `InputError` for unknown or invalid ones."""
-        changes = current_names(type(self), changes)
         check_names(type(self), changes)
         return dataclasses.replace(self, **changes)
 
@@ -160,26 +145,6 @@ def _inside(cls: type[Settings], name: str) -> str:
     return ""
 
 
-def current_names(cls: type[Settings], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values of settings under the current names, see `FORMER_NAMES`, at all levels."""
-    types, found = types_of(cls), {}
-    for given_name, value in given.items():
-        current = _FORMER_FIELDS.get(given_name, "")
-        name = current if current in types and given_name not in types else given_name
-        found[name] = _current_value(name, types.get(name), value)
-    return found
-
-
-def _current_value(name: str, hint: Any, value: Any) -> Any:
-    if isinstance(value, str):
-        return FORMER_CHOICES.get(f"{name}={value}", value)
-    if not isinstance(value, Mapping) or not isinstance(hint, type):
-        return value
-    if "_target_" in value:
-        value = {**value, "_target_": _current_value(name, str, value["_target_"])}
-    return current_names(hint, value) if issubclass(hint, Settings) else value
-
-
 def _refuse_untyped(cls: type[Settings]) -> None:
     """Raise an `InputError` for a class attribute without an annotation, which is no setting."""
     own = dict(vars(cls))
@@ -208,20 +173,6 @@ def _refuse_unknown_names(cls: type[Settings]) -> None:
             raise
 
     setattr(cls, "__init__", checked)  # noqa: B010
-
-
-def _accept_former_names(cls: type[Settings]) -> None:
-    """Let the constructor and the attributes of a class have former names, too."""
-    construct = cls.__init__
-
-    @functools.wraps(construct)
-    def accepting(self: Settings, **given: Any) -> None:
-        construct(self, **current_names(type(self), given))
-
-    setattr(cls, "__init__", accepting)  # noqa: B010
-    for former, current in _FORMER_FIELDS.items():
-        if current in cls.__dataclass_fields__:
-            setattr(cls, former, property(operator.attrgetter(current)))
 
 
 @contextlib.contextmanager
