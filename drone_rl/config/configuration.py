@@ -328,11 +328,6 @@ def from_arguments(
         if group in others:
             text = f"{group}={{{name!r}: {shown(changes[name])}}}"
             raise InputError(f"{name} is a setting of {group}; give {text}")
-        if group and any(p.name == "policy" for p in parameters):
-            text = f"load_policy(...).in_{group}({name}={shown(changes[name])})"
-            raise InputError(f"{name} is a setting of {group}; give {text}")
-    if "plugins" in changes:
-        raise InputError("plugins belongs to the command line; in Python, import the modules")
     check_names(of, changes, others=others, synonyms=read_other_names()["settings"])
     return given.replace(**changes)
 

@@ -5,7 +5,7 @@ import functools
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import torch
 from torchrl.envs import TransformedEnv
@@ -25,16 +25,16 @@ from drone_rl.config import (
 from drone_rl.config.configuration import Changes, as_changes
 from drone_rl.config.transforms import Frame, Gray, Rgb, Standardize, Transform, as_transforms
 from drone_rl.policies import ExternalNetwork
-from drone_rl.policies.environment import make_env
+from drone_rl.policies.environment import EnvOptions, make_env
 from drone_rl.policies.external_network import Function, Logits
 from drone_rl.policies.policy import BasePolicy, load_policy
 from drone_rl.policies.self_check import check_on_episodes
 from drone_rl.policies.zoo.description import output_of
 from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import Task, as_task
-from drone_rl.utils.display import table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, shown
+from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import Settings, prefixed_errors
 
 
@@ -108,14 +108,30 @@ class ExternalPolicy(BasePolicy):
         used = Instance(AppearanceSettings).read(appearance, "appearance")
         return dataclasses.replace(self, used_appearance=used)
 
-    def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv:
-        task: Any = self.task
+    def make_env(
+        self,
+        num_envs: int,
+        *,
+        seed: int = 0,
+        stream: Stream = Stream.REPORT,
+        device: str = "cpu",
+        **options: Unpack[EnvOptions],
+    ) -> TransformedEnv:
+        """See `BasePolicy`."""
+        dynamics = options["dynamics"] = options.get("dynamics") or self.dynamics
         options.setdefault("appearance", self.appearance)
-        dynamics = options.pop("dynamics", None) or self.dynamics
         if isinstance(dynamics, DynamicsSettings):
             options.setdefault("actions", self.actions)
-        parts = {"task": task, "dynamics": dynamics, "transforms": self.transforms or (Rgb(),)}
-        return make_env(num_envs, camera=self.camera, **parts, **options)
+        return make_env(
+            num_envs,
+            task=self.task,
+            camera=self.camera,
+            transforms=self.transforms or (Rgb(),),
+            seed=seed,
+            stream=stream,
+            device=device,
+            **options,
+        )
 
     def make_network(self, device: str | torch.device = "cpu") -> ExternalNetwork:
         """Return its network; raise an `InputError` as `ExternalNetwork` does."""
@@ -131,12 +147,6 @@ class ExternalPolicy(BasePolicy):
         )
         network.owner = f"policy={self.name}"
         return network
-
-    def _repr_html_(self) -> str:
-        """Return a table for notebooks."""
-        sees = " > ".join(transform.name for transform in self.transforms) or "RGB bytes"
-        rows = [["network", type(self.logits).__name__], ["sees", sees], ["file", "none"]]
-        return table(["policy", self.name], rows)
 
 
 def policy_from(

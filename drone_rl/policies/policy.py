@@ -6,7 +6,7 @@ import dataclasses
 import functools
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, Unpack
 
 import numpy as np
 import torch
@@ -24,6 +24,7 @@ from drone_rl.config import (
 from drone_rl.config.configuration import Changes
 from drone_rl.envs.transforms import apply_to_frames, memory_of, pixel_transforms
 from drone_rl.policies import ImageNetwork, RecurrentNetwork, make_actor
+from drone_rl.policies.environment import EnvOptions
 from drone_rl.policies.recurrent import Memory
 from drone_rl.policies.zoo import PolicyDescription, find_policy, parse, read_policy
 from drone_rl.sim.rendering.devices import check_defaults
@@ -116,6 +117,7 @@ class BasePolicy(abc.ABC):
             InputError: A setting is unknown or out of range.
         """
 
+    @abc.abstractmethod
     def make_env(
         self,
         num_envs: int,
@@ -123,18 +125,12 @@ class BasePolicy(abc.ABC):
         seed: int = 0,
         stream: Stream = Stream.REPORT,
         device: str = "cpu",
-        **kwargs: Any,
+        **options: Unpack[EnvOptions],
     ) -> TransformedEnv:
         """Return environments like those of its training, with its camera and transforms.
 
-        The default `stream` has the environments to report on, which training never sees. The
-        other arguments are those of `drone_rl.envs.DroneEnv`.
+        The default `stream` has the environments to report on, which training never sees.
         """
-        options = {"seed": seed, "stream": stream, "device": device, **kwargs}
-        return self._make_env(num_envs, options)
-
-    @abc.abstractmethod
-    def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv: ...
 
     @abc.abstractmethod
     def make_network(self, device: str | torch.device = "cpu") -> ImageNetwork:
@@ -163,10 +159,16 @@ class BasePolicy(abc.ABC):
 
     @contextlib.contextmanager
     def flying(
-        self, num_envs: int, *, seed: int = 0, stream: Stream = Stream.REPORT, **kwargs: Any
+        self,
+        num_envs: int,
+        *,
+        seed: int = 0,
+        stream: Stream = Stream.REPORT,
+        device: str = "cpu",
+        **options: Unpack[EnvOptions],
     ) -> Iterator[tuple[TransformedEnv, TensorDictModuleBase]]:
         """Yield environments and its actor; close them afterwards. See `make_env`."""
-        env = self.make_env(num_envs, seed=seed, stream=stream, **kwargs)
+        env = self.make_env(num_envs, seed=seed, stream=stream, device=device, **options)
         try:
             yield env, self.make_actor(env, seed=seed, stream=stream)
         finally:
@@ -254,8 +256,19 @@ class Policy(BasePolicy):
         described = dataclasses.replace(self.description, appearance=appearance)
         return dataclasses.replace(self, description=described)
 
-    def _make_env(self, num_envs: int, options: dict[str, Any]) -> TransformedEnv:
-        return self.description.build_env(num_envs, **options)
+    def make_env(
+        self,
+        num_envs: int,
+        *,
+        seed: int = 0,
+        stream: Stream = Stream.REPORT,
+        device: str = "cpu",
+        **options: Unpack[EnvOptions],
+    ) -> TransformedEnv:
+        """See `BasePolicy`."""
+        return self.description.build_env(
+            num_envs, seed=seed, stream=stream, device=device, **options
+        )
 
     def make_network(self, device: str | torch.device = "cpu") -> ImageNetwork:
         """Return its network."""
@@ -272,14 +285,7 @@ class Policy(BasePolicy):
         Returns:
             The index of the action, or the values of a continuous one.
         """
-        image, camera = _copied(image), self.description.camera
-        size = (camera.height, camera.width, 3)
-        if image.dtype != torch.uint8 or image.shape != size:
-            raise InputError(
-                f"an image of shape {tuple(image.shape)} and type {image.dtype} does not fit the "
-                f"policy's camera; give one uint8 image of shape {size}; act_batch takes several"
-            )
-        action = self.act_batch(image[None])[0].numpy()
+        action = self.act_batch(_copied(image)[None])[0].numpy()
         return action if action.ndim else int(action)
 
     @torch.no_grad()

@@ -105,7 +105,7 @@ def read_result(folder: Path) -> dict[str, Any] | None:
     """Return `result.json` of a finished run, or None for an unfinished one."""
     try:
         content = read_bytes(folder / "result.json", RESULT_BYTES)
-        result = as_mapping(parse_json(content, "result", allow_nan=True), "result")
+        result = dict(as_mapping(parse_json(content, "result", allow_nan=True), "result"))
         reason = Text(100).read(result.get("reason"), "reason")
     except InputError:
         return None

@@ -20,21 +20,9 @@ from drone_rl.utils.schema import Flag, Instance, Kind, Maybe, Real, Record, Tex
 S = TypeVar("S", bound="Settings")
 
 
-class _Frozen:
-    """Values that can't be assigned or deleted."""
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise dataclasses.FrozenInstanceError(
-            f"{name} can't be assigned; make new ones, as in settings.replace({name}={value!r})"
-        )
-
-    def __delattr__(self, name: str) -> None:
-        raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
-
-
 @typing.dataclass_transform(kw_only_default=True, frozen_default=True)
 @dataclasses.dataclass(frozen=True)
-class Settings(_Frozen):
+class Settings:
     """Values that are checked before anything is built; each subclass is a frozen dataclass.
 
     A field is annotated with its type and its kind, as in `Annotated[int, Whole(1, 100)]`; for
@@ -46,19 +34,11 @@ class Settings(_Frozen):
     """
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Make the subclass a frozen dataclass with keyword arguments.
-
-        A subclass may repeat `@dataclasses.dataclass(frozen=True)`: the fields are restored as they
-        were written, and the methods that the decorator refuses to replace are removed.
-        """
+        """Make the subclass a frozen dataclass with keyword arguments."""
         super().__init_subclass__(**kwargs)
-        fields = {name: f for name, f in vars(cls).items() if isinstance(f, dataclasses.Field)}
         dataclasses.dataclass(frozen=True, kw_only=True)(cls)
-        for name, field in fields.items():
-            setattr(cls, name, field)
         _refuse_unknown_names(cls)
         _refuse_untyped(cls)
-        del cls.__setattr__, cls.__delattr__
 
     def __post_init__(self) -> None:
         """Check every value by its kind."""
