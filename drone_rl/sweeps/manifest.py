@@ -13,13 +13,11 @@ from drone_rl.config.configuration import check_same_config
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import (
     last_of,
-    parse_json,
-    read_bytes,
     read_json,
     refuse_links,
     write_atomically,
 )
-from drone_rl.utils.limits import RESULT_BYTES, SWEEP_BYTES
+from drone_rl.utils.limits import SWEEP_BYTES
 from drone_rl.utils.overrides import COMMAND, MOST_OVERRIDES, check_harmless
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.schema import (
@@ -101,17 +99,6 @@ class Run:
         return shlex.join(["drone-rl", "train", *settings, *alone])
 
 
-def read_result(folder: Path) -> dict[str, Any] | None:
-    """Return `result.json` of a finished run, or None for an unfinished one."""
-    try:
-        content = read_bytes(folder / "result.json", RESULT_BYTES)
-        result = dict(as_mapping(parse_json(content, "result", allow_nan=True), "result"))
-        reason = Text(100).read(result.get("reason"), "reason")
-    except InputError:
-        return None
-    return None if reason.startswith("SIG") else result
-
-
 def read_failure(run: Run) -> str | None:
     """Return the error of a failed run, or None."""
     try:
@@ -181,7 +168,8 @@ def read_sweep(folder: Path) -> Sweep:
         if len({run.number for run in runs}) < len(runs):
             raise InputError("two runs have the same number")
         check_folders(runs)
-        return Sweep(folder, content["command"], content["settings"], runs)
+        settings = dict(as_mapping(content["settings"], "settings"))
+        return Sweep(folder, content["command"], settings, runs)
     except InputError as error:
         raise InputError(
             f"{path} is damaged, or of an older version of drone_rl ({error}); move the folder "

@@ -9,8 +9,9 @@ from typing import Any
 import yaml
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import read_bytes
-from drone_rl.utils.limits import METRICS_BYTES, YAML_BYTES
+from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.limits import METRICS_BYTES, RESULT_BYTES, YAML_BYTES
+from drone_rl.utils.schema import Text, as_mapping
 
 
 def read_yaml(path: Path, most: int = YAML_BYTES) -> Any:
@@ -72,3 +73,14 @@ def read_table(path: Path) -> Iterator[list[str]]:
         yield from filter(None, csv.reader(io.StringIO(content.decode(), newline="")))
     except (csv.Error, UnicodeDecodeError) as error:
         raise InputError(f"{path} is damaged: no CSV ({error})") from None
+
+
+def read_result(folder: Path) -> dict[str, Any] | None:
+    """Return `result.json` of a finished run, or None for an unfinished one."""
+    try:
+        content = read_bytes(folder / "result.json", RESULT_BYTES)
+        result = dict(as_mapping(parse_json(content, "result", allow_nan=True), "result"))
+        reason = Text(100).read(result.get("reason"), "reason")
+    except InputError:
+        return None
+    return None if reason.startswith("SIG") else result

@@ -93,7 +93,7 @@ def with_part(**parts):
 
 def checkpoint(**changes):
     state = {
-        **{"format": "drone_rl checkpoint", "format_version": 2, "policy": weights()},
+        **{"format": "drone_rl checkpoint", "format_version": 3, "policy": weights()},
         **{"config": {}, "description": DESCRIPTION, "progress": PROGRESS, "best": 0.5},
         "provenance": ORIGIN,
     }

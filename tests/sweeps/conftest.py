@@ -7,9 +7,9 @@ import sys
 import numpy as np
 import pytest
 
-from drone_rl.evaluation.rule import BLIND_BASELINES, Kind, Rule
 from drone_rl.sweeps import executors
 from drone_rl.sweeps.manifest import Run, open_sweep
+from drone_rl.trust.rule import BLIND_BASELINES, Kind, Rule
 from drone_rl.utils.intervals import mean_bounds, proportion
 
 FAKE = """
@@ -127,7 +127,7 @@ SOLVED = {
     "episodes": 10,
     "seconds": 2.0,
     "running_reward": 2.97,
-    "num_cubes": 3,
+    "largest_reward": 3,
 }
 LEFT_LOST = _verdict("one-sided (right)", left=0.0, whole=0.6, certain=False)
 

@@ -1,5 +1,6 @@
 """Policies in files: descriptions, weights and provenance."""
 
+import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -201,3 +202,13 @@ def metadata_of(content: bytes) -> tuple[Any, Any]:
             raise InputError(f"its {key} is missing")
     description, about = (parse_json(str(text), f"its {key}") for key, text in texts.items())
     return description, about
+
+
+def fingerprint(weights: Mapping[str, torch.Tensor]) -> str:
+    """Return the SHA-256 hash of a network's weights; order and device do not matter."""
+    digest = hashlib.sha256()
+    for name in sorted(weights):
+        value = weights[name].detach().cpu().contiguous()
+        digest.update(f"{name} {list(value.shape)}\n".encode())
+        digest.update(value.numpy().astype("<f4").tobytes())
+    return digest.hexdigest()
