@@ -39,7 +39,6 @@ class Whole:
 
     def read(self, value: Any, where: str) -> int:
         """See `Kind`."""
-        _refuse_text(value, where, self.words)
         if not _is_number(value, numbers.Integral):
             raise InputError(f"{where}={shown(value)} is not a whole number; give {self.words}")
         if not self.low <= value <= self.high:
@@ -69,7 +68,6 @@ class Real:
 
     def read(self, value: Any, where: str) -> float:
         """See `Kind`."""
-        _refuse_text(value, where, self.words)
         value = _unboxed(value)
         if not _is_number(value, numbers.Real) or not self._holds(value):
             raise InputError(f"{where}={shown(value)} is out of range; give {self.words}")
@@ -333,12 +331,6 @@ def _unboxed(value: Any) -> Any:
 def _is_number(value: Any, kind: type) -> bool:
     """Return whether a value is a number of Python or NumPy, and no bool."""
     return isinstance(value, kind) and not isinstance(value, bool)
-
-
-def _refuse_text(value: Any, where: str, words: str) -> None:
-    """Raise an `InputError` for a text where a number belongs."""
-    if isinstance(value, str):
-        raise InputError(f"{where}={shown(value)} is a text; give {words}")
 
 
 def _check_plain(value: Any, where: str) -> None:

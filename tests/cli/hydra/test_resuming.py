@@ -27,16 +27,16 @@ def run(tmp_path):
     (tmp_path / "checkpoints").mkdir()
     (tmp_path / "checkpoints" / "last.pt").write_bytes(b"")
     (tmp_path / ".hydra").mkdir()
-    told = ["policy=mlp", "policy.hidden=[8]", "seed=3"]
+    told = ["network=mlp", "network.hidden=[8]", "seed=3"]
     (tmp_path / ".hydra" / "overrides.yaml").write_text(yaml.safe_dump(told))
     return tmp_path
 
 
 def test_one_training_is_left_as_it_is():
-    assert complete(["seed=1", "policy=mlp"]) == ["seed=1", "network=mlp"]
+    assert complete(["seed=1", "network=mlp"]) == ["seed=1", "network=mlp"]
 
 
-def test_a_run_that_goes_on_takes_over_its_settings_in_todays_words(run):
+def test_a_run_that_goes_on_takes_over_its_settings(run):
     told = [f"resume={run}", "seed=3"]
     assert complete(told) == [
         *("network=mlp", "network.hidden=[8]"),
@@ -46,7 +46,7 @@ def test_a_run_that_goes_on_takes_over_its_settings_in_todays_words(run):
     ]
 
 
-@pytest.mark.parametrize("again", ["network=small_cnn", "policy=small_cnn"])
+@pytest.mark.parametrize("again", ["network=small_cnn"])
 def test_what_is_told_anew_is_not_taken_over(run, again):
     found = complete([f"resume={run}", again])
     assert "network=mlp" not in found
