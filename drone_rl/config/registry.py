@@ -156,8 +156,8 @@ def modules_of(settings: Any) -> set[str]:
     if not isinstance(settings, Settings):
         return set()
     values = (getattr(settings, field.name) for field in dataclasses.fields(settings))
-    own = type(settings).__module__
-    return modules_of(tuple(values)) | ({own} if not own.startswith("drone_rl.") else set())
+    module = type(settings).__module__
+    return modules_of(tuple(values)) | ({module} if not module.startswith("drone_rl.") else set())
 
 
 def _decorator(
@@ -258,7 +258,7 @@ def _fields(
     every = list(inspect.signature(factory).parameters.values())
     plain = [p for p in every if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
     parameters = [p for p in every if p not in plain[:positional]]
-    found = []
+    fields = []
     for parameter in parameters:
         is_star = parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
         if is_star or parameter.name in skipped:
@@ -270,8 +270,8 @@ def _fields(
             )
         hint = _annotated(hints[parameter.name], f"{name}: the parameter {parameter.name}")
         default = parameter.default
-        found.append((parameter.name, hint, tuple(default) if type(default) is list else default))
-    return found
+        fields.append((parameter.name, hint, tuple(default) if type(default) is list else default))
+    return fields
 
 
 def _annotated(hint: Any, where: str) -> Any:

@@ -65,8 +65,8 @@ class ExternalNetwork(ImageNetwork):
         self._logit_factor = torch.ones(self.num_actions, device=device)
         self._logit_bias = torch.zeros(self.num_actions, device=device)
         image = torch.full((1, *self.in_shape), 0.5, device=device)
-        found = self(image)
-        if not torch.allclose(found, self(image), atol=_TOLERANCE):
+        logits_of_image = self(image)
+        if not torch.allclose(logits_of_image, self(image), atol=_TOLERANCE):
             raise InputError(
                 "the network returned different logits for one image; give a deterministic network"
             )
@@ -136,16 +136,16 @@ def _remedy(module: nn.Module) -> str:
 def copied(module: nn.Module, memo: dict[int, Any] | None = None) -> nn.Module:
     """Return a copy in evaluation mode; `memo` has what replaces parts, by their `id`."""
     try:
-        own = copy.deepcopy(module, memo).eval()
+        module_copy = copy.deepcopy(module, memo).eval()
     except Exception as error:
         raise InputError(
             f"the network {type(module).__name__} can't be copied ({type(error).__name__}); give a "
             "function that calls it"
         ) from error
-    for part in own.modules():
+    for part in module_copy.modules():
         if hasattr(part, "inplace"):  # explanations read the outputs of layers
             vars(part)["inplace"] = False
-    return own
+    return module_copy
 
 
 @torch.enable_grad()

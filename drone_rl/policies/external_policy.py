@@ -193,7 +193,7 @@ def policy_from(
     Instance(ActionSettings).read(actions, "actions")
     if isinstance(task, str):
         task = settings_of(task, "task")()
-    given = None if transforms is None else as_transforms(transforms)
+    before_wrappers = None if transforms is None else as_transforms(transforms)
     of_env: Mapping[str, Any] = getattr(network, "conditions", {})
     observations: Any = getattr(network, "observations", None)
     dynamics = of_env.get("dynamics", dynamics) if dynamics is COMPUTER_VISION else dynamics
@@ -204,9 +204,9 @@ def policy_from(
         task=task or of_env.get("task") or _TASK,
         camera=camera or of_env.get("camera") or _camera_of(network),
         transforms=(
-            _transforms_of(network, given)
+            _transforms_of(network, before_wrappers)
             if observations is None
-            else observations.all_transforms(given)
+            else observations.all_transforms(before_wrappers)
         ),
         actions=of_env.get("actions", actions) if actions is MOVES_SETTINGS else actions,
         own_dynamics=dynamics,
@@ -219,7 +219,7 @@ def policy_from(
         check_on_episodes(policy)
     else:
         model: Any = network
-        predict = functools.partial(model.predict, transforms=given)
+        predict = functools.partial(model.predict, transforms=before_wrappers)
         check_on_episodes(policy, predict, observations.names)
     return policy
 

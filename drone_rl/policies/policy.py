@@ -77,16 +77,16 @@ class BasePolicy(abc.ABC):
 
         Names are of `dynamics`, or "appearance.NAME".
         """
-        own, used = self.own_dynamics.values(), self.dynamics.values()
+        trained, flown = self.own_dynamics.values(), self.dynamics.values()
         if self.dynamics.is_computer_vision:  # where little else counts
             timing = ("control_ticks", "tick") if self.actions.kind == "velocity" else ()
-            own, used = ({n: of[n] for n in ("mode", *timing)} for of in (own, used))
+            trained, flown = ({n: of[n] for n in ("mode", *timing)} for of in (trained, flown))
         looks = (self.own_appearance.values(), self.appearance.values())
-        own, used = (
+        trained, flown = (
             {**of, **{f"appearance.{name}": value for name, value in look.items()}}
-            for of, look in zip((own, used), looks, strict=True)
+            for of, look in zip((trained, flown), looks, strict=True)
         )
-        return {n: {"own": own[n], "flown": v} for n, v in used.items() if own[n] != v}
+        return {n: {"own": trained[n], "flown": v} for n, v in flown.items() if trained[n] != v}
 
     @abc.abstractmethod
     def in_appearance(self, appearance: AppearanceSettings | str) -> Self:
@@ -311,10 +311,10 @@ class Policy(BasePolicy):
                 f"images of shape {tuple(images.shape)} and type {images.dtype} do not fit the "
                 f"policy's camera; give uint8 of shape (N, {camera.height}, {camera.width}, 3)"
             )
-        known = [*self._earlier_frames[-1:], *(memory.hidden for memory in self._memory)]
-        if known and len(known[0]) != len(images):
+        remembered = [*self._earlier_frames[-1:], *(memory.hidden for memory in self._memory)]
+        if remembered and len(remembered[0]) != len(images):
             raise InputError(
-                f"{len(images)} images follow {len(known[0])}; call reset() before images of "
+                f"{len(images)} images follow {len(remembered[0])}; call reset() before images of "
                 "another number of drones"
             )
         network, transforms = self._network_and_transforms

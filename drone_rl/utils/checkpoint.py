@@ -32,8 +32,8 @@ _FORMATS = {
 
 def other_format(content: bytes) -> str | None:
     """Return what a file with this content is, with a remedy; None if that is not known."""
-    found = (text for start, text in _FORMATS.items() if re.match(start, content, re.DOTALL))
-    return next(found, None)
+    descriptions = (text for start, text in _FORMATS.items() if re.match(start, content, re.DOTALL))
+    return next(descriptions, None)
 
 
 def save_checkpoint(path: str | Path, state: Mapping[str, Any]) -> None:
@@ -125,21 +125,21 @@ def check_weights(weights: Any, expected: Mapping[str, Tensor]) -> dict[str, Ten
     Raises:
         InputError: They differ; the message names the first difference.
     """
-    found = dict(as_mapping(weights, "the policy's weights"))
-    for name in [*expected, *(name for name in found if name not in expected)]:
-        there, here = _kind(found.get(name)), _kind(expected.get(name))
+    saved = dict(as_mapping(weights, "the policy's weights"))
+    for name in [*expected, *(name for name in saved if name not in expected)]:
+        there, here = _kind(saved.get(name)), _kind(expected.get(name))
         if there != here:
             raise InputError(
                 "the saved weights are not those of the described policy: "
                 f"{shown(name)} is {there} in the file and {here} by the description; choose the "
                 "policy and camera of the training"
             )
-    for name, value in found.items():
+    for name, value in saved.items():
         if value.is_floating_point() and not bool(torch.isfinite(value).all()):
             raise InputError(
                 f"the weights {name} hold NaN or infinity; use a checkpoint from before that"
             )
-    return found
+    return saved
 
 
 def _kind(value: Any) -> str:

@@ -97,8 +97,8 @@ def newest(paths: Iterable[Path]) -> Path | None:
 
 def trained_policies(outputs: str | Path) -> list[Path]:
     """Return last.pt of every training under a folder of outputs, the newest first."""
-    found = as_path(outputs, "outputs").glob("train/**/checkpoints/last.pt")
-    return sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
+    checkpoints = as_path(outputs, "outputs").glob("train/**/checkpoints/last.pt")
+    return sorted(checkpoints, key=lambda path: path.stat().st_mtime, reverse=True)
 
 
 def read_json(path: Path, most: int = SMALL_JSON_BYTES) -> Any:

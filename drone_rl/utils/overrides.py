@@ -80,8 +80,8 @@ def read_overrides(folder: Path) -> list[str]:
     path = folder / ".hydra" / "overrides.yaml"
     if not path.exists():
         return []
-    found = read_yaml(path)
-    texts = Several(Text(_LONGEST), 0, MOST_OVERRIDES).read(found, str(path))
+    content = read_yaml(path)
+    texts = Several(Text(_LONGEST), 0, MOST_OVERRIDES).read(content, str(path))
     return [check_harmless(text, str(path)) for text in texts]
 
 
@@ -92,14 +92,16 @@ def taken_over(folder: Path, typed: Collection[str]) -> list[str]:
         InputError: An override may not be taken from a file.
     """
     keys = {_key(override) for override in typed}
-    found = [o for o in read_overrides(folder) if _key(o) not in keys and not _is_of_one_folder(o)]
-    for override in must_be_typed(found):
+    recorded = [
+        o for o in read_overrides(folder) if _key(o) not in keys and not _is_of_one_folder(o)
+    ]
+    for override in must_be_typed(recorded):
         raise InputError(
             f"{folder}/.hydra/overrides.yaml sets {shown(override)}, which can't be read from a "
             "file for safety; if you trust it, repeat it on the command line; start a run of an "
             "older version of drone_rl again"
         )
-    return found
+    return recorded
 
 
 def must_be_typed(overrides: Iterable[str]) -> list[str]:

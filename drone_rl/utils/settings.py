@@ -106,12 +106,15 @@ def check_names(
 
     `synonyms` are the settings that other projects' names mean, dotted as on the command line.
     """
-    known = kinds_of(cls)
+    kinds = kinds_of(cls)
     for name in given:
-        if name not in known:
-            names = [*known, *others]
-            ours = [name, *(other.rpartition(".")[2] for other in synonyms.get(name.lower(), ()))]
-            hints = (_inside(cls, our) or did_you_mean(our, names) for our in ours)
+        if name not in kinds:
+            names = [*kinds, *others]
+            meanings = [
+                name,
+                *(other.rpartition(".")[2] for other in synonyms.get(name.lower(), ())),
+            ]
+            hints = (_inside(cls, our) or did_you_mean(our, names) for our in meanings)
             meant = next(filter(None, hints), "")
             raise InputError(f"{prefix}{name} is unknown; valid names: {', '.join(names)}{meant}")
 

@@ -192,8 +192,8 @@ class PolicyDescription:
             network = self._network(self.make_dynamics().actions, torch.Generator())
         else:
             network = self._without_weights()
-        own = {name: weight.to("cpu", copy=True) for name, weight in weights.items()}
-        network.load_state_dict(own, assign=True)  # `to_empty` imports sympy: 0.3 s
+        copies = {name: weight.to("cpu", copy=True) for name, weight in weights.items()}
+        network.load_state_dict(copies, assign=True)  # `to_empty` imports sympy: 0.3 s
         return self._checked(network, network.actions.num_outputs).eval()
 
     def build_critic(self, generator: torch.Generator | None = None) -> ImageNetwork:
@@ -224,9 +224,11 @@ class PolicyDescription:
         if place := own_place(self.network):
             who, zeros = f"network={self.network.name}: {place}", torch.zeros(2, *self.input.shape)
             with torch.enable_grad(), errors_of(f"network={self.network.name}", place):
-                given: Any = network.eval()(zeros)  # with gradients, also numbers that overflow
+                outputs_of_zeros: Any = network.eval()(
+                    zeros
+                )  # with gradients, also numbers that overflow
                 network.train()
-            _check_returned(given, who, zeros, (2, outputs))
+            _check_returned(outputs_of_zeros, who, zeros, (2, outputs))
             if getattr(network, "num_actions", None) != outputs:
                 raise InputError(f'{who} has no last layer "logits" of {outputs} outputs; add it')
         return network
