@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from drone_rl.policies.networks import ImageNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.plugins import line_of
+from drone_rl.utils.plugins import described, line_of
 
 Function = Callable[[Any], Any]
 """From a batch of frames to logits (N, number of actions), a tensor or an array."""
@@ -81,18 +81,14 @@ class ExternalNetwork(ImageNetwork):
         """See `ImageNetwork`; raise an `InputError` if the result is not finite logits."""
         flat = pixels.reshape(-1, *self.in_shape)
         outputs = self._outputs(self._given(flat))
-        wanted, names = (len(flat), self.num_actions), ", ".join(self.actions.output_names)
-        if not isinstance(outputs, Tensor | np.ndarray):
+        wanted = (len(flat), self.num_actions)
+        is_array = isinstance(outputs, Tensor | np.ndarray)
+        if not is_array or tuple(outputs.shape) != wanted:
             raise InputError(
-                f"the network returned a {type(outputs).__name__}; give a callable that returns "
-                f"logits of shape {wanted}, one for each of {names}"
+                f"the network returned {described(outputs)}; give a callable that returns logits "
+                f"of shape {wanted}, one for each of {', '.join(self.actions.output_names)}"
             )
         logits = torch.as_tensor(outputs).to(flat.device, flat.dtype)
-        if tuple(logits.shape) != wanted:
-            raise InputError(
-                f"the network returned logits of shape {tuple(logits.shape)}; give one that "
-                f"returns {wanted}, one for each of {names}"
-            )
         if not torch.isfinite(logits).all():
             raise InputError("the network returned logits that are not finite; give another one")
         logits = logits * self._logit_factor + self._logit_bias
@@ -113,24 +109,14 @@ class ExternalNetwork(ImageNetwork):
             where = line_of(error) or type(self._logits).__name__
             raise InputError(
                 f"the network failed in {where} on images of shape {tuple(images.shape)}, "
-                f"{images.dtype} ({what}); {_remedy(self.parts)}"
+                f"{images.dtype} ({what}); correct it, give drone_rl.policy_from the camera= and "
+                "transforms= that it needs, or network.float() if its weights are of another type"
             ) from error
 
     def _given(self, flat: Tensor) -> Tensor:
         if not self._takes_bytes:
             return flat
         return (flat * 255).round().to(torch.uint8).movedim(-3, -1)
-
-
-def _remedy(module: nn.Module) -> str:
-    """Return what to do about a network that fails."""
-    for parameter in module.parameters():
-        if parameter.dtype != torch.float32:
-            return f"give network.float(), since its parameters are {parameter.dtype}"
-    return (
-        "correct it, or give drone_rl.policy_from the camera= and transforms= that it needs, such "
-        "as transforms=[Rgb()] for color images"
-    )
 
 
 def copied(module: nn.Module, memo: dict[int, Any] | None = None) -> nn.Module:

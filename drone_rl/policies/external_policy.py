@@ -239,11 +239,7 @@ def _checked_logits(logits: Any, env: Any) -> Function:
             f"env= is of models of Stable-Baselines3, but policy={shown(logits)} is none; give "
             "task=, camera= and transforms="
         )
-    if isinstance(logits, type):
-        raise InputError(
-            f"policy={logits.__name__} is a class; give an instance, such as {logits.__name__}()"
-        )
-    if not callable(logits):
+    if isinstance(logits, type) or not callable(logits):
         raise InputError(
             f"policy={shown(logits)} is no policy; give a callable from images to logits, or the "
             "name or file of a policy"

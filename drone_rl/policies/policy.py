@@ -380,12 +380,10 @@ def load_policy(which: str | Path | Policy, *, outputs: str | Path = "outputs") 
     if isinstance(which, Policy):
         return which
     if not isinstance(which, str | Path):
-        if not isinstance(which, BasePolicy) and not callable(which):
-            raise InputError(f"policy={shown(which)} is no name and no path; give one of them")
-        name = getattr(which, "name", type(which).__name__)
+        name = getattr(which, "name", shown(which))
         raise InputError(
             f"policy={name} is in no file of drone_rl's, which this function needs (judge, "
-            "evaluate, explain and shifts do not); give a policy that drone-rl trained"
+            "evaluate, explain and shifts do not); give the name or path of a trained policy"
         )
     path = find_policy(which, outputs)
     state = read_policy(path)

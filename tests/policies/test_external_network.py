@@ -78,8 +78,8 @@ def test_module_is_copied_in_eval_mode():
     [
         (nn.Linear(7, 3), r"failed in Linear on images of shape \(1, 1, 2, 4\)"),
         (lambda x: 1 / 0, r"failed in line \d+ of .*test_external_network\.py"),
-        (lambda x: left_half(x)[:, :2], r"returned logits of shape \(1, 2\)"),
-        (lambda x: left_half(x).argmax(-1), r"returned logits of shape \(1,\)"),
+        (lambda x: left_half(x)[:, :2], r"returned a Tensor of shape \(1, 2\)"),
+        (lambda x: left_half(x).argmax(-1), r"returned a Tensor of shape \(1,\)"),
         (lambda x: (left_half(x), x), "returned a tuple"),
         (lambda x: left_half(x) / 0 * 0, "returned logits that are not finite"),
         (lambda x: torch.rand(len(x), 3), "returned different logits for one image"),
