@@ -18,17 +18,18 @@ import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import torch
+from torch import Tensor
 
 from drone_rl.collectors.complete_episodes import Episodes
 from drone_rl.trust.agents import OracleAgent, PolicyAgent, has_oracle
 from drone_rl.trust.axes import Axis
-from drone_rl.trust.outcomes import OutcomeSet
 from drone_rl.trust.paired_evaluation import PairedEvaluator
 from drone_rl.trust.perturbations import Condition
 from drone_rl.trust.rule import Kind, Quantity, Rule, kinds_within
 from drone_rl.trust.suite import finite
-from drone_rl.trust.verdict import measure, widen
+from drone_rl.trust.verdict import estimate, observe_each
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
 from drone_rl.utils.seeding import Stream, torch_generator
@@ -155,9 +156,7 @@ class Prober:
             self._baselines[key] = self._evaluator.run_baselines(condition)
         rule = self.rule_at(part)
         baselines = {**self._baselines[key], "oracle": self._oracle}
-        unknown = OutcomeSet(None, torch.empty(0, dtype=torch.int64), agent.is_fragile)
-        widened = widen(measure(greedy, baselines, rule), greedy, baselines, rule, unknown)
-        found = dict(zip(rule.quantities, widened, strict=True))
+        found = measure_open(greedy, baselines, rule, agent.is_fragile)
         return {
             "good": is_surely_good(found, rule),
             "bad": Kind.GOOD not in _kinds(found, rule),
@@ -207,6 +206,26 @@ class Prober:
         success = self._evaluator.run(condition, agent=OracleAgent()).episodes.success
         seen = proportion(int(success.sum()), len(success))
         return {**found, "oracle": seen, "impossible": seen["upper95"] < self._possible}
+
+
+def measure_open(
+    greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule, is_open: Tensor
+) -> dict[str, Quantity]:
+    """Return a rule's quantities, with intervals that hold for any outcomes of open episodes.
+
+    Lower bounds count the worst value of a quantity in these episodes, (n,), bool, upper bounds the
+    best one.
+    """
+    quantities = {}
+    observed, rows = observe_each(greedy, baselines, rule), is_open.numpy()
+    for i, (name, values) in enumerate(zip(rule.quantities, observed, strict=True)):
+        middle, least, most = (
+            estimate(i, one[~np.isnan(one)], rule)
+            for one in (values, *(np.where(rows, end, values) for end in rule.ranges[i]))
+        )
+        low, high = min(middle.lower, least.lower), max(middle.upper, most.upper)
+        quantities[name] = middle._replace(lower=low, upper=high)
+    return quantities
 
 
 def is_surely_good(found: Mapping[str, Quantity], rule: Rule) -> bool:

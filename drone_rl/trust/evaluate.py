@@ -37,12 +37,12 @@ class Evaluation(Result):
     policy: BasePolicy
     settings: EvaluateSettings
     figures: dict[str, dict[str, Any]]
-    """Figures of "greedy", "sampled" and the baselines; see `evaluation.metrics.summarise`."""
+    """Figures of "greedy", "sampled" and the baselines; see `drone_rl.trust.metrics.summarise`."""
     seed: RootSeed
     """Root of the environments' random streams."""
     rounding: dict[str, Any] | None = None
     """The implementation that computed the actions, and the comparison with another one; see
-    `drone_rl.trust.outcomes.Rounding`."""
+    `drone_rl.trust.rounding_sensitivity.Rounding`."""
 
     @property
     def success(self) -> float:

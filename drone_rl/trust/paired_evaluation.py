@@ -1,7 +1,8 @@
 """Run a policy under conditions, from the same initial states in each of them."""
 
 import dataclasses
-from collections.abc import Sequence
+import itertools
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import torch
@@ -37,7 +38,6 @@ from drone_rl.trust.perturbations import (
     task_region,
     variations,
 )
-from drone_rl.trust.rollouts import rollout
 from drone_rl.utils.seeding import Stream, torch_generator, world_random_state
 from drone_rl.utils.settings import prefixed_errors
 
@@ -174,6 +174,24 @@ class PairedEvaluator:
         """Close the renderers."""
         for worlds in self._built.values():
             worlds.close()
+
+
+def rollout(start: State, step: Callable[[int, State, Tensor], tuple[State, Tensor]]) -> State:
+    """Step a batch of n scenes from initial states until each is over; return the final states.
+
+    `step` is called with the number of the step, the states of the active scenes and their indices.
+    It returns the next states and which of them remain active, shape (number active,), bool.
+    """
+    active = torch.arange(len(start), device=start.end_reason.device)
+    final, state = start[active], start
+    for number in itertools.count():
+        state, is_active = step(number, state, active)
+        final[active] = state
+        if not is_active.all():
+            state, active = state[is_active], active[is_active]
+        if not len(active):
+            break
+    return final
 
 
 class _Stage:

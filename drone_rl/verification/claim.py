@@ -12,7 +12,7 @@ from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks.collect_cubes import EndReason
-from drone_rl.trust.outcomes import Rounding
+from drone_rl.trust.rounding_sensitivity import Rounding
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path
 from drone_rl.utils.seeding import RootSeed, root_seed
@@ -55,8 +55,8 @@ class Claim:
     def as_evidence(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
         """Return what a verdict may quote: nothing if an episode contradicts the certificate.
 
-        A proof holds for any order of sums, so nothing is quoted either if rounding can lead to an
-        end that is not stated.
+        A proof holds for any order of sums, so nothing is quoted either if the episodes depend too
+        much on rounding.
 
         Returns:
             Plain values: "refused" (the reason or None) and, unless refused, "every" (whether all
@@ -72,7 +72,7 @@ class Claim:
         if not all(held):
             count = f"{len(held) - sum(held)} of {len(held)} greedy flights of this verdict"
             return {"refused": f"{count} ended otherwise than it states"}
-        if rounding is not None and _can_end_otherwise(stated, greedy, rounding):
+        if rounding is not None and rounding.is_excessive:
             return {"refused": "decisions of the policy depend on rounding"}
         won, lost = (
             [o for o in stated.outcomes if len(o.boxes) and (o.end == EndReason.ALL_CUBES) == wins]
@@ -128,15 +128,6 @@ def find_claim(
         return _read_and_check(policy, path, flights, seed, **options) if path.is_file() else None
     except InputError as error:
         return Claim(path, None, refused=str(error))
-
-
-def _can_end_otherwise(stated: Certificate, greedy: Episodes, rounding: Rounding) -> bool:
-    """Whether rounding can lead to another end than the stated one."""
-    ends = rounding.outcomes
-    is_stated = _outcomes_of(stated, greedy) < len(stated.outcomes)
-    unknown = bool((ends.is_open.numpy() & is_stated).any())
-    is_other = ends.episodes is not None and not all(_ends_as_stated(stated, ends.episodes))
-    return rounding.is_excessive or unknown or is_other
 
 
 def _outcomes_of(stated: Certificate, episodes: Episodes) -> NDArray[np.int64]:

@@ -14,9 +14,9 @@ from drone_rl.policies.baselines import constant_policy, oracle_policy
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.sim.vocabulary import TaskVocabulary
-from drone_rl.trust.outcomes import OutcomeSet, Rounding
+from drone_rl.trust.rounding_sensitivity import Rounding
 from drone_rl.trust.rule import Kind, Rule
-from drone_rl.trust.verdict import apply_rule, judge_policy, measure, observe, widen
+from drone_rl.trust.verdict import apply_rule, judge_policy, measure, observe
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
 from tests.fake_flight import floating
@@ -280,86 +280,39 @@ def test_a_task_without_an_oracle_is_refused_before_any_episode(monkeypatch):
         judge_policy(env, constant_policy(Move.LEFT), 2)
 
 
-@pytest.fixture
-def rounded(make_episodes, make_baselines):
-    """The verdict on a perfect policy of whose 400 episodes some may end otherwise."""
-
-    def rounded(number, *, is_open=False, excessive=False):
-        sides = [LAYOUTS[i % 4] for i in range(400)]
-        flown = make_episodes(sides, [[True, True]] * 400)
-        lost = make_episodes(sides[:number], [[False, False]] * number) if not is_open else None
-        opened = torch.arange(400) < (number if is_open else 0)
-        owner = torch.arange(0 if is_open else number)
-        rounding = Rounding(
-            arithmetic="float32 on cpu, PyTorch",
-            is_bound=True,
-            frames=16_000,
-            fragile=16_000 if excessive else number,
-            is_fragile=torch.arange(400) < number,
-            outcomes=OutcomeSet(lost, owner, opened),
-            compared="fused kernel",
-            compared_episodes=50,
-            differing=0,
-            unexplained=0,
-        )
-        return apply_rule(flown, make_baselines(flown), rounding=rounding)
-
-    return rounded
+def rounding(fragile, number=400, unexplained=0):
+    """A check of 40 frames for each of so many episodes, with fragile frames in all of them."""
+    return Rounding(
+        arithmetic="float32 on cpu, PyTorch",
+        is_bound=True,
+        frames=40 * number,
+        fragile=fragile,
+        episodes=number,
+        fragile_episodes=min(fragile, number),
+        compared="fused kernel",
+        compared_episodes=50,
+        differing=unexplained,
+        unexplained=unexplained,
+    )
 
 
-@pytest.mark.parametrize("is_open", [False, True])
-def test_few_episodes_that_rounding_decides_leave_a_verdict_certain(rounded, is_open):
-    verdict = rounded(4, is_open=is_open)
+def test_few_fragile_frames_leave_a_verdict_certain(judged):
+    verdict = judged(lambda i, side: True, rounding=rounding(100))
     assert (verdict.kind, verdict.exit_code) == (Kind.GOOD, 0)
     assert verdict.sentence.endswith("The verdict holds for float32 on cpu, PyTorch.")
 
 
-@pytest.mark.parametrize("is_open", [False, True])
-def test_a_tenth_of_the_episodes_makes_it_uncertain(rounded, is_open):
-    verdict = rounded(40, is_open=is_open)
+@pytest.mark.parametrize("found", [rounding(321), rounding(101), rounding(0, unexplained=1)])
+def test_many_fragile_frames_or_episodes_or_other_actions_make_it_uncertain(judged, found):
+    verdict = judged(lambda i, side: True, rounding=found)
     assert (verdict.kind, verdict.certain, verdict.exit_code) == (Kind.GOOD, False, 13)
-    assert "Not certain: decisions depend on rounding. In 40 of 16,000 frames" in verdict.sentence
-    assert "too few" not in verdict.sentence
+    assert "Not certain: decisions depend on rounding." in verdict.sentence
     assert verdict.evidence["rounding"]["decides"]
 
 
-def test_no_certainty_where_all_frames_are_fragile(rounded):
-    assert rounded(1, excessive=True).exit_code == 13
-
-
-def test_an_episode_that_may_offer_nothing_on_a_side_may_have_any_share_there(
-    make_episodes, make_baselines
-):
-    flown = make_episodes([[Side.LEFT, Side.LEFT]] * 400, [[True, True]] * 400)
-    ends = make_episodes([[Side.RIGHT, Side.RIGHT]] * 40, [[True, True]] * 40)
-    outcomes = OutcomeSet(ends, torch.arange(40), torch.zeros(400, dtype=torch.bool))
-    baselines, rule = make_baselines(flown), Rule()
-    found = measure(flown, baselines, rule)
-    wider = widen(found, flown, baselines, rule, outcomes)
-    left = rule.quantities.index("collected left")
-    assert found[left].lower > 0.95
-    assert wider[left].lower < 0.9 < wider[left].upper  # 40 of the 400 may have collected none
-
-
-def test_more_episodes_do_not_help_where_rounding_decides(make_episodes, make_baselines):
-    flown = make_episodes([LAYOUTS[i % 4] for i in range(8)], [[True, True]] * 8)
-    is_open = torch.arange(8) < 2
-    rounding = Rounding(
-        arithmetic="float32 on cpu, PyTorch",
-        is_bound=True,
-        frames=320,
-        fragile=2,
-        is_fragile=is_open,
-        outcomes=OutcomeSet(None, torch.arange(0), is_open),
-        compared="fused kernel",
-        compared_episodes=8,
-        differing=0,
-        unexplained=0,
-    )
-    for one in (rounding, dataclasses.replace(rounding, fragile=320)):
-        verdict = apply_rule(flown, make_baselines(flown), rounding=one)
-        assert not verdict.certain and verdict.evidence["enough"] is None
-        assert "would do" not in verdict.sentence
+def test_more_episodes_do_not_help_where_rounding_decides(judged):
+    verdict = judged(lambda i, side: True, number=8, rounding=rounding(320, number=8))
+    assert not verdict.certain and verdict.evidence["enough"] is None
 
 
 def test_phrases_that_no_file_may_hold_are_refused_before_any_episode(monkeypatch):
