@@ -22,12 +22,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from drone_rl.collectors.complete_episodes import Episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.trust.agents import OracleAgent, PolicyAgent, has_oracle
 from drone_rl.trust.axes import Axis
 from drone_rl.trust.paired_evaluation import PairedEvaluator
 from drone_rl.trust.perturbations import Condition
-from drone_rl.trust.rule import Kind, Quantity, Rule, kinds_within
+from drone_rl.trust.rule import Quantity, Rule, VerdictKind, kinds_within
 from drone_rl.trust.suite import finite
 from drone_rl.trust.verdict import estimate, observe_each
 from drone_rl.utils.errors import InputError
@@ -109,7 +109,7 @@ class Prober:
     def __init__(
         self,
         evaluator: PairedEvaluator,
-        oracle: Episodes,
+        oracle: CompleteEpisodes,
         good_share: float,
         possible_share: float = 0.9,
         plain_part: float = WALKING,
@@ -124,7 +124,7 @@ class Prober:
         self._rule = Rule(
             good_share=good_share, strata=task.strata, blind_baselines=task.blind_baselines
         )
-        self._baselines: dict[Any, dict[str, Episodes]] = {}
+        self._baselines: dict[Any, dict[str, CompleteEpisodes]] = {}
         self.plain = self.probe(Condition(), plain_part)
 
     def rule_at(self, part: float) -> Rule:
@@ -159,7 +159,7 @@ class Prober:
         found = measure_open(greedy, baselines, rule, agent.is_fragile)
         return {
             "good": is_surely_good(found, rule),
-            "bad": Kind.GOOD not in _kinds(found, rule),
+            "bad": VerdictKind.GOOD not in _kinds(found, rule),
             "refused": None,
             "success": float(greedy.success.mean()),
             "fragile": int(agent.is_fragile.sum()),
@@ -209,7 +209,7 @@ class Prober:
 
 
 def measure_open(
-    greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule, is_open: Tensor
+    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule, is_open: Tensor
 ) -> dict[str, Quantity]:
     """Return a rule's quantities, with intervals that hold for any outcomes of open episodes.
 
@@ -231,10 +231,10 @@ def measure_open(
 def is_surely_good(found: Mapping[str, Quantity], rule: Rule) -> bool:
     """Return whether the verdict is certainly good and certainly above all baselines."""
     sees = all(found[f"above {name}"].levels[0] > 0 for name in rule.blind_baselines)
-    return sees and _kinds(found, rule) == {Kind.GOOD}
+    return sees and _kinds(found, rule) == {VerdictKind.GOOD}
 
 
-def _kinds(found: Mapping[str, Quantity], rule: Rule) -> frozenset[Kind]:
+def _kinds(found: Mapping[str, Quantity], rule: Rule) -> frozenset[VerdictKind]:
     """Return all kinds that the intervals admit."""
     box = tuple(quantity.levels for quantity in found.values())
     return kinds_within(box, len(rule.strata))

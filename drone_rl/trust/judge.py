@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, cast, overload
+from typing import Any, TypedDict, Unpack, cast, overload
 
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
@@ -131,24 +131,50 @@ class Judgements(Result, tuple[Judgement, ...]):
         return table(head, rows)
 
 
+class JudgeOptions(TypedDict, total=False):
+    """Arguments of `judge`: those of `judge_one`, and all of `JudgeSettings`."""
+
+    task: Mapping[str, Any] | None
+    dynamics: Mapping[str, Any] | None
+    appearance: AppearanceSettings | str | None
+    certificate: str | Path | None
+    shifts: str | Path | None
+    require_domain: str | Path | None
+    outputs: str | Path
+    progress: Progress | None
+    drawn_seed: RootSeed | None
+    find_claim: FindClaim | None
+    episodes: int
+    num_envs: int
+    seed: int | None
+    device: str
+    renderer: str
+    sampled: bool
+    good_share: float
+    certificate_flights: int
+    domain_flights: int
+
+
+Given = str | Path | BasePolicy | Logits
+"""A policy, or something that `as_policy` converts to one."""
+
+
 @overload
 def judge(
-    policy: str | Path | BasePolicy | Logits, settings: JudgeSettings | None = None, **how: Any
+    policy: Given, settings: JudgeSettings | None = None, **options: Unpack[JudgeOptions]
 ) -> Judgement: ...
 
 
 @overload
 def judge(
-    policy: Sequence[str | Path | BasePolicy | Logits],
-    settings: JudgeSettings | None = None,
-    **how: Any,
+    policy: Sequence[Given], settings: JudgeSettings | None = None, **options: Unpack[JudgeOptions]
 ) -> Judgements: ...
 
 
 def judge(
-    policy: str | Path | BasePolicy | Logits | Sequence[str | Path | BasePolicy | Logits],
+    policy: Given | Sequence[Given],
     settings: JudgeSettings | None = None,
-    **how: Any,
+    **options: Unpack[JudgeOptions],
 ) -> Judgement | Judgements:
     """Judge one policy, or a list or tuple of policies in the same environments.
 
@@ -156,29 +182,27 @@ def judge(
         policy: The policy, what `load_policy` takes, a callable, see `policy_from`, a model of
             Stable-Baselines3, or a baseline: "random", "forward", "left", "right" or "oracle".
         settings: Number of episodes, seed, device and so on.
-        how: See `drone_rl.trust.judge.judge_one`: task, dynamics, appearance, certificate,
-            shifts, require_domain, outputs, progress, and settings to change, as in
+        options: See `drone_rl.trust.judge.judge_one`; also settings to change, as in
             `judge("good", episodes=1000, appearance="fog")`.
 
     Raises:
         InputError: A policy, setting or file is unusable, or the list is empty.
     """
     if not isinstance(policy, list | tuple):
-        return judge_one(cast("Any", policy), settings, **how)
+        return judge_one(cast("Any", policy), settings, **options)
     if not policy:
         raise InputError("policy=[] is empty; give one or more policies")
     settings = from_arguments(JudgeSettings, settings, {}, judge_one)
-    changed = {name: how.get(name) for name in ("task", "dynamics", "appearance")}
+    changed = {name: options.get(name) for name in ("task", "dynamics", "appearance")}
     for one in policy:  # a wrong one is refused before any episode
-        _loaded(one, how.get("outputs", "outputs"), changed)
-    given = how.pop("seed", settings.seed)
-    seed = how.pop("drawn_seed", None) or root_seed(given)  # all in the same environments
-    done = (judge_one(one, settings, drawn_seed=seed, **how) for one in policy)
-    return Judgements(tuple(done))
+        _loaded(one, options.get("outputs", "outputs"), changed)
+    seed = options.pop("seed", settings.seed)  # all in the same environments
+    options["drawn_seed"] = options.get("drawn_seed") or root_seed(seed)
+    return Judgements(tuple(judge_one(one, settings, **options) for one in policy))
 
 
 def judge_one(
-    policy: str | Path | BasePolicy | Logits,
+    policy: Given,
     settings: JudgeSettings | None = None,
     *,
     task: Mapping[str, Any] | None = None,
@@ -244,10 +268,17 @@ def judge_one(
         if find_claim is not None:
             claim = find_claim(loaded, certificate, flights=flights, seed=seed, **where)
         worlds = held_out_environments(loaded, settings, seed)
-    is_sampled, rule = settings.sampled and loaded is not None, Rule(good_share=settings.good_share)
-    known = {"claim": claim, "unlike": loaded and loaded.unlike, "rule": rule, "seed": seed}
     with worlds as (env, actor):
-        verdict = judge_policy(env, actor, settings.episodes, sampled=is_sampled, **known)
+        verdict = judge_policy(
+            env,
+            actor,
+            settings.episodes,
+            sampled=settings.sampled and loaded is not None,
+            rule=Rule(good_share=settings.good_share),
+            claim=claim,
+            unlike=None if loaded is None else loaded.unlike,
+            seed=seed,
+        )
     progress("judged", 1, 1)
     path = None if claim is None else claim.path
     done = Judgement(name, settings, verdict, path, measured, identify(loaded))

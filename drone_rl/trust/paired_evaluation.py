@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torchrl.envs import Transform
 
-from drone_rl.collectors.complete_episodes import Episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.config import (
     COMPUTER_VISION,
     MINIMAL,
@@ -31,7 +31,7 @@ from drone_rl.trust.perturbations import (
     ONSET_STEP,
     Condition,
     FaultPipeline,
-    Mode,
+    PerturbationMode,
     clutter,
     sample_distractors,
     scene_appearance,
@@ -64,7 +64,7 @@ class EvaluatedPolicy:
 class ConditionResult:
     """Episodes under a condition."""
 
-    episodes: Episodes
+    episodes: CompleteEpisodes
     """One of each environment."""
     trace: Tensor
     """A checksum of all images of each episode. Shape: (n,)."""
@@ -119,7 +119,10 @@ class PairedEvaluator:
 
     @torch.no_grad()
     def run(
-        self, condition: Condition, mode: Mode = Mode.CONSTANT, agent: Agent | None = None
+        self,
+        condition: Condition,
+        mode: PerturbationMode = PerturbationMode.CONSTANT,
+        agent: Agent | None = None,
     ) -> ConditionResult:
         """Run one episode of an agent, by default the policy, in every environment.
 
@@ -128,7 +131,7 @@ class PairedEvaluator:
         if agent is None:
             agent = PolicyAgent(self.subject.network, self.subject.transforms, self.episodes)
         stages = {0: condition}
-        if mode is Mode.ONSET:
+        if mode is PerturbationMode.ONSET:
             stages = {0: Condition(), ONSET_STEP: condition}
         stage = _Stage(self, stages[0], mode, agent)
         start = stage.worlds.start(self._drawn, self._seeds)
@@ -151,10 +154,10 @@ class PairedEvaluator:
             return state, state.end_reason == 0
 
         final, worlds = rollout(start, step), stage.worlds
-        episodes = Episodes.ended(worlds.task, worlds.info(final), final.steps)
+        episodes = CompleteEpisodes.ended(worlds.task, worlds.info(final), final.steps)
         return ConditionResult(episodes, trace.cpu())
 
-    def run_baselines(self, condition: Condition) -> dict[str, Episodes]:
+    def run_baselines(self, condition: Condition) -> dict[str, CompleteEpisodes]:
         """Return the episodes of the task's random and constant baselines, by name."""
         worlds = self.worlds(condition)
         episodes = {}
@@ -198,7 +201,7 @@ class _Stage:
     """A part of an episode under one condition."""
 
     def __init__(
-        self, evaluator: PairedEvaluator, condition: Condition, mode: Mode, agent: Agent
+        self, evaluator: PairedEvaluator, condition: Condition, mode: PerturbationMode, agent: Agent
     ) -> None:
         self._evaluator, self._condition = evaluator, condition
         self.worlds, self.delay = evaluator.worlds(condition), condition.delay

@@ -32,7 +32,7 @@ _AWAY = (2.0, 10.0)
 """Distance of distractors from the area of the task, metres, from and to."""
 
 
-class Mode(enum.StrEnum):
+class PerturbationMode(enum.StrEnum):
     """When a perturbation is active."""
 
     CONSTANT = "constant"
@@ -91,14 +91,14 @@ class Condition:
 
 
 def variations(
-    mode: Mode, dimensions: Sequence[int], num_envs: int, generator: torch.Generator
+    mode: PerturbationMode, dimensions: Sequence[int], num_envs: int, generator: torch.Generator
 ) -> Iterator[list[Tensor]]:
     """Yield the variations of each step, without end, of all environments, active or not.
 
     `dimensions` are those of each part of the condition; one tensor per part is yielded. Shapes:
     (num_envs, dimensions), float64.
     """
-    shape, is_drifting = (num_envs, sum(dimensions)), mode is Mode.DRIFTING
+    shape, is_drifting = (num_envs, sum(dimensions)), mode is PerturbationMode.DRIFTING
     variation = torch.rand(shape, generator=generator, dtype=torch.float64).round() * 2 - 1
     variation = torch.zeros_like(variation) if is_drifting else variation
     while True:

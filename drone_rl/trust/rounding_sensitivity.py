@@ -11,7 +11,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.collectors.complete_episodes import (
-    Episodes,
+    CompleteEpisodes,
     StepLog,
     episode_batches,
     final_episodes,
@@ -109,7 +109,7 @@ class Rounding:
 
 def run_compared(
     env: EnvBase, actor: TensorDictModuleBase, num_episodes: int
-) -> tuple[Episodes, Rounding | None]:
+) -> tuple[CompleteEpisodes, Rounding | None]:
     """Run greedy episodes in PyTorch, and the first ones again by another implementation.
 
     Return the episodes and what `check_rounding` returns; see there for errors.
@@ -142,7 +142,7 @@ def check_rounding(
     actor: TensorDictModuleBase,
     episodes: int,
     *,
-    greedy: Episodes,
+    greedy: CompleteEpisodes,
     log: StepLog,
     is_compiled: bool = True,
 ) -> Rounding | None:
@@ -206,7 +206,7 @@ def check_rounding(
 
 def _run_checked(
     env: EnvBase, decide: Decide, network: ImageNetwork, episodes: int
-) -> tuple[Episodes, StepLog, list[Tensor]]:
+) -> tuple[CompleteEpisodes, StepLog, list[Tensor]]:
     """Run episodes in PyTorch; return also which frames of each are fragile, (T,), bool."""
     log, fragile, finals = StepLog(), list[Tensor](), []
     for batch in episode_batches(
@@ -215,7 +215,7 @@ def _run_checked(
         lengths = [len(actions) for actions in log.actions[len(fragile) :]]
         fragile += cast(Tensor, batch["fragile"]).cpu().split(lengths)
         finals.append(final_episodes(env, batch))
-    return Episodes.joined(finals), log, fragile
+    return CompleteEpisodes.joined(finals), log, fragile
 
 
 def _run_again(
@@ -225,7 +225,7 @@ def _run_again(
     state: dict[str, Any],
     *,
     is_compiled: bool = False,
-) -> tuple[Episodes, StepLog]:
+) -> tuple[CompleteEpisodes, StepLog]:
     """Run episodes from this state of the environments."""
     base_env(env).load_state_dict(state)
     log = StepLog()
@@ -250,7 +250,7 @@ def _first_difference(one: Tensor, other: Tensor) -> int | None:
     return None if len(one) == len(other) else shared
 
 
-def _other_outcome(one: Episodes, other: Episodes, i: int) -> int | None:
+def _other_outcome(one: CompleteEpisodes, other: CompleteEpisodes, i: int) -> int | None:
     """Return the length of episode i if its outcomes differ, or None."""
     is_same = bool(one.end_reason[i] == other.end_reason[i]) and torch.equal(
         one.goals.reached[i], other.goals.reached[i]

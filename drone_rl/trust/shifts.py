@@ -28,7 +28,7 @@ from drone_rl.trust.axes import AXES, Axis, check_axes, find_axes
 from drone_rl.trust.charts import chart, strips
 from drone_rl.trust.domain import Prober
 from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
-from drone_rl.trust.perturbations import Condition, Mode
+from drone_rl.trust.perturbations import Condition, PerturbationMode
 from drone_rl.trust.rounding_sensitivity import require_function
 from drone_rl.trust.shifts_file import FORMAT, FORMAT_VERSION
 from drone_rl.trust.shifts_text import SHIFTS, is_tested, rows
@@ -142,7 +142,9 @@ def shifts(
         progress(text, next(done), total)
 
     with closing(PairedEvaluator(subject, settings.episodes, seed.value)) as evaluator:
-        suite = Suite(evaluator, [Mode(mode) for mode in settings.modes], settings.possible_share)
+        suite = Suite(
+            evaluator, [PerturbationMode(mode) for mode in settings.modes], settings.possible_share
+        )
         found = suite.run(axes, settings.strengths, report)
     domain = _domain(subject, axes, settings, seed, report) if settings.domain else None
     with closing(PairedEvaluator(subject, 1, seed.value)) as filmed:

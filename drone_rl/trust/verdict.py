@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.complete_episodes import Episodes, StepLog, run_episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes, StepLog, run_episodes
 from drone_rl.envs import base_env, worlds_of
 from drone_rl.policies.baselines import check_baselines
 from drone_rl.policies.policy import BasePolicy, load_policy
@@ -21,7 +21,7 @@ from drone_rl.sim.vocabulary import terms_of
 from drone_rl.trust.baselines import run_baselines
 from drone_rl.trust.metrics import failure_table, summarise
 from drone_rl.trust.rounding_sensitivity import Rounding, check_rounding
-from drone_rl.trust.rule import Kind, Quantity, Rule, decide, kinds_within
+from drone_rl.trust.rule import Quantity, Rule, VerdictKind, decide, kinds_within
 from drone_rl.trust.verdict_text import SENTENCES, is_proved
 from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.intervals import mean_bounds, proportion
@@ -45,7 +45,9 @@ class CertificateClaim(Protocol):
         """Why it is refused, in one line; None if it is not."""
         ...
 
-    def as_evidence(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
+    def as_evidence(
+        self, greedy: CompleteEpisodes, *, rounding: Rounding | None = None
+    ) -> dict[str, Any]:
         """Return the evidence that a verdict on these greedy episodes may quote."""
         ...
 
@@ -71,7 +73,7 @@ class FindClaim(Protocol):
 class Verdict:
     """The kind of a policy, whether that is certain, and the evidence."""
 
-    kind: Kind
+    kind: VerdictKind
     certain: bool
     evidence: dict[str, Any]
     """Plain values: all entries of `as_dict` except the sentence."""
@@ -102,12 +104,15 @@ def judge_policy(
     episodes: int,
     *,
     sampled: bool = True,
-    **known: Any,
+    rule: Rule | None = None,
+    claim: CertificateClaim | None = None,
+    unlike: Mapping[str, Any] | None = None,
+    seed: RootSeed | None = None,
 ) -> Verdict:
     """Run so many episodes of a policy and of each baseline, and apply the rule.
 
-    Initial states are the same. `sampled` also runs the policy with sampled actions; `known` are
-    the arguments "rule", "claim", "unlike" and "seed" of `apply_rule`.
+    Initial states are the same. `sampled` also runs the policy with sampled actions; for the other
+    arguments see `apply_rule`.
 
     Raises:
         InputError: The task has no oracle, baselines or strata; also what `check_rounding` raises.
@@ -125,7 +130,16 @@ def judge_policy(
         drawn = run_episodes(env, actor, episodes, greedy=False)
     base.load_state_dict(state)
     rounding = check_rounding(env, actor, episodes, greedy=greedy, log=log)
-    return apply_rule(greedy, baselines, sampled=drawn, rounding=rounding, **known)
+    return apply_rule(
+        greedy,
+        baselines,
+        rule=rule,
+        sampled=drawn,
+        claim=claim,
+        unlike=unlike,
+        seed=seed,
+        rounding=rounding,
+    )
 
 
 def judge_for_selection(
@@ -166,11 +180,11 @@ def _rule_of(rule: Rule | None, task: Task[Any]) -> Rule:
 
 
 def apply_rule(
-    greedy: Episodes,
-    baselines: Mapping[str, Episodes],
+    greedy: CompleteEpisodes,
+    baselines: Mapping[str, CompleteEpisodes],
     *,
     rule: Rule | None = None,
-    sampled: Episodes | None = None,
+    sampled: CompleteEpisodes | None = None,
     claim: CertificateClaim | None = None,
     unlike: Mapping[str, Any] | None = None,
     seed: RootSeed | None = None,
@@ -232,7 +246,7 @@ def apply_rule(
 
 
 def measure(
-    greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule, times: int = 1
+    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule, times: int = 1
 ) -> tuple[Quantity, ...]:
     """Return the rule's quantities with simultaneous confidence intervals.
 
@@ -242,7 +256,9 @@ def measure(
     return tuple(estimate(i, np.tile(values, times), rule) for i, values in enumerate(observed))
 
 
-def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
+def observe(
+    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule
+) -> list[NDArray]:
     """Return each episode's value of each of the rule's quantities, float64.
 
     Shapes: (at most n,); those of "collected" are only of episodes that offered such a goal.
@@ -261,7 +277,9 @@ def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
     return Quantity(mean["mean"], mean["lower95"], mean["upper95"], thresholds)
 
 
-def observe_each(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
+def observe_each(
+    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule
+) -> list[NDArray]:
     """Return the values of `observe` for all episodes, NaN if undefined. Shapes: (n,), float64."""
     oracle = baselines["oracle"]
     observed = [greedy.success - rule.good_share * oracle.success]
@@ -284,7 +302,9 @@ def _is_certain(found: tuple[Quantity, ...], rule: Rule) -> bool:
     return len(kinds_within(box, len(rule.strata))) == 1
 
 
-def _enough(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> int | None:
+def _enough(
+    greedy: CompleteEpisodes, baselines: Mapping[str, CompleteEpisodes], rule: Rule
+) -> int | None:
     """Return about how many episodes certainty needs; None if more than `MANY` covers."""
     for times in (1, *MANY):
         if _is_certain(measure(greedy, baselines, rule, times), rule):

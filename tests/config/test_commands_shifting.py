@@ -1,12 +1,12 @@
 import pytest
 
 from drone_rl.config.commands import MODES, ShiftSettings
-from drone_rl.trust.perturbations import Mode
+from drone_rl.trust.perturbations import PerturbationMode
 from drone_rl.utils.errors import InputError
 
 
 def test_modes_are_those_that_are_flown():
-    assert [*MODES] == [mode.value for mode in Mode]
+    assert [*MODES] == [mode.value for mode in PerturbationMode]
     assert ShiftSettings().modes == MODES
 
 

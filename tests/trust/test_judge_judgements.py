@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from drone_rl.trust.judge import Judgements
-from drone_rl.trust.rule import Kind
+from drone_rl.trust.rule import VerdictKind
 
 
 def judged(name, kind, certain, share):
@@ -16,7 +16,9 @@ def judged(name, kind, certain, share):
 
 @pytest.fixture
 def both():
-    return Judgements((judged("a", Kind.GOOD, True, 0.95), judged("<b>", Kind.POOR, False, 0.1)))
+    return Judgements(
+        (judged("a", VerdictKind.GOOD, True, 0.95), judged("<b>", VerdictKind.POOR, False, 0.1))
+    )
 
 
 def test_it_is_a_sequence(both):

@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from drone_rl.collectors.complete_episodes import Episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.sim.tasks import CollectCubes, Goals
 from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.trust.metrics import summarise
@@ -12,7 +12,7 @@ from tests.second_task import End, Posts
 @pytest.fixture
 def episodes():
     """Three episodes of two cubes; the last one never came to its second cube."""
-    return Episodes(
+    return CompleteEpisodes(
         task=CollectCubes(),
         goals=Goals(
             reached=torch.tensor([[True, True], [True, False], [False, False]]),
@@ -30,7 +30,7 @@ def test_episodes_by_what_was_true_when_they_ended():
         "sides": torch.tensor([[0, 1], [1, -1]]),
         "end_reason": torch.tensor([[End.THROUGH], [End.TOUCHED]]),
     }
-    flown = Episodes.ended(Posts(), info, torch.tensor([8, 9]))
+    flown = CompleteEpisodes.ended(Posts(), info, torch.tensor([8, 9]))
     assert flown.success.tolist() == [1.0, 0.0]
     assert flown.goals.stratum.tolist() == [[0, 1], [1, -1]]
     assert flown.end_reason.tolist() == [End.THROUGH, End.TOUCHED]
@@ -69,7 +69,7 @@ def test_dependent_cubes_don_t_make_an_interval_narrower():
     whole = torch.arange(100) < 90
     common = {"end_reason": torch.ones(100).long(), "length": torch.ones(100).long()}
     alike = [
-        Episodes(
+        CompleteEpisodes(
             task=CollectCubes(),
             goals=Goals(
                 reached=whole[:, None].expand(100, cubes),
@@ -99,7 +99,9 @@ def test_another_task_has_strata_and_ends_of_its_own():
         stratum=torch.tensor([[0, 1], [1, -1]]),
         world=torch.zeros(2, 1),
     )
-    flown = Episodes(Posts(), goals, torch.tensor([End.THROUGH, End.TOUCHED]), torch.ones(2).long())
+    flown = CompleteEpisodes(
+        Posts(), goals, torch.tensor([End.THROUGH, End.TOUCHED]), torch.ones(2).long()
+    )
     summary = summarise(flown)
     assert {n: e["successes"] for n, e in summary["ends"].items()} == {
         "through": 1, "touched": 1, "time": 0,

@@ -3,7 +3,7 @@ import enum
 import pytest
 import torch
 
-from drone_rl.collectors.complete_episodes import Episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.config import TaskSettings
 from drone_rl.sim.tasks import CollectCubes, Goals
 from drone_rl.sim.tasks.collect_cubes import EndReason, Side
@@ -120,7 +120,7 @@ def test_another_task_has_classes_and_ends_of_its_own():
         world=torch.zeros(3, 1),
     )
     ends = torch.tensor([End.THROUGH, End.TOUCHED, End.TIME])
-    table = failure_table(Episodes(Posts(), goals, ends, torch.tensor([7, 2, 12])))
+    table = failure_table(CompleteEpisodes(Posts(), goals, ends, torch.tensor([7, 2, 12])))
     assert [(r["by"], r["value"]) for r in table["rows"]] == [
         ("side", "left"), ("side", "right"), ("end", "touched"), ("end", "time"),
     ]  # fmt: skip
@@ -138,7 +138,9 @@ def test_the_expected_end_is_the_largest_if_no_class_has_the_missed_goals():
         world=torch.zeros(2, 1),
     )
     ends = torch.tensor([End.TIME, End.TIME])
-    largest = failure_table(Episodes(Posts(), goals, ends, torch.tensor([12, 12])))["largest"]
+    largest = failure_table(CompleteEpisodes(Posts(), goals, ends, torch.tensor([12, 12])))[
+        "largest"
+    ]
     assert (largest["by"], largest["value"], largest["failed"]) == ("end", "time", 2)
 
 
@@ -158,7 +160,7 @@ def test_all_goals_without_success_are_a_failure_by_the_end():
         world=torch.zeros(2, 1),
     )
     ends = torch.tensor([End.THROUGH, End.TOUCHED])
-    table = failure_table(Episodes(Posts(), goals, ends, torch.tensor([7, 7])))
+    table = failure_table(CompleteEpisodes(Posts(), goals, ends, torch.tensor([7, 7])))
     assert table["bound"] == proportion(1, 2)
     assert row(table, "end", "touched") == (2, 1)
     assert (table["largest"]["by"], table["largest"]["value"]) == ("end", "touched")
@@ -173,5 +175,7 @@ def test_a_task_may_lack_the_expected_end():
         ends, success_end, truncation, expected_end = Only, Only.TIME, Only.TIME, 2
 
     goals = Goals(torch.ones(2, 2).bool(), torch.zeros(2, 2).long(), torch.zeros(2, 1))
-    table = failure_table(Episodes(Hover(), goals, torch.ones(2).long(), torch.tensor([9, 9])))
+    table = failure_table(
+        CompleteEpisodes(Hover(), goals, torch.ones(2).long(), torch.tensor([9, 9]))
+    )
     assert table["expected_end"] is None and table["largest"] is None

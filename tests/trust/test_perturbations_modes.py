@@ -3,7 +3,7 @@ import itertools
 import pytest
 import torch
 
-from drone_rl.trust.perturbations import DRIFT, Mode, reflect, variations
+from drone_rl.trust.perturbations import DRIFT, PerturbationMode, reflect, variations
 
 
 def first(mode, steps, count=1000, dimensions=(1, 2)):
@@ -11,7 +11,7 @@ def first(mode, steps, count=1000, dimensions=(1, 2)):
     return [*itertools.islice(variations(mode, dimensions, count, generator), steps)]
 
 
-@pytest.mark.parametrize("mode", [Mode.CONSTANT, Mode.ONSET])
+@pytest.mark.parametrize("mode", [PerturbationMode.CONSTANT, PerturbationMode.ONSET])
 def test_what_is_constant_is_extreme_and_stays(mode):
     one, two = first(mode, 2)
     assert [part.shape for part in one] == [(1000, 1), (1000, 2)]
@@ -22,7 +22,7 @@ def test_what_is_constant_is_extreme_and_stays(mode):
 
 
 def test_what_drifts_begins_with_no_difference_and_stays_within_the_strength():
-    walk = torch.stack([part[1] for part in first(Mode.DRIFTING, 400, 300)])
+    walk = torch.stack([part[1] for part in first(PerturbationMode.DRIFTING, 400, 300)])
     assert walk[0].abs().max() == 0
     assert walk.abs().max() <= 1
     assert (walk[1] - walk[0]).std() == pytest.approx(DRIFT, rel=0.1)
@@ -35,5 +35,7 @@ def test_mirrors():
 
 
 def test_worlds_go_the_same_ways_at_every_strength():
-    for one, two in zip(first(Mode.DRIFTING, 5), first(Mode.DRIFTING, 5), strict=True):
+    for one, two in zip(
+        first(PerturbationMode.DRIFTING, 5), first(PerturbationMode.DRIFTING, 5), strict=True
+    ):
         assert all(torch.equal(a, b) for a, b in zip(one, two, strict=True))

@@ -9,9 +9,9 @@ from drone_rl.trust import rule
 from drone_rl.trust.rule import (
     BLIND_BASELINES,
     SIDES,
-    Kind,
     Quantity,
     Rule,
+    VerdictKind,
     decide,
     kinds_within,
     level,
@@ -32,24 +32,24 @@ def levels(
 @pytest.mark.parametrize(
     ("found", "kind"),
     [
-        (levels(), Kind.GOOD),
-        (levels(shares=(2, 1, 2)), Kind.NONE),  # dodges cubes ahead
-        (levels(shares=(2, 1, 2), offered=(1, 0, 1)), Kind.GOOD),  # there are next to none
-        (levels(success=0), Kind.NONE),
-        (levels(success=0, above=(1, 0, 1, 1)), Kind.POOR),  # no better than one luck
-        (levels(success=0, shares=(0, 0, 2)), Kind.ONE_SIDED_RIGHT),
-        (levels(success=0, shares=(2, 2, 0)), Kind.ONE_SIDED_LEFT),
-        (levels(success=0, shares=(0, 2, 2), above=(0, 0, 0, 0)), Kind.ONE_SIDED_RIGHT),
-        (levels(shares=(0, 2, 2)), Kind.ONE_SIDED_RIGHT),  # succeeds, but not on its left
-        (levels(shares=(0, 2, 2), offered=(0, 1, 1)), Kind.GOOD),
-        (levels(success=0, shares=(0, 2, 2), offered=(0, 1, 1)), Kind.NONE),
-        (levels(success=0, shares=(1, 2, 2)), Kind.NONE),
-        (levels(success=0, shares=(0, 2, 1)), Kind.NONE),
-        (levels(unsolved=(1, 0, 1, 1)), Kind.TRIVIAL),
-        (levels(unsolved=(0, 0, 0, 0), above=(0, 0, 0, 0)), Kind.TRIVIAL),
-        (levels(success=0, unsolved=(0, 1, 1, 1)), Kind.NONE),  # not even good
-        (levels(success=0, unsolved=(1, 0, 1, 1), above=(1, 0, 1, 1)), Kind.POOR),
-        (levels(above=(1, 0, 1, 1)), Kind.GOOD),  # succeeds more often than the baseline
+        (levels(), VerdictKind.GOOD),
+        (levels(shares=(2, 1, 2)), VerdictKind.NONE),  # dodges cubes ahead
+        (levels(shares=(2, 1, 2), offered=(1, 0, 1)), VerdictKind.GOOD),  # there are next to none
+        (levels(success=0), VerdictKind.NONE),
+        (levels(success=0, above=(1, 0, 1, 1)), VerdictKind.POOR),  # no better than one luck
+        (levels(success=0, shares=(0, 0, 2)), VerdictKind.ONE_SIDED_RIGHT),
+        (levels(success=0, shares=(2, 2, 0)), VerdictKind.ONE_SIDED_LEFT),
+        (levels(success=0, shares=(0, 2, 2), above=(0, 0, 0, 0)), VerdictKind.ONE_SIDED_RIGHT),
+        (levels(shares=(0, 2, 2)), VerdictKind.ONE_SIDED_RIGHT),  # succeeds, but not on its left
+        (levels(shares=(0, 2, 2), offered=(0, 1, 1)), VerdictKind.GOOD),
+        (levels(success=0, shares=(0, 2, 2), offered=(0, 1, 1)), VerdictKind.NONE),
+        (levels(success=0, shares=(1, 2, 2)), VerdictKind.NONE),
+        (levels(success=0, shares=(0, 2, 1)), VerdictKind.NONE),
+        (levels(unsolved=(1, 0, 1, 1)), VerdictKind.TRIVIAL),
+        (levels(unsolved=(0, 0, 0, 0), above=(0, 0, 0, 0)), VerdictKind.TRIVIAL),
+        (levels(success=0, unsolved=(0, 1, 1, 1)), VerdictKind.NONE),  # not even good
+        (levels(success=0, unsolved=(1, 0, 1, 1), above=(1, 0, 1, 1)), VerdictKind.POOR),
+        (levels(above=(1, 0, 1, 1)), VerdictKind.GOOD),  # succeeds more often than the baseline
     ],
 )
 def test_kinds_by_hand(found, kind):
@@ -81,7 +81,7 @@ def test_thresholds_of_every_quantity():
 def test_no_corner_of_a_box_is_missed():
     """Left about 0.68 of 0.7, right about 0.32 of 0.3: one-sided lies within both intervals."""
     box = [(0, 0), (1, 1), (1, 1), (1, 1), (1, 2), (2, 2), (0, 1), *[(1, 1)] * 8]
-    assert kinds_within(tuple(box)) == {Kind.NONE, Kind.ONE_SIDED_LEFT}
+    assert kinds_within(tuple(box)) == {VerdictKind.NONE, VerdictKind.ONE_SIDED_LEFT}
 
 
 @given(BOXES, st.data())
@@ -111,15 +111,15 @@ def test_more_success_keeps_a_good_policy_good_and_makes_none_poor(found, which)
         return
     better = list(found)
     better[which] = len(RULE.thresholds[which])
-    if decide(found) is Kind.GOOD:
-        assert decide(better) is Kind.GOOD
-    if decide(found) is Kind.NONE:
-        assert decide(better) is not Kind.POOR
+    if decide(found) is VerdictKind.GOOD:
+        assert decide(better) is VerdictKind.GOOD
+    if decide(found) is VerdictKind.NONE:
+        assert decide(better) is not VerdictKind.POOR
 
 
 def test_every_kind_can_be_given():
     ranges = [range(len(t) + 1) for t in RULE.thresholds]
-    assert {decide(cell) for cell in itertools.product(*ranges)} == set(Kind)
+    assert {decide(cell) for cell in itertools.product(*ranges)} == set(VerdictKind)
 
 
 @pytest.mark.parametrize("value", [0.0, 1.0, -1, float("nan"), "much", True])
@@ -165,12 +165,12 @@ def test_the_strata_and_luck_of_the_rule_are_those_of_cube_collection():
 @pytest.mark.parametrize(
     ("levels", "kind"),
     [
-        ((1, 1, 1, 2, 2, 1, 1), Kind.GOOD),
-        ((1, 1, 1, 2, 2, 1, 0), Kind.TRIVIAL),
-        ((0, 1, 1, 0, 2, 1, 1), Kind.ONE_SIDED_RIGHT),
-        ((0, 1, 1, 2, 0, 1, 1), Kind.ONE_SIDED_LEFT),
-        ((0, 1, 0, 2, 0, 1, 1), Kind.NONE),
-        ((0, 1, 1, 1, 1, 0, 1), Kind.POOR),
+        ((1, 1, 1, 2, 2, 1, 1), VerdictKind.GOOD),
+        ((1, 1, 1, 2, 2, 1, 0), VerdictKind.TRIVIAL),
+        ((0, 1, 1, 0, 2, 1, 1), VerdictKind.ONE_SIDED_RIGHT),
+        ((0, 1, 1, 2, 0, 1, 1), VerdictKind.ONE_SIDED_LEFT),
+        ((0, 1, 0, 2, 0, 1, 1), VerdictKind.NONE),
+        ((0, 1, 1, 1, 1, 0, 1), VerdictKind.POOR),
     ],
 )
 def test_a_task_may_have_two_strata_and_one_luck(levels, kind):
@@ -194,7 +194,7 @@ def test_many_strata_are_not_multiplied(monkeypatch):
 
     monkeypatch.setattr(rule, "decide", count)
     box = ((0, 1), *[(0, 1)] * 7, *[(0, 2)] * 7, (0, 1), (0, 1))
-    assert kinds_within(box, 7) == set(Kind)
+    assert kinds_within(box, 7) == set(VerdictKind)
     assert len(calls) < 2000
 
 

@@ -6,7 +6,7 @@ import torch
 from drone_rl.envs.fault_models import dead_rows
 from drone_rl.trust.axes import AXES
 from drone_rl.trust.paired_evaluation import PairedEvaluator
-from drone_rl.trust.perturbations import Condition, Mode
+from drone_rl.trust.perturbations import Condition, PerturbationMode
 from drone_rl.trust.suite import Suite, area, mcnemar
 from tests.trust.subjects import Blind, subject
 
@@ -18,7 +18,7 @@ def silent(text):
 @pytest.fixture(scope="module")
 def suite():
     evaluator = PairedEvaluator(subject(Blind(0)), 20)
-    yield Suite(evaluator, [*Mode], 0.9)
+    yield Suite(evaluator, [*PerturbationMode], 0.9)
     evaluator.close()
 
 

@@ -15,7 +15,7 @@ from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.trust.rounding_sensitivity import Rounding
-from drone_rl.trust.rule import Kind, Rule
+from drone_rl.trust.rule import Rule, VerdictKind
 from drone_rl.trust.verdict import apply_rule, judge_policy, measure, observe
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
@@ -42,13 +42,13 @@ def judged(make_episodes, make_baselines):
 @pytest.mark.parametrize(
     ("hits", "kind", "status"),
     [
-        (lambda i, side: True, Kind.GOOD, 0),
-        (lambda i, side: False, Kind.POOR, 10),
-        (lambda i, side: side != LEFT, Kind.ONE_SIDED_RIGHT, 11),
-        (lambda i, side: side != RIGHT, Kind.ONE_SIDED_LEFT, 11),
-        (lambda i, side: side != AHEAD, Kind.NONE, 12),
-        (lambda i, side: side == AHEAD, Kind.POOR, 10),  # as flying straight on
-        (lambda i, side: i % 8 < 4, Kind.NONE, 12),
+        (lambda i, side: True, VerdictKind.GOOD, 0),
+        (lambda i, side: False, VerdictKind.POOR, 10),
+        (lambda i, side: side != LEFT, VerdictKind.ONE_SIDED_RIGHT, 11),
+        (lambda i, side: side != RIGHT, VerdictKind.ONE_SIDED_LEFT, 11),
+        (lambda i, side: side != AHEAD, VerdictKind.NONE, 12),
+        (lambda i, side: side == AHEAD, VerdictKind.POOR, 10),  # as flying straight on
+        (lambda i, side: i % 8 < 4, VerdictKind.NONE, 12),
     ],
 )
 def test_kinds(judged, hits, kind, status):
@@ -62,7 +62,7 @@ def test_kinds(judged, hits, kind, status):
 
 def test_few_episodes_prove_nothing(judged):
     verdict = judged(lambda i, side: True, number=5)
-    assert (verdict.kind, verdict.certain, verdict.exit_code) == (Kind.GOOD, False, 13)
+    assert (verdict.kind, verdict.certain, verdict.exit_code) == (VerdictKind.GOOD, False, 13)
     assert verdict.evidence["enough"] == 100
     assert judged(lambda i, side: True, number=100).exit_code == 0
 
@@ -97,9 +97,9 @@ def test_luck_is_measured_on_the_way_to_what_the_oracle_gets(make_episodes, make
 def test_exactly_at_the_threshold_is_not_good_and_never_certain(judged):
     verdict = judged(lambda i, side: i % 10 > 0)
     assert verdict.evidence["greedy"]["success"]["share"] == 0.9
-    assert (verdict.kind, verdict.certain) == (Kind.NONE, False)
+    assert (verdict.kind, verdict.certain) == (VerdictKind.NONE, False)
     assert verdict.evidence["enough"] is None
-    assert judged(lambda i, side: i % 10 > 0, rule=Rule(good_share=0.8)).kind is Kind.GOOD
+    assert judged(lambda i, side: i % 10 > 0, rule=Rule(good_share=0.8)).kind is VerdictKind.GOOD
 
 
 def test_quantities_by_hand(make_episodes, make_baselines):
@@ -132,15 +132,15 @@ def test_more_of_the_same_is_known_better(make_episodes, make_baselines):
 def test_what_was_not_offered_is_no_failure(make_episodes, make_baselines):
     episodes = make_episodes([[AHEAD, AHEAD]] * 400, [[1, 1]] * 400)
     verdict = apply_rule(episodes, make_baselines(episodes))
-    assert (verdict.kind, verdict.certain) == (Kind.TRIVIAL, True)
+    assert (verdict.kind, verdict.certain) == (VerdictKind.TRIVIAL, True)
     assert verdict.evidence["greedy"]["shares"]["left"]["mean"] is None
     assert "0%" not in verdict.sentence.replace("100%", "")
 
 
 @pytest.mark.parametrize(
     ("solved", "kind", "certain", "status"),
-    [(400, Kind.TRIVIAL, True, 18), (360, Kind.TRIVIAL, False, 13), (352, Kind.GOOD, False, 13),
-     (200, Kind.GOOD, True, 0)],
+    [(400, VerdictKind.TRIVIAL, True, 18), (360, VerdictKind.TRIVIAL, False, 13),
+     (352, VerdictKind.GOOD, False, 13), (200, VerdictKind.GOOD, True, 0)],
 )  # fmt: skip
 def test_a_task_that_a_baseline_solves_is_trivial(
     make_episodes, make_baselines, solved, kind, certain, status
@@ -189,7 +189,7 @@ def test_sampled_flights_are_compared_pair_by_pair(judged, make_episodes):
     verdict = judged(lambda i, side: True, sampled=drawn)
     assert verdict.evidence["drawing"]["mean"] == -0.5
     assert verdict.evidence["sampled"]["success"]["share"] == 0.5
-    assert verdict.kind is Kind.GOOD
+    assert verdict.kind is VerdictKind.GOOD
 
 
 def test_a_policy_is_flown_beside_its_baselines_and_repeats():
@@ -236,7 +236,7 @@ def test_a_mirrored_flight_gets_the_mirrored_kind(make_episodes, make_baselines,
 def test_another_task_is_judged_by_its_own_strata_and_luck():
     env = DroneEnv(20, Posts(), pixels=False)
     straight = judge_policy(env, constant_policy(Move.FORWARD), 200, sampled=False)
-    assert (straight.kind, straight.certain) == (Kind.TRIVIAL, True)
+    assert (straight.kind, straight.certain) == (VerdictKind.TRIVIAL, True)
     evidence = straight.evidence
     assert list(evidence["quantities"]) == [
         "success", "offered left", "offered right", "collected left", "collected right",
@@ -244,7 +244,7 @@ def test_another_task_is_judged_by_its_own_strata_and_luck():
     ]  # fmt: skip
     assert list(evidence["baselines"]) == ["random", "forward", "oracle"]
     leaving = judge_policy(env, constant_policy(Move.LEFT), 200, sampled=False)
-    assert (leaving.kind, leaving.certain) == (Kind.POOR, True)
+    assert (leaving.kind, leaving.certain) == (VerdictKind.POOR, True)
     assert leaving.evidence["failures"]["largest"]["value"] in ("left", "right")
 
 
@@ -298,14 +298,14 @@ def rounding(fragile, number=400, unexplained=0):
 
 def test_few_fragile_frames_leave_a_verdict_certain(judged):
     verdict = judged(lambda i, side: True, rounding=rounding(100))
-    assert (verdict.kind, verdict.exit_code) == (Kind.GOOD, 0)
+    assert (verdict.kind, verdict.exit_code) == (VerdictKind.GOOD, 0)
     assert verdict.sentence.endswith("The verdict holds for float32 on cpu, PyTorch.")
 
 
 @pytest.mark.parametrize("found", [rounding(321), rounding(101), rounding(0, unexplained=1)])
 def test_many_fragile_frames_or_episodes_or_other_actions_make_it_uncertain(judged, found):
     verdict = judged(lambda i, side: True, rounding=found)
-    assert (verdict.kind, verdict.certain, verdict.exit_code) == (Kind.GOOD, False, 13)
+    assert (verdict.kind, verdict.certain, verdict.exit_code) == (VerdictKind.GOOD, False, 13)
     assert "Not certain: decisions depend on rounding." in verdict.sentence
     assert verdict.evidence["rounding"]["decides"]
 

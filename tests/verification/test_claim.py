@@ -6,7 +6,7 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.collectors.complete_episodes import Episodes
+from drone_rl.collectors.complete_episodes import CompleteEpisodes
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import CubeGoals, EndReason
 from drone_rl.trust.rounding_sensitivity import Rounding
@@ -30,7 +30,7 @@ def flown(places, ends):
         lateral=y,
         height=torch.zeros_like(y),
     )
-    return Episodes(CollectCubes(), goals, end, torch.full((len(y),), 30))
+    return CompleteEpisodes(CollectCubes(), goals, end, torch.full((len(y),), 30))
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from typing import Any
 from drone_rl.explanations.report.explanation import METHOD_NAMES
 from drone_rl.sim.vocabulary import terms_of
 from drone_rl.trust import quoted_text, shifts_text
-from drone_rl.trust.rule import Kind
+from drone_rl.trust.rule import VerdictKind
 from drone_rl.trust.verdict_text import is_proved, is_quoted, is_stated
 from drone_rl.utils.text import Claims, Evidence, listed, plural, rate
 
@@ -50,7 +50,7 @@ def _missing(line: str) -> Claims:
 def _say_verdict(evidence: Evidence) -> Claims:
     verdict, terms, claims = evidence["verdict"], terms_of(evidence), Claims()
     greedy, kind = verdict["greedy"], verdict["kind"]
-    kind = "neither good nor poor nor one-sided" if kind == str(Kind.NONE) else kind
+    kind = "neither good nor poor nor one-sided" if kind == str(VerdictKind.NONE) else kind
     if verdict["certain"]:
         claims["summary.verdict"] = (
             f"{kind.capitalize()}. This verdict is wrong with at most "
