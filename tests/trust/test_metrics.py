@@ -24,7 +24,7 @@ def episodes():
     )
 
 
-def test_episodes_by_what_was_true_when_they_ended():
+def test_episodes_from_the_last_step():
     info = {
         "passed": torch.tensor([[True, True], [True, False]]),
         "sides": torch.tensor([[0, 1], [1, -1]]),
@@ -52,19 +52,19 @@ def test_summary_by_hand(episodes):
     assert (summary["mean_length"], summary["max_length"]) == (30.0, 60)
 
 
-def test_a_stratum_is_not_those_after_it(episodes):
+def test_rate_of_one_stratum(episodes):
     episodes.goals.stratum[1, 1] = 2  # which was not reached, while its first one was
     assert episodes.stratum_share(0).tolist() == [1.0, 1.0]
     assert episodes.stratum_share(2).tolist() == [0.0, 0.0]
 
 
-def test_what_was_not_offered_has_no_share(episodes):
+def test_stratum_without_goals_has_no_rate(episodes):
     ahead = summarise(episodes)["shares"]["ahead"]
     assert ahead["mean"] is None
     assert (ahead["lower95"], ahead["upper95"], ahead["count"], ahead["goals"]) == (0, 1, 0, 0)
 
 
-def test_dependent_cubes_don_t_make_an_interval_narrower():
+def test_intervals_count_episodes_not_goals():
     """All or nothing: three cubes an episode tell no more than one."""
     whole = torch.arange(100) < 90
     common = {"end_reason": torch.ones(100).long(), "length": torch.ones(100).long()}
@@ -85,7 +85,7 @@ def test_dependent_cubes_don_t_make_an_interval_narrower():
     assert one["lower95"] < proportion(90, 100)["lower95"]
 
 
-def test_rows_can_be_chosen(episodes):
+def test_selecting_episodes(episodes):
     assert len(episodes[1:]) == 2
     assert episodes[torch.tensor([2])].offered(Side.RIGHT).tolist() == [True]
     assert episodes.stratum_share(Side.LEFT).tolist() == [1.0, 0.5]
@@ -93,7 +93,7 @@ def test_rows_can_be_chosen(episodes):
     assert episodes[1:].goals.world.tolist() == [[2.0], [-4.0]]
 
 
-def test_another_task_has_strata_and_ends_of_its_own():
+def test_summary_of_another_task():
     goals = Goals(
         reached=torch.tensor([[True, True], [False, False]]),
         stratum=torch.tensor([[0, 1], [1, -1]]),

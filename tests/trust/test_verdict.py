@@ -60,7 +60,7 @@ def test_kinds(judged, hits, kind, status):
     json.dumps(plain, allow_nan=False)
 
 
-def test_few_episodes_prove_nothing(judged):
+def test_few_episodes_are_not_certain(judged):
     verdict = judged(lambda i, side: True, number=5)
     assert (verdict.kind, verdict.certain, verdict.exit_code) == (VerdictKind.GOOD, False, 13)
     assert verdict.evidence["enough"] == 100
@@ -79,12 +79,12 @@ def test_few_episodes_prove_nothing(judged):
         (40, 14, 100 * 40),
     ],
 )
-def test_how_many_episodes_would_be_enough(judged, number, missed, enough):
+def test_number_of_episodes_that_would_be_enough(judged, number, missed, enough):
     verdict = judged(lambda i, side: missed is None or i % missed > 0, number=number)
     assert (verdict.certain, verdict.evidence["enough"]) == (False, enough)
 
 
-def test_luck_is_measured_on_the_way_to_what_the_oracle_gets(make_episodes, make_baselines):
+def test_margin_above_baselines(make_episodes, make_baselines):
     episodes = make_episodes([[LEFT, LEFT], [AHEAD, AHEAD]], [[1, 1], [1, 0]])
     baselines = make_baselines(episodes)
     baselines["oracle"] = make_episodes([[LEFT, LEFT], [AHEAD, AHEAD]], [[1, 0], [0, 0]])
@@ -94,7 +94,7 @@ def test_luck_is_measured_on_the_way_to_what_the_oracle_gets(make_episodes, make
     assert told["above forward"].tolist() == pytest.approx([1 - 1 / 6 * 0.5, 0.5 - 5 / 6])
 
 
-def test_exactly_at_the_threshold_is_not_good_and_never_certain(judged):
+def test_success_at_the_threshold_is_not_good(judged):
     verdict = judged(lambda i, side: i % 10 > 0)
     assert verdict.evidence["greedy"]["success"]["share"] == 0.9
     assert (verdict.kind, verdict.certain) == (VerdictKind.NONE, False)
@@ -120,16 +120,7 @@ def test_quantities_by_hand(make_episodes, make_baselines):
     assert found["above forward"].value == pytest.approx(0.5 - 5 / 6 * 0.5 / 3 - 1 / 6)
 
 
-def test_more_of_the_same_is_known_better(make_episodes, make_baselines):
-    episodes = make_episodes([[LEFT, RIGHT], [RIGHT, AHEAD]], [[1, 1], [1, 0]])
-    baselines, rule = make_baselines(episodes), Rule()
-    once, often = (measure(episodes, baselines, rule, times) for times in (1, 50))
-    for few, many in zip(once, often, strict=True):
-        assert few.value == pytest.approx(many.value)
-        assert many.upper - many.lower < few.upper - few.lower
-
-
-def test_what_was_not_offered_is_no_failure(make_episodes, make_baselines):
+def test_sides_without_goals_do_not_count(make_episodes, make_baselines):
     episodes = make_episodes([[AHEAD, AHEAD]] * 400, [[1, 1]] * 400)
     verdict = apply_rule(episodes, make_baselines(episodes))
     assert (verdict.kind, verdict.certain) == (VerdictKind.TRIVIAL, True)
@@ -142,7 +133,7 @@ def test_what_was_not_offered_is_no_failure(make_episodes, make_baselines):
     [(400, VerdictKind.TRIVIAL, True, 18), (360, VerdictKind.TRIVIAL, False, 13),
      (352, VerdictKind.GOOD, False, 13), (200, VerdictKind.GOOD, True, 0)],
 )  # fmt: skip
-def test_a_task_that_a_baseline_solves_is_trivial(
+def test_task_that_a_baseline_solves_is_trivial(
     make_episodes, make_baselines, solved, kind, certain, status
 ):
     """Of 400 episodes the policy succeeds in all; flying straight needs 360 to be good, too."""
@@ -154,7 +145,7 @@ def test_a_task_that_a_baseline_solves_is_trivial(
     assert verdict.sentence.startswith(trivial) == (solved == 400)
 
 
-def test_baselines_fly_with_the_dynamics_of_the_environment(monkeypatch):
+def test_baselines_have_the_dynamics_of_the_environment(monkeypatch):
     """The baselines of a verdict meet the same wind as the policy."""
     floating(monkeypatch)
     task = TaskSettings(num_cubes=1)
@@ -167,7 +158,7 @@ def test_baselines_fly_with_the_dynamics_of_the_environment(monkeypatch):
     assert still.evidence["greedy"]["mean_length"] < policy["mean_length"]
 
 
-def test_other_worlds_are_no_baseline(make_episodes, make_baselines):
+def test_other_initial_states_are_refused(make_episodes, make_baselines):
     ours = make_episodes([[LEFT, LEFT]] * 2, [[1, 1]] * 2)
     theirs = make_episodes([[RIGHT, LEFT]] * 2, [[1, 1]] * 2)
     with pytest.raises(ValueError, match="different initial states"):
@@ -176,14 +167,7 @@ def test_other_worlds_are_no_baseline(make_episodes, make_baselines):
         apply_rule(ours, make_baselines(ours), sampled=ours[:1])
 
 
-def test_one_other_world_is_enough_to_be_no_baseline(make_episodes, make_baselines):
-    ours = make_episodes([[LEFT, LEFT]] * 3, [[1, 1]] * 3)
-    theirs = make_episodes([[LEFT, LEFT]] * 2 + [[RIGHT, LEFT]], [[1, 1]] * 3)
-    with pytest.raises(ValueError, match="different initial states"):
-        apply_rule(ours, make_baselines(theirs))
-
-
-def test_sampled_flights_are_compared_pair_by_pair(judged, make_episodes):
+def test_sampled_episodes_are_compared_pairwise(judged, make_episodes):
     sides = [LAYOUTS[i % 4] for i in range(400)]
     drawn = make_episodes(sides, [[i % 2 == 0] * 2 for i in range(400)])
     verdict = judged(lambda i, side: True, sampled=drawn)
@@ -192,7 +176,7 @@ def test_sampled_flights_are_compared_pair_by_pair(judged, make_episodes):
     assert verdict.kind is VerdictKind.GOOD
 
 
-def test_a_policy_is_flown_beside_its_baselines_and_repeats():
+def test_verdict_repeats():
     task = TaskSettings(num_cubes=1)
     dicts = []
     for _ in range(2):
@@ -222,7 +206,7 @@ def mirrored(episodes):
 @settings(
     max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
-def test_a_mirrored_flight_gets_the_mirrored_kind(make_episodes, make_baselines, drawn):
+def test_mirrored_episodes_get_the_mirrored_kind(make_episodes, make_baselines, drawn):
     sides, hits = [row[0] for row in drawn] * 30, [row[1:] for row in drawn] * 30
     ours = make_episodes(sides, hits)
     baselines = make_baselines(ours)
@@ -233,7 +217,7 @@ def test_a_mirrored_flight_gets_the_mirrored_kind(make_episodes, make_baselines,
     assert reflected.certain == verdict.certain
 
 
-def test_another_task_is_judged_by_its_own_strata_and_luck():
+def test_verdict_on_another_task():
     env = DroneEnv(20, Posts(), pixels=False)
     straight = judge_policy(env, constant_policy(Move.FORWARD), 200, sampled=False)
     assert (straight.kind, straight.certain) == (VerdictKind.TRIVIAL, True)
@@ -248,7 +232,7 @@ def test_another_task_is_judged_by_its_own_strata_and_luck():
     assert leaving.evidence["failures"]["largest"]["value"] in ("left", "right")
 
 
-def test_a_policy_is_flown_greedily_and_with_drawn_actions_in_the_same_worlds(monkeypatch):
+def test_greedy_and_sampled_episodes_share_initial_states(monkeypatch):
     flown = []
 
     def run(env, actor, episodes, **how):
@@ -266,7 +250,7 @@ def test_a_policy_is_flown_greedily_and_with_drawn_actions_in_the_same_worlds(mo
     assert [greedy for greedy, *_ in flown] == [True]
 
 
-def test_a_task_without_an_oracle_is_refused_before_any_episode(monkeypatch):
+def test_task_without_an_oracle_is_refused(monkeypatch):
     class Blind(Posts):
         name, oracle = "fog", None
 
@@ -315,7 +299,7 @@ def test_more_episodes_do_not_help_where_rounding_decides(judged):
     assert not verdict.certain and verdict.evidence["enough"] is None
 
 
-def test_phrases_that_no_file_may_hold_are_refused_before_any_episode(monkeypatch):
+def test_unusable_vocabulary_is_refused(monkeypatch):
     class Wordy(Posts):
         name, vocabulary = "wordy", TaskVocabulary(tested="two posts\nin a row")
 
