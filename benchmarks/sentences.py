@@ -27,7 +27,7 @@ from drone_rl.trust import evaluate as evaluation
 from drone_rl.trust import export as card
 from drone_rl.trust import shifts_text as shifts
 from drone_rl.trust import verdict_text as verdict
-from drone_rl.trust.quoted_text import BRIEF
+from drone_rl.trust.shifts_text import BRIEF
 from drone_rl.utils import text as seeds
 from drone_rl.utils.text import Claims, Paragraph, said
 

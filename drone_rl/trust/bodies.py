@@ -109,6 +109,8 @@ def bodies(
     names = [policy.name for policy in loaded]
     if not names:
         raise InputError("policies=[] is empty; give at least one policy")
+    if settings.loop_flights and in_the_loop is None:
+        raise InputError(f"loop_flights={settings.loop_flights} needs in_the_loop=")
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise InputError(f"two policies are called {twice}; give each once, or rename a file")
     shared = settings.as_base(JudgeSettings)
@@ -125,7 +127,7 @@ def bodies(
             done = judge(policy, shared, **how, progress=silent, drawn_seed=seed)
             verdicts[body] = done.verdict.as_dict()
     numbers: dict[str, Any] = {"bodies": [*settings.bodies], **seed.as_dict(), "policies": found}
-    if settings.loop_flights and in_the_loop:
+    if in_the_loop is not None and settings.loop_flights:
         looped = numbers[LOOPED] = {}
         for policy in loaded:
             progress(f"{policy.name}: {LOOPED}", steps - len(loaded) + len(looped), steps)

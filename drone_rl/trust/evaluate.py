@@ -19,9 +19,9 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.sim.tasks import as_task
 from drone_rl.trust.baselines import run_baselines
-from drone_rl.trust.conditions_text import unlike as unlike_text
 from drone_rl.trust.metrics import summarise
 from drone_rl.trust.rounding_sensitivity import run_compared
+from drone_rl.trust.verdict_text import unlike as unlike_text
 from drone_rl.utils.display import Result, aligned, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Progress, as_progress

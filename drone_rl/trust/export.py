@@ -15,8 +15,8 @@ from drone_rl.policies.zoo.files import exported_bytes
 from drone_rl.sim.vocabulary import some_cubes, terms_of
 from drone_rl.trust.coverage import find_domain
 from drone_rl.trust.evaluate import held_out_environments
-from drone_rl.trust.quoted_text import QUOTED, not_evaluated
-from drone_rl.trust.quoted_text import is_quoted as has_domain
+from drone_rl.trust.shifts_text import QUOTED, not_evaluated
+from drone_rl.trust.shifts_text import is_quoted as has_domain
 from drone_rl.trust.verdict import FindClaim, Verdict, judge_policy
 from drone_rl.trust.verdict_text import best_baseline, is_quoted
 from drone_rl.utils.errors import InputError

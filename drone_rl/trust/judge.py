@@ -21,12 +21,11 @@ from drone_rl.policies.policy import BasePolicy, Policy
 from drone_rl.trust.baselines import BASELINES
 from drone_rl.trust.coverage import Coverage, compare_with_required, find_domain, recheck_domain
 from drone_rl.trust.evaluate import held_out_environments
-from drone_rl.trust.quoted_text import BRIEF, why_not
 from drone_rl.trust.recorded import identify
 from drone_rl.trust.rule import Rule
 from drone_rl.trust.shifts_file import SavedShifts
+from drone_rl.trust.shifts_text import BRIEF, why_not
 from drone_rl.trust.verdict import FindClaim, Verdict, judge_policy
-from drone_rl.trust.verdict_text import quantity_label
 from drone_rl.utils.display import Result, aligned, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.exit_codes import NOT_COVERED, PROOF_MISSING
@@ -97,16 +96,7 @@ class Judgement(Result):
         return "\n".join(filter(None, (line, self.domain, required, seed)))
 
     def _repr_html_(self) -> str:
-        evidence = self.verdict.evidence
-        success = evidence["greedy"]["success"]
-        rate = [success[key] for key in ("share", "lower95", "upper95")]
-        figures = {"success rate (95% interval)": rate} | {
-            quantity_label(name, evidence): [q[key] for key in ("value", "lower", "upper")]
-            for name, q in evidence["quantities"].items()
-        }
-        shown = [[k, *("" if v is None else f"{v:.3f}" for v in row)] for k, row in figures.items()]
-        lines = "".join(map(paragraph, str(self).splitlines()))
-        return lines + table(["quantity", "value", "lower", "upper"], shown)
+        return "".join(map(paragraph, str(self).splitlines()))
 
 
 class Judgements(Result, tuple[Judgement, ...]):
@@ -252,7 +242,13 @@ def judge_one(
         name = str(loaded.path)
     claim = measured = coverage = None
     if loaded is None:
-        _refuse_files(name, certificate=certificate, shifts=shifts, require_domain=require_domain)
+        files = {"certificate": certificate, "shifts": shifts, "require_domain": require_domain}
+        for setting, path in files.items():
+            if path is not None:
+                raise InputError(
+                    f"{setting}={path}, but policy={name} has no network; give {setting}= with the "
+                    "policy that it is of"
+                )
         own = Changes(TaskSettings).read(as_changes(task, "task"), "task")
         air = Changes(DynamicsSettings).read(as_changes(dynamics, "dynamics"), "dynamics")
         moved = DynamicsSettings(**air)
@@ -315,16 +311,6 @@ def _reflown(
 def _quoted(measured: SavedShifts, verdict: Verdict) -> dict[str, Any]:
     """Evidence of the sentences about the operating domain."""
     return {"shifts": measured.evidence, "verdict": verdict.evidence}
-
-
-def _refuse_files(name: str, **given: str | Path | None) -> None:
-    """Refuse files of a network for a baseline."""
-    for setting, path in given.items():
-        if path is not None:
-            raise InputError(
-                f"{setting}={path}, but policy={name} has no network; give {setting}= with the "
-                "policy that it is of"
-            )
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import torch
@@ -135,11 +135,11 @@ class PairedEvaluator:
             stages = {0: Condition(), ONSET_STEP: condition}
         stage = _Stage(self, stages[0], mode, agent)
         start = stage.worlds.start(self._drawn, self._seeds)
+        active = torch.arange(len(start), device=start.end_reason.device)
+        final, state = start[active], start
         trace = torch.zeros(len(start), dtype=torch.float64, device=stage.worlds.device)
         decided: list[Tensor] = []
-
-        def step(number: int, state: State, active: Tensor) -> tuple[State, Tensor]:
-            nonlocal stage
+        for number in itertools.count():
             if number and number in stages:
                 stage = _Stage(self, stages[number], mode, agent)
             delay = stage.delay
@@ -151,9 +151,13 @@ class PairedEvaluator:
             decided.append(action.new_zeros(len(start), *action.shape[1:]))
             decided[-1][active] = action
             state, _ = stage.worlds.advance(state, decided[max(number - delay, 0)][active])
-            return state, state.end_reason == 0
-
-        final, worlds = rollout(start, step), stage.worlds
+            final[active] = state
+            is_active = state.end_reason == 0
+            if not is_active.all():
+                state, active = state[is_active], active[is_active]
+            if not len(active):
+                break
+        worlds = stage.worlds
         episodes = CompleteEpisodes.ended(worlds.task, worlds.info(final), final.steps)
         return ConditionResult(episodes, trace.cpu())
 
@@ -177,24 +181,6 @@ class PairedEvaluator:
         """Close the renderers."""
         for worlds in self._built.values():
             worlds.close()
-
-
-def rollout(start: State, step: Callable[[int, State, Tensor], tuple[State, Tensor]]) -> State:
-    """Step a batch of n scenes from initial states until each is over; return the final states.
-
-    `step` is called with the number of the step, the states of the active scenes and their indices.
-    It returns the next states and which of them remain active, shape (number active,), bool.
-    """
-    active = torch.arange(len(start), device=start.end_reason.device)
-    final, state = start[active], start
-    for number in itertools.count():
-        state, is_active = step(number, state, active)
-        final[active] = state
-        if not is_active.all():
-            state, active = state[is_active], active[is_active]
-        if not len(active):
-            break
-    return final
 
 
 class _Stage:

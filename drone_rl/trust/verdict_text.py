@@ -1,10 +1,10 @@
 """Sentences of a verdict. Evidence: `verdict.json`."""
 
+import json
 from collections.abc import Callable
 from typing import Any
 
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.trust.conditions_text import unlike
 from drone_rl.utils.text import (
     Evidence,
     Sentence,
@@ -26,6 +26,8 @@ _ACTING = {
     "left": "flying left",
     "right": "flying right",
 }
+_MAX_NAMED = 4
+"""Greatest number of items in a sentence; the last one counts the settings that do not fit."""
 
 
 def is_quoted(evidence: Evidence) -> bool:
@@ -302,24 +304,28 @@ def _sampled_difference(evidence: Evidence) -> str:
     )
 
 
-def quantity_label(name: str, evidence: Evidence) -> str:
-    """Return the label of one of the rule's quantities, by name."""
-    terms, share = terms_of(evidence), f"{100 * evidence['good_share']:g}%"
-    kind, _, of = name.partition(" ")
-    baseline = of.removeprefix("by ")
-    return {
-        "success": f"success rate above {share} of the oracle's (margin, good if above 0)",
-        "offered": f"episodes that offer {terms.goals} {of} (fraction)",
-        "collected": f"{terms.goals} {terms.reached} {of} (fraction)",
-        "above": (
-            f"{terms.goals} {terms.reached} beyond a sixth of the way from {of} to the oracle "
-            "(margin)"
-        ),
-        "unsolved": (
-            f"{share} of the oracle's success rate above that of {baseline} (margin, trivial if "
-            "not above 0)"
-        ),
-    }.get(kind, name)
+def unlike(evidence: Evidence) -> str:
+    """Return how dynamics and appearance (dotted names) differ from those of training."""
+    differences = evidence["unlike"]
+    parts = [
+        f"{name if '.' in name else f'dynamics.{name}'}={_said(of['flown'])} instead of "
+        f"{_said(of['own'])}"
+        for name, of in differences.items()
+    ]
+    if len(parts) > _MAX_NAMED:
+        parts[_MAX_NAMED - 1 :] = [f"{len(parts) - _MAX_NAMED + 1} other changed settings"]
+    moved = [] if all("." in name for name in differences) else ["other dynamics"]
+    seen = ["another appearance"] if any("." in name for name in differences) else []
+    return f"It was trained with {listed(moved + seen)}: here it flew with {listed(parts)}."
+
+
+def _said(value: Any) -> str:
+    """Return a value as one types it in a setting."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_said, value))}]"
+    if isinstance(value, float):
+        return f"{value:.12g}"  # without ".0"
+    return value if isinstance(value, str) else json.dumps(value)
 
 
 SENTENCES = (

@@ -230,8 +230,7 @@ def render_step(base: DroneEnv) -> StepImages:
     strip = worlds.render_all(worlds.state, five, look)["rgb"][0]
     body, dynamics, panel = worlds.state.body, worlds.dynamics, None
     if isinstance(body, FlightState) and isinstance(dynamics, Quadrotor):
-        reading, settings = instruments.read(body), dynamics.settings
-        panel = instruments.panel(reading, settings.velocity_limit, settings.hover_throttle)
+        panel = instruments.panel(instruments.read(body), dynamics.settings.hover_throttle)
     return StepImages(base.last_pixels[0], chase, strip, panel)
 
 

@@ -104,7 +104,7 @@ def test_positions_on_an_inverse_scale():
     of_visibility = axis(INVERSE, math.inf)
     assert of_visibility.position(50.0) == pytest.approx(0.02)
     assert of_visibility.between(math.inf, 50.0) == pytest.approx(100.0)
-    assert INVERSE.back(0.0) == math.inf
+    assert INVERSE.inverse(0.0) == math.inf
 
 
 def test_strengths_between_whole_numbers():

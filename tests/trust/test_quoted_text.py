@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.evidence import SHIFTS, VERDICT, changed
-from drone_rl.trust.quoted_text import QUOTED, is_quoted, not_evaluated, why_not
+from drone_rl.trust.shifts_text import QUOTED, is_quoted, not_evaluated, why_not
 from drone_rl.utils.text import said
 
 GOOD = {"verdict": {**VERDICT, "kind": "good", "certain": True}, "shifts": SHIFTS}
