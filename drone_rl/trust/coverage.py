@@ -103,7 +103,7 @@ class Coverage(Result):
 
 
 def find_domain(
-    policy: BasePolicy, given: str | Path | None = None, outputs: str | Path = "outputs"
+    policy: BasePolicy, shifts: str | Path | None = None, outputs: str | Path = "outputs"
 ) -> SavedShifts | None:
     """Find the robustness evaluation of a policy in its task; return None if there is none.
 
@@ -116,15 +116,15 @@ def find_domain(
         InputError: The given file is unreadable, of another network or task, or contradicts itself.
     """
     if not isinstance(policy, Policy):
-        if given is not None:
+        if shifts is not None:
             raise InputError(
-                f"policy={policy.name} is not a drone_rl policy file, so shifts={given} can't be "
+                f"policy={policy.name} is not a drone_rl policy file, so shifts={shifts} can't be "
                 "matched to its weights; leave shifts out"
             )
         return None
     of = policy.description, policy.state["policy"]
-    if given is not None:
-        path = as_path(given, "shifts")
+    if shifts is not None:
+        path = as_path(shifts, "shifts")
         return read_shifts(path / "shifts.json" if path.is_dir() else path, *of)
     adjacent = shifts_path(policy.path)
     if adjacent.is_file():
@@ -134,14 +134,14 @@ def find_domain(
             return SavedShifts(adjacent, None, refused=str(error))
     folder = as_path(outputs, "outputs") / "shifts"
     there = [*folder.glob("runs/*/shifts.json"), *folder.glob("multiruns/*/*/shifts.json")]
-    found = None
+    newest = None
     for path in sorted(there, key=lambda p: p.stat().st_mtime, reverse=True)[:MAX_FILES]:
         with suppress(InputError):  # of another policy
             measured = read_shifts(path, *of)
             if measured.has_ranges:
                 return measured
-            found = found or measured
-    return found
+            newest = newest or measured
+    return newest
 
 
 def read_requirements(path: Path) -> dict[str, Need]:
@@ -154,12 +154,12 @@ def read_requirements(path: Path) -> dict[str, Need]:
     """
     parse = parse_json if path.suffix == ".json" else parse_yaml
     try:
-        given = as_mapping(parse(read_bytes(path, YAML_BYTES), "the file"), "the file")
-        if not given:
+        required = as_mapping(parse(read_bytes(path, YAML_BYTES), "the file"), "the file")
+        if not required:
             raise InputError(
                 "the file is empty; give axes, as in {fog: {low: 60, unit: m of sight}}"
             )
-        return {name: _read_need(name, need) for name, need in given.items()}
+        return {name: _read_need(name, need) for name, need in required.items()}
     except InputError as error:
         raise InputError(f"require_domain={path}: {error}") from None
 
@@ -235,12 +235,12 @@ def recheck_domain(
     with closing(PairedEvaluator(subject, settings.domain_flights, seed.value)) as evaluator:
         oracle = evaluator.run(Condition(), agent=OracleAgent(only_visible=False)).episodes
         prober = Prober(evaluator, oracle, settings.good_share, plain_part=1 / count)
-        found = [contradicted(None, 0.0, "", prober.plain)]
+        contradictions = [contradicted(None, 0.0, "", prober.plain)]
         for axis, strengths in tried.items():
             for strength in strengths:
                 probed = prober.probe(axis.make(strength, subject), 1 / count)
                 value = axis.value(strength, subject)
-                found.append(contradicted(axis.name, value, axis.unit, probed))
+                contradictions.append(contradicted(axis.name, value, axis.unit, probed))
     return DomainRecheck(
         episodes=settings.domain_flights,
         seed=seed.value,
@@ -249,7 +249,7 @@ def recheck_domain(
             axis.name: tuple(axis.value(strength, subject) for strength in strengths)
             for axis, strengths in tried.items()
         },
-        contradictions=tuple(line for line in found if line is not None),
+        contradictions=tuple(line for line in contradictions if line is not None),
     )
 
 

@@ -156,14 +156,14 @@ class Prober:
             self._baselines[key] = self._evaluator.run_baselines(condition)
         rule = self.rule_at(part)
         baselines = {**self._baselines[key], "oracle": self._oracle}
-        found = measure_open(greedy, baselines, rule, agent.is_fragile)
+        quantities = measure_open(greedy, baselines, rule, agent.is_fragile)
         return {
-            "good": is_surely_good(found, rule),
-            "bad": VerdictKind.GOOD not in _kinds(found, rule),
+            "good": is_surely_good(quantities, rule),
+            "bad": VerdictKind.GOOD not in _kinds(quantities, rule),
             "refused": None,
             "success": float(greedy.success.mean()),
             "fragile": int(agent.is_fragile.sum()),
-            "worst": _worst(found, rule),
+            "worst": _worst(quantities, rule),
         }
 
     def search(self, axis: Axis) -> dict[str, Any]:
@@ -199,13 +199,13 @@ class Prober:
         ]
         return range_of(axis, ends, failed, self._evaluator.subject)
 
-    def _explain(self, axis: Axis, strength: float, found: dict[str, Any]) -> dict[str, Any]:
-        if found["refused"] is not None or not has_oracle(self._oracle.task):
-            return {**found, "oracle": None, "impossible": False}
+    def _explain(self, axis: Axis, strength: float, probed: dict[str, Any]) -> dict[str, Any]:
+        if probed["refused"] is not None or not has_oracle(self._oracle.task):
+            return {**probed, "oracle": None, "impossible": False}
         condition = axis.make(strength, self._evaluator.subject)
         success = self._evaluator.run(condition, agent=OracleAgent()).episodes.success
         seen = proportion(int(success.sum()), len(success))
-        return {**found, "oracle": seen, "impossible": seen["upper95"] < self._possible}
+        return {**probed, "oracle": seen, "impossible": seen["upper95"] < self._possible}
 
 
 def measure_open(
@@ -228,26 +228,26 @@ def measure_open(
     return quantities
 
 
-def is_surely_good(found: Mapping[str, Quantity], rule: Rule) -> bool:
+def is_surely_good(quantities: Mapping[str, Quantity], rule: Rule) -> bool:
     """Return whether the verdict is certainly good and certainly above all baselines."""
-    sees = all(found[f"above {name}"].levels[0] > 0 for name in rule.blind_baselines)
-    return sees and _kinds(found, rule) == {VerdictKind.GOOD}
+    sees = all(quantities[f"above {name}"].levels[0] > 0 for name in rule.blind_baselines)
+    return sees and _kinds(quantities, rule) == {VerdictKind.GOOD}
 
 
-def _kinds(found: Mapping[str, Quantity], rule: Rule) -> frozenset[VerdictKind]:
+def _kinds(quantities: Mapping[str, Quantity], rule: Rule) -> frozenset[VerdictKind]:
     """Return all kinds that the intervals admit."""
-    box = tuple(quantity.levels for quantity in found.values())
+    box = tuple(quantity.levels for quantity in quantities.values())
     return kinds_within(box, len(rule.strata))
 
 
-def _worst(found: Mapping[str, Quantity], rule: Rule) -> dict[str, Any] | None:
+def _worst(quantities: Mapping[str, Quantity], rule: Rule) -> dict[str, Any] | None:
     """Return the stratum with the smallest fraction of goals reached, None if unknown."""
-    shares = {s: found[f"collected {s}"].value for s in rule.strata}
-    known = {stratum: share for stratum, share in shares.items() if share is not None}
-    if not known:
+    shares = {s: quantities[f"collected {s}"].value for s in rule.strata}
+    rates = {stratum: share for stratum, share in shares.items() if share is not None}
+    if not rates:
         return None
-    side = min(known, key=lambda stratum: known[stratum])
-    return {"side": side, "share": known[side]}
+    side = min(rates, key=lambda stratum: rates[stratum])
+    return {"side": side, "share": rates[side]}
 
 
 def _course(axis: Axis, side: list[float], seed: int) -> Iterator[float]:

@@ -87,12 +87,12 @@ def recorded_origin(path: Path, state: dict[str, Any]) -> tuple[str | None, dict
 
     The command is None if it is unknown, as of a run that was trained from Python.
     """
-    own = state if path.suffix == ".safetensors" else {}  # nobody checked that of a checkpoint
-    noted, folder = own.get("command"), path.absolute().parent.parent
+    metadata = state if path.suffix == ".safetensors" else {}  # nobody checked that of a checkpoint
+    noted, folder = metadata.get("command"), path.absolute().parent.parent
     if noted is None and (folder / ".hydra" / "overrides.yaml").is_file():
         typed = [o for o in read_overrides(folder) if not o.startswith(("resume=", "trial="))]
         noted = shlex.join(["drone-rl", "train", *typed])
-    return noted, own.get("chosen")
+    return noted, metadata.get("chosen")
 
 
 def export_policy(
@@ -157,8 +157,8 @@ def write_card(name: str, digest: str, about: Evidence) -> str:
     """
     sentences = said(SENTENCES, about)
     verdict = sentences.pop("card.verdict")
-    known = about["provenance"]["versions"]
-    packages = {name: known.get(name, "unknown") for name in ("torch", "torchrl", "mujoco-warp")}
+    versions = about["provenance"]["versions"]
+    packages = {name: versions.get(name, "unknown") for name in ("torch", "torchrl", "mujoco-warp")}
     revision = about["provenance"]["git_revision"] or "unknown"
     points = "\n".join(f"- {text}" for text in sentences.values())
     by = "" if about["command"] is None else f"by `{about['command']}` "

@@ -249,11 +249,13 @@ def judge_one(
                     f"{setting}={path}, but policy={name} has no network; give {setting}= with the "
                     "policy that it is of"
                 )
-        own = Changes(TaskSettings).read(as_changes(task, "task"), "task")
-        air = Changes(DynamicsSettings).read(as_changes(dynamics, "dynamics"), "dynamics")
-        moved = DynamicsSettings(**air)
-        moved.check_air()
-        worlds = _baseline(name, TaskSettings(**own), moved, settings, seed)
+        changed_task = Changes(TaskSettings).read(as_changes(task, "task"), "task")
+        changed_dynamics = Changes(DynamicsSettings).read(
+            as_changes(dynamics, "dynamics"), "dynamics"
+        )
+        drone = DynamicsSettings(**changed_dynamics)
+        drone.check_air()
+        worlds = _baseline(name, TaskSettings(**changed_task), drone, settings, seed)
     else:
         measured = find_domain(loaded, shifts, outputs)
         needs = require_domain
@@ -277,11 +279,11 @@ def judge_one(
         )
     progress("judged", 1, 1)
     path = None if claim is None else claim.path
-    done = Judgement(name, settings, verdict, path, measured, identify(loaded))
+    judgement = Judgement(name, settings, verdict, path, measured, identify(loaded))
     if coverage is None or measured is None:
-        return done
+        return judgement
     against = why_not(_quoted(measured, verdict))
-    return dataclasses.replace(done, coverage=dataclasses.replace(coverage, against=against))
+    return dataclasses.replace(judgement, coverage=dataclasses.replace(coverage, against=against))
 
 
 def _loaded(policy: Any, outputs: str | Path, changed: Mapping[str, Any]) -> BasePolicy | None:

@@ -205,10 +205,9 @@ class _Stage:
         """Everything that the agent may use at the next step."""
         appearances, condition = self._evaluator.appearances, self._condition
         variation = [part.to(self.worlds.device)[active] for part in next(self._variations)]
-        own = appearances.current(active) if appearances.varies else self._own
+        appearance = appearances.current(active) if appearances.varies else self._own
         if self._full is not None:
-            own = self._full if own is None else own.over(self._full)
-        appearance = own
+            appearance = self._full if appearance is None else appearance.over(self._full)
         for part, by in zip(
             (*condition.appearance_changes, *condition.mounts), variation, strict=True
         ):

@@ -118,9 +118,9 @@ def scene_appearance(scene: Scene) -> Appearance:
 
     A class whose geoms differ in color is left out, so that it stays as in the model.
     """
-    known = {*scene.semantic_classes} - {SemanticClass.DISTRACTOR}
-    found = {m: {*map(tuple, scene.colors[scene.geoms(m), :3].tolist())} for m in known}
-    colors = {m: next(iter(own)) for m, own in found.items() if len(own) == 1}
+    classes = {*scene.semantic_classes} - {SemanticClass.DISTRACTOR}
+    by_class = {m: {*map(tuple, scene.colors[scene.geoms(m), :3].tolist())} for m in classes}
+    colors = {m: next(iter(own)) for m, own in by_class.items() if len(own) == 1}
     model = scene.model
     lights = (model.light_ambient[0], model.light_diffuse[0], model.light_dir[0])
     ambient, sun, direction = (tuple(light.tolist()) for light in lights)

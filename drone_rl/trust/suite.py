@@ -49,12 +49,12 @@ class Suite:
             Plain values: "plain", without perturbation; "axes", by name; and "together", all axes
             combined, each at its third strength.
         """
-        found = {axis.name: self.along(axis, numbers, report) for axis in axes}
+        by_axis = {axis.name: self.along(axis, numbers, report) for axis in axes}
         report("all together")
         parts = (axis.make(axis.strengths[TOGETHER - 1], self._evaluator.subject) for axis in axes)
         together = functools.reduce(lambda a, b: a | b, parts, Condition())
         plain = {"oracle": _success(self.oracle), **self._figures(self.plain)}
-        return {"plain": plain, "axes": found, "together": self.level(together)}
+        return {"plain": plain, "axes": by_axis, "together": self.level(together)}
 
     def along(self, axis: Axis, numbers: Sequence[int], report: Report) -> dict[str, Any]:
         """Measure one axis at some of its strengths."""

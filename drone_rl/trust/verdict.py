@@ -175,8 +175,8 @@ def check_judged(task: Task[Any], actions: Actions) -> None:
 
 def _rule_of(rule: Rule | None, task: Task[Any]) -> Rule:
     """Return the rule for a task's strata and baselines; an `InputError` if it has none."""
-    own = {"strata": task.strata, "blind_baselines": task.blind_baselines}
-    return dataclasses.replace(rule or Rule(), **own)
+    of_task = {"strata": task.strata, "blind_baselines": task.blind_baselines}
+    return dataclasses.replace(rule or Rule(), **of_task)
 
 
 def apply_rule(
@@ -212,9 +212,12 @@ def apply_rule(
     for other in (*baselines.values(), greedy if sampled is None else sampled):
         if not torch.equal(other.goals.world, greedy.goals.world):
             raise ValueError("policy and baselines have different initial states; use the same")
-    found = measure(greedy, baselines, rule)
-    kind = decide([quantity.level for quantity in found], len(rule.strata))
-    is_enough, is_open = _is_certain(found, rule), rounding is not None and rounding.is_excessive
+    quantities = measure(greedy, baselines, rule)
+    kind = decide([quantity.level for quantity in quantities], len(rule.strata))
+    is_enough, is_open = (
+        _is_certain(quantities, rule),
+        rounding is not None and rounding.is_excessive,
+    )
     certain, depends = is_enough and not is_open, is_enough and is_open
     evidence = {
         "kind": kind.value,
@@ -238,7 +241,9 @@ def apply_rule(
         if sampled is None
         else mean_bounds(sampled.success - greedy.success, -1.0, 1.0),
         "failures": failure_table(greedy),
-        "quantities": {name: q._asdict() for name, q in zip(rule.quantities, found, strict=True)},
+        "quantities": {
+            name: q._asdict() for name, q in zip(rule.quantities, quantities, strict=True)
+        },
         "enough": _enough(greedy, baselines, rule) if is_enough or not is_open else None,
         **({"unlike": dict(unlike)} if unlike else {}),
     }

@@ -209,24 +209,24 @@ def depends_on_rounding(evidence: Evidence) -> bool:
 
 
 def _rounding(evidence: Evidence) -> str:
-    found = evidence["rounding"]
+    check = evidence["rounding"]
     text = (
         "Not certain: decisions depend on rounding. In "
-        f"{found['fragile']:,} of {found['frames']:,} frames ({percent(found['fragile_rate'])}) "
+        f"{check['fragile']:,} of {check['frames']:,} frames ({percent(check['fragile_rate'])}) "
         "the order in which float32 sums are computed can change the action, in "
-        f"{found['fragile_episodes']:,} of {found['episodes']:,} episodes"
+        f"{check['fragile_episodes']:,} of {check['episodes']:,} episodes"
     )
-    if found["unexplained"]:
-        count = f"{found['unexplained']:,} of {found['compared_episodes']:,} episodes"
-        took = "took other actions" if found.get("bound", True) else "gave other results"
-        text += f"; {found['compared']} {took} in {count} for no such reason"
+    if check["unexplained"]:
+        count = f"{check['unexplained']:,} of {check['compared_episodes']:,} episodes"
+        took = "took other actions" if check.get("bound", True) else "gave other results"
+        text += f"; {check['compared']} {took} in {count} for no such reason"
     return f"{text}."
 
 
 def _arithmetic(evidence: Evidence) -> str:
-    found = evidence["rounding"]
-    tried = "" if found.get("bound", True) else "; effects of rounding were estimated, not bounded"
-    return f"The verdict holds for {found['arithmetic']}{tried}."
+    check = evidence["rounding"]
+    tried = "" if check.get("bound", True) else "; effects of rounding were estimated, not bounded"
+    return f"The verdict holds for {check['arithmetic']}{tried}."
 
 
 def _shares(evidence: Evidence) -> str:
