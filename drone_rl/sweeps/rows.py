@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_sweep
-from drone_rl.trust.rule import SIDES, Kind, Rule
+from drone_rl.trust.rule import SIDES, Rule, VerdictKind
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.readers import read_result, read_table
 from drone_rl.utils.schema import Flag, Maybe, OneOf, Real, Whole
@@ -63,7 +63,7 @@ class Row:
     @property
     def kind(self) -> str | None:
         """One of `KINDS`, without sides; None without a verdict."""
-        return None if self.verdict is None else Kind(self.verdict["kind"]).family
+        return None if self.verdict is None else VerdictKind(self.verdict["kind"]).family
 
     @property
     def is_certain(self) -> bool:
@@ -166,7 +166,7 @@ def _read_row(run: Run, choice: dict[str, str], folder: str) -> Row:
     return row
 
 
-_KIND = OneOf(tuple(kind.value for kind in Kind))
+_KIND = OneOf(tuple(kind.value for kind in VerdictKind))
 _RESULT = {
     "frames": Whole(0, 10**15),
     "episodes": Whole(0, 10**12),

@@ -5,8 +5,8 @@ from typing import Any
 
 from drone_rl.explanations.report.explanation import METHOD_NAMES
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.trust import quoted_text, shifts_text
-from drone_rl.trust.rule import Kind
+from drone_rl.trust import shifts_text
+from drone_rl.trust.rule import VerdictKind
 from drone_rl.trust.verdict_text import is_proved, is_quoted, is_stated
 from drone_rl.utils.text import Claims, Evidence, listed, plural, rate
 
@@ -50,7 +50,7 @@ def _missing(line: str) -> Claims:
 def _say_verdict(evidence: Evidence) -> Claims:
     verdict, terms, claims = evidence["verdict"], terms_of(evidence), Claims()
     greedy, kind = verdict["greedy"], verdict["kind"]
-    kind = "neither good nor poor nor one-sided" if kind == str(Kind.NONE) else kind
+    kind = "neither good nor poor nor one-sided" if kind == str(VerdictKind.NONE) else kind
     if verdict["certain"]:
         claims["summary.verdict"] = (
             f"{kind.capitalize()}. This verdict is wrong with at most "
@@ -75,8 +75,8 @@ def _say_robustness(evidence: Evidence) -> Claims:
                 "Not measured; run drone-rl shifts on this policy and explain it again."
             )
         }
-    if not quoted_text.is_quoted(evidence):
-        why = quoted_text.why_not(evidence)
+    if not shifts_text.is_quoted(evidence):
+        why = shifts_text.why_not(evidence)
         return {"summary.robustness_refused": f"Measured, but not shown here: {why}."}
     count = plural(len(shifts["axes"]), "perturbation")
     if shifts["domain"] is None:
@@ -143,7 +143,7 @@ def _say_heat(truth: Mapping[str, Any]) -> Claims:
 
 def _say_limits(evidence: Evidence) -> Claims:
     parts = ["real cameras and drones"]
-    if evidence.get("verdict") and (names := quoted_text.not_evaluated(evidence)):
+    if evidence.get("verdict") and (names := shifts_text.not_evaluated(evidence)):
         parts.append(f"other {listed(names, 'or')}")
     left_out = evidence.get("left_out") or {}
     if left_out:

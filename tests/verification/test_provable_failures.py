@@ -6,8 +6,8 @@ from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies.baselines import constant_policy
 from drone_rl.sim.actions import Move
-from drone_rl.trust.rollouts import find_failures
 from drone_rl.utils.seeding import world_random_state
+from drone_rl.verification.provable import find_failures
 
 TASK = TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60)
 

@@ -12,7 +12,7 @@ from tests.continuous import SETTINGS
 from tests.second_task import Posts
 
 
-def test_the_oracle_does_what_the_tasks_rule_says():
+def test_oracle_follows_the_rule_of_the_task():
     info = {
         "drone": torch.zeros(3, 3),
         "cube_positions": torch.tensor([[[9.0, y, 0.0]] for y in (4.0, 0.1, -4.0)]),
@@ -24,7 +24,7 @@ def test_the_oracle_does_what_the_tasks_rule_says():
     assert oracle_policy(Posts()).in_keys == [("info", "end_reason")]
 
 
-def test_a_task_without_an_oracle_says_so_in_one_line():
+def test_task_without_an_oracle_is_refused():
     class Blind(Posts):
         name, oracle = "fog", None
 
@@ -33,14 +33,14 @@ def test_a_task_without_an_oracle_says_so_in_one_line():
     assert "\n" not in str(e.value)
 
 
-def test_chance_draws_all_actions_alike_and_habit_takes_one():
+def test_random_and_constant_actions():
     done = TensorDict({"done": torch.zeros(3000, 1, dtype=torch.bool)}, [3000])
     drawn = random_policy(MOVES, torch.Generator().manual_seed(0))(done)["action"]
     assert all(900 < int((drawn == action).sum()) < 1100 for action in Move)
     assert constant_policy(Move.RIGHT)(done)["action"].unique().tolist() == [2]
 
 
-def test_chance_and_habit_have_continuous_actions_too():
+def test_random_and_constant_continuous_actions():
     actions = ContinuousActions.of(SETTINGS)
     done = TensorDict({"done": torch.zeros(3000, 1, dtype=torch.bool)}, [3000])
     drawn = random_policy(actions, torch.Generator().manual_seed(0))(done)["action"]
@@ -50,7 +50,7 @@ def test_chance_and_habit_have_continuous_actions_too():
     assert habit.shape == (3000, 3) and habit[7].tolist() == [-1, -1, 0]
 
 
-def test_the_oracle_flies_what_has_actions_of_the_same_names():
+def test_oracle_with_continuous_actions():
     info = {
         "drone": torch.zeros(3, 3),
         "cube_positions": torch.tensor([[[9.0, y, 0.0]] for y in (4.0, 0.1, -4.0)]),

@@ -1,10 +1,15 @@
 import pytest
 import torch
 
-from drone_rl.collectors import EpisodeCollector
-from drone_rl.collectors.complete_episodes import run_episodes
+import drone_rl
+from drone_rl.collectors.complete_episodes import (
+    StepLog,
+    episode_batches,
+    final_episodes,
+    run_episodes,
+)
 from drone_rl.config import TaskSettings
-from drone_rl.envs import DroneEnv
+from drone_rl.envs import DroneEnv, base_env
 from drone_rl.policies.baselines import constant_policy, oracle_policy, random_policy
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.tasks.collect_cubes import EndReason
@@ -16,13 +21,13 @@ from drone_rl.utils.seeding import Stream
     "settings",
     [TaskSettings(), TaskSettings(num_cubes=5), TaskSettings(step_length=0.5, cube_size=1.0)],
 )
-def test_oracle_collects_everything(settings):
+def test_oracle_collects_all_cubes(settings):
     env = DroneEnv(100, settings, pixels=False, stream=Stream.REPORT)
     summary = summarise(run_episodes(env, oracle_policy(settings), 100))
     assert summary["success"]["share"] == 1.0
 
 
-def test_random_policy_collects_what_the_original_studys_did():
+def test_random_policy_matches_the_original_study():
     env = DroneEnv(500, pixels=False)
     policy = random_policy(MOVES, torch.Generator().manual_seed(0))
     summary = summarise(run_episodes(env, policy, 500))
@@ -30,13 +35,13 @@ def test_random_policy_collects_what_the_original_studys_did():
     assert 125 < summary["mean_length"] < 142  # 133 there
 
 
-def test_exactly_as_many_episodes_as_asked_for():
+def test_number_of_episodes():
     env = DroneEnv(8, pixels=False)
     episodes = run_episodes(env, oracle_policy(env.worlds.task.settings), 11)
     assert len(episodes.length) == 11
 
 
-def test_episodes_are_those_of_each_world_alone_in_order_and_the_first_of_them():
+def test_episodes_do_not_depend_on_the_batch_size():
     """Of 4 worlds, 10 episodes: three rounds, of which the last gives two worlds'."""
     policy = oracle_policy(TaskSettings())
     together = run_episodes(DroneEnv(4, pixels=False, seed=3), policy, 10)
@@ -50,7 +55,7 @@ def test_episodes_are_those_of_each_world_alone_in_order_and_the_first_of_them()
     assert len(together.length.unique()) > 3  # no two alike, or order would not show
 
 
-def test_greedy_flies_by_the_mode_and_sampling_by_the_odds(make_pipeline):
+def test_greedy_takes_the_mode_and_sampling_follows_the_probabilities(make_pipeline):
     """Odds of 0.4, 0.3 and 0.3: the mode flies straight on, 11 steps to the boundary."""
     task = TaskSettings(num_cubes=1, first_distance=4.0, front_margin=6.5, step_limit=40)
 
@@ -70,19 +75,6 @@ def test_greedy_flies_by_the_mode_and_sampling_by_the_odds(make_pipeline):
     assert 15 < float(sampled.mean()) < 40  # 11 / 0.4 = 27.5 less what hits a limit
 
 
-@pytest.mark.parametrize(("number", "batches"), [(1, 1), (8, 1), (9, 2), (16, 2)])
-def test_no_batch_is_flown_in_vain_and_no_picture_kept(make_pipeline, monkeypatch, number, batches):
-    collected, collect = [], EpisodeCollector.collect
-    monkeypatch.setattr(
-        EpisodeCollector, "collect", lambda *how: collected.append(collect(*how)) or collected[-1]
-    )
-    task = TaskSettings(num_cubes=1, first_distance=4.0, step_limit=4)
-    env, actor = make_pipeline(8, task=task)
-    assert len(run_episodes(env, actor, number)) == number
-    assert len(collected) == batches
-    assert not any("pixels" in batch for batch in collected)
-
-
 def test_heights_are_metres_above_the_drone():
     env = DroneEnv(4, TaskSettings(vertical_bound=1.0, altitude=5.0), pixels=False)
     start = env.state_dict()
@@ -94,7 +86,7 @@ def test_heights_are_metres_above_the_drone():
     assert flown.length.max() == 45  # 44 is still within bounds
 
 
-def test_the_kth_episode_is_the_same_world_whatever_the_policy():
+def test_initial_states_do_not_depend_on_the_policy():
     env = DroneEnv(8, TaskSettings(vertical_bound=1.0, altitude=5.0), pixels=False)
     start = env.state_dict()
     flown = []
@@ -110,14 +102,21 @@ def test_the_kth_episode_is_the_same_world_whatever_the_policy():
     assert theirs.lateral[:, 1:].isnan().all()  # never reached
 
 
-def test_greedy_repeats_and_sampling_does_not(make_pipeline):
-    settings = TaskSettings(num_cubes=1, first_distance=4.0, step_limit=20)
-
-    def lengths(greedy):
-        env, actor = make_pipeline(6, task=settings)
-        first = run_episodes(env, actor, 6, greedy=greedy).length
-        env.set_seed(0)
-        return first, run_episodes(env, actor, 6, greedy=greedy).length
-
-    assert torch.equal(*lengths(True))
-    assert not torch.equal(*lengths(False))
+@pytest.mark.parametrize(
+    ("is_compiled", "implementation"), [(True, "fused kernel"), (False, "PyTorch")]
+)
+def test_implementations_run_the_same_episodes(is_compiled, implementation):
+    """Of 4 environments, 6 episodes: two batches, of four and of two."""
+    policy, log = drone_rl.load_policy("good"), StepLog()
+    with policy.flying(4, seed=3) as (env, actor):
+        before = base_env(env).state_dict()
+        flown = run_episodes(env, actor, 6)
+        base_env(env).load_state_dict(before)
+        batches = episode_batches(env, actor, 6, is_compiled=is_compiled, log=log)
+        found = [final_episodes(env, batch) for batch in batches]
+    assert log.implementation == implementation
+    assert [len(one) for one in found] == [4, 2]
+    assert torch.cat([one.length for one in found]).equal(flown.length)
+    assert torch.cat([one.end_reason for one in found]).equal(flown.end_reason)
+    assert torch.cat([one.goals.reached for one in found]).equal(flown.goals.reached)
+    assert [len(actions) for actions in log.actions] == flown.length.tolist()
