@@ -20,7 +20,7 @@ from markupsafe import Markup
 
 from drone_rl.explanations.report import embedding
 from drone_rl.explanations.report.explanation import Explanation, Part
-from drone_rl.explanations.report.page import Policy, render_page
+from drone_rl.explanations.report.page import PolicyPage, render_page
 from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary
 from drone_rl.sweeps.report import render_page as render_sweep
 from drone_rl.utils.display import page, paragraph, table
@@ -161,7 +161,7 @@ class _Forged(Explanation):
 
 
 @dataclasses.dataclass(frozen=True)
-class _ForgedPolicy(Policy):
+class _ForgedPolicy(PolicyPage):
     """A policy that gives templates the payload for every text."""
 
     text: str = ""
@@ -169,7 +169,7 @@ class _ForgedPolicy(Policy):
     """Extras of parts that are slow to compute, by title."""
 
     def show(self, part: Part) -> dict[str, Any]:
-        """See `Policy`."""
+        """See `PolicyPage`."""
         explanation = self.explanation
         extras = self.extras.get(part.title) or part.extras(explanation)
         found = {n: [*said(may, explanation.numbers).values()] for n, may in part.text.items()}
@@ -185,7 +185,7 @@ class _ForgedPolicy(Policy):
             "actions": explanation.actions,
             "pictures": pictures,
             "text": {name: " ".join(claims) for name, claims in found.items()},
-            "found": found,
+            "claims": found,
             "terms": explanation.terms,
             "extras": extras,
         }

@@ -92,7 +92,6 @@ class ClassModel:
             {
                 **dataclasses.asdict(attempts.settings),
                 **values_of(attempts, attempts.best()),
-                "each_start": attempts.probabilities.tolist(),
                 "chosen": [a for a, i in enumerate(best) if i // starts == setting],
             }
             for setting, attempts in enumerate(self.tried)
@@ -102,7 +101,6 @@ class ClassModel:
             "starts": starts,
             "num_settings": len(self.tried),
             "highest": every.probabilities.amax(1).tolist(),
-            "starts_above_half": (every.probabilities > 0.5).sum(1).tolist(),
             "tried": rows,
         }
 

@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Literal
 
 import torch
 from captum.attr import IntegratedGradients, LayerGradCam, Saliency
@@ -79,17 +79,20 @@ class Explainer:
 
     def integrated_gradients(self, observations: Tensor, actions: Tensor) -> Tensor:
         """Return the absolute path integral from the baseline. Shape: (T, H, W)."""
-        return self._integrated(observations, actions).sum(1).abs()
+        quick = accelerated_gradients(self.network, wrt="pixels")
+        method = IntegratedGradients(self._forward("probability", quick))
 
-    def completeness_error(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """Return the absolute error of the sum of integrated gradients. Shape: (T,).
+        def attribute(x: Tensor, a: Tensor) -> Tensor:
+            return method.attribute(
+                x,
+                self.absent[None],
+                a,
+                method="riemann_middle",
+                n_steps=INTEGRATION_STEPS,
+                internal_batch_size=BATCH,
+            )
 
-        The exact integral sums to the action's probability minus that on the baseline.
-        """
-        total = self._integrated(observations, actions).flatten(1).sum(1)
-        there = probabilities(self.network, observations).gather(1, actions[:, None])[:, 0]
-        absent = probabilities(self.network, self.absent[None])[0][actions]
-        return (total - (there - absent)).abs()
+        return _in_batches(attribute, observations, actions).sum(1).abs()
 
     def occlusion(self, observations: Tensor, actions: Tensor) -> Tensor:
         """Return the change of the probability if a patch is replaced by the baseline. (T, H, W).
@@ -107,17 +110,6 @@ class Explainer:
         covered = windows.flatten(1).float()
         mean = change @ covered / covered.sum(0).clamp_min(1)
         return mean.view(-1, height, width).abs()
-
-    def _integrated(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """Return the path integral. Shape: (T, C, H, W)."""
-        quick = accelerated_gradients(self.network, wrt="pixels")
-        method = IntegratedGradients(self._forward("probability", quick))
-
-        def attribute(x: Tensor, a: Tensor) -> Tensor:
-            how: dict[str, Any] = {"n_steps": INTEGRATION_STEPS, "internal_batch_size": BATCH}
-            return method.attribute(x, self.absent[None], a, method="riemann_middle", **how)
-
-        return _in_batches(attribute, observations, actions)
 
     def _forward(
         self, objective: Objective, network: nn.Module | None = None

@@ -1,4 +1,4 @@
-"""Sections on one target: "response" and "places" (maps over its place), and "asymmetry"."""
+"""Sections on one target: "response" with "asymmetry", and "places" (maps over its place)."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -31,33 +31,23 @@ BLIND = 0.1  # a policy is blind to a target that changes its action probabiliti
 _RESPONSE, _OUTCOME = 0, 1  # numbers of the maps' grids
 
 
-def policy_response(context: Context) -> "ResponseMap":
-    """Return the response map of the policy, computed once."""
-    scenes, network, seed = context.scenes, context.network, context.seed.value
-    return context.shared("response", lambda: response_map(scenes, network, seed=seed))
-
-
-def response_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "response".
+def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Return "response", and "asymmetry": on the "dataset" and on the "grid" of the response map.
 
     Arrays: "response_..." and "outcome_...", the fields of `ResponseMap` and `OutcomeMap`.
     """
-    response = policy_response(context)
-    outcome = outcome_map(context.scenes, context.network, seed=context.seed.value)
+    scenes, network, seed = context.scenes, context.network, context.seed.value
+    data, actions = context.dataset, scenes.actions
+    response = response_map(scenes, network, seed=seed)
+    outcome = outcome_map(scenes, network, seed=seed)
     maps = {"response": vars(response), "outcome": vars(outcome)}
     arrays = {f"{n}_{key}": array for n, fields in maps.items() for key, array in fields.items()}
-    return {"response": summarise(response, outcome, context.scenes.task.strata)}, arrays
-
-
-def asymmetry_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return "asymmetry": on the "dataset" and on the "grid" of the response map."""
-    data, actions = context.dataset, context.scenes.actions
-    seen = data.tensor("observations")
+    on_frames = asymmetry(network, data.tensor("observations"), data.episode, actions)
     numbers = {
-        "dataset": asymmetry(context.network, seen, data.episode, actions),
-        "grid": grid_asymmetry(policy_response(context), actions),
+        "response": summarise(response, outcome, scenes.task.strata),
+        "asymmetry": {"dataset": on_frames, "grid": grid_asymmetry(response, actions)},
     }
-    return {"asymmetry": numbers}, {}
+    return numbers, arrays
 
 
 @dataclasses.dataclass
@@ -232,23 +222,12 @@ def asymmetry(
     }
 
 
-def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, Any]:
+def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, float]:
     """Compare a response map with its mirror image, which is the map read backwards."""
     here, there = response.probabilities, actions.mirror(response.probabilities[:, :, ::-1])
-    signed, distance = (
-        actions.prob_left(here) - actions.prob_left(there),
-        actions.distance(here, there),
-    )
-    at = np.unravel_index(distance.argmax(), distance.shape)
-    places = zip(("height", "forward", "lateral"), at, strict=True)
-    return {
-        "signed": float(signed.mean()),
-        "absolute": float(distance.mean()),
-        "worst": {
-            "distance": float(distance.max()),
-            **{axis: float(getattr(response, axis)[i]) for axis, i in places},
-        },
-    }
+    signed = actions.prob_left(here) - actions.prob_left(there)
+    distance = actions.distance(here, there)
+    return {"signed": float(signed.mean()), "absolute": float(distance.mean())}
 
 
 _COMPARED = 1000
@@ -262,11 +241,11 @@ def places_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]
     """
     settings = PlacesSettings()
     try:
-        found = _exact_map(context, settings)
+        exact_map = _exact_map(context, settings)
     except InputError as error:
         return {"places": {"refused": str(error)}}, {}
-    arrays = {f"places_{name}": array for name, array in found.outlines().items()}
-    return {"places": found.summary(settings.logit_gap)}, arrays
+    arrays = {f"places_{name}": array for name, array in exact_map.outlines().items()}
+    return {"places": exact_map.summary(settings.logit_gap)}, arrays
 
 
 def _exact_map(context: Context, settings: PlacesSettings) -> ActionMap:

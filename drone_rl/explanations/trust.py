@@ -27,7 +27,7 @@ from torch import Tensor
 from drone_rl.explanations import patches
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.patches import (
-    Grid,
+    PatchGrid,
     likeness,
     make_grid,
     placebo_maps,
@@ -57,7 +57,7 @@ class Trial:
     effects: NDArray  # (T, patches); effect of each patch; see `patch_effects`
     placebos: dict[str, Tensor]  # (T, h, w) each
     episode: NDArray  # (T,)
-    grid: Grid
+    grid: PatchGrid
     frames_without_effect: int = 0  # left out, as no patch affects the policy
     seed: int = 0
 
@@ -75,8 +75,6 @@ class Trial:
 
     def maps(self, method: MapOf, network: ImageNetwork | None = None) -> Tensor:
         """Return a method's maps of the trial's frames. Shape: (T, h, w)."""
-        if not len(self.observations):
-            return self.observations.new_zeros(0, *self.observations.shape[-2:])
         return method(network or self.network, self.observations, self.actions)
 
     def scores(self, maps: Tensor) -> NDArray:
@@ -160,11 +158,10 @@ def method_maps(explainer: Explainer) -> dict[str, MapOf]:
 def check_maps(
     trial: Trial,
     methods: Mapping[str, MapOf],
-    maps: Mapping[str, Tensor] | None = None,
     *,
     num_methods: int | None = None,
 ) -> dict[str, Any]:
-    """Test methods, by name; `maps` has `trial.maps` of those for which it is already computed.
+    """Test methods, by name.
 
     The error rate is shared by `num_methods`, by default those that are given.
 
@@ -174,8 +171,7 @@ def check_maps(
         "level": error rate of each method; "confidence" of the intervals "lower" to "upper".
     """
     level = ERROR_RATE / (num_methods or max(1, len(methods)))
-    maps = maps or {}
-    results = {n: check_method(trial, of, level, maps.get(n)) for n, of in methods.items()}
+    results = {name: check_method(trial, method, level) for name, method in methods.items()}
     scores = {name: one["score"]["lower95"] for name, one in results.items() if one["trusted"]}
     return {
         "trusted": max(scores, key=lambda name: scores[name], default=None),
@@ -192,9 +188,7 @@ def check_maps(
     }
 
 
-def check_method(
-    trial: Trial, method: MapOf, level: float, maps: Tensor | None = None
-) -> dict[str, Any]:
+def check_method(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
     """Test one method; see `check_maps`.
 
     Returns:
@@ -209,7 +203,7 @@ def check_method(
     if not len(episode):
         none = patches.summarise_scores(np.zeros(0), np.zeros(0))
         return {"trusted": False, "failed": ["nothing moves the policy"], "score": none}
-    maps = trial.maps(method) if maps is None else maps
+    maps = trial.maps(method)
     scores = trial.scores(maps)
     hit, chance = patches.pointing(trial.grid.means(maps), trial.effects)
     result = {
