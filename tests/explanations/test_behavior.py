@@ -17,8 +17,8 @@ from drone_rl.explanations.behavior import (
     summarise_pairs,
 )
 from drone_rl.explanations.rollouts import RolloutDataset
-from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.sim.actions import MOVES
+from drone_rl.trust.shifts_file import SavedShifts
 from tests.five_actions import FIVE
 
 F, L, R = 0, 1, 2

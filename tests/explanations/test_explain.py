@@ -13,13 +13,13 @@ from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.explanations import explain as explaining
 from drone_rl.explanations.context import Context, LeftOutError
-from drone_rl.explanations.explain import SECTIONS, Explanations, _named, explain_policy
+from drone_rl.explanations.explain import Explanations, _named, explain_policy
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import MLP
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
-from tests.explanations.quick import quick
+from tests.explanations.quick import ALL_SECTIONS, quick
 from tests.second_task import NUM_POSTS, Posts
 
 SEED = RootSeed(6, is_fixed=False)
@@ -103,7 +103,7 @@ def explain(env, network, folder, settings=SMALL, **kwargs):
 
 @pytest.mark.slow
 def test_everything_is_written_and_the_order_of_sections_changes_nothing(make_pipeline, tmp_path):
-    contents, found = [], SECTIONS
+    contents, found = [], ALL_SECTIONS
     for name, order in (("a", list(found)), ("b", list(found)[::-1])):
         env, actor = make_pipeline(num_envs=30, seed=2, task=TaskSettings(num_cubes=1))
         network = actor.module[0].module
@@ -129,7 +129,7 @@ def test_a_section_that_fails_is_left_out_with_the_reason(make_pipeline, tmp_pat
     def fails(context):
         raise LeftOutError("It has no eyes.")
 
-    sections = {"eyes": fails, "dataset": SECTIONS["dataset"]}
+    sections = {"eyes": fails, "dataset": ALL_SECTIONS["dataset"]}
     numbers = explain(env, actor.module[0].module, tmp_path, sections=sections)
     assert numbers["left_out"] == {"eyes": "It has no eyes."}
     assert numbers["dataset"]["frames"] == SMALL.frames and "eyes" not in numbers["seconds"]

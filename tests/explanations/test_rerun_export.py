@@ -15,9 +15,6 @@ from drone_rl.config import (
     AppearanceSettings,
     TaskSettings,
 )
-from drone_rl.evaluation.baselines import constant_policy
-from drone_rl.evaluation.plots.images import heated, shown_picture
-from drone_rl.evaluation.video import CAMERAS, render_step
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.rerun_export import (
     EpisodeLog,
@@ -26,7 +23,10 @@ from drone_rl.explanations.rerun_export import (
     record_episode,
 )
 from drone_rl.policies.actor import exploring
+from drone_rl.policies.baselines import constant_policy
 from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.trust.plots.images import heated, shown_picture
+from drone_rl.trust.video import CAMERAS, render_step
 from drone_rl.utils.errors import InputError
 
 rerun = pytest.importorskip("rerun", reason="rerun isn't installed: extra [rerun]")

@@ -1,8 +1,5 @@
 """Maps over the place of one target: response, outcome, exact actions; asymmetry."""
 
-import dataclasses
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 import torch
@@ -10,7 +7,6 @@ from torch import nn
 
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
-from drone_rl.explanations import response
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.response import (
     OutcomeMap,
@@ -24,12 +20,10 @@ from drone_rl.explanations.response import (
     summarise,
 )
 from drone_rl.explanations.scenes import Scenes, place_target
-from drone_rl.policies import MLP, ExternalNetwork
+from drone_rl.policies import MLP
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.continuous_actions import ContinuousActions
-from drone_rl.verification.prover.cube_images import camera_ahead
 from tests.continuous import SETTINGS
-from tests.five_actions import FIVE
 from tests.second_task import Posts
 
 IDLE, LEFT = [1.0, 0.0, 0.0], [0.1, 0.9, 0.0]
@@ -204,40 +198,3 @@ def test_a_policy_that_turns_to_either_side_is_its_mirror_image():
     result = grid_asymmetry(found, MOVES)
     assert result["signed"] == pytest.approx(0.3 / 12)
     assert result["absolute"] == pytest.approx(2 * 0.3 / 12)  # the place and its mirror image
-
-
-def test_the_exact_map_is_that_of_rendered_observations(context, monkeypatch):
-    small = response.PlacesSettings(farthest=3.5, sideways=3.0)
-    monkeypatch.setattr(response, "PlacesSettings", lambda: small)
-    numbers, arrays = response.places_section(context)
-    told = numbers["places"]
-    assert told["window"] == {"nearest": 2.5, "farthest": 3.5, "sideways": 3.0}
-    assert set(arrays) == {"places_points", "places_ends", "places_labels"}
-    found = response._exact_map(context, small)
-    where = np.random.RandomState(0).uniform((2.5, -3.0), (3.5, 3.0), (100, 2))
-    ahead, left = torch.from_numpy(where).T
-    pictures = context.scenes.observe(place_target(context.scenes, ahead + camera_ahead(), left))
-    with torch.no_grad():
-        taken = context.network(pictures).argmax(-1)
-    assert found.at(where).tolist() == taken.tolist()
-
-
-def test_reasons_for_no_exact_map(context):
-    scenes = context.scenes
-
-    def refused(**changes):
-        names = ("task", "actions", "memory", "worlds")
-        network = changes.pop("network", None)
-        changed = {name: getattr(scenes, name) for name in names} | changes
-        given = SimpleNamespace(scenes=SimpleNamespace(**changed), network=network)
-        numbers, arrays = response.places_section(given)
-        assert arrays == {}
-        return numbers["places"]["refused"]
-
-    assert "stack of frames" in refused(memory=1)
-    assert "does not choose among forward, left, right" in refused(actions=FIVE)
-    assert "its task is not cube collection" in refused(task=None)
-    tall = dataclasses.replace(scenes.task.settings, vertical_bound=1.0)
-    function = ExternalNetwork(lambda x: x.flatten(1)[:, :3], (1, 25, 64), MOVES)
-    assert "not a torch module" in refused(network=function)
-    assert "vertical_bound=1.0" in refused(task=type(scenes.task)(tall))

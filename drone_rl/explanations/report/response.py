@@ -1,23 +1,18 @@
-"""Report sections "response", "places" (maps over one target's place) and "asymmetry"."""
-
-from typing import Any
+"""Report sections "response" (maps over one target's place) and "asymmetry"."""
 
 import numpy as np
-from markupsafe import Markup
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from PIL import Image
 
-from drone_rl.evaluation.plots import images, regions
-from drone_rl.evaluation.plots.saving import new_chart
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.sim.vocabulary import terms_of
+from drone_rl.trust.plots import images
+from drone_rl.trust.plots.saving import new_chart
 from drone_rl.utils.palette import EMPTY, GOOD, css
 from drone_rl.utils.text import Claims, Evidence, bounds, listed, percent
-from drone_rl.verification.text import rows as place_rows
-from drone_rl.verification.text import say_places
 
 
 def say_response(evidence: Evidence) -> Claims:
@@ -153,29 +148,4 @@ ASYMMETRY_PART = Part(
     needs=("asymmetry",),
     text={"asymmetry": say_asymmetry},
     draw=lambda explanation: {"asymmetry": worst_frames(explanation)},
-)
-
-
-def exact_map(explanation: Explanation) -> tuple[Any, ...]:
-    """Return numbers, outlines and actions of the exact map; nothing if there is none."""
-    if "refused" in explanation.numbers["places"]:
-        return ()
-    outlines = {n: explanation.arrays[f"places_{n}"] for n in ("points", "ends", "labels")}
-    return explanation.numbers["places"], outlines, explanation.actions
-
-
-def _exact_map_extras(explanation: Explanation) -> dict[str, Any]:
-    if not (drawn := exact_map(explanation)):
-        return {}
-    rows = place_rows(explanation.numbers["places"], explanation.actions.names)
-    return {"svg": Markup(regions.svg(*drawn)), "rows": rows}
-
-
-PLACES_PART = Part(
-    title="Exact action map of one cube",
-    label="Exact map",
-    needs=("places",),
-    text={"places": say_places},
-    draw=lambda e: {"places": regions.chart(*drawn)} if (drawn := exact_map(e)) else {},
-    extras=_exact_map_extras,
 )

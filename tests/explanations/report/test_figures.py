@@ -5,11 +5,18 @@ import pytest
 from matplotlib.colors import to_hex
 
 from benchmarks.evidence import EXPLANATION, SHIFTS, VERDICT
-from drone_rl.explanations.report import attribution, behavior, class_models, embedding, response
+from drone_rl.explanations.report import (
+    attribution,
+    behavior,
+    class_models,
+    embedding,
+    places,
+    response,
+)
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.truth import changes, truth_charts
 from drone_rl.utils.palette import GOOD, MUTED, css
-from tests.evaluation.plots.test_regions import NUMBERS, WAYS
+from tests.trust.plots.test_regions import NUMBERS, WAYS
 
 SCORE = {"mean": 0.5, "lower95": 0.4, "upper95": 0.6}
 UNKNOWN = {"mean": None, "lower95": None, "upper95": None}
@@ -166,7 +173,7 @@ def test_the_charts_of_the_response_are_of_each_height(mapped):
 
 
 def test_the_exact_map_is_drawn_unless_it_is_refused(make_explanation):
-    part = response.PLACES_PART
+    part = places.PART
     numbers = {"places": EXPLANATION["places"] | NUMBERS}
     explanation = make_explanation(numbers, {f"places_{name}": a for name, a in WAYS.items()})
     assert list(part.draw(explanation)) == ["places"]
