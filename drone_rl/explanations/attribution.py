@@ -1,4 +1,4 @@
-"""Section "attribution": heat maps of all frames, and of one episode as a film."""
+"""Section "attribution": heat maps of one episode as a film."""
 
 from collections.abc import Collection, Mapping
 from typing import Any
@@ -21,19 +21,17 @@ COUNT = 6  # key frames of an episode, as in Figs. 13 to 15.
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Return "attribution".
 
-    Arrays: "map_..." (T, H, W) of each method, each frame's maximum 1; of the film's n steps
-    "film_frames" (n, H, W, 3), "film_heat" (n, H, W), "film_heat_..." of each method,
-    "film_probabilities" and "film_actions".
+    Arrays of the film's n steps: "film_frames" (n, H, W, 3), "film_heat" (n, H, W) and
+    "film_heat_..." of each method, the maximum of each 1, "film_probabilities", "film_actions".
     """
     flights, explainer, film = context.flights, context.explainer, context.film
     to_frame = context.scenes.to_frame
-    arrays = {f"map_{name}": _normalized(to_frame(maps)) for name, maps in context.maps.items()}
     first = int(np.flatnonzero(flights.episode == FILMED)[0])
-    methods = shown_methods(context.maps)
     inputs = film.tensor("observations"), film.tensor("actions")
     heats = {n: to_frame(of(*inputs)) for n, of in explainer.methods().items()}
+    methods = shown_methods(heats)
     heat, by = first_heat({name: heats[name] for name in methods})
-    arrays |= {f"film_heat_{name}": _normalized(maps) for name, maps in heats.items()}
+    arrays = {f"film_heat_{name}": _normalized(maps) for name, maps in heats.items()}
     arrays |= {
         "film_frames": film.frames,
         "film_heat": _normalized(heat),
@@ -43,7 +41,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     frames = key_frames(flights, FILMED, context.scenes.task, len(film))
     numbers = {
         "layer": explainer.layer,
-        "methods": list(context.maps),
+        "methods": list(heats),
         "shown": methods[0],
         "film": {
             "episode": FILMED,
@@ -56,8 +54,8 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
 
 def shown_methods(methods: Collection[str]) -> list[str]:
     """Return the methods of "film_heat" among those that a policy allows, the first one first."""
-    shown = [name for name in SHOWN if name in methods]
-    return shown or [name for name in INSTEAD if name in methods][:1]
+    preferred = [name for name in SHOWN if name in methods]
+    return preferred or [name for name in INSTEAD if name in methods][:1]
 
 
 def first_heat(maps: Mapping[str, Tensor]) -> tuple[Tensor, list[str | None]]:

@@ -156,7 +156,6 @@ def _three_states(settings: FigureSettings, subjects: list[Policy]) -> _Drawn:
     right.axvline(estimated, color=css(INK), linestyle=":", label=label)
     right.set(xlabel="gradient by the logit of a1, uniform policy", ylabel="batches")
     right.legend(frameon=False, fontsize=8)
-    right.set_ylim(0, 1.5 * right.get_ylim()[1])  # room for the legend
     caption = (
         "REINFORCE on the three-state process; action a1 leads from s0 to s2 and reward 1 with "
         f"probability {SUCCESS_PROBABILITY:g}, otherwise to s1."

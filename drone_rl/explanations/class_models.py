@@ -39,13 +39,13 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
         return search(network, statistics, objective, seed=context.seed.value)
 
     with pool_like_caller(len(OBJECTIVES)) as pool:  # a small batch uses one core
-        found = dict(zip(OBJECTIVES, pool.map(optimize, OBJECTIVES), strict=True))
+        models = dict(zip(OBJECTIVES, pool.map(optimize, OBJECTIVES), strict=True))
     numbers = {
         "statistics": dataclasses.asdict(statistics),
         "channels": context.scenes.channels,
-        **{objective: model.summary() for objective, model in found.items()},
+        **{objective: model.summary() for objective, model in models.items()},
     }
-    arrays = {f"class_model_{name}": model.images.numpy() for name, model in found.items()}
+    arrays = {f"class_model_{name}": model.images.numpy() for name, model in models.items()}
     return {"class_model": numbers}, arrays
 
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from tensordict.nn import TensorDictModuleBase
-from torch import Tensor
 from torchrl.envs import TransformedEnv
 
 from drone_rl.explanations.heat_maps import Explainer
@@ -103,9 +102,3 @@ class Context:
         most = min(FILM_STEPS, FILM_BYTES // (3 * camera.height * camera.width))
         rows = np.flatnonzero(self.flights.episode == FILMED)[:most]
         return render_frames(self.flights, rows, self.scenes, self.network)
-
-    @functools.cached_property
-    def maps(self) -> dict[str, Tensor]:
-        """Heat maps of the actions taken, by method, on the observations. Shape: (T, h, w)."""
-        inputs = self.dataset.tensor("observations"), self.dataset.tensor("actions")
-        return {name: of(*inputs) for name, of in self.explainer.methods().items()}

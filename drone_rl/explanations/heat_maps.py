@@ -38,11 +38,8 @@ class Explainer:
             return
         find_layer(self.network, self.layer)
         if self.layer not in spatial:
-            none = (
-                "it has no convolution" if self.network.is_differentiable else "it has no gradient"
-            )
-            have = ", ".join(spatial) or f"none of this policy, because {none}"
-            raise InputError(f"layer={self.layer} has no feature map; those that do: {have}")
+            names = ", ".join(spatial) or "none of this policy"
+            raise InputError(f"layer={self.layer} has no feature map; those that do: {names}")
 
     def methods(self) -> dict[str, MapMethod]:
         """Return all methods that this policy allows, by name."""
@@ -102,11 +99,11 @@ class Explainer:
         """
         height, width = observations.shape[-2:]
         windows = _windows(height, width)
-        chosen = probabilities(self.network, observations).gather(1, actions[:, None])[:, 0]
-        change = chosen.new_zeros(len(chosen), len(windows))
+        before = probabilities(self.network, observations).gather(1, actions[:, None])[:, 0]
+        change = before.new_zeros(len(before), len(windows))
         absent = self.absent[None].expand_as(observations)
         for frames, patches, after in replaced(self.network, observations, absent, windows):
-            change[frames, patches] = chosen[frames] - after[range(len(frames)), actions[frames]]
+            change[frames, patches] = before[frames] - after[range(len(frames)), actions[frames]]
         covered = windows.flatten(1).float()
         mean = change @ covered / covered.sum(0).clamp_min(1)
         return mean.view(-1, height, width).abs()

@@ -151,11 +151,11 @@ def rank_correlation(first: NDArray, second: NDArray) -> NDArray:
 
 def sample_frames(episode: NDArray, most: int) -> NDArray:
     """Return indices of at most `most` frames of each episode, evenly spaced. Shape: (N,)."""
-    found = [np.zeros(0, np.int64)]
+    parts = [np.zeros(0, np.int64)]
     for number in np.unique(episode):
         rows = np.flatnonzero(episode == number)
-        found.append(rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(np.int64)])
-    return np.concatenate(found)
+        parts.append(rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(np.int64)])
+    return np.concatenate(parts)
 
 
 def summarise_scores(values: NDArray, episode: NDArray) -> dict[str, Any]:

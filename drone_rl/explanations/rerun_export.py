@@ -76,11 +76,9 @@ def record(
         renderer: Renderer of the environments.
 
     Raises:
-        InputError: There are no episodes, the extra `rerun` is missing, or a file can't be written.
+        InputError: The extra `rerun` is missing, or a file can't be written.
     """
     rerun = extra("rerun", "rerun", "format=rerun")
-    if episodes < 1:
-        raise InputError(f"episodes={episodes} records nothing; give 1 or more")
     files: list[Path] = []
     with policy.flying(1, seed=seed, device=device, renderer=renderer) as (env, actor):
         network = policy.make_network(device)

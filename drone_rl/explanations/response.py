@@ -42,30 +42,31 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     return numbers, arrays
 
 
-@dataclasses.dataclass
-class ResponseMap:
-    """Action probabilities for one target at each place of a grid: Z up, F ahead, L sideways."""
+@dataclasses.dataclass(kw_only=True)
+class TargetGrid:
+    """Places of one target: Z up, F ahead, L sideways."""
 
     height: NDArray  # (Z,); metres above the drone
     forward: NDArray  # (F,); metres ahead of it
     lateral: NDArray  # (L,); metres to its left
-    probabilities: NDArray  # (Z, F, L, A)
-    without_target: NDArray  # (A,); action probabilities without a target
     oracle: NDArray  # (L,); the needed action: a turn where flying straight on would miss
     stratum: NDArray  # (L,); the task's stratum of a target there: its side
+
+
+@dataclasses.dataclass(kw_only=True)
+class ResponseMap(TargetGrid):
+    """Action probabilities for one target at each place."""
+
+    probabilities: NDArray  # (Z, F, L, A)
+    without_target: NDArray  # (A,); action probabilities without a target
     blind: NDArray  # (Z, F, L) bool; see `find_blind`
 
 
-@dataclasses.dataclass
-class OutcomeMap:
-    """Whether greedy rollouts reach a target at each place; fields as in `ResponseMap`."""
+@dataclasses.dataclass(kw_only=True)
+class OutcomeMap(TargetGrid):
+    """Whether greedy rollouts reach a target at each place."""
 
-    height: NDArray  # (Z,)
-    forward: NDArray  # (f,)
-    lateral: NDArray  # (l,)
-    collected: NDArray  # (Z, f, l) bool
-    oracle: NDArray  # (l,)
-    stratum: NDArray  # (l,)
+    collected: NDArray  # (Z, F, L) bool
 
 
 def response_map(

@@ -139,10 +139,10 @@ def make_trial(
     """
     rows = sample_frames(episode, FRAMES_AN_EPISODE)
     index = torch.from_numpy(rows)
-    chosen = state[index].to(scenes.worlds.device)
-    others = list(alternatives(scenes, chosen, seed).values())
+    sampled = state[index].to(scenes.worlds.device)
+    others = list(alternatives(scenes, sampled, seed).values())
     absent = scenes.observe(empty_scene(scenes))[0]
-    seen = scenes.observe(chosen)
+    seen = scenes.observe(sampled)
     return measure(network, actions[index], seen, others, absent, episode[rows], seed)
 
 
@@ -177,8 +177,8 @@ def check_maps(
         "trusted": max(scores, key=lambda name: scores[name], default=None),
         "methods": results,
         "placebos": {
-            name: patches.summarise_scores(found, trial.episode)
-            for name, found in trial.placebo_scores.items()
+            name: patches.summarise_scores(placebo, trial.episode)
+            for name, placebo in trial.placebo_scores.items()
         },
         "frames": len(trial.episode),
         "frames_unmoved": trial.frames_without_effect,
@@ -209,8 +209,8 @@ def check_method(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
     result = {
         "score": patches.summarise_scores(scores, episode),
         "placebos": {
-            name: _median(scores - found, episode, level)
-            for name, found in trial.placebo_scores.items()
+            name: _median(scores - placebo, episode, level)
+            for name, placebo in trial.placebo_scores.items()
         },
         "pointing": {
             **_median(hit - chance, episode, level),
@@ -237,16 +237,16 @@ def random_weights(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
         shuffled policies; "as_good": how many of them scored as much.
     """
     few = trial.thinned()
-    own = float(few.scores(few.maps(method)).mean())
+    score = float(few.scores(few.maps(method)).mean())
     others: list[float] = []
     is_as_good = False
     count = math.ceil(1 / level) - 1
     for network in shuffled_networks(trial.network, trial.observations, count, trial.seed):
         others.append(float(few.scores(few.maps(method, network)).mean()))
-        if is_as_good := others[-1] >= own - 1e-9:
+        if is_as_good := others[-1] >= score - 1e-9:
             break
     return {
-        "score": own,
+        "score": score,
         "best": max(others),
         "mean": float(np.mean(others)),
         "tried": len(others),
@@ -268,9 +268,9 @@ def _failed(result: dict[str, Any]) -> list[str]:
 def _likeness(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
     """Compare a policy's maps with those of shuffled weights, all seeds together and each."""
     few = trial.thinned()
-    own = few.maps(method)
+    maps = few.maps(method)
     networks = shuffled_networks(trial.network, trial.observations, WEIGHT_SEEDS, trial.seed)
-    seeds = np.stack([likeness(own, few.maps(method, network)) for network in networks])
+    seeds = np.stack([likeness(maps, few.maps(method, network)) for network in networks])
     medians = np.median(seeds, axis=1).tolist()
     return {**_median(seeds.mean(0), few.episode, level), "seeds": medians}
 

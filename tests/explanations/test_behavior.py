@@ -57,7 +57,7 @@ def test_pairs_are_classified_by_the_place_of_the_target():
     }  # fmt: skip
     assert pairs[0].opposition == pytest.approx(0.8)
     assert pairs[0].distance == pytest.approx(0.1 / np.sqrt(2))
-    summary = summarise_pairs(pairs, data, 0.1)
+    summary = summarise_pairs(pairs, data)
     assert (summary["contradictions"], summary["justified"], summary["unknown"]) == (1, 1, 1)
     assert summary["pairs"] == 3 and summary["worst_opposition"] == pytest.approx(0.8)
 
@@ -94,7 +94,7 @@ def test_each_frame_is_in_one_pair():
 
 def test_all_pairs_are_counted_and_fifty_are_listed():
     data = fake(np.zeros((110, 2)), [LEFT, RIGHT] * 55, [[5, 1]] * 110)
-    summary = summarise_pairs(pairs_of(data, alike=1.0), data, 1.0)
+    summary = summarise_pairs(pairs_of(data, alike=1.0), data)
     assert summary["pairs"] == summary["contradictions"] == 55
     assert len(summary["list"]) == 50
 

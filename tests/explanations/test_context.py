@@ -41,9 +41,7 @@ def test_frames_are_steps_of_the_episodes(make_pipeline):
     step = {(int(e), int(s)): t for t, (e, s) in enumerate(every)}
     rows = [step[int(e), int(s)] for e, s in zip(data.episode, data.step, strict=True)]
     np.testing.assert_array_equal(data.actions, flights.actions[rows])
-    assert context.dataset is data and context.maps is context.maps  # made once
-    first = context.explainer.saliency(data.tensor("observations")[:2], data.tensor("actions")[:2])
-    torch.testing.assert_close(context.maps["saliency"][:2], first)
+    assert context.dataset is data
 
 
 def test_a_copy_for_a_thread_shares_data_and_copies_the_network(make_pipeline):

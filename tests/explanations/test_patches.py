@@ -8,9 +8,7 @@ import torch
 
 from drone_rl.explanations.patches import (
     PatchGrid,
-    band,
     blob,
-    difference,
     has_effect,
     horizon_row,
     likeness,
@@ -18,16 +16,13 @@ from drone_rl.explanations.patches import (
     patch_effects,
     placebo_maps,
     pointing,
-    rank_correlation,
     replaced,
     sample_frames,
     scores,
     shuffled_networks,
     smoothed,
-    summarise_scores,
 )
 from drone_rl.policies import MLP, SmallCNN
-from drone_rl.utils.intervals import episode_means
 
 SIZES = [(25, 64), (13, 32), (38, 96), (8, 8), (1, 7), (7, 1), (3, 200), (37, 65), (43, 111)]
 
@@ -141,23 +136,6 @@ def test_frames_without_an_effect():
     assert has_effect(effects).tolist() == [False, True, True]
 
 
-def test_rank_correlation_by_hand():
-    first = np.array([[1, 2, 3, 4], [1, 2, 3, 4], [5, 5, 5, 5]], float)
-    second = np.array([[10, 20, 30, 40], [4, 3, 2, 1], [1, 2, 3, 4]], float)
-    np.testing.assert_allclose(rank_correlation(first, second), [1.0, -1.0, 0.0])
-    two = np.array([[1.0, 2.0], [2.0, 1.0]])
-    np.testing.assert_allclose(rank_correlation(two, two[:1]), [1.0, -1.0])
-
-
-def test_episodes_have_equal_weight():
-    values, episode = np.array([1.0, 1.0, 1.0, 0.0]), np.array([7, 7, 7, 9])
-    assert episode_means(values, episode).tolist() == [1.0, 0.0]
-    found = summarise_scores(values, episode)
-    assert (found["mean"], found["count"]) == (0.5, 2)
-    assert summarise_scores(np.zeros(0), np.zeros(0))["mean"] is None
-    assert summarise_scores(-np.ones(30), np.arange(30))["upper95"] < -0.5
-
-
 def test_frames_are_spread_over_each_episode():
     episode = np.array([3] * 9 + [5] * 2 + [8])
     assert sample_frames(episode, 3).tolist() == [0, 4, 8, 9, 10, 11]
@@ -189,19 +167,6 @@ def test_a_blob_by_hand():
     assert made[0, 0].item() == pytest.approx(math.exp(-(0.25**2 + 0.125**2) / (2 * 0.2**2)))
     assert made[1, 3].item() == pytest.approx(math.exp(-(0.25**2 + 0.625**2) / (2 * 0.2**2)))
     assert blob(1, 1, 0.0, 0.5, 0.5).item() == pytest.approx(math.exp(-0.5))
-
-
-def test_a_band_by_hand():
-    made = band(20, 3, 4.5)
-    assert made.shape == (20, 3) and (made == made[:, :1]).all()
-    # a tenth of the height, two rows, is the deviation
-    assert made[6, 0].item() == pytest.approx(math.exp(-(0.75**2) / 2))
-    assert band(10, 3, 4.0, 0.2)[8, 0].item() == pytest.approx(math.exp(-2))
-
-
-def test_differences_add_up_over_channels():
-    x, absent = torch.tensor([[[[1.0]], [[-2.0]]]]), torch.tensor([[[0.5]], [[1.0]]])
-    assert difference(x, absent).tolist() == [[[3.5]]]
 
 
 @pytest.mark.parametrize(("width", "box"), [(10, 3), (39, 3), (40, 5), (64, 7)])

@@ -184,11 +184,6 @@ def test_following_by_hand():
     assert followed(rollout_of(1, [0.0, 9.0]), rollout_of(1, [0.0, 0.0])).tolist() == [1.0]
 
 
-def test_without_a_target_there_are_no_rollouts(scenes, follower):
-    found = measure_outcomes(scenes, follower, empty_scene(scenes), np.zeros(1))
-    assert found["rollout_of"] == 0 and found["follows"]["mean"] is None
-
-
 @pytest.mark.slow
 def test_the_section_has_tests_and_changes(context):
     numbers, arrays = section(context)

@@ -50,18 +50,18 @@ def say_untrusted(evidence: Evidence) -> Claims:
 def key_frames(explanation: Explanation, method: str | None) -> dict[str, Image.Image]:
     """Return up to six frames of an episode with heat map and action probabilities, by caption."""
     steps = explanation.numbers["attribution"]["film"]["key_steps"]
-    captions = [f"{i}. {entry['why']}" for i, entry in enumerate(steps, start=1)]
-    return {
-        caption: explained_step(explanation, entry["step"], caption, method)
-        for caption, entry in zip(captions, steps, strict=True)
-    }
+    tiles = {}
+    for i, entry in enumerate(steps, start=1):
+        caption = f"{i}. {entry['why']}"
+        tiles[caption] = explained_step(explanation, entry["step"], caption, method)
+    return tiles
 
 
 def film(explanation: Explanation, method: str | None) -> NDArray:
     """Return the episode with heat map and action probabilities. Shape: (T, H, W, 3), uint8."""
     steps = range(len(explanation.arrays["film_frames"]))
-    shown = (explained_step(explanation, t, f"step {t}", method) for t in steps)
-    frames = np.stack([np.asarray(image) for image in shown])
+    tiles = (explained_step(explanation, t, f"step {t}", method) for t in steps)
+    frames = np.stack([np.asarray(image) for image in tiles])
     height, width = (-n % BLOCK for n in frames.shape[1:3])
     margins = (0, 0), (0, height), (0, width), (0, 0)
     return np.pad(frames, margins, constant_values=255)

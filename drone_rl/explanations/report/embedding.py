@@ -39,9 +39,9 @@ def say_embedding(evidence: Evidence) -> Claims:
 
 def tsne_map(explanation: Explanation, which: str) -> Image.Image:
     """Return a map of thumbnails at their embedded positions, tinted by action."""
-    chosen = shown_frames(explanation)
-    colors = [explanation.actions.colors[a] for a in explanation.data["actions"][chosen]]
-    frames = explanation.data["frames"][chosen]
+    index = shown_frames(explanation)
+    colors = [explanation.actions.colors[a] for a in explanation.data["actions"][index]]
+    frames = explanation.data["frames"][index]
     return images.thumbnails(frames, colors, cells(explanation, which))
 
 
@@ -54,11 +54,11 @@ def shown_frames(explanation: Explanation) -> NDArray:
 def cells(explanation: Explanation, which: str) -> NDArray:
     """Return column and row of each shown frame. Shape: (N, 2)."""
     frames = explanation.data["frames"]
-    chosen = shown_frames(explanation)
+    index = shown_frames(explanation)
     tile = frames.shape[2] / frames.shape[1]
-    rows = int(np.ceil(np.sqrt(CELLS_A_THUMBNAIL * len(chosen) * tile / ASPECT)))
-    columns = int(np.ceil(CELLS_A_THUMBNAIL * len(chosen) / rows))
-    return snap_to_grid(explanation.arrays[f"tsne_{which}"][chosen], columns, rows)
+    rows = int(np.ceil(np.sqrt(CELLS_A_THUMBNAIL * len(index) * tile / ASPECT)))
+    columns = int(np.ceil(CELLS_A_THUMBNAIL * len(index) / rows))
+    return snap_to_grid(explanation.arrays[f"tsne_{which}"][index], columns, rows)
 
 
 def snap_to_grid(points: NDArray, columns: int, rows: int) -> NDArray:
@@ -79,18 +79,18 @@ def sprite(explanation: Explanation) -> Image.Image:
 
 def points(explanation: Explanation) -> dict[str, Any]:
     """Return the data of each shown frame that the interactive map uses."""
-    data, chosen = explanation.data, shown_frames(explanation)
+    data, index = explanation.data, shown_frames(explanation)
     height, width = data["frames"].shape[1:3]
     last, terms = np.bincount(data["flights/episode"]) - 1, explanation.terms
     events = {1: f"{terms.reaches} a {terms.goal}", -1: f"misses a {terms.goal}"}
     return {
         "tile": [width, height],
         "cells": {which: cells(explanation, which).tolist() for which in MAPS},
-        "action": data["actions"][chosen].tolist(),
-        "probabilities": np.round(data["probabilities"][chosen].astype(float), 3).tolist(),
-        "episode": data["episode"][chosen].tolist(),
-        "step": data["step"][chosen].tolist(),
-        "event": [events.get(event, "") for event in data["event"][chosen].tolist()],
+        "action": data["actions"][index].tolist(),
+        "probabilities": np.round(data["probabilities"][index].astype(float), 3).tolist(),
+        "episode": data["episode"][index].tolist(),
+        "step": data["step"][index].tolist(),
+        "event": [events.get(event, "") for event in data["event"][index].tolist()],
         "last": last.tolist(),
         "names": explanation.actions.names,
         "order": explanation.actions.order,

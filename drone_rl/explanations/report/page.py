@@ -44,7 +44,7 @@ PARTS: dict[str, Part] = {
 """All parts in the order of the page, by the names of `explanations.explain.SECTIONS`; entries of
 an explanation that no part shows are printed as JSON."""
 STYLES = ("style.css", "report.css")  # files of the page's one style element
-SCRIPTS = ("map.js", "zoom.js")
+SCRIPTS = ("map.js",)
 """Files of the page's one script element; their data are in elements of type JSON."""
 
 

@@ -65,24 +65,6 @@ def test_the_map_of_pixels_can_be_chosen(browser):
     assert button.get_attribute("aria-pressed") == "true"
 
 
-def test_the_exact_map_is_zoomed_and_shown_whole_again(browser):
-    element = browser.find_element(By.CSS_SELECTOR, "#places svg")
-    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
-    whole = [float(v) for v in element.get_dom_attribute("viewBox").split()]
-    browser.execute_script(
-        """const box = arguments[0].getBoundingClientRect();
-        arguments[0].dispatchEvent(new WheelEvent("wheel", {deltaY: -500, cancelable: true,
-            clientX: box.left + box.width / 2, clientY: box.top + box.height / 2}));""",
-        element,
-    )
-    assert float(element.get_dom_attribute("viewBox").split()[2]) < 0.5 * whole[2]
-    ActionChains(browser).move_to_element(element).perform()
-    where = browser.find_element(By.CSS_SELECTOR, "#places .where").text
-    assert "m ahead" in where and "goes " in where
-    ActionChains(browser).double_click(element).perform()
-    assert [float(v) for v in element.get_dom_attribute("viewBox").split()] == whole
-
-
 def test_it_fits_a_phone(browser):
     browser.set_window_size(500, 900)
     wide = browser.execute_script("return document.documentElement.scrollWidth - innerWidth")
