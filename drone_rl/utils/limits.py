@@ -35,7 +35,6 @@ FILM_BYTES = 2**23  # the film of a report
 
 # Counts
 JSON_VALUES = 2**18  # values in a JSON file, without names
-EXPLANATION_VALUES = 2**16  # those in explanation.json
 CERTIFICATE_VALUES = 3 * 2**19  # those in a certificate, nearly all of them borders of boxes
 FILM_STEPS = 2000  # steps of the film of a report
 JSON_DEPTH = 64  # levels of lists and mappings in a JSON file

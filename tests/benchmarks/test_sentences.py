@@ -51,9 +51,9 @@ def test_every_sentence_of_the_package_is_registered():
 
 
 def test_a_sentence_that_stays_or_never_appears_is_not_flipped():
-    stays = EvidenceChange("explanation", "loops.some", {"dataset.frames": 7})
+    stays = EvidenceChange("explanation", "loops.share", {"dataset.frames": 7})
     assert not stays.is_flipped
-    absent = EvidenceChange("explanation", "loops.none", {"loops.longest": 7})
+    absent = EvidenceChange("explanation", "advice.use", {"loops.longest": 7})
     assert not absent.is_flipped
 
 

@@ -116,7 +116,10 @@ SHIFTS_PART = Part(
     needs=("shifts",),
     text={"shifts": QUOTED},
     draw=draw_shifts,
-    extras=lambda explanation: {"rows": rows, "names": charts.NAMES},
+    extras=lambda explanation: {
+        "rows": rows(explanation.numbers["shifts"]) if is_quoted(explanation.numbers) else [],
+        "names": charts.NAMES,
+    },
 )
 LEFT_OUT_PART = Part(
     title="What is left out, and why",

@@ -73,7 +73,8 @@ def _interval_chart(rows: Sequence[_Row], limit: float, title: str) -> Figure:
         axis.plot(row.value, y, "o", color=row.color)
     if all(row.value is None for row in rows):
         _write(axis, _NO_EFFECT if rows else "no method was tested")
-    axis.axvline(limit, color=css(INK), ls="--", lw=1.2)
+    else:
+        axis.axvline(limit, color=css(INK), ls="--", lw=1.2)
     labels = [textwrap.fill(row.label, 26) for row in reversed(rows)]
     axis.set_yticks(range(len(rows)), labels, fontsize=8)
     axis.set_ylim(-0.6, max(len(rows), 1) - 0.4)
