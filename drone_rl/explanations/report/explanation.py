@@ -71,11 +71,8 @@ class Explanation:
         """
         try:
             content = read_bytes(folder / "explanation.json", EXPLANATION_BYTES)
-            numbers = dict(
-                as_mapping(
-                    parse_json(content, "explanation.json", allow_nan=True), "explanation.json"
-                )
-            )
+            parsed = parse_json(content, "explanation.json", allow_nan=True)
+            numbers = dict(as_mapping(parsed, "explanation.json"))
             version = numbers.get("format"), numbers.get("format_version")
             if version != (FORMAT, FORMAT_VERSION):
                 raise InputError(f"it has no format version {FORMAT_VERSION}")

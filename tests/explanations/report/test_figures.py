@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from benchmarks.evidence import EXPLANATION, SHIFTS, VERDICT
 from drone_rl.explanations.report import (
     attribution,
     behavior,
@@ -16,6 +15,7 @@ from drone_rl.explanations.report import (
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.truth import changes, truth_charts
 from drone_rl.utils.palette import GOOD, MUTED, css
+from tests.evidence import EXPLANATION, SHIFTS, VERDICT
 from tests.trust.plots.test_regions import NUMBERS, WAYS
 
 SCORE = {"mean": 0.5, "lower95": 0.4, "upper95": 0.6}

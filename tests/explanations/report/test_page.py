@@ -12,12 +12,12 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from benchmarks.evidence import SHIFTS
 from drone_rl.explanations.report import page, write_report
 from drone_rl.explanations.report.explanation import FORMAT, FORMAT_VERSION, Explanation
 from drone_rl.explanations.report.page import PARTS, find_explanations
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
+from tests.evidence import SHIFTS
 from tests.explanations.quick import ALL_SECTIONS, quick_figures
 from tests.explanations.report.conftest import NASTY
 

@@ -1,11 +1,10 @@
 """Numbers, intervals and conditions of the report's sentences.
 
-tests/benchmarks checks that every sentence changes with the evidence under it.
+tests/test_claims.py checks that every sentence changes with the evidence under it.
 """
 
 import pytest
 
-from benchmarks.evidence import EXPLANATION, HIGHER, PROOF, SHIFTS, changed
 from drone_rl.explanations.report import behavior
 from drone_rl.explanations.report.attribution import say_attribution
 from drone_rl.explanations.report.class_models import say_class_models
@@ -14,6 +13,7 @@ from drone_rl.explanations.report.response import say_asymmetry, say_response
 from drone_rl.explanations.report.summary import LINES, say_summary
 from drone_rl.explanations.report.truth import say_findings, say_reasons
 from drone_rl.utils.text import said
+from tests.evidence import EXPLANATION, HIGHER, PROOF, SHIFTS, changed
 
 NONE_TRUSTED = {
     "truth.trusted": None,
