@@ -9,13 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import drone_rl
 from drone_rl.cli.hydra import resuming
-from drone_rl.cli.hydra.launchers import (
-    LocalLauncher,
-    RayLauncher,
-    SlurmLauncher,
-    register_plugins,
-)
-from drone_rl.cli.hydra.searching import OptunaSweeper
 from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.commands import ProvableSettings
 from drone_rl.config.training import Logger, Tensorboard, TrainSettings
@@ -60,8 +53,7 @@ class TrainCommand(CommandSettings, TrainSettings):
 
     @classmethod
     def prepare(cls, overrides: Sequence[str]) -> list[str]:
-        """Register launchers and sweeper with Hydra; return the complete command line."""
-        register_plugins(LocalLauncher, SlurmLauncher, RayLauncher, OptunaSweeper)
+        """Return the complete command line."""
         return resuming.complete(overrides)
 
     def used_policy(self, folder: Path) -> str:
