@@ -10,7 +10,6 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from drone_rl.config.configuration import check_same_config
-from drone_rl.config.training import TrainSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import (
     last_of,
@@ -25,7 +24,6 @@ from drone_rl.utils.overrides import COMMAND, MOST_OVERRIDES, check_harmless
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.readers import with_current_names
 from drone_rl.utils.schema import Maybe, Plain, Record, Several, Text, Whole, as_mapping, shown
-from drone_rl.utils.settings import current_names
 
 FORMAT = "drone_rl sweep"
 MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s", "renderer")
@@ -83,9 +81,9 @@ class Run:
     def arguments(self) -> list[str]:
         """Return the arguments of `drone-rl` that begin or resume this run."""
         folder = quoted(str(self.folder))
-        own = ["hydra.mode=RUN", f"hydra.run.dir={folder}"]
+        single = ["hydra.mode=RUN", f"hydra.run.dir={folder}"]
         resume = [f"resume={folder}"] if self.checkpoint.is_file() else []
-        return ["train", *self.overrides, *own, *resume]
+        return ["train", *self.overrides, *single, *resume]
 
     def repeat_command(self) -> str:
         """Return the shell command that repeats this training run."""
@@ -143,8 +141,13 @@ class Sweep:
             {"number": r.number, "overrides": list(r.overrides), "folder": self.name_of(r)}
             for r in self.runs
         ]
-        own = {"format": FORMAT, "command": self.command, "settings": self.settings, "runs": runs}
-        content = {**own, **provenance()}
+        content = {
+            "format": FORMAT,
+            "command": self.command,
+            "settings": self.settings,
+            "runs": runs,
+            **provenance(),
+        }
         write_atomically(self.folder / "sweep.json", json.dumps(content, indent=2))
 
 
@@ -171,11 +174,7 @@ def read_sweep(folder: Path) -> Sweep:
             )
             for run in content["runs"]
         ]
-        if len({run.number for run in runs}) < len(runs):
-            raise InputError("two runs have the same number")
-        check_folders(runs)
-        given = as_mapping(content["settings"], "settings")
-        settings = current_names(TrainSettings, given)
+        settings = dict(as_mapping(content["settings"], "settings"))
         return Sweep(folder, content["command"], settings, runs)
     except InputError as error:
         raise InputError(
@@ -229,14 +228,14 @@ def open_sweep(
         sweep = Sweep(folder, shlex.join(command), dict(settings), list(runs))
     else:
         sweep = read_sweep(folder)
-        known = {run.number: run.overrides for run in sweep.runs}
-        if any(known.get(run.number, run.overrides) != run.overrides for run in runs):
+        begun = {run.number: run.overrides for run in sweep.runs}
+        if any(begun.get(run.number, run.overrides) != run.overrides for run in runs):
             raise InputError(
                 f"hydra.sweep.dir={folder} holds another sweep, begun by: {sweep.command}; "
                 "choose another folder, or give that command to resume it"
             )
         check_same_config(sweep.settings, json.loads(json.dumps(settings)), MAY_CHANGE)
-        sweep.runs += [run for run in runs if run.number not in known]
+        sweep.runs += [run for run in runs if run.number not in begun]
         check_folders(sweep.runs)
     sweep.save()
     return sweep
