@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.injections import chromium
-from drone_rl.explanations.fly_page.server import fly
+from drone_rl.flight.fly_page.server import fly
 
 _SIZE = (1300, 900)
 _START_S = 60.0

@@ -213,7 +213,7 @@ def _sources() -> frozenset[str]:
     files = [
         file
         for folder in (
-            *("evaluation", "robustness", "verification", "utils", "sim", "evaluation/plots"),
+            *("trust", "verification", "utils", "sim", "trust/plots"),
             *("explanations/report", "explanations/report/templates/sections"),
         )
         for file in root.joinpath(folder).iterdir()

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from drone_rl.policies.policy import load_policy
 from drone_rl.policies.zoo import policy_names
-from drone_rl.verdicts.onnx_export import export_onnx
+from drone_rl.trust.onnx_export import export_onnx
 
 
 def bench_onnx(folder: Path, quick: bool) -> dict[str, float]:

@@ -53,11 +53,11 @@ from tools.docs.run import measure as measure_pages
 _RENDERING = ("sim", "envs")
 _COLLECTING = (*_RENDERING, "policies", "collectors")
 _TRAINING = (*_COLLECTING, "objectives", "training")
-_JUDGING = (*_RENDERING, "policies", "evaluation", "verdicts")
+_JUDGING = (*_RENDERING, "policies", "trust")
 _PROVING = (*_RENDERING, "policies", "verification/prover", "verification/checker")
 _EXPLAINING = (*_JUDGING, "explanations")
 _ORIGINAL = (*_TRAINING, "conf", "benchmarks/original")
-_CLAIMS = ("evaluation", "robustness", "verification", "verdicts", "explanations", "sweeps")
+_CLAIMS = ("trust", "verification", "explanations", "sweeps")
 
 
 def _flight_training(setup: Setup, experiment: str, seeds: Sequence[int]) -> dict[str, Any]:
@@ -99,12 +99,12 @@ BENCHMARKS: dict[str, Benchmark] = {
     "solve": Benchmark(
         lambda s: bench_solve(s.runs, s.seeds, s.episodes, s.device, s.quick),
         "main",
-        (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
+        (*_TRAINING, "trust", "conf", "benchmarks/training"),
     ),
     "seeds": Benchmark(
         lambda s: bench_seeds(s.runs / "seeds", s.device, s.quick),
         "main",
-        (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
+        (*_TRAINING, "trust", "conf", "benchmarks/training"),
     ),
     "large": Benchmark(
         lambda s: bench_large(s.runs, s.device, s.quick),
@@ -114,7 +114,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "coverage": Benchmark(
         lambda s: bench_coverage(s.quick),
         "adversarial",
-        ("utils/intervals", "evaluation", "benchmarks/coverage", "benchmarks/simulated_policies"),
+        ("utils/intervals", "trust", "benchmarks/coverage", "benchmarks/simulated_policies"),
     ),
     "sentences": Benchmark(
         lambda s: bench_sentences(),
@@ -146,7 +146,6 @@ BENCHMARKS: dict[str, Benchmark] = {
         "adversarial",
         (
             *_JUDGING,
-            "robustness",
             "benchmarks/gamed",
             "benchmarks/gamed_memory",
             "benchmarks/gamed_rounding",
@@ -181,20 +180,19 @@ BENCHMARKS: dict[str, Benchmark] = {
     "shifts": Benchmark(
         lambda s: bench_shifts(s.quick),
         "adversarial",
-        (*_JUDGING, "robustness", "benchmarks/shifts"),
+        (*_JUDGING, "benchmarks/shifts"),
     ),
     "domain_axes": Benchmark(
         lambda s: bench_domain_axes(s.runs / "domain_axes", s.quick),
         "adversarial",
-        (*_JUDGING, "robustness", "benchmarks/domain_axes"),
+        (*_JUDGING, "benchmarks/domain_axes"),
     ),
     "robust": Benchmark(
         lambda s: bench_robust(s.runs / "robust", s.seeds[:3], s.quick),
         "adversarial",
         (
             *_TRAINING,
-            "evaluation",
-            "robustness",
+            "trust",
             "conf",
             "benchmarks/robust",
             "benchmarks/robust_comparison",
@@ -242,7 +240,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "exact_coverage": Benchmark(
         lambda s: bench_exact_coverage(s.runs / "exact_coverage", s.quick),
         "verification",
-        (*_TRAINING, *_PROVING, "verdicts", "benchmarks/exact_coverage"),
+        (*_TRAINING, *_PROVING, "trust", "benchmarks/exact_coverage"),
     ),
     "provable": Benchmark(
         lambda s: bench_provable(s.runs / "provable", s.seeds[:3], s.quick),
@@ -257,17 +255,17 @@ BENCHMARKS: dict[str, Benchmark] = {
     "pillars": Benchmark(
         lambda s: bench_pillars(s.runs / "pillars", s.seeds[:3], s.episodes, s.device, s.quick),
         "libraries",
-        (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
+        (*_TRAINING, "trust", "conf", "benchmarks/training"),
     ),
     "revisions": Benchmark(
         lambda s: bench_revisions(s.runs / "revisions", s.quick),
         "system",
-        (*_TRAINING, "evaluation", "explanations", "cli", "conf", "benchmarks/revisions"),
+        (*_TRAINING, "trust", "explanations", "cli", "conf", "benchmarks/revisions"),
     ),
     "imitation": Benchmark(
         lambda s: bench_imitation(s.runs / "imitation", s.seeds[:3], s.episodes, s.device, s.quick),
         "long",
-        (*_TRAINING, "evaluation", "conf", "benchmarks/imitation", "benchmarks/training"),
+        (*_TRAINING, "trust", "conf", "benchmarks/imitation", "benchmarks/training"),
     ),
     "original": Benchmark(
         _original,
@@ -282,7 +280,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "fly_page": Benchmark(
         lambda s: bench_fly_page(s.runs / "fly_page", s.quick),
         "flight",
-        (*_RENDERING, "flight", "policies", "explanations/fly_page", "benchmarks/fly_page"),
+        (*_RENDERING, "flight", "policies", "benchmarks/fly_page"),
     ),
     "airsim": Benchmark(
         lambda s: {
@@ -302,12 +300,12 @@ BENCHMARKS: dict[str, Benchmark] = {
     "startup": Benchmark(
         lambda s: bench_startup(s.runs / "startup", s.device, s.quick),
         "system",
-        (*_TRAINING, "verdicts", "config", "cli", "conf", "benchmarks/startup"),
+        (*_TRAINING, "trust", "config", "cli", "conf", "benchmarks/startup"),
     ),
     "onnx": Benchmark(
         lambda s: bench_onnx(s.runs / "onnx", s.quick),
         "libraries",
-        (*_RENDERING, "policies", "evaluation", "verdicts/export", "benchmarks/onnx_export"),
+        (*_RENDERING, "policies", "trust", "benchmarks/onnx_export"),
     ),
     "peers": Benchmark(
         lambda s: bench_peers(s.runs / "peers", s.seeds[:3], s.episodes, s.quick),
@@ -333,17 +331,17 @@ BENCHMARKS: dict[str, Benchmark] = {
     "flight_moves": Benchmark(
         lambda s: _flight_training(s, "flight", s.seeds),
         "flight",
-        (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
+        (*_TRAINING, "trust", "conf", "benchmarks/training"),
     ),
     "flight_velocity": Benchmark(
         lambda s: _flight_training(s, "flight_velocity", s.seeds[:3]),
         "flight",
-        (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
+        (*_TRAINING, "trust", "conf", "benchmarks/training"),
     ),
     "flight_pillars": Benchmark(
         lambda s: _flight_training(s, "flight_pillars", s.seeds[:3]),
         "flight",
-        (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
+        (*_TRAINING, "trust", "conf", "benchmarks/training"),
     ),
 }
 GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))

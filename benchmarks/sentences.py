@@ -19,17 +19,17 @@ from benchmarks.evidence import (
     VERDICT,
     changed,
 )
-from drone_rl.evaluation import evaluate as evaluation
-from drone_rl.evaluation import verdict_text as verdict
 from drone_rl.explanations.report.behavior import say_source
 from drone_rl.explanations.report.page import PARTS
 from drone_rl.explanations.report.summary import say_summary
-from drone_rl.robustness import shifts_text as shifts
-from drone_rl.robustness.quoted_text import BRIEF
 from drone_rl.sweeps import text as sweep
+from drone_rl.trust import evaluate as evaluation
+from drone_rl.trust import export as card
+from drone_rl.trust import shifts_text as shifts
+from drone_rl.trust import verdict_text as verdict
+from drone_rl.trust.quoted_text import BRIEF
 from drone_rl.utils import text as seeds
 from drone_rl.utils.text import Claims, Paragraph, said
-from drone_rl.verdicts import export as card
 
 Changes = Mapping[str, Any]
 SENTENCES: dict[str, tuple[tuple[Paragraph, ...], Mapping[str, Any]]] = {

@@ -4,7 +4,7 @@ import time
 from typing import Any
 
 from drone_rl.config.commands import ShiftSettings
-from drone_rl.robustness.shifts import shifts
+from drone_rl.trust.shifts import shifts
 from drone_rl.utils.progress import silent
 
 

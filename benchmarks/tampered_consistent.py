@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.tampered_inconsistent import Change, Data, largest
 from drone_rl.policies.policy import load_policy
-from drone_rl.verification.checker.certificate import fingerprint
+from drone_rl.policies.zoo import fingerprint
 from drone_rl.verification.checker.consistency import MAX_MISSING, volume
 
 _TAIL = 1000

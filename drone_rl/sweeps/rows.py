@@ -3,15 +3,16 @@
 import contextlib
 import dataclasses
 import itertools
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.evaluation.rule import SIDES, Kind, Rule
-from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_result
+from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_sweep
+from drone_rl.trust.rule import SIDES, Kind, Rule
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.readers import read_table
+from drone_rl.utils.readers import read_result, read_table
 from drone_rl.utils.schema import Flag, Maybe, OneOf, Real, Whole
 
 Array = NDArray[np.float64]
@@ -196,3 +197,20 @@ def _read_metrics(row: Row) -> tuple[Array, Array]:
     entropy = float(np.mean(logged)) if logged else np.nan
     row.entropy = entropy if np.isfinite(entropy) else None
     return frames, rewards
+
+
+def choice_in_sweep(checkpoint: Path) -> tuple[str, dict[str, Any]] | None:
+    """Return the command that repeats a checkpoint's run, and how it was chosen in its sweep.
+
+    That is "runs", the number of runs in the sweep, and "episodes", the number by which it was
+    judged there. None if it is no checkpoint of a sweep's run.
+    """
+    folder = checkpoint.absolute().parent.parent
+    if checkpoint.suffix != ".pt" or not (folder.parent / "sweep.json").is_file():
+        return None
+    rows = read_rows(read_sweep(folder.parent))
+    row = next((row for row in rows if row.run.folder == folder), None)
+    if row is None:
+        return None
+    episodes = None if row.verdict is None else row.verdict["greedy"]["episodes"]
+    return row.run.repeat_command(), {"runs": len(rows), "episodes": episodes}

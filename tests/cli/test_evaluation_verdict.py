@@ -5,7 +5,7 @@ import json
 import pytest
 
 import drone_rl
-from tests.robustness.making import shifts_of
+from tests.trust.making import shifts_of
 from tests.verification.checker.making import of_every_place
 
 

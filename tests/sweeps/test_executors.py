@@ -20,10 +20,11 @@ from drone_rl.sweeps.executors import (
     describe_active,
     finish_run,
 )
-from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_result
+from drone_rl.sweeps.manifest import Run, Sweep, read_failure
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock
 from drone_rl.utils.provenance import num_cores
+from drone_rl.utils.readers import read_result
 
 pytestmark = pytest.mark.usefixtures("fake_training")
 

@@ -10,11 +10,11 @@ from drone_rl.sweeps.manifest import (
     is_sweep,
     open_sweep,
     read_failure,
-    read_result,
     read_sweep,
     sweep_name,
 )
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.readers import read_result
 
 
 def begin(folder, runs, **settings):

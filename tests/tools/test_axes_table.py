@@ -1,6 +1,6 @@
 """The table of the axes of perturbation."""
 
-from drone_rl.robustness.axes import AXES
+from drone_rl.trust.axes import AXES
 from tools.readme.axes import MEANINGS, list_axes
 
 

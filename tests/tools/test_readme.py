@@ -21,8 +21,8 @@ from tools.readme.__main__ import (
 from tools.readme.blocks import marked_blocks, replace_blocks
 from tools.readme.flight_rows import FLIGHT
 from tools.readme.headlines import HEADLINES, make_headlines
-from tools.readme.layers import draw_layers, list_packages
 from tools.readme.library_rows import LIBRARIES
+from tools.readme.packages import list_contracts, list_packages
 from tools.readme.rows import MAIN, PROOF, TRUTH
 from tools.readme.stale import report_ages
 from tools.readme.tables import (
@@ -190,36 +190,27 @@ def test_seconds_have_two_significant_digits(value, text):
     assert seconds(value) == text
 
 
-def test_layers_are_boxes_followed_by_forbidden_imports():
-    drawn = draw_layers(
-        [
-            {"type": "layers", "name": "order", "layers": ["top", "left | right", "base"]},
-            {
-                "type": "forbidden",
-                "name": "no water inside",
-                "source_modules": ["drone_rl.top", "drone_rl.left"],
-                "forbidden_modules": ["sea", "rain"],
-            },
-        ]
-    )
-    boxes = ["top</code>", "left</code> <code>right</code>", "base</code>"]
-    assert drawn.splitlines()[1:4] == [f"<li><code>{box}</li>" for box in boxes]
-    assert drawn.endswith("- No water inside: top, left may not import sea, rain.")
+def test_forbidden_imports_are_listed():
+    contract = {
+        "type": "forbidden",
+        "name": "no water inside",
+        "source_modules": ["drone_rl.top", "drone_rl.left"],
+        "forbidden_modules": ["sea", "rain"],
+    }
+    listed = list_contracts([contract, {"type": "acyclic_siblings"}])
+    assert listed == "- No water inside: top, left may not import sea, rain."
 
 
-def test_packages_are_listed_from_the_top_with_their_subpackages(tmp_path):
+def test_packages_are_listed_with_their_subpackages(tmp_path):
     texts = {"base/__init__": "Low.", "top/__init__": "High.\n\nMore", "top/a/__init__": "In"}
     for name, text in texts.items():
         path = tmp_path / f"{name}.py"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f'"""{text}"""\n')
-    (tmp_path / "left.py").write_text('"""A module."""\n')
-    contracts = [{"type": "layers", "name": "order", "layers": ["top", "left", "base"]}]
-    assert list_packages(contracts, tmp_path).splitlines()[2:] == [
+    assert list_packages(tmp_path).splitlines()[2:] == [
+        "| `base/` | Low |",
         "| `top/` | High |",
         "| `top/a/` | In |",
-        "| `left.py` | A module |",
-        "| `base/` | Low |",
     ]
 
 

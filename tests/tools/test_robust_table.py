@@ -1,7 +1,7 @@
 """The table of the ablation of randomized training."""
 
 from benchmarks.robust import ARMS
-from drone_rl.robustness.axes import GROUPS
+from drone_rl.trust.axes import GROUPS
 from tools.readme.robust import make_robust
 from tools.readme.tables import UNKNOWN
 

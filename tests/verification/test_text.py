@@ -3,7 +3,8 @@
 import pytest
 
 from benchmarks.evidence import EXPLANATION, changed
-from drone_rl.verification.text import exact_percent, rows, say_places
+from drone_rl.explanations.report.places import rows, say_places
+from drone_rl.utils.text import exact_percent
 
 
 def speak(**changes):

@@ -11,9 +11,9 @@ from tools.readme.axes import list_axes
 from tools.readme.blocks import replace_blocks
 from tools.readme.flight_rows import FLIGHT
 from tools.readme.headlines import HEADLINES, make_headlines
-from tools.readme.layers import draw_layers, list_packages, read_contracts
 from tools.readme.library_rows import LIBRARIES
 from tools.readme.notebook import make_notebook
+from tools.readme.packages import list_contracts, list_packages, read_contracts
 from tools.readme.peers import make_peers
 from tools.readme.robust import make_robust
 from tools.readme.rows import MAIN, PROOF, TRUTH
@@ -65,8 +65,8 @@ def make_blocks(root: Path) -> dict[str, str]:
         "robust": make_robust(ledger.figures),
         "figures": list_figures(ledger),
         "origins": list_origins(ledger, BENCHMARKS),
-        "packages": list_packages(contracts, root / "drone_rl"),
-        "layers": draw_layers(contracts),
+        "packages": list_packages(root / "drone_rl"),
+        "contracts": list_contracts(contracts),
         "choices": list_choices(root / "conf"),
         "groups": list_groups(),
         "parts": list_parts(),

@@ -5,7 +5,7 @@ from typing import Any
 
 from benchmarks.robust import ALL_KINDS, ARMS
 from benchmarks.robust_comparison import PLAIN, mean
-from drone_rl.robustness.axes import GROUPS
+from drone_rl.trust.axes import GROUPS
 from tools.readme.tables import UNKNOWN
 
 _UNTOUCHED = "untouched"
