@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.sweeps.rows import Row
-from drone_rl.sweeps.summary import FAILED, Group, median_band, on_grid
+from drone_rl.sweeps.summary import FAILED, RunGroup, median_band, on_grid
 from drone_rl.trust.rule import KINDS
 from drone_rl.utils.palette import BAD, FAINT, GOOD, MUTED, ONE_SIDED, css, light
 
@@ -45,17 +45,17 @@ class Layout:
 
     axis: str | None
     """A swept setting; None if only seeds differ."""
-    panels: dict[str, list[Group]]
+    panels: dict[str, list[RunGroup]]
     """Groups by the values of the other settings; at most `MAX_PANELS`."""
     left_out: int = 0
     """Number of panels beyond this limit."""
 
 
-def lay_out(groups: Sequence[Group]) -> Layout:
+def lay_out(groups: Sequence[RunGroup]) -> Layout:
     """Put the learning rate, or else the last swept setting, on the x axis."""
     keys = list(groups[0].choice) if groups else []
     axis = FAVOURITE_AXIS if FAVOURITE_AXIS in keys else (keys[-1] if keys else None)
-    panels: dict[str, list[Group]] = {}
+    panels: dict[str, list[RunGroup]] = {}
     for group in groups:
         rest = [f"{key}={value}" for key, value in group.choice.items() if key != axis]
         panels.setdefault(", ".join(rest), []).append(group)
@@ -102,7 +102,7 @@ def _render(
     return file.getvalue()
 
 
-def _curves(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+def _curves(axes: Axes, layout: Layout, groups: list[RunGroup]) -> None:
     colors = colormaps["viridis"](np.linspace(0.1, 0.9, max(1, len(groups))))
     for group, color in zip(groups, colors, strict=True):
         end = max((row.frames for row in group.known), default=0.0)
@@ -125,7 +125,7 @@ def _curves(axes: Axes, layout: Layout, groups: list[Group]) -> None:
         axes.legend(title=_literal(layout.axis or ""), fontsize=7, title_fontsize=7)
 
 
-def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+def _verdicts(axes: Axes, layout: Layout, groups: list[RunGroup]) -> None:
     places = _places(axes, layout, groups)
     for i, kind in enumerate(COLORS):
         shares = [group.verdicts[kind] for group in groups]
@@ -140,13 +140,13 @@ def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     _explain_colors(axes)
 
 
-def _sides(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+def _sides(axes: Axes, layout: Layout, groups: list[RunGroup]) -> None:
     _dots(axes, layout, groups, lambda row: row.lean)
     axes.axhline(0.0, color="0.5", linewidth=0.8, zorder=0)
     axes.set(ylabel="goals reached, right minus left", ylim=(-1.1, 1.1))
 
 
-def _entropies(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+def _entropies(axes: Axes, layout: Layout, groups: list[RunGroup]) -> None:
     _dots(axes, layout, groups, lambda row: row.entropy)
     axes.set(ylabel="entropy at the end, nats")
     entropies = [r.entropy for group in groups for r in group.rows if r.entropy is not None]
@@ -157,7 +157,7 @@ def _entropies(axes: Axes, layout: Layout, groups: list[Group]) -> None:
 
 
 def _dots(
-    axes: Axes, layout: Layout, groups: list[Group], value: Callable[[Row], float | None]
+    axes: Axes, layout: Layout, groups: list[RunGroup], value: Callable[[Row], float | None]
 ) -> None:
     """Plot a dot per judged run, hollow if uncertain; the runs of a group are side by side."""
     places = _places(axes, layout, groups)
@@ -194,28 +194,19 @@ def _explain_colors(axes: Axes) -> None:
     figure.legend(handles=handles, loc="outside upper center", ncols=columns, fontsize=8)
 
 
-def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+def _costs(axes: Axes, layout: Layout, groups: list[RunGroup]) -> None:
     for place, group in zip(_places(axes, layout, groups), groups, strict=True):
         for row in group.known:
             kind = "poor" if row.state == FAILED else "none of these"
             color = COLORS["good" if row.is_solved else kind]
             marker, fill = ("o", "full") if row.is_solved else ("^", "none")
             axes.plot([place], [row.frames], marker, alpha=0.6, color=color, fillstyle=fill)
-        note = axes.annotate(
-            f"{group.solved['successes']}/{group.solved['trials']}",
-            (place, 1.0),
-            xycoords=("data", "axes fraction"),
-            ha="center",
-            va="top",
-            fontsize=7,
-        )
-        note.set_in_layout(False)
     every = [group for panel in layout.panels.values() for group in panel]  # they share the axis
     top = max((row.frames for group in every for row in group.known), default=0.0) or 1.0
     axes.set(ylabel="frames to solve", ylim=(0, 1.2 * top))
 
 
-Plot = Callable[[Axes, Layout, list[Group]], None]
+Plot = Callable[[Axes, Layout, list[RunGroup]], None]
 PLOTS: dict[str, tuple[str, Plot, float]] = {
     "curves": ("Learning curves", _curves, 3.6),
     "shares": ("Verdicts", _verdicts, 3.4),
@@ -226,7 +217,7 @@ PLOTS: dict[str, tuple[str, Plot, float]] = {
 """Title, function and height in inches of each plot, by the prefix of its `SENTENCES`."""
 
 
-def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:
+def _places(axes: Axes, layout: Layout, groups: list[RunGroup]) -> list[float]:
     """Set the ticks and return the x position of each group: its number, or its index."""
     names = [str(group.choice.get(layout.axis or "", "")) for group in groups]
     axes.set_xlabel(_literal(layout.axis or "all runs"))

@@ -16,7 +16,7 @@ from markupsafe import Markup, escape
 from drone_rl.sweeps import figures
 from drone_rl.sweeps.manifest import Sweep, read_sweep
 from drone_rl.sweeps.rows import read_rows
-from drone_rl.sweeps.summary import Group, make_groups, summarise_sweep, to_csv
+from drone_rl.sweeps.summary import RunGroup, make_groups, summarise_sweep, to_csv
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, last_of, newest, write_atomically
@@ -159,7 +159,7 @@ def render_page(name: str, summary: dict[str, Any], pictures: list[dict[str, str
     )
 
 
-def _plots(groups: Sequence[Group], sentences: Mapping[str, str]) -> list[dict[str, str]]:
+def _plots(groups: Sequence[RunGroup], sentences: Mapping[str, str]) -> list[dict[str, str]]:
     rows = [row for group in groups for row in group.known]
     if not rows:
         return []

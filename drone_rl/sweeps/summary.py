@@ -95,7 +95,7 @@ def _path_argument(path: Path) -> str:
 
 
 @dataclasses.dataclass
-class Group:
+class RunGroup:
     """Runs that differ in their seed only."""
 
     choice: dict[str, str]
@@ -162,12 +162,12 @@ class Group:
         return {**figures, "sentences": said(GROUP_SENTENCES, figures)}
 
 
-def make_groups(rows: Sequence[Row]) -> list[Group]:
-    """Group runs that differ in their seed only, in the order of their first run."""
-    groups: dict[tuple, Group] = {}
+def make_groups(rows: Sequence[Row]) -> list[RunGroup]:
+    """RunGroup runs that differ in their seed only, in the order of their first run."""
+    groups: dict[tuple, RunGroup] = {}
     for row in rows:
         choice = {key: value for key, value in row.choice.items() if key != "seed"}
-        groups.setdefault(tuple(choice.items()), Group(choice, [])).rows.append(row)
+        groups.setdefault(tuple(choice.items()), RunGroup(choice, [])).rows.append(row)
     return list(groups.values())
 
 
@@ -216,10 +216,10 @@ def median_band(values: Array) -> tuple[Array, Array] | None:
     Lower and upper bounds have shape (num_points,) each; None for fewer than six runs.
     """
     bounds = [median_bounds(column) for column in np.asarray(values, float).T]
-    known = [pair for pair in bounds if pair is not None]
-    if not known:
+    existing = [pair for pair in bounds if pair is not None]
+    if not existing:
         return None
-    lower, upper = np.array(known).T
+    lower, upper = np.array(existing).T
     return lower, upper
 
 

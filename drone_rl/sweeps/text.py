@@ -222,7 +222,7 @@ SENTENCES = (
         "costs.dots",
         "a run was solved",
         "solved",
-        "Each dot is a run that reached its target; above: their number, of the runs that ended.",
+        "Each dot is a run that reached its target.",
     ),
     _if_any(
         "costs.open",

@@ -17,10 +17,9 @@ from drone_rl.sweeps.executors import (
     RayExecutor,
     RunProcess,
     SlurmExecutor,
-    describe_active,
     finish_run,
 )
-from drone_rl.sweeps.manifest import Run, Sweep, read_failure
+from drone_rl.sweeps.manifest import read_failure
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock
 from drone_rl.utils.provenance import num_cores
@@ -199,19 +198,6 @@ def test_a_run_that_another_process_works_on_is_waited_for(make_runs):
     thread.join(10)
     assert statuses == [0]
     assert not (run.folder / "starts").exists()
-
-
-def test_runs_at_work_are_described_by_their_last_line(tmp_path):
-    runs = [Run(i, (), tmp_path / f"lr{i}" / "0") for i in range(3)]
-    sweep = Sweep(tmp_path, "drone-rl train -m", {}, runs)
-    for run in runs:
-        run.folder.mkdir(parents=True)
-        (run.folder / "output.log").write_text("[10:00:00] begins\n[10:00:05] frames 2\n")
-    (runs[1].folder / "output.log").write_text("")
-    assert describe_active(sweep, runs) == ""
-    with folder_lock(runs[0].folder), folder_lock(runs[1].folder):
-        assert describe_active(sweep, runs) == "lr0/0: frames 2; lr1/0: starts"
-        assert describe_active(sweep, runs, most=1) == "lr0/0: frames 2; and 1 more"
 
 
 def test_a_process_that_came_too_late_is_no_failure(make_runs):

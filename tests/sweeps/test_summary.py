@@ -99,25 +99,12 @@ def test_failed_runs_count(begin_sweep, make_verdict):
     assert group["final_share"]["median"] == 0.0
 
 
-def test_runs_that_solved_late(begin_sweep):
-    runs = {f"seed={i}": {"frames": 1000} for i in range(2)}
-    (late,) = groups(begin_sweep(runs | {"seed=2": {"frames": 9000}, "seed=3": {"frames": 9000}}))
-    assert (late["frames_to_solve"]["median"], late["solved"]["share"]) == (5000, 1.0)
-
-
 def test_unsolved_runs_are_censored(begin_sweep):
     never = {"frames": 9000, "reason": "frames"}
     runs = {f"seed={i}": {"frames": 1000} for i in range(2)}
     (group,) = groups(begin_sweep(runs | {"seed=2": never, "seed=3": never}))
     assert (group["frames_to_solve"]["median"], group["solved"]["share"]) == (None, 0.5)
     assert group["frames_to_solve"]["more_than"] == 5000
-
-
-def test_certain_verdicts_are_counted(begin_sweep, make_verdict):
-    certain, not_certain = ({"verdict": make_verdict(certain=c)} for c in (True, False))
-    (group,) = groups(begin_sweep({"seed=0": certain, "seed=1": not_certain}))
-    good = group["verdicts"]["good"]
-    assert (good["successes"], good["certain"]) == (2, 1)
 
 
 def test_runs_that_are_not_judged_may_be_of_any_kind(begin_sweep, make_verdict):

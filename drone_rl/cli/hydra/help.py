@@ -41,11 +41,11 @@ def show_help(
     config = composed(command, conf, typed)
     values: Any = OmegaConf.to_container(config, resolve=False)
     del values["hydra"]
-    chosen = {g: c for g, c in config.hydra.runtime.choices.items() if "@" not in g}
-    files = {g: sorted(path.stem for path in (conf / g).glob("*.yaml")) for g in chosen}
+    selected = {g: c for g, c in config.hydra.runtime.choices.items() if "@" not in g}
+    files = {g: sorted(path.stem for path in (conf / g).glob("*.yaml")) for g in selected}
     groups = {g: names for g, names in files.items() if names and g not in _NOT_SHOWN}
     keys = [*(group for group in groups if group not in values), *flattened(values)]
-    meanings = comments(command, conf, {g: c for g, c in chosen.items() if "/" not in g})
+    meanings = comments(command, conf, {g: c for g, c in selected.items() if "/" not in g})
     meanings |= {g: f"One of: {', '.join(names)}." for g, names in groups.items()}
     meanings["hydra.run.dir"] = _RUN_FOLDER
     name = command.replace("_", "-")
@@ -59,7 +59,7 @@ def show_help(
         if "all" not in topics:
             keys = [key for topic in topics for key in _about(topic, keys, f"drone-rl {name}")]
     for key in keys:
-        value = chosen[key] if key in groups else _inside(values, key)
+        value = selected[key] if key in groups else _inside(values, key)
         meaning = " ".join(meanings.get(key, "").split())
         if not isinstance(value, dict) or not value:
             text = "FOLDER" if key == "hydra.run.dir" else _value(value)
@@ -78,10 +78,10 @@ def show_help(
 
 def _about(topic: str, keys: Sequence[str], command: str) -> list[str]:
     """Return the setting that is most like a topic, and the settings inside it."""
-    found = next((name for name in similar(topic, keys) if name in keys), None)
-    if found is None:
+    setting = next((name for name in similar(topic, keys) if name in keys), None)
+    if setting is None:
         raise InputError(f"{command} has no setting {topic}; {command} --help all lists all")
-    return [key for key in keys if f"{key}.".startswith(f"{found}.")]
+    return [key for key in keys if f"{key}.".startswith(f"{setting}.")]
 
 
 def next_steps(name: str, policy: str, folder: Path, plugins: Sequence[str] = ()) -> str:
@@ -124,26 +124,26 @@ def _unit(settings: Any, path: Sequence[str]) -> str:
     return getattr(getattr(kind, "kind", kind), "unit", "")
 
 
-def comments(command: str, conf: Path, chosen: dict[str, str | None]) -> dict[str, str]:
+def comments(command: str, conf: Path, selected: dict[str, str | None]) -> dict[str, str]:
     """Return the comment of each setting of a command by its dotted name.
 
-    `command` is the name of its file in `conf`, `chosen` the file of each group.
+    `command` is the name of its file in `conf`, `selected` the file of each group.
     """
-    found = {"plugins": "Modules that register parts of your own: networks, transforms and so on."}
+    texts = {"plugins": "Modules that register parts of your own: networks, transforms and so on."}
     dynamics = read_comments(conf / "dynamics" / "computer_vision.yaml")
-    found |= {f"dynamics.{key}": text for key, text in dynamics.items()}
+    texts |= {f"dynamics.{key}": text for key, text in dynamics.items()}
     tasks = conf / "task"
     for path in [*sorted(tasks.glob("*.yaml")), tasks / "collect_cubes.yaml"]:  # the last one wins
-        found |= {f"task.{key}": text for key, text in read_comments(path).items()}
-    for group, name in chosen.items():
+        texts |= {f"task.{key}": text for key, text in read_comments(path).items()}
+    for group, name in selected.items():
         for path in _with_parents(conf / group / f"{name}.yaml"):
-            found |= {f"{group}.{key}": text for key, text in read_comments(path).items()}
-    return found | read_comments(conf / f"{command}.yaml")
+            texts |= {f"{group}.{key}": text for key, text in read_comments(path).items()}
+    return texts | read_comments(conf / f"{command}.yaml")
 
 
 def read_comments(path: Path) -> dict[str, str]:
     """Return the comment above each setting of one file by its dotted name."""
-    found, above, where = {}, [], []
+    texts, above, where = {}, [], []
     for line in path.read_text().splitlines():
         setting = _SETTING.match(line)
         if line.lstrip().startswith("#"):
@@ -151,11 +151,11 @@ def read_comments(path: Path) -> dict[str, str]:
         elif setting and setting["name"] != "defaults":
             where = [*where[: len(setting["indent"]) // 2], setting["name"]]
             if above:
-                found[".".join(where)] = "\n".join(above)
+                texts[".".join(where)] = "\n".join(above)
             above = []
         else:
             above = []
-    return found
+    return texts
 
 
 def _with_parents(path: Path) -> Iterator[Path]:

@@ -1,8 +1,8 @@
 """Explain a command line that a command does not accept: what is wrong, and what to type instead.
 
-One mechanism for all mistakes: `Command.problem` says why a word is refused, and `Command.repair`
-tries what may be meant: how the words are spelled, then the name, then the value. It returns the
-first override without a problem.
+One mechanism for all mistakes: `CommandLine.problem` says why a word is refused, and
+`CommandLine.repair` tries what may be meant: how the words are spelled, then the name, then the
+value. It returns the first override without a problem.
 """
 
 import contextlib
@@ -98,13 +98,13 @@ def check_words(name: str, conf: Path, words: Sequence[str]) -> None:
             names = re.findall(r"[\w.-]+", value)
             is_refused |= not {*names} <= {*choices(conf, group)} and "(" not in value
         if is_refused and word not in OPTIONS:
-            raise Command(name, conf, words).mistake(position)
+            raise CommandLine(name, conf, words).mistake(position)
 
 
 def explain(error: Exception, name: str, conf: Path, words: Sequence[str]) -> InputError:
     """Return the error for a user whose settings Hydra or OmegaConf rejected."""
     if not any(word.startswith(_OWN_FOLDERS) for word in words):
-        command = Command(name, conf, words)
+        command = CommandLine(name, conf, words)
         for position, word in enumerate(words):
             if word not in OPTIONS and command.problem(word) is not None:
                 return command.mistake(position)
@@ -115,16 +115,16 @@ def _is_group(conf: Path, name: str) -> bool:
     return bool(name) and not name.startswith((".", "/")) and (conf / name).is_dir()
 
 
-class Command:
+class CommandLine:
     """A command and the words after its name."""
 
     def __init__(self, name: str, conf: Path, words: Sequence[str]) -> None:
         self.name, self.conf, self.words = name.replace("_", "-"), conf, words
         self._parser = OverridesParser.create()
         self._read(composed(name, conf, ()))
-        chosen = [w for w in words if w.partition("=")[0] in self.groups and not self.problem(w)]
-        if chosen and not is_sweep(words):
-            self._read(composed(name, conf, chosen))
+        selected = [w for w in words if w.partition("=")[0] in self.groups and not self.problem(w)]
+        if selected and not is_sweep(words):
+            self._read(composed(name, conf, selected))
 
     def _read(self, config: DictConfig) -> None:
         """Take the settings, which the choices of groups determine."""
@@ -149,11 +149,11 @@ class Command:
         override = self._parsed(word)
         if override is None:
             return "its value has special characters, which need quotes"
-        key, is_known = override.key_or_group, override.key_or_group in self.keys
+        key, exists = override.key_or_group, override.key_or_group in self.keys
         is_added = word.startswith("+")
-        if not is_known and not is_added:
+        if not exists and not is_added:
             return f"drone-rl {self.name} has no setting {key}"
-        if is_known and is_added and not override.is_force_add():
+        if exists and is_added and not override.is_force_add():
             return f"{key} exists already"
         if not is_sweep(self.words):
             if key in _FOR_SWEEPS:
@@ -238,9 +238,9 @@ class Command:
     def _meant(self, text: str) -> Iterator[str]:
         """Yield the overrides that may be meant by one."""
         name, _, value = text.partition("=")
-        is_known = name.lstrip("+") in self.keys
+        exists = name.lstrip("+") in self.keys
         yield f"{name}.{value}" if "=" in value else text
-        for meant in [name.lstrip("+")] if is_known else similar(name, self.keys):
+        for meant in [name.lstrip("+")] if exists else similar(name, self.keys):
             if "=" in meant:
                 yield meant
                 continue
@@ -249,7 +249,7 @@ class Command:
                 yield f"{meant}={variant}"
             if self._parsed(text) is None:
                 yield f"{meant}={quoted(value)}"
-            if not is_known:
+            if not exists:
                 yield f"{meant}={_ANY}"
 
     def _choice_with(self, key: str) -> str | None:

@@ -77,6 +77,7 @@ def test_whole_numbers_may_have_an_exponent(override, number):
 @pytest.mark.parametrize("line", ["-m seed=1,2 device=cpu", "seed=1,2 -m device=cpu"])
 def test_a_command_gets_its_settings_and_status_for_each_run(monkeypatch, tmp_path, line):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "1")  # as `guarded` does
     runs = []
 
     def run(settings, folder):
