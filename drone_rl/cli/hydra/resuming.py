@@ -11,7 +11,7 @@ from hydra.core.hydra_config import HydraConfig
 from omegaconf import OmegaConf
 
 import drone_rl
-from drone_rl.sweeps.manifest import is_sweep, quoted, sweep_name
+from drone_rl.sweeps.manifest import is_sweep, quoted
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import last_of, refuse_links, trained_policies, write_atomically
 from drone_rl.utils.overrides import must_be_typed, taken_over
@@ -47,10 +47,14 @@ def complete(overrides: Sequence[str]) -> list[str]:
     """
     typed = [*overrides]
     refuse_policies(typed)
+    folders = [o.split("=", 1)[1] for o in typed if o.startswith("resume=")]
+    if is_sweep(typed) and folders:
+        raise InputError(
+            "resume= continues one run, not with -m; to continue a sweep, repeat its command"
+        )
     if is_sweep(typed):
         is_named = any(o.startswith("hydra.sweep.dir=") for o in typed)
         return typed if is_named else [*typed, _FOLDER + sweep_name(typed)]
-    folders = [o.split("=", 1)[1] for o in typed if o.startswith("resume=")]
     if not folders or folders[-1] in ("", "null"):
         return typed
     if any(o.startswith("hydra.run.dir=") for o in typed):
