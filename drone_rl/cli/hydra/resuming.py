@@ -11,7 +11,7 @@ from hydra.core.hydra_config import HydraConfig
 from omegaconf import OmegaConf
 
 import drone_rl
-from drone_rl.sweeps.manifest import is_sweep, quoted
+from drone_rl.sweeps.manifest import is_sweep, quoted, sweep_name
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import last_of, refuse_links, trained_policies, write_atomically
 from drone_rl.utils.overrides import must_be_typed, taken_over
