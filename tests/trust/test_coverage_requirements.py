@@ -46,7 +46,7 @@ def test_what_shifts_leaves_can_be_needed(read):
             "fog: {low: 1}\nfog: {low: 2}",
             r"line 2 of .* is no YAML \(fog occurs twice\); correct it",
         ),
-        ("a: !!python/object/apply:os.getcwd []", "no plain YAML"),
+        ("a: !!python/object/apply:os.getcwd []", "no YAML"),
         ("wind: {low: 1, unit: m/s}", "'wind' is not an axis; give one or more of: object_color"),
         ("fog: 60", "fog=60 must be a mapping; give low, high or both, and unit: m of sight"),
         ("fog: {low: 60, unit: km}", "fog.unit='km' is wrong; give .* unit: m of sight"),
@@ -54,7 +54,7 @@ def test_what_shifts_leaves_can_be_needed(read):
         ("fog: {least: 60, unit: m of sight}", "fog.'least' is unknown"),
         ("fog: {unit: m of sight}", "neither low nor high"),
         ("fog: {low: 60, high: 40, unit: m of sight}", "from 60 to 40, which is less"),
-        ("fog: {low: sixty, unit: m of sight}", "fog.low='sixty' is a text"),
+        ("fog: {low: sixty, unit: m of sight}", "fog.low='sixty'"),
         ("fog: {high: .inf, unit: m of sight}", "fog.high=inf is out of range"),
         (
             "camera_yaw: {low: -5, high: 5, unit: degrees}",
