@@ -121,7 +121,7 @@ def test_an_extra_that_is_not_installed(in_process, monkeypatch, module, extra, 
 def test_a_logger_whose_package_is_missing(in_process, monkeypatch, tmp_path):
     monkeypatch.setattr("torchrl.record.loggers.wandb._has_wandb", False)
     told = [*TINY, "logger=wandb", "hydra.run.dir=run"]
-    assert "pip install wandb" in error_line(in_process("train", *told))
+    assert "wandb" in error_line(in_process("train", *told))
     assert not (tmp_path / "run" / "checkpoints").exists()
 
 
