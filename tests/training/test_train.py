@@ -297,12 +297,10 @@ def test_folders_that_do_not_work_are_named(given, message):
         drone_rl.train(TINY, progress=silent, **given)
 
 
-def test_plugins_are_imported_in_python():
+def test_names_of_other_projects():
     for name, meant in (("learning_rate", r"Adam\(lr"), ("n_envs", r"Episodes\(num_envs")):
         with pytest.raises(InputError, match=rf"^{name} is unknown; .*did you mean .*{meant}="):
             drone_rl.train(**{name: 1})
-    with pytest.raises(InputError, match=r"^plugins belongs to the command .*import the"):
-        drone_rl.train(plugins=["mine"], progress=silent)
 
 
 def test_settings_of_another_kind_are_named():
