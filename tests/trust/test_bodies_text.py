@@ -2,8 +2,8 @@
 
 import pytest
 
-from benchmarks.evidence import VERDICT, changed
 from drone_rl.trust.bodies import cell, failure, rows
+from tests.evidence import VERDICT, changed
 
 GOOD = changed(
     VERDICT,

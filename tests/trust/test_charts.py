@@ -1,8 +1,8 @@
 import numpy as np
 
-from benchmarks.evidence import SHIFTS, changed
 from drone_rl.trust.charts import chart, conditions, curves, strips
 from drone_rl.utils.palette import INK
+from tests.evidence import SHIFTS, changed
 
 PICTURES = [np.full((25, 64, 3), 40 * i, np.uint8) for i in range(6)]
 

@@ -7,11 +7,11 @@ import shutil
 import pytest
 
 import drone_rl
-from benchmarks.evidence import changed
 from drone_rl.policies.zoo import shifts_path
 from drone_rl.trust.coverage import compare_with_required, find_domain
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
+from tests.evidence import changed
 from tests.trust.making import shifts_of
 
 

@@ -2,10 +2,10 @@ import json
 
 import pytest
 
-from benchmarks.evidence import SHIFTS, changed
 from drone_rl.trust.coverage import read_requirements
 from drone_rl.trust.shifts import ranges_of
 from drone_rl.utils.errors import InputError
+from tests.evidence import SHIFTS, changed
 
 
 @pytest.fixture

@@ -2,9 +2,9 @@
 
 import pytest
 
-from benchmarks.evidence import SHIFTS, VERDICT, changed
 from drone_rl.trust.quoted_text import BRIEF, QUOTED, is_quoted, not_evaluated, why_not
 from drone_rl.utils.text import said
+from tests.evidence import SHIFTS, VERDICT, changed
 
 GOOD = {"verdict": {**VERDICT, "kind": "good", "certain": True}, "shifts": SHIFTS}
 

@@ -1,9 +1,9 @@
 import pytest
 
-from benchmarks.evidence import SHIFTS as EVIDENCE
-from benchmarks.evidence import changed
 from drone_rl.trust.shifts_text import NAMES, SHIFTS, inward, rows
 from drone_rl.utils.text import said
+from tests.evidence import SHIFTS as EVIDENCE
+from tests.evidence import changed
 
 
 def test_the_whole():

@@ -1,8 +1,8 @@
 import pytest
 
-from benchmarks.evidence import SHIFTS, VERDICT, changed
 from drone_rl.trust.shifts_text import contradicted, lacking
 from drone_rl.utils.errors import InputError
+from tests.evidence import SHIFTS, VERDICT, changed
 
 GOOD = {"verdict": {**VERDICT, "kind": "good", "certain": True}, "shifts": SHIFTS}
 

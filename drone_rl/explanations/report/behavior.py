@@ -22,7 +22,6 @@ from drone_rl.utils.text import (
     plural,
     said,
     seed_line,
-    seed_of,
 )
 
 
@@ -87,8 +86,8 @@ def say_seed(evidence: Evidence) -> Claims:
         return {}
     return {
         "explanation.fixed_seed": (
-            f"Fixed seed {seed_of(evidence)}: a policy could have been fitted to the environments, "
-            "frames and placements of all sections."
+            f"Fixed seed {evidence.get('seed')}: a policy could have been fitted to the "
+            "environments, frames and placements of all sections."
         )
     }
 

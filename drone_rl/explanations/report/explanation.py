@@ -15,7 +15,7 @@ from drone_rl.trust.plots.saving import Rows
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes, refuse_links
-from drone_rl.utils.limits import ARRAYS_BYTES, EXPLANATION_BYTES, EXPLANATION_VALUES, Allowance
+from drone_rl.utils.limits import EXPLANATION_BYTES
 from drone_rl.utils.schema import Text, as_mapping
 from drone_rl.utils.text import SEED_KEYS, Paragraph
 
@@ -71,27 +71,22 @@ class Explanation:
         return terms_of(self.numbers)
 
     @classmethod
-    def load(cls, folder: Path, allowance: Allowance | None = None) -> "Explanation":
+    def load(cls, folder: Path) -> "Explanation":
         """Read a folder.
-
-        `allowance` is the byte budget for arrays, shared by all explanations of a report.
 
         Raises:
             InputError: A file is missing, damaged, too large, or of another version.
         """
-        allowance = allowance or Allowance(ARRAYS_BYTES)
         try:
             refuse_links(folder, depth=1)
             content = read_bytes(folder / "explanation.json", EXPLANATION_BYTES)
-            parsed = parse_json(
-                content, "explanation.json", allow_nan=True, most_values=EXPLANATION_VALUES
-            )
+            parsed = parse_json(content, "explanation.json", allow_nan=True)
             numbers = dict(as_mapping(parsed, "explanation.json"))
             version = numbers.get("format"), numbers.get("format_version")
             if version != (FORMAT, FORMAT_VERSION):
                 raise InputError(f"it has no format version {FORMAT_VERSION}")
             arrays, data = (
-                read_arrays(folder / f"{name}.npz", allowance=allowance, wanted=_may_be_shown)
+                read_arrays(folder / f"{name}.npz", wanted=_may_be_shown)
                 for name in ("arrays", "dataset")
             )
             data.pop("meta", None)

@@ -25,7 +25,6 @@ from drone_rl.trust.plots.saving import save_drawn, save_numbers, save_rows
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest, to_file_name
-from drone_rl.utils.limits import ARRAYS_BYTES, Allowance
 from drone_rl.utils.text import percent, said, say
 
 PARTS: dict[str, Part] = {
@@ -106,8 +105,7 @@ def write_report(folders: Sequence[Path], target: Path) -> Path:
     Raises:
         InputError: An explanation can't be read or the report can't be written.
     """
-    allowance = Allowance(ARRAYS_BYTES)
-    loaded = [Explanation.load(folder, allowance) for folder in folders]
+    loaded = [Explanation.load(folder) for folder in folders]
     figures = target / "figures"
     policies = [Policy(e, figures, f"{i}_{to_file_name(e.name)}") for i, e in enumerate(loaded)]
     for policy in policies:

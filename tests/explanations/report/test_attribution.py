@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from benchmarks.evidence import EXPLANATION, changed
 from drone_rl.explanations.report.attribution import (
     BLOCK,
     PART,
@@ -12,6 +11,7 @@ from drone_rl.explanations.report.attribution import (
     say_untrusted,
 )
 from drone_rl.utils.display import page_environment
+from tests.evidence import EXPLANATION, changed
 
 STEPS = 5
 

@@ -1,7 +1,7 @@
 import pytest
 
-from benchmarks.evidence import EXPLANATION, changed
 from drone_rl.explanations.report.behavior import say_advice, say_scope
+from tests.evidence import EXPLANATION, changed
 
 
 @pytest.mark.parametrize(

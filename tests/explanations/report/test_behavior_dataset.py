@@ -1,6 +1,6 @@
-from benchmarks.evidence import EXPLANATION
 from drone_rl.explanations.report.behavior import DATASET_PART
 from drone_rl.utils.text import say
+from tests.evidence import EXPLANATION
 
 
 def test_it_tells_the_size_of_the_data_set_and_draws_nothing(make_explanation):

@@ -1,8 +1,8 @@
 import numpy as np
 
-from benchmarks.evidence import SHIFTS, VERDICT
 from drone_rl.explanations.report.behavior import SHIFTS_PART
 from drone_rl.trust.shifts_text import NAMES
+from tests.evidence import SHIFTS, VERDICT
 
 GOOD = {**VERDICT, "kind": "good", "certain": True}
 ARRAYS = {f"shifts_{name}": np.zeros((6, 5, 16, 3), np.uint8) for name in SHIFTS["axes"]}

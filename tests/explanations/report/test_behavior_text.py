@@ -1,7 +1,7 @@
 """Sentences on the recorded rollouts, contradictions and loops, word for word."""
 
-from benchmarks.evidence import EXPLANATION, changed
 from drone_rl.explanations.report.behavior import say_contradictions, say_dataset, say_loops
+from tests.evidence import EXPLANATION, changed
 
 
 def speak(**changes):

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from benchmarks.evidence import EXPLANATION, changed
 from drone_rl.explanations.report.class_models import PART, grid, say_class_models
+from tests.evidence import EXPLANATION, changed
 
 
 @pytest.fixture

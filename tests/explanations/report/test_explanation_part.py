@@ -4,10 +4,10 @@ from importlib import resources
 
 import pytest
 
-from benchmarks.evidence import EXPLANATION
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.explanations.report.page import PARTS
 from drone_rl.utils.text import said
+from tests.evidence import EXPLANATION
 from tests.explanations.quick import ALL_SECTIONS
 
 

@@ -10,11 +10,11 @@ import jinja2
 import numpy as np
 import pytest
 
-from benchmarks.evidence import SHIFTS
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.report.page import PARTS
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
+from tests.evidence import SHIFTS
 from tests.explanations.quick import quick_figures
 from tests.explanations.report.conftest import NASTY
 

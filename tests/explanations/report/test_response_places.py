@@ -1,5 +1,5 @@
-from benchmarks.evidence import EXPLANATION
 from drone_rl.explanations.report.places import PART
+from tests.evidence import EXPLANATION
 from tests.trust.plots.test_regions import NUMBERS, WAYS
 
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from benchmarks.evidence import EXPLANATION, HIGHER, changed
 from drone_rl.explanations.report.response import say_asymmetry, say_response
+from tests.evidence import EXPLANATION, HIGHER, changed
 
 
 def speak(**changes):

@@ -1,5 +1,5 @@
-from benchmarks.evidence import EXPLANATION, PROOF, SHIFTS, changed
 from drone_rl.explanations.report.summary import LINES, say_summary
+from tests.evidence import EXPLANATION, PROOF, SHIFTS, changed
 
 
 def speak(**changes):

@@ -1,5 +1,5 @@
-from benchmarks.evidence import EXPLANATION, changed
 from drone_rl.explanations.report.truth import best_placebo, say_findings, say_reasons
+from tests.evidence import EXPLANATION, changed
 
 NONE = {
     "truth.trusted": None,
