@@ -13,7 +13,7 @@ from omegaconf import OmegaConf
 from drone_rl.sweeps.manifest import is_sweep, quoted, sweep_name
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import last_of, refuse_links, trained_policies, write_atomically
-from drone_rl.utils.overrides import taken_over
+from drone_rl.utils.overrides import must_be_typed, taken_over
 
 _FOLDER = "hydra.sweep.dir=${paths.outputs}/${hydra.job.config_name}/multiruns/"
 _NO_EARLY_FILES = ("hydra.output_subdir=null", "++hydra.job_logging.handlers.file.delay=true")
