@@ -240,7 +240,8 @@ class CommandLine:
         name, _, value = text.partition("=")
         exists = name.lstrip("+") in self.keys
         yield f"{name}.{value}" if "=" in value else text
-        for meant in [name.lstrip("+")] if exists else similar(name, self.keys):
+        names = [name.lstrip("+")] if exists else [*similar(name, self.keys)]
+        for meant in names:
             if "=" in meant:
                 yield meant
                 continue
@@ -250,8 +251,8 @@ class CommandLine:
                 yield f"{meant}={variant}"
             if self._parsed(text) is None:
                 yield f"{meant}={quoted(value)}"
-            if not exists:
-                yield f"{meant}={_ANY}"
+        if not exists:
+            yield from (f"{meant}={_ANY}" for meant in names)
 
     def _choice_with(self, key: str) -> str | None:
         """Return the first other choice of a group whose file has a setting, as an override."""
