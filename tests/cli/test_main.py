@@ -134,7 +134,7 @@ def test_a_full_disk_is_one_line_with_path_and_remedy(tmp_path, limit):
     assert "full" in line and "File too large" in line and "free some space" in line
 
 
-def test_a_demo_goes_on_with_the_policy_that_it_trained(monkeypatch):
+def test_a_demo_evaluates_the_policy_that_it_trained(monkeypatch):
     ran = []
 
     def note(name, command, overrides):

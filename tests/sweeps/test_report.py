@@ -94,7 +94,7 @@ def test_the_latest_is_the_newest(tmp_path):
     assert find_sweep(sweeps[0]).folder == sweeps[0]
 
 
-def test_there_is_none(tmp_path):
+def test_no_sweep(tmp_path):
     with pytest.raises(InputError, match="drone-rl train -m first"):
         find_sweep("latest", tmp_path)
 
