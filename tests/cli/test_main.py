@@ -99,7 +99,7 @@ def test_each_command_has_a_class_a_file_and_help(command):
     assert issubclass(settings, CommandSettings) and settings().paths.outputs == "outputs"
     assert f"\n  {command} " in USAGE
     assert (conf_dir() / f"{command.replace('-', '_')}.yaml").is_file()
-    assert TABLE[command].keys() == {"module", "class", "about", "settings", "examples", "next"}
+    assert TABLE[command].keys() == {"module", "about", "settings", "examples", "next"}
 
 
 @pytest.mark.parametrize("args", [["--help"], ["export", "--help"], ["policies", "most=0"]])
