@@ -9,11 +9,11 @@ from typing import Any
 from benchmarks.benchmark import Setup
 from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.robustness.axes import AXES, Axis
-from drone_rl.robustness.shifts import shifts
+from drone_rl.trust.axes import AXES, Axis
+from drone_rl.trust.coverage import Coverage, compare_with_required, find_domain, recheck_domain
+from drone_rl.trust.shifts import shifts
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import root_seed
-from drone_rl.verdicts.coverage import Coverage, compare_with_required, find_domain, recheck_domain
 
 POLICY = "robust"
 """A policy that is good in a range of positive width on every axis."""

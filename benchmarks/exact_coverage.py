@@ -15,11 +15,11 @@ from benchmarks.benchmark import Setup
 from drone_rl.config import TaskSettings
 from drone_rl.config.learning import Episodes
 from drone_rl.config.training import TrainerSettings
-from drone_rl.evaluation.verdict import judge_policy
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.training import Callback
 from drone_rl.training.callbacks import OngoingTraining
 from drone_rl.training.train import train
+from drone_rl.trust.verdict import judge_policy
 from drone_rl.utils.progress import silent
 from drone_rl.verification.prove import prove
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from benchmarks.benchmark import Setup
 from benchmarks.browser import chromium
-from drone_rl.explanations.fly_page.server import fly
+from drone_rl.flight.fly_page.server import fly
 
 _SIZE = (1300, 900)
 _START_S = 60.0

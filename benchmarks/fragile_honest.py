@@ -7,8 +7,8 @@ from benchmarks.commands import train
 from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.policy import load_policy
 from drone_rl.policies.zoo import policy_names
+from drone_rl.trust.judge import judge
 from drone_rl.utils.progress import silent
-from drone_rl.verdicts.judge import judge
 
 
 def bench_fragile_honest(setup: Setup) -> dict[str, Any]:

@@ -18,7 +18,6 @@ from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import TaskSettings
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import TrainSettings
-from drone_rl.evaluation.evaluate import evaluate
 from drone_rl.policies import MLP
 from drone_rl.policies.actor import exploring
 from drone_rl.policies.external_network import Logits
@@ -26,12 +25,13 @@ from drone_rl.policies.external_policy import ExternalPolicy, policy_from
 from drone_rl.policies.policy import BasePolicy, load_policy
 from drone_rl.policies.zoo import describe
 from drone_rl.policies.zoo.files import exported_bytes
-from drone_rl.robustness.shifts import shifts
 from drone_rl.sim.actions import Move
+from drone_rl.trust.evaluate import evaluate
+from drone_rl.trust.judge import judge
+from drone_rl.trust.shifts import shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import Stream
-from drone_rl.verdicts.judge import judge
 
 KNOWN_SEED = 0
 """The default of version 0.1."""

@@ -3,7 +3,7 @@
 from benchmarks.benchmark import Setup
 from drone_rl.policies.policy import load_policy
 from drone_rl.policies.zoo import policy_names
-from drone_rl.verdicts.onnx_export import export_onnx
+from drone_rl.trust.onnx_export import export_onnx
 
 
 def bench_onnx(setup: Setup) -> dict[str, float]:

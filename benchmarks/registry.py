@@ -42,9 +42,8 @@ from drone_rl.utils.errors import InputError
 _RENDERING = ("sim", "envs")
 _COLLECTING = (*_RENDERING, "policies", "collectors")
 _TRAINING = (*_COLLECTING, "objectives", "training", "conf")
-_SOLVING = (*_TRAINING, "evaluation")
-_JUDGING = (*_RENDERING, "policies", "evaluation", "verdicts")
-_SHIFTING = (*_JUDGING, "robustness")
+_SOLVING = (*_TRAINING, "trust")
+_JUDGING = (*_RENDERING, "policies", "trust")
 _PROVING = (*_RENDERING, "policies", "verification/prover", "verification/checker")
 _EXPLAINING = (*_JUDGING, "explanations")
 _COMMANDS = (*_TRAINING, "config", "cli")
@@ -91,13 +90,13 @@ BENCHMARKS: dict[str, Benchmark] = {
         bench_coverage,
         "adversarial",
         "utils/intervals",
-        "evaluation",
+        "trust",
         *_parts("simulated_policies"),
     ),
     "gamed": _benchmark(
         bench_gamed,
         "adversarial",
-        *_SHIFTING,
+        *_JUDGING,
         "verification",
         *_parts("gamed_memory", "gamed_rounding", "gamed_certificates"),
     ),
@@ -108,13 +107,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         *_parts("adversarial_maps", "known_map_policies"),
     ),
     "explain": _benchmark(bench_explain, "adversarial", *_EXPLAINING, "conf"),
-    "verdicts": _benchmark(bench_verdicts, "adversarial", *_JUDGING, *_parts("scripted_policies")),
+    "trust": _benchmark(bench_verdicts, "adversarial", *_JUDGING, *_parts("scripted_policies")),
     "fragile_honest": _benchmark(bench_fragile_honest, "adversarial", *_TRAINING, *_JUDGING),
-    "shifts": _benchmark(bench_shifts, "adversarial", *_SHIFTING),
-    "domain_axes": _benchmark(bench_domain_axes, "adversarial", *_SHIFTING),
-    "robust": _benchmark(
-        bench_robust, "adversarial", *_SOLVING, "robustness", *_parts("robust_comparison")
-    ),
+    "shifts": _benchmark(bench_shifts, "adversarial", *_JUDGING),
+    "domain_axes": _benchmark(bench_domain_axes, "adversarial", *_JUDGING),
+    "robust": _benchmark(bench_robust, "adversarial", *_SOLVING, *_parts("robust_comparison")),
     "render_truth": _benchmark(
         bench_render_truth, "adversarial", "sim/rendering", *_parts("random_scenes")
     ),
@@ -122,19 +119,17 @@ BENCHMARKS: dict[str, Benchmark] = {
     "kills": _benchmark(bench_kills, "parallel", *_TRAINING, "sweeps"),
     "prove": _benchmark(bench_prove, "verification", *_PROVING),
     "exact_coverage": _benchmark(
-        bench_exact_coverage, "verification", *_TRAINING, *_PROVING, "verdicts"
+        bench_exact_coverage, "verification", *_TRAINING, *_PROVING, "trust"
     ),
     "provable": _benchmark(bench_provable, "verification", *_TRAINING, *_PROVING),
     "pillars": _benchmark(
         bench_experiment, "libraries", *_SOLVING, experiment="pillars", num_seeds=3
     ),
-    "revisions": _benchmark(bench_revisions, "system", *_COMMANDS, "evaluation", "explanations"),
+    "revisions": _benchmark(bench_revisions, "system", *_COMMANDS, "trust", "explanations"),
     "imitation": _benchmark(bench_imitation, "long", *_SOLVING),
     "original": _benchmark(bench_original, "long", *_TRAINING),
     "chapter": _benchmark(bench_chapter, "long", *_TRAINING, "acceleration", "flight/commands"),
-    "fly_page": _benchmark(
-        bench_fly_page, "flight", *_RENDERING, "flight", "policies", "explanations/fly_page"
-    ),
+    "fly_page": _benchmark(bench_fly_page, "flight", *_RENDERING, "flight", "policies"),
     "airsim": _benchmark(
         _bench_airsim,
         "flight",
@@ -142,7 +137,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         "flight",
         *_parts("airsim", "airsim_scripts", "airsim_chapter", "airsim_programs"),
     ),
-    "startup": _benchmark(bench_startup, "system", *_COMMANDS, "verdicts"),
+    "startup": _benchmark(bench_startup, "system", *_COMMANDS, "trust"),
     "onnx": _benchmark(bench_onnx, "libraries", *_JUDGING),
     "peers": _benchmark(bench_peers, "libraries", *_COMMANDS, *_parts("peers")),
     "gymnasium": _benchmark(bench_gymnasium, "libraries", *_RENDERING),

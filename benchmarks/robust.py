@@ -18,10 +18,10 @@ from drone_rl.config import MINIMAL
 from drone_rl.config.commands import ShiftSettings
 from drone_rl.policies.policy import load_policy
 from drone_rl.policies.zoo import read_checkpoint
-from drone_rl.robustness.axes import AXES, GROUPS, find_axes
-from drone_rl.robustness.paired_evaluation import EvaluatedPolicy, PairedEvaluator
-from drone_rl.robustness.shifts import make_evaluated_policy
 from drone_rl.training.run_folder import settings_of
+from drone_rl.trust.axes import AXES, GROUPS, find_axes
+from drone_rl.trust.paired_evaluation import EvaluatedPolicy, PairedEvaluator
+from drone_rl.trust.shifts import make_evaluated_policy
 from drone_rl.utils.files import last_of
 
 DEFAULT, ALL = "default", "all"

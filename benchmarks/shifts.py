@@ -5,7 +5,7 @@ from typing import Any
 
 from benchmarks.benchmark import Setup
 from drone_rl.config.commands import ShiftSettings
-from drone_rl.robustness.shifts import shifts
+from drone_rl.trust.shifts import shifts
 from drone_rl.utils.progress import silent
 
 

@@ -14,12 +14,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from drone_rl.evaluation.baselines import BASELINES
-from drone_rl.evaluation.metrics import Episodes
-from drone_rl.evaluation.rule import Kind, Quantity, Rule, decide, kinds_within
-from drone_rl.evaluation.verdict import estimate, observe
+from drone_rl.collectors.complete_episodes import Episodes
 from drone_rl.sim.tasks import CollectCubes, Goals
 from drone_rl.sim.tasks.collect_cubes import EndReason, Side
+from drone_rl.trust.baselines import BASELINES
+from drone_rl.trust.rule import Kind, Quantity, Rule, decide, kinds_within
+from drone_rl.trust.verdict import estimate, observe
 
 L, A, R = Side
 Type = tuple[tuple[Side, ...], tuple[int, ...], bool]

@@ -16,13 +16,12 @@ import torch
 from benchmarks.benchmark import Setup
 from benchmarks.commands import call
 from benchmarks.scripted_policies import SCRIPTS, Script, ScriptedPolicy
+from drone_rl.collectors.complete_episodes import Episodes, run_episodes
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import BASELINES, run_baselines
-from drone_rl.evaluation.metrics import Episodes
-from drone_rl.evaluation.rollouts import run_episodes
-from drone_rl.evaluation.rule import Kind
-from drone_rl.evaluation.verdict import apply_rule
+from drone_rl.trust.baselines import BASELINES, run_baselines
+from drone_rl.trust.rule import Kind
+from drone_rl.trust.verdict import apply_rule
 from drone_rl.utils.exit_codes import NOT_CERTAIN
 from drone_rl.utils.seeding import Stream
 

@@ -2,11 +2,10 @@
 
 import pytest
 
-from drone_rl.evaluation import verdict_text
 from drone_rl.explanations.report.page import PARTS
 from drone_rl.explanations.report.summary import say_summary
-from drone_rl.robustness import shifts_text
 from drone_rl.sweeps import text as sweep_text
+from drone_rl.trust import shifts_text, verdict_text
 from drone_rl.utils.text import said
 from tests.evidence import EXPLANATION, PROOF, SHIFTS, SWEEP, VERDICT, changed
 

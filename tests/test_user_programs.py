@@ -54,7 +54,7 @@ INHERITED = {
     "a notebook's backend": (
         {"MPLBACKEND": "module://not_installed.backend_inline"},
         """
-from drone_rl.evaluation.plots.saving import new_chart, to_png
+from drone_rl.trust.plots.saving import new_chart, to_png
 assert to_png(new_chart()[0]).startswith(b"\\x89PNG")
 """,
     ),
@@ -62,7 +62,7 @@ assert to_png(new_chart()[0]).startswith(b"\\x89PNG")
         {"HOME": "/dev/null/home"},
         """
 import warp
-from drone_rl.evaluation.plots.saving import new_chart
+from drone_rl.trust.plots.saving import new_chart
 from drone_rl.sim.rendering.devices import start_warp
 start_warp("cpu")
 assert os.access(warp.config.kernel_cache_dir, os.W_OK)

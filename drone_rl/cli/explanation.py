@@ -7,9 +7,9 @@ from typing import Annotated, Any
 import drone_rl
 from drone_rl.cli.settings import CommandSettings, PolicyCommandSettings, finish
 from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
-from drone_rl.evaluation.rule import Kind
 from drone_rl.explanations.chapter_figures import FigureSettings
 from drone_rl.explanations.settings import ClassModelsSettings, ExplainSettings
+from drone_rl.trust.rule import Kind
 from drone_rl.utils.progress import log
 from drone_rl.utils.schema import Listed, OneOf, Whole
 

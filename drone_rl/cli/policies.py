@@ -36,7 +36,7 @@ class PoliciesCommand(CommandSettings):
     def run(self, folder: Path) -> tuple[int, None]:
         """List the shipped and the trained policies; return the exit status."""
         from drone_rl.policies.zoo import policy_names, policy_path  # imports torch
-        from drone_rl.verdicts.recorded import read_verdicts
+        from drone_rl.trust.recorded import read_verdicts
 
         outputs = Path(self.paths.outputs)
         verdicts = read_verdicts(outputs)
@@ -63,7 +63,7 @@ def _short(row: Sequence[str]) -> Sequence[str]:
 
 def _row(path: Path, name: str, verdicts: Sequence[tuple[float, Any]]) -> list[str]:
     """Return name, task, verdict, success rate and origin of a policy."""
-    from drone_rl.verdicts.recorded import describe, recorded_verdict  # imports torch
+    from drone_rl.trust.recorded import describe, recorded_verdict  # imports torch
 
     try:
         policy = drone_rl.load_policy(path)

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from drone_rl.evaluation.rule import Rule
-from drone_rl.evaluation.verdict import judge_policy
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.actions import Actions
+from drone_rl.trust.rule import Rule
+from drone_rl.trust.verdict import judge_policy
 from drone_rl.utils.intervals import mean_interval, proportion
 
 ALIKE_METRES = 1.0  # next targets that differ by at most this along each axis are at the same place

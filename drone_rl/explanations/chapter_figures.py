@@ -16,8 +16,6 @@ from scipy.spatial.distance import cdist
 
 from drone_rl.config.configuration import from_arguments
 from drone_rl.envs.three_state import SUCCESS_PROBABILITY, exact_gradient
-from drone_rl.evaluation.plots import images
-from drone_rl.evaluation.plots.saving import to_png
 from drone_rl.explanations.class_model_gallery import CHAPTER, class_models
 from drone_rl.explanations.embedding import embed
 from drone_rl.explanations.heat_maps import Explainer
@@ -28,6 +26,8 @@ from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frame
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.training.three_state import sample_gradients, train_three_state
+from drone_rl.trust.plots import images
+from drone_rl.trust.plots.saving import to_png
 from drone_rl.utils.display import Result, picture
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.palette import INK, MUTED, css

@@ -11,7 +11,6 @@ import torch
 from PIL import Image
 
 from drone_rl.config.configuration import from_arguments
-from drone_rl.evaluation.plots import images
 from drone_rl.explanations.class_models import (
     NO_GRADIENTS,
     Attempts,
@@ -28,6 +27,7 @@ from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.policies.recurrent import require_memoryless
 from drone_rl.sim.vocabulary import ShownActions, shown_actions
+from drone_rl.trust.plots import images
 from drone_rl.utils.display import Result, aligned, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance

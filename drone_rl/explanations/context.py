@@ -18,10 +18,10 @@ from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frame
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import ImageNetwork, make_actor
-from drone_rl.robustness.shifts_file import SavedShifts
+from drone_rl.trust.shifts_file import SavedShifts
+from drone_rl.trust.verdict import CertificateClaim
 from drone_rl.utils.limits import FILM_BYTES, FILM_STEPS
 from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
-from drone_rl.verdicts.certificate import Claim
 
 T = TypeVar("T")
 FILMED = 0  # the episode shown as a film: always the first
@@ -43,7 +43,7 @@ class Context:
         env: TransformedEnv,
         network: ImageNetwork,
         settings: ExplainSettings,
-        claim: Claim | None = None,
+        claim: CertificateClaim | None = None,
         measured: SavedShifts | None = None,
         unlike: Mapping[str, Any] | None = None,
         seed: RootSeed | None = None,

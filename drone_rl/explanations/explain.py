@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from torchrl.envs import TransformedEnv
 
 from drone_rl.config.configuration import from_arguments
-from drone_rl.evaluation.rounding_sensitivity import require_function
 from drone_rl.explanations import attribution, behavior, class_models, embedding, response, truth
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.report import write_report
@@ -25,6 +24,10 @@ from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_policy
 from drone_rl.policies.policy import BasePolicy
 from drone_rl.policies.recurrent import require_memoryless
+from drone_rl.trust.coverage import find_domain
+from drone_rl.trust.recorded import record_verdict
+from drone_rl.trust.rounding_sensitivity import require_function
+from drone_rl.trust.verdict import FindClaim
 from drone_rl.utils.display import Result, page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import as_path, new_run_folder, to_file_name
@@ -34,9 +37,6 @@ from drone_rl.utils.schema import Whole
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import seed_line
 from drone_rl.utils.threads import pool_like_caller, torch_threads
-from drone_rl.verdicts.certificate import find_claim
-from drone_rl.verdicts.coverage import find_domain
-from drone_rl.verdicts.recorded import record_verdict
 
 _Result = tuple[dict[str, Any], dict[str, NDArray], float] | LeftOutError  # with seconds
 Given = str | Path | BasePolicy | Logits  # a policy or something that `as_policy` converts to one
@@ -50,12 +50,11 @@ SECTIONS: dict[str, Section] = {
     "embedding": embedding.section,
     "evaluation": behavior.evaluation_section,
     "flaws": behavior.flaws_section,
-    "places": response.places_section,
     "response": response.response_section,
     "shifts": behavior.shifts_section,
     "truth": truth.section,
 }
-"""All sections by name. `report.page.PARTS` displays them."""
+"""Sections by name; `drone_rl.explain` adds "places". `report.page.PARTS` displays them."""
 THREADED = frozenset({"attribution", "class_models", "embedding", "flaws"})
 """Sections that run in a second thread: they step no environment and use a copy of the network."""
 
@@ -93,6 +92,8 @@ def explain(
     num_envs: int = 128,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
+    more_sections: Mapping[str, Section] | None = None,
+    find_claim: FindClaim | None = None,
     **changes: Any,
 ) -> Explanations:
     """Explain what policies respond to and whether they can be trusted.
@@ -105,6 +106,8 @@ def explain(
         num_envs: Environments in a batch; bounds memory.
         outputs: Folder of all runs, see `load_policy` and `find_domain`.
         progress: Callback for progress; shows a bar by default.
+        more_sections: Sections in addition to `SECTIONS`, by name.
+        find_claim: Finds and checks certificates, see `judge`.
         changes: Settings to change, as in `explain("good", frames=100)`.
 
     Raises:
@@ -130,7 +133,8 @@ def explain(
                 name=policy.name,
                 provenance={**policy.origin, **provenance()},
                 progress=lambda title: progress(f"{policy.name}: {title}"),
-                claim=find_claim(policy, seed=seed),
+                sections={**SECTIONS, **(more_sections or {})},
+                claim=None if find_claim is None else find_claim(policy, seed=seed),
                 measured=find_domain(policy, None, outputs),
                 unlike=policy.unlike,
                 seed=seed,

@@ -20,8 +20,6 @@ from torch import Tensor
 from torchrl.envs import TransformedEnv
 
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.plots.images import heated, shown_picture
-from drone_rl.evaluation.video import CAMERAS, probabilities, render_step, run_episode
 from drone_rl.explanations.attribution import first_heat, shown_methods
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.scenes import Scenes
@@ -31,6 +29,8 @@ from drone_rl.sim.composer_task import seconds_per_step
 from drone_rl.sim.rendering import Appearance, Mounting
 from drone_rl.sim.rendering.appearance import product, rotate
 from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.trust.plots.images import heated, shown_picture
+from drone_rl.trust.video import CAMERAS, probabilities, render_step, run_episode
 from drone_rl.utils import palette
 from drone_rl.utils.errors import InputError, extra
 
@@ -61,7 +61,7 @@ def record(
 ) -> list[Path]:
     """Record episodes in held-out environments as Rerun files, and return the files.
 
-    The episodes are those of `drone_rl.evaluation.video.film`. Heat maps are those that a report
+    The episodes are those of `drone_rl.trust.video.film`. Heat maps are those that a report
     shows by default, see `drone_rl.explanations.attribution`; recurrent policies and those without
     gradients have none.
 

@@ -14,16 +14,13 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import (
     last_of,
-    parse_json,
-    read_bytes,
     read_json,
     refuse_links,
     write_atomically,
 )
-from drone_rl.utils.limits import RESULT_BYTES, SWEEP_BYTES
+from drone_rl.utils.limits import SWEEP_BYTES
 from drone_rl.utils.overrides import COMMAND, MOST_OVERRIDES, check_harmless
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.readers import with_current_names
 from drone_rl.utils.schema import Maybe, Plain, Record, Several, Text, Whole, as_mapping, shown
 from drone_rl.utils.settings import current_names
 
@@ -92,17 +89,6 @@ class Run:
         settings = [o for o in self.overrides if not o.startswith("trial=")]
         alone = ["hydra.mode=RUN"] if is_sweep(settings) else []  # a file of conf/sweep is chosen
         return shlex.join(["drone-rl", "train", *settings, *alone])
-
-
-def read_result(folder: Path) -> dict[str, Any] | None:
-    """Return `result.json` of a finished run, or None for an unfinished one."""
-    try:
-        content = read_bytes(folder / "result.json", RESULT_BYTES)
-        result = as_mapping(parse_json(content, "result", allow_nan=True), "result")
-        reason = Text(100).read(result.get("reason"), "reason")
-    except InputError:
-        return None
-    return None if reason.startswith("SIG") else with_current_names(result)
 
 
 def read_failure(run: Run) -> str | None:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.evaluation.rule import SIDES, Kind, Rule
-from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_result
+from drone_rl.sweeps.manifest import Run, Sweep, read_failure, read_sweep
+from drone_rl.trust.rule import SIDES, Kind, Rule
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.limits import SWEEP_RESULTS_BYTES, Allowance
-from drone_rl.utils.readers import NAMES_OF_0_1, TablesAllowance, read_table
+from drone_rl.utils.readers import NAMES_OF_0_1, TablesAllowance, read_result, read_table
 from drone_rl.utils.schema import Flag, Maybe, OneOf, Real, Whole
 
 Array = NDArray[np.float64]
@@ -241,3 +241,20 @@ def _metrics_columns(path: Path, allowance: TablesAllowance) -> Array:
 def _cell(row: list[str], place: int | None) -> str:
     """Return the text in a column; empty if the row or the table lacks it."""
     return "" if place is None or place >= len(row) else row[place]
+
+
+def choice_in_sweep(checkpoint: Path) -> tuple[str, dict[str, Any]] | None:
+    """Return the command that repeats a checkpoint's run, and how it was chosen in its sweep.
+
+    That is "runs", the number of runs in the sweep, and "episodes", the number by which it was
+    judged there. None if it is no checkpoint of a sweep's run.
+    """
+    folder = checkpoint.absolute().parent.parent
+    if checkpoint.suffix != ".pt" or not (folder.parent / "sweep.json").is_file():
+        return None
+    rows = read_rows(read_sweep(folder.parent))
+    row = next((row for row in rows if row.run.folder == folder), None)
+    if row is None:
+        return None
+    episodes = None if row.verdict is None else row.verdict["greedy"]["episodes"]
+    return row.run.repeat_command(), {"runs": len(rows), "episodes": episodes}

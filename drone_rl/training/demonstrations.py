@@ -30,7 +30,7 @@ from drone_rl.config import (
 from drone_rl.config.configuration import from_arguments
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import oracle_policy
+from drone_rl.policies.baselines import oracle_policy
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import as_task

@@ -9,11 +9,12 @@ from typing import Any
 import yaml
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import read_bytes
+from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.limits import (
     METRICS_BYTES,
     METRICS_CELLS,
     METRICS_ROWS,
+    RESULT_BYTES,
     SWEEP_METRICS_BYTES,
     SWEEP_METRICS_CELLS,
     SWEEP_METRICS_ROWS,
@@ -22,6 +23,7 @@ from drone_rl.utils.limits import (
     YAML_VALUES,
     Allowance,
 )
+from drone_rl.utils.schema import Text, as_mapping
 
 _DAMAGE = (
     *(yaml.YAMLError, RecursionError, ValueError, ArithmeticError),
@@ -160,3 +162,14 @@ def _size(path: Path) -> int:
         return path.stat().st_size
     except (OSError, ValueError):
         return 0  # the reader reports the error
+
+
+def read_result(folder: Path) -> dict[str, Any] | None:
+    """Return `result.json` of a finished run, or None for an unfinished one."""
+    try:
+        content = read_bytes(folder / "result.json", RESULT_BYTES)
+        result = as_mapping(parse_json(content, "result", allow_nan=True), "result")
+        reason = Text(100).read(result.get("reason"), "reason")
+    except InputError:
+        return None
+    return None if reason.startswith("SIG") else with_current_names(result)

@@ -5,6 +5,7 @@ the JSON files, so that a test can change the evidence and see the sentence chan
 """
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -100,6 +101,10 @@ def percent(share: float, digits: int = 1) -> str:
     return f"less than {step:g}%" if float(text[:-1]) <= 0 else text
 
 
+exact_percent = functools.partial(percent, digits=2)
+"""Returns a known fraction in percent with two decimals."""
+
+
 def interval(figure: Mapping[str, Any]) -> str:
     """Return the 95% confidence interval of a rate, in percent."""
     return " to ".join(hundredfold(figure[end]) for end in ("lower95", "upper95"))
@@ -159,7 +164,7 @@ def fixed_seed(name: str, what: str = "environments") -> Sentence:
 BODIES = (fixed_seed("bodies.fixed_seed"),)
 """Evidence: `bodies.json`."""
 LOOPED = (fixed_seed("looped.fixed_seed"),)
-"""Evidence: see `drone_rl.robustness.sitl.SitlEvaluation.as_dict`."""
+"""Evidence: see `drone_rl.flight.sitl_evaluation.SitlEvaluation.as_dict`."""
 CHANCES = (fixed_seed("chances.fixed_seed", "placements"),)
 """Evidence: `chances.json` of held-out placements; those that a user gives have no seed."""
 CHECK = (fixed_seed("check.fixed_seed", "placements"),)

@@ -17,7 +17,6 @@ from drone_rl.config import TaskSettings
 from drone_rl.config.commands import ProvableSettings, ProveSettings
 from drone_rl.config.configuration import as_config, check_same_config, from_arguments
 from drone_rl.config.training import TrainSettings
-from drone_rl.evaluation.rollouts import find_failures
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import describe, read_checkpoint
 from drone_rl.sim.tasks import FailureReplayTask
@@ -26,6 +25,7 @@ from drone_rl.training import Callback
 from drone_rl.training.callbacks import OngoingTraining, with_progress
 from drone_rl.training.run_folder import (
     MAY_CHANGE,
+    Judge,
     RunFolder,
     Training,
     finish,
@@ -33,6 +33,8 @@ from drone_rl.training.run_folder import (
     settings_of,
 )
 from drone_rl.training.train import learn
+from drone_rl.trust.rollouts import find_failures
+from drone_rl.trust.verdict import check_judged, judge_for_selection
 from drone_rl.utils.archives import read_array
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import last_of, read_json, write_atomically
@@ -251,7 +253,8 @@ def train_until_proved(
         if is_same and not result["reason"].startswith("SIG"):
             result["reason"] = "proved"
         result["rounds"] = [done.values() for done in journal.rounds]
-        done = finish(journal.settings, folder, result)
+        judge = Judge(check_judged, judge_for_selection)
+        done = finish(journal.settings, folder, result, judge)
     return reraise_signal(done, "train_until_proved")
 
 

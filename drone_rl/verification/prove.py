@@ -14,6 +14,7 @@ import numpy as np
 from drone_rl.config.commands import ProveSettings
 from drone_rl.config.configuration import as_changes, from_arguments
 from drone_rl.policies.policy import Policy, load_policy
+from drone_rl.policies.zoo import fingerprint
 from drone_rl.utils.display import Result, aligned, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import (
@@ -31,7 +32,6 @@ from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import plural
 from drone_rl.utils.threads import torch_threads
-from drone_rl.verification.checker.certificate import fingerprint
 from drone_rl.verification.prover.policy_spec import (
     PolicySpec,
     make_policy_spec,

@@ -15,7 +15,7 @@ from benchmarks.simulated_policies import (
     judge_samples,
     policies,
 )
-from drone_rl.evaluation.rule import Kind, Rule
+from drone_rl.trust.rule import Kind, Rule
 from drone_rl.utils.intervals import proportion
 
 

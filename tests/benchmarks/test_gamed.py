@@ -9,7 +9,7 @@ import drone_rl
 from benchmarks import gamed, gamed_certificates, gamed_memory, gamed_rounding
 from drone_rl.config import TaskSettings
 from drone_rl.policies.zoo import certificate_path
-from drone_rl.robustness.shifts import shifts
+from drone_rl.trust.shifts import shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import Stream

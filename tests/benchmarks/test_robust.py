@@ -21,12 +21,12 @@ from drone_rl.config import AppearanceSettings, CameraSettings, TaskSettings
 from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.config.transforms import Blur, Fault, Gray, LateFrames, Noise, Shift, Standardize
-from drone_rl.robustness.axes import AXES, GROUPS
-from drone_rl.robustness.paired_evaluation import PairedEvaluator
-from drone_rl.robustness.shifts import ranges_of
+from drone_rl.trust.axes import AXES, GROUPS
+from drone_rl.trust.paired_evaluation import PairedEvaluator
+from drone_rl.trust.shifts import ranges_of
 from drone_rl.utils.settings import snake_case
-from tests.robustness.making import shifts_of
-from tests.robustness.subjects import Blind, subject
+from tests.trust.making import shifts_of
+from tests.trust.subjects import Blind, subject
 
 AHEAD = TaskSettings(num_cubes=1, first_distance=8.0, front_margin=4.0, lateral_bound=0.0)
 
@@ -135,7 +135,7 @@ def test_required_ranges_are_enforced_in_their_direction(setup, monkeypatch, is_
     monkeypatch.setattr(domain_axes, "recheck_domain", lambda *args: contradictions)
     if is_reversed:
         monkeypatch.setattr(
-            "drone_rl.verdicts.coverage.lacking",
+            "drone_rl.trust.coverage.lacking",
             lambda numbers, name, need: None if need["low"] is None else "reversed",
         )
     figures = domain_axes.bench_domain_axes(setup)

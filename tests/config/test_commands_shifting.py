@@ -1,7 +1,7 @@
 import pytest
 
 from drone_rl.config.commands import MODES, ShiftSettings
-from drone_rl.robustness.perturbations import Mode
+from drone_rl.trust.perturbations import Mode
 from drone_rl.utils.errors import InputError
 
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from drone_rl.explanations.behavior import shifts_section
-from drone_rl.robustness.shifts_file import SavedShifts
+from drone_rl.trust.shifts_file import SavedShifts
 
 
 def test_what_was_measured_is_taken_over():

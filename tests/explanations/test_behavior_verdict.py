@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from drone_rl.explanations.behavior import evaluation_section
-from drone_rl.verdicts.certificate import Claim
+from drone_rl.verification.claim import Claim
 
 
 def test_the_verdict_rests_on_the_first_episodes_whoever_flew_before(context):

@@ -6,11 +6,11 @@ import torch
 
 from drone_rl.config import TaskSettings
 from drone_rl.explanations.context import LeftOutError
-from drone_rl.explanations.explain import SECTIONS, explain_policy
+from drone_rl.explanations.explain import explain_policy
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import MLP
 from drone_rl.utils.errors import InputError
-from tests.explanations.quick import quick
+from tests.explanations.quick import ALL_SECTIONS, quick
 
 SMALL = ExplainSettings(frames=40, episodes=6, perplexity=5, seed=3)
 
@@ -25,7 +25,7 @@ def explain(env, network, folder, settings=SMALL, **kwargs):
 
 @pytest.mark.slow
 def test_everything_is_written_and_the_order_of_sections_changes_nothing(make_pipeline, tmp_path):
-    contents, found = [], SECTIONS
+    contents, found = [], ALL_SECTIONS
     for name, order in (("a", list(found)), ("b", list(found)[::-1])):
         env, actor = make_pipeline(num_envs=30, seed=2, task=TaskSettings(num_cubes=1))
         network = actor.module[0].module
@@ -65,7 +65,7 @@ def test_a_section_that_can_not_be_made_is_told_of_and_the_others_are(make_pipel
     def fails(context):
         raise LeftOutError("It has no eyes.")
 
-    sections = {"eyes": fails, "dataset": SECTIONS["dataset"]}
+    sections = {"eyes": fails, "dataset": ALL_SECTIONS["dataset"]}
     numbers = explain(env, actor.module[0].module, tmp_path, sections=sections)
     assert numbers["left_out"] == {"eyes": "It has no eyes."}
     assert numbers["dataset"]["frames"] == SMALL.frames and "eyes" not in numbers["seconds"]

@@ -21,9 +21,6 @@ from drone_rl.config import (
 )
 from drone_rl.config.networks import Lstm
 from drone_rl.config.training import TrainSettings
-from drone_rl.evaluation.baselines import constant_policy
-from drone_rl.evaluation.plots.images import heated, shown_picture
-from drone_rl.evaluation.video import CAMERAS, render_step
 from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.rerun_export import (
     CLASS_COLORS,
@@ -34,10 +31,13 @@ from drone_rl.explanations.rerun_export import (
 )
 from drone_rl.policies import make_actor
 from drone_rl.policies.actor import exploring
+from drone_rl.policies.baselines import constant_policy
 from drone_rl.policies.zoo import describe
 from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S, seconds_per_step
 from drone_rl.sim.dynamics import ComputerVision, Kinematic, Quadrotor
 from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.trust.plots.images import heated, shown_picture
+from drone_rl.trust.video import CAMERAS, render_step
 from drone_rl.utils.errors import InputError
 from tests.second_task import Posts
 

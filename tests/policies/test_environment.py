@@ -4,12 +4,12 @@ from torchrl.envs.utils import check_env_specs
 
 import drone_rl
 from drone_rl.config.transforms import Gray, Resize
-from drone_rl.evaluation.video import film
 from drone_rl.policies.zoo import certificate_path, describe, parse, policy_path
 from drone_rl.sim import worlds as worlds_module
 from drone_rl.sim.rendering import Raytracer
 from drone_rl.sim.tasks import Pillars
 from drone_rl.training.components import make_collector
+from drone_rl.trust.video import film
 from drone_rl.utils.errors import InputError
 from tests.fake_flight import floating
 from tests.second_dynamics import Turning

@@ -14,7 +14,6 @@ from drone_rl.config.commands import HeldOutSettings
 from drone_rl.config.learning import Ppo, Rollouts
 from drone_rl.config.networks import Lstm
 from drone_rl.config.training import TrainSettings
-from drone_rl.evaluation.video import view
 from drone_rl.objectives import LeaveOneOut, ReinforceLoss
 from drone_rl.policies import RecurrentNetwork, make_actor
 from drone_rl.policies.actor import exploring
@@ -22,8 +21,9 @@ from drone_rl.policies.policy import load_policy
 from drone_rl.policies.recurrent import CELL, HIDDEN, Memory
 from drone_rl.policies.zoo import describe
 from drone_rl.training.learners import ReinforceLearner, episode_chunks
+from drone_rl.trust.export import export
+from drone_rl.trust.video import view
 from drone_rl.utils.errors import InputError
-from drone_rl.verdicts.export import export
 
 TASK = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=9, front_margin=3.0)
 SETTINGS = TrainSettings(

@@ -7,9 +7,9 @@ import sys
 import numpy as np
 import pytest
 
-from drone_rl.evaluation.rule import BLIND_BASELINES, Kind, Rule
 from drone_rl.sweeps import executors
 from drone_rl.sweeps.manifest import Run, open_sweep
+from drone_rl.trust.rule import BLIND_BASELINES, Kind, Rule
 from drone_rl.utils.intervals import mean_bounds, proportion
 
 FAKE = """

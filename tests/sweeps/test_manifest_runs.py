@@ -5,7 +5,8 @@ import os
 
 import pytest
 
-from drone_rl.sweeps.manifest import Run, read_failure, read_result
+from drone_rl.sweeps.manifest import Run, read_failure
+from drone_rl.utils.readers import read_result
 
 
 @pytest.mark.parametrize(

@@ -9,13 +9,13 @@ from benchmarks.benchmark import Benchmark
 from benchmarks.ledger import Ledger, Origin, digest_code, make_origin
 from benchmarks.registry import BENCHMARKS
 from benchmarks.robust import ARMS
-from drone_rl.robustness.axes import AXES, GROUPS
+from drone_rl.trust.axes import AXES, GROUPS
 from tools.readme import __main__ as readme
 from tools.readme import rows
 from tools.readme.__main__ import ROOT, keep, main, make_blocks, make_files, replace_blocks
 from tools.readme.axes import list_axes
-from tools.readme.layers import draw_layers
 from tools.readme.notebook import make_notebook
+from tools.readme.packages import list_contracts
 from tools.readme.tables import (
     UNKNOWN,
     Row,
@@ -124,17 +124,15 @@ def test_axes_have_units_and_strengths():
     assert fog in lines
 
 
-def test_layers_are_boxes_followed_by_forbidden_imports():
-    layers = {"type": "layers", "name": "order", "layers": ["top", "left | right", "base"]}
-    forbidden = {
+def test_forbidden_imports_are_listed():
+    contract = {
         "type": "forbidden",
         "name": "no water inside",
         "source_modules": ["drone_rl.top", "drone_rl.left"],
         "forbidden_modules": ["sea", "rain"],
     }
-    drawn = draw_layers([layers, forbidden])
-    assert "<li><code>left</code> <code>right</code></li>" in drawn
-    assert drawn.endswith("- No water inside: top, left may not import sea, rain.")
+    listed = list_contracts([contract, {"type": "acyclic_siblings"}])
+    assert listed == "- No water inside: top, left may not import sea, rain."
 
 
 def add(ledger, name, code, **figures):

@@ -20,10 +20,10 @@ from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.config.transforms import EpisodeReward, Gray, Stack
 from drone_rl.training import ActorCriticLearner, ReinforceLearner
 from drone_rl.training.components import make_collector
+from drone_rl.trust.export import export
 from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
-from drone_rl.verdicts.export import export
 
 TASK = TaskSettings(num_cubes=2, first_distance=4.0, spacing=4.0, front_margin=2.0, step_limit=29)
 TINY = TrainSettings(task=TASK, trainer=TrainerSettings(total_frames=180)).replace(

@@ -2,7 +2,8 @@
 
 import pytest
 
-from drone_rl.verification.text import exact_percent, rows, say_places
+from drone_rl.explanations.report.places import rows, say_places
+from drone_rl.utils.text import exact_percent
 from tests.evidence import EXPLANATION, changed
 
 

@@ -12,8 +12,8 @@ from benchmarks.registry import BENCHMARKS
 from drone_rl.flight.airsim.methods import PARTLY, UNSUPPORTED
 from tools.readme import rows, settings
 from tools.readme.axes import list_axes
-from tools.readme.layers import draw_layers, list_packages, read_contracts
 from tools.readme.notebook import make_notebook
+from tools.readme.packages import list_contracts, list_packages, read_contracts
 from tools.readme.tables import (
     list_origins,
     make_headlines,
@@ -45,8 +45,8 @@ def make_blocks(root: Path) -> dict[str, str]:
         "robust": make_robust(figures),
         "origins": list_origins(ledger, BENCHMARKS),
         "axes": list_axes(),
-        "packages": list_packages(contracts, root / "drone_rl"),
-        "layers": draw_layers(contracts),
+        "packages": list_packages(root / "drone_rl"),
+        "contracts": list_contracts(contracts),
         "choices": settings.list_choices(root / "conf"),
         "groups": settings.list_groups(),
         "parts": settings.list_parts(),

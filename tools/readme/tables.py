@@ -10,7 +10,7 @@ from benchmarks.ledger import Ledger, Origin
 from benchmarks.peers.settings import LABELS, OURS, THEIRS
 from benchmarks.robust import ALL_KINDS, ARMS
 from benchmarks.robust_comparison import PLAIN, mean
-from drone_rl.robustness.axes import GROUPS
+from drone_rl.trust.axes import GROUPS
 
 Figures = Mapping[str, Any]
 UNKNOWN = "not measured yet"

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from drone_rl.evaluation.plots import images
 from drone_rl.explanations.report.explanation import METHOD_NAMES, Explanation, Figures, Part
+from drone_rl.trust.plots import images
 from drone_rl.utils.text import Claims, Evidence
 
 BLOCK = 16  # sides of a film are multiples of this many pixels, as its encoder requires

@@ -2,14 +2,14 @@
 
 from PIL import Image
 
-from drone_rl.evaluation.plots import images
-from drone_rl.evaluation.plots.saving import Rows
-from drone_rl.evaluation.verdict_text import SENTENCES, depends_on_rounding
 from drone_rl.explanations.report.explanation import METHOD_NAMES, Explanation, Figures, Part
-from drone_rl.robustness import charts
-from drone_rl.robustness.quoted_text import QUOTED, is_quoted, not_evaluated
-from drone_rl.robustness.shifts_text import rows
 from drone_rl.sim.vocabulary import shown_actions, terms_of
+from drone_rl.trust import charts
+from drone_rl.trust.plots import images
+from drone_rl.trust.plots.saving import Rows
+from drone_rl.trust.quoted_text import QUOTED, is_quoted, not_evaluated
+from drone_rl.trust.shifts_text import rows
+from drone_rl.trust.verdict_text import SENTENCES, depends_on_rounding
 from drone_rl.utils.schema import as_mapping
 from drone_rl.utils.text import (
     Claims,

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from PIL import Image
 
-from drone_rl.evaluation.plots import images
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.sim.vocabulary import shown_actions
+from drone_rl.trust.plots import images
 from drone_rl.utils.text import Claims, Evidence, listed
 
 _OBJECTIVES = ("probability", "logit")

@@ -8,9 +8,9 @@ from PIL import Image
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from drone_rl.evaluation.plots import images
-from drone_rl.evaluation.plots.saving import Rows, to_png, to_uri
 from drone_rl.explanations.report.explanation import Explanation, Part
+from drone_rl.trust.plots import images
+from drone_rl.trust.plots.saving import Rows, to_png, to_uri
 from drone_rl.utils.text import Claims, Evidence, listed, percent
 
 MAX_THUMBNAILS = 900  # if there are more frames, an evenly spaced selection is shown

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from drone_rl.evaluation.plots.saving import Rows
 from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary, shown_actions, terms_of
+from drone_rl.trust.plots.saving import Rows
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes, refuse_links

@@ -10,17 +10,18 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from drone_rl.evaluation.plots.saving import save_drawn, save_numbers, save_rows
 from drone_rl.explanations.report import (
     attribution,
     behavior,
     class_models,
     embedding,
+    places,
     response,
     summary,
     truth,
 )
 from drone_rl.explanations.report.explanation import HEADER, Explanation, Figures, Part
+from drone_rl.trust.plots.saving import save_drawn, save_numbers, save_rows
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest, to_file_name
@@ -37,7 +38,7 @@ PARTS: dict[str, Part] = {
     "attribution": attribution.PART,
     "truth": truth.PART,
     "response": response.RESPONSE_PART,
-    "places": response.PLACES_PART,
+    "places": places.PART,
     "asymmetry": response.ASYMMETRY_PART,
     "left_out": behavior.LEFT_OUT_PART,
 }

@@ -1,10 +1,9 @@
-"""Report sections "response", "places" (maps over one target's place) and "asymmetry"."""
+"""Report sections "response" (maps over one target's place) and "asymmetry"."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
@@ -12,14 +11,12 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from PIL import Image
 
-from drone_rl.evaluation.plots import images, regions
-from drone_rl.evaluation.plots.saving import Rows, new_chart
 from drone_rl.explanations.report.explanation import Explanation, Part
 from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary, terms_of
+from drone_rl.trust.plots import images
+from drone_rl.trust.plots.saving import Rows, new_chart
 from drone_rl.utils.palette import EMPTY, GOOD, css
 from drone_rl.utils.text import Claims, Evidence, bounds, listed, percent
-from drone_rl.verification.text import rows as place_rows
-from drone_rl.verification.text import say_places
 
 _OUTCOMES = (css(EMPTY), css(GOOD))  # colors of unhandled and of handled targets
 
@@ -204,31 +201,4 @@ ASYMMETRY_PART = Part(
     needs=("asymmetry",),
     text={"asymmetry": say_asymmetry},
     draw=lambda explanation: {"asymmetry": worst_frames(explanation)},
-)
-
-
-def _exact_map(explanation: Explanation) -> tuple[Any, ...]:
-    """Return numbers, outlines and actions of the exact map; nothing if there is none."""
-    if "refused" in explanation.numbers["places"]:
-        return ()
-    outlines = {n: explanation.arrays[f"places_{n}"] for n in ("points", "ends", "labels")}
-    return explanation.numbers["places"], outlines, explanation.actions
-
-
-def _place_rows(explanation: Explanation) -> Rows:
-    return place_rows(explanation.numbers["places"], explanation.actions.names)
-
-
-PLACES_PART = Part(
-    title="Exact action map of one cube",
-    label="Exact map",
-    needs=("places",),
-    text={"places": say_places},
-    draw=lambda e: {"places": regions.chart(*_exact_map(e))} if _exact_map(e) else {},
-    tables=lambda e: {"places": _place_rows(e)} if _exact_map(e) else {},
-    extras=lambda e: (
-        {"svg": Markup(regions.svg(*_exact_map(e))), "rows": _place_rows(e)}
-        if _exact_map(e)
-        else {"svg": ""}
-    ),
 )

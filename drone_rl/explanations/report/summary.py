@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import Any
 
-from drone_rl.evaluation.rule import Kind
-from drone_rl.evaluation.verdict_text import is_proved, is_quoted, is_stated
 from drone_rl.explanations.report.explanation import METHOD_NAMES
-from drone_rl.robustness import quoted_text, shifts_text
 from drone_rl.sim.vocabulary import terms_of
+from drone_rl.trust import quoted_text, shifts_text
+from drone_rl.trust.rule import Kind
+from drone_rl.trust.verdict_text import is_proved, is_quoted, is_stated
 from drone_rl.utils.text import Claims, Evidence, listed, plural, rate
 
 LINES: Mapping[str, tuple[str, str]] = {

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from drone_rl.evaluation.plots import images
-from drone_rl.evaluation.plots.saving import new_chart
 from drone_rl.explanations.report.explanation import METHOD_NAMES, Explanation, Part
 from drone_rl.sim.vocabulary import terms_of
+from drone_rl.trust.plots import images
+from drone_rl.trust.plots.saving import new_chart
 from drone_rl.utils.palette import (
     FAINT,
     GOOD,

@@ -1,5 +1,6 @@
 """Policies in files: descriptions, weights and provenance."""
 
+import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -217,3 +218,13 @@ def _inner(metadata: Mapping[str, Any], key: str) -> Any:
 
 def _progress_of(progress: Any) -> dict[str, Any]:
     return with_current_names(as_mapping(progress, "progress"))
+
+
+def fingerprint(weights: Mapping[str, torch.Tensor]) -> str:
+    """Return the SHA-256 hash of a network's weights; order and device do not matter."""
+    digest = hashlib.sha256()
+    for name in sorted(weights):
+        value = weights[name].detach().cpu().contiguous()
+        digest.update(f"{name} {list(value.shape)}\n".encode())
+        digest.update(value.numpy().astype("<f4").tobytes())
+    return digest.hexdigest()

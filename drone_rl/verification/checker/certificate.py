@@ -1,7 +1,6 @@
 """Read certificates: untrusted data of bounded size, parsed strictly."""
 
 import dataclasses
-import hashlib
 from collections.abc import Mapping
 from itertools import chain
 from pathlib import Path
@@ -12,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from drone_rl.config import BaseTaskSettings, TaskSettings
-from drone_rl.policies.zoo import PolicyDescription, parse
+from drone_rl.policies.zoo import PolicyDescription, fingerprint, parse
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils import schema
 from drone_rl.utils.errors import InputError
@@ -215,16 +214,6 @@ def _read_boxes(value: Any, where: str, cubes: int) -> NDArray[np.float64]:
     if len(empty):
         raise InputError(f"{where}[{empty[0]}] is empty; {shape}, low below high")
     return boxes
-
-
-def fingerprint(weights: Mapping[str, torch.Tensor]) -> str:
-    """Return the SHA-256 hash of a network's weights; order and device do not matter."""
-    digest = hashlib.sha256()
-    for name in sorted(weights):
-        value = weights[name].detach().cpu().contiguous()
-        digest.update(f"{name} {list(value.shape)}\n".encode())
-        digest.update(value.numpy().astype("<f4").tobytes())
-    return digest.hexdigest()
 
 
 def check_same_policy(

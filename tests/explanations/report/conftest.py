@@ -14,7 +14,7 @@ from drone_rl.explanations.report import page, write_report
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import SmallCNN
-from tests.explanations.quick import quick, quick_figures
+from tests.explanations.quick import ALL_SECTIONS, quick, quick_figures
 from tests.shared import shared_folder
 
 NASTY = '</script><b>"a" & b'
@@ -54,7 +54,9 @@ def explain_twice(root):
     settings = ExplainSettings(frames=90, episodes=6, perplexity=5)
     origin = {"policy": f"/somewhere/{NASTY}", "trained": {}}
     with quick():
-        explain_policy(env, network, root / "a", settings, name=NASTY, provenance=origin)
+        explain_policy(
+            env, network, root / "a", settings, name=NASTY, provenance=origin, sections=ALL_SECTIONS
+        )
     env.close()
     shutil.copytree(root / "a", root / "b")
     numbers = json.loads((root / "b" / "explanation.json").read_text())

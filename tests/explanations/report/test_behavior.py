@@ -1,5 +1,5 @@
-from drone_rl.evaluation.plots.images import frame_with_probabilities
 from drone_rl.explanations.report.behavior import FLAWS_PART, MAX_PAIRS, pairs
+from drone_rl.trust.plots.images import frame_with_probabilities
 
 
 def listed(*kinds):

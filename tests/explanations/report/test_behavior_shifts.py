@@ -1,7 +1,7 @@
 import numpy as np
 
 from drone_rl.explanations.report.behavior import SHIFTS_PART
-from drone_rl.robustness.shifts_text import NAMES
+from drone_rl.trust.shifts_text import NAMES
 from tests.evidence import SHIFTS, VERDICT
 
 GOOD = {**VERDICT, "kind": "good", "certain": True}

@@ -7,11 +7,11 @@ import torch
 
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
-from drone_rl.explanations.explain import SECTIONS, explain_policy
+from drone_rl.explanations.explain import explain_policy
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import MLP
-from tests.explanations.quick import quick, quick_figures
+from tests.explanations.quick import ALL_SECTIONS, quick, quick_figures
 from tests.second_dynamics import Turning
 
 
@@ -28,7 +28,7 @@ def folder(tmp_path_factory):
     with torch.no_grad():  # mostly onwards, or flights last for ever
         network.layers.logits.bias.copy_(torch.tensor([3.0, 0.0, 0.0, -2.0, 0.0]))
     settings = ExplainSettings(frames=40, episodes=6, perplexity=5)
-    sections = {name: s for name, s in SECTIONS.items() if name != "evaluation"}
+    sections = {name: s for name, s in ALL_SECTIONS.items() if name != "evaluation"}
     how = {"name": "turning", "provenance": {}, "sections": sections}
     with quick():
         explain_policy(env, network, folder, settings, **how)

@@ -1,5 +1,5 @@
-from drone_rl.evaluation.plots.images import frame_with_probabilities
 from drone_rl.explanations.report.response import worst_frames
+from drone_rl.trust.plots.images import frame_with_probabilities
 
 
 def test_the_three_worst_are_shown_in_order(make_explanation):

@@ -1,6 +1,6 @@
-from drone_rl.explanations.report.response import PLACES_PART as PART
-from tests.evaluation.plots.test_regions import NUMBERS, WAYS
+from drone_rl.explanations.report.places import PART
 from tests.evidence import EXPLANATION
+from tests.trust.plots.test_regions import NUMBERS, WAYS
 
 
 def test_a_map_is_drawn_told_and_can_be_zoomed(make_explanation):

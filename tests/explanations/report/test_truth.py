@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from drone_rl.evaluation.plots.images import enlarge, titled
 from drone_rl.explanations.report.truth import changes
+from drone_rl.trust.plots.images import enlarge, titled
 
 
 @pytest.fixture

@@ -27,11 +27,11 @@ from drone_rl.policies.zoo import (
     shifts_path,
 )
 from drone_rl.policies.zoo.files import exported_bytes
+from drone_rl.trust.export import export_policy
 from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
-from drone_rl.verdicts.export import export_policy
 from tests.policies.zoo.test_description import DEFAULT
-from tests.verdicts.test_export_card_text import VERDICT
+from tests.trust.test_export_card_text import VERDICT
 
 DESCRIPTION = {
     **DEFAULT,

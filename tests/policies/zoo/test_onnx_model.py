@@ -15,8 +15,8 @@ from drone_rl.envs import on_pixels
 from drone_rl.policies import MLP, make_actor
 from drone_rl.policies.zoo import make_onnx, open_onnx, parse
 from drone_rl.sim.continuous_actions import ContinuousActions
+from drone_rl.trust.onnx_export import agreement
 from drone_rl.utils.errors import InputError
-from drone_rl.verdicts.onnx_export import agreement
 from tests.continuous import SETTINGS
 from tests.policies.zoo.test_description import DEFAULT
 
