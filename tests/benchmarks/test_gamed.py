@@ -38,12 +38,8 @@ def _few_episodes():
         yield
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["evaluate, callable that looks frames up", "shifts, callable that looks frames up"],
-)
-def test_memorised_environments_deceive_with_the_known_seed_only(name, tmp_path):
-    judgement = gamed_memory.judgements(tmp_path)[name]
+def test_memorised_environments_deceive_with_the_known_seed_only(tmp_path):
+    judgement = gamed_memory.judgements(tmp_path)["evaluate, callable that looks frames up"]
     assert judgement(0), "the attack must succeed with the known seed"
     assert not judgement(None)
 

@@ -117,9 +117,8 @@ def test_means_by_kind_of_shift():
 class FakeShifts:
     """A result of `drone_rl.shifts` for a policy that is good up to the third strength."""
 
-    def __init__(self):
-        policy = drone_rl.load_policy(domain_axes.POLICY)
-        self.numbers = shifts_of(policy, axes=tuple(AXES))
+    def __init__(self, axes):
+        self.numbers = shifts_of(drone_rl.load_policy(domain_axes.POLICY), axes=axes)
 
     def save(self, folder):
         (folder / "shifts.json").write_text(json.dumps(self.numbers))
@@ -130,7 +129,8 @@ class FakeShifts:
 def test_required_ranges_are_enforced_in_their_direction(setup, monkeypatch, is_reversed):
     """Reversed, for example, a largest visibility in fog is required instead of a smallest one."""
     contradictions = type("Recheck", (), {"contradictions": ()})
-    measured = FakeShifts()
+    axes = ("fog", "blur") if is_reversed else tuple(AXES)
+    measured = FakeShifts(axes)
     monkeypatch.setattr(domain_axes, "shifts", lambda *args, **options: measured)
     monkeypatch.setattr(domain_axes, "recheck_domain", lambda *args: contradictions)
     if is_reversed:
@@ -139,6 +139,5 @@ def test_required_ranges_are_enforced_in_their_direction(setup, monkeypatch, is_
             lambda numbers, name, need: None if need["low"] is None else "reversed",
         )
     figures = domain_axes.bench_domain_axes(setup)
-    assert figures["domain_axes"] == len(AXES) == 22
-    assert ("fog" in figures["domain_axes_wrong"]) == is_reversed
-    assert (figures["domain_axes_right"] == 22) != is_reversed
+    assert figures["domain_axes"] == len(axes)
+    assert figures["domain_axes_right"] == (0 if is_reversed else 22)
