@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from benchmarks.benchmark import Setup
+from benchmarks.forces_kernel import forces
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
 from drone_rl.sim.dynamics import FlightState, Goals, Mode, Quadrotor
 from drone_rl.sim.dynamics import state as fs
-from drone_rl.sim.dynamics.forces_kernel import forces
 
 SECONDS = 10.0
 HEIGHT = 1000.0

@@ -421,6 +421,14 @@ FLIGHT = (
         "2.9 each; 90%; 20",
     ),
     Row(
+        "airsim",
+        "kinds of AirSim programs whose numbers are right through every client that has their "
+        "calls (1.1.7, 1.2.8, 1.8.1, cosysairsim 3.5); simulated seconds after 200 continues of "
+        "0.01 s, and of 0.05 s",
+        "{airsim_scripts_right} of {airsim_scripts}; {airsim_continue_s:.2f}",
+        "all; 2.0, 10.0",
+    ),
+    Row(
         "flight_speed",
         "environment steps per second of 256 drones (33 physics steps with all controllers each); "
         "ratio to MuJoCo Warp with the same body and no controller",
