@@ -13,6 +13,7 @@ from typing import Any
 
 import torch
 
+from benchmarks.benchmark import Setup
 from benchmarks.commands import call
 from benchmarks.scripted_policies import SCRIPTS, Script, ScriptedPolicy
 from drone_rl.collectors.complete_episodes import CompleteEpisodes, run_episodes
@@ -35,21 +36,19 @@ _NUM_ENVS = 500
 _STATUSES = (NOT_CERTAIN, *(kind.exit_code for kind in VerdictKind))
 
 
-def bench_verdicts(folder: Path, device: str, quick: bool) -> dict[str, Any]:
+def bench_verdicts(setup: Setup) -> dict[str, Any]:
     """Compare verdicts with the true kinds of policies.
-
-    Args:
-        folder: Folder of trainings and verdicts.
-        device: Device of trainings and verdicts.
-        quick: Whether to judge only a few policies, by few episodes.
 
     Returns:
         See `count`.
     """
-    scripts = dict(list(SCRIPTS.items())[:3]) if quick else SCRIPTS
-    verdicts = {name: _judge_script(script, quick) for name, script in scripts.items()}
-    for name, policy in _policies(folder, device, quick):
-        verdicts[name] = _judge_policy(folder / f"judge_{len(verdicts)}", policy, device, quick)
+    folder = setup.runs
+    scripts = dict(list(SCRIPTS.items())[:3]) if setup.quick else SCRIPTS
+    verdicts = {name: _judge_script(script, setup.quick) for name, script in scripts.items()}
+    for name, policy in _policies(folder, setup.device, setup.quick):
+        verdicts[name] = _judge_policy(
+            folder / f"judge_{len(verdicts)}", policy, setup.device, setup.quick
+        )
     return count(verdicts)
 
 

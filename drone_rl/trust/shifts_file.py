@@ -104,7 +104,7 @@ class _Each:
         """See `drone_rl.utils.schema.Kind`."""
         given = as_mapping(value, where)
         if self.names is None:
-            Plain(most=1000).read(given, where)
+            Plain().read(given, where)
         else:
             for key in given:
                 OneOf(self.names).read(key, f"a name in {where}")
@@ -115,7 +115,7 @@ _ANY = Real(-1e12, 1e12)
 _COUNT, _PART = Whole(0, 10**9), Real(0.0, 1.0)
 _BOUNDS = {"lower95": _PART, "upper95": _PART}
 _SHARE = Record({"share": Maybe(_PART), **_BOUNDS, "successes": _COUNT, "trials": _COUNT})
-_FREE = Plain(most=1000, deepest=3)
+_FREE = Plain()
 _SIGNED = Real(-1.0, 1.0)
 _MEAN = Record({"mean": Maybe(_PART), **_BOUNDS, "count": _COUNT})
 _FIGURES = {
@@ -178,8 +178,8 @@ _WHOLE = Record(
         "format": OneOf((FORMAT,)),
         "format_version": Whole(FORMAT_VERSION, FORMAT_VERSION),
         "policy": Text(),
-        "network": Record({"weights": Text(64), "description": Plain(most=1000)}),
-        "settings": Plain(most=1000),
+        "network": Record({"weights": Text(64), "description": Plain()}),
+        "settings": Plain(),
         "seed": Whole(0),
         "seed_is_fixed": Flag(),
         "terms": Plain(),

@@ -26,7 +26,7 @@ from drone_rl.utils.files import (
     remove_leftovers,
     write_atomically,
 )
-from drone_rl.utils.limits import ARRAYS_BYTES, CERTIFICATE_BYTES, CERTIFICATE_VALUES
+from drone_rl.utils.limits import ARRAYS_BYTES, CERTIFICATE_BYTES
 from drone_rl.utils.progress import Progress, as_progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
@@ -216,7 +216,7 @@ def load_proof(path: str | Path) -> Proof:
     path = path / "certificate.json" if path.is_dir() else path
     content = read_bytes(path, CERTIFICATE_BYTES)
     try:
-        found = parse_json(content, "it", most_values=CERTIFICATE_VALUES)
+        found = parse_json(content, "it")
         if not isinstance(found, dict) or found.get("format") != FORMAT:
             raise InputError(f"its format is not {FORMAT!r}")
         if missing := {"policy", "outcomes", "undecided"} - found.keys():

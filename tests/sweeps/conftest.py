@@ -129,7 +129,7 @@ SOLVED = {
     "episodes": 10,
     "seconds": 2.0,
     "running_reward": 2.97,
-    "num_cubes": 3,
+    "largest_reward": 3,
 }
 LEFT_LOST = _verdict("one-sided (right)", left=0.0, whole=0.6, certain=False)
 

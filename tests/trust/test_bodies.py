@@ -7,7 +7,6 @@ from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
 
 import drone_rl
-from benchmarks.evidence import VERDICT, changed
 from drone_rl.config import DynamicsSettings
 from drone_rl.trust.bodies import (
     LOOPED,
@@ -20,6 +19,7 @@ from drone_rl.utils import palette
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
 from drone_rl.utils.progress import silent
+from tests.evidence import VERDICT, changed
 
 TWO = ["computer vision", "wind 8 m/s"]
 STILL = {"wind": [0.0, 0.0, 0.0], "gusts": 0.0}

@@ -1,7 +1,7 @@
 import numpy as np
 
-from benchmarks.evidence import SHIFTS, changed
 from drone_rl.trust.charts import chart, curves, strips
+from tests.evidence import SHIFTS, changed
 
 PICTURES = [np.full((25, 64, 3), 40 * i, np.uint8) for i in range(6)]
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import drone_rl
-from benchmarks.evidence import SHIFTS, changed
 from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.zoo import shifts_path
 from drone_rl.trust.axes import AXES
@@ -25,6 +24,7 @@ from drone_rl.trust.shifts import ranges_of
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
+from tests.evidence import SHIFTS, changed
 from tests.trust.making import shifts_of
 
 

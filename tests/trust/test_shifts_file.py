@@ -3,10 +3,10 @@ import json
 import pytest
 
 import drone_rl
-from benchmarks.evidence import changed
 from drone_rl.trust.axes import AXES
 from drone_rl.trust.shifts_file import read_shifts
 from drone_rl.utils.errors import InputError
+from tests.evidence import changed
 from tests.trust.making import shifts_of
 
 

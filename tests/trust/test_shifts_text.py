@@ -1,7 +1,5 @@
 import pytest
 
-from benchmarks.evidence import SHIFTS as EVIDENCE
-from benchmarks.evidence import VERDICT, changed
 from drone_rl.trust.shifts_text import (
     QUOTED,
     SHIFTS,
@@ -13,6 +11,8 @@ from drone_rl.trust.shifts_text import (
 )
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.text import said
+from tests.evidence import SHIFTS as EVIDENCE
+from tests.evidence import VERDICT, changed
 
 
 def test_all_sentences():

@@ -2,9 +2,9 @@
 
 import pytest
 
-from benchmarks.evidence import PROOF as QUOTED
 from drone_rl.trust.verdict_text import PROOF, SENTENCES, is_proved, is_quoted
 from drone_rl.utils.text import said
+from tests.evidence import PROOF as QUOTED
 
 
 def share(value, **more):

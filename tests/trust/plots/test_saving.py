@@ -1,14 +1,12 @@
 import base64
-import csv
 import io
-import json
 
 import imageio.v3 as iio
 import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
-from drone_rl.trust.plots.saving import save_drawn, save_numbers, save_rows
+from drone_rl.trust.plots.saving import new_chart, save_drawn, to_uri
 
 
 def content(uri, kind):
@@ -17,7 +15,7 @@ def content(uri, kind):
     return base64.b64decode(text)
 
 
-def test_image_files(tmp_path):
+def test_a_picture_is_a_png_and_a_uri_of_the_same_pixels(tmp_path):
     picture = Image.new("RGB", (3, 2), (10, 20, 30))
     saved = content(save_drawn(picture, tmp_path / "0_a.b"), "image/png")
     assert (tmp_path / "0_a.b.png").read_bytes() == saved
@@ -25,7 +23,7 @@ def test_image_files(tmp_path):
         assert (read.size, read.getpixel((2, 1))) == ((3, 2), (10, 20, 30))
 
 
-def test_chart_files(tmp_path):
+def test_a_chart_is_a_png_of_90_dots_an_inch_and_an_svg_of_the_same_bytes_each_time(tmp_path):
     saved = [content(save_drawn(Figure((2, 1)), tmp_path / "c"), "image/svg+xml") for _ in "ab"]
     assert saved[0] == saved[1] == (tmp_path / "c.svg").read_bytes()
     assert b'width="144pt" height="72pt"' in saved[0]
@@ -33,7 +31,12 @@ def test_chart_files(tmp_path):
         assert p.size == (180, 90)
 
 
-def test_film_files(tmp_path):
+def test_a_chart_of_one_panel():
+    figure, axis = new_chart(height=2.0)
+    assert figure.axes == [axis] and figure.get_size_inches().tolist() == [4.5, 2.0]
+
+
+def test_a_film_is_an_mp4_with_all_frames(tmp_path):
     film = np.zeros((5, 16, 32, 3), np.uint8)
     film[3:] = 200
     assert (
@@ -44,9 +47,5 @@ def test_film_files(tmp_path):
     assert read[0].mean() < 20 and read[4].mean() > 180
 
 
-def test_tables_and_numbers(tmp_path):
-    save_rows([["a", "b"], [1, "x, y"]], tmp_path / "t")
-    with open(tmp_path / "t.csv", newline="") as file:
-        assert list(csv.reader(file)) == [["a", "b"], ["1", "x, y"]]
-    save_numbers({"a": [1, None]}, tmp_path / "n")
-    assert json.loads((tmp_path / "n.json").read_text()) == {"a": [1, None]}
+def test_a_uri():
+    assert to_uri(b"abc", "text/plain") == "data:text/plain;base64,YWJj"
