@@ -75,11 +75,6 @@ def test_image_of_a_moved_camera(renderer):
     assert not torch.equal(drawn[0], drawn[2])
 
 
-def test_default_condition():
-    assert Condition() == Condition(task={}, camera={}, delay=0)
-    assert Condition().dimensions == ()
-
-
 def test_combined_conditions():
     blurred, late = out_of_focus(1.0), late_frames(2)
     tinted, sun, moved = tint((SemanticClass.GROUND,), 0.1), sun_at(5.0), mount(degrees=3.0)
