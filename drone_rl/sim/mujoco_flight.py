@@ -11,7 +11,6 @@ from typing import Any
 import mujoco as mujoco_module
 import numpy as np
 import torch
-from dm_control import mjcf
 from numpy.typing import NDArray
 from torch import Tensor
 
@@ -22,6 +21,7 @@ from drone_rl.sim.dynamics import state as fs
 from drone_rl.sim.dynamics.forces_kernel import forces
 from drone_rl.sim.dynamics.state import twist_about_z
 from drone_rl.sim.entities import DRONE_CAMERAS, Drone
+from drone_rl.sim.quiet_dm_control import mjcf
 
 mujoco: Any = mujoco_module
 """Its compiled functions have no types."""

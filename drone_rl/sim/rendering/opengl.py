@@ -12,9 +12,9 @@ from typing import Any
 import mujoco as _mujoco
 import numpy as np
 import torch
-from dm_control import mjcf
 from numpy.typing import NDArray
 
+from drone_rl.sim.quiet_dm_control import mjcf
 from drone_rl.sim.rendering import textures
 from drone_rl.sim.rendering.appearance import Appearance, Mounting, Texture, product
 from drone_rl.sim.rendering.scene import Scene, SemanticClass
