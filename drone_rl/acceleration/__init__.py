@@ -7,6 +7,5 @@ imports it. Each `try_create` returns an implementation, or the reasons why ther
 from drone_rl.acceleration.direct_collector import DirectCollector as DirectCollector
 from drone_rl.acceleration.direct_collector import DirectStepper as DirectStepper
 from drone_rl.acceleration.fused_collector import FusedCollector as FusedCollector
-from drone_rl.acceleration.fused_network import ActivationCache as ActivationCache
 from drone_rl.acceleration.fused_network import FusedNetwork as FusedNetwork
 from drone_rl.acceleration.inference_kernel import BatchedInference as BatchedInference

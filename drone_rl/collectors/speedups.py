@@ -16,12 +16,7 @@ from torchrl.envs import EnvBase
 from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
 
 if TYPE_CHECKING:
-    from drone_rl.acceleration import (
-        ActivationCache,
-        DirectCollector,
-        DirectStepper,
-        FusedCollector,
-    )
+    from drone_rl.acceleration import DirectCollector, DirectStepper, FusedCollector
 
 Acceleration = Literal["none", "direct", "fused"]
 """Implementation. "none": step with TorchRL. "direct": step without it, bit-identical. "fused": one
@@ -101,7 +96,6 @@ def accelerated_gradients(
     num_threads: int = 1,
     *,
     wrt: Literal["weights", "pixels"] = "weights",
-    cache: "Callable[[], ActivationCache | None]" = lambda: None,
 ) -> nn.Module:
     """Return the network with fused forward and backward pass if that is supported, else itself.
 
@@ -110,7 +104,7 @@ def accelerated_gradients(
     package = _package()
     if package is None:
         return network
-    found = package.FusedNetwork.try_create(network, num_threads, wrt=wrt, cache=cache)
+    found = package.FusedNetwork.try_create(network, num_threads, wrt=wrt)
     return network if isinstance(found, Reasons) else found
 
 

@@ -33,7 +33,7 @@ class Components(NamedTuple):
     """The collector of batches with returns, and the network that learns from them."""
 
     collector: Any
-    """Has `actor`, `postproc` and `cache_activations`, in addition to what `Trainer` needs."""
+    """Has `actor` and `postproc`, in addition to what `Trainer` needs."""
     network: ImageNetwork
     generators: dict[str, torch.Generator]
     """Random streams of this process, by name."""
@@ -102,8 +102,7 @@ def learning_actor(settings: TrainSettings, components: Components) -> Any:
     actor, threads = components.collector.actor, settings.trainer.num_threads
     if components.network.is_recurrent or not settings.trainer.compiled:
         return actor
-    cache = components.collector.cache_activations
-    fused = accelerated_gradients(components.network, threads, cache=cache)
+    fused = accelerated_gradients(components.network, threads)
     if fused is components.network:
         return actor
     return make_actor(fused, actor.spec["action"])
